@@ -1,0 +1,3 @@
+//! Mathematics that knows no mechanics.
+
+pub mod dual;

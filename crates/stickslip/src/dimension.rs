@@ -1,0 +1,74 @@
+//! Physical dimensions of the quantities that a model is made of.
+//!
+//! A dimension is four integer exponents: kilogram, metre, second, radian. The radian counts as a base unit here, because
+//! a drive frequency of 121 Hz and one of 121 rad/s must never be taken for each other (1 Hz is 2π rad/s).
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Exponents of kilogram, metre, second and radian.
+///
+/// # Example
+/// ```
+/// use stickslip::dimension::Dimension;
+/// assert_eq!(Dimension::FORCE.to_string(), "force (N)");
+/// assert_eq!(Dimension { kg: 0, m: 2, s: 0, rad: 0 }.to_string(), "m^2");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[allow(missing_docs)] // the four fields are the four base units
+pub struct Dimension {
+    pub kg: i8,
+    pub m: i8,
+    pub s: i8,
+    pub rad: i8,
+}
+
+macro_rules! named {
+    ($($constant:ident = [$kg:expr, $m:expr, $s:expr, $rad:expr] $name:literal $unit:literal;)*) => {
+        impl Dimension {
+            $(#[doc = concat!($name, ", SI unit ", $unit)]
+            pub const $constant: Dimension = Dimension { kg: $kg, m: $m, s: $s, rad: $rad };)*
+
+            /// Name and SI unit of a dimension that has a name here.
+            pub fn name_and_unit(self) -> Option<(&'static str, &'static str)> {
+                $(if self == Self::$constant { return Some(($name, $unit)); })*
+                None
+            }
+        }
+    };
+}
+
+named! {
+    NONE = [0, 0, 0, 0] "pure number" "1";
+    MASS = [1, 0, 0, 0] "mass" "kg";
+    LENGTH = [0, 1, 0, 0] "length" "m";
+    TIME = [0, 0, 1, 0] "time" "s";
+    ANGLE = [0, 0, 0, 1] "angle" "rad";
+    FREQUENCY = [0, 0, -1, 1] "frequency" "Hz or rad/s";
+    SWEEP_RATE = [0, 0, -2, 1] "sweep rate" "Hz/s or rad/s^2";
+    VELOCITY = [0, 1, -1, 0] "velocity" "m/s";
+    INVERSE_VELOCITY = [0, -1, 1, 0] "inverse velocity" "s/m";
+    FORCE = [1, 1, -2, 0] "force" "N";
+    STIFFNESS = [1, 0, -2, 0] "stiffness" "N/m";
+    DAMPING = [1, 0, -1, 0] "damping" "kg/s";
+    ENERGY = [1, 2, -2, 0] "energy" "J";
+}
+
+impl fmt::Display for Dimension {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some((name, unit)) = self.name_and_unit() {
+            return write!(f, "{name} ({unit})");
+        }
+        let mut first = true;
+        for (unit, exponent) in [("kg", self.kg), ("m", self.m), ("s", self.s), ("rad", self.rad)] {
+            if exponent != 0 {
+                write!(f, "{}{unit}", if first { "" } else { " " })?;
+                if exponent != 1 {
+                    write!(f, "^{exponent}")?;
+                }
+                first = false;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,51 @@
+//! Elastic dry friction: a spring in series with an ideal slider (Jenkins element).
+//!
+//! `f = kt (u - s)`; the slider rests (`s' = 0`) while `|f| < limit`, and moves with `|f| = limit`.   Eq. (1)
+//! The paper prints Eq. (1) with the sign of the spring force reversed; the form here is the consistent one.
+//! Source: Jenkins (1962); Pust, Pesek, Radolfova (2015), Fig. 1a and Eq. (1).
+
+use super::{Branch, FrictionLaw, JenkinsArctan, Law, Parameter, ReturnMap};
+use crate::dimension::Dimension;
+use serde::{Deserialize, Serialize};
+
+/// Spring and ideal slider in series, without mass.
+///
+/// # Example
+/// ```
+/// use stickslip::law::{FrictionLaw, Jenkins};
+/// let law = Jenkins { stiffness: 1e4, limit: 2.0 };
+/// assert_eq!(law.network().unwrap()[0].stiffness, Some(1e4));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Jenkins {
+    /// Stiffness of the spring `kt`, N/m.
+    pub stiffness: f64,
+    /// Slip limit `Ft0`, N.
+    pub limit: f64,
+}
+
+impl FrictionLaw for Jenkins {
+    const NAME: &'static str = "jenkins";
+    const SUMMARY: &'static str = "spring and slider in series, f = kt (u - s), |f| <= limit, exact, paper Eq. (1)";
+    const PARAMETERS: &'static [Parameter] = &[
+        Parameter { key: "stiffness", dimension: Dimension::STIFFNESS, doc: "tangential contact stiffness" },
+        Parameter { key: "limit", dimension: Dimension::FORCE, doc: "slip limit: force while the slider moves" },
+    ];
+
+    fn from_values(values: &[f64]) -> Self {
+        Jenkins { stiffness: values[0], limit: values[1] }
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![self.stiffness, self.limit]
+    }
+    #[doc(alias = "eq1")]
+    fn network(&self) -> Option<Vec<Branch>> {
+        Some(vec![Branch { stiffness: Some(self.stiffness), limit: self.limit }]) // Eq. (1)
+    }
+    fn return_map(&self) -> Option<ReturnMap> {
+        self.network().map(|branches| ReturnMap { branches })
+    }
+    fn regularised(&self, width: f64) -> Option<Law> {
+        Some(Law::JenkinsArctan(JenkinsArctan { stiffness: self.stiffness, limit: self.limit, alpha: 1.0 / width }))
+    }
+}

@@ -1,0 +1,72 @@
+//! Elastic dry friction smoothed over velocity: a spring in series with an arctangent slider, without mass.
+//!
+//! From `kt (s - u) + limit (2/π) arctan(alpha s') = 0` follows `f = kt (u - s)` and
+//! `f' = kt (u' - tan(π f / (2 limit)) / alpha)`, `|f| < limit`.
+//! Source: Pust, Pesek, Radolfova (2015), Sec. 3, the equation of Fig. 3.
+
+use super::{FrictionLaw, Parameter, Rate, RateLaw, Relative};
+use crate::dimension::Dimension;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
+use stickslip_numerics::dual::Real;
+
+/// Spring and smooth slider in series.
+///
+/// The internal state is `z = asinh(alpha s')`, with the slider's velocity `s'`, a pure number: it is unbounded, so that no
+/// solver can step out of `|f| < limit`, it resolves the creep of the stuck contact (`z` near 0), and it grows only
+/// logarithmically in slip.
+/// `f = limit (2/π) arctan(sinh z)`, `z' = kt (π / (2 limit)) cosh z (u' - sinh(z) / alpha)`.
+///
+/// # Example
+/// ```
+/// use stickslip::law::{JenkinsArctan, RateLaw, Relative};
+/// let law = JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 };
+/// let mut rate = [0.0];
+/// let force = law.evaluate(&Relative::along(0.0, 1e-3), &[0.0], &mut rate);
+/// assert_eq!(force[0], 0.0);
+/// assert!((rate[0] - 1e4 * std::f64::consts::PI / 4.0 * 1e-3).abs() < 1e-12);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct JenkinsArctan {
+    /// Stiffness of the spring `kt`, N/m.
+    pub stiffness: f64,
+    /// Force that the slider tends to at high velocity, N.
+    pub limit: f64,
+    /// Steepness of the slider's arctangent at rest, s/m.
+    pub alpha: f64,
+}
+
+impl FrictionLaw for JenkinsArctan {
+    const NAME: &'static str = "jenkins-arctan";
+    const SUMMARY: &'static str = "spring and smoothed slider in series, f' = kt (u' - tan(pi f/(2 limit))/alpha)";
+    const PARAMETERS: &'static [Parameter] = &[
+        Parameter { key: "stiffness", dimension: Dimension::STIFFNESS, doc: "tangential contact stiffness" },
+        Parameter { key: "limit", dimension: Dimension::FORCE, doc: "friction force at high sliding velocity" },
+        Parameter { key: "alpha", dimension: Dimension::INVERSE_VELOCITY, doc: "steepness of the arctangent at rest" },
+    ];
+
+    fn from_values(values: &[f64]) -> Self {
+        JenkinsArctan { stiffness: values[0], limit: values[1], alpha: values[2] }
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![self.stiffness, self.limit, self.alpha]
+    }
+    fn rate(&self) -> Option<Rate> {
+        Some(Rate::JenkinsArctan(*self))
+    }
+}
+
+impl RateLaw for JenkinsArctan {
+    #[inline]
+    fn states(&self) -> usize {
+        1
+    }
+    #[inline]
+    fn evaluate<S: Real>(&self, contact: &Relative<S>, z: &[S], z_rate: &mut [S]) -> [S; 3] {
+        let zero = S::from_f64(0.0);
+        let (sinh, cosh) = (z[0].sinh(), z[0].cosh());
+        let creep = contact.velocity[0] - sinh * S::from_f64(1.0 / self.alpha);
+        z_rate[0] = cosh * creep * S::from_f64(self.stiffness * FRAC_PI_2 / self.limit);
+        [sinh.atan() * S::from_f64(self.limit * FRAC_2_PI), zero, zero]
+    }
+}

@@ -1,0 +1,303 @@
+//! Friction laws: what happens where two places rub.
+//!
+//! A law is plain data: one variant of [`Law`] and one file. It offers the *views* that are honest for it, and a method asks
+//! for the view it needs:
+//!
+//! | view | what it is | who asks |
+//! | --- | --- | --- |
+//! | [`FrictionLaw::network`] | ideal sliders, each behind a spring or rigid | event-driven |
+//! | [`FrictionLaw::rate`] | `z' = g(u, u', z)`, `f = h(u, u', z)`, smooth | transient, shooting |
+//! | [`FrictionLaw::return_map`] | the next force from a displacement step | harmonic balance |
+//! | [`FrictionLaw::regularised`] | the smooth neighbour of an exact law | comparison of the two |
+//!
+//! A joint acts along a direction matrix `W` (n × d): `u = Wᵀ x`, force on the structure `-W f`. All laws that exist now have
+//! d = 1; [`Relative`] carries three components and a normal force, so that laws of sliding in a plane fit the same traits.
+//!
+//! To add a law: write its file, then one line in [`friction_laws!`](self) below.
+
+mod coulomb;
+mod coulomb_arctan;
+mod jenkins;
+mod jenkins_arctan;
+
+pub use coulomb::Coulomb;
+pub use coulomb_arctan::CoulombArctan;
+pub use jenkins::Jenkins;
+pub use jenkins_arctan::JenkinsArctan;
+
+use crate::dimension::Dimension;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use stickslip_numerics::dual::Real;
+
+/// One parameter of a law: its key in a study file, its dimension, what it means.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Key in `law = { kind = …, KEY = … }`.
+    pub key: &'static str,
+    /// Physical dimension, for units and for error messages.
+    pub dimension: Dimension,
+    /// One line for the documentation and for editors.
+    pub doc: &'static str,
+}
+
+/// The relative motion at a contact, up to three components (the first `d` count), and the normal force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Relative<S> {
+    /// Relative displacement `u = Wᵀ x`, m.
+    pub displacement: [S; 3],
+    /// Relative velocity `u'`, m/s.
+    pub velocity: [S; 3],
+    /// Normal force, N; laws with a fixed slip limit do not read it.
+    pub normal_force: S,
+}
+
+impl<S: Real> Relative<S> {
+    /// Motion along one direction, without a normal force.
+    pub fn along(displacement: S, velocity: S) -> Self {
+        let zero = S::from_f64(0.0);
+        Relative { displacement: [displacement, zero, zero], velocity: [velocity, zero, zero], normal_force: zero }
+    }
+}
+
+/// One ideal slider of a law's network, in series with a spring.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Branch {
+    /// Stiffness of the spring in front of the slider, N/m; `None` if the slider is rigid.
+    pub stiffness: Option<f64>,
+    /// Slip limit, N: the slider holds while `|f| < limit` and moves with `|f| = limit`.
+    pub limit: f64,
+}
+
+/// A law of rate form: `f = h(u, u', z)`, `z' = g(u, u', z)`, both smooth.
+pub trait RateLaw {
+    /// Number of internal states `z`.
+    fn states(&self) -> usize;
+    /// Force and rates at one instant. `z` and `z_rate` have length [`RateLaw::states`]; units belong to the law.
+    /// Returns the force components, N.
+    fn evaluate<S: Real>(&self, contact: &Relative<S>, z: &[S], z_rate: &mut [S]) -> [S; 3];
+}
+
+/// What every friction law answers. Views that a law cannot offer stay `None`.
+pub trait FrictionLaw {
+    /// Name in study files.
+    const NAME: &'static str;
+    /// One line of what the law is, with its equation.
+    const SUMMARY: &'static str;
+    /// Keys of the parameters, in the order of [`FrictionLaw::values`].
+    const PARAMETERS: &'static [Parameter];
+    /// Builds the law from values in the order of `PARAMETERS`, SI units; no check is made here.
+    fn from_values(values: &[f64]) -> Self;
+    /// The parameters' values in SI, in the order of `PARAMETERS`.
+    fn values(&self) -> Vec<f64>;
+    /// Directions of relative motion (1, 2 or 3).
+    fn directions(&self) -> usize {
+        1
+    }
+    /// Exact view: parallel branches of spring and ideal slider.
+    fn network(&self) -> Option<Vec<Branch>> {
+        None
+    }
+    /// Smooth view.
+    fn rate(&self) -> Option<Rate> {
+        None
+    }
+    /// Discrete hysteretic view, for harmonic balance.
+    fn return_map(&self) -> Option<ReturnMap> {
+        None
+    }
+    /// The smooth law that tends to this one as `width` (m/s, the velocity over which friction changes its sign) goes to zero.
+    fn regularised(&self, _width: f64) -> Option<Law> {
+        None
+    }
+}
+
+/// The return map of a law: ideal springs-and-sliders, forces updated from displacement to displacement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReturnMap {
+    /// The parallel branches; every stiffness is finite.
+    pub branches: Vec<Branch>,
+}
+
+/// Why a law's parameters are refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{law}: `{key}` must be a positive finite {dimension}, found {value}")]
+pub struct LawError {
+    /// Name of the law.
+    pub law: &'static str,
+    /// Key of the parameter.
+    pub key: &'static str,
+    /// What is measured by it.
+    pub dimension: Dimension,
+    /// The value that was given, SI.
+    pub value: f64,
+}
+
+/// A row of the table of laws: what can be known of a law without an instance of it.
+#[derive(Debug, Clone, Copy)]
+pub struct LawInfo {
+    /// Name in study files.
+    pub name: &'static str,
+    /// One line of what it is.
+    pub summary: &'static str,
+    /// Its parameters.
+    pub parameters: &'static [Parameter],
+    /// A typical instance, for examples and for the conformance tests.
+    pub sample: fn() -> Law,
+    build: fn(&[f64]) -> Law,
+}
+
+macro_rules! friction_laws {
+    ($($variant:ident $name:literal [$($sample:expr),*];)*) => {
+        /// A friction law, as data.
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+        #[serde(tag = "kind")]
+        pub enum Law {
+            $(#[doc = concat!("See [`struct@", stringify!($variant), "`].")]
+            #[serde(rename = $name)]
+            $variant($variant),)*
+        }
+
+        /// Every law there is, in the order in which lists show them.
+        pub const TABLE: &[LawInfo] = &[$(LawInfo {
+            name: <$variant as FrictionLaw>::NAME,
+            summary: <$variant as FrictionLaw>::SUMMARY,
+            parameters: <$variant as FrictionLaw>::PARAMETERS,
+            sample: || Law::$variant($variant::from_values(&[$($sample),*])),
+            build: |values| Law::$variant($variant::from_values(values)),
+        }),*];
+
+        impl Law {
+            /// Name in study files.
+            pub fn name(&self) -> &'static str {
+                match self { $(Law::$variant(_) => <$variant as FrictionLaw>::NAME,)* }
+            }
+            /// The parameters' values, SI, in the order of the law's table row.
+            pub fn values(&self) -> Vec<f64> {
+                match self { $(Law::$variant(law) => law.values(),)* }
+            }
+            /// Directions of relative motion.
+            pub fn directions(&self) -> usize {
+                match self { $(Law::$variant(law) => law.directions(),)* }
+            }
+            /// Exact view, see [`FrictionLaw::network`].
+            pub fn network(&self) -> Option<Vec<Branch>> {
+                match self { $(Law::$variant(law) => law.network(),)* }
+            }
+            /// Smooth view, see [`FrictionLaw::rate`].
+            pub fn rate(&self) -> Option<Rate> {
+                match self { $(Law::$variant(law) => law.rate(),)* }
+            }
+            /// Discrete hysteretic view, see [`FrictionLaw::return_map`].
+            pub fn return_map(&self) -> Option<ReturnMap> {
+                match self { $(Law::$variant(law) => law.return_map(),)* }
+            }
+            /// Smooth neighbour, see [`FrictionLaw::regularised`].
+            pub fn regularised(&self, width: f64) -> Option<Law> {
+                match self { $(Law::$variant(law) => law.regularised(width),)* }
+            }
+        }
+    };
+}
+
+friction_laws! {
+    Coulomb "coulomb" [2.0];
+    CoulombArctan "coulomb-arctan" [2.0, 25_000.0];
+    Jenkins "jenkins" [10_000.0, 2.0];
+    JenkinsArctan "jenkins-arctan" [10_000.0, 2.0, 25_000.0];
+}
+
+/// The smooth laws behind one type, so that inner loops call them without dynamic dispatch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Rate {
+    /// See [`struct@CoulombArctan`].
+    CoulombArctan(CoulombArctan),
+    /// See [`struct@JenkinsArctan`].
+    JenkinsArctan(JenkinsArctan),
+}
+
+impl RateLaw for Rate {
+    #[inline]
+    fn states(&self) -> usize {
+        match self {
+            Rate::CoulombArctan(law) => law.states(),
+            Rate::JenkinsArctan(law) => law.states(),
+        }
+    }
+    #[inline]
+    fn evaluate<S: Real>(&self, contact: &Relative<S>, z: &[S], z_rate: &mut [S]) -> [S; 3] {
+        match self {
+            Rate::CoulombArctan(law) => law.evaluate(contact, z, z_rate),
+            Rate::JenkinsArctan(law) => law.evaluate(contact, z, z_rate),
+        }
+    }
+}
+
+impl Law {
+    /// The row of [`TABLE`] that describes this law.
+    pub fn info(&self) -> &'static LawInfo {
+        // every variant has its row, by the macro
+        TABLE.iter().find(|row| row.name == self.name()).expect("every law has its row")
+    }
+
+    /// Checks that every parameter is a positive finite number.
+    ///
+    /// # Errors
+    /// [`LawError`] names the first parameter that is not.
+    pub fn check(&self) -> Result<(), LawError> {
+        let info = self.info();
+        for (parameter, value) in info.parameters.iter().zip(self.values()) {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(LawError { law: info.name, key: parameter.key, dimension: parameter.dimension, value });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl LawInfo {
+    /// Builds the law from values by key (SI).
+    ///
+    /// # Errors
+    /// The keys that are missing, or a value that is not positive and finite.
+    ///
+    /// # Example
+    /// ```
+    /// use std::collections::BTreeMap;
+    /// let row = stickslip::law::find("coulomb").unwrap();
+    /// let law = row.build(&BTreeMap::from([("limit", 2.0)])).unwrap();
+    /// assert_eq!(law.values(), [2.0]);
+    /// ```
+    pub fn build(&self, values: &BTreeMap<&str, f64>) -> Result<Law, BuildError> {
+        let missing: Vec<&'static str> =
+            self.parameters.iter().map(|p| p.key).filter(|key| !values.contains_key(key)).collect();
+        if !missing.is_empty() {
+            return Err(BuildError::Missing { law: self.name, keys: missing });
+        }
+        let ordered: Vec<f64> = self.parameters.iter().map(|p| values[p.key]).collect();
+        let law = (self.build)(&ordered);
+        law.check()?;
+        Ok(law)
+    }
+}
+
+/// Why a law could not be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BuildError {
+    /// Parameters are missing.
+    #[error("law `{law}` needs {}", .keys.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", "))]
+    Missing {
+        /// Name of the law.
+        law: &'static str,
+        /// The keys that are missing.
+        keys: Vec<&'static str>,
+    },
+    /// A value is refused.
+    #[error(transparent)]
+    Value(#[from] LawError),
+}
+
+/// The row of [`TABLE`] with this name.
+pub fn find(name: &str) -> Option<&'static LawInfo> {
+    TABLE.iter().find(|row| row.name == name)
+}

@@ -1,0 +1,90 @@
+//! What the user states: masses, springs, joints, forces, imposed motions.
+//!
+//! A [`Model`] is plain data in SI units. [`Model::assemble`] checks it and turns it into a [`System`] of matrices.
+
+mod assemble;
+pub mod templates;
+
+pub use assemble::{Element, Load, ModelError, System, SystemJoint};
+
+use crate::law::Law;
+use serde::{Deserialize, Serialize};
+
+/// Name of the fixed frame.
+pub const GROUND: &str = "ground";
+
+/// A structure with joints and its excitation, as stated by the user; all values SI.
+///
+/// A place is a mass, [`GROUND`], or a place that is moved (see [`Motion`]).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Model {
+    /// Point masses; each is one degree of freedom.
+    pub masses: Vec<Mass>,
+    /// Springs and dampers.
+    pub springs: Vec<Spring>,
+    /// Places that rub.
+    pub joints: Vec<Joint>,
+    /// Forces, harmonic in time.
+    pub forces: Vec<Force>,
+    /// Imposed motions, harmonic in time.
+    pub motions: Vec<Motion>,
+}
+
+/// A point mass with one displacement.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Mass {
+    /// Identifier.
+    pub name: String,
+    /// Mass, kg.
+    pub mass: f64,
+}
+
+/// A spring, with a viscous damper in parallel to it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Spring {
+    /// The two places it joins.
+    pub between: [String; 2],
+    /// Stiffness, N/m.
+    pub stiffness: f64,
+    /// Viscous damping, kg/s.
+    pub damping: f64,
+}
+
+/// Two places that rub: `u` is the displacement of the first minus that of the second, and the law's force `f` acts on the
+/// first as `-f`, on the second as `+f`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Joint {
+    /// Identifier.
+    pub name: String,
+    /// The two places.
+    pub between: [String; 2],
+    /// Friction law.
+    pub law: Law,
+}
+
+/// A force `amplitude · cos(harmonic · Ω t + phase)`; a harmonic 0 makes it constant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Force {
+    /// The mass it acts on.
+    pub on: String,
+    /// Amplitude, N.
+    pub amplitude: f64,
+    /// Phase lead, rad.
+    pub phase: f64,
+    /// Multiple of the drive frequency.
+    pub harmonic: u32,
+}
+
+/// An imposed motion `amplitude · cos(harmonic · Ω t + phase)` of a place. The place is either one that exists only by this
+/// motion, or a mass, which then is no degree of freedom any more. Several motions of one place add up.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Motion {
+    /// The place that is moved.
+    pub on: String,
+    /// Amplitude, m.
+    pub amplitude: f64,
+    /// Phase lead, rad.
+    pub phase: f64,
+    /// Multiple of the drive frequency.
+    pub harmonic: u32,
+}

@@ -1,0 +1,3 @@
+//! Study files of Stickslip: what a TOML file asks for, read, checked and run.
+
+pub mod dataset;
