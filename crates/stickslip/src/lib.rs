@@ -7,3 +7,4 @@ pub mod dimension;
 pub mod law;
 pub mod method;
 pub mod model;
+pub mod orbit;

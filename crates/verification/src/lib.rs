@@ -1,1 +1,1 @@
-//!
+//! Tests of Stickslip against closed forms, published results and outside integrators; see `tests/`.

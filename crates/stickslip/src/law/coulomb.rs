@@ -5,7 +5,9 @@
 
 use super::{Branch, CoulombArctan, FrictionLaw, Law, Parameter, ReturnMap};
 use crate::dimension::Dimension;
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// Rigid dry friction with a fixed slip limit.
 ///
@@ -41,5 +43,8 @@ impl FrictionLaw for Coulomb {
     }
     fn regularised(&self, width: f64) -> Option<Law> {
         Some(Law::CoulombArctan(CoulombArctan { limit: self.limit, alpha: 1.0 / width }))
+    }
+    fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
+        Complex64::new(0.0, 4.0 * self.limit / (PI * amplitude))
     }
 }

@@ -6,8 +6,9 @@
 
 use super::{FrictionLaw, Parameter, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::FRAC_2_PI;
+use std::f64::consts::{FRAC_2_PI, PI};
 use stickslip_numerics::dual::Real;
 
 /// Smooth dry friction.
@@ -43,6 +44,12 @@ impl FrictionLaw for CoulombArctan {
     }
     fn rate(&self) -> Option<Rate> {
         Some(Rate::CoulombArctan(*self))
+    }
+    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+        // first harmonic of arctan(z cos θ), z the scaled velocity; written without cancellation for small z
+        let z = self.alpha * amplitude * omega;
+        let first = self.limit * 4.0 / PI * z / ((1.0 + z * z).sqrt() + 1.0);
+        Complex64::new(0.0, first / amplitude)
     }
 }
 

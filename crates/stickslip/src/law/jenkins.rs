@@ -6,7 +6,9 @@
 
 use super::{Branch, FrictionLaw, JenkinsArctan, Law, Parameter, ReturnMap};
 use crate::dimension::Dimension;
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// Spring and ideal slider in series, without mass.
 ///
@@ -47,5 +49,14 @@ impl FrictionLaw for Jenkins {
     }
     fn regularised(&self, width: f64) -> Option<Law> {
         Some(Law::JenkinsArctan(JenkinsArctan { stiffness: self.stiffness, limit: self.limit, alpha: 1.0 / width }))
+    }
+    fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
+        let hold = self.limit / self.stiffness;
+        if amplitude <= hold {
+            return Complex64::new(self.stiffness, 0.0);
+        }
+        let slip = (1.0 - 2.0 * hold / amplitude).acos(); // phase at which slip begins
+        let (sin, cos) = slip.sin_cos();
+        Complex64::new(slip - sin * cos, sin * sin) * (self.stiffness / PI)
     }
 }

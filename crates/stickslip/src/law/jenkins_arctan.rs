@@ -4,8 +4,9 @@
 //! `f' = kt (u' - tan(π f / (2 limit)) / alpha)`, `|f| < limit`.
 //! Source: Pust, Pesek, Radolfova (2015), Sec. 3, the equation of Fig. 3.
 
-use super::{FrictionLaw, Parameter, Rate, RateLaw, Relative};
+use super::{FrictionLaw, Jenkins, Parameter, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 use stickslip_numerics::dual::Real;
@@ -53,6 +54,10 @@ impl FrictionLaw for JenkinsArctan {
     }
     fn rate(&self) -> Option<Rate> {
         Some(Rate::JenkinsArctan(*self))
+    }
+    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+        // a search begins at the exact law; the smooth one is near it wherever it is used
+        Jenkins { stiffness: self.stiffness, limit: self.limit }.linearised(amplitude, omega)
     }
 }
 

@@ -26,6 +26,7 @@ pub use jenkins::Jenkins;
 pub use jenkins_arctan::JenkinsArctan;
 
 use crate::dimension::Dimension;
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stickslip_numerics::dual::Real;
@@ -106,6 +107,8 @@ pub trait FrictionLaw {
     fn return_map(&self) -> Option<ReturnMap> {
         None
     }
+    /// Complex stiffness of the first harmonic under `u = amplitude cos Ωt` (N/m): where methods begin to search.
+    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64;
     /// The smooth law that tends to this one as `width` (m/s, the velocity over which friction changes its sign) goes to zero.
     fn regularised(&self, _width: f64) -> Option<Law> {
         None
@@ -191,6 +194,10 @@ macro_rules! friction_laws {
             /// Discrete hysteretic view, see [`FrictionLaw::return_map`].
             pub fn return_map(&self) -> Option<ReturnMap> {
                 match self { $(Law::$variant(law) => law.return_map(),)* }
+            }
+            /// First-harmonic stiffness, see [`FrictionLaw::linearised`].
+            pub fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+                match self { $(Law::$variant(law) => law.linearised(amplitude, omega),)* }
             }
             /// Smooth neighbour, see [`FrictionLaw::regularised`].
             pub fn regularised(&self, width: f64) -> Option<Law> {

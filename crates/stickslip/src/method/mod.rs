@@ -1,9 +1,192 @@
 //! Methods: from a system and a drive frequency to an orbit.
 //!
 //! A method is named with options in a study file; [`TABLE`] lists them. To add one: write its file, then one line in [`TABLE`].
+//! Of a [`Method`], [`Method::solver`] makes a [`Solver`] for one system, which keeps what can be reused from orbit to orbit.
+
+pub mod auto;
+pub mod event_driven;
+mod guess;
+mod periodic;
+
+pub use event_driven::Contact;
 
 use crate::dimension::Dimension;
+use crate::model::System;
+use crate::orbit::Orbit;
 use std::collections::BTreeMap;
+
+/// Turns systems into orbits.
+pub trait Method: Send + Sync + std::fmt::Debug {
+    /// Name in study files.
+    fn name(&self) -> &'static str;
+    /// Prepares for one system.
+    ///
+    /// # Errors
+    /// The system is none that this method can take: [`MethodError`] names the joint or place and what to use instead.
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError>;
+}
+
+/// Finds orbits of one system.
+pub trait Solver {
+    /// The orbit at drive frequency `omega` (rad/s, positive), from the state `start` of a neighbouring orbit if given.
+    ///
+    /// # Errors
+    /// No orbit was found: [`OrbitError`] says how far the method got and what to try. A motion that did not converge is never
+    /// returned as an orbit.
+    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError>;
+}
+
+/// A method cannot take a system.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MethodError {
+    /// A law lacks the view that the method needs.
+    #[error("{method} cannot take the law `{law}` of joint `{joint}`; use {instead}")]
+    Law {
+        /// The method.
+        method: &'static str,
+        /// The joint.
+        joint: String,
+        /// Its law.
+        law: &'static str,
+        /// What to use instead.
+        instead: &'static str,
+    },
+    /// A place has no mass.
+    #[error("{method} needs a mass above zero at `{place}`; for a massless contact point use the law `jenkins`")]
+    NeedsMass {
+        /// The method.
+        method: &'static str,
+        /// The place.
+        place: String,
+    },
+    /// A matrix is not positive definite.
+    #[error("{method} needs a positive definite {matrix} matrix")]
+    NotPositive {
+        /// The method.
+        method: &'static str,
+        /// Which matrix.
+        matrix: &'static str,
+    },
+    /// An option has an impossible value.
+    #[error("option `{key}` of {method}: {message}")]
+    Option {
+        /// The method.
+        method: &'static str,
+        /// The key.
+        key: &'static str,
+        /// What is expected.
+        message: String,
+    },
+}
+
+/// Why a motion could not be followed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Breakdown {
+    /// Too many switches.
+    #[error("joint {joint} chatters at t = {time:.6e} s after {switches} switches", joint = joint + 1)]
+    Chatter {
+        /// When, s.
+        time: f64,
+        /// Switches until then.
+        switches: usize,
+        /// Index of the joint.
+        joint: usize,
+    },
+    /// The contact problem has no solution.
+    #[error("no stick-slip state is consistent at t = {time:.6e} s")]
+    Undecidable {
+        /// When, s.
+        time: f64,
+    },
+    /// The linear motion of a pattern has no full set of modes.
+    #[error(
+        "two modes fall together at {lambda:.6e} rad/s (critical damping) at t = {time:.6e} s; change a damper slightly"
+    )]
+    Defective {
+        /// When, s.
+        time: f64,
+        /// Modulus of the exponent, rad/s.
+        lambda: f64,
+    },
+    /// The signals oscillate too fast for the period.
+    #[error("modes far faster than the drive: no switch could be excluded within the allowed steps, t = {time:.6e} s")]
+    TooFast {
+        /// When, s.
+        time: f64,
+    },
+    /// The step size of an integration became too small.
+    #[error("the integration stalls at t = {time:.6e} s (step {step:.1e} s)")]
+    Stalled {
+        /// When, s.
+        time: f64,
+        /// The step, s.
+        step: f64,
+    },
+    /// A number is no longer finite.
+    #[error("the motion grows beyond all bounds by t = {time:.6e} s")]
+    Unbounded {
+        /// When, s.
+        time: f64,
+    },
+}
+
+/// No orbit was found.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum OrbitError {
+    /// The iteration did not converge.
+    #[error(
+        "{method} stopped at Ω = {omega:.4} rad/s after {iterations} iterations, residual {residual:.1e}; \
+         start from a neighbouring orbit, or check that a periodic motion exists (undamped resonance has none)"
+    )]
+    NotConverged {
+        /// The method.
+        method: &'static str,
+        /// Drive frequency, rad/s.
+        omega: f64,
+        /// Iterations made.
+        iterations: usize,
+        /// Smallest residual reached.
+        residual: f64,
+    },
+    /// The motion broke down.
+    #[error("{method} broke down at Ω = {omega:.4} rad/s: {cause}")]
+    Breakdown {
+        /// The method.
+        method: &'static str,
+        /// Drive frequency, rad/s.
+        omega: f64,
+        /// The cause.
+        cause: Breakdown,
+    },
+    /// The evidence contradicts the orbit.
+    #[error("{method} closed an orbit at Ω = {omega:.4} rad/s that fails its check: energy gap {energy_gap:.1e}")]
+    Evidence {
+        /// The method.
+        method: &'static str,
+        /// Drive frequency, rad/s.
+        omega: f64,
+        /// The gap.
+        energy_gap: f64,
+    },
+    /// The drive frequency is no positive finite number.
+    #[error("the drive frequency must be positive and finite, found {omega} rad/s")]
+    Frequency {
+        /// What was given, rad/s.
+        omega: f64,
+    },
+}
+
+impl OrbitError {
+    /// One word for tables.
+    pub fn status(&self) -> &'static str {
+        match self {
+            OrbitError::NotConverged { .. } => "not-converged",
+            OrbitError::Breakdown { .. } => "breakdown",
+            OrbitError::Evidence { .. } => "evidence-fails",
+            OrbitError::Frequency { .. } => "bad-frequency",
+        }
+    }
+}
 
 /// An option of a method: a key in `[method]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,35 +213,12 @@ pub struct MethodInfo {
     pub summary: &'static str,
     /// Its options, all optional.
     pub options: &'static [MethodOption],
+    /// Builds the method from its options.
+    pub build: fn(&Options) -> Result<Box<dyn Method>, MethodError>,
 }
 
 /// Every method there is.
-pub const TABLE: &[MethodInfo] = &[
-    MethodInfo { name: "auto", summary: "event-driven for exact laws, shooting for smooth laws", options: &[] },
-    MethodInfo {
-        name: "event-driven",
-        summary: "exact: closed-form motion between switches, Newton on the period",
-        options: &[],
-    },
-    MethodInfo {
-        name: "shooting",
-        summary: "smooth laws: Newton on the period of a stiff integration, exact sensitivities",
-        options: &[
-            MethodOption {
-                key: "tolerance",
-                dimension: Dimension::NONE,
-                count: false,
-                doc: "relative error per step of the integration; 1e-9 when absent",
-            },
-            MethodOption {
-                key: "width",
-                dimension: Dimension::VELOCITY,
-                count: false,
-                doc: "replaces exact laws by smooth ones that change sign over this velocity; exact laws are refused when absent",
-            },
-        ],
-    },
-];
+pub const TABLE: &[MethodInfo] = &[auto::INFO, event_driven::INFO];
 
 /// The method with this name.
 pub fn find(name: &str) -> Option<&'static MethodInfo> {

@@ -1,0 +1,154 @@
+//! Linear complementarity in a box: find `λ` with `low ≤ λ ≤ high` and `w = b - D λ` such that
+//! `w = 0` where `λ` is inside, `w ≥ 0` at `high`, `w ≤ 0` at `low`.
+//!
+//! With `D` symmetric positive semidefinite this is the optimality of `min ½ λᵀDλ - bᵀλ` over the box; `w` is unique, and so is `λ`
+//! if `D` is definite. Contact decisions are of this form: `λ` friction forces, `w` relative accelerations.
+//! Solved by block pivoting with Murty's least-index rule as the safeguard that makes it finite.
+//! Source: Cottle, Pang, Stone, "The Linear Complementarity Problem" (1992), Ch. 4; Júdice and Pires (1994).
+
+use nalgebra::{DMatrix, DVector};
+
+/// Where a component of the solution stands in its box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Inside,
+    Low,
+    High,
+}
+
+/// Block pivots that may pass without fewer infeasible components before single pivots take over.
+const PATIENCE: usize = 3;
+/// A component counts as infeasible beyond this fraction of the problem's scale: rounding of a small dense solve.
+const FEASIBLE: f64 = 1e-13;
+/// Singular values of `D` below this fraction of the largest count as zero: redundant contacts.
+const RANK: f64 = 1e-12;
+
+/// Solves the problem; `None` if it cycles, which an indefinite `D` can cause.
+///
+/// # Example
+/// ```
+/// use nalgebra::{dmatrix, dvector};
+/// use stickslip_numerics::complementarity::solve;
+/// // pushed with 3, held by at most 2: moves with 1
+/// let λ = solve(&dmatrix![1.0], &dvector![3.0], &dvector![-2.0], &dvector![2.0]).unwrap();
+/// assert_eq!(λ[0], 2.0);
+/// ```
+pub fn solve(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<f64>) -> Option<DVector<f64>> {
+    let n = b.len();
+    let mut side = vec![Side::Inside; n];
+    let (mut fewest, mut patience) = (n + 1, PATIENCE);
+    for _ in 0..(100 + 20 * n * n) {
+        let mut lambda = solve_inside(d, b, low, high, &side);
+        let w = b - d * &lambda;
+        let w_scale = FEASIBLE * (b.amax() + (d * &lambda).amax());
+        let l_scale = FEASIBLE * lambda.amax();
+        let wrong: Vec<usize> = (0..n)
+            .filter(|&i| match side[i] {
+                Side::Inside => lambda[i] > high[i] + l_scale || lambda[i] < low[i] - l_scale,
+                Side::High => w[i] < -w_scale,
+                Side::Low => w[i] > w_scale,
+            })
+            .collect();
+        if wrong.is_empty() {
+            for i in 0..n {
+                lambda[i] = lambda[i].clamp(low[i], high[i]);
+            }
+            return Some(lambda);
+        }
+        if wrong.len() < fewest {
+            (fewest, patience) = (wrong.len(), PATIENCE);
+        } else {
+            patience = patience.saturating_sub(1);
+        }
+        let change = if patience > 0 { &wrong[..] } else { &wrong[..1] };
+        for &i in change {
+            side[i] = match side[i] {
+                Side::Inside if lambda[i] > high[i] => Side::High,
+                Side::Inside => Side::Low,
+                _ => Side::Inside,
+            };
+        }
+    }
+    None
+}
+
+fn solve_inside(
+    d: &DMatrix<f64>,
+    b: &DVector<f64>,
+    low: &DVector<f64>,
+    high: &DVector<f64>,
+    side: &[Side],
+) -> DVector<f64> {
+    let n = b.len();
+    let mut lambda = DVector::from_fn(n, |i, _| match side[i] {
+        Side::Inside => 0.0,
+        Side::Low => low[i],
+        Side::High => high[i],
+    });
+    let inside: Vec<usize> = (0..n).filter(|&i| side[i] == Side::Inside).collect();
+    if inside.is_empty() {
+        return lambda;
+    }
+    let rest = b - d * &lambda;
+    if let [i] = inside[..] {
+        lambda[i] = if d[(i, i)] > 0.0 { rest[i] / d[(i, i)] } else { 0.0 };
+        return lambda;
+    }
+    // redundant contacts carry loads in proportion to their limits: that is the minimum of Σ λ²/high
+    let share = |i: usize| if high[i].is_finite() && high[i] > 0.0 { high[i].sqrt() } else { 1.0 };
+    let scaled = DMatrix::from_fn(inside.len(), inside.len(), |i, j| {
+        share(inside[i]) * d[(inside[i], inside[j])] * share(inside[j])
+    });
+    let right = DVector::from_fn(inside.len(), |i, _| share(inside[i]) * rest[inside[i]]);
+    let solution = match scaled.clone().cholesky() {
+        Some(factor) if factor.l_dirty().diagonal().iter().all(|p| p * p > RANK * scaled.amax()) => {
+            factor.solve(&right)
+        }
+        _ => {
+            let svd = scaled.svd(true, true);
+            let rank = RANK * svd.singular_values.amax();
+            svd.solve(&right, rank).unwrap_or_else(|_| DVector::zeros(inside.len()))
+        }
+    };
+    for (k, &i) in inside.iter().enumerate() {
+        lambda[i] = solution[k] * share(i);
+    }
+    lambda
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// The conditions hold on random definite problems, whatever the pivoting did.
+        #[test]
+        fn solution_satisfies_the_conditions(
+            entries in prop::collection::vec(-1.0..1.0f64, 36),
+            b in prop::collection::vec(-3.0..3.0f64, 6),
+            limits in prop::collection::vec(0.01..2.0f64, 6),
+        ) {
+            let a = DMatrix::from_vec(6, 6, entries);
+            let d = &a.transpose() * &a + DMatrix::identity(6, 6) * 1e-3;
+            let (b, high) = (DVector::from_vec(b), DVector::from_vec(limits));
+            let low = -&high;
+            let lambda = solve(&d, &b, &low, &high).expect("definite problems end");
+            let w = &b - &d * &lambda;
+            for i in 0..6 {
+                prop_assert!(lambda[i].abs() <= high[i]);
+                if lambda[i] < high[i] * (1.0 - 1e-12) { prop_assert!(w[i] < 1e-10); }
+                if lambda[i] > low[i] * (1.0 - 1e-12) { prop_assert!(w[i] > -1e-10); }
+            }
+        }
+    }
+
+    /// Two contacts side by side carry the load in proportion to their limits.
+    #[test]
+    fn parallel_contacts_share_by_limit() {
+        let d = DMatrix::from_element(2, 2, 1.0);
+        let (b, high) = (DVector::from_vec(vec![1.5, 1.5]), DVector::from_vec(vec![1.0, 2.0]));
+        let lambda = solve(&d, &b, &-&high, &high).unwrap();
+        assert!((lambda[0] - 0.5).abs() < 1e-12 && (lambda[1] - 1.0).abs() < 1e-12, "{lambda}");
+    }
+}

@@ -1,0 +1,312 @@
+//! Modes of `q'' + C q' + K q = g(t)` with symmetric `C`, `K`: the decoupling that makes its motion a closed form.
+//!
+//! Every mode `(λ, φ)` solves `(λ² + λ C + K) φ = 0`. With `θ = φᵀ(2λ + C)φ` the modal coordinate
+//! `η = [φᵀ(λ + C) q + φᵀ q'] / θ` obeys `η' = λ η + φᵀg/θ`, and `q = Re Σ φ η` (complex pairs are kept once, with weight 2).
+//! A direction that neither springs nor dampers hold (`Kφ = Cφ = 0`) is a *free* one and keeps its double zero: `ρ'' = φᵀ g`.
+//! Source: Tisseur and Meerbergen, "The quadratic eigenvalue problem", SIAM Review 43 (2001), Sec. 3.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use num_complex::Complex64;
+
+/// The modes of a system with unit mass matrix.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Modes {
+    /// Exponents λ, one of every complex pair, rad/s.
+    pub lambda: Vec<Complex64>,
+    /// Columns φ times their weight (2 for a complex pair, 1 for a real mode), m × modes.
+    pub shape: DMatrix<Complex64>,
+    /// Rows φᵀ(λ + C)/θ: the part of η that comes from `q`, modes × m.
+    pub from_displacement: DMatrix<Complex64>,
+    /// Rows φᵀ/θ: the part of η that comes from `q'`, and the modal force of a unit force, modes × m.
+    pub from_velocity: DMatrix<Complex64>,
+    /// Orthonormal free directions, m × r.
+    pub free: DMatrix<f64>,
+}
+
+/// The matrix has no full set of modes: two of them fall together, as at critical damping.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("two modes fall together at {lambda:.6} rad/s (critical damping); change a damper by a part in a million")]
+pub struct Defective {
+    /// Where.
+    pub lambda: Complex64,
+}
+
+/// Eigenvalues of `K` below this fraction of the largest are zero: rounding of the symmetric eigenvalue problem.
+const RIGID: f64 = 1e-13;
+/// Modal damping couples two undamped modes when it exceeds this fraction of the largest.
+const COUPLED: f64 = 1e-14;
+/// Eigenvalues closer than this fraction of the largest belong together: the square root of the rounding error of a
+/// non-symmetric eigenvalue, which a nearly defective pair shows.
+const CLUSTER: f64 = 1e-7;
+/// `|θ|` relative to `2|λ| + |C|` below which a mode counts as defective: half of the digits are lost then.
+const DEFECTIVE: f64 = 1e-7;
+
+impl Modes {
+    /// Computes the modes of `q'' + C q' + K q`, both m × m and symmetric.
+    ///
+    /// # Errors
+    /// [`Defective`] at (nearly) critical damping.
+    ///
+    /// # Example
+    /// ```
+    /// use nalgebra::dmatrix;
+    /// use stickslip_numerics::modes::Modes;
+    /// let modes = Modes::new(&dmatrix![0.02], &dmatrix![1.0]).unwrap();
+    /// assert!((modes.lambda[0].re + 0.01).abs() < 1e-15);
+    /// ```
+    pub fn new(damping: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Result<Modes, Defective> {
+        let m = damping.nrows();
+        let mut modes = Modes {
+            lambda: Vec::new(),
+            shape: DMatrix::zeros(m, 0),
+            from_displacement: DMatrix::zeros(0, m),
+            from_velocity: DMatrix::zeros(0, m),
+            free: DMatrix::zeros(m, 0),
+        };
+        if m == 0 {
+            return Ok(modes);
+        }
+        let undamped = SymmetricEigen::new((stiffness + stiffness.transpose()) * 0.5);
+        let basis = split_free(damping, &undamped, &mut modes.free);
+        let (c, k) = (basis.transpose() * damping * &basis, basis.transpose() * stiffness * &basis);
+        for component in components(&c, &k) {
+            let part = DMatrix::from_fn(m, component.len(), |i, j| basis[(i, component[j])]);
+            let select = |matrix: &DMatrix<f64>| {
+                DMatrix::from_fn(component.len(), component.len(), |i, j| matrix[(component[i], component[j])])
+            };
+            modes.add_component(&part, &select(&c), &select(&k))?;
+        }
+        Ok(modes)
+    }
+
+    /// Modes of a coupled group of coordinates, the columns of `part`.
+    fn add_component(&mut self, part: &DMatrix<f64>, c: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(), Defective> {
+        let r = c.nrows();
+        let eigenvalues = if r == 1 { single(c[0], k[0]) } else { companion_eigenvalues(c, k) };
+        let scale = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
+        let mut done = vec![false; eigenvalues.len()];
+        let part = part.map(|x| Complex64::new(x, 0.0));
+        let cc = c.map(|x| Complex64::new(x, 0.0));
+        for i in 0..eigenvalues.len() {
+            // of every pair the one above the real axis; a value within rounding of the axis is real
+            let real = eigenvalues[i].im.abs() <= CLUSTER * scale;
+            if done[i] || (!real && eigenvalues[i].im < 0.0) {
+                continue;
+            }
+            let members: Vec<usize> = (i..eigenvalues.len())
+                .filter(|&j| !done[j] && (eigenvalues[j] - eigenvalues[i]).norm() <= CLUSTER * scale)
+                .collect();
+            members.iter().for_each(|&j| done[j] = true);
+            let mut lambda = members.iter().map(|&j| eigenvalues[j]).sum::<Complex64>() / members.len() as f64;
+            if real {
+                lambda.im = 0.0;
+            }
+            let mut phi = null_space(&quadratic(&cc, k, lambda), members.len());
+            let two_lambda_c = |lambda: Complex64| DMatrix::from_diagonal_element(r, r, 2.0 * lambda) + &cc;
+            let mut theta = phi.transpose() * two_lambda_c(lambda) * &phi;
+            if members.len() == 1 && theta[0].norm() > DEFECTIVE * scale {
+                // one Newton step on φᵀQ(λ)φ = 0 removes the rounding of the unsymmetric eigenvalue problem
+                let correction = (phi.transpose() * quadratic(&cc, k, lambda) * &phi)[0] / theta[0];
+                lambda -= if real { Complex64::new(correction.re, 0.0) } else { correction };
+                phi = null_space(&quadratic(&cc, k, lambda), 1);
+                theta = phi.transpose() * two_lambda_c(lambda) * &phi;
+            }
+            if real {
+                phi = real_basis(&phi);
+                theta = phi.transpose() * two_lambda_c(lambda) * &phi;
+            }
+            let size = (2.0 * lambda.norm() + c.norm()).max(f64::MIN_POSITIVE);
+            let singular = theta.clone().svd(false, false).singular_values.min() <= DEFECTIVE * size;
+            let inverse = if singular { None } else { theta.try_inverse() };
+            let Some(inverse) = inverse else { return Err(Defective { lambda }) };
+            let left = inverse * phi.transpose();
+            let weight = if real { 1.0 } else { 2.0 };
+            let lambda_c = DMatrix::from_diagonal_element(r, r, lambda) + &cc;
+            let m = part.nrows();
+            let (shape, rows_q, rows_v) = (
+                &part * &phi * Complex64::new(weight, 0.0),
+                &left * lambda_c * part.transpose(),
+                left * part.transpose(),
+            );
+            for j in 0..members.len() {
+                self.lambda.push(lambda);
+                let count = self.lambda.len();
+                let zero = Complex64::new(0.0, 0.0);
+                let empty = || DMatrix::from_element(0, m, zero);
+                self.shape = std::mem::replace(&mut self.shape, DMatrix::zeros(0, 0)).insert_column(count - 1, zero);
+                self.shape.set_column(count - 1, &shape.column(j));
+                for (rows, target) in [(&rows_q, &mut self.from_displacement), (&rows_v, &mut self.from_velocity)] {
+                    *target = std::mem::replace(target, empty()).insert_row(count - 1, zero);
+                    target.set_row(count - 1, &rows.row(j));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Free directions into `free`; returns an orthonormal basis of the rest, undamped modes where possible.
+fn split_free(
+    damping: &DMatrix<f64>,
+    undamped: &SymmetricEigen<f64, nalgebra::Dyn>,
+    free: &mut DMatrix<f64>,
+) -> DMatrix<f64> {
+    let m = damping.nrows();
+    let largest = undamped.eigenvalues.amax();
+    let soft: Vec<usize> = (0..m).filter(|&i| undamped.eigenvalues[i].abs() <= RIGID * largest).collect();
+    let mut columns: Vec<DVector<f64>> =
+        (0..m).filter(|i| !soft.contains(i)).map(|i| undamped.eigenvectors.column(i).into_owned()).collect();
+    if !soft.is_empty() {
+        let null = undamped.eigenvectors.select_columns(&soft);
+        let inner = SymmetricEigen::new(null.transpose() * damping * &null);
+        let threshold = RIGID * damping.amax();
+        let mut free_columns = Vec::new();
+        for i in 0..soft.len() {
+            let direction = &null * inner.eigenvectors.column(i);
+            if inner.eigenvalues[i].abs() <= threshold { free_columns.push(direction) } else { columns.push(direction) }
+        }
+        if !free_columns.is_empty() {
+            *free = DMatrix::from_columns(&free_columns);
+        }
+    }
+    if columns.is_empty() { DMatrix::zeros(m, 0) } else { DMatrix::from_columns(&columns) }
+}
+
+/// Groups of coordinates that damping or stiffness couples.
+fn components(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Vec<usize>> {
+    let r = c.nrows();
+    let (c_scale, k_scale) = (COUPLED * c.amax(), 10.0 * RIGID * k.amax());
+    let coupled = |i: usize, j: usize| c[(i, j)].abs() > c_scale || k[(i, j)].abs() > k_scale;
+    let mut left: Vec<usize> = (0..r).collect();
+    let mut groups = Vec::new();
+    while let Some(first) = left.pop() {
+        let mut group = vec![first];
+        let mut next = 0;
+        while next < group.len() {
+            let i = group[next];
+            let (linked, rest): (Vec<usize>, Vec<usize>) = left.iter().partition(|&&j| coupled(i, j));
+            group.extend(linked);
+            left = rest;
+            next += 1;
+        }
+        group.sort_unstable();
+        groups.push(group);
+    }
+    groups
+}
+
+/// Roots of λ² + cλ + k without cancellation.
+fn single(c: f64, k: f64) -> Vec<Complex64> {
+    let discriminant = 0.25 * c * c - k;
+    if discriminant < 0.0 {
+        let root = (-discriminant).sqrt();
+        return vec![Complex64::new(-0.5 * c, root), Complex64::new(-0.5 * c, -root)];
+    }
+    let large = -(0.5 * c + discriminant.sqrt().copysign(c));
+    let small = if large == 0.0 { 0.0 } else { k / large };
+    vec![Complex64::new(large, 0.0), Complex64::new(small, 0.0)]
+}
+
+fn companion_eigenvalues(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Complex64> {
+    let r = c.nrows();
+    let omega = k.amax().sqrt().max(c.amax()).max(f64::MIN_POSITIVE);
+    let mut companion = DMatrix::zeros(2 * r, 2 * r);
+    for i in 0..r {
+        companion[(i, r + i)] = omega;
+        for j in 0..r {
+            companion[(r + i, j)] = -k[(i, j)] / omega;
+            companion[(r + i, r + j)] = -c[(i, j)];
+        }
+    }
+    companion.complex_eigenvalues().iter().copied().collect()
+}
+
+fn quadratic(c: &DMatrix<Complex64>, k: &DMatrix<f64>, lambda: Complex64) -> DMatrix<Complex64> {
+    DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| {
+        let diagonal = if i == j { lambda * lambda } else { Complex64::new(0.0, 0.0) };
+        diagonal + c[(i, j)] * lambda + k[(i, j)]
+    })
+}
+
+/// Orthonormal basis of the directions that the matrix maps closest to zero, one per column.
+fn null_space(matrix: &DMatrix<Complex64>, dimension: usize) -> DMatrix<Complex64> {
+    let r = matrix.nrows();
+    if r == 1 {
+        return DMatrix::from_element(1, 1, Complex64::new(1.0, 0.0));
+    }
+    let svd = matrix.clone().svd(false, true);
+    let v_t = svd.v_t.expect("asked for");
+    let mut order: Vec<usize> = (0..r).collect();
+    order.sort_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
+    DMatrix::from_fn(r, dimension.min(r), |i, j| v_t[(order[j], i)].conj())
+}
+
+/// A real basis of the space that the columns span, which is known to have one.
+fn real_basis(columns: &DMatrix<Complex64>) -> DMatrix<Complex64> {
+    let (r, count) = columns.shape();
+    let parts =
+        DMatrix::from_fn(r, 2 * count, |i, j| if j < count { columns[(i, j)].re } else { columns[(i, j - count)].im });
+    let svd = parts.svd(true, false);
+    let u = svd.u.expect("asked for");
+    let mut order: Vec<usize> = (0..svd.singular_values.len()).collect();
+    order.sort_by(|&a, &b| svd.singular_values[b].total_cmp(&svd.singular_values[a]));
+    DMatrix::from_fn(r, count, |i, j| Complex64::new(u[(i, order[j])], 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// `q` and `q'` are recovered from the modal coordinates, and the modal equation is that of the system.
+    fn check(c: &DMatrix<f64>, k: &DMatrix<f64>, tolerance: f64) {
+        let m = c.nrows();
+        let modes = Modes::new(c, k).unwrap();
+        let count: usize = modes.lambda.iter().map(|l| if l.im == 0.0 { 1 } else { 2 }).sum();
+        assert_eq!(count + 2 * modes.free.ncols(), 2 * m);
+        let (q, v) = (DVector::from_fn(m, |i, _| 1.0 + i as f64), DVector::from_fn(m, |i, _| 0.3 - 0.2 * i as f64));
+        let complex = |x: &DVector<f64>| x.map(|x| Complex64::new(x, 0.0));
+        let eta = &modes.from_displacement * complex(&q) + &modes.from_velocity * complex(&v);
+        let free = &modes.free * (modes.free.transpose() * &q);
+        let free_v = &modes.free * (modes.free.transpose() * &v);
+        let lambda_eta = DVector::from_fn(eta.len(), |i, _| modes.lambda[i] * eta[i]);
+        let lambda2_eta = DVector::from_fn(eta.len(), |i, _| modes.lambda[i] * lambda_eta[i]);
+        let real = |x: &DVector<Complex64>| (&modes.shape * x).map(|z| z.re);
+        let size = 1.0 + k.amax();
+        assert!((real(&eta) + free - &q).amax() < tolerance * size, "displacement");
+        assert!((real(&lambda_eta) + free_v - &v).amax() < tolerance * size, "velocity");
+        assert!((real(&lambda2_eta) + c * &v + k * &q).amax() < tolerance * size * size, "equation");
+    }
+
+    #[test]
+    fn repeated_free_and_overdamped_modes() {
+        use nalgebra::dmatrix;
+        check(&DMatrix::zeros(3, 3), &DMatrix::identity(3, 3), 1e-13); // threefold
+        check(&(DMatrix::identity(3, 3) * 0.2), &DMatrix::identity(3, 3), 1e-13);
+        check(&DMatrix::zeros(2, 2), &dmatrix![1.0, -1.0; -1.0, 1.0], 1e-13); // free together
+        check(&dmatrix![0.5, 0.0; 0.0, 0.0], &dmatrix![1.0, -1.0; -1.0, 1.0], 1e-12);
+        check(&dmatrix![5.0], &dmatrix![1.0], 1e-13); // overdamped
+        check(&dmatrix![0.1], &dmatrix![0.0], 1e-13); // damped but not held
+        check(&dmatrix![0.0], &dmatrix![0.0], 1e-13);
+        // two equal pairs of masses that damping couples within each pair
+        let (c, k) = (dmatrix![0.3, 0.0; 0.0, 0.0], dmatrix![2.0, -1.0; -1.0, 1.5]);
+        let twice =
+            |a: &DMatrix<f64>| DMatrix::from_fn(4, 4, |i, j| if i / 2 == j / 2 { a[(i % 2, j % 2)] } else { 0.0 });
+        check(&twice(&c), &twice(&k), 1e-10);
+        // and mixed by a rotation, so that the pairs cannot be told apart by their zeros
+        let h = 0.5f64.sqrt();
+        let turn = dmatrix![h, 0.0, h, 0.0; 0.0, h, 0.0, h; -h, 0.0, h, 0.0; 0.0, -h, 0.0, h];
+        check(&(&turn * twice(&c) * turn.transpose()), &(&turn * twice(&k) * turn.transpose()), 1e-10);
+        assert!(Modes::new(&dmatrix![2.0], &dmatrix![1.0]).is_err(), "critical damping is defective");
+    }
+
+    proptest! {
+        #[test]
+        fn random_systems(entries in prop::collection::vec(-1.0..1.0f64, 32), size in 1usize..5) {
+            let a = DMatrix::from_fn(size, size, |i, j| entries[i * 4 + j]);
+            let b = DMatrix::from_fn(size, size, |i, j| entries[16 + i * 4 + j]);
+            let (k, c) = (&a * a.transpose(), &b * b.transpose() * 0.05);
+            check(&c, &k, 1e-8);
+        }
+    }
+}

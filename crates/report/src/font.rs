@@ -1,0 +1,67 @@
+//! The one font of the figures, DejaVu Sans, embedded: the width of a text does not depend on the machine.
+//!
+//! DejaVu has the subscripts of `a₁`, Greek and the mathematical signs; a viewer of an SVG that lacks it falls back on
+//! [`FAMILY`], whose second choice has the same proportions.
+
+use skrifa::instance::{LocationRef, Size};
+use skrifa::{FontRef, MetadataProvider};
+
+/// The fonts an SVG asks for, in order.
+pub(crate) const FAMILY: &str = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif";
+
+/// Thickness of the strokes of a text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Weight {
+    Regular,
+    Bold,
+}
+
+pub(crate) fn data(weight: Weight) -> &'static [u8] {
+    match weight {
+        Weight::Regular => dejavu::sans::regular(),
+        Weight::Bold => dejavu::sans::bold(),
+    }
+}
+
+/// Width of a line of text, px.
+pub(crate) fn width(text: &str, size: f64, weight: Weight) -> f64 {
+    let Ok(font) = FontRef::new(data(weight)) else { return 0.6 * size * text.chars().count() as f64 };
+    let glyphs = font.charmap();
+    let metrics = font.glyph_metrics(Size::new(1000.0), LocationRef::default());
+    // a sign that DejaVu lacks is drawn by a substitute of unknown width: one em at most
+    let advance =
+        |c: char| glyphs.map(c).and_then(|glyph| metrics.advance_width(glyph)).map_or(1.0, |w| f64::from(w) / 1000.0);
+    size * text.chars().map(advance).sum::<f64>()
+}
+
+/// Breaks a text at its spaces into lines that fit `limit` px; a longer word stands alone.
+pub(crate) fn wrap(text: &str, size: f64, weight: Weight, limit: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if width(&format!("{line} {word}"), size, weight) <= limit => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_font_is_there_and_measures_subscripts() {
+        let w = width("a₁ Ω µ ∮ ≤ ×10⁻³", 12.0, Weight::Regular);
+        assert!((80.0..150.0).contains(&w), "{w}");
+        let font = FontRef::new(data(Weight::Bold)).unwrap();
+        for c in "a₁₂₃₀₉ₐₑ⁻⁰¹²³⁴⁵⁶⁷⁸⁹αβΩωµ∮≤≥×°é".chars() {
+            assert!(font.charmap().map(c).is_some_and(|g| g.to_u32() > 0), "{c}");
+        }
+        assert_eq!(wrap("one two three", 12.0, Weight::Regular, 60.0), ["one two", "three"]);
+        assert!(wrap(" ", 12.0, Weight::Regular, 60.0).is_empty());
+    }
+}

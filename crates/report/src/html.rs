@@ -1,0 +1,303 @@
+//! The interactive figure as one self-contained page: zoom, pan, values under the pointer; works offline.
+//!
+//! The plotting script (plotly.js, MIT) comes embedded in the `plotly` crate. The figure itself is plain data for it,
+//! written here because the crate's layout knows eight axes at most.
+
+use crate::font;
+use crate::frame::{self, Range};
+use crate::output::{File, Output, ReportError};
+use crate::svg::escape;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::sync::OnceLock;
+use stickslip_study::dataset::{Axis, Dataset, Figure, Series, Style};
+
+/// The output `html`.
+pub const OUTPUT: Output = Output { name: "html", summary: "figure.html, interactive, self-contained", make: files };
+
+fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
+    Ok(vec![File::new("figure.html", to_html(&dataset.figure))])
+}
+
+/// The figure as a complete page with its script.
+pub fn to_html(figure: &Figure) -> String {
+    let title = escape(&figure.title);
+    let body = format!("<h1>{title}</h1>\n{}", fragment(figure, "figure"));
+    document(&title, "body { max-width: 1280px; } h1 { text-align: center; }", &body)
+}
+
+/// A whole page around a body that contains figures; the script stands once. `title` is already escaped.
+pub(crate) fn document(title: &str, style: &str, body: &str) -> String {
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{title}</title>\n<style>\n{STYLE}{style}\n</style>\n<script>{}</script>\n<script>{DRAW}</script>\n</head>\n\
+         <body>\n{body}\n</body>\n</html>\n",
+        script()
+    )
+}
+
+const STYLE: &str = "\
+body { margin: 0 auto; padding: 1.5rem; font: 16px/1.55 system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif; color: #1a1a1a; background: #fff; }
+h1 { font-size: 1.45rem; line-height: 1.25; margin: 0 0 .75rem; overflow-wrap: anywhere; }
+.figure { width: 100%; margin: .5rem 0 1rem; }
+.figure svg.static { max-width: 100%; height: auto; }
+";
+
+/// Draws a figure into its place: the same panels below each other where the page is narrow.
+const DRAW: &str = "
+function stickslip(id, figure) {
+  const place = document.getElementById(id), narrow = window.matchMedia('(max-width: 720px)');
+  const draw = () => {
+    const layout = narrow.matches && !window.matchMedia('print').matches ? figure.narrow : figure.wide;
+    Plotly.react(place, figure.data, layout, {responsive: true, displaylogo: false,
+      modeBarButtonsToRemove: ['select2d', 'lasso2d'], toImageButtonOptions: {format: 'svg', filename: 'figure'}});
+  };
+  place.replaceChildren();
+  draw();
+  narrow.addEventListener('change', draw);
+  window.addEventListener('beforeprint', () => Plotly.Plots.resize(place));
+}
+";
+
+/// plotly.js without the mathematics typesetter (2 MB) that the crate puts behind it.
+fn script() -> &'static str {
+    static SCRIPT: OnceLock<String> = OnceLock::new();
+    SCRIPT.get_or_init(|| {
+        let both = plotly::Plot::offline_js_sources();
+        let first = both.split_once('>').map_or("", |(_, rest)| rest);
+        first.split_once("</script>").map_or(first, |(script, _)| script).to_owned()
+    })
+}
+
+/// The figure inside a page: its place, which holds the static figure until a script draws the live one.
+pub(crate) fn fragment(figure: &Figure, id: &str) -> String {
+    let (columns, _) = frame::grid(figure.panels.len());
+    let data = json!({ "data": traces(figure), "wide": layout(figure, columns), "narrow": layout(figure, 1) });
+    // `<` would let a label end the script element
+    let data = data.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029");
+    let height = layout(figure, columns)["height"].as_f64().unwrap_or(0.0);
+    let still = crate::svg::to_svg(figure).replacen("<svg ", "<svg class=\"static\" ", 1);
+    format!(
+        "<div id=\"{id}\" class=\"figure\" style=\"min-height: {height}px\"><noscript>{still}</noscript></div>\n\
+         <script>stickslip(\"{id}\", {data});</script>"
+    )
+}
+
+/// Names the axis of a panel the way plotly counts: x, x2, x3, …
+fn axis_name(letter: &str, panel: usize) -> String {
+    if panel == 0 { letter.to_owned() } else { format!("{letter}{}", panel + 1) }
+}
+
+fn traces(figure: &Figure) -> Vec<Value> {
+    let mut seen = BTreeSet::new();
+    let several = figure.panels.len() > 1;
+    let mut traces = Vec::new();
+    for (i, panel) in figure.panels.iter().enumerate() {
+        let lines = panel.series.iter().filter(|s| s.style != Style::Marks);
+        for series in lines.chain(panel.series.iter().filter(|s| s.style == Style::Marks)) {
+            let named = !series.label.trim().is_empty();
+            let place =
+                if several && !panel.title.is_empty() { format!("<br>{}", plain(&panel.title)) } else { String::new() };
+            let mut trace = json!({
+                "type": if series.x.len() > 5000 { "scattergl" } else { "scatter" },
+                "x": numbers(&series.x), "y": numbers(&series.y),
+                "xaxis": axis_name("x", i), "yaxis": axis_name("y", i),
+                "name": plain(&series.label), "legendgroup": series.label,
+                "showlegend": named && frame::points(series).any(frame::drawable) && seen.insert(series.label.as_str()),
+                "connectgaps": false,
+                "hovertemplate": format!("{}<br>{}<extra>{}{place}</extra>", hover("x", &panel.x), hover("y", &panel.y), plain(&series.label)),
+            });
+            let colour = frame::colour(series.colour);
+            if series.style == Style::Marks {
+                trace["mode"] = json!("markers");
+                trace["marker"] = json!({ "color": "#ffffff", "size": 8, "line": { "color": colour, "width": 2 } });
+            } else {
+                trace["mode"] = json!(if lonely(series) { "lines+markers" } else { "lines" });
+                trace["marker"] = json!({ "color": colour, "size": 4 });
+                trace["line"] = json!({ "color": colour, "width": 2, "dash": match series.style {
+                    Style::Dashed => "7px,4px",
+                    Style::Dotted => "2px,3px",
+                    Style::Solid | Style::Marks => "solid",
+                }});
+            }
+            traces.push(trace);
+        }
+    }
+    traces
+}
+
+/// Whether some point has gaps on both sides: a line alone would not show it.
+fn lonely(series: &Series) -> bool {
+    let points: Vec<(f64, f64)> = frame::points(series).collect();
+    points.split(|p| !frame::drawable(*p)).any(|piece| piece.len() == 1)
+}
+
+/// Numbers for the page, nine digits; what does not exist is null and interrupts the curve.
+fn numbers(values: &[f64]) -> Vec<Value> {
+    values
+        .iter()
+        .map(|v| format!("{v:.8e}").parse::<f64>().ok().filter(|v| v.is_finite()).map_or(Value::Null, Value::from))
+        .collect()
+}
+
+/// `frequency = 121.25 Hz` for the value under the pointer.
+fn hover(letter: &str, axis: &Axis) -> String {
+    let quantity = if axis.quantity.trim().is_empty() { letter } else { axis.quantity.trim() };
+    format!("{} = %{{{letter}:.6~g}} {}", plain(quantity), plain(axis.unit.trim()))
+}
+
+/// Text that plotly, which reads some tags and templates, shows literally.
+fn plain(text: &str) -> String {
+    escape(text).replace("&quot;", "\"").replace("&#39;", "'").replace("%{", "%\u{200b}{")
+}
+
+/// Sizes of the interactive figure, px.
+const WIDTH: f64 = 1200.0;
+const TOP: f64 = 70.0;
+const BOTTOM: f64 = 60.0;
+const ROW_GAP: f64 = 95.0;
+
+fn layout(figure: &Figure, columns: usize) -> Value {
+    let count = figure.panels.len().max(1);
+    let (columns, rows) = (columns.min(count), count.div_ceil(columns));
+    let plot_height = match (columns, rows) {
+        (1, 1) => 460.0,
+        (1, _) => 270.0,
+        (2, 1) => 380.0,
+        _ => 270.0,
+    };
+    let inside = rows as f64 * plot_height + (rows as f64 - 1.0) * ROW_GAP;
+    let column_gap = if columns == 1 { 0.0 } else { 85.0 / WIDTH };
+    let plot_width = (1.0 - column_gap * (columns as f64 - 1.0)) / columns as f64;
+    let entries = frame::legend(figure);
+    let font = json!({ "family": "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif", "size": 14, "color": "#1a1a1a" });
+    let mut layout = json!({
+        "height": inside + TOP + BOTTOM, "autosize": true, "font": font,
+        "margin": { "l": 70, "r": 20, "t": TOP, "b": BOTTOM },
+        "paper_bgcolor": "#ffffff", "plot_bgcolor": "#ffffff", "hovermode": "closest", "dragmode": "zoom",
+        "hoverlabel": { "bgcolor": "#ffffff", "font": { "size": 13 } },
+        "showlegend": !entries.is_empty(),
+        "legend": { "orientation": "h", "x": 0.5, "xanchor": "center", "y": 1.0 + 34.0 / inside, "yanchor": "bottom", "font": { "size": 14 } },
+    });
+    let mut titles = Vec::new();
+    let ranges = frame::ranges(figure);
+    for (i, (panel, (x, y))) in figure.panels.iter().zip(&ranges).enumerate() {
+        let (column, row) = ((i % columns) as f64, (i / columns) as f64);
+        let left = column * (plot_width + column_gap);
+        let top = 1.0 - row * (plot_height + ROW_GAP) / inside;
+        let bottom = (top - plot_height / inside).max(0.0);
+        let (left, right) = (left.min(1.0), (left + plot_width).min(1.0));
+        layout[format!("xaxis{}", suffix(i))] = axis(
+            &panel.x,
+            *x,
+            [left, right],
+            &axis_name("y", i),
+            partner(&ranges, i, |r| r.0, |j| figure.panels[j].x == panel.x),
+            "x",
+        );
+        layout[format!("yaxis{}", suffix(i))] = axis(
+            &panel.y,
+            *y,
+            [bottom, top],
+            &axis_name("x", i),
+            partner(&ranges, i, |r| r.1, |j| figure.panels[j].y == panel.y),
+            "y",
+        );
+        let limit = if columns == 1 { 560.0 } else { 0.9 * WIDTH * plot_width };
+        let lines = font::wrap(&panel.title, 15.0, font::Weight::Bold, limit);
+        titles.push(json!({
+            "text": format!("<b>{}</b>", lines.iter().map(|l| plain(l)).collect::<Vec<_>>().join("<br>")),
+            "x": (left + right) / 2.0, "y": top, "xref": "paper", "yref": "paper", "xanchor": "center", "yanchor": "bottom",
+            "yshift": 4, "showarrow": false, "font": { "size": 15 },
+        }));
+    }
+    layout["annotations"] = Value::from(titles);
+    layout
+}
+
+fn suffix(panel: usize) -> String {
+    axis_name("", panel)
+}
+
+/// The first earlier panel whose axis shows the same quantity over the same range: they zoom together.
+fn partner(
+    ranges: &[(Range, Range)],
+    i: usize,
+    pick: fn(&(Range, Range)) -> Range,
+    alike: impl Fn(usize) -> bool,
+) -> Option<usize> {
+    (0..i).find(|&j| alike(j) && pick(&ranges[j]) == pick(&ranges[i]))
+}
+
+fn axis(axis: &Axis, range: Range, domain: [f64; 2], anchor: &str, partner: Option<usize>, letter: &str) -> Value {
+    let mut value = json!({
+        "domain": domain, "anchor": anchor, "range": [range.from, range.to],
+        "title": { "text": plain(&frame::axis_title(axis, 0)), "standoff": 8, "font": { "size": 14 } },
+        "showline": true, "mirror": true, "linecolor": "#444444", "gridcolor": "#e3e3e3", "zerolinecolor": "#b0b0b0",
+        "ticks": "outside", "tickcolor": "#444444", "exponentformat": "power", "nticks": 8, "automargin": true,
+        "zeroline": range.from < 0.0, "tickfont": { "size": 13 },
+    });
+    if let Some(partner) = partner {
+        value["matches"] = json!(axis_name(letter, partner));
+    }
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples;
+
+    /// What stands outside of the scripts: nothing there may load anything.
+    pub(crate) fn markup(html: &str) -> String {
+        html.split("<script>").map(|part| part.split_once("</script>").map_or(part, |(_, rest)| rest)).collect()
+    }
+
+    #[test]
+    fn the_page_is_self_contained() {
+        for dataset in samples::all() {
+            let html = to_html(&dataset.figure);
+            assert_eq!(html.matches("plotly.js v").count(), 1);
+            let markup = markup(&html);
+            assert!(
+                !markup.contains("src=")
+                    && !markup.contains("href=")
+                    && !markup.contains("@import")
+                    && !markup.contains("url(")
+            );
+            assert!(!html.contains("MathJax-script"));
+            assert!(html.len() < 12_000_000, "{}", html.len());
+        }
+    }
+
+    #[test]
+    fn a_label_cannot_end_its_script_or_become_a_tag() {
+        let html = to_html(&samples::hostile().figure);
+        let markup = markup(&html);
+        assert!(!html.contains("<script>alert") && !markup.contains("<b>bold") && !markup.contains("</title><"));
+        assert_eq!(html.matches("<script>").count(), html.matches("</script>").count());
+    }
+
+    #[test]
+    fn every_panel_has_axes_and_every_label_one_legend_entry() {
+        for dataset in samples::all() {
+            let figure = &dataset.figure;
+            let (columns, _) = frame::grid(figure.panels.len());
+            let layout = layout(figure, columns);
+            for (i, panel) in figure.panels.iter().enumerate() {
+                let text = layout[format!("xaxis{}", suffix(i))]["title"]["text"].as_str().unwrap();
+                assert_eq!(text, plain(&frame::axis_title(&panel.x, 0)));
+                let domain = &layout[format!("yaxis{}", suffix(i))]["domain"];
+                assert!(domain[0].as_f64().unwrap() >= 0.0 && domain[0].as_f64() < domain[1].as_f64());
+            }
+            let shown = traces(figure).iter().filter(|t| t["showlegend"] == true).count();
+            assert_eq!(shown, frame::legend(figure).len());
+        }
+    }
+
+    #[test]
+    fn gaps_are_null() {
+        assert_eq!(json!(numbers(&[1.0, f64::NAN, f64::INFINITY, 0.1 + 0.2])), json!([1.0, null, null, 0.3]));
+    }
+}

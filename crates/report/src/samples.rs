@@ -1,0 +1,254 @@
+//! Datasets like those of real studies, and worse ones, for the tests.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use stickslip_study::dataset::*;
+
+fn axis(quantity: &str, unit: &str) -> Axis {
+    Axis { quantity: quantity.into(), unit: unit.into() }
+}
+
+fn series(label: &str, x: Vec<f64>, y: Vec<f64>, style: Style, colour: usize) -> Series {
+    Series { label: label.into(), x, y, style, colour }
+}
+
+fn number(name: &str, values: Vec<f64>) -> Column {
+    Column { name: name.into(), values: Values::Number(values) }
+}
+
+fn text(name: &str, values: &[&str]) -> Column {
+    Column { name: name.into(), values: Values::Text(values.iter().map(|v| (*v).to_owned()).collect()) }
+}
+
+fn record(points: &[(&str, u64)]) -> Record {
+    Record {
+        version: "0.1.0".into(),
+        study: serde_json::json!({ "parameters": { "m": 0.182, "k": 105103.0, "Ft": [2.0, 4.0, 6.0, 8.0] } }),
+        seed: Some(7),
+        threads: 2,
+        wall_time_s: 0.125,
+        points: points.iter().map(|(status, n)| ((*status).to_owned(), *n)).collect::<BTreeMap<_, _>>(),
+        interrupted: false,
+    }
+}
+
+pub(crate) fn all() -> Vec<Dataset> {
+    vec![response(), hysteresis(), hostile(), many()]
+}
+
+/// Response curves of two weakly coupled blades and their contact: four limits of friction.
+pub(crate) fn response() -> Dataset {
+    let resonance =
+        |f: f64, f0: f64, zeta: f64| 1.0 / ((1.0 - (f / f0).powi(2)).powi(2) + (2.0 * zeta * f / f0).powi(2)).sqrt();
+    let f: Vec<f64> = (0..241).map(|i| 119.5 + 3.0 * f64::from(i) / 240.0).collect();
+    let (mut panels, mut rows) = (Vec::new(), [const { Vec::new() }; 4]);
+    let (mut peak_case, mut peak_mass, mut peak_f, mut peak_a) = (vec![], vec![], vec![], vec![]);
+    for limit in [2.0, 4.0, 6.0, 8.0] {
+        let zeta = 0.0008 + 0.0002 * limit;
+        let a = |k: usize| -> Vec<f64> {
+            let at = |f: &f64| match k {
+                0 => 100.0 * 5.2 * 0.0000115 * resonance(*f, 120.95, zeta) * 2.0,
+                1 => 100.0 * 3.1 * 0.0000115 * resonance(*f, 121.1 + 0.02 * limit, zeta) * 2.0,
+                _ => 100.0 * 1.2 * 0.0000115 * resonance(*f, 120.8 + 0.05 * limit, 1.5 * zeta) * 2.0,
+            };
+            f.iter().map(at).collect()
+        };
+        let mut list = Vec::new();
+        for (k, (name, style)) in
+            [("a₁", Style::Solid), ("a₂", Style::Dashed), ("a₃", Style::Solid)].into_iter().enumerate()
+        {
+            let values = a(k);
+            let top = (0..f.len()).max_by(|i, j| values[*i].total_cmp(&values[*j])).unwrap();
+            peak_case.push(limit);
+            peak_mass.push(["blade1", "contact", "blade3"][k]);
+            peak_f.push(f[top]);
+            peak_a.push(values[top] / 100.0);
+            rows[k + 1].extend(values.iter().map(|v| v / 100.0));
+            list.push(series("peak", vec![f[top]], vec![values[top]], Style::Marks, k));
+            list.insert(k, series(name, f.clone(), values, style, k));
+        }
+        rows[0].extend(f.iter().map(|_| limit));
+        panels.push(Panel {
+            title: format!("Ft = {limit} N"),
+            x: axis("frequency", "Hz"),
+            y: axis("amplitude", "cm"),
+            series: list,
+        });
+    }
+    let [limits, a1, a2, a3] = rows;
+    Dataset {
+        name: "fig06".into(),
+        title: "Response curves of the blade couple, m₁ = m/100".into(),
+        source: Some("Pust, Pesek, Radolfova (2015), Fig. 6".into()),
+        kind: "response".into(),
+        tables: vec![
+            Table {
+                name: "curve".into(),
+                columns: vec![
+                    number("Ft", limits),
+                    number("frequency_Hz", f.repeat(4)),
+                    number("blade1_amplitude_m", a1),
+                    number("contact_amplitude_m", a2),
+                    number("blade3_amplitude_m", a3),
+                    Column { name: "stable".into(), values: Values::Flag(vec![Some(true); 964]) },
+                    Column { name: "iterations".into(), values: Values::Integer(vec![4; 964]) },
+                    text("status", &["converged"; 964]),
+                ],
+            },
+            Table {
+                name: "peaks".into(),
+                columns: vec![
+                    number("Ft", peak_case),
+                    text("mass", &peak_mass),
+                    number("frequency_Hz", peak_f),
+                    number("amplitude_m", peak_a),
+                ],
+            },
+        ],
+        figure: Figure { title: "Response curves of the blade couple, m₁ = m/100".into(), panels },
+        notes: vec!["Amplitudes are half peak to peak over one period.".into()],
+        failures: vec![],
+        record: record(&[("converged", 964)]),
+    }
+}
+
+/// Hysteresis loops of an elastic dry-friction element: two stiffnesses, three amplitudes.
+pub(crate) fn hysteresis() -> Dataset {
+    let mut panels = Vec::new();
+    let (mut stiffness, mut amplitude, mut loss) = (vec![], vec![], vec![]);
+    for kt in [2.0, 10.0] {
+        let limit = 2.0; // mN, displacements in mm
+        let mut list = Vec::new();
+        for (k, a) in [1.0, 1.5, 2.5].into_iter().enumerate() {
+            let slip = f64::min(2.0 * limit / kt, 2.0 * a);
+            let x = vec![a, a - slip, -a, -a + slip, a];
+            let y = vec![limit, -limit, -limit, limit, limit];
+            list.push(series(&format!("a = {a} mm"), x, y, [Style::Solid, Style::Dashed, Style::Dotted][k], k));
+            stiffness.push(kt);
+            amplitude.push(a * 1e-3);
+            loss.push(4.0 * limit * (a - limit / kt) * 1e-6);
+        }
+        panels.push(Panel {
+            title: format!("kt = {kt} N/m"),
+            x: axis("displacement", "mm"),
+            y: axis("force", "mN"),
+            series: list,
+        });
+    }
+    Dataset {
+        name: "fig02".into(),
+        title: "Hysteresis loops of elastic dry friction".into(),
+        source: Some("Pust, Pesek, Radolfova (2015), Fig. 2".into()),
+        kind: "hysteresis".into(),
+        tables: vec![Table {
+            name: "loops_summary".into(),
+            columns: vec![
+                number("kt", stiffness),
+                number("amplitude_m", amplitude),
+                number("dissipation_J", loss.clone()),
+                number("equivalent_stiffness_N_per_m", loss.iter().map(|e| 1.25e6 * e).collect()),
+                number("equivalent_damping_kg_per_s", loss.iter().map(|e| 3.3e3 * e).collect()),
+            ],
+        }],
+        figure: Figure { title: "Hysteresis loops of elastic dry friction".into(), panels },
+        notes: vec![],
+        failures: vec![],
+        record: record(&[("converged", 6)]),
+    }
+}
+
+/// Gaps, failures, empty and constant curves, huge and tiny values, signs that files must escape.
+pub(crate) fn hostile() -> Dataset {
+    let x: Vec<f64> = (0..60).map(|i| f64::from(i) / 10.0).collect();
+    let gap = |i: usize| (20..26).contains(&i) || i == 40 || i == 42;
+    let wave = |a: f64| -> Vec<f64> {
+        x.iter().enumerate().map(|(i, x)| if gap(i) { f64::NAN } else { a * x.sin() }).collect()
+    };
+    let panel = |title: &str, unit: &str, series: Vec<Series>| Panel {
+        title: title.into(),
+        x: axis("time", "s"),
+        y: axis("x < y & \"z\"", unit),
+        series,
+    };
+    let panels = vec![
+        panel(
+            "gaps & <failures>",
+            "mm",
+            vec![
+                series("wave & <b>bold</b> \"q\" 'a' $x$", x.clone(), wave(1.0), Style::Solid, 0),
+                series("failed", vec![2.2, 4.1], vec![0.5, -0.5], Style::Marks, 1),
+            ],
+        ),
+        panel(
+            "constant",
+            "N",
+            vec![
+                series("zero", x.clone(), vec![0.0; 60], Style::Solid, 2),
+                series("constant", x.clone(), vec![0.0; 60], Style::Dashed, 3),
+            ],
+        ),
+        panel("huge", "Pa", vec![series("huge", x.clone(), wave(1e301), Style::Solid, 4)]),
+        panel("tiny", "m", vec![series("tiny", x.clone(), wave(3e-12), Style::Dotted, 5)]),
+        panel(
+            "single point, a title so long that it cannot stand in one line above the panel",
+            "",
+            vec![series("one", vec![1.0], vec![5.0], Style::Solid, 6)],
+        ),
+        panel(
+            "empty",
+            "m",
+            vec![
+                series("", vec![], vec![], Style::Solid, 0),
+                series("nothing", vec![f64::NAN], vec![1.0], Style::Solid, 7),
+            ],
+        ),
+        panel(
+            "offset",
+            "m",
+            vec![series("offset", x.clone(), x.iter().map(|x| 1e6 + 1e-3 * x).collect(), Style::Solid, 8)],
+        ),
+    ];
+    Dataset {
+        name: "hostile".into(),
+        title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž 位移, with a title that has so many words that it must be broken into more than one line of text to fit".into(),
+        source: Some("<i>nobody</i> & sons".into()),
+        kind: "orbit".into(),
+        tables: vec![
+            Table { name: "peaks".into(), columns: vec![number("frequency_Hz", vec![f64::NAN, 1e-300, 121.25]), text("mass", &["<b>", "a,b", "位移"]), number("amplitude_m", vec![1e300, -0.0, 0.0487321])] },
+            Table { name: "empty".into(), columns: vec![number("a_m", vec![])] },
+            Table { name: "none".into(), columns: vec![] },
+        ],
+        figure: Figure { title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž, with a title that has so many words that it must be broken into more than one line of text to fit the figure, which is not all that narrow".into(), panels },
+        notes: vec!["A <note> & more.".into()],
+        failures: (0..9).map(|i| Failure { at: format!("Ft = 2 N, frequency = {} Hz", 121.0 + 0.25 * f64::from(i)),
+            reason: "shooting stopped after 50 iterations, residual 3.1e-4; try more harmonics <or> start from a neighbour".into() }).collect(),
+        record: record(&[("converged", 240), ("not converged", 9)]),
+    }
+}
+
+/// One panel with every colour of the palette and many points.
+pub(crate) fn many() -> Dataset {
+    let x: Vec<f64> = (0..40_000).map(|i| f64::from(i) * 1e-4).collect();
+    let list = (0..7).map(|k| {
+        let y = x
+            .iter()
+            .map(|x| 8.0 * f64::from(k) + 3.0 * (TAU * 5.0 * x).sin() * (-x * f64::from(k) / 5.0).exp())
+            .collect();
+        series(&format!("mass {k}"), x.clone(), y, Style::Solid, k as usize)
+    });
+    Dataset {
+        name: "many".into(),
+        tables: vec![],
+        figure: Figure {
+            title: "Transient".into(),
+            panels: vec![Panel {
+                title: String::new(),
+                x: axis("time", "s"),
+                y: axis("displacement", "mm"),
+                series: list.collect(),
+            }],
+        },
+        kind: "transient".into(),
+        ..hysteresis()
+    }
+}

@@ -1,0 +1,275 @@
+//! Stick or slip: which pattern begins at an instant.
+//!
+//! Sliders with relative velocity slip on. For the rigid ones at rest the accelerations and friction forces solve a box
+//! complementarity problem (all of them together, so the order of listing plays no part): an acceleration means slip, a force
+//! inside its limit means stick. Where a force is exactly at its limit and the acceleration is zero, which is the rule when stick
+//! ends, the same problem for the next derivative decides, and so on.
+//! Source: Glocker, "Set-Valued Force Laws" (2001), Ch. 10; Leine and Nijmeijer (2004), Ch. 6.
+
+use super::mechanics::{Contact, Drive, Mechanics};
+use nalgebra::{DMatrix, DVector};
+use stickslip_numerics::complementarity;
+
+/// A relative velocity below this fraction of the largest one is rest. Switch instants are found to 1e-15 of the velocity scale;
+/// joints that switch together by symmetry differ by the rounding of the whole orbit, about 1e-12.
+pub(crate) const REST: f64 = 1e-10;
+/// A force within this fraction of its limit is at the limit, for the same reason.
+pub(crate) const AT_LIMIT: f64 = 1e-10;
+/// An acceleration (or a higher derivative) below this fraction of the terms that it is the sum of is zero.
+const BALANCED: f64 = 1e-9;
+/// Derivatives tried before contacts that stay exactly at the border are left in stick.
+const LEVELS: u32 = 4;
+
+/// The decision, and the accelerations that go with it.
+#[derive(Debug, Clone)]
+pub(crate) struct Decision {
+    pub contacts: Vec<Contact>,
+    /// Acceleration right after the instant, length n, m/s².
+    pub acceleration: DVector<f64>,
+    free: DVector<f64>,
+    jerk: DVector<f64>,
+    at_rest: Vec<usize>,
+    undecided: Vec<usize>,
+}
+
+impl Decision {
+    pub fn new(mechanics: &Mechanics) -> Self {
+        Decision {
+            contacts: vec![Contact::Stick; mechanics.sliders.len()],
+            acceleration: DVector::zeros(mechanics.n),
+            free: DVector::zeros(mechanics.n),
+            jerk: DVector::zeros(mechanics.n),
+            at_rest: Vec::new(),
+            undecided: Vec::new(),
+        }
+    }
+
+    /// Decides at `time` for `state`; `velocity_scale` is the largest relative velocity of the motion (m/s).
+    /// Returns false if the complementarity problem has no solution, which needs an indefinite mass matrix.
+    pub fn decide(
+        &mut self,
+        mechanics: &Mechanics,
+        drive: &Drive,
+        time: f64,
+        state: &[f64],
+        velocity_scale: f64,
+    ) -> bool {
+        let n = mechanics.n;
+        let (x, v) = (&state[..n], &state[n..2 * n]);
+        let still = REST * velocity_scale;
+        self.at_rest.clear();
+        let mut elastic_undecided = false;
+        for (i, slider) in mechanics.sliders.iter().enumerate() {
+            let velocity = relative(slider, v) + drive.imposed_at(i, time, 1);
+            self.contacts[i] = match slider.state {
+                None if velocity.abs() > still => Contact::slip(velocity),
+                None => {
+                    self.at_rest.push(i);
+                    Contact::Stick
+                }
+                Some(s) => {
+                    let force = state[2 * n + s];
+                    if force.abs() < slider.limit * (1.0 - AT_LIMIT) {
+                        Contact::Stick
+                    } else if velocity.abs() > still {
+                        if velocity * force > 0.0 { Contact::slip(force) } else { Contact::Stick }
+                    } else {
+                        elastic_undecided = true;
+                        Contact::Stick
+                    }
+                }
+            };
+        }
+        // accelerations without the forces of the rigid sliders at rest
+        self.free.fill(0.0);
+        drive.add_force(time, 0, &mut self.free);
+        subtract_product(&mechanics.damping, v, &mut self.free);
+        subtract_product(&mechanics.stiffness, x, &mut self.free);
+        for (i, slider) in mechanics.sliders.iter().enumerate() {
+            let force = match slider.state {
+                Some(s) => state[2 * n + s],
+                None => self.contacts[i].sign() * slider.limit,
+            };
+            if force != 0.0 {
+                self.free.axpy(-force, &slider.direction, 1.0);
+            }
+        }
+        multiply(&mechanics.inverse_mass, &self.free, &mut self.acceleration);
+        if self.at_rest.is_empty() && !elastic_undecided {
+            return true;
+        }
+        if !self.settle_rigid(mechanics, drive, time, state) {
+            return false;
+        }
+        if elastic_undecided {
+            self.settle_elastic(mechanics, drive, time, state, still);
+        }
+        true
+    }
+
+    /// Rigid sliders at rest: accelerations first, then higher derivatives for those at their limit.
+    fn settle_rigid(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64]) -> bool {
+        if self.at_rest.is_empty() {
+            return true;
+        }
+        let limits =
+            DVector::from_iterator(self.at_rest.len(), self.at_rest.iter().map(|&i| mechanics.sliders[i].limit));
+        let delassus = delassus(mechanics, &self.at_rest);
+        let push = self.push(mechanics, drive, time, 2, &self.acceleration);
+        let Some(lambda) = complementarity::solve(&delassus, &push, &-&limits, &limits) else {
+            return false;
+        };
+        let relative = &push - &delassus * &lambda;
+        let size = push.amax() + (&delassus * &limits).amax();
+        self.undecided.clear();
+        for (k, &i) in self.at_rest.iter().enumerate() {
+            if relative[k].abs() > BALANCED * size {
+                self.contacts[i] = Contact::slip(lambda[k]);
+            } else if lambda[k].abs() >= limits[k] * (1.0 - AT_LIMIT) {
+                self.undecided.push(i);
+            }
+            self.acceleration -= &mechanics.inverse_mass * &mechanics.sliders[i].direction * lambda[k];
+        }
+        if !self.undecided.is_empty() {
+            let signs: Vec<(usize, f64)> = self
+                .at_rest
+                .iter()
+                .enumerate()
+                .filter(|(_, i)| self.undecided.contains(i))
+                .map(|(k, &i)| (i, lambda[k].signum()))
+                .collect();
+            self.settle_derivatives(mechanics, drive, time, state, signs);
+        }
+        true
+    }
+
+    /// Relative acceleration (order 2) or a higher derivative of the sliders at rest that `motion` gives, with imposed motion.
+    fn push(&self, mechanics: &Mechanics, drive: &Drive, time: f64, order: u32, motion: &DVector<f64>) -> DVector<f64> {
+        DVector::from_iterator(
+            self.at_rest.len(),
+            self.at_rest.iter().map(|&i| mechanics.sliders[i].direction.dot(motion) + drive.imposed_at(i, time, order)),
+        )
+    }
+
+    /// Sliders exactly at their limit with zero acceleration: `signs` holds them with the sign of their force.
+    fn settle_derivatives(
+        &mut self,
+        mechanics: &Mechanics,
+        drive: &Drive,
+        time: f64,
+        state: &[f64],
+        mut signs: Vec<(usize, f64)>,
+    ) {
+        let n = mechanics.n;
+        // x, v, a, jerk, …: each row is the derivative of the one before
+        let mut derivatives = vec![
+            DVector::from_column_slice(&state[..n]),
+            DVector::from_column_slice(&state[n..2 * n]),
+            self.acceleration.clone(),
+        ];
+        for level in 1..LEVELS {
+            self.at_rest.retain(|i| self.contacts[*i] == Contact::Stick);
+            let delassus = delassus(mechanics, &self.at_rest);
+            self.free_derivative(mechanics, drive, time, level, &derivatives);
+            let mut jerk = std::mem::replace(&mut self.jerk, DVector::zeros(0));
+            multiply(&mechanics.inverse_mass, &self.free, &mut jerk);
+            let push = self.push(mechanics, drive, time, level + 2, &jerk);
+            let infinite = f64::INFINITY;
+            let bound = |side: f64| {
+                DVector::from_iterator(
+                    self.at_rest.len(),
+                    self.at_rest.iter().map(|i| match signs.iter().find(|(s, _)| s == i) {
+                        // a force at its limit can only recede
+                        Some((_, sign)) if *sign == side => 0.0,
+                        _ => side * infinite,
+                    }),
+                )
+            };
+            let Some(rate) = complementarity::solve(&delassus, &push, &bound(-1.0), &bound(1.0)) else { break };
+            let relative = &push - &delassus * &rate;
+            let size = push.amax().max((&delassus * &rate).amax());
+            let mut left = Vec::new();
+            for (k, &i) in self.at_rest.iter().enumerate() {
+                if let Some(&(_, sign)) = signs.iter().find(|(s, _)| *s == i) {
+                    if relative[k] * sign > BALANCED * size && size > 0.0 {
+                        self.contacts[i] = Contact::slip(sign);
+                    } else if rate[k] * sign * delassus[(k, k)] > -BALANCED * size {
+                        left.push((i, sign));
+                    }
+                }
+                jerk -= &mechanics.inverse_mass * &mechanics.sliders[i].direction * rate[k];
+            }
+            derivatives.push(jerk.clone());
+            self.jerk = jerk;
+            if left.is_empty() {
+                return;
+            }
+            signs = left;
+        }
+        if self.jerk.len() != n {
+            self.jerk = DVector::zeros(n);
+        }
+    }
+
+    /// The `level`-th derivative of the forces other than those of rigid sliders at rest, into `self.free`.
+    fn free_derivative(
+        &mut self,
+        mechanics: &Mechanics,
+        drive: &Drive,
+        time: f64,
+        level: u32,
+        derivatives: &[DVector<f64>],
+    ) {
+        let l = level as usize;
+        self.free.fill(0.0);
+        drive.add_force(time, level, &mut self.free);
+        subtract_product(&mechanics.damping, derivatives[l + 1].as_slice(), &mut self.free);
+        subtract_product(&mechanics.stiffness, derivatives[l].as_slice(), &mut self.free);
+        for (i, slider) in mechanics.sliders.iter().enumerate() {
+            if let (Some(kt), Contact::Stick) = (slider.stiffness, self.contacts[i]) {
+                let force = kt * (slider.direction.dot(&derivatives[l]) + drive.imposed_at(i, time, level));
+                self.free.axpy(-force, &slider.direction, 1.0);
+            }
+        }
+    }
+
+    /// Sliders behind springs, at their limit with zero relative velocity: the acceleration decides.
+    fn settle_elastic(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64], still: f64) {
+        let n = mechanics.n;
+        for (i, slider) in mechanics.sliders.iter().enumerate() {
+            let Some(s) = slider.state else { continue };
+            let force = state[2 * n + s];
+            let velocity = relative(slider, &state[n..2 * n]) + drive.imposed_at(i, time, 1);
+            if force.abs() < slider.limit * (1.0 - AT_LIMIT) || velocity.abs() > still {
+                continue;
+            }
+            let acceleration = slider.direction.dot(&self.acceleration) + drive.imposed_at(i, time, 2);
+            if acceleration * force > 0.0 {
+                self.contacts[i] = Contact::slip(force);
+            }
+        }
+    }
+}
+
+fn delassus(mechanics: &Mechanics, sliders: &[usize]) -> DMatrix<f64> {
+    DMatrix::from_fn(sliders.len(), sliders.len(), |a, b| {
+        let (wa, wb) = (&mechanics.sliders[sliders[a]].direction, &mechanics.sliders[sliders[b]].direction);
+        wa.dot(&(&mechanics.inverse_mass * wb))
+    })
+}
+
+fn relative(slider: &super::mechanics::Slider, v: &[f64]) -> f64 {
+    slider.direction.iter().zip(v).map(|(w, v)| w * v).sum()
+}
+
+fn subtract_product(matrix: &DMatrix<f64>, vector: &[f64], out: &mut DVector<f64>) {
+    for (j, value) in vector.iter().enumerate() {
+        if *value != 0.0 {
+            out.axpy(-*value, &matrix.column(j), 1.0);
+        }
+    }
+}
+
+fn multiply(matrix: &DMatrix<f64>, vector: &DVector<f64>, out: &mut DVector<f64>) {
+    out.gemv(1.0, matrix, vector, 0.0);
+}

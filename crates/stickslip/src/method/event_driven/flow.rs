@@ -1,0 +1,462 @@
+//! The motion over a stretch of time: closed-form segments joined at the switches, with its exact sensitivity.
+
+use super::decide::{AT_LIMIT, Decision, REST};
+use super::mechanics::{Contact, Drive, Mechanics};
+use super::pattern::{Driven, Pattern, Work};
+use crate::method::Breakdown;
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use std::collections::BTreeMap;
+use stickslip_numerics::signal::{Basis, Begin, FirstZero, Scratch, real_dot};
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// Switches in one stretch beyond which the motion counts as chatter. Den Hartog's oscillator at a fiftieth of its natural
+/// frequency has some 200.
+pub(crate) const SWITCH_LIMIT: usize = 20_000;
+/// Switches at one and the same instant beyond which the decision is going round in circles: every slider may change once
+/// per derivative that decides.
+const AT_ONCE_LIMIT: usize = 8;
+
+/// One closed-form stretch of the motion.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Segment {
+    /// Start, s.
+    pub start: f64,
+    /// Length, s.
+    pub length: f64,
+    /// Index of the pattern.
+    pub pattern: usize,
+    /// Coefficients of the displacements, n × basis, row after row.
+    pub displacement: Vec<Complex64>,
+    /// Forces of the sliders, sliders × basis, row after row.
+    pub force: Vec<Complex64>,
+}
+
+struct Slot {
+    pattern: Pattern,
+    /// Made for the present drive when the pattern first occurs under it.
+    driven: Option<Driven>,
+}
+
+impl Slot {
+    fn driven(&self) -> &Driven {
+        self.driven.as_ref().expect("a pattern is driven before it is used")
+    }
+}
+
+/// Runs the motion; keeps patterns, memory and the last run's segments.
+pub(crate) struct Flow {
+    pub mechanics: Mechanics,
+    pub drive: Drive,
+    slots: Vec<Slot>,
+    index: BTreeMap<Vec<Contact>, usize>,
+    segments: Vec<Segment>,
+    /// Number of segments of the last run.
+    used: usize,
+    /// Number of switches of the last run.
+    pub switches: usize,
+    decision: Decision,
+    work: Work,
+    scratch: Scratch,
+    values: Vec<Complex64>,
+    velocity: Vec<Complex64>,
+    acceleration: Vec<Complex64>,
+    multipliers: Vec<Complex64>,
+    signals: Vec<Complex64>,
+    begins: Vec<Begin>,
+    watched: Vec<usize>,
+    before: DVector<f64>,
+    after: DVector<f64>,
+    row: DVector<f64>,
+}
+
+impl Flow {
+    pub fn new(mechanics: Mechanics, drive: Drive) -> Self {
+        let (work, decision) = (Work::new(&mechanics, drive.rates.len()), Decision::new(&mechanics));
+        let states = mechanics.states();
+        Flow {
+            mechanics,
+            drive,
+            slots: Vec::new(),
+            index: BTreeMap::new(),
+            segments: Vec::new(),
+            used: 0,
+            switches: 0,
+            decision,
+            work,
+            scratch: Scratch::default(),
+            values: Vec::new(),
+            velocity: Vec::new(),
+            acceleration: Vec::new(),
+            multipliers: Vec::new(),
+            signals: Vec::new(),
+            begins: Vec::new(),
+            watched: Vec::new(),
+            before: DVector::zeros(states),
+            after: DVector::zeros(states),
+            row: DVector::zeros(states),
+        }
+    }
+
+    /// The segments of the last run, with the basis of each.
+    pub fn segments(&self) -> impl Iterator<Item = (&Segment, &Basis, &Pattern)> {
+        self.segments[..self.used].iter().map(|s| {
+            let slot = &self.slots[s.pattern];
+            (s, &slot.driven().basis, &slot.pattern)
+        })
+    }
+
+    /// Runs from `state` (changed to the end state) over `[start, start + duration]`. `sensitivity`, if given, is multiplied
+    /// from the left by the derivative of the end state with respect to the initial state.
+    pub fn run(
+        &mut self,
+        state: &mut [f64],
+        start: f64,
+        duration: f64,
+        mut sensitivity: Option<&mut DMatrix<f64>>,
+    ) -> Result<(), Breakdown> {
+        self.used = 0;
+        self.switches = 0;
+        let n = self.mechanics.n;
+        for slider in &self.mechanics.sliders {
+            if let Some(s) = slider.state {
+                state[2 * n + s] = state[2 * n + s].clamp(-slider.limit, slider.limit);
+            }
+        }
+        let velocity_scale = self.velocity_scale(state);
+        let end = start + duration;
+        let mut time = start;
+        let mut at_once = 0;
+        if !self.decision.decide(&self.mechanics, &self.drive, time, state, velocity_scale) {
+            return Err(Breakdown::Undecidable { time });
+        }
+        loop {
+            let pattern = self.pattern(time)?;
+            self.start_segment(time, pattern, state);
+            self.watch(velocity_scale);
+            let rest = end - time;
+            let basis = &self.slots[pattern].driven().basis;
+            let zero = basis.first_zero(&self.signals, &self.begins, rest, &mut self.scratch);
+            let (length, event) = match zero {
+                FirstZero::None => (rest, None),
+                FirstZero::At { index, time } => (time, Some(self.watched[index])),
+                FirstZero::TooManySteps => return Err(Breakdown::TooFast { time }),
+            };
+            self.finish_segment(length, state, sensitivity.as_deref_mut());
+            let Some(slider) = event else { return Ok(()) };
+            time += length;
+            self.switches += 1;
+            at_once = if length <= f64::EPSILON * end.abs() { at_once + 1 } else { 0 };
+            if self.switches > SWITCH_LIMIT || at_once > AT_ONCE_LIMIT * (1 + self.mechanics.sliders.len()) {
+                let joint = self.mechanics.sliders[slider].joint;
+                return Err(Breakdown::Chatter { time, switches: self.switches, joint });
+            }
+            let old = self.slots[pattern].pattern.contacts[slider];
+            if old != Contact::Stick || self.mechanics.sliders[slider].state.is_some() {
+                self.snap(slider, old, state);
+            }
+            if !self.decision.decide(&self.mechanics, &self.drive, time, state, velocity_scale) {
+                return Err(Breakdown::Undecidable { time });
+            }
+            if let Some(sensitivity) = sensitivity.as_deref_mut() {
+                self.jump(slider, pattern, time, state, sensitivity);
+            }
+        }
+    }
+
+    /// The largest relative velocity to be expected: from the state and the imposed motion.
+    fn velocity_scale(&self, state: &[f64]) -> f64 {
+        let n = self.mechanics.n;
+        let fastest = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
+        // displacements count with the drive frequency, so that a start at a reversal has a scale too
+        let widest = state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs())) * self.drive.omega;
+        let imposed = self
+            .drive
+            .imposed
+            .iter()
+            .zip(&self.drive.rates)
+            .flat_map(|(g, rate)| g.iter().map(move |g| g.norm() * rate));
+        let largest = imposed.fold(fastest.max(widest), f64::max);
+        if largest > 0.0 {
+            return largest;
+        }
+        // everything rests: a velocity that the load gives to the masses in a period
+        let load = self
+            .drive
+            .constant
+            .amax()
+            .max(self.drive.forces.iter().map(|f| f.map(|z| z.norm()).amax()).fold(0.0, f64::max));
+        let mobility = if n == 0 { 1.0 } else { self.mechanics.inverse_mass.amax() };
+        (load * mobility / self.drive.omega.max(1.0)).max(f64::MIN_POSITIVE)
+    }
+
+    /// The pattern that was decided, with its response to the drive.
+    fn pattern(&mut self, time: f64) -> Result<usize, Breakdown> {
+        // slip direction does not change the linear motion but the constants; patterns are kept per direction for simplicity
+        let found = self.index.get(&self.decision.contacts).copied();
+        let index = match found {
+            Some(index) => index,
+            None => {
+                let contacts = self.decision.contacts.clone();
+                let pattern = Pattern::new(&self.mechanics, &contacts)
+                    .map_err(|defective| Breakdown::Defective { time, lambda: defective.lambda.norm() })?;
+                self.slots.push(Slot { pattern, driven: None });
+                self.index.insert(contacts, self.slots.len() - 1);
+                self.slots.len() - 1
+            }
+        };
+        let slot = &mut self.slots[index];
+        if slot.driven.is_none() {
+            slot.driven = Some(slot.pattern.drive(&self.mechanics, &self.drive));
+        }
+        Ok(index)
+    }
+
+    /// Changes the drive; patterns stay.
+    pub fn set_drive(&mut self, drive: Drive) {
+        self.work = Work::new(&self.mechanics, drive.rates.len());
+        self.drive = drive;
+        self.slots.iter_mut().for_each(|slot| slot.driven = None);
+    }
+
+    fn start_segment(&mut self, time: f64, pattern: usize, state: &[f64]) {
+        if self.segments.len() == self.used {
+            self.segments.push(Segment::default());
+        }
+        let segment = &mut self.segments[self.used];
+        let (shape, driven) = (&self.slots[pattern].pattern, self.slots[pattern].driven());
+        let (n, nb, sliders) = (self.mechanics.n, driven.basis.len(), self.mechanics.sliders.len());
+        (segment.start, segment.pattern) = (time, pattern);
+        segment.displacement.resize(n * nb, ZERO);
+        segment.force.resize(sliders * nb, ZERO);
+        shape.displacement(
+            &self.mechanics,
+            &self.drive,
+            driven,
+            time,
+            state,
+            &mut self.work,
+            &mut segment.displacement,
+        );
+        self.velocity.resize(n * nb, ZERO);
+        self.acceleration.resize(n * nb, ZERO);
+        for row in 0..n {
+            let range = row * nb..(row + 1) * nb;
+            driven.basis.differentiate(&segment.displacement[range.clone()], &mut self.velocity[range.clone()]);
+            driven.basis.differentiate(&self.velocity[range.clone()], &mut self.acceleration[range]);
+        }
+        self.forces(time, pattern, state);
+    }
+
+    /// Forces of all sliders as signals.
+    fn forces(&mut self, time: f64, pattern: usize, state: &[f64]) {
+        let segment = &mut self.segments[self.used];
+        let (shape, driven) = (&self.slots[pattern].pattern, self.slots[pattern].driven());
+        let (n, basis) = (self.mechanics.n, &driven.basis);
+        let (nb, constant, modes) = (basis.len(), basis.constant(), shape.lambda.len());
+        segment.force.fill(ZERO);
+        for (i, slider) in self.mechanics.sliders.iter().enumerate() {
+            let row = &mut segment.force[i * nb..(i + 1) * nb];
+            match (shape.contacts[i], slider.stiffness) {
+                (Contact::Stick, None) => {}
+                (Contact::Stick, Some(kt)) => {
+                    let state_index = 2 * n + slider.state.expect("a slider behind a spring has a state");
+                    let stretch: f64 = (0..n).map(|k| slider.direction[k] * state[k]).sum();
+                    row[constant].re = state[state_index] - kt * (stretch + self.drive.imposed_at(i, time, 0));
+                    for k in 0..n {
+                        let w = kt * slider.direction[k];
+                        if w != 0.0 {
+                            for (f, x) in row.iter_mut().zip(&segment.displacement[k * nb..(k + 1) * nb]) {
+                                *f += x * w;
+                            }
+                        }
+                    }
+                    for h in 0..self.drive.rates.len() {
+                        row[modes + h] += self.drive.imposed[h][i] * turn(self.drive.rates[h], time) * kt;
+                    }
+                }
+                (slip, _) => row[constant].re = slip.sign() * slider.limit,
+            }
+        }
+        if shape.held.is_empty() {
+            return;
+        }
+        // λ = multiplier (F - C v - K x - other sliders) + inverse_delassus g''
+        for b in 0..nb {
+            for row in 0..n {
+                let mut push = ZERO;
+                if b >= modes && b < modes + self.drive.rates.len() {
+                    let h = b - modes;
+                    push += self.drive.forces[h][row] * turn(self.drive.rates[h], time);
+                } else if b == constant {
+                    push.re += self.drive.constant[row];
+                }
+                for k in 0..n {
+                    push -= self.velocity[k * nb + b] * self.mechanics.damping[(row, k)];
+                    push -= segment.displacement[k * nb + b] * self.mechanics.stiffness[(row, k)];
+                }
+                for (i, slider) in self.mechanics.sliders.iter().enumerate() {
+                    push -= segment.force[i * nb + b] * slider.direction[row];
+                }
+                self.values.resize(n.max(nb), ZERO);
+                self.values[row] = push;
+            }
+            for s in 0..shape.held.len() {
+                // the rows of held sliders are filled last, so that they do not count among the others above
+                let mut force = ZERO;
+                for row in 0..n {
+                    force += self.values[row] * shape.multiplier[(s, row)];
+                }
+                if b >= modes && b < modes + self.drive.rates.len() {
+                    let h = b - modes;
+                    let rate = self.drive.rates[h];
+                    for (t, &j) in shape.held.iter().enumerate() {
+                        force -= self.drive.imposed[h][j]
+                            * turn(rate, time)
+                            * (rate * rate * shape.inverse_delassus[(s, t)]);
+                    }
+                }
+                self.multipliers.push(force);
+            }
+            for (force, &i) in self.multipliers.drain(..).zip(&shape.held) {
+                segment.force[i * nb + b] = force;
+            }
+        }
+    }
+
+    /// The signals whose zeros are switches: `limit ∓ f` in stick, the velocity in slip direction in slip.
+    fn watch(&mut self, velocity_scale: f64) {
+        let segment = &self.segments[self.used];
+        let (shape, driven) = (&self.slots[segment.pattern].pattern, self.slots[segment.pattern].driven());
+        let (n, nb) = (self.mechanics.n, driven.basis.len());
+        let (constant, modes) = (driven.basis.constant(), shape.lambda.len());
+        self.values.resize(n.max(nb), ZERO);
+        driven.basis.evaluate(0.0, &mut self.values[..nb]);
+        self.signals.clear();
+        self.begins.clear();
+        self.watched.clear();
+        for (i, slider) in self.mechanics.sliders.iter().enumerate() {
+            if shape.contacts[i] == Contact::Stick {
+                let force = &segment.force[i * nb..(i + 1) * nb];
+                let now = real_dot(force, &self.values[..nb]);
+                for side in [1.0, -1.0] {
+                    let at = self.signals.len();
+                    self.signals.extend(force.iter().map(|f| f * -side));
+                    self.signals[at + constant].re += slider.limit;
+                    self.begins.push(begin(slider.limit - side * now, AT_LIMIT * slider.limit));
+                    self.watched.push(i);
+                }
+            } else {
+                let (at, sign) = (self.signals.len(), shape.contacts[i].sign());
+                self.signals.resize(at + nb, ZERO);
+                let signal = &mut self.signals[at..];
+                for k in 0..n {
+                    let w = sign * slider.direction[k];
+                    if w != 0.0 {
+                        for (s, v) in signal.iter_mut().zip(&self.velocity[k * nb..(k + 1) * nb]) {
+                            *s += v * w;
+                        }
+                    }
+                }
+                for h in 0..self.drive.rates.len() {
+                    let rate = self.drive.rates[h];
+                    let velocity = self.drive.imposed[h][i] * turn(rate, segment.start) * Complex64::new(0.0, rate);
+                    signal[modes + h] += velocity * sign;
+                }
+                let now = real_dot(signal, &self.values[..nb]);
+                self.begins.push(begin(now, REST * velocity_scale));
+                self.watched.push(i);
+            }
+        }
+    }
+
+    /// Ends the current segment: end state, sensitivity.
+    fn finish_segment(&mut self, length: f64, state: &mut [f64], sensitivity: Option<&mut DMatrix<f64>>) {
+        let segment = &mut self.segments[self.used];
+        segment.length = length;
+        self.used += 1;
+        let (shape, driven) = (&self.slots[segment.pattern].pattern, self.slots[segment.pattern].driven());
+        let (n, nb) = (self.mechanics.n, driven.basis.len());
+        self.values.resize(n.max(nb), ZERO);
+        driven.basis.evaluate(length, &mut self.values[..nb]);
+        let values = &self.values[..nb];
+        for row in 0..n {
+            let range = row * nb..(row + 1) * nb;
+            state[row] = real_dot(&segment.displacement[range.clone()], values);
+            state[n + row] = real_dot(&self.velocity[range.clone()], values);
+            self.before[n + row] = real_dot(&self.acceleration[range], values);
+        }
+        for (i, slider) in self.mechanics.sliders.iter().enumerate() {
+            if let Some(s) = slider.state {
+                state[2 * n + s] = real_dot(&segment.force[i * nb..(i + 1) * nb], values);
+            }
+        }
+        if let Some(sensitivity) = sensitivity {
+            shape.carry(&self.mechanics, length, values, sensitivity, &mut self.work);
+        }
+    }
+
+    /// A spring force that reached its limit is set exactly there.
+    fn snap(&self, slider: usize, old: Contact, state: &mut [f64]) {
+        let slider = &self.mechanics.sliders[slider];
+        if let (Some(s), Contact::Stick) = (slider.state, old) {
+            let force = &mut state[2 * self.mechanics.n + s];
+            *force = slider.limit.copysign(*force);
+        }
+    }
+
+    /// The jump of the sensitivity at a switch of `slider` (saltation): `S = I + (F⁺ - F⁻) ∇g / g'`.
+    /// Source: Leine and Nijmeijer (2004), Sec. 7.
+    fn jump(&mut self, slider: usize, pattern: usize, time: f64, state: &[f64], sensitivity: &mut DMatrix<f64>) {
+        let n = self.mechanics.n;
+        let contacts = &self.slots[pattern].pattern.contacts;
+        let body = &self.mechanics.sliders[slider];
+        // rates of the state before and after: displacements go on smoothly
+        for row in 0..n {
+            self.after[n + row] = self.decision.acceleration[row];
+            (self.before[row], self.after[row]) = (0.0, 0.0);
+        }
+        for (i, other) in self.mechanics.sliders.iter().enumerate() {
+            if let (Some(s), Some(kt)) = (other.state, other.stiffness) {
+                let velocity: f64 =
+                    (0..n).map(|k| other.direction[k] * state[n + k]).sum::<f64>() + self.drive.imposed_at(i, time, 1);
+                let rate = |contact: Contact| if contact == Contact::Stick { kt * velocity } else { 0.0 };
+                self.before[2 * n + s] = rate(contacts[i]);
+                self.after[2 * n + s] = rate(self.decision.contacts[i]);
+            }
+        }
+        self.row.fill(0.0);
+        let slope = match (contacts[slider], body.state) {
+            (Contact::Stick, Some(s)) => {
+                self.row[2 * n + s] = 1.0;
+                self.before[2 * n + s]
+            }
+            // a rigid slider lets go with continuous forces: nothing jumps
+            (Contact::Stick, None) => return,
+            _ => {
+                for k in 0..n {
+                    self.row[n + k] = body.direction[k];
+                }
+                body.direction.dot(&self.before.rows(n, n)) + self.drive.imposed_at(slider, time, 2)
+            }
+        };
+        if slope == 0.0 {
+            return; // grazing: the derivative does not exist, the one-sided one of "no switch" is taken
+        }
+        self.after -= &self.before;
+        for mut column in sensitivity.column_iter_mut() {
+            let along = self.row.dot(&column) / slope;
+            column.axpy(along, &self.after, 1.0);
+        }
+    }
+}
+
+fn turn(rate: f64, time: f64) -> Complex64 {
+    let (sin, cos) = (rate * time).sin_cos();
+    Complex64::new(cos, sin)
+}
+
+fn begin(value: f64, zero: f64) -> Begin {
+    if value > zero { Begin::Positive } else { Begin::Zero }
+}

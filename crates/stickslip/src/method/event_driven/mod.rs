@@ -1,0 +1,140 @@
+//! The exact method: between switches the motion is a closed form, and switches are zeros of analytic signals.
+//!
+//! - `mechanics`: the system as masses, springs and ideal sliders;
+//! - `pattern`: the linear motion while a pattern of stick and slip lasts;
+//! - `decide`: which pattern begins at an instant;
+//! - `flow`: segments joined at the switches, with the exact derivative of the motion;
+//! - `path`: the orbit's numbers from its segments.
+//!
+//! The periodic orbit is found by Newton's method on the return map. If the excitation has only odd harmonics the half period
+//! `x(t + T/2) = -x(t)` is solved: half the work, and regular also where a joint sticks for the whole period.
+
+mod decide;
+mod flow;
+mod mechanics;
+mod path;
+mod pattern;
+
+pub use mechanics::Contact;
+
+use super::guess::Guess;
+use super::periodic::{Aim, ReturnMap, close};
+use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, Solver};
+use crate::model::System;
+use crate::orbit::{Orbit, Symmetry};
+use flow::Flow;
+use mechanics::{Drive, Mechanics};
+use nalgebra::DMatrix;
+
+pub(crate) const NAME: &str = "event-driven";
+
+/// The row of this method in [`super::TABLE`].
+pub(super) const INFO: MethodInfo = MethodInfo {
+    name: NAME,
+    summary: "exact: closed-form motion between switches, Newton on the period",
+    options: &[],
+    build: |_| Ok(Box::new(EventDriven)),
+};
+
+/// Residual at which an orbit is closed, relative to its state: a hundred times the rounding of one period.
+const CLOSED: f64 = 1e-12;
+/// Energy gap above which an orbit is not reported as converged. The closed-form integrals are exact to about 1e-12.
+const ENERGY_GAP: f64 = 1e-8;
+
+/// The exact method.
+///
+/// # Example
+/// ```
+/// use stickslip::method::{Method, event_driven::EventDriven};
+/// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+/// let orbit = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25, None).unwrap();
+/// assert!((orbit.place("blade1").unwrap().amplitude() - 0.0489246).abs() < 1e-6);
+/// assert!(orbit.evidence.energy_gap < 1e-9);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EventDriven;
+
+impl Method for EventDriven {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        let mechanics = Mechanics::new(system)?;
+        let weights = vec![1.0; mechanics.states()];
+        Ok(Box::new(Exact { system, flow: Flow::new(mechanics, Drive::default()), weights, duration: 0.0 }))
+    }
+}
+
+struct Exact<'a> {
+    system: &'a System,
+    flow: Flow,
+    weights: Vec<f64>,
+    duration: f64,
+}
+
+impl ReturnMap for Exact<'_> {
+    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), Breakdown> {
+        self.flow.run(state, 0.0, self.duration, derivative)
+    }
+    fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+}
+
+impl Exact<'_> {
+    /// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia.
+    fn set_weights(&mut self, omega: f64) {
+        let mechanics = &self.flow.mechanics;
+        let n = mechanics.n;
+        for i in 0..n {
+            let inertia = omega * omega * mechanics.mass[(i, i)];
+            self.weights[i] = mechanics.stiffness[(i, i)].max(inertia).sqrt();
+            self.weights[n + i] = mechanics.mass[(i, i)].sqrt();
+        }
+        for slider in &mechanics.sliders {
+            if let (Some(s), Some(kt)) = (slider.state, slider.stiffness) {
+                self.weights[2 * n + s] = 1.0 / kt.sqrt();
+            }
+        }
+    }
+
+    fn first_state(&self, omega: f64) -> Vec<f64> {
+        let mechanics = &self.flow.mechanics;
+        let guess = Guess::new(self.system, omega);
+        let mut state = guess.state(mechanics.n);
+        state.resize(mechanics.states(), 0.0);
+        state
+    }
+}
+
+impl Solver for Exact<'_> {
+    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        if !(omega.is_finite() && omega > 0.0) {
+            return Err(OrbitError::Frequency { omega });
+        }
+        let drive = Drive::new(self.system, &self.flow.mechanics, omega);
+        self.flow.set_drive(drive);
+        self.set_weights(omega);
+        let (symmetry, sign, share) =
+            if self.system.is_odd() { (Symmetry::HalfPeriod, -1.0, 0.5) } else { (Symmetry::FullPeriod, 1.0, 1.0) };
+        self.duration = share * std::f64::consts::TAU / omega;
+        let aim = Aim { method: NAME, omega, residual: CLOSED, sign };
+        let warm = start.filter(|state| state.len() == self.flow.mechanics.states());
+        let closed = match warm.map(|state| close(self, state, aim)) {
+            Some(Ok(closed)) => closed,
+            _ => {
+                let first = self.first_state(omega);
+                close(self, &first, aim)?
+            }
+        };
+        // the last run of the iteration was a trial only if it was accepted: run the orbit itself once more for its segments
+        let mut end = closed.state.clone();
+        let broke = |cause| OrbitError::Breakdown { method: NAME, omega, cause };
+        self.flow.run(&mut end, 0.0, self.duration, None).map_err(broke)?;
+        let orbit = path::orbit(self.system, &self.flow, omega, symmetry, closed);
+        if orbit.evidence.energy_gap > ENERGY_GAP {
+            return Err(OrbitError::Evidence { method: NAME, omega, energy_gap: orbit.evidence.energy_gap });
+        }
+        Ok(orbit)
+    }
+}

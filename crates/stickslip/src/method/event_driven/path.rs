@@ -1,0 +1,466 @@
+//! The orbit's numbers from its closed-form segments.
+
+use super::flow::{Flow, Segment};
+use super::mechanics::Contact;
+use super::{NAME, mechanics::Drive};
+use crate::method::periodic::Closed;
+use crate::model::System;
+use crate::orbit::{Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
+use num_complex::Complex64;
+use std::sync::Arc;
+use stickslip_numerics::signal::{Basis, Begin, FirstZero, Scratch, integral_of_product, real_dot};
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// Work below this fraction of (force times velocity) of the period is no yardstick for the energy gap: the motion is conservative.
+const NO_WORK: f64 = 1e-6;
+
+/// The closed-form segments of one return, with all that is needed to evaluate them.
+#[derive(Debug, Clone)]
+struct ExactPath {
+    system: System,
+    pieces: Vec<Piece>,
+    symmetry: Symmetry,
+    period: f64,
+    rates: Vec<f64>,
+}
+
+#[derive(Debug, Clone)]
+struct Piece {
+    segment: Segment,
+    basis: Basis,
+    modes: usize,
+    contacts: Vec<Contact>,
+    velocity: Vec<Complex64>,
+    acceleration: Vec<Complex64>,
+}
+
+/// Makes the orbit of the flow's last run.
+pub(super) fn orbit(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
+    let path = ExactPath::new(system, flow, omega, symmetry);
+    let times = if symmetry == Symmetry::HalfPeriod { 2 } else { 1 };
+    let places = path.places(omega);
+    let joints = path.joints(flow);
+    let energy = path.energy(flow, omega, &joints);
+    let stuck = joints
+        .iter()
+        .zip(&system.joints)
+        .filter(|(motion, _)| motion.slip_fraction == 0.0)
+        .map(|(_, j)| j.name.clone());
+    let reference = energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive));
+    let balance = energy.work_in - energy.viscous - energy.friction;
+    Orbit {
+        method: NAME,
+        omega,
+        symmetry,
+        start: closed.state,
+        evidence: Evidence {
+            residual: closed.residual,
+            energy_gap: if reference > 0.0 { balance.abs() / reference } else { balance.abs() },
+            switches: times * flow.switches,
+            iterations: closed.iterations,
+            truncation: None,
+            stuck: stuck.collect(),
+        },
+        places,
+        joints,
+        energy,
+        return_map: closed.derivative,
+        path: Arc::new(path),
+    }
+}
+
+impl ExactPath {
+    fn new(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry) -> Self {
+        let n = system.dofs();
+        let pieces = flow
+            .segments()
+            .map(|(segment, basis, pattern)| {
+                let nb = basis.len();
+                let derivative = |of: &[Complex64]| {
+                    let mut out = vec![ZERO; n * nb];
+                    for row in 0..n {
+                        basis.differentiate(&of[row * nb..(row + 1) * nb], &mut out[row * nb..(row + 1) * nb]);
+                    }
+                    out
+                };
+                let velocity = derivative(&segment.displacement);
+                Piece {
+                    acceleration: derivative(&velocity),
+                    velocity,
+                    segment: segment.clone(),
+                    basis: basis.clone(),
+                    modes: pattern.lambda.len(),
+                    contacts: pattern.contacts.clone(),
+                }
+            })
+            .collect();
+        let period = std::f64::consts::TAU / omega;
+        ExactPath { system: system.clone(), pieces, symmetry, period, rates: flow.drive.rates.clone() }
+    }
+
+    /// How often the segments are run through in a period.
+    fn times(&self) -> f64 {
+        if self.symmetry == Symmetry::HalfPeriod { 2.0 } else { 1.0 }
+    }
+
+    fn places(&self, omega: f64) -> Vec<PlaceMotion> {
+        let n = self.system.dofs();
+        let mut scratch = Scratch::default();
+        let mut values = Vec::new();
+        (0..n)
+            .map(|i| {
+                let (mut maximum, mut minimum) = (f64::NEG_INFINITY, f64::INFINITY);
+                let (mut integral, mut fourier) = (0.0, ZERO);
+                for piece in &self.pieces {
+                    let nb = piece.basis.len();
+                    let (x, v) =
+                        (&piece.segment.displacement[i * nb..(i + 1) * nb], &piece.velocity[i * nb..(i + 1) * nb]);
+                    let (low, high) = piece.extremes(x, v, &mut scratch, &mut values);
+                    (maximum, minimum) = (maximum.max(high), minimum.min(low));
+                    if self.symmetry == Symmetry::FullPeriod {
+                        integral += piece.basis.integral(x, piece.segment.length);
+                    }
+                    let turn = Complex64::new(0.0, -omega * piece.segment.start).exp();
+                    fourier += piece.basis.fourier_integral(x, omega, piece.segment.length) * turn;
+                }
+                if self.symmetry == Symmetry::HalfPeriod {
+                    maximum = maximum.max(-minimum);
+                    minimum = -maximum;
+                }
+                PlaceMotion {
+                    name: self.system.places[i].clone(),
+                    maximum,
+                    minimum,
+                    mean: integral / self.period,
+                    first_harmonic: fourier * (2.0 * self.times() / self.period),
+                }
+            })
+            .collect()
+    }
+
+    fn joints(&self, flow: &Flow) -> Vec<JointMotion> {
+        let n = self.system.dofs();
+        let mut scratch = Scratch::default();
+        let mut values = Vec::new();
+        self.system
+            .joints
+            .iter()
+            .enumerate()
+            .map(|(j, joint)| {
+                let sliders: Vec<usize> =
+                    (0..flow.mechanics.sliders.len()).filter(|&s| flow.mechanics.sliders[s].joint == j).collect();
+                let (mut dissipation, mut slipping, mut switches) = (0.0, 0.0, 0);
+                let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+                let mut before: Option<&Piece> = None;
+                for piece in &self.pieces {
+                    let nb = piece.basis.len();
+                    let mut u = vec![ZERO; nb];
+                    for i in 0..n {
+                        let w = joint.direction[(i, 0)];
+                        if w != 0.0 {
+                            let x = &piece.segment.displacement[i * nb..(i + 1) * nb];
+                            u.iter_mut().zip(x).for_each(|(u, x)| *u += x * w);
+                        }
+                    }
+                    self.add_imposed(piece, &joint.imposed, &mut u);
+                    let mut velocity = vec![ZERO; nb];
+                    piece.basis.differentiate(&u, &mut velocity);
+                    values.resize(nb, ZERO);
+                    piece.basis.evaluate(piece.segment.length, &mut values);
+                    let at_end = real_dot(&u, &values);
+                    piece.basis.evaluate(0.0, &mut values);
+                    let travel = at_end - real_dot(&u, &values);
+                    let (least, most) = piece.extremes(&u, &velocity, &mut scratch, &mut values);
+                    (low, high) = (low.min(least), high.max(most));
+                    for &s in &sliders {
+                        dissipation += piece.contacts[s].sign() * flow.mechanics.sliders[s].limit * travel;
+                    }
+                    if sliders.iter().any(|&s| piece.contacts[s] != Contact::Stick) {
+                        slipping += piece.segment.length;
+                    }
+                    if let Some(before) = before {
+                        switches += sliders.iter().filter(|&&s| before.contacts[s] != piece.contacts[s]).count();
+                    }
+                    before = Some(piece);
+                }
+                if let (Some(first), Some(last)) = (self.pieces.first(), self.pieces.last()) {
+                    let sign = if self.symmetry == Symmetry::HalfPeriod { -1.0 } else { 1.0 };
+                    switches +=
+                        sliders.iter().filter(|&&s| last.contacts[s].sign() != sign * first.contacts[s].sign()).count();
+                }
+                if self.symmetry == Symmetry::HalfPeriod {
+                    high = high.max(-low);
+                    low = -high;
+                }
+                JointMotion {
+                    name: joint.name.clone(),
+                    dissipation: self.times() * dissipation,
+                    slip_fraction: self.times() * slipping / self.period,
+                    displacement: (low, high),
+                    switches: self.times() as usize * switches,
+                }
+            })
+            .collect()
+    }
+
+    /// Adds `Re Σ G_h e^{jhΩt}` to a signal of the piece.
+    fn add_imposed(&self, piece: &Piece, imposed: &[(u32, Complex64)], signal: &mut [Complex64]) {
+        let omega = std::f64::consts::TAU / self.period;
+        for &(harmonic, amplitude) in imposed {
+            if harmonic == 0 {
+                signal[piece.basis.constant()].re += amplitude.re;
+                continue;
+            }
+            let rate = f64::from(harmonic) * omega;
+            // the drive lists every harmonic that occurs
+            let h = self.rates.iter().position(|r| (r - rate).abs() < 0.5 * omega).expect("listed");
+            signal[piece.modes + h] += amplitude * Complex64::new(0.0, rate * piece.segment.start).exp();
+        }
+    }
+
+    /// The force and the force-velocity product as they enter the energy balance; see [`System`] for the meaning of the parts.
+    fn energy(&self, flow: &Flow, omega: f64, joints: &[JointMotion]) -> Energy {
+        let n = self.system.dofs();
+        let (mut work, mut viscous) = (0.0, 0.0);
+        for piece in &self.pieces {
+            let (nb, length) = (piece.basis.len(), piece.segment.length);
+            let product =
+                |a: &[Complex64], b: &[Complex64]| integral_of_product((&piece.basis, a), (&piece.basis, b), length);
+            let velocity = |i: usize| &piece.velocity[i * nb..(i + 1) * nb];
+            for i in 0..n {
+                let force = self.load(piece, &flow.drive, i);
+                if force.iter().any(|f| *f != ZERO) {
+                    work += product(&force, velocity(i));
+                }
+                for k in 0..=i {
+                    let c = self.system.damping[(i, k)];
+                    if c != 0.0 {
+                        viscous += if k == i { c } else { 2.0 * c } * product(velocity(i), velocity(k));
+                    }
+                }
+            }
+            for (m, place) in self.system.moved.iter().enumerate() {
+                let (motion, speed) = self.moved_motion(piece, m);
+                work += product(&self.reaction(piece, m, flow), &speed);
+                for i in 0..n {
+                    let (k, c) = (place.stiffness.0[i], place.damping.0[i]);
+                    // the load on the masses contains what the moved place does to them: that is no work from outside
+                    let coupling: Vec<Complex64> = motion.iter().zip(&speed).map(|(u, v)| u * k + v * c).collect();
+                    if k != 0.0 || c != 0.0 {
+                        work += product(&coupling, velocity(i));
+                        viscous += 2.0 * c * product(&speed, velocity(i));
+                    }
+                }
+                for (other, c) in place.damping.1.iter().enumerate() {
+                    if *c != 0.0 {
+                        viscous += c * product(&speed, &self.moved_motion(piece, other).1);
+                    }
+                }
+            }
+        }
+        let _ = omega;
+        Energy {
+            work_in: self.times() * work,
+            viscous: self.times() * viscous,
+            friction: joints.iter().map(|joint| joint.dissipation).sum(),
+        }
+    }
+
+    /// Load on degree of freedom `i` as a signal.
+    fn load(&self, piece: &Piece, drive: &Drive, i: usize) -> Vec<Complex64> {
+        let mut force = vec![ZERO; piece.basis.len()];
+        force[piece.basis.constant()].re = drive.constant[i];
+        for (h, rate) in drive.rates.iter().enumerate() {
+            force[piece.modes + h] = drive.forces[h][i] * Complex64::new(0.0, rate * piece.segment.start).exp();
+        }
+        force
+    }
+
+    /// Displacement and velocity of a moved place as signals.
+    fn moved_motion(&self, piece: &Piece, m: usize) -> (Vec<Complex64>, Vec<Complex64>) {
+        let mut motion = vec![ZERO; piece.basis.len()];
+        self.add_imposed(piece, &self.system.moved[m].motion, &mut motion);
+        let mut speed = motion.clone();
+        piece.basis.differentiate(&motion, &mut speed);
+        (motion, speed)
+    }
+
+    /// The force that moves a place, as a signal.
+    fn reaction(&self, piece: &Piece, m: usize, flow: &Flow) -> Vec<Complex64> {
+        let owners: Vec<usize> = flow.mechanics.sliders.iter().map(|s| s.joint).collect();
+        self.reaction_of(piece, m, &owners)
+    }
+
+    fn reaction_of(&self, piece: &Piece, m: usize, owners: &[usize]) -> Vec<Complex64> {
+        let (n, nb, place) = (self.system.dofs(), piece.basis.len(), &self.system.moved[m]);
+        let mut force = vec![ZERO; nb];
+        let add = |force: &mut [Complex64], signal: &[Complex64], factor: f64| {
+            if factor != 0.0 {
+                force.iter_mut().zip(signal).for_each(|(f, s)| *f += s * factor);
+            }
+        };
+        for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
+            let (motion, speed) = self.moved_motion(piece, other);
+            add(&mut force, &motion, *k);
+            add(&mut force, &speed, *c);
+            if other == m {
+                let mut acceleration = vec![ZERO; nb];
+                piece.basis.differentiate(&speed, &mut acceleration);
+                add(&mut force, &acceleration, place.mass);
+            }
+        }
+        for i in 0..n {
+            add(&mut force, &piece.segment.displacement[i * nb..(i + 1) * nb], place.stiffness.0[i]);
+            add(&mut force, &piece.velocity[i * nb..(i + 1) * nb], place.damping.0[i]);
+        }
+        for (s, &joint) in owners.iter().enumerate() {
+            add(&mut force, &piece.segment.force[s * nb..(s + 1) * nb], place.joints[joint]);
+        }
+        force
+    }
+
+    /// Force amplitude times velocity amplitude times period: what could be exchanged.
+    fn exchanged(&self, drive: &Drive) -> f64 {
+        let fastest = |i: usize| {
+            let sizes = self.pieces.iter().map(|piece| {
+                let nb = piece.basis.len();
+                piece.velocity[i * nb..(i + 1) * nb].iter().map(|c| c.norm()).sum::<f64>()
+            });
+            sizes.fold(0.0, f64::max)
+        };
+        let loads: f64 =
+            (0..self.system.dofs()).map(|i| drive.forces.iter().map(|f| f[i].norm()).sum::<f64>() * fastest(i)).sum();
+        let joints: f64 = self
+            .system
+            .joints
+            .iter()
+            .map(|joint| {
+                let limit: f64 = joint.law.network().unwrap_or_default().iter().map(|b| b.limit).sum();
+                limit * joint.imposed.iter().map(|(h, g)| f64::from(*h) * g.norm()).sum::<f64>() / self.period
+            })
+            .sum();
+        self.period * (loads + joints)
+    }
+
+    /// The piece at a time within the first return, and the time since its start.
+    fn piece(&self, time: f64) -> (&Piece, f64) {
+        let index = self.pieces.partition_point(|piece| piece.segment.start <= time).max(1) - 1;
+        let piece = &self.pieces[index];
+        (piece, (time - piece.segment.start).clamp(0.0, piece.segment.length))
+    }
+}
+
+impl Piece {
+    /// Least and largest value of `signal`, whose derivative is `slope`, over the piece.
+    fn extremes(
+        &self,
+        signal: &[Complex64],
+        slope: &[Complex64],
+        scratch: &mut Scratch,
+        values: &mut Vec<Complex64>,
+    ) -> (f64, f64) {
+        let nb = self.basis.len();
+        values.resize(nb, ZERO);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut visit = |time: f64, values: &mut [Complex64]| {
+            self.basis.evaluate(time, values);
+            let value = real_dot(signal, values);
+            (low, high) = (low.min(value), high.max(value));
+            real_dot(slope, values)
+        };
+        let mut time = 0.0;
+        let mut now = visit(0.0, values);
+        visit(self.segment.length, values);
+        // from turning point to turning point: shift the slope to the present time and look for its next zero
+        let size: f64 = slope.iter().map(|c| c.norm()).sum();
+        let mut sign = if now < 0.0 { -1.0 } else { 1.0 };
+        let mut shifted = vec![ZERO; nb];
+        while size > 0.0 && time < self.segment.length {
+            self.basis.shift(slope, time, sign, &mut shifted);
+            let begin = if now.abs() > FLAT * size { Begin::Positive } else { Begin::Zero };
+            match self.basis.first_zero(&shifted, &[begin], self.segment.length - time, scratch) {
+                FirstZero::At { time: after, .. } => {
+                    if after == 0.0 && begin == Begin::Positive {
+                        break;
+                    }
+                    time += after;
+                    visit(time, values);
+                    now = 0.0;
+                    sign = -sign;
+                }
+                FirstZero::None | FirstZero::TooManySteps => break,
+            }
+        }
+        (low, high)
+    }
+}
+
+/// A slope below this fraction of its terms is a turning point.
+const FLAT: f64 = 1e-12;
+
+impl Path for ExactPath {
+    fn sample(&self, time: f64) -> Sample {
+        let half = 0.5 * self.period;
+        let (time, sign) = match self.symmetry {
+            Symmetry::HalfPeriod if time >= half => (time - half, -1.0),
+            _ => (time, 1.0),
+        };
+        let (piece, since) = self.piece(time);
+        let (n, nb) = (self.system.dofs(), piece.basis.len());
+        let mut values = vec![ZERO; nb];
+        piece.basis.evaluate(since, &mut values);
+        let row = |coefficients: &[Complex64], i: usize| sign * real_dot(&coefficients[i * nb..(i + 1) * nb], &values);
+        let rows = |coefficients: &[Complex64]| (0..n).map(|i| row(coefficients, i)).collect::<Vec<f64>>();
+        let (displacement, velocity) = (rows(&piece.segment.displacement), rows(&piece.velocity));
+        let owners = slider_owners(&self.system);
+        let joints = self
+            .system
+            .joints
+            .iter()
+            .enumerate()
+            .map(|(j, joint)| {
+                let mut imposed = vec![ZERO; nb];
+                self.add_imposed(piece, &joint.imposed, &mut imposed);
+                let mut speed = vec![ZERO; nb];
+                piece.basis.differentiate(&imposed, &mut speed);
+                let along = |v: &[f64]| (0..n).map(|i| joint.direction[(i, 0)] * v[i]).sum::<f64>();
+                let mine = || owners.iter().enumerate().filter(|(_, owner)| **owner == j).map(|(s, _)| s);
+                let contact =
+                    mine().map(|s| piece.contacts[s]).find(|c| *c != Contact::Stick).unwrap_or(Contact::Stick);
+                JointSample {
+                    displacement: along(&displacement) + sign * real_dot(&imposed, &values),
+                    velocity: along(&velocity) + sign * real_dot(&speed, &values),
+                    force: mine().map(|s| row(&piece.segment.force, s)).sum(),
+                    contact: if contact == Contact::Stick { contact } else { Contact::slip(sign * contact.sign()) },
+                }
+            })
+            .collect();
+        let moved = (0..self.system.moved.len())
+            .map(|m| {
+                let (motion, _) = self.moved_motion(piece, m);
+                let reaction = self.reaction_of(piece, m, &owners);
+                (sign * real_dot(&motion, &values), sign * real_dot(&reaction, &values))
+            })
+            .collect();
+        Sample { acceleration: rows(&piece.acceleration), displacement, velocity, joints, moved }
+    }
+
+    fn switch_times(&self) -> Vec<f64> {
+        let starts = self.pieces.iter().skip(1).map(|piece| piece.segment.start);
+        match self.symmetry {
+            Symmetry::FullPeriod => starts.collect(),
+            Symmetry::HalfPeriod => {
+                let first: Vec<f64> = starts.collect();
+                let second: Vec<f64> = first.iter().map(|t| t + 0.5 * self.period).collect();
+                first.into_iter().chain(second).collect()
+            }
+        }
+    }
+}
+
+/// The joint of every slider, in the order in which `Mechanics` lists them.
+fn slider_owners(system: &System) -> Vec<usize> {
+    let branches = |joint: &crate::model::SystemJoint| joint.law.network().map_or(0, |b| b.len());
+    system.joints.iter().enumerate().flat_map(|(j, joint)| std::iter::repeat_n(j, branches(joint))).collect()
+}

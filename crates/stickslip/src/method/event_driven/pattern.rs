@@ -1,0 +1,474 @@
+//! The linear motion while a pattern of stick and slip lasts.
+//!
+//! In a pattern the rigid sliders that stick hold `Wₛᵀx + g(t) = c`; those that slip, and the springs in front of sliders, are
+//! forces that are constant or linear in `x`. With `N` an M-orthonormal basis of the directions that are left free and
+//! `S = M⁻¹Wₛ(WₛᵀM⁻¹Wₛ)⁺`, the motion is `x = N q + S (c - g)` and `q'' + NᵀCN q' + NᵀKₚN q = Nᵀ(forces)`, which the modes of
+//! [`stickslip_numerics::modes`] solve in closed form. Nothing here depends on time, drive frequency or slip direction.
+
+use super::mechanics::{Contact, Drive, Mechanics};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use num_complex::Complex64;
+use stickslip_numerics::modes::{Defective, Modes};
+use stickslip_numerics::signal::Basis;
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// Directions of stuck sliders are redundant below this fraction of the largest eigenvalue of their Delassus matrix.
+const REDUNDANT: f64 = 1e-11;
+/// A mode slower than this fraction of the fastest is taken to be exactly at zero: the rounding of `Modes`.
+const STILL: f64 = 1e-13;
+/// A harmonic this close to a mode (relative) is integrated as a resonant pair; nearer than this the plain particular solution
+/// would lose more than the last five digits.
+const RESONANT: f64 = 1e-5;
+
+/// The closed-form motion of one pattern.
+#[derive(Debug, Clone)]
+pub(crate) struct Pattern {
+    pub contacts: Vec<Contact>,
+    /// Rigid sliders that stick.
+    pub held: Vec<usize>,
+    /// Exponents.
+    pub lambda: Vec<Complex64>,
+    /// x = Re(shape η), n × modes, column-major.
+    pub shape: DMatrix<Complex64>,
+    /// Modal coordinates from the state (x, v, f): the constant part and the decaying part, modes × states.
+    constant_from_state: DMatrix<Complex64>,
+    decaying_from_state: DMatrix<Complex64>,
+    /// Constant modal coordinate of a unit constant force, modes × n (zero rows for modes at λ = 0).
+    constant_from_force: DMatrix<Complex64>,
+    /// Modal force of a unit force, modes × n.
+    input: DMatrix<Complex64>,
+    /// Modes exactly at λ = 0: they drift under a constant force.
+    drifting: Vec<usize>,
+    /// Free directions: x part, n × r; coordinate and modal force, r × n.
+    free: DMatrix<f64>,
+    free_coordinate: DMatrix<f64>,
+    free_input: DMatrix<f64>,
+    /// Constant force on the structure from the state, n × states.
+    force_from_state: DMatrix<f64>,
+    /// S, n × held; S Wₛᵀ, n × n.
+    hold: DMatrix<f64>,
+    hold_projection: DMatrix<f64>,
+    /// Stiffness with the springs of stuck sliders, n × n.
+    pub stiffness: DMatrix<f64>,
+    /// λ = multiplier (forces) + inverse_delassus g'': held × n, held × held.
+    pub multiplier: DMatrix<f64>,
+    pub inverse_delassus: DMatrix<f64>,
+}
+
+/// What a pattern adds at one drive frequency.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Driven {
+    pub basis: Basis,
+    /// Steady complex displacement per harmonic, n each.
+    steady: Vec<DVector<Complex64>>,
+    /// Resonant pairs: mode, harmonic, modal force amplitude.
+    resonant: Vec<(usize, usize, Complex64)>,
+    /// Steady complex coordinate of the free directions per harmonic.
+    free_steady: Vec<DVector<Complex64>>,
+}
+
+impl Pattern {
+    pub fn new(mechanics: &Mechanics, contacts: &[Contact]) -> Result<Self, Defective> {
+        let n = mechanics.n;
+        let held: Vec<usize> = (0..contacts.len())
+            .filter(|&s| contacts[s] == Contact::Stick && mechanics.sliders[s].stiffness.is_none())
+            .collect();
+        let w = DMatrix::from_fn(n, held.len(), |i, s| mechanics.sliders[held[s]].direction[i]);
+        let inverse_delassus = weighted_inverse(
+            &(w.transpose() * &mechanics.inverse_mass * &w),
+            &held.iter().map(|&s| mechanics.sliders[s].limit).collect::<Vec<_>>(),
+        );
+        let hold = &mechanics.inverse_mass * &w * &inverse_delassus;
+        let multiplier = &inverse_delassus * w.transpose() * &mechanics.inverse_mass;
+
+        let states = mechanics.states();
+        let mut stiffness = mechanics.stiffness.clone();
+        // constant force: -Σ w (f0 - kt wᵀx0) of stuck springs, and -Kₚ S Wₛᵀ x0
+        let mut force_from_state = DMatrix::zeros(n, states);
+        for (slider, contact) in mechanics.sliders.iter().zip(contacts) {
+            if let (Some(kt), Some(state), Contact::Stick) = (slider.stiffness, slider.state, contact) {
+                let outer = &slider.direction * slider.direction.transpose() * kt;
+                stiffness += &outer;
+                let mut block = force_from_state.columns_mut(0, n);
+                block += outer;
+                let mut column = force_from_state.column_mut(2 * n + state);
+                column -= &slider.direction;
+            }
+        }
+        let hold_projection = &hold * w.transpose();
+        {
+            let mut block = force_from_state.columns_mut(0, n);
+            block -= &stiffness * &hold_projection;
+        }
+
+        let basis = free_directions(&mechanics.mass, &w);
+        let modes =
+            Modes::new(&(basis.transpose() * &mechanics.damping * &basis), &(basis.transpose() * &stiffness * &basis))?;
+        let project = basis.transpose(); // forces to modal
+        let coordinates = &project * &mechanics.mass; // displacements to q
+        let complex = |m: &DMatrix<f64>| m.map(|x| Complex64::new(x, 0.0));
+        let count = modes.lambda.len();
+        let fastest = modes.lambda.iter().map(|l| l.norm()).fold(0.0, f64::max);
+        let mut lambda = modes.lambda.clone();
+        let drifting: Vec<usize> =
+            (0..count).filter(|&k| lambda[k].norm() <= STILL * fastest || fastest == 0.0).collect();
+        for &k in &drifting {
+            lambda[k] = ZERO;
+        }
+        let input = &modes.from_velocity * complex(&project);
+        let constant_from_force =
+            DMatrix::from_fn(count, n, |k, i| if lambda[k] == ZERO { ZERO } else { -input[(k, i)] / lambda[k] });
+        let constant_from_state = &constant_from_force * complex(&force_from_state);
+        let mut decaying_from_state = -&constant_from_state;
+        {
+            let mut x = decaying_from_state.columns_mut(0, n);
+            x += &modes.from_displacement * complex(&coordinates);
+        }
+        {
+            let mut v = decaying_from_state.columns_mut(n, n);
+            v += &modes.from_velocity * complex(&coordinates);
+        }
+        Ok(Pattern {
+            contacts: contacts.to_vec(),
+            held,
+            lambda,
+            shape: complex(&basis) * &modes.shape,
+            constant_from_state,
+            decaying_from_state,
+            constant_from_force,
+            input,
+            drifting,
+            free: &basis * &modes.free,
+            free_coordinate: modes.free.transpose() * &coordinates,
+            free_input: modes.free.transpose() * &project,
+            force_from_state,
+            hold,
+            hold_projection,
+            stiffness,
+            multiplier,
+            inverse_delassus,
+        })
+    }
+
+    /// Steady response and basis at one drive frequency.
+    pub fn drive(&self, mechanics: &Mechanics, drive: &Drive) -> Driven {
+        let n = mechanics.n;
+        let mut driven = Driven::default();
+        driven.basis.exponents = self.lambda.clone();
+        driven.basis.exponents.extend(drive.rates.iter().map(|&rate| Complex64::new(0.0, rate)));
+        let complex = |m: &DMatrix<f64>| m.map(|x| Complex64::new(x, 0.0));
+        for (h, &rate) in drive.rates.iter().enumerate() {
+            let s = Complex64::new(0.0, rate);
+            let held = DVector::from_fn(self.held.len(), |i, _| drive.imposed[h][self.held[i]]);
+            let moved = complex(&self.hold) * held; // S g: the stuck part moves with -S g
+            let mut force =
+                drive.forces[h].clone() + (complex(&self.stiffness) + complex(&mechanics.damping) * s) * &moved;
+            for (i, slider) in mechanics.sliders.iter().enumerate() {
+                if let (Some(kt), Contact::Stick) = (slider.stiffness, self.contacts[i]) {
+                    force -= complex_vector(&slider.direction) * (drive.imposed[h][i] * kt);
+                }
+            }
+            let mut steady = -moved;
+            for (k, &lambda) in self.lambda.iter().enumerate() {
+                let forward: Complex64 = (0..n).map(|i| self.input[(k, i)] * force[i]).sum::<Complex64>() * 0.5;
+                let backward: Complex64 = (0..n).map(|i| self.input[(k, i)] * force[i].conj()).sum::<Complex64>() * 0.5;
+                let near = (s - lambda).norm() <= RESONANT * rate;
+                if near && forward != ZERO {
+                    driven.resonant.push((k, h, forward));
+                    driven.basis.resonant.push((lambda, s - lambda));
+                    driven.basis.driven_by.push(self.lambda.len() + h);
+                }
+                let plus = if near { ZERO } else { forward / (s - lambda) };
+                let minus = backward / (-s - lambda);
+                for i in 0..n {
+                    steady[i] += self.shape[(i, k)] * plus + (self.shape[(i, k)] * minus).conj();
+                }
+            }
+            let free: DVector<Complex64> = complex(&self.free_input) * &force / (s * s);
+            steady += complex(&self.free) * &free;
+            driven.free_steady.push(free);
+            driven.steady.push(steady);
+        }
+        driven
+    }
+
+    /// Coefficients of the displacements (n × basis, one row after the other) for the motion that starts at `time` from `state`.
+    pub fn displacement(
+        &self,
+        mechanics: &Mechanics,
+        drive: &Drive,
+        driven: &Driven,
+        time: f64,
+        state: &[f64],
+        work: &mut Work,
+        out: &mut [Complex64],
+    ) {
+        let (n, nb, count) = (mechanics.n, driven.basis.len(), self.lambda.len());
+        let constant = driven.basis.constant();
+        out[..n * nb].fill(ZERO);
+        // constant force that does not come from the state: loads, slip, imposed motion at the start
+        work.force.clear();
+        work.force.extend(drive.constant.iter());
+        work.held.clear();
+        work.held.extend(self.held.iter().map(|&s| drive.imposed_at(s, time, 0)));
+        for (i, slider) in mechanics.sliders.iter().enumerate() {
+            let value = match (self.contacts[i], slider.stiffness) {
+                (Contact::Stick, None) => continue,
+                (Contact::Stick, Some(kt)) => kt * drive.imposed_at(i, time, 0),
+                (slip, _) => -slip.sign() * slider.limit,
+            };
+            for row in 0..n {
+                work.force[row] += value * slider.direction[row];
+            }
+        }
+        for row in 0..n {
+            // displacement S c with the part of c that imposed motion gives; the part from x0 is in hold_projection
+            let shift: f64 = (0..self.held.len()).map(|s| self.hold[(row, s)] * work.held[s]).sum();
+            let carried: f64 = (0..n).map(|i| self.hold_projection[(row, i)] * state[i]).sum();
+            out[row * nb + constant].re += shift + carried;
+            work.shift[row] = shift;
+        }
+        if work.held.iter().any(|&g| g != 0.0) {
+            for row in 0..n {
+                for i in 0..n {
+                    work.force[row] -= self.stiffness[(row, i)] * work.shift[i];
+                }
+            }
+        }
+        for h in 0..drive.rates.len() {
+            let (sin, cos) = (drive.rates[h] * time).sin_cos();
+            work.turn[h] = Complex64::new(cos, sin);
+            for row in 0..n {
+                out[row * nb + count + h] = driven.steady[h][row] * work.turn[h];
+            }
+        }
+        // state without the steady part
+        for k in 0..count {
+            let mut fixed = ZERO;
+            let mut decaying = ZERO;
+            for i in 0..n {
+                fixed += self.constant_from_force[(k, i)] * work.force[i];
+            }
+            for (i, &z) in state.iter().enumerate() {
+                decaying += self.decaying_from_state[(k, i)] * z;
+                fixed += self.constant_from_state[(k, i)] * z;
+            }
+            // decaying_from_state already subtracts the constant that the state causes
+            for i in 0..n {
+                decaying -= self.constant_from_force[(k, i)] * work.force[i];
+            }
+            work.eta[k] = decaying;
+            work.fixed[k] = fixed;
+        }
+        self.subtract_steady(mechanics, drive, driven, work);
+        for row in 0..n {
+            for k in 0..count {
+                out[row * nb + k] = self.shape[(row, k)] * work.eta[k];
+                out[row * nb + constant].re += (self.shape[(row, k)] * work.fixed[k]).re;
+            }
+            for (r, (k, h, forward)) in driven.resonant.iter().enumerate() {
+                out[row * nb + count + drive.rates.len() + r] = self.shape[(row, *k)] * forward * work.turn[*h];
+            }
+        }
+        self.add_polynomials(mechanics, drive, driven, state, work, out);
+    }
+
+    /// η of the steady response, taken off `work.eta`.
+    fn subtract_steady(&self, mechanics: &Mechanics, drive: &Drive, driven: &Driven, work: &mut Work) {
+        let n = mechanics.n;
+        for h in 0..drive.rates.len() {
+            let rate = Complex64::new(0.0, drive.rates[h]);
+            for i in 0..n {
+                let z = driven.steady[h][i] * work.turn[h];
+                work.steady[i] = z.re;
+                work.steady[n + i] = (z * rate).re;
+            }
+            for k in 0..self.lambda.len() {
+                let mut eta = ZERO;
+                for i in 0..2 * n {
+                    // the state's own constants must not count here: they belong to forces, not to the coordinates
+                    let from = self.decaying_from_state[(k, i)] + self.constant_from_state[(k, i)];
+                    eta += from * work.steady[i];
+                }
+                work.eta[k] -= eta;
+            }
+        }
+    }
+
+    /// Free directions and drifting modes: 1, τ, τ²/2.
+    fn add_polynomials(
+        &self,
+        mechanics: &Mechanics,
+        drive: &Drive,
+        driven: &Driven,
+        state: &[f64],
+        work: &mut Work,
+        out: &mut [Complex64],
+    ) {
+        if self.drifting.is_empty() && self.free.ncols() == 0 {
+            return;
+        }
+        let (n, nb, constant) = (mechanics.n, driven.basis.len(), driven.basis.constant());
+        for row in 0..n {
+            for (i, &z) in state.iter().enumerate() {
+                work.force[row] += self.force_from_state[(row, i)] * z;
+            }
+        }
+        for &k in &self.drifting {
+            let drift: Complex64 = (0..n).map(|i| self.input[(k, i)] * work.force[i]).sum();
+            for row in 0..n {
+                out[row * nb + constant + 1].re += (self.shape[(row, k)] * drift).re;
+            }
+        }
+        for r in 0..self.free.ncols() {
+            let dot = |v: &[f64]| (0..n).map(|i| self.free_coordinate[(r, i)] * v[i]).sum::<f64>();
+            let (mut place, mut speed) = (dot(&state[..n]), dot(&state[n..2 * n]));
+            for h in 0..drive.rates.len() {
+                let z = driven.free_steady[h][r] * work.turn[h];
+                place -= z.re;
+                speed -= (z * Complex64::new(0.0, drive.rates[h])).re;
+            }
+            let push: f64 = (0..n).map(|i| self.free_input[(r, i)] * work.force[i]).sum();
+            for row in 0..n {
+                out[row * nb + constant].re += self.free[(row, r)] * place;
+                out[row * nb + constant + 1].re += self.free[(row, r)] * speed;
+                out[row * nb + constant + 2].re += self.free[(row, r)] * push;
+            }
+        }
+    }
+
+    /// Carries the columns of `sensitivity` (states × columns) over a stretch whose exponentials at its end are `values`.
+    pub fn carry(
+        &self,
+        mechanics: &Mechanics,
+        length: f64,
+        values: &[Complex64],
+        sensitivity: &mut DMatrix<f64>,
+        work: &mut Work,
+    ) {
+        let (n, states, count) = (mechanics.n, mechanics.states(), self.lambda.len());
+        for mut column in sensitivity.column_iter_mut() {
+            work.column.copy_from_slice(column.as_slice());
+            let z = &work.column;
+            for row in 0..n {
+                work.shift[row] = (0..n).map(|i| self.hold_projection[(row, i)] * z[i]).sum();
+                work.steady[row] = 0.0;
+            }
+            for k in 0..count {
+                let (mut fixed, mut decaying) = (ZERO, ZERO);
+                for i in 0..states {
+                    fixed += self.constant_from_state[(k, i)] * z[i];
+                    decaying += self.decaying_from_state[(k, i)] * z[i];
+                }
+                let (now, rate) = (decaying * values[k], decaying * values[k] * self.lambda[k]);
+                for row in 0..n {
+                    let shape = self.shape[(row, k)];
+                    work.shift[row] += (shape * (now + fixed)).re;
+                    work.steady[row] += (shape * rate).re;
+                }
+            }
+            if !self.drifting.is_empty() || self.free.ncols() > 0 {
+                for row in 0..n {
+                    work.force[row] = (0..states).map(|i| self.force_from_state[(row, i)] * z[i]).sum();
+                }
+                for &k in &self.drifting {
+                    let drift: Complex64 = (0..n).map(|i| self.input[(k, i)] * work.force[i]).sum();
+                    for row in 0..n {
+                        let speed = (self.shape[(row, k)] * drift).re;
+                        work.shift[row] += speed * length;
+                        work.steady[row] += speed;
+                    }
+                }
+                for r in 0..self.free.ncols() {
+                    let dot = |v: &[f64]| (0..n).map(|i| self.free_coordinate[(r, i)] * v[i]).sum::<f64>();
+                    let (place, speed) = (dot(&z[..n]), dot(&z[n..2 * n]));
+                    let push: f64 = (0..n).map(|i| self.free_input[(r, i)] * work.force[i]).sum();
+                    for row in 0..n {
+                        work.shift[row] +=
+                            self.free[(row, r)] * (place + speed * length + 0.5 * push * length * length);
+                        work.steady[row] += self.free[(row, r)] * (speed + push * length);
+                    }
+                }
+            }
+            for (slider, contact) in mechanics.sliders.iter().zip(&self.contacts) {
+                if let (Some(kt), Some(state)) = (slider.stiffness, slider.state) {
+                    column[2 * n + state] = if *contact == Contact::Stick {
+                        let stretch: f64 = (0..n).map(|i| slider.direction[i] * (work.shift[i] - z[i])).sum();
+                        z[2 * n + state] + kt * stretch
+                    } else {
+                        0.0
+                    };
+                }
+            }
+            for row in 0..n {
+                column[row] = work.shift[row];
+                column[n + row] = work.steady[row];
+            }
+        }
+    }
+}
+
+/// Scratch memory of the pattern's formulas.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Work {
+    force: Vec<f64>,
+    held: Vec<f64>,
+    shift: Vec<f64>,
+    steady: Vec<f64>,
+    column: Vec<f64>,
+    turn: Vec<Complex64>,
+    eta: Vec<Complex64>,
+    fixed: Vec<Complex64>,
+}
+
+impl Work {
+    pub fn new(mechanics: &Mechanics, harmonics: usize) -> Self {
+        let n = mechanics.n;
+        Work {
+            force: vec![0.0; n],
+            held: Vec::with_capacity(mechanics.sliders.len()),
+            shift: vec![0.0; n],
+            steady: vec![0.0; 2 * n],
+            column: vec![0.0; mechanics.states()],
+            turn: vec![ZERO; harmonics],
+            eta: vec![ZERO; 2 * n],
+            fixed: vec![ZERO; 2 * n],
+        }
+    }
+}
+
+fn complex_vector(v: &DVector<f64>) -> DVector<Complex64> {
+    v.map(|x| Complex64::new(x, 0.0))
+}
+
+/// M-orthonormal basis of the displacements that `Wᵀ` maps to zero.
+fn free_directions(mass: &DMatrix<f64>, w: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = mass.nrows();
+    if n == 0 {
+        return DMatrix::zeros(0, 0);
+    }
+    let factor = mass.clone().cholesky().expect("the mass matrix was checked to be positive");
+    let l_inverse = factor.l().solve_lower_triangular(&DMatrix::identity(n, n)).expect("positive diagonal");
+    if w.ncols() == 0 {
+        return l_inverse.transpose();
+    }
+    let scaled = &l_inverse * w;
+    let eigen = SymmetricEigen::new(&scaled * scaled.transpose());
+    let largest = eigen.eigenvalues.amax();
+    let null: Vec<usize> = (0..n).filter(|&i| eigen.eigenvalues[i] <= REDUNDANT * largest).collect();
+    l_inverse.transpose() * eigen.eigenvectors.select_columns(&null)
+}
+
+/// Inverse of the Delassus matrix; where stuck contacts are redundant, the one that loads them in proportion to their limits.
+fn weighted_inverse(delassus: &DMatrix<f64>, limits: &[f64]) -> DMatrix<f64> {
+    let s = delassus.nrows();
+    if s == 0 {
+        return DMatrix::zeros(0, 0);
+    }
+    let weight = DMatrix::from_fn(s, s, |i, j| if i == j { limits[i].sqrt() } else { 0.0 });
+    let eigen = SymmetricEigen::new(&weight * delassus * &weight);
+    let largest = eigen.eigenvalues.amax();
+    let inverse = eigen.eigenvalues.map(|value| if value > REDUNDANT * largest { 1.0 / value } else { 0.0 });
+    &weight * &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose() * &weight
+}

@@ -1,0 +1,147 @@
+//! Newton's method on the return map: the state that comes back to itself after a period, or to its mirror image after half.
+//!
+//! Friction only dissipates, so the return map `R` does not increase the energy distance of two motions and `I - R` is monotone.
+//! Newton's method uses its exact derivative; where the map has kinks and the step does not help, iterating the map itself
+//! (letting the transient die) always comes closer, and Newton goes on from there.
+
+use super::{Breakdown, OrbitError};
+use nalgebra::{DMatrix, DVector};
+
+/// A flow that can be returned.
+pub(crate) trait ReturnMap {
+    /// Replaces `state` by its return, and `derivative` by that of the return with respect to the state.
+    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), Breakdown>;
+    /// Weights of the energy norm, one per state.
+    fn weights(&self) -> &[f64];
+}
+
+/// What the iteration aims at, and how long it may take.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Aim {
+    /// Name, for errors.
+    pub method: &'static str,
+    /// Drive frequency, rad/s.
+    pub omega: f64,
+    /// Residual relative to the state at which the orbit is closed.
+    pub residual: f64,
+    /// +1: the return is the state; -1: its mirror image.
+    pub sign: f64,
+}
+
+/// A closed orbit.
+#[derive(Debug)]
+pub(crate) struct Closed {
+    pub state: Vec<f64>,
+    /// Derivative of the return map (with its sign as it is, not mirrored).
+    pub derivative: DMatrix<f64>,
+    pub residual: f64,
+    pub iterations: usize,
+}
+
+/// Newton iterations in all; a warm start takes 2 to 4, a cold one 5 to 15.
+const ITERATIONS: usize = 200;
+/// Halvings of a Newton step before the transient is let die instead.
+const HALVINGS: usize = 4;
+/// Returns by which the transient dies between Newton attempts.
+const RETURNS: usize = 40;
+/// A step must leave at most this share of the residual.
+const DECREASE: f64 = 0.95;
+/// Singular values below this fraction of the largest belong to the continuum of stick offsets.
+const CONTINUUM: f64 = 1e-10;
+
+pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<Closed, OrbitError> {
+    let n = start.len();
+    let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
+    let mut state = start.to_vec();
+    let mut derivative = DMatrix::identity(n, n);
+    let mut gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
+    let mut smallest = f64::INFINITY;
+    let mut returns = RETURNS;
+    for iteration in 1..=ITERATIONS {
+        let size = norm(map.weights(), &state);
+        let residual = norm(map.weights(), gap.as_slice()) / size.max(f64::MIN_POSITIVE);
+        smallest = smallest.min(residual);
+        if residual <= aim.residual || (size == 0.0 && gap.amax() == 0.0) {
+            return Ok(Closed {
+                state,
+                derivative,
+                residual: if size == 0.0 { 0.0 } else { residual },
+                iterations: iteration,
+            });
+        }
+        let step = newton_step(&derivative, &gap, aim.sign, map.weights());
+        let before = norm(map.weights(), gap.as_slice());
+        let mut fraction = 1.0;
+        let mut accepted = false;
+        for _ in 0..=HALVINGS {
+            let trial: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + fraction * d).collect();
+            let mut trial_derivative = DMatrix::identity(n, n);
+            if let Ok(trial_gap) = evaluate(map, &trial, aim, &mut trial_derivative)
+                && norm(map.weights(), trial_gap.as_slice()) <= DECREASE * before
+            {
+                (state, gap, derivative) = (trial, trial_gap, trial_derivative);
+                accepted = true;
+                break;
+            }
+            fraction *= 0.5;
+        }
+        if !accepted {
+            for _ in 0..returns {
+                map.returned(&mut state, None).map_err(broke)?;
+                state.iter_mut().for_each(|z| *z *= aim.sign);
+                if state.iter().any(|z| !z.is_finite()) {
+                    return Err(broke(Breakdown::Unbounded { time: f64::INFINITY }));
+                }
+            }
+            returns = (returns * 3 / 2).min(2000);
+            derivative = DMatrix::identity(n, n);
+            gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
+        }
+    }
+    Err(OrbitError::NotConverged { method: aim.method, omega: aim.omega, iterations: ITERATIONS, residual: smallest })
+}
+
+/// `z - sign · R(z)`, with the derivative of R.
+fn evaluate(
+    map: &mut dyn ReturnMap,
+    state: &[f64],
+    aim: Aim,
+    derivative: &mut DMatrix<f64>,
+) -> Result<DVector<f64>, Breakdown> {
+    let mut end = state.to_vec();
+    map.returned(&mut end, Some(derivative))?;
+    if end.iter().any(|z| !z.is_finite()) {
+        return Err(Breakdown::Unbounded { time: 0.0 });
+    }
+    Ok(DVector::from_iterator(state.len(), state.iter().zip(&end).map(|(z, e)| z - aim.sign * e)))
+}
+
+/// `-(I - sign · R')⁻¹ gap`; of least energy norm where the matrix is singular.
+fn newton_step(derivative: &DMatrix<f64>, gap: &DVector<f64>, sign: f64, weights: &[f64]) -> DVector<f64> {
+    let n = gap.len();
+    // in energy coordinates, so that singular values and the least norm mean something
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        let identity = if i == j { 1.0 } else { 0.0 };
+        weights[i] * (identity - sign * derivative[(i, j)]) / weights[j]
+    });
+    let right = DVector::from_fn(n, |i, _| -weights[i] * gap[i]);
+    let lu = scaled.clone().lu();
+    let pivots = lu.u().diagonal().map(f64::abs);
+    let solution = if n > 0 && pivots.min() > CONTINUUM * pivots.max() {
+        lu.solve(&right)
+    } else {
+        let svd = scaled.svd(true, true);
+        let threshold = CONTINUUM * svd.singular_values.amax();
+        svd.solve(&right, threshold).ok()
+    };
+    let mut step = solution.unwrap_or_else(|| right.clone());
+    for i in 0..n {
+        step[i] /= weights[i];
+    }
+    step
+}
+
+/// Energy norm.
+pub(crate) fn norm(weights: &[f64], vector: &[f64]) -> f64 {
+    weights.iter().zip(vector).map(|(w, z)| (w * z) * (w * z)).sum::<f64>().sqrt()
+}

@@ -1,0 +1,197 @@
+//! A periodic motion, with the evidence for it.
+//!
+//! All methods return the same [`Orbit`]. Its numbers (amplitudes, energies, slip) are computed by the method that found it, in
+//! closed form where it can; [`Orbit::sample`] gives the motion at any time.
+
+mod stability;
+
+pub use crate::method::Contact;
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use std::fmt;
+use std::sync::Arc;
+
+/// A converged periodic motion of a system.
+#[derive(Clone)]
+pub struct Orbit {
+    /// Name of the method that found it.
+    pub method: &'static str,
+    /// Drive frequency Ω, rad/s.
+    pub omega: f64,
+    /// Whether the orbit was found as one with `x(t + T/2) = -x(t)` or over the full period.
+    pub symmetry: Symmetry,
+    /// State at t = 0: displacements (m), velocities (m/s), then the states of the joints. A start for neighbouring orbits.
+    pub start: Vec<f64>,
+    /// One entry per degree of freedom.
+    pub places: Vec<PlaceMotion>,
+    /// One entry per joint.
+    pub joints: Vec<JointMotion>,
+    /// Work and losses per period, J.
+    pub energy: Energy,
+    /// Why the orbit may be trusted.
+    pub evidence: Evidence,
+    /// Derivative of the state after one return (half or full period by `symmetry`) with respect to the state at t = 0.
+    pub return_map: DMatrix<f64>,
+    pub(crate) path: Arc<dyn Path>,
+}
+
+/// Which return the orbit was closed on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Symmetry {
+    /// `x(t + T/2) = -x(t)`.
+    HalfPeriod,
+    /// `x(t + T) = x(t)` only.
+    FullPeriod,
+}
+
+/// Motion of one place over a period.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlaceMotion {
+    /// Name.
+    pub name: String,
+    /// Largest displacement, m.
+    pub maximum: f64,
+    /// Smallest displacement, m.
+    pub minimum: f64,
+    /// Mean displacement, m.
+    pub mean: f64,
+    /// First harmonic `X` in `x = Re(X e^{jΩt}) + …`, m.
+    pub first_harmonic: Complex64,
+}
+
+impl PlaceMotion {
+    /// Half of peak to peak, m.
+    pub fn amplitude(&self) -> f64 {
+        0.5 * (self.maximum - self.minimum)
+    }
+    /// Phase of the first harmonic against `cos Ωt`, degrees in (-180, 180].
+    pub fn phase_deg(&self) -> f64 {
+        self.first_harmonic.arg().to_degrees()
+    }
+}
+
+/// What one joint does over a period.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointMotion {
+    /// Name.
+    pub name: String,
+    /// Energy lost in friction per period, J.
+    pub dissipation: f64,
+    /// Fraction of the period in which the joint slips.
+    pub slip_fraction: f64,
+    /// Largest and smallest relative displacement, m.
+    pub displacement: (f64, f64),
+    /// Changes between stick and slip, or of the slip direction, per period.
+    pub switches: usize,
+}
+
+/// Energies per period, J.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Energy {
+    /// Work of the forces and of imposed motion.
+    pub work_in: f64,
+    /// Loss in viscous dampers.
+    pub viscous: f64,
+    /// Loss in joints.
+    pub friction: f64,
+}
+
+/// The numbers that say how far an orbit may be trusted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evidence {
+    /// Distance between the state and its return, relative to the state, in the energy norm.
+    pub residual: f64,
+    /// `|work in - viscous - friction| / work in`, from independent integrals.
+    pub energy_gap: f64,
+    /// Switches per period.
+    pub switches: usize,
+    /// Iterations of the method.
+    pub iterations: usize,
+    /// Estimated relative error of the amplitudes from discretisation; `None` for a method that has none.
+    pub truncation: Option<f64>,
+    /// Names of joints that stick for the whole period: their offset is not unique, the orbit is one of a continuum
+    /// (the symmetric one, with [`Symmetry::HalfPeriod`]).
+    pub stuck: Vec<String>,
+}
+
+/// The state of a motion at one instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// Displacements, length n, m.
+    pub displacement: Vec<f64>,
+    /// Velocities, length n, m/s.
+    pub velocity: Vec<f64>,
+    /// Accelerations, length n, m/s².
+    pub acceleration: Vec<f64>,
+    /// The joints.
+    pub joints: Vec<JointSample>,
+    /// Displacement of, and force that moves, each place with imposed motion: m, N.
+    pub moved: Vec<(f64, f64)>,
+}
+
+/// A joint at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointSample {
+    /// Relative displacement, m.
+    pub displacement: f64,
+    /// Relative velocity, m/s.
+    pub velocity: f64,
+    /// Friction force, N.
+    pub force: f64,
+    /// Stick or slip.
+    pub contact: Contact,
+}
+
+/// A motion that can be evaluated at any time of its period.
+pub(crate) trait Path: Send + Sync {
+    /// The state at `time` in `[0, T)`.
+    fn sample(&self, time: f64) -> Sample;
+    /// The instants at which something switches, in `[0, T)`, rising.
+    fn switch_times(&self) -> Vec<f64>;
+}
+
+impl Orbit {
+    /// Period `T = 2π/Ω`, s.
+    pub fn period(&self) -> f64 {
+        std::f64::consts::TAU / self.omega
+    }
+
+    /// The state at any time (s).
+    pub fn sample(&self, time: f64) -> Sample {
+        self.path.sample(time.rem_euclid(self.period()))
+    }
+
+    /// Instants within `[0, T)` at which a joint switches, rising, s.
+    pub fn switch_times(&self) -> Vec<f64> {
+        self.path.switch_times()
+    }
+
+    /// The motion of a place by its name.
+    pub fn place(&self, name: &str) -> Option<&PlaceMotion> {
+        self.places.iter().find(|place| place.name == name)
+    }
+
+    /// A joint by its name.
+    pub fn joint(&self, name: &str) -> Option<&JointMotion> {
+        self.joints.iter().find(|joint| joint.name == name)
+    }
+
+    /// Whether a joint sticks for the whole period, so that the orbit is one of a continuum.
+    pub fn is_one_of_many(&self) -> bool {
+        !self.evidence.stuck.is_empty()
+    }
+}
+
+impl fmt::Debug for Orbit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Orbit")
+            .field("method", &self.method)
+            .field("omega", &self.omega)
+            .field("symmetry", &self.symmetry)
+            .field("places", &self.places)
+            .field("joints", &self.joints)
+            .field("energy", &self.energy)
+            .field("evidence", &self.evidence)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,236 @@
+//! What is wrong in a study file: where, what was expected, what to do.
+
+use crate::units::Fault;
+use miette::{Diagnostic, LabeledSpan, MietteError, SourceCode, SourceSpan, SpanContents};
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A text that values come from: the file, or the value of a `--set`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Source {
+    pub name: String,
+    pub text: String,
+}
+
+/// Where a value stands: the text (by index) and its bytes.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct Place {
+    pub source: usize,
+    pub span: Range<usize>,
+}
+
+/// An error before it knows its text.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Problem {
+    pub place: Place,
+    pub key: String,
+    pub message: String,
+    pub help: Option<String>,
+}
+
+impl Problem {
+    pub fn new(place: &Place, key: impl Into<String>, message: impl Into<String>) -> Self {
+        Problem { place: place.clone(), key: key.into(), message: message.into(), help: None }
+    }
+
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    pub fn maybe_help(mut self, help: Option<String>) -> Self {
+        self.help = help;
+        self
+    }
+
+    /// A fault inside the text at `place`; `inner` says where the text begins in the source, if it stands there as it is.
+    pub fn fault(place: &Place, inner: Option<usize>, key: &str, fault: Fault) -> Self {
+        let span = match inner {
+            Some(start) => start + fault.span.start..start + fault.span.end,
+            None => place.span.clone(),
+        };
+        let place = Place { source: place.source, span };
+        Problem { place, key: key.to_owned(), message: fault.message, help: fault.help }
+    }
+}
+
+/// Why a study is refused.
+///
+/// One line with file, line and column as [`Display`](fmt::Display); as a [`Diagnostic`] it underlines the wrong value and carries the
+/// other errors of the same file as related ones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StudyError(Box<Inner>);
+
+#[derive(Debug, Clone, PartialEq)]
+struct Inner {
+    source: Arc<Source>,
+    /// Bytes in the text and (line, column); `None` for a file that could not be read.
+    at: Option<(Range<usize>, usize, usize)>,
+    key: Option<String>,
+    message: String,
+    help: Option<String>,
+    others: Vec<StudyError>,
+}
+
+impl StudyError {
+    /// An error about a file as a whole.
+    pub(crate) fn file(name: &str, message: impl Into<String>, help: Option<String>) -> Self {
+        let source = Arc::new(Source { name: name.to_owned(), text: String::new() });
+        StudyError(Box::new(Inner { source, at: None, key: None, message: message.into(), help, others: Vec::new() }))
+    }
+
+    /// An error at a place of one of the texts.
+    pub(crate) fn at(sources: &[Arc<Source>], problem: Problem) -> Self {
+        let source = match sources.get(problem.place.source) {
+            Some(source) => Arc::clone(source),
+            None => Arc::new(Source { name: String::new(), text: String::new() }),
+        };
+        let start = boundary(&source.text, problem.place.span.start);
+        let end = boundary(&source.text, problem.place.span.end.max(start));
+        let (line, column) = line_and_column(&source.text, start);
+        StudyError(Box::new(Inner {
+            source,
+            at: Some((start..end, line, column)),
+            key: (!problem.key.is_empty()).then_some(problem.key),
+            message: problem.message,
+            help: problem.help,
+            others: Vec::new(),
+        }))
+    }
+
+    /// The first of several errors, in the order of the file, with the rest behind it.
+    pub(crate) fn all(sources: &[Arc<Source>], mut problems: Vec<Problem>) -> Option<Self> {
+        problems.sort_by_key(|p| (p.place.source, p.place.span.start));
+        let mut errors = problems.into_iter().map(|problem| StudyError::at(sources, problem));
+        let mut first = errors.next()?;
+        first.0.others = errors.collect();
+        Some(first)
+    }
+
+    /// Name of the file as it was given; `--set NAME` for a value from the command line.
+    pub fn file_name(&self) -> &str {
+        &self.0.source.name
+    }
+
+    /// Line of the wrong value, from 1; `None` if the file could not be read at all.
+    pub fn line(&self) -> Option<usize> {
+        self.0.at.as_ref().map(|at| at.1)
+    }
+
+    /// Column of the wrong value in characters, from 1.
+    pub fn column(&self) -> Option<usize> {
+        self.0.at.as_ref().map(|at| at.2)
+    }
+
+    /// The key that the error is about, for example `stiffness`.
+    pub fn key(&self) -> Option<&str> {
+        self.0.key.as_deref()
+    }
+
+    /// What is wrong and what was expected, in one line.
+    pub fn message(&self) -> &str {
+        &self.0.message
+    }
+
+    /// What to do.
+    pub fn help_text(&self) -> Option<&str> {
+        self.0.help.as_deref()
+    }
+
+    /// The text that is wrong.
+    pub fn underlined(&self) -> Option<&str> {
+        self.0.at.as_ref().and_then(|(span, _, _)| self.0.source.text.get(span.clone()))
+    }
+
+    /// Other errors that were found in the same file.
+    pub fn others(&self) -> &[StudyError] {
+        &self.0.others
+    }
+}
+
+/// The nearest character boundary at or before `at`.
+fn boundary(text: &str, at: usize) -> usize {
+    let mut at = at.min(text.len());
+    while !text.is_char_boundary(at) {
+        at -= 1;
+    }
+    at
+}
+
+/// Line and column (in characters) of a byte, both from 1.
+fn line_and_column(text: &str, at: usize) -> (usize, usize) {
+    let before = &text[..at];
+    let line = before.matches('\n').count() + 1;
+    let start = before.rfind('\n').map_or(0, |i| i + 1);
+    (line, before[start..].chars().count() + 1)
+}
+
+impl fmt::Display for StudyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:", self.0.source.name)?;
+        if let Some((_, line, column)) = &self.0.at {
+            write!(f, "{line}:{column}:")?;
+        }
+        match &self.0.key {
+            Some(key) => write!(f, " `{key}`: {}", self.0.message),
+            None => write!(f, " {}", self.0.message),
+        }
+    }
+}
+
+impl std::error::Error for StudyError {}
+
+impl SourceCode for Source {
+    fn read_span<'a>(
+        &'a self,
+        span: &SourceSpan,
+        before: usize,
+        after: usize,
+    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
+        let inner = self.text.as_str().read_span(span, before, after)?;
+        Ok(Box::new(miette::MietteSpanContents::new_named(
+            self.name.clone(),
+            inner.data(),
+            *inner.span(),
+            inner.line(),
+            inner.column(),
+            inner.line_count(),
+        )))
+    }
+}
+
+impl Diagnostic for StudyError {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.0.help.as_ref().map(|help| Box::new(help) as Box<dyn fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.0.at.as_ref().map(|_| &*self.0.source as &dyn SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let (span, _, _) = self.0.at.as_ref()?;
+        let label = LabeledSpan::new(Some("here".to_owned()), span.start, span.len());
+        Some(Box::new(std::iter::once(label)))
+    }
+
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
+        if self.0.others.is_empty() {
+            return None;
+        }
+        Some(Box::new(self.0.others.iter().map(|error| error as &dyn Diagnostic)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_count_characters() {
+        assert_eq!(line_and_column("a\nµ = 1", 5), (2, 4));
+        assert_eq!(boundary("µ", 1), 0);
+        assert_eq!(boundary("µ", 9), 2);
+    }
+}

@@ -1,0 +1,724 @@
+//! Quantities and expressions: `"25 s/mm"`, `"m - m1/2"`, `"sqrt(k/m) * 1 rad"`.
+//!
+//! `+ - * / ^`, parentheses, numbers, numbers with a unit, names of parameters, `pi`, and the functions of [`FUNCTIONS`].
+//!
+//! **Bare numbers.** A number without a unit has no dimension yet. It is SI of whatever dimension its place expects, also when it
+//! arrives through a parameter. The rules:
+//!
+//! | operation | bare with bare | bare with dimension `d` |
+//! | --- | --- | --- |
+//! | `a + b`, `a - b`, `min`, `max` | bare | the bare one is taken in the SI unit of `d`; result `d` |
+//! | `a * b`, `a / b` | bare | the bare one is a pure number |
+//! | `a ^ b` | bare | the exponent must be bare or a pure number |
+//! | `sqrt`, `abs` | bare | of a bare number: bare |
+//! | `sin`, `cos`, `tan`, `exp`, `ln` | bare | of a bare number (radians, or a pure number): bare |
+//!
+//! The SI unit of a frequency is Hz here, and of a sweep rate Hz/s: `f = 121`, `frequency = "f"` means 121 Hz. A bare number that was
+//! computed with `pi` is refused as a frequency, since it was probably meant in rad/s. A ratio of two masses is a pure number; it is
+//! *not* bare and does not fit where a stiffness is expected.
+
+use crate::near::{nearest, shown};
+use crate::units::{self, Fault, Names, power, times};
+use std::f64::consts::TAU;
+use std::ops::Range;
+use stickslip::dimension::Dimension;
+
+/// A number with or without a dimension.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Value {
+    /// The number, SI (rad/s for frequencies); of a bare number, as written.
+    pub si: f64,
+    /// Its dimension; `None` for a bare number.
+    pub dimension: Option<Dimension>,
+    /// Whether a bare number was computed with `pi`.
+    with_pi: bool,
+}
+
+impl Value {
+    /// A bare number.
+    pub fn bare(si: f64) -> Self {
+        Value { si, dimension: None, with_pi: false }
+    }
+
+    /// A number of known dimension, SI.
+    pub fn of(si: f64, dimension: Dimension) -> Self {
+        Value { si, dimension: Some(dimension), with_pi: false }
+    }
+
+    /// The number in SI as a quantity of this dimension.
+    ///
+    /// # Errors
+    /// Message and help, if the dimension is another one.
+    pub fn to(self, expected: Dimension) -> Result<f64, (String, Option<String>)> {
+        let Some(found) = self.dimension else {
+            return self.in_si_unit_of(expected);
+        };
+        if found == expected {
+            return Ok(self.si);
+        }
+        let only_radians = Dimension { rad: expected.rad, ..found } == expected;
+        let help = match (only_radians, expected.rad.cmp(&found.rad)) {
+            (true, std::cmp::Ordering::Greater) if expected == Dimension::FREQUENCY => Some(
+                "1/s does not say whether it counts radians or cycles: multiply by `1 rad`, as in \"sqrt(k/m) * 1 rad\", \
+                 or by `1 rev`"
+                    .to_owned(),
+            ),
+            (true, std::cmp::Ordering::Greater) => Some("a radian is missing: multiply by `1 rad`".to_owned()),
+            (true, std::cmp::Ordering::Less) => Some("a radian is left over: divide by `1 rad`".to_owned()),
+            _ => None,
+        };
+        Err((format!("expected {}, found {}", described(expected), described(found)), help))
+    }
+
+    fn in_si_unit_of(self, dimension: Dimension) -> Result<f64, (String, Option<String>)> {
+        let counts_cycles = dimension == Dimension::FREQUENCY || dimension == Dimension::SWEEP_RATE;
+        if counts_cycles && self.with_pi {
+            return Err((
+                "a bare number is in Hz here, but this one was computed with `pi`".to_owned(),
+                Some("say the unit: \"… * 1 rad/s\" or \"… * 1 Hz\"".to_owned()),
+            ));
+        }
+        Ok(if counts_cycles { self.si * TAU } else { self.si })
+    }
+}
+
+/// Dimension with an article-free name: `stiffness (N/m)`.
+pub(crate) fn described(dimension: Dimension) -> String {
+    match dimension {
+        Dimension::NONE => "a pure number".to_owned(),
+        other if other.name_and_unit().is_none() => format!("a quantity in {other}"),
+        other => format!("{other}"),
+    }
+}
+
+/// A number in its dimension's main unit, with as many digits as a reader wants: `2.5 N`, `121 Hz`.
+pub(crate) fn displayed(si: f64, dimension: Option<Dimension>) -> String {
+    let (value, unit) = match dimension {
+        None | Some(Dimension::NONE) => (si, String::new()),
+        Some(Dimension::FREQUENCY) => (si / TAU, "Hz".to_owned()),
+        Some(Dimension::SWEEP_RATE) => (si / TAU, "Hz/s".to_owned()),
+        Some(other) => (si, other.name_and_unit().map_or_else(|| other.to_string(), |(_, unit)| unit.to_owned())),
+    };
+    let rounded: f64 = format!("{value:.8e}").parse().unwrap_or(value);
+    let number = if rounded != 0.0 && !(1e-4..1e7).contains(&rounded.abs()) {
+        format!("{rounded:e}")
+    } else {
+        rounded.to_string()
+    };
+    if unit.is_empty() { number } else { format!("{number} {unit}") }
+}
+
+/// The functions of expressions.
+pub const FUNCTIONS: &[&str] = &["sqrt", "sin", "cos", "tan", "exp", "ln", "abs", "min", "max"];
+
+/// Whether a parameter cannot have this name.
+pub(crate) fn is_reserved(name: &str) -> bool {
+    FUNCTIONS.contains(&name) || name == "pi" || is_not_finite(name)
+}
+
+fn is_not_finite(name: &str) -> bool {
+    ["nan", "inf", "infinity"].iter().any(|word| name.eq_ignore_ascii_case(word))
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Operation {
+    Push(Value),
+    Parameter(usize),
+    Negate,
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Power,
+    Call { function: &'static str, arguments: usize },
+}
+
+/// An expression, compiled: steps for a stack machine, so that no depth of nesting can exhaust ours.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expression {
+    steps: Vec<(Operation, Range<usize>)>,
+}
+
+/// Parentheses and powers inside each other.
+const DEEPEST: usize = 64;
+
+impl Expression {
+    /// A bare number.
+    pub fn number(value: f64) -> Self {
+        Expression { steps: vec![(Operation::Push(Value::bare(value)), 0..0)] }
+    }
+
+    /// Compiles `text`; a name means the parameter at its index in `parameters`.
+    ///
+    /// # Errors
+    /// [`Fault`] with the bytes of `text` that are wrong.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip::dimension::Dimension;
+    /// use stickslip_study::expression::{Expression, Value};
+    /// let e = Expression::compile("m - m1/2", &["m", "m1"]).unwrap();
+    /// let value = e.evaluate(&[Value::of(0.182, Dimension::MASS), Value::bare(0.002)]).unwrap();
+    /// assert_eq!(value.to(Dimension::MASS), Ok(0.181));
+    /// ```
+    pub fn compile<S: AsRef<str>>(text: &str, parameters: &[S]) -> Result<Self, Fault> {
+        let index = |name: &str| parameters.iter().position(|p| p.as_ref() == name);
+        let names: Vec<&str> = parameters.iter().map(AsRef::as_ref).collect();
+        Expression::compile_with(text, &index, &names)
+    }
+
+    pub(crate) fn compile_with(
+        text: &str,
+        index: &dyn Fn(&str) -> Option<usize>,
+        names: &[&str],
+    ) -> Result<Self, Fault> {
+        let mut parser = Parser { text, at: 0, index, names, depth: 0, steps: Vec::new() };
+        parser.space();
+        if parser.peek().is_none() {
+            return Err(Fault::new(0..text.len(), "the text is empty, a number or an expression is missing"));
+        }
+        parser.sum()?;
+        if let Some(c) = parser.peek() {
+            return Err(parser.unexpected(c));
+        }
+        Ok(Expression { steps: parser.steps })
+    }
+
+    /// The parameters it reads, by index.
+    pub fn parameters(&self) -> impl Iterator<Item = usize> + '_ {
+        self.steps.iter().filter_map(|(operation, _)| match operation {
+            Operation::Parameter(index) => Some(*index),
+            _ => None,
+        })
+    }
+
+    /// Whether it is one literal number, with or without a unit.
+    pub fn is_literal(&self) -> bool {
+        matches!(self.steps.as_slice(), [(Operation::Push(_), _)] | [(Operation::Push(_), _), (Operation::Negate, _)])
+    }
+
+    /// The value, with `parameters` by index.
+    ///
+    /// # Errors
+    /// [`Fault`] with the bytes of the sub-expression whose dimensions do not fit or whose value is not finite.
+    pub fn evaluate(&self, parameters: &[Value]) -> Result<Value, Fault> {
+        let mut stack: Vec<Value> = Vec::with_capacity(8);
+        for (operation, span) in &self.steps {
+            let fault = |message: String| Fault::new(span.clone(), message);
+            let mut pop = || stack.pop().unwrap_or(Value::bare(f64::NAN)); // the compiler balances the stack
+            let value = match *operation {
+                Operation::Push(value) => value,
+                Operation::Parameter(index) => parameters.get(index).copied().unwrap_or(Value::bare(f64::NAN)),
+                Operation::Negate => {
+                    let a = pop();
+                    Value { si: -a.si, ..a }
+                }
+                Operation::Add | Operation::Subtract => {
+                    let (b, a) = (pop(), pop());
+                    let (verb, sign) = if *operation == Operation::Add { ("add", 1.0) } else { ("subtract", -1.0) };
+                    let (x, y, value) = unify(a, b).map_err(|e| e.into_fault(span, verb))?;
+                    Value { si: x + sign * y, ..value }
+                }
+                Operation::Multiply | Operation::Divide => {
+                    let (b, a) = (pop(), pop());
+                    let divide = *operation == Operation::Divide;
+                    let one = Dimension::NONE;
+                    let dimension = match (a.dimension, b.dimension) {
+                        (None, None) => None,
+                        (da, db) => {
+                            let db = power(db.unwrap_or(one), if divide { -1.0 } else { 1.0 });
+                            let product = db.and_then(|db| times(da.unwrap_or(one), db));
+                            Some(product.ok_or_else(|| fault("the powers of the unit become too large".to_owned()))?)
+                        }
+                    };
+                    let si = if divide { a.si / b.si } else { a.si * b.si };
+                    if divide && b.si == 0.0 {
+                        return Err(fault("this divides by zero".to_owned()));
+                    }
+                    Value { si, dimension, with_pi: a.with_pi || b.with_pi }
+                }
+                Operation::Power => {
+                    let (b, a) = (pop(), pop());
+                    if b.dimension.is_some_and(|d| d != Dimension::NONE) {
+                        let found = described(b.dimension.unwrap_or(Dimension::NONE));
+                        return Err(fault(format!("an exponent must be a pure number, found {found}")));
+                    }
+                    let dimension = match a.dimension {
+                        None => None,
+                        Some(d) => Some(power(d, b.si).ok_or_else(|| {
+                            fault(format!("{} cannot be raised to the power {}", described(d), b.si))
+                        })?),
+                    };
+                    Value { si: a.si.powf(b.si), dimension, with_pi: a.with_pi || b.with_pi }
+                }
+                Operation::Call { function: function @ ("min" | "max"), arguments } => {
+                    let mut best = pop();
+                    for _ in 1..arguments {
+                        let (x, y, value) = unify(best, pop()).map_err(|e| e.into_fault(span, "compare"))?;
+                        best = Value { si: if function == "min" { x.min(y) } else { x.max(y) }, ..value };
+                    }
+                    best
+                }
+                Operation::Call { function, .. } => call(function, pop()).map_err(fault)?,
+            };
+            if !value.si.is_finite() {
+                return Err(fault("this is not a finite number".to_owned()));
+            }
+            stack.push(value);
+        }
+        Ok(stack.pop().unwrap_or(Value::bare(f64::NAN)))
+    }
+}
+
+struct Clash {
+    a: Dimension,
+    b: Dimension,
+    other: Option<(String, Option<String>)>,
+}
+
+impl Clash {
+    fn into_fault(self, span: &Range<usize>, verb: &str) -> Fault {
+        match self.other {
+            Some((message, help)) => Fault { span: span.clone(), message, help },
+            None => Fault::new(
+                span.clone(),
+                format!("these do not {verb}: {} and {}", described(self.a), described(self.b)),
+            ),
+        }
+    }
+}
+
+/// Two values in one dimension: both numbers, and what the result is like.
+fn unify(a: Value, b: Value) -> Result<(f64, f64, Value), Clash> {
+    let none = Dimension::NONE;
+    let unit = |value: Value, d| value.in_si_unit_of(d).map_err(|e| Clash { a: none, b: none, other: Some(e) });
+    match (a.dimension, b.dimension) {
+        (None, None) => Ok((a.si, b.si, Value { with_pi: a.with_pi || b.with_pi, ..a })),
+        (Some(d), None) => Ok((a.si, unit(b, d)?, a)),
+        (None, Some(d)) => Ok((unit(a, d)?, b.si, b)),
+        (Some(d), Some(e)) if d == e => Ok((a.si, b.si, a)),
+        (Some(a), Some(b)) => Err(Clash { a, b, other: None }),
+    }
+}
+
+fn call(function: &str, a: Value) -> Result<Value, String> {
+    let pure = |allowed: &[Dimension], value: f64| match a.dimension {
+        None => Ok(Value { si: value, ..a }),
+        Some(d) if allowed.contains(&d) => Ok(Value::of(value, Dimension::NONE)),
+        Some(d) => Err(format!("`{function}` takes {}, found {}", described(allowed[0]), described(d))),
+    };
+    let angle = &[Dimension::ANGLE, Dimension::NONE];
+    match function {
+        "sin" => pure(angle, a.si.sin()),
+        "cos" => pure(angle, a.si.cos()),
+        "tan" => pure(angle, a.si.tan()),
+        "exp" => pure(&[Dimension::NONE], a.si.exp()),
+        "ln" => pure(&[Dimension::NONE], a.si.ln()),
+        "abs" => Ok(Value { si: a.si.abs(), ..a }),
+        _ => {
+            let dimension = match a.dimension {
+                None => None,
+                Some(d) => Some(power(d, 0.5).ok_or_else(|| format!("{} has no square root", described(d)))?),
+            };
+            if a.si < 0.0 {
+                return Err(format!("the square root of a negative number ({})", a.si));
+            }
+            Ok(Value { si: a.si.sqrt(), dimension, ..a })
+        }
+    }
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    at: usize,
+    index: &'a dyn Fn(&str) -> Option<usize>,
+    names: &'a [&'a str],
+    depth: usize,
+    steps: Vec<(Operation, Range<usize>)>,
+}
+
+impl Parser<'_> {
+    fn rest(&self) -> &str {
+        &self.text[self.at..]
+    }
+
+    fn peek(&self) -> Option<char> {
+        self.rest().chars().next()
+    }
+
+    fn space(&mut self) {
+        self.at += self.rest().len() - self.rest().trim_start().len();
+    }
+
+    fn next(&mut self, c: char) {
+        self.at += c.len_utf8();
+        self.space();
+    }
+
+    fn push(&mut self, operation: Operation, start: usize) {
+        let end = self.text[..self.at].trim_end().len().max(start);
+        self.steps.push((operation, start..end));
+    }
+
+    fn deeper(&mut self) -> Result<(), Fault> {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            let message = format!("more than {DEEPEST} parentheses or powers inside each other");
+            return Err(Fault::new(self.at..self.at, message).help("name the parts as parameters"));
+        }
+        Ok(())
+    }
+
+    fn sum(&mut self) -> Result<(), Fault> {
+        let start = self.at;
+        self.product()?;
+        while let Some(c @ ('+' | '-' | '−')) = self.peek() {
+            self.next(c);
+            self.product()?;
+            self.push(if c == '+' { Operation::Add } else { Operation::Subtract }, start);
+        }
+        Ok(())
+    }
+
+    fn product(&mut self) -> Result<(), Fault> {
+        let start = self.at;
+        self.signed()?;
+        while let Some(c @ ('*' | '/' | '·' | '⋅' | '×')) = self.peek() {
+            if self.rest().starts_with("**") {
+                return Err(Fault::new(self.at..self.at + 2, "`**` is no operator").help("a power is written `^`"));
+            }
+            self.next(c);
+            self.signed()?;
+            self.push(if c == '/' { Operation::Divide } else { Operation::Multiply }, start);
+        }
+        Ok(())
+    }
+
+    fn signed(&mut self) -> Result<(), Fault> {
+        let start = self.at;
+        let mut negative = false;
+        while let Some(c @ ('+' | '-' | '−')) = self.peek() {
+            negative ^= c != '+';
+            self.next(c);
+        }
+        self.power()?;
+        if negative {
+            self.push(Operation::Negate, start);
+        }
+        Ok(())
+    }
+
+    fn power(&mut self) -> Result<(), Fault> {
+        let start = self.at;
+        self.atom()?;
+        if self.peek() == Some('^') {
+            self.next('^');
+            self.deeper()?;
+            self.signed()?;
+            self.depth -= 1;
+            self.push(Operation::Power, start);
+        }
+        Ok(())
+    }
+
+    fn atom(&mut self) -> Result<(), Fault> {
+        let start = self.at;
+        match self.peek() {
+            None => Err(Fault::new(start..start, "the expression ends too early, a value is missing here")),
+            Some('(') => {
+                self.next('(');
+                self.deeper()?;
+                self.sum()?;
+                self.close(start)?;
+                self.depth -= 1;
+                Ok(())
+            }
+            Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
+            Some(c) if c.is_ascii_alphabetic() || c == '_' => self.name(),
+            Some(c) => Err(self.unexpected(c)),
+        }
+    }
+
+    fn close(&mut self, open: usize) -> Result<(), Fault> {
+        match self.peek() {
+            Some(')') => {
+                self.next(')');
+                Ok(())
+            }
+            None => {
+                Err(Fault::new(open..open + 1, "this parenthesis is not closed").help("add `)` where it should close"))
+            }
+            Some(c) => Err(self.unexpected(c)),
+        }
+    }
+
+    fn number(&mut self) -> Result<(), Fault> {
+        let start = self.at;
+        let bytes = self.text.as_bytes();
+        let digits = |mut at: usize| {
+            while bytes.get(at).is_some_and(u8::is_ascii_digit) {
+                at += 1;
+            }
+            at
+        };
+        let mut end = digits(start);
+        if bytes.get(end) == Some(&b'.') {
+            end = digits(end + 1);
+        }
+        if end == start + 1 && bytes[start] == b'.' {
+            return Err(Fault::new(start..end, "a number needs digits"));
+        }
+        if matches!(bytes.get(end), Some(b'e' | b'E')) {
+            let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
+            let after = digits(end + 1 + sign);
+            if after > end + 1 + sign {
+                end = after;
+            }
+        }
+        let literal = &self.text[start..end];
+        if matches!(bytes.get(end), Some(b'.' | b',')) && bytes.get(end + 1).is_some_and(u8::is_ascii_digit) {
+            return Err(Fault::new(start..digits(end + 1), "this is not one number")
+                .help("the decimal sign is a point, and digits are not grouped: \"10000.5 N/m\""));
+        }
+        self.at = end;
+        self.space();
+        let value = match self.peek() {
+            Some(c) if units::starts_unit(c) => {
+                let parameter = |name: &str| (self.index)(name).is_some();
+                let function = |name: &str| FUNCTIONS.contains(&name);
+                let names = Names { parameter: &parameter, function: &function };
+                let (unit, end) = units::read(self.text, self.at, &names)?;
+                self.at = end;
+                Value::of(unit.scale(literal), unit.dimension)
+            }
+            _ => Value::bare(literal.parse().unwrap_or(f64::NAN)),
+        };
+        if !value.si.is_finite() {
+            return Err(Fault::new(start..end, "this number is too large"));
+        }
+        let mantissa = literal.split(['e', 'E']).next().unwrap_or(literal);
+        if value.si == 0.0 && mantissa.bytes().any(|b| (b'1'..=b'9').contains(&b)) {
+            return Err(Fault::new(start..end, "this number is too small").help("write 0 if it is meant to be zero"));
+        }
+        self.push(Operation::Push(value), start);
+        self.space();
+        Ok(())
+    }
+
+    fn name(&mut self) -> Result<(), Fault> {
+        let start = self.at;
+        let rest = self.rest();
+        let end = start + rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(rest.len());
+        let name = &self.text[start..end];
+        self.at = end;
+        self.space();
+        if self.peek() == Some('(') {
+            return self.call(name, start..end);
+        }
+        if let Some(index) = (self.index)(name) {
+            self.push(Operation::Parameter(index), start);
+            return Ok(());
+        }
+        if name == "pi" {
+            let value = Value { si: std::f64::consts::PI, dimension: None, with_pi: true };
+            self.push(Operation::Push(value), start);
+            return Ok(());
+        }
+        if is_not_finite(name) {
+            return Err(Fault::new(start..end, format!("a finite number is needed, found `{name}`")));
+        }
+        if FUNCTIONS.contains(&name) {
+            return Err(Fault::new(start..end, format!("the function `{name}` needs its argument in parentheses")));
+        }
+        let fault = Fault::new(start..end, format!("there is no parameter `{}`", shown(name)));
+        Err(if units::find(name).is_some() {
+            let help = if self.steps.is_empty() {
+                format!("a unit needs a number before it, as in \"1 {name}\"")
+            } else {
+                format!("as a unit, `{name}` stands right after a number, as in \"1 {name}\" or \"1 {name}^-1\"")
+            };
+            fault.help(help)
+        } else if let Some(near) = nearest(name, self.names.iter().copied()) {
+            fault.help(format!("did you mean `{near}`?"))
+        } else if let Some(unit) = units::nearest_unit(name).filter(|_| !self.steps.is_empty()) {
+            fault.help(format!("did you mean the unit `{unit}`?"))
+        } else {
+            fault.help(format!("add it to [parameters]: {} = \"…\"", shown(name)))
+        })
+    }
+
+    fn call(&mut self, name: &str, span: Range<usize>) -> Result<(), Fault> {
+        let Some(&function) = FUNCTIONS.iter().find(|f| **f == name) else {
+            let fault = Fault::new(span, format!("there is no function `{}`", shown(name)));
+            return Err(match nearest(name, FUNCTIONS.iter().copied()) {
+                Some(near) => fault.help(format!("did you mean `{near}`?")),
+                None => fault.help(format!("the functions are {}; a product is written `*`", FUNCTIONS.join(", "))),
+            });
+        };
+        let open = self.at;
+        self.next('(');
+        self.deeper()?;
+        let mut arguments = 1;
+        self.sum()?;
+        while self.peek() == Some(',') {
+            self.next(',');
+            self.sum()?;
+            arguments += 1;
+        }
+        self.close(open)?;
+        self.depth -= 1;
+        let several = matches!(function, "min" | "max");
+        if several != (arguments > 1) {
+            let needed = if several { "two or more arguments" } else { "one argument" };
+            return Err(Fault::new(span.start..self.at, format!("`{function}` takes {needed}, found {arguments}")));
+        }
+        self.push(Operation::Call { function, arguments }, span.start);
+        Ok(())
+    }
+
+    fn unexpected(&self, c: char) -> Fault {
+        let span = self.at..self.at + c.len_utf8();
+        match c {
+            ')' => Fault::new(span, "this parenthesis closes none"),
+            ',' => Fault::new(span, "`,` separates the arguments of `min` and `max` only")
+                .help("the decimal sign is a point"),
+            c if c.is_alphanumeric() => Fault::new(span, "an operator is missing here").help("a product is written `*`"),
+            c => Fault::new(span, format!("`{}` has no meaning here", shown(&c.to_string()))),
+        }
+    }
+}
+
+/// The value in SI of a quantity without parameters, as a study file would read it at a place that expects `dimension`.
+///
+/// # Errors
+/// [`Fault`].
+///
+/// # Example
+/// ```
+/// use stickslip::dimension::Dimension;
+/// use stickslip_study::expression::quantity;
+/// assert_eq!(quantity("25 s/mm", Dimension::INVERSE_VELOCITY), Ok(25_000.0));
+/// assert!(quantity("10 kg", Dimension::STIFFNESS).is_err());
+/// ```
+pub fn quantity(text: &str, dimension: Dimension) -> Result<f64, Fault> {
+    let value = Expression::compile::<&str>(text, &[])?.evaluate(&[])?;
+    value.to(dimension).map_err(|(message, help)| Fault { span: 0..text.len(), message, help })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PARAMETERS: [&str; 6] = ["m", "m1", "k", "f", "Ft", "omega"];
+
+    fn values() -> [Value; 6] {
+        [
+            Value::of(0.182, Dimension::MASS),
+            Value::bare(0.002),
+            Value::of(105_103.0, Dimension::STIFFNESS),
+            Value::bare(121.0),
+            Value::of(2.0, Dimension::FORCE),
+            Value::of(760.0, Dimension::FREQUENCY),
+        ]
+    }
+
+    fn evaluate(text: &str, dimension: Dimension) -> Result<f64, Fault> {
+        let value = Expression::compile(text, &PARAMETERS)?.evaluate(&values())?;
+        value.to(dimension).map_err(|(message, help)| Fault { span: 0..text.len(), message, help })
+    }
+
+    fn check(text: &str, dimension: Dimension, expected: f64) {
+        assert_eq!(evaluate(text, dimension), Ok(expected), "{text}");
+    }
+
+    #[test]
+    fn dimensions_follow_the_algebra() {
+        check("m - m1/2", Dimension::MASS, 0.182 - 0.002 / 2.0);
+        check("m1 - m1/2", Dimension::MASS, 0.001);
+        check("-2^2", Dimension::NONE, -4.0);
+        check("2^-1", Dimension::NONE, 0.5);
+        check("2^3^2", Dimension::NONE, 512.0);
+        check("sqrt(k/m) * 1 rad", Dimension::FREQUENCY, (105_103.0f64 / 0.182).sqrt());
+        check("k * 2 mm", Dimension::FORCE, 105_103.0 * 0.002);
+        check("2 mm + 1e-3", Dimension::LENGTH, 0.003);
+        check("min(Ft, 1, 3 N)", Dimension::FORCE, 1.0);
+        check("max(1, 2)", Dimension::FORCE, 2.0);
+        check("m/m", Dimension::NONE, 1.0);
+        check("Ft*sin(30 deg)", Dimension::FORCE, 2.0 * (std::f64::consts::PI / 6.0).sin());
+        check("2 N * min(1, 2)", Dimension::FORCE, 2.0);
+        check("pi/2", Dimension::ANGLE, std::f64::consts::FRAC_PI_2);
+        check("3N", Dimension::FORCE, 3.0);
+        check("(m)(".trim_end_matches('('), Dimension::MASS, 0.182);
+    }
+
+    #[test]
+    fn bare_frequencies_are_in_hertz() {
+        check("f", Dimension::FREQUENCY, 121.0 * TAU);
+        check("f + 1 Hz", Dimension::FREQUENCY, 121.0 * TAU + TAU);
+        check("omega", Dimension::FREQUENCY, 760.0);
+        check("121", Dimension::FREQUENCY, 121.0 * TAU);
+        refuse("2*pi*f", Dimension::FREQUENCY, "computed with `pi`", 0..6);
+        refuse("sqrt(k/m)", Dimension::FREQUENCY, "multiply by `1 rad`", 0..9);
+    }
+
+    fn refuse(text: &str, dimension: Dimension, words: &str, span: Range<usize>) {
+        let fault = evaluate(text, dimension).unwrap_err();
+        let all = format!("{} {}", fault.message, fault.help.clone().unwrap_or_default());
+        assert!(all.contains(words), "{text}: {all}");
+        assert_eq!(fault.span, span, "{text}: {all}");
+    }
+
+    #[test]
+    fn faults_point_at_the_part_that_is_wrong() {
+        refuse("m + Ft", Dimension::MASS, "these do not add: mass (kg) and force (N)", 0..6);
+        refuse("2 * (m - k)", Dimension::MASS, "subtract", 5..10);
+        refuse("10 kg", Dimension::STIFFNESS, "expected stiffness (N/m), found mass (kg)", 0..5);
+        refuse("kt * 2", Dimension::FORCE, "there is no parameter `kt`", 0..2);
+        refuse("ft * 2", Dimension::FORCE, "a unit needs a number", 0..2);
+        refuse("F * 2", Dimension::FORCE, "did you mean", 0..1);
+        refuse("nan N", Dimension::FORCE, "finite number", 0..3);
+        refuse("-inf", Dimension::FORCE, "finite number", 1..4);
+        refuse("1e999 N", Dimension::FORCE, "too large", 0..5);
+        refuse("1e-999 N", Dimension::FORCE, "too small", 0..6);
+        refuse("Ft/(1-1)", Dimension::FORCE, "divides by zero", 0..8);
+        refuse("10 N/", Dimension::FORCE, "after `/` a unit is missing", 4..5);
+        refuse("N", Dimension::FORCE, "number before it", 0..1);
+        refuse("  ", Dimension::FORCE, "empty", 0..2);
+        refuse("2 *", Dimension::FORCE, "ends too early", 3..3);
+        refuse("(2", Dimension::FORCE, "not closed", 0..1);
+        refuse("2)", Dimension::FORCE, "closes none", 1..2);
+        refuse("1,5 N", Dimension::FORCE, "decimal sign is a point", 0..3);
+        refuse("2 Ft", Dimension::FORCE, "write \"* Ft\"", 2..4);
+        refuse("2 ** 3", Dimension::NONE, "`^`", 2..4);
+        refuse("sqrt 2", Dimension::NONE, "parentheses", 0..4);
+        refuse("sqr(2)", Dimension::NONE, "did you mean `sqrt`?", 0..3);
+        refuse("sqrt(m)", Dimension::MASS, "no square root", 0..7);
+        refuse("sqrt(0-1)", Dimension::NONE, "negative", 0..9);
+        refuse("exp(m)", Dimension::NONE, "pure number", 0..6);
+        refuse("min(1)", Dimension::NONE, "two or more", 0..6);
+        refuse("2 m^2", Dimension::LENGTH, "found a quantity in m^2", 0..5);
+        refuse("k^0.3", Dimension::NONE, "raised", 0..5);
+    }
+
+    #[test]
+    fn no_depth_exhausts_the_stack() {
+        for text in [
+            "(".repeat(100_000),
+            "-".repeat(100_000),
+            "2^".repeat(100_000),
+            "sqrt(".repeat(100_000),
+            format!("2 N/{}", "(".repeat(100_000)),
+        ] {
+            assert!(evaluate(&text, Dimension::NONE).is_err());
+        }
+        let long = format!("1{}", "+1".repeat(100_000));
+        check(&long, Dimension::NONE, 100_001.0);
+    }
+
+    #[test]
+    fn values_are_shown_as_a_reader_would_write_them() {
+        assert_eq!(displayed(0.1 + 0.2, Some(Dimension::FORCE)), "0.3 N");
+        assert_eq!(displayed(121.0 * TAU, Some(Dimension::FREQUENCY)), "121 Hz");
+        assert_eq!(displayed(2.0, None), "2");
+    }
+}

@@ -1,0 +1,77 @@
+//! Study kinds: what can be asked for. One file each, one line in [`TABLE`].
+//!
+//! A kind states its keys of `[study]`; the reader checks them and hands over their [`Values`] for every case.
+
+mod hysteresis;
+mod orbit;
+mod response;
+mod transient;
+
+use crate::schema::{Key, Takes, default, required};
+use crate::values::Values;
+use stickslip::model::Model;
+
+/// A row of the table of study kinds.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind {
+    /// Name in study files.
+    pub name: &'static str,
+    /// One line of what it computes.
+    pub summary: &'static str,
+    /// Its keys of `[study]`, beside those of [`crate::schema::STUDY`].
+    pub keys: &'static [Key],
+    /// What one key alone cannot tell: conditions between keys, and names that must exist in the model.
+    pub check: fn(&Values, &Model) -> Result<(), Complaint>,
+}
+
+/// Every study kind there is, in the order in which lists show them.
+pub const TABLE: &[Kind] = &[hysteresis::KIND, orbit::KIND, response::KIND, transient::KIND];
+
+/// The kind with this name.
+pub fn find(name: &str) -> Option<&'static Kind> {
+    TABLE.iter().find(|kind| kind.name == name)
+}
+
+/// What a kind finds wrong in the values of its keys.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Complaint {
+    /// The key; the error stands at its value, or at `[study]` if it is absent.
+    pub key: &'static str,
+    /// The name inside the key's value that is wrong, if it is one.
+    pub name: Option<String>,
+    /// What is wrong and what was expected.
+    pub message: String,
+    /// What to do.
+    pub help: Option<String>,
+}
+
+impl Complaint {
+    fn new(key: &'static str, message: impl Into<String>, help: impl Into<String>) -> Self {
+        Complaint { key, name: None, message: message.into(), help: Some(help.into()) }
+    }
+
+    /// A name in the value of `key` that is none of `candidates`.
+    fn unknown(key: &'static str, what: &str, name: &str, candidates: &[&str]) -> Self {
+        let help = match crate::near::nearest(name, candidates.iter().copied()) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None if candidates.is_empty() => format!("the model has no {what}"),
+            None => format!("choose {}", crate::near::one_of(candidates.iter().take(12).copied())),
+        };
+        let message = format!("there is no {what} `{}`", crate::near::shown(name));
+        Complaint { key, name: Some(name.to_owned()), message, help: Some(help) }
+    }
+}
+
+/// Most samples per period.
+const MOST_SAMPLES: i64 = 100_000;
+
+/// The key `frequency` of the kinds that need a drive.
+const FREQUENCY: Key = required(
+    "frequency",
+    Takes::Frequencies,
+    "drive frequency: one, a list, or a range with both ends",
+    "{ from = \"119 Hz\", to = \"123 Hz\", points = 241 }",
+);
+
+/// The key `samples` of the kinds that show a motion over one period.
+const SAMPLES: Key = default("samples", Takes::Count(8, MOST_SAMPLES), "720", "points per period", "720");

@@ -1,0 +1,116 @@
+//! Transients: the motion in time from rest or from given displacements; free decay, switched-on drive, or run-up.
+
+use super::{Complaint, Kind, MOST_SAMPLES};
+use crate::schema::{Key, Takes, Within, default, optional, required};
+use crate::values::Values;
+use stickslip::dimension::Dimension;
+use stickslip::model::Model;
+
+const FREQUENCY: Takes = Takes::Quantity(Dimension::FREQUENCY, Within::Positive);
+const DURATION: Takes = Takes::Quantity(Dimension::TIME, Within::Positive);
+
+/// Most samples of one transient.
+const MOST_STEPS: f64 = 1e7;
+
+const RUN_UP: &[Key] = &[
+    required("from", FREQUENCY, "drive frequency at the start", "\"110 Hz\""),
+    required("to", FREQUENCY, "drive frequency at the end; it may be the lower one", "\"130 Hz\""),
+    required("duration", DURATION, "time from the one to the other, linearly", "\"10 s\""),
+];
+
+pub(super) const KIND: Kind = Kind {
+    name: "transient",
+    summary: "motion in time from rest or given displacements: free decay, switched-on drive, run-up",
+    keys: &[
+        optional(
+            "frequency",
+            Takes::Frequencies,
+            "drive frequency; without it and without `run_up` the motion is a free decay",
+            "\"121 Hz\"",
+        ),
+        optional(
+            "run_up",
+            Takes::Table(RUN_UP),
+            "drive frequency that changes linearly in time",
+            "{ from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }",
+        ),
+        optional("duration", DURATION, "time that is computed; of a run-up its own duration when absent", "\"2 s\""),
+        optional("cycles", Takes::Count(1, 1_000_000), "the same in periods of `frequency`", "200"),
+        optional("start", Takes::ByName(Dimension::LENGTH), "displacements at the start; zero when absent", "{ blade1 = \"1 mm\" }"),
+        optional(
+            "start_velocity",
+            Takes::ByName(Dimension::VELOCITY),
+            "velocities at the start; zero when absent",
+            "{ blade1 = \"0.1 m/s\" }",
+        ),
+        default(
+            "samples_per_cycle",
+            Takes::Count(8, MOST_SAMPLES),
+            "64",
+            "points of the table per period of the drive (of a run-up: of its highest frequency)",
+            "64",
+        ),
+        optional("time_step", DURATION, "distance of the points of the table; needed for a free decay", "\"0.1 ms\""),
+    ],
+    check,
+};
+
+fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+    let free: Vec<&str> = model
+        .masses
+        .iter()
+        .map(|mass| mass.name.as_str())
+        .filter(|name| !model.motions.iter().any(|motion| motion.on == *name))
+        .collect();
+    for key in ["start", "start_velocity"] {
+        for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
+            if !free.contains(&name.as_str()) {
+                return Err(Complaint::unknown(key, "free mass", name, &free));
+            }
+        }
+    }
+    let (drive, run_up) = (values.frequencies("frequency"), values.table("run_up"));
+    let (duration, cycles) = (values.quantity("duration"), values.count("cycles"));
+    if run_up.is_some() && drive.is_some() {
+        return Err(Complaint::new("run_up", "`frequency` and `run_up` exclude each other", "leave one of them out"));
+    }
+    if duration.is_some() && cycles.is_some() {
+        return Err(Complaint::new("cycles", "`duration` and `cycles` exclude each other", "leave one of them out"));
+    }
+    if cycles.is_some() && drive.is_none() {
+        let help = "write `duration` instead, or add `frequency`";
+        return Err(Complaint::new("cycles", "`cycles` counts periods of `frequency`, which is absent", help));
+    }
+    if let Some(run_up) = run_up
+        && run_up.quantity("from") == run_up.quantity("to")
+    {
+        let help = "write `frequency` for a drive that does not change";
+        return Err(Complaint::new("run_up", "`from` and `to` are the same frequency", help));
+    }
+    let lowest = drive.map(|f| f.iter().fold(f64::INFINITY, f64::min));
+    let highest = match (drive, run_up) {
+        (Some(f), _) => Some(f.iter().fold(0.0, f64::max)),
+        (None, Some(r)) => {
+            r.quantity("from").into_iter().chain(r.quantity("to")).reduce(f64::max)
+        }
+        (None, None) => None,
+    };
+    let period = |omega: f64| std::f64::consts::TAU / omega;
+    let time = duration
+        .or_else(|| Some(cycles? as f64 * period(lowest?)))
+        .or_else(|| run_up.and_then(|run_up| run_up.quantity("duration")));
+    let Some(time) = time else {
+        let help = if drive.is_some() { "add `duration` or `cycles`" } else { "add `duration`" };
+        return Err(Complaint::new("duration", "it is not said how long the motion lasts", help));
+    };
+    let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
+    let Some(step) = values.quantity("time_step").or(highest.map(|omega| period(omega) / per_cycle)) else {
+        let help = "add `time_step`, for example \"0.1 ms\"";
+        return Err(Complaint::new("time_step", "a free decay has no period to divide into samples", help));
+    };
+    if time / step > MOST_STEPS {
+        let message = format!("{:.3e} samples are asked for; the limit is {MOST_STEPS:e}", time / step);
+        return Err(Complaint::new("duration", message, "shorten `duration` or take fewer samples"));
+    }
+    Ok(())
+}

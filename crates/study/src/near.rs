@@ -1,0 +1,60 @@
+//! Near misses: the word that was probably meant.
+
+/// The candidate nearest to `word`, if one is near enough to be worth a question.
+pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // words from a file can be megabytes long, and the distance costs the product of the lengths
+    if word.len() > 64 {
+        return None;
+    }
+    let lower = word.to_lowercase();
+    candidates
+        .into_iter()
+        .filter_map(|candidate| {
+            let other = candidate.to_lowercase();
+            let distance = strsim::damerau_levenshtein(&lower, &other);
+            let length = lower.chars().count().max(other.chars().count());
+            // one slip in a short word, a third of a long one; or an abbreviation such as `freq`
+            let near = distance <= (length / 3).max(usize::from(length > 1));
+            let abbreviation = lower.chars().count() >= 3 && other.starts_with(&lower);
+            (near || abbreviation).then_some((distance, candidate))
+        })
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, candidate)| candidate)
+}
+
+/// `` `a`, `b` or `c` ``.
+pub(crate) fn one_of<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
+    let words: Vec<String> = words.into_iter().map(|word| format!("`{word}`")).collect();
+    match words.split_last() {
+        None => "nothing".to_owned(),
+        Some((only, [])) => only.clone(),
+        Some((last, rest)) => format!("{} or {last}", rest.join(", ")),
+    }
+}
+
+/// A word of the file as it can be shown in one line of a message: no control characters, not too long.
+pub(crate) fn shown(word: &str) -> String {
+    const LONGEST: usize = 60;
+    let mut text: String =
+        word.chars().take(LONGEST).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect();
+    if word.chars().nth(LONGEST).is_some() {
+        text.push('…');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_slips_and_abbreviations_but_no_strangers() {
+        let keys = ["between", "stiffness", "damping"];
+        assert_eq!(nearest("stifness", keys), Some("stiffness"));
+        assert_eq!(nearest("Damping", keys), Some("damping"));
+        assert_eq!(nearest("damp", keys), Some("damping"));
+        assert_eq!(nearest("colour", keys), None);
+        assert_eq!(nearest(&"x".repeat(100_000), keys), None);
+        assert_eq!(one_of(keys), "`between`, `stiffness` or `damping`");
+    }
+}

@@ -1,0 +1,458 @@
+//! The study file, schema 1: every table and key, once, as data.
+//!
+//! The reader checks files against this table, and the documentation and the JSON Schema for editors are generated from it. Laws and
+//! methods come from [`stickslip::law::TABLE`] and [`stickslip::method::TABLE`], study kinds from [`crate::kinds::TABLE`].
+
+use crate::kinds;
+use serde_json::{Map, Value, json};
+use stickslip::dimension::Dimension;
+use stickslip::{law, method, model::templates};
+
+/// The schema version that this program reads.
+pub const VERSION: i64 = 1;
+
+/// Most points of a study: cases times frequencies.
+pub const MOST_POINTS: usize = 1_000_000;
+
+/// Most elements in one list (`[[mass]]`, …): the matrices are dense.
+pub const MOST_ELEMENTS: usize = 1_000;
+
+/// Most bytes of a study file.
+pub const MOST_BYTES: u64 = 4 * 1024 * 1024;
+
+/// One key of a table.
+#[derive(Debug, Clone, Copy)]
+pub struct Key {
+    /// The key.
+    pub name: &'static str,
+    /// What it takes.
+    pub takes: Takes,
+    /// Whether it must stand there, or what happens without it.
+    pub presence: Presence,
+    /// One line of what it is.
+    pub doc: &'static str,
+    /// An example of the value, as TOML.
+    pub example: &'static str,
+}
+
+/// Whether a key must stand in its table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Presence {
+    /// It must.
+    Required,
+    /// It may be absent, and then nothing stands for it.
+    Optional,
+    /// It may be absent, and this (as the content of a TOML string, or a bare value) stands for it.
+    Default(&'static str),
+}
+
+/// What a key takes.
+#[derive(Debug, Clone, Copy)]
+pub enum Takes {
+    /// Any text.
+    Text,
+    /// An identifier.
+    Name,
+    /// A name or a list of names.
+    Names,
+    /// Two names of places.
+    Pair,
+    /// A quantity of a dimension within a range.
+    Quantity(Dimension, Within),
+    /// A whole number within these bounds.
+    Count(i64, i64),
+    /// `true` or `false`.
+    Flag,
+    /// Frequencies: one, a list, or `{ from, to, points }`.
+    Frequencies,
+    /// A table from a name to a quantity: `{ blade1 = "1 mm" }`.
+    ByName(Dimension),
+    /// A table of its own with these keys.
+    Table(&'static [Key]),
+    /// A friction law: `{ kind = …, … }`.
+    Law,
+    /// One of the words that the function lists, each with a line of what it is.
+    Choice(fn() -> Vec<(&'static str, &'static str)>),
+    /// `[parameters]`: quantities by name.
+    Parameters,
+    /// `vary`: lists of quantities, or ranges, by parameter.
+    Vary,
+    /// `[method]`: `kind` and the options of that method.
+    Method,
+    /// `[study]`: `kind`, `vary` and the keys of that kind.
+    Study,
+    /// A list of tables with these keys: `[[mass]]`.
+    List(&'static [Key]),
+}
+
+/// The range of a quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Within {
+    /// Any finite number.
+    Finite,
+    /// Zero or more.
+    AtLeastZero,
+    /// More than zero.
+    Positive,
+}
+
+impl Within {
+    /// Whether the number is in the range.
+    pub fn holds(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Within::Finite => true,
+                Within::AtLeastZero => value >= 0.0,
+                Within::Positive => value > 0.0,
+            }
+    }
+
+    /// In words.
+    pub fn described(self) -> &'static str {
+        match self {
+            Within::Finite => "a finite number",
+            Within::AtLeastZero => "zero or more",
+            Within::Positive => "more than zero",
+        }
+    }
+}
+
+/// A key that must be there.
+pub const fn required(name: &'static str, takes: Takes, doc: &'static str, example: &'static str) -> Key {
+    Key { name, takes, presence: Presence::Required, doc, example }
+}
+
+/// A key that may be absent.
+pub const fn optional(name: &'static str, takes: Takes, doc: &'static str, example: &'static str) -> Key {
+    Key { name, takes, presence: Presence::Optional, doc, example }
+}
+
+/// A key that may be absent, and what then stands for it.
+pub const fn default(
+    name: &'static str,
+    takes: Takes,
+    value: &'static str,
+    doc: &'static str,
+    example: &'static str,
+) -> Key {
+    Key { name, takes, presence: Presence::Default(value), doc, example }
+}
+
+use Within::{AtLeastZero, Finite, Positive};
+
+/// The keys at the top of the file.
+pub const FILE: &[Key] = &[
+    required("schema", Takes::Count(VERSION, VERSION), "version of the file format", "1"),
+    optional("title", Takes::Text, "title of the figure; the file's name when absent", "\"Response of the blade couple\""),
+    optional("source", Takes::Text, "where the study comes from: a paper, a figure", "\"Den Hartog (1931), Fig. 5\""),
+    optional("parameters", Takes::Parameters, "quantities by name, for use in expressions", "{ Ft = \"2 N\" }"),
+    optional("model", Takes::Table(MODEL), "a ready model instead of the lists below", "{ template = \"blade-couple\" }"),
+    optional("mass", Takes::List(MASS), "point masses, each with one displacement", "[]"),
+    optional("spring", Takes::List(SPRING), "springs and dampers", "[]"),
+    optional("joint", Takes::List(JOINT), "places that rub", "[]"),
+    optional("force", Takes::List(FORCE), "forces amplitude * cos(harmonic * Omega * t + phase); they add up", "[]"),
+    optional("motion", Takes::List(MOTION), "imposed motions of a place; they add up", "[]"),
+    required("study", Takes::Study, "what is asked for", "{ kind = \"response\" }"),
+    optional("method", Takes::Method, "how the orbits are found", "{ kind = \"event-driven\" }"),
+];
+
+const MODEL: &[Key] = &[
+    required("template", Takes::Choice(template_names), "name of the ready model", "\"blade-couple\""),
+    optional("law", Takes::Law, "replaces the law of every joint", "{ kind = \"coulomb\", limit = \"2 N\" }"),
+];
+
+const MASS: &[Key] = &[
+    required("name", Takes::Name, "name of the place, for springs, joints and forces", "\"blade1\""),
+    required("mass", Takes::Quantity(Dimension::MASS, AtLeastZero), "mass", "\"182 g\""),
+];
+
+const SPRING: &[Key] = &[
+    required("between", Takes::Pair, "the two places it joins; `ground` is the fixed frame", "[\"blade1\", \"ground\"]"),
+    optional(
+        "stiffness",
+        Takes::Quantity(Dimension::STIFFNESS, AtLeastZero),
+        "stiffness; may be absent where damping is given",
+        "\"105103 N/m\"",
+    ),
+    optional("damping", Takes::Quantity(Dimension::DAMPING, Finite), "viscous damping in parallel", "\"0.2 kg/s\""),
+];
+
+const JOINT: &[Key] = &[
+    required("name", Takes::Name, "name, for results", "\"shroud\""),
+    required("between", Takes::Pair, "the two places that rub", "[\"blade1\", \"contact\"]"),
+    required("law", Takes::Law, "friction law", "{ kind = \"coulomb\", limit = \"2 N\" }"),
+];
+
+const MOST_HARMONIC: i64 = 1_000;
+
+const FORCE: &[Key] = &[
+    required("on", Takes::Name, "the mass it acts on", "\"blade1\""),
+    required("amplitude", Takes::Quantity(Dimension::FORCE, Finite), "amplitude", "\"10 N\""),
+    default("phase", Takes::Quantity(Dimension::ANGLE, Finite), "0 deg", "phase lead", "\"90 deg\""),
+    default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
+];
+
+const MOTION: &[Key] = &[
+    required("on", Takes::Name, "the place: a mass, or one that exists by this motion alone", "\"mover\""),
+    required("amplitude", Takes::Quantity(Dimension::LENGTH, Finite), "amplitude", "\"2 mm\""),
+    default("phase", Takes::Quantity(Dimension::ANGLE, Finite), "0 deg", "phase lead", "\"90 deg\""),
+    default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
+];
+
+/// The keys of `[study]` that every kind has.
+pub const STUDY: &[Key] = &[
+    required("kind", Takes::Choice(kind_names), "what is computed", "\"response\""),
+    optional(
+        "vary",
+        Takes::Vary,
+        "runs the study for every combination of these values of parameters: a list, or `{ from, to, points }`",
+        "{ Ft = [\"2 N\", \"4 N\"] }",
+    ),
+];
+
+/// Keys of the range of a frequency.
+pub const RANGE: &[Key] = &[
+    required("from", Takes::Quantity(Dimension::FREQUENCY, Positive), "first value", "\"119 Hz\""),
+    required("to", Takes::Quantity(Dimension::FREQUENCY, Positive), "last value", "\"123 Hz\""),
+    required("points", Takes::Count(2, MOST_POINTS as i64), "number of values, both ends included", "241"),
+];
+
+/// The choice of `kind` in `[method]`.
+pub const METHOD: &[Key] =
+    &[default("kind", Takes::Choice(method_names), "auto", "the method", "\"event-driven\"")];
+
+fn template_names() -> Vec<(&'static str, &'static str)> {
+    templates::TABLE.iter().map(|row| (row.name, row.summary)).collect()
+}
+
+fn kind_names() -> Vec<(&'static str, &'static str)> {
+    kinds::TABLE.iter().map(|row| (row.name, row.summary)).collect()
+}
+
+fn method_names() -> Vec<(&'static str, &'static str)> {
+    method::TABLE.iter().map(|row| (row.name, row.summary)).collect()
+}
+
+/// What a key takes, in a few words for messages and for the book.
+pub fn described(takes: &Takes) -> String {
+    match takes {
+        Takes::Text => "a text in quotes".to_owned(),
+        Takes::Name => "a name in quotes".to_owned(),
+        Takes::Names => "a name in quotes or a list of names".to_owned(),
+        Takes::Pair => "a list of two names of places".to_owned(),
+        Takes::Quantity(dimension, within) => {
+            let range = if *within == Finite { String::new() } else { format!(", {}", within.described()) };
+            format!("{}{range}", crate::expression::described(*dimension))
+        }
+        Takes::Count(from, to) if from == to => format!("the number {from}"),
+        Takes::Count(from, to) => format!("a whole number from {from} to {to}"),
+        Takes::Flag => "true or false".to_owned(),
+        Takes::Frequencies => "a frequency (Hz or rad/s), a list of them, or { from, to, points }".to_owned(),
+        Takes::ByName(dimension) => format!("a table from names to {}", crate::expression::described(*dimension)),
+        Takes::Table(keys) | Takes::List(keys) => {
+            let names = crate::near::one_of(keys.iter().map(|key| key.name)).replace(" or ", ", ");
+            let many = matches!(takes, Takes::List(_));
+            format!("{} with the keys {names}", if many { "a list of tables" } else { "a table" })
+        }
+        Takes::Law => "a law: { kind = \"…\", … }".to_owned(),
+        Takes::Choice(words) => format!("one of {}", crate::near::one_of(words().iter().map(|word| word.0))),
+        Takes::Parameters => "a table of quantities by name".to_owned(),
+        Takes::Vary => "a table from parameters to lists of values or { from, to, points }".to_owned(),
+        Takes::Method => "a table with `kind` and the options of that method".to_owned(),
+        Takes::Study => "a table with `kind` and the keys of that kind".to_owned(),
+    }
+}
+
+// ---------------------------------------------------------------------------------------------- JSON Schema
+
+const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
+const NAME_PATTERN: &str = "^[A-Za-z][A-Za-z0-9_]*$";
+
+/// The JSON Schema (draft 2020-12) of study files, for editors that complete and check TOML.
+pub fn json_schema() -> Value {
+    let mut schema = object(FILE);
+    schema["$schema"] = json!(DRAFT);
+    schema["title"] = json!("Stickslip study");
+    schema["$defs"] = json!({
+        "quantity": {
+            "description": "a quantity with a unit, an expression over [parameters], or a bare number in SI",
+            "type": ["string", "number"],
+        },
+    });
+    schema
+}
+
+fn object(keys: &[Key]) -> Value {
+    let properties: Map<String, Value> = keys.iter().map(|key| (key.name.to_owned(), property(key))).collect();
+    let required: Vec<&str> =
+        keys.iter().filter(|key| key.presence == Presence::Required).map(|key| key.name).collect();
+    json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
+}
+
+fn property(key: &Key) -> Value {
+    let mut schema = takes_schema(&key.takes);
+    let mut doc = key.doc.to_owned();
+    if let Takes::Quantity(..) | Takes::Frequencies | Takes::ByName(_) = key.takes {
+        doc = format!("{doc}: {}", described(&key.takes));
+    }
+    if let Presence::Default(value) = key.presence {
+        doc = format!("{doc}; {value} when absent");
+    }
+    schema["description"] = json!(doc);
+    schema
+}
+
+fn takes_schema(takes: &Takes) -> Value {
+    let quantity = || json!({ "$ref": "#/$defs/quantity" });
+    match takes {
+        Takes::Text => json!({ "type": "string" }),
+        Takes::Name => json!({ "type": "string", "pattern": NAME_PATTERN }),
+        Takes::Names => {
+            let name = json!({ "type": "string", "pattern": NAME_PATTERN });
+            json!({ "anyOf": [name, { "type": "array", "items": name, "minItems": 1 }] })
+        }
+        Takes::Pair => json!({
+            "type": "array", "minItems": 2, "maxItems": 2, "items": { "type": "string", "pattern": NAME_PATTERN },
+        }),
+        Takes::Quantity(..) => quantity(),
+        Takes::Count(from, to) => json!({ "type": "integer", "minimum": from, "maximum": to }),
+        Takes::Flag => json!({ "type": "boolean" }),
+        Takes::Frequencies => {
+            json!({ "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(RANGE)] })
+        }
+        Takes::ByName(_) | Takes::Parameters => json!({
+            "type": "object", "additionalProperties": quantity(), "propertyNames": { "pattern": NAME_PATTERN },
+        }),
+        Takes::Table(keys) => object(keys),
+        Takes::List(keys) => json!({ "type": "array", "items": object(keys), "maxItems": MOST_ELEMENTS }),
+        Takes::Law => {
+            let one = |row: &law::LawInfo| {
+                let parameters = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc));
+                kind_object(row.name, row.summary, parameters, true)
+            };
+            json!({ "oneOf": law::TABLE.iter().map(one).collect::<Vec<_>>() })
+        }
+        Takes::Choice(words) => {
+            let one = |(word, summary): (&str, &str)| json!({ "const": word, "description": summary });
+            json!({ "oneOf": words().into_iter().map(one).collect::<Vec<_>>() })
+        }
+        Takes::Vary => json!({
+            "type": "object",
+            "additionalProperties": {
+                "anyOf": [{ "type": "array", "items": quantity(), "minItems": 1 }, object(RANGE)],
+            },
+        }),
+        Takes::Method => {
+            let one = |row: &method::MethodInfo| {
+                let mut schema =
+                    kind_object(row.name, row.summary, row.options.iter().map(|o| (o.key, o.dimension, o.doc)), false);
+                for option in row.options.iter().filter(|option| option.count) {
+                    schema["properties"][option.key] =
+                        json!({ "type": "integer", "minimum": 1, "description": option.doc });
+                }
+                schema
+            };
+            let mut all: Vec<Value> = method::TABLE.iter().map(one).collect();
+            // `kind` may be absent: auto
+            for schema in all.iter_mut().filter(|schema| schema["properties"]["kind"]["const"] == "auto") {
+                schema["required"] = json!([]);
+            }
+            json!({ "oneOf": all })
+        }
+        Takes::Study => {
+            let one = |row: &kinds::Kind| {
+                let mut schema = object(&[STUDY, row.keys].concat());
+                schema["description"] = json!(row.summary);
+                schema["properties"]["kind"] = json!({ "const": row.name, "description": row.summary });
+                schema
+            };
+            json!({ "oneOf": kinds::TABLE.iter().map(one).collect::<Vec<_>>() })
+        }
+    }
+}
+
+fn kind_object(
+    name: &str,
+    summary: &str,
+    parameters: impl Iterator<Item = (&'static str, Dimension, &'static str)>,
+    all_required: bool,
+) -> Value {
+    let mut properties = Map::new();
+    let mut required = vec!["kind"];
+    properties.insert("kind".to_owned(), json!({ "const": name }));
+    for (key, dimension, doc) in parameters {
+        let doc = format!("{doc}: {}", crate::expression::described(dimension));
+        properties.insert(key.to_owned(), json!({ "$ref": "#/$defs/quantity", "description": doc }));
+        if all_required {
+            required.push(key);
+        }
+    }
+    json!({
+        "type": "object", "description": summary, "properties": properties, "required": required,
+        "additionalProperties": false,
+    })
+}
+
+// ---------------------------------------------------------------------------------------------- the book
+
+/// The reference of study files, key by key, as Markdown tables.
+pub fn markdown() -> String {
+    let mut book = String::new();
+    let rows = |book: &mut String, heading: &str, intro: &str, keys: &[Key]| {
+        book.push_str(&format!("## {heading}\n\n"));
+        if !intro.is_empty() {
+            book.push_str(&format!("{intro}\n\n"));
+        }
+        book.push_str("| key | takes | without it | what it is | example |\n| --- | --- | --- | --- | --- |\n");
+        for key in keys {
+            let absent = match key.presence {
+                Presence::Required => "error".to_owned(),
+                Presence::Optional => String::new(),
+                Presence::Default(value) => format!("`{value}`"),
+            };
+            let example = if key.example == "[]" { String::new() } else { format!("`{} = {}`", key.name, key.example) };
+            let cells = [format!("`{}`", key.name), described(&key.takes), absent, key.doc.to_owned(), example];
+            book.push_str(&format!("| {} |\n", cells.map(|cell| cell.replace('|', "\\|")).join(" | ")));
+        }
+        book.push('\n');
+    };
+    rows(&mut book, "Top of the file", "", FILE);
+    for key in FILE {
+        match key.takes {
+            Takes::List(keys) => rows(&mut book, &format!("`[[{}]]`", key.name), key.doc, keys),
+            Takes::Table(keys) => rows(&mut book, &format!("`[{}]`", key.name), key.doc, keys),
+            _ => {}
+        }
+    }
+    rows(&mut book, "`[study]`", "The keys of every kind; each kind adds its own.", STUDY);
+    for kind in kinds::TABLE {
+        rows(&mut book, &format!("`[study]` with `kind = \"{}\"`", kind.name), kind.summary, kind.keys);
+        for key in kind.keys {
+            if let Takes::Table(keys) = key.takes {
+                rows(&mut book, &format!("`{}` of `{}`", key.name, kind.name), key.doc, keys);
+            }
+        }
+    }
+    let named = |book: &mut String, name: &str, summary: &str, keys: &[(&str, Dimension, &str)]| {
+        book.push_str(&format!("- `{name}`: {summary}\n"));
+        for (key, dimension, doc) in keys {
+            book.push_str(&format!("  - `{key}` ({}): {doc}\n", crate::expression::described(*dimension)));
+        }
+    };
+    book.push_str("## Laws\n\n");
+    for row in law::TABLE {
+        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc)).collect();
+        named(&mut book, row.name, row.summary, &keys);
+    }
+    book.push_str("\n## Methods\n\n");
+    for row in method::TABLE {
+        let keys: Vec<_> = row.options.iter().map(|o| (o.key, o.dimension, o.doc)).collect();
+        named(&mut book, row.name, row.summary, &keys);
+    }
+    book.push_str("\n## Templates\n\n");
+    for row in templates::TABLE {
+        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc)).collect();
+        named(&mut book, row.name, row.summary, &keys);
+    }
+    book
+}
