@@ -201,7 +201,7 @@ pub(crate) fn ticks(range: Range, count: f64) -> Ticks {
     // (unless the ticks differ in their last figures only)
     let usual = if range.span() < 1e-3 * size { -4..=9 } else { -2..=4 };
     let power = if usual.contains(&exponent) { 0 } else { 3 * exponent.div_euclid(3) };
-    let scaled = |v: f64| v / 10f64.powi(power / 2) / 10f64.powi(power - power / 2); // two factors: 1e-300 has no inverse
+    let scaled = |v: f64| scaled(v, power);
     let whole = |d: &i32| {
         let digits = scaled(step) * 10f64.powi(*d);
         digits > 0.5 && (digits - digits.round()).abs() < 1e-6 * digits
@@ -209,6 +209,11 @@ pub(crate) fn ticks(range: Range, count: f64) -> Ticks {
     let decimals = (0..15).find(whole).unwrap_or(15) as usize;
     let labels = at.iter().map(|v| signed(format!("{:.decimals$}", scaled(*v)))).collect();
     Ticks { at, labels, power }
+}
+
+/// A value in units of a power of ten.
+pub(crate) fn scaled(value: f64, power: i32) -> f64 {
+    value / 10f64.powi(power / 2) / 10f64.powi(power - power / 2) // two factors: 1e-320 has no inverse
 }
 
 /// A number with a true minus sign, and without the sign of a zero.
@@ -220,11 +225,15 @@ fn signed(text: String) -> String {
     }
 }
 
+/// The unit of an axis, with the power of ten taken out of its numbers: `Hz`, `10⁻⁶ J`.
+pub(crate) fn unit(axis: &Axis, power: i32) -> String {
+    let factor = if power == 0 { String::new() } else { format!("10{}", superscript(power)) };
+    [factor.as_str(), axis.unit.trim()].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
 /// What an axis shows: `frequency (Hz)`; with a power of ten taken out, `energy (10⁻⁶ J)`.
 pub(crate) fn axis_title(axis: &Axis, power: i32) -> String {
-    let factor = if power == 0 { String::new() } else { format!("10{}", superscript(power)) };
-    let unit =
-        [factor.as_str(), axis.unit.trim()].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ");
+    let unit = unit(axis, power);
     match (axis.quantity.trim(), unit.as_str()) {
         (quantity, "") => quantity.to_owned(),
         ("", unit) => unit.to_owned(),

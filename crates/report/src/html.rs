@@ -40,7 +40,7 @@ pub(crate) fn document(title: &str, style: &str, body: &str) -> String {
 const STYLE: &str = "\
 body { margin: 0 auto; padding: 1.5rem; font: 16px/1.55 system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif; color: #1a1a1a; background: #fff; }
 h1 { font-size: 1.45rem; line-height: 1.25; margin: 0 0 .75rem; overflow-wrap: anywhere; }
-.figure { width: 100%; margin: .5rem 0 1rem; }
+.figure { width: 100%; margin: .5rem 0 1rem; overflow-x: clip; }
 .figure svg.static { max-width: 100%; height: auto; }
 ";
 
@@ -90,36 +90,59 @@ fn axis_name(letter: &str, panel: usize) -> String {
 }
 
 fn traces(figure: &Figure) -> Vec<Value> {
-    let mut seen = BTreeSet::new();
-    let several = figure.panels.len() > 1;
     let mut traces = Vec::new();
-    for (i, panel) in figure.panels.iter().enumerate() {
+    let mut seen = BTreeSet::new();
+    // a label of several colours stands in the legend in grey, as a trace without points
+    for entry in frame::legend(figure).iter().filter(|e| e.colour == frame::MANY_COLOURS) {
+        let mode = match (entry.line, entry.marks) {
+            (None, _) => "markers",
+            (_, true) => "lines+markers",
+            (_, false) => "lines",
+        };
+        seen.insert(entry.label.clone());
+        traces.push(json!({
+            "type": "scatter", "x": [null], "y": [null], "mode": mode, "legendrank": 2000,
+            "name": plain(&entry.label), "legendgroup": entry.label, "showlegend": true,
+            "line": { "color": entry.colour, "width": 2, "dash": dash(entry.line.unwrap_or(Style::Solid)) },
+            "marker": { "color": "#ffffff", "size": 8, "line": { "color": entry.colour, "width": 2 } },
+        }));
+    }
+    let several = figure.panels.len() > 1;
+    for (i, (panel, (x, y))) in figure.panels.iter().zip(frame::ranges(figure)).enumerate() {
+        let (x_power, y_power) = (power(x), power(y));
         let lines = panel.series.iter().filter(|s| s.style != Style::Marks);
         for series in lines.chain(panel.series.iter().filter(|s| s.style == Style::Marks)) {
             let named = !series.label.trim().is_empty();
             let place =
                 if several && !panel.title.is_empty() { format!("<br>{}", plain(&panel.title)) } else { String::new() };
+            let (x, y) = (hover("x", &panel.x, x_power), hover("y", &panel.y, y_power));
             let mut trace = json!({
                 "type": if series.x.len() > 5000 { "scattergl" } else { "scatter" },
-                "x": numbers(&series.x), "y": numbers(&series.y),
+                "x": numbers(frame::points(series).map(|p| p.0), x_power),
+                "y": numbers(frame::points(series).map(|p| p.1), y_power),
                 "xaxis": axis_name("x", i), "yaxis": axis_name("y", i),
                 "name": plain(&series.label), "legendgroup": series.label,
-                "showlegend": named && frame::points(series).any(frame::drawable) && seen.insert(series.label.as_str()),
+                "showlegend": named && frame::points(series).any(frame::drawable) && seen.insert(series.label.clone()),
                 "connectgaps": false,
-                "hovertemplate": format!("{}<br>{}<extra>{}{place}</extra>", hover("x", &panel.x), hover("y", &panel.y), plain(&series.label)),
+                "hovertemplate": format!("{x}<br>{y}<extra>{}{place}</extra>", plain(&series.label)),
             });
             let colour = frame::colour(series.colour);
             if series.style == Style::Marks {
                 trace["mode"] = json!("markers");
                 trace["marker"] = json!({ "color": "#ffffff", "size": 8, "line": { "color": colour, "width": 2 } });
             } else {
-                trace["mode"] = json!(if lonely(series) { "lines+markers" } else { "lines" });
-                trace["marker"] = json!({ "color": colour, "size": 4 });
-                trace["line"] = json!({ "color": colour, "width": 2, "dash": match series.style {
-                    Style::Dashed => "7px,4px",
-                    Style::Dotted => "2px,3px",
-                    Style::Solid | Style::Marks => "solid",
-                }});
+                let alone = lonely(series);
+                if !alone.is_empty() {
+                    let mut dots = trace.clone();
+                    dots["x"] = Value::from(numbers(alone.iter().map(|p| p.0), x_power));
+                    dots["y"] = Value::from(numbers(alone.iter().map(|p| p.1), y_power));
+                    dots["mode"] = json!("markers");
+                    dots["marker"] = json!({ "color": colour, "size": 5 });
+                    dots["showlegend"] = json!(false);
+                    traces.push(dots);
+                }
+                trace["mode"] = json!("lines");
+                trace["line"] = json!({ "color": colour, "width": 2, "simplify": false, "dash": dash(series.style) });
             }
             traces.push(trace);
         }
@@ -127,24 +150,34 @@ fn traces(figure: &Figure) -> Vec<Value> {
     traces
 }
 
-/// Whether some point has gaps on both sides: a line alone would not show it.
-fn lonely(series: &Series) -> bool {
-    let points: Vec<(f64, f64)> = frame::points(series).collect();
-    points.split(|p| !frame::drawable(*p)).any(|piece| piece.len() == 1)
+/// The dashes of the static figure, in the words of plotly.
+fn dash(style: Style) -> &'static str {
+    match style {
+        Style::Dashed => "7px,4px",
+        Style::Dotted => "2px,3px",
+        Style::Solid | Style::Marks => "solid",
+    }
 }
 
-/// Numbers for the page, nine digits; what does not exist is null and interrupts the curve.
-fn numbers(values: &[f64]) -> Vec<Value> {
-    values
-        .iter()
-        .map(|v| format!("{v:.8e}").parse::<f64>().ok().filter(|v| v.is_finite()).map_or(Value::Null, Value::from))
+/// The points with gaps on both sides: a line alone would not show them.
+fn lonely(series: &Series) -> Vec<(f64, f64)> {
+    let points: Vec<(f64, f64)> = frame::points(series).collect();
+    points
+        .split(|p| !frame::drawable(*p))
+        .filter_map(|piece| if let [point] = piece { Some(*point) } else { None })
         .collect()
 }
 
+/// Numbers for the page in units of a power of ten, 13 digits; what does not exist is null and interrupts the curve.
+fn numbers(values: impl Iterator<Item = f64>, power: i32) -> Vec<Value> {
+    let number = |v: f64| format!("{:.12e}", frame::scaled(v, power)).parse::<f64>().ok().filter(|v| v.is_finite());
+    values.map(|v| number(v).map_or(Value::Null, Value::from)).collect()
+}
+
 /// `frequency = 121.25 Hz` for the value under the pointer.
-fn hover(letter: &str, axis: &Axis) -> String {
+fn hover(letter: &str, axis: &Axis, power: i32) -> String {
     let quantity = if axis.quantity.trim().is_empty() { letter } else { axis.quantity.trim() };
-    format!("{} = %{{{letter}:.6~g}} {}", plain(quantity), plain(axis.unit.trim()))
+    format!("{} = %{{{letter}:.6~g}} {}", plain(quantity), plain(&frame::unit(axis, power)))
 }
 
 /// Text that plotly, which reads some tags and templates, shows literally.
@@ -154,9 +187,16 @@ fn plain(text: &str) -> String {
 
 /// Sizes of the interactive figure, px.
 const WIDTH: f64 = 1200.0;
-const TOP: f64 = 70.0;
+const TOP: f64 = 92.0;
 const BOTTOM: f64 = 60.0;
-const ROW_GAP: f64 = 95.0;
+const ROW_GAP: f64 = 92.0;
+const COLUMN_GAP: f64 = 85.0;
+const TITLE: f64 = 15.0;
+
+/// The power of ten that the axis of this range takes out, the same as in the static figure.
+fn power(range: Range) -> i32 {
+    frame::ticks(range, 6.0).power
+}
 
 fn layout(figure: &Figure, columns: usize) -> Value {
     let count = figure.panels.len().max(1);
@@ -167,79 +207,77 @@ fn layout(figure: &Figure, columns: usize) -> Value {
         (2, 1) => 380.0,
         _ => 270.0,
     };
-    let inside = rows as f64 * plot_height + (rows as f64 - 1.0) * ROW_GAP;
-    let column_gap = if columns == 1 { 0.0 } else { 85.0 / WIDTH };
+    let ranges = frame::ranges(figure);
+    let widest = |range: &(Range, Range)| {
+        let ticks = frame::ticks(range.1, 6.0);
+        ticks.labels.iter().map(|l| font::width(l, 13.0, font::Weight::Regular)).fold(0.0, f64::max)
+    };
+    let widest = ranges.iter().map(widest).fold(0.0, f64::max);
+    let column_gap = if columns == 1 { 0.0 } else { COLUMN_GAP.max(widest + 60.0) / WIDTH };
     let plot_width = (1.0 - column_gap * (columns as f64 - 1.0)) / columns as f64;
+    let limit = if columns == 1 { 420.0 } else { 0.85 * WIDTH * plot_width };
+    let titles: Vec<Vec<String>> =
+        figure.panels.iter().map(|p| font::wrap(&p.title, TITLE, font::Weight::Bold, limit)).collect();
+    let lines = titles.iter().map(Vec::len).max().unwrap_or(0).max(1) as f64;
+    // titles of several lines push the rows apart and the legend up
+    let more = 1.3 * TITLE * (lines - 1.0);
+    let (top, row_gap) = (TOP + more, ROW_GAP + more);
+    let inside = rows as f64 * plot_height + (rows as f64 - 1.0) * row_gap;
     let entries = frame::legend(figure);
     let font = json!({ "family": "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif", "size": 14, "color": "#1a1a1a" });
     let mut layout = json!({
-        "height": inside + TOP + BOTTOM, "autosize": true, "font": font,
-        "margin": { "l": 70, "r": 20, "t": TOP, "b": BOTTOM },
+        "height": inside + top + BOTTOM, "autosize": true, "font": font,
+        "margin": { "l": 70, "r": 20, "t": top, "b": BOTTOM },
         "paper_bgcolor": "#ffffff", "plot_bgcolor": "#ffffff", "hovermode": "closest", "dragmode": "zoom",
         "hoverlabel": { "bgcolor": "#ffffff", "font": { "size": 13 } },
         "showlegend": !entries.is_empty(),
-        "legend": { "orientation": "h", "x": 0.5, "xanchor": "center", "y": 1.0 + 34.0 / inside, "yanchor": "bottom", "font": { "size": 14 } },
+        "legend": { "orientation": "h", "x": 0.5, "xanchor": "center", "y": 1.0 + (30.0 + more) / inside, "yanchor": "bottom", "font": { "size": 14 } },
     });
-    let mut titles = Vec::new();
-    let ranges = frame::ranges(figure);
+    let mut notes = Vec::new();
     for (i, (panel, (x, y))) in figure.panels.iter().zip(&ranges).enumerate() {
         let (column, row) = ((i % columns) as f64, (i / columns) as f64);
-        let left = column * (plot_width + column_gap);
-        let top = 1.0 - row * (plot_height + ROW_GAP) / inside;
+        let left = (column * (plot_width + column_gap)).min(1.0);
+        let right = (left + plot_width).min(1.0);
+        let top = 1.0 - row * (plot_height + row_gap) / inside;
         let bottom = (top - plot_height / inside).max(0.0);
-        let (left, right) = (left.min(1.0), (left + plot_width).min(1.0));
-        layout[format!("xaxis{}", suffix(i))] = axis(
-            &panel.x,
-            *x,
-            [left, right],
-            &axis_name("y", i),
-            partner(&ranges, i, |r| r.0, |j| figure.panels[j].x == panel.x),
-            "x",
-        );
-        layout[format!("yaxis{}", suffix(i))] = axis(
-            &panel.y,
-            *y,
-            [bottom, top],
-            &axis_name("x", i),
-            partner(&ranges, i, |r| r.1, |j| figure.panels[j].y == panel.y),
-            "y",
-        );
-        let limit = if columns == 1 { 560.0 } else { 0.9 * WIDTH * plot_width };
-        let lines = font::wrap(&panel.title, 15.0, font::Weight::Bold, limit);
-        titles.push(json!({
-            "text": format!("<b>{}</b>", lines.iter().map(|l| plain(l)).collect::<Vec<_>>().join("<br>")),
-            "x": (left + right) / 2.0, "y": top, "xref": "paper", "yref": "paper", "xanchor": "center", "yanchor": "bottom",
-            "yshift": 4, "showarrow": false, "font": { "size": 15 },
-        }));
+        let x_partner = (0..i).find(|&j| figure.panels[j].x == panel.x && ranges[j].0 == *x);
+        let y_partner = (0..i).find(|&j| figure.panels[j].y == panel.y && ranges[j].1 == *y);
+        layout[axis_name("xaxis", i)] =
+            axis(&panel.x, *x, [left, right], axis_name("y", i), x_partner.map(|j| axis_name("x", j)));
+        layout[axis_name("yaxis", i)] =
+            axis(&panel.y, *y, [bottom, top], axis_name("x", i), y_partner.map(|j| axis_name("y", j)));
+        let note = json!({ "x": (left + right) / 2.0, "xref": "paper", "yref": "paper", "xanchor": "center", "showarrow": false });
+        let mut title = note.clone();
+        let text = titles[i].iter().map(|l| plain(l)).collect::<Vec<_>>().join("<br>");
+        title["text"] = json!(format!("<b>{text}</b>"));
+        title["y"] = json!(top);
+        title["yanchor"] = json!("bottom");
+        title["yshift"] = json!(4);
+        title["font"] = json!({ "size": TITLE });
+        notes.push(title);
+        if !frame::has_data(panel) {
+            let mut empty = note;
+            empty["text"] = json!("no data");
+            empty["y"] = json!((top + bottom) / 2.0);
+            notes.push(empty);
+        }
     }
-    layout["annotations"] = Value::from(titles);
+    layout["annotations"] = Value::from(notes);
     layout
 }
 
-fn suffix(panel: usize) -> String {
-    axis_name("", panel)
-}
-
-/// The first earlier panel whose axis shows the same quantity over the same range: they zoom together.
-fn partner(
-    ranges: &[(Range, Range)],
-    i: usize,
-    pick: fn(&(Range, Range)) -> Range,
-    alike: impl Fn(usize) -> bool,
-) -> Option<usize> {
-    (0..i).find(|&j| alike(j) && pick(&ranges[j]) == pick(&ranges[i]))
-}
-
-fn axis(axis: &Axis, range: Range, domain: [f64; 2], anchor: &str, partner: Option<usize>, letter: &str) -> Value {
+/// An axis; `partner` is the earlier axis of the same quantity and range that it zooms with.
+fn axis(axis: &Axis, range: Range, domain: [f64; 2], anchor: String, partner: Option<String>) -> Value {
+    let power = power(range);
     let mut value = json!({
-        "domain": domain, "anchor": anchor, "range": [range.from, range.to],
-        "title": { "text": plain(&frame::axis_title(axis, 0)), "standoff": 8, "font": { "size": 14 } },
+        "domain": domain, "anchor": anchor, "range": [frame::scaled(range.from, power), frame::scaled(range.to, power)],
+        "title": { "text": plain(&frame::axis_title(axis, power)), "standoff": 8, "font": { "size": 14 } },
         "showline": true, "mirror": true, "linecolor": "#444444", "gridcolor": "#e3e3e3", "zerolinecolor": "#b0b0b0",
-        "ticks": "outside", "tickcolor": "#444444", "exponentformat": "power", "nticks": 8, "automargin": true,
+        "ticks": "outside", "tickcolor": "#444444", "exponentformat": "none", "separatethousands": false, "nticks": 8, "automargin": true,
         "zeroline": range.from < 0.0, "tickfont": { "size": 13 },
     });
     if let Some(partner) = partner {
-        value["matches"] = json!(axis_name(letter, partner));
+        value["matches"] = json!(partner);
     }
     value
 }
@@ -286,9 +324,9 @@ mod tests {
             let (columns, _) = frame::grid(figure.panels.len());
             let layout = layout(figure, columns);
             for (i, panel) in figure.panels.iter().enumerate() {
-                let text = layout[format!("xaxis{}", suffix(i))]["title"]["text"].as_str().unwrap();
+                let text = layout[axis_name("xaxis", i)]["title"]["text"].as_str().unwrap();
                 assert_eq!(text, plain(&frame::axis_title(&panel.x, 0)));
-                let domain = &layout[format!("yaxis{}", suffix(i))]["domain"];
+                let domain = &layout[axis_name("yaxis", i)]["domain"];
                 assert!(domain[0].as_f64().unwrap() >= 0.0 && domain[0].as_f64() < domain[1].as_f64());
             }
             let shown = traces(figure).iter().filter(|t| t["showlegend"] == true).count();
@@ -298,6 +336,9 @@ mod tests {
 
     #[test]
     fn gaps_are_null() {
-        assert_eq!(json!(numbers(&[1.0, f64::NAN, f64::INFINITY, 0.1 + 0.2])), json!([1.0, null, null, 0.3]));
+        assert_eq!(
+            json!(numbers([1.0, f64::NAN, f64::INFINITY, 0.1 + 0.2].into_iter(), 0)),
+            json!([1.0, null, null, 0.3])
+        );
     }
 }

@@ -22,14 +22,14 @@ mod frame;
 pub mod html;
 pub mod json;
 pub mod output;
-//pub mod page;
+pub mod page;
 pub mod png;
 pub mod svg;
-//pub mod terminal;
+pub mod terminal;
 
 #[cfg(test)]
 mod samples;
 
 pub use output::{Output, Outputs, ReportError, write_dataset, write_file};
-//pub use page::{Claim, Page, PageTable, Section, Verdict};
+pub use page::{Claim, Page, PageTable, Section, Verdict};
 pub use stickslip_study::dataset::{Dataset, Figure};

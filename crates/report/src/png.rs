@@ -71,7 +71,10 @@ mod tests {
     fn look() {
         let folder = std::path::PathBuf::from(std::env::var("STICKSLIP_FIGURES").unwrap());
         for dataset in samples::all() {
-            crate::write_dataset(&dataset, &folder, &crate::Outputs::all()).unwrap();
+            let files = crate::write_dataset(&dataset, &folder, &crate::Outputs::all()).unwrap();
+            let text = crate::terminal::Terminal::default().text(&dataset, &files);
+            std::fs::write(folder.join(format!("{}.txt", dataset.name)), text).unwrap();
         }
+        crate::page::tests::page().write(&folder.join("report.html")).unwrap();
     }
 }
