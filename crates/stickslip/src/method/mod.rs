@@ -92,6 +92,17 @@ pub enum Breakdown {
         /// Index of the joint.
         joint: usize,
     },
+    /// Rigid joints that form a loop stick together, and how they share the load is not unique.
+    #[error(
+        "joint {joint} and others stick in a loop of rigid contacts whose forces are not unique at t = {time:.6e} s; \
+         give one of them a stiffness (law `jenkins`)", joint = joint + 1
+    )]
+    Redundant {
+        /// When, s.
+        time: f64,
+        /// Index of one of the joints.
+        joint: usize,
+    },
     /// The contact problem has no solution.
     #[error("no stick-slip state is consistent at t = {time:.6e} s")]
     Undecidable {

@@ -26,6 +26,8 @@ pub(crate) struct Aim {
     pub residual: f64,
     /// +1: the return is the state; -1: its mirror image.
     pub sign: f64,
+    /// Energy norm below which a state counts as rest, √J: residuals are relative to the state or to this.
+    pub rest: f64,
 }
 
 /// A closed orbit.
@@ -58,16 +60,11 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
     let mut smallest = f64::INFINITY;
     let mut returns = RETURNS;
     for iteration in 1..=ITERATIONS {
-        let size = norm(map.weights(), &state);
-        let residual = norm(map.weights(), gap.as_slice()) / size.max(f64::MIN_POSITIVE);
+        let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
+        let residual = norm(map.weights(), gap.as_slice()) / size;
         smallest = smallest.min(residual);
-        if residual <= aim.residual || (size == 0.0 && gap.amax() == 0.0) {
-            return Ok(Closed {
-                state,
-                derivative,
-                residual: if size == 0.0 { 0.0 } else { residual },
-                iterations: iteration,
-            });
+        if residual <= aim.residual {
+            return Ok(Closed { state, derivative, residual, iterations: iteration });
         }
         let step = newton_step(&derivative, &gap, aim.sign, map.weights());
         let before = norm(map.weights(), gap.as_slice());

@@ -5,7 +5,7 @@
 mod assemble;
 pub mod templates;
 
-pub use assemble::{Element, Load, ModelError, System, SystemJoint};
+pub use assemble::{Element, Load, ModelError, MovedPlace, System, SystemJoint, is_identifier};
 
 use crate::law::Law;
 use serde::{Deserialize, Serialize};

@@ -26,6 +26,8 @@ pub(crate) struct Decision {
     pub contacts: Vec<Contact>,
     /// Acceleration right after the instant, length n, m/s².
     pub acceleration: DVector<f64>,
+    /// Largest force on a mass without those of rigid sliders at rest, N.
+    pushed: f64,
     free: DVector<f64>,
     jerk: DVector<f64>,
     at_rest: Vec<usize>,
@@ -37,6 +39,7 @@ impl Decision {
         Decision {
             contacts: vec![Contact::Stick; mechanics.sliders.len()],
             acceleration: DVector::zeros(mechanics.n),
+            pushed: 0.0,
             free: DVector::zeros(mechanics.n),
             jerk: DVector::zeros(mechanics.n),
             at_rest: Vec::new(),
@@ -95,6 +98,7 @@ impl Decision {
             }
         }
         multiply(&mechanics.inverse_mass, &self.free, &mut self.acceleration);
+        self.pushed = self.free.amax();
         if self.at_rest.is_empty() && !elastic_undecided {
             return true;
         }
@@ -143,6 +147,19 @@ impl Decision {
         true
     }
 
+    /// The size of the terms that the derivative of this order (2: acceleration) is the sum of.
+    fn size(&self, mechanics: &Mechanics, drive: &Drive, order: u32) -> f64 {
+        let limit = mechanics.sliders.iter().map(|slider| slider.limit).fold(0.0, f64::max);
+        let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax() };
+        let imposed = drive
+            .rates
+            .iter()
+            .zip(&drive.imposed)
+            .map(|(rate, g)| rate * rate * g.iter().map(|g| g.norm()).fold(0.0, f64::max));
+        let acceleration = mobility * (self.pushed + limit) + imposed.sum::<f64>();
+        acceleration * drive.omega.max(mechanics.fastest).powi(order as i32 - 2)
+    }
+
     /// Relative acceleration (order 2) or a higher derivative of the sliders at rest that `motion` gives, with imposed motion.
     fn push(&self, mechanics: &Mechanics, drive: &Drive, time: f64, order: u32, motion: &DVector<f64>) -> DVector<f64> {
         DVector::from_iterator(
@@ -187,7 +204,7 @@ impl Decision {
             };
             let Some(rate) = complementarity::solve(&delassus, &push, &bound(-1.0), &bound(1.0)) else { break };
             let relative = &push - &delassus * &rate;
-            let size = push.amax().max((&delassus * &rate).amax());
+            let size = push.amax().max((&delassus * &rate).amax()).max(self.size(mechanics, drive, level + 2));
             let mut left = Vec::new();
             for (k, &i) in self.at_rest.iter().enumerate() {
                 if let Some(&(_, sign)) = signs.iter().find(|(s, _)| *s == i) {
@@ -233,20 +250,54 @@ impl Decision {
         }
     }
 
-    /// Sliders behind springs, at their limit with zero relative velocity: the acceleration decides.
+    /// Sliders behind springs, at their limit with zero relative velocity: its first derivative that does not vanish decides.
     fn settle_elastic(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64], still: f64) {
         let n = mechanics.n;
-        for (i, slider) in mechanics.sliders.iter().enumerate() {
-            let Some(s) = slider.state else { continue };
-            let force = state[2 * n + s];
-            let velocity = relative(slider, &state[n..2 * n]) + drive.imposed_at(i, time, 1);
-            if force.abs() < slider.limit * (1.0 - AT_LIMIT) || velocity.abs() > still {
-                continue;
+        let mut undecided: Vec<(usize, f64)> = (0..mechanics.sliders.len())
+            .filter_map(|i| {
+                let slider = &mechanics.sliders[i];
+                let force = state[2 * n + slider.state?];
+                let velocity = relative(slider, &state[n..2 * n]) + drive.imposed_at(i, time, 1);
+                let at_limit = force.abs() >= slider.limit * (1.0 - AT_LIMIT) && velocity.abs() <= still;
+                at_limit.then_some((i, force.signum()))
+            })
+            .collect();
+        let mut derivatives = vec![
+            DVector::from_column_slice(&state[..n]),
+            DVector::from_column_slice(&state[n..2 * n]),
+            self.acceleration.clone(),
+        ];
+        for level in 1..=LEVELS {
+            let order = level + 1;
+            let size = self.size(mechanics, drive, order);
+            undecided.retain(|&(i, sign)| {
+                let slope =
+                    mechanics.sliders[i].direction.dot(&derivatives[order as usize]) + drive.imposed_at(i, time, order);
+                if slope.abs() <= BALANCED * size {
+                    return true;
+                }
+                if slope * sign > 0.0 {
+                    self.contacts[i] = Contact::slip(sign);
+                }
+                false
+            });
+            if undecided.is_empty() || level == LEVELS {
+                return;
             }
-            let acceleration = slider.direction.dot(&self.acceleration) + drive.imposed_at(i, time, 2);
-            if acceleration * force > 0.0 {
-                self.contacts[i] = Contact::slip(force);
+            // the next derivative with the contacts as they stand: rigid sliders at rest hold
+            self.at_rest.retain(|i| self.contacts[*i] == Contact::Stick);
+            self.free_derivative(mechanics, drive, time, level, &derivatives);
+            let mut next = &mechanics.inverse_mass * &self.free;
+            if !self.at_rest.is_empty() {
+                let delassus = delassus(mechanics, &self.at_rest);
+                let push = self.push(mechanics, drive, time, level + 2, &next);
+                let infinite = DVector::from_element(self.at_rest.len(), f64::INFINITY);
+                let Some(rate) = complementarity::solve(&delassus, &push, &-&infinite, &infinite) else { return };
+                for (k, &i) in self.at_rest.iter().enumerate() {
+                    next -= &mechanics.inverse_mass * &mechanics.sliders[i].direction * rate[k];
+                }
             }
+            derivatives.push(next);
         }
     }
 }

@@ -150,6 +150,9 @@ impl Flow {
             at_once = if length <= f64::EPSILON * end.abs() { at_once + 1 } else { 0 };
             if self.switches > SWITCH_LIMIT || at_once > AT_ONCE_LIMIT * (1 + self.mechanics.sliders.len()) {
                 let joint = self.mechanics.sliders[slider].joint;
+                if self.slots[pattern].pattern.redundant {
+                    return Err(Breakdown::Redundant { time, joint });
+                }
                 return Err(Breakdown::Chatter { time, switches: self.switches, joint });
             }
             let old = self.slots[pattern].pattern.contacts[slider];
@@ -165,30 +168,13 @@ impl Flow {
         }
     }
 
-    /// The largest relative velocity to be expected: from the state and the imposed motion.
+    /// The largest relative velocity to be expected: from the state, the imposed motion and the loads.
     fn velocity_scale(&self, state: &[f64]) -> f64 {
         let n = self.mechanics.n;
         let fastest = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
         // displacements count with the drive frequency, so that a start at a reversal has a scale too
         let widest = state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs())) * self.drive.omega;
-        let imposed = self
-            .drive
-            .imposed
-            .iter()
-            .zip(&self.drive.rates)
-            .flat_map(|(g, rate)| g.iter().map(move |g| g.norm() * rate));
-        let largest = imposed.fold(fastest.max(widest), f64::max);
-        if largest > 0.0 {
-            return largest;
-        }
-        // everything rests: a velocity that the load gives to the masses in a period
-        let load = self
-            .drive
-            .constant
-            .amax()
-            .max(self.drive.forces.iter().map(|f| f.map(|z| z.norm()).amax()).fold(0.0, f64::max));
-        let mobility = if n == 0 { 1.0 } else { self.mechanics.inverse_mass.amax() };
-        (load * mobility / self.drive.omega.max(1.0)).max(f64::MIN_POSITIVE)
+        fastest.max(widest).max(self.drive.velocity_scale)
     }
 
     /// The pattern that was decided, with its response to the drive.

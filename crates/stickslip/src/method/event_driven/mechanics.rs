@@ -58,6 +58,8 @@ pub(crate) struct Mechanics {
     pub sliders: Vec<Slider>,
     /// Number of sliders behind springs.
     pub elastic: usize,
+    /// Estimate of the fastest natural frequency, rad/s.
+    pub fastest: f64,
 }
 
 impl Mechanics {
@@ -100,8 +102,10 @@ impl Mechanics {
             .clone()
             .try_inverse()
             .ok_or(MethodError::NotPositive { method: super::NAME, matrix: "mass" })?;
+        let fastest = (0..n).map(|i| (system.stiffness[(i, i)] / system.mass[(i, i)]).sqrt()).fold(0.0, f64::max);
         Ok(Mechanics {
             n,
+            fastest,
             mass: system.mass.clone(),
             inverse_mass,
             damping: system.damping.clone(),
@@ -130,7 +134,14 @@ pub(crate) struct Drive {
     pub constant: DVector<f64>,
     /// Imposed relative motion per harmonic and slider, m (without its constant part, which changes nothing).
     pub imposed: Vec<Vec<Complex64>>,
+    /// Square root of an energy that the loads can give to the structure, √J: the scale of a state near rest.
+    pub energy_scale: f64,
+    /// A velocity well below those of a moving structure, m/s: the scale of velocities near rest.
+    pub velocity_scale: f64,
 }
+
+/// Velocities of a structure near rest are measured against this fraction of the velocity that its loads could cause.
+const NEAR_REST: f64 = 1e-3;
 
 impl Drive {
     pub fn new(system: &System, mechanics: &Mechanics, omega: f64) -> Self {
@@ -154,13 +165,29 @@ impl Drive {
                 })
                 .collect()
         };
-        Drive {
+        let mut drive = Drive {
             omega,
             rates: harmonics.iter().map(|&h| f64::from(h) * omega).collect(),
             forces: harmonics.iter().map(|&h| force_at(h).unwrap_or_else(zero)).collect(),
             constant: force_at(0).map_or_else(|| DVector::zeros(n), |f| f.map(|z| z.re)),
             imposed: harmonics.iter().map(|&h| imposed_at(h)).collect(),
-        }
+            ..Drive::default()
+        };
+        drive.set_scales(mechanics);
+        drive
+    }
+
+    fn set_scales(&mut self, mechanics: &Mechanics) {
+        let loads = (0..mechanics.n).map(|i| {
+            let force = self.constant[i].abs() + self.forces.iter().map(|f| f[i].norm()).sum::<f64>();
+            let inertia = self.omega * self.omega * mechanics.mass[(i, i)];
+            force / mechanics.stiffness[(i, i)].max(inertia).sqrt()
+        });
+        let springs = mechanics.sliders.iter().filter_map(|slider| Some(slider.limit / slider.stiffness?.sqrt()));
+        self.energy_scale = loads.chain(springs).sum();
+        let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax().sqrt() };
+        let imposed = self.imposed.iter().zip(&self.rates).flat_map(|(g, rate)| g.iter().map(move |g| g.norm() * rate));
+        self.velocity_scale = imposed.fold(NEAR_REST * self.energy_scale * mobility, f64::max).max(f64::MIN_POSITIVE);
     }
 
     /// The k-th time derivative of the force at `time`, added to `out`.

@@ -38,6 +38,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 
 /// Residual at which an orbit is closed, relative to its state: a hundred times the rounding of one period.
 const CLOSED: f64 = 1e-12;
+/// A state counts as rest below this fraction of what the loads could cause.
+const NEAR_REST: f64 = 1e-3;
 /// Energy gap above which an orbit is not reported as converged. The closed-form integrals are exact to about 1e-12.
 const ENERGY_GAP: f64 = 1e-8;
 
@@ -118,7 +120,7 @@ impl Solver for Exact<'_> {
         let (symmetry, sign, share) =
             if self.system.is_odd() { (Symmetry::HalfPeriod, -1.0, 0.5) } else { (Symmetry::FullPeriod, 1.0, 1.0) };
         self.duration = share * std::f64::consts::TAU / omega;
-        let aim = Aim { method: NAME, omega, residual: CLOSED, sign };
+        let aim = Aim { method: NAME, omega, residual: CLOSED, sign, rest: NEAR_REST * self.flow.drive.energy_scale };
         let warm = start.filter(|state| state.len() == self.flow.mechanics.states());
         let closed = match warm.map(|state| close(self, state, aim)) {
             Some(Ok(closed)) => closed,

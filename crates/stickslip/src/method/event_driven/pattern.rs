@@ -27,6 +27,8 @@ pub(crate) struct Pattern {
     pub contacts: Vec<Contact>,
     /// Rigid sliders that stick.
     pub held: Vec<usize>,
+    /// Whether fewer of them would hold the same motion, so that their forces are not unique.
+    pub redundant: bool,
     /// Exponents.
     pub lambda: Vec<Complex64>,
     /// x = Re(shape η), n × modes, column-major.
@@ -79,6 +81,7 @@ impl Pattern {
             &(w.transpose() * &mechanics.inverse_mass * &w),
             &held.iter().map(|&s| mechanics.sliders[s].limit).collect::<Vec<_>>(),
         );
+        let redundant = !held.is_empty() && inverse_delassus.rank(REDUNDANT * inverse_delassus.amax()) < held.len();
         let hold = &mechanics.inverse_mass * &w * &inverse_delassus;
         let multiplier = &inverse_delassus * w.transpose() * &mechanics.inverse_mass;
 
@@ -132,6 +135,7 @@ impl Pattern {
         Ok(Pattern {
             contacts: contacts.to_vec(),
             held,
+            redundant,
             lambda,
             shape: complex(&basis) * &modes.shape,
             constant_from_state,

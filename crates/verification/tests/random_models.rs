@@ -1,0 +1,39 @@
+//! Random models: every one ends in an orbit with its evidence, or in an error that says why.
+
+use std::time::Instant;
+use stickslip::method::{Method, event_driven::EventDriven};
+use stickslip_verification::random_model;
+
+/// Models tried.
+const MODELS: u64 = 5000;
+
+#[test]
+fn random_models_converge_with_evidence() {
+    let (mut converged, mut failures) = (0, Vec::new());
+    let (mut gap, mut residual) = (0.0f64, 0.0f64);
+    let mut slowest = (0.0, 0);
+    for seed in 0..MODELS {
+        let (model, omega) = random_model(seed);
+        let system = model.assemble().unwrap();
+        let start = Instant::now();
+        match EventDriven.solver(&system).unwrap().orbit(omega, None) {
+            Ok(orbit) => {
+                converged += 1;
+                gap = gap.max(orbit.evidence.energy_gap);
+                residual = residual.max(orbit.evidence.residual);
+                if orbit.evidence.energy_gap > 1e-9 {
+                    println!("seed {seed}: {:?} {:?}", orbit.energy, orbit.evidence);
+                }
+            }
+            Err(error) => failures.push(format!("seed {seed}: {error}")),
+        }
+        let took = start.elapsed().as_secs_f64();
+        if took > slowest.0 {
+            slowest = (took, seed);
+        }
+    }
+    println!("{converged} of {MODELS} converged; largest energy gap {gap:.1e}, residual {residual:.1e}; slowest {slowest:?}");
+    failures.iter().for_each(|failure| println!("{failure}"));
+    assert!(converged * 100 >= MODELS * 98, "{} of {MODELS} converged", converged);
+    assert!(gap < 1e-9 && residual < 1e-10);
+}
