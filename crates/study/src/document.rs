@@ -78,7 +78,8 @@ pub(crate) fn parse(text: &str, source: usize) -> Result<Table, Problem> {
             message = format!("the key `{}` stands twice in one table", shown(key));
             help = Some("leave one of them; a list of masses is written with several `[[mass]]`".to_owned());
         } else if let Some(rest) = message.strip_prefix("cannot recurse further") {
-            message = format!("too many brackets inside each other{}", if rest.is_empty() { "" } else { " (80 at most)" });
+            message =
+                format!("too many brackets inside each other{}", if rest.is_empty() { "" } else { " (80 at most)" });
         } else {
             message = format!("this is not TOML: {message}");
             help = Some("texts and quantities stand in quotes: mass = \"182 g\"".to_owned());
@@ -131,9 +132,7 @@ impl Reader<'_> {
                 };
                 Content::Number { value, whole }
             }
-            DeValue::Float(float) => {
-                Content::Number { value: float.as_str().parse().unwrap_or(f64::NAN), whole: None }
-            }
+            DeValue::Float(float) => Content::Number { value: float.as_str().parse().unwrap_or(f64::NAN), whole: None },
             DeValue::Boolean(flag) => Content::Flag(*flag),
             DeValue::Datetime(_) => Content::Date,
             DeValue::Array(list) => {

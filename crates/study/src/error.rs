@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn columns_count_characters() {
-        assert_eq!(line_and_column("a\nµ = 1", 5), (2, 4));
+        assert_eq!(line_and_column("a\nµ = 1", 5), (2, 3));
         assert_eq!(boundary("µ", 1), 0);
         assert_eq!(boundary("µ", 9), 2);
     }

@@ -31,7 +31,7 @@ pub struct Value {
     /// Its dimension; `None` for a bare number.
     pub dimension: Option<Dimension>,
     /// Whether a bare number was computed with `pi`.
-    with_pi: bool,
+    pub(crate) with_pi: bool,
 }
 
 impl Value {
@@ -110,6 +110,11 @@ pub(crate) fn displayed(si: f64, dimension: Option<Dimension>) -> String {
 
 /// The functions of expressions.
 pub const FUNCTIONS: &[&str] = &["sqrt", "sin", "cos", "tan", "exp", "ln", "abs", "min", "max"];
+
+/// Whether `name` is an identifier `[A-Za-z][A-Za-z0-9_]*`.
+pub(crate) fn is_identifier(name: &str) -> bool {
+    name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+}
 
 /// Whether a parameter cannot have this name.
 pub(crate) fn is_reserved(name: &str) -> bool {
@@ -582,7 +587,9 @@ impl Parser<'_> {
             ')' => Fault::new(span, "this parenthesis closes none"),
             ',' => Fault::new(span, "`,` separates the arguments of `min` and `max` only")
                 .help("the decimal sign is a point"),
-            c if c.is_alphanumeric() => Fault::new(span, "an operator is missing here").help("a product is written `*`"),
+            c if c.is_alphanumeric() => {
+                Fault::new(span, "an operator is missing here").help("a product is written `*`")
+            }
             c => Fault::new(span, format!("`{}` has no meaning here", shown(&c.to_string()))),
         }
     }

@@ -1,3 +1,22 @@
 //! Study files of Stickslip: what a TOML file asks for, read, checked and run.
+//!
+//! [`read_study`] turns a text into a [`Study`]: tree ([`toml`]), statements (every expression compiled, every place known), then every
+//! case once, so that whatever is wrong is found before anything is written. [`schema`] describes all tables and keys as data.
 
 pub mod dataset;
+mod document;
+mod error;
+pub mod expression;
+pub mod kinds;
+mod near;
+mod read;
+pub mod schema;
+mod statement;
+mod study;
+pub mod units;
+mod values;
+
+pub use error::StudyError;
+pub use read::{read_bytes, read_file, read_study};
+pub use study::{Case, MethodChoice, Study, VariedValue};
+pub use values::{Frequencies, Values};

@@ -138,15 +138,23 @@ pub const fn default(
     Key { name, takes, presence: Presence::Default(value), doc, example }
 }
 
-use Within::{AtLeastZero, Finite, Positive};
-
 /// The keys at the top of the file.
 pub const FILE: &[Key] = &[
     required("schema", Takes::Count(VERSION, VERSION), "version of the file format", "1"),
-    optional("title", Takes::Text, "title of the figure; the file's name when absent", "\"Response of the blade couple\""),
+    optional(
+        "title",
+        Takes::Text,
+        "title of the figure; the file's name when absent",
+        "\"Response of the blade couple\"",
+    ),
     optional("source", Takes::Text, "where the study comes from: a paper, a figure", "\"Den Hartog (1931), Fig. 5\""),
     optional("parameters", Takes::Parameters, "quantities by name, for use in expressions", "{ Ft = \"2 N\" }"),
-    optional("model", Takes::Table(MODEL), "a ready model instead of the lists below", "{ template = \"blade-couple\" }"),
+    optional(
+        "model",
+        Takes::Table(MODEL),
+        "a ready model instead of the lists below",
+        "{ template = \"blade-couple\" }",
+    ),
     optional("mass", Takes::List(MASS), "point masses, each with one displacement", "[]"),
     optional("spring", Takes::List(SPRING), "springs and dampers", "[]"),
     optional("joint", Takes::List(JOINT), "places that rub", "[]"),
@@ -163,18 +171,28 @@ const MODEL: &[Key] = &[
 
 const MASS: &[Key] = &[
     required("name", Takes::Name, "name of the place, for springs, joints and forces", "\"blade1\""),
-    required("mass", Takes::Quantity(Dimension::MASS, AtLeastZero), "mass", "\"182 g\""),
+    required("mass", Takes::Quantity(Dimension::MASS, Within::AtLeastZero), "mass", "\"182 g\""),
 ];
 
 const SPRING: &[Key] = &[
-    required("between", Takes::Pair, "the two places it joins; `ground` is the fixed frame", "[\"blade1\", \"ground\"]"),
+    required(
+        "between",
+        Takes::Pair,
+        "the two places it joins; `ground` is the fixed frame",
+        "[\"blade1\", \"ground\"]",
+    ),
     optional(
         "stiffness",
-        Takes::Quantity(Dimension::STIFFNESS, AtLeastZero),
+        Takes::Quantity(Dimension::STIFFNESS, Within::AtLeastZero),
         "stiffness; may be absent where damping is given",
         "\"105103 N/m\"",
     ),
-    optional("damping", Takes::Quantity(Dimension::DAMPING, Finite), "viscous damping in parallel", "\"0.2 kg/s\""),
+    optional(
+        "damping",
+        Takes::Quantity(Dimension::DAMPING, Within::Finite),
+        "viscous damping in parallel",
+        "\"0.2 kg/s\"",
+    ),
 ];
 
 const JOINT: &[Key] = &[
@@ -187,15 +205,15 @@ const MOST_HARMONIC: i64 = 1_000;
 
 const FORCE: &[Key] = &[
     required("on", Takes::Name, "the mass it acts on", "\"blade1\""),
-    required("amplitude", Takes::Quantity(Dimension::FORCE, Finite), "amplitude", "\"10 N\""),
-    default("phase", Takes::Quantity(Dimension::ANGLE, Finite), "0 deg", "phase lead", "\"90 deg\""),
+    required("amplitude", Takes::Quantity(Dimension::FORCE, Within::Finite), "amplitude", "\"10 N\""),
+    default("phase", Takes::Quantity(Dimension::ANGLE, Within::Finite), "0 deg", "phase lead", "\"90 deg\""),
     default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
 ];
 
 const MOTION: &[Key] = &[
     required("on", Takes::Name, "the place: a mass, or one that exists by this motion alone", "\"mover\""),
-    required("amplitude", Takes::Quantity(Dimension::LENGTH, Finite), "amplitude", "\"2 mm\""),
-    default("phase", Takes::Quantity(Dimension::ANGLE, Finite), "0 deg", "phase lead", "\"90 deg\""),
+    required("amplitude", Takes::Quantity(Dimension::LENGTH, Within::Finite), "amplitude", "\"2 mm\""),
+    default("phase", Takes::Quantity(Dimension::ANGLE, Within::Finite), "0 deg", "phase lead", "\"90 deg\""),
     default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
 ];
 
@@ -212,14 +230,13 @@ pub const STUDY: &[Key] = &[
 
 /// Keys of the range of a frequency.
 pub const RANGE: &[Key] = &[
-    required("from", Takes::Quantity(Dimension::FREQUENCY, Positive), "first value", "\"119 Hz\""),
-    required("to", Takes::Quantity(Dimension::FREQUENCY, Positive), "last value", "\"123 Hz\""),
+    required("from", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "first value", "\"119 Hz\""),
+    required("to", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "last value", "\"123 Hz\""),
     required("points", Takes::Count(2, MOST_POINTS as i64), "number of values, both ends included", "241"),
 ];
 
 /// The choice of `kind` in `[method]`.
-pub const METHOD: &[Key] =
-    &[default("kind", Takes::Choice(method_names), "auto", "the method", "\"event-driven\"")];
+pub const METHOD: &[Key] = &[default("kind", Takes::Choice(method_names), "auto", "the method", "\"event-driven\"")];
 
 fn template_names() -> Vec<(&'static str, &'static str)> {
     templates::TABLE.iter().map(|row| (row.name, row.summary)).collect()
@@ -241,7 +258,7 @@ pub fn described(takes: &Takes) -> String {
         Takes::Names => "a name in quotes or a list of names".to_owned(),
         Takes::Pair => "a list of two names of places".to_owned(),
         Takes::Quantity(dimension, within) => {
-            let range = if *within == Finite { String::new() } else { format!(", {}", within.described()) };
+            let range = if *within == Within::Finite { String::new() } else { format!(", {}", within.described()) };
             format!("{}{range}", crate::expression::described(*dimension))
         }
         Takes::Count(from, to) if from == to => format!("the number {from}"),

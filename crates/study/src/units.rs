@@ -55,7 +55,11 @@ struct Named {
 const fn named(name: &'static str, prefixes: bool, factor: (u64, u64, i32, i32), base: (i8, i8, i8, i8)) -> Named {
     let (numerator, denominator, exponent, pi) = factor;
     let (kg, m, s, rad) = base;
-    Named { name, prefixes, unit: Unit { numerator, denominator, exponent, pi, dimension: Dimension { kg, m, s, rad } } }
+    Named {
+        name,
+        prefixes,
+        unit: Unit { numerator, denominator, exponent, pi, dimension: Dimension { kg, m, s, rad } },
+    }
 }
 
 // name, prefixes, (numerator, denominator, power of ten, power of π), (kg, m, s, rad)
@@ -253,7 +257,8 @@ impl Reader<'_> {
     /// Whether a unit is here: a known name that is not called as a function.
     fn unit_here(&self) -> bool {
         let word = self.word();
-        find(word).is_some() && !((self.names.function)(word) && self.rest()[word.len()..].trim_start().starts_with('('))
+        find(word).is_some()
+            && !((self.names.function)(word) && self.rest()[word.len()..].trim_start().starts_with('('))
     }
 
     fn product(&mut self, group: bool) -> Result<Unit, Fault> {

@@ -8,7 +8,13 @@ pub(super) const KIND: Kind = Kind {
     summary: "response curves over the drive frequency, with refined peaks",
     keys: &[
         FREQUENCY,
-        default("peaks", Takes::Flag, "true", "refines the peak of every mass between the points of the curve", "false"),
+        default(
+            "peaks",
+            Takes::Flag,
+            "true",
+            "refines the peak of every mass between the points of the curve",
+            "false",
+        ),
     ],
     check: |_, _| Ok(()),
 };

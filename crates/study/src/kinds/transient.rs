@@ -36,7 +36,12 @@ pub(super) const KIND: Kind = Kind {
         ),
         optional("duration", DURATION, "time that is computed; of a run-up its own duration when absent", "\"2 s\""),
         optional("cycles", Takes::Count(1, 1_000_000), "the same in periods of `frequency`", "200"),
-        optional("start", Takes::ByName(Dimension::LENGTH), "displacements at the start; zero when absent", "{ blade1 = \"1 mm\" }"),
+        optional(
+            "start",
+            Takes::ByName(Dimension::LENGTH),
+            "displacements at the start; zero when absent",
+            "{ blade1 = \"1 mm\" }",
+        ),
         optional(
             "start_velocity",
             Takes::ByName(Dimension::VELOCITY),
@@ -90,9 +95,7 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     let lowest = drive.map(|f| f.iter().fold(f64::INFINITY, f64::min));
     let highest = match (drive, run_up) {
         (Some(f), _) => Some(f.iter().fold(0.0, f64::max)),
-        (None, Some(r)) => {
-            r.quantity("from").into_iter().chain(r.quantity("to")).reduce(f64::max)
-        }
+        (None, Some(r)) => r.quantity("from").into_iter().chain(r.quantity("to")).reduce(f64::max),
         (None, None) => None,
     };
     let period = |omega: f64| std::f64::consts::TAU / omega;

@@ -1,0 +1,880 @@
+//! Reads a study file: text to tree to statements, then every case once, so that nothing wrong is found later.
+
+use crate::document::{self, Content, Entry, Node, Table};
+use crate::error::{Place, Problem, Source, StudyError};
+use crate::expression::{Expression, Value, described, is_identifier, is_reserved};
+use crate::kinds;
+use crate::near::{nearest, one_of, shown};
+use crate::schema::{self, FILE, Key, MOST_BYTES, MOST_ELEMENTS, MOST_POINTS, Presence, STUDY, Takes, Within};
+use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable};
+use crate::study::{Lists, Parameter, Structure, Study, Varied, VariedPoints};
+use crate::values::Given;
+use std::collections::HashMap;
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
+use stickslip::dimension::Dimension;
+use stickslip::model::templates::{self, Template};
+use stickslip::{law, method};
+
+/// Most errors that are reported at once.
+const MOST_ERRORS: usize = 20;
+
+/// Reads the study at `path`; `overrides` are parameters and their new values, as in `--set Ft=3N`.
+///
+/// # Errors
+/// [`StudyError`]: the file is not there, is a folder, is too big, or what [`read_bytes`] refuses.
+pub fn read_file(path: &Path, overrides: &[(String, String)]) -> Result<Study, StudyError> {
+    let name = path.display().to_string();
+    let refuse = |message: String, help: Option<String>| StudyError::file(&name, message, help);
+    let failed = |error: std::io::Error| match error.kind() {
+        std::io::ErrorKind::NotFound => refuse("there is no such file".to_owned(), sibling(path)),
+        std::io::ErrorKind::PermissionDenied => refuse("the file may not be read".to_owned(), None),
+        _ => refuse(format!("the file cannot be read: {error}"), None),
+    };
+    if std::fs::metadata(path).map_err(failed)?.is_dir() {
+        return Err(refuse("this is a folder, a study file (TOML) is needed".to_owned(), None));
+    }
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(failed)?;
+    file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    read_bytes(&name, &bytes, overrides)
+}
+
+/// A file beside `path` whose name is like it.
+fn sibling(path: &Path) -> Option<String> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let names: Vec<String> = std::fs::read_dir(folder)
+        .ok()?
+        .flatten()
+        .take(10_000)
+        .filter_map(|f| f.file_name().into_string().ok())
+        .collect();
+    let near = nearest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
+    Some(format!("did you mean `{}`?", folder.join(near).display()))
+}
+
+/// Reads a study from the bytes of a file; `name` is the file's name for messages and for the study's own name.
+///
+/// # Errors
+/// [`StudyError`]: the bytes are not UTF-8, or what [`read_study`] refuses.
+pub fn read_bytes(name: &str, bytes: &[u8], overrides: &[(String, String)]) -> Result<Study, StudyError> {
+    too_big(name, bytes.len())?;
+    match std::str::from_utf8(bytes) {
+        Ok(text) => read_study(name, text, overrides),
+        Err(error) => {
+            let valid = error.valid_up_to();
+            let text = String::from_utf8_lossy(bytes).into_owned();
+            let span = valid..valid + char::REPLACEMENT_CHARACTER.len_utf8();
+            let message = format!("the file is not UTF-8 text: byte {:#04x} has no meaning here", bytes[valid]);
+            let problem = Problem::new(&Place { source: 0, span }, "", message)
+                .help("save the file as UTF-8; a binary file is no study");
+            Err(StudyError::at(&[Arc::new(Source { name: name.to_owned(), text })], problem))
+        }
+    }
+}
+
+fn too_big(name: &str, bytes: usize) -> Result<(), StudyError> {
+    if bytes as u64 <= MOST_BYTES {
+        return Ok(());
+    }
+    let message = format!("the file is too big for a study: the limit is {} MiB", MOST_BYTES / (1024 * 1024));
+    Err(StudyError::file(name, message, None))
+}
+
+/// Reads a study from its text. Every case is checked: a study that is returned can be run.
+///
+/// `name` is the file's name (its stem becomes the name of the study), `overrides` are parameters and their new values.
+///
+/// # Errors
+/// [`StudyError`] with the first error in the order of the file, and others behind it.
+///
+/// # Example
+/// ```
+/// use stickslip::model::templates;
+/// use stickslip_study::read_study;
+/// let text = templates::find("blade-couple").unwrap().study;
+/// let study = read_study("couple.toml", text, &[("Ft".into(), "3 N".into())]).unwrap();
+/// assert_eq!((study.name(), study.cases()), ("couple", 4));
+/// assert_eq!(study.case(0).unwrap().varied[0].text, "Ft = 2 N");
+/// let error = read_study("couple.toml", &text.replace("stiffness", "stifness"), &[]).unwrap_err();
+/// assert_eq!(error.help_text(), Some("did you mean `stiffness`?"));
+/// ```
+pub fn read_study(name: &str, text: &str, overrides: &[(String, String)]) -> Result<Study, StudyError> {
+    too_big(name, text.len())?;
+    let mut reader = Reader {
+        sources: vec![Arc::new(Source { name: name.to_owned(), text: text.to_owned() })],
+        problems: Vec::new(),
+        names: Vec::new(),
+        index: HashMap::new(),
+    };
+    let study = reader.study(name, text, overrides);
+    match study {
+        Some(study) if reader.problems.is_empty() => {
+            study.check()?;
+            Ok(study)
+        }
+        _ => {
+            reader.problems.truncate(MOST_ERRORS);
+            let error = StudyError::all(&reader.sources, std::mem::take(&mut reader.problems));
+            Err(error.unwrap_or_else(|| StudyError::file(name, "the study could not be read", None)))
+        }
+    }
+}
+
+struct Reader {
+    sources: Vec<Arc<Source>>,
+    problems: Vec<Problem>,
+    /// Parameters, in order, and their index by name.
+    names: Vec<String>,
+    index: HashMap<String, usize>,
+}
+
+impl Reader {
+    fn study(&mut self, file: &str, text: &str, overrides: &[(String, String)]) -> Option<Study> {
+        let root = match document::parse(text, 0) {
+            Ok(root) => root,
+            Err(problem) => {
+                self.problems.push(problem);
+                return None;
+            }
+        };
+        self.check_keys(&root, FILE, "the file");
+        if let Some(entry) = root.get("schema") {
+            let key = FILE.iter().find(|key| key.name == "schema")?;
+            let before = self.problems.len();
+            self.value(key, &entry.node);
+            if let Some(problem) = self.problems.get_mut(before) {
+                problem.help = Some(format!("this program reads schema {}", schema::VERSION));
+                return None; // another schema has other keys
+            }
+        }
+        let words = |reader: &mut Reader, name: &str| -> Option<String> {
+            let key = FILE.iter().find(|key| key.name == name)?;
+            match reader.value(key, &root.get(name)?.node)? {
+                Stated::Fixed(Given::Text(text)) => Some(text),
+                _ => None,
+            }
+        };
+        let title = words(self, "title");
+        let source = words(self, "source");
+
+        let template = self.template(&root);
+        let parameters = self.parameters(&root, template.as_ref().map(|(row, _)| *row), overrides);
+        let structure = match template {
+            Some((row, table)) => self.with_template(&root, row, table),
+            None => self.lists(&root),
+        };
+        let (kind, study, vary) = self.request(&root)?;
+        let method = self.method(&root);
+        let mut parameters = parameters?;
+        let varied = vary.and_then(|entry| self.vary(entry, &mut parameters)).unwrap_or_default();
+        if !self.problems.is_empty() {
+            return None;
+        }
+        let order = self.order(&parameters, &varied)?;
+        self.limit_points(&study, &varied)?;
+        let stem = Path::new(file).file_stem().and_then(|stem| stem.to_str()).unwrap_or("study").to_owned();
+        Some(Study {
+            title: title.unwrap_or_else(|| stem.clone()),
+            name: stem,
+            source,
+            text: text.to_owned(),
+            kind,
+            overrides: overrides.to_vec(),
+            sources: std::mem::take(&mut self.sources),
+            names: std::mem::take(&mut self.names),
+            parameters,
+            order,
+            varied,
+            structure: structure?,
+            study,
+            method: method?,
+        })
+    }
+
+    // ------------------------------------------------------------------------------------------ tables and keys
+
+    /// Unknown and missing keys.
+    fn check_keys(&mut self, table: &Table, keys: &[Key], owner: &str) {
+        for entry in &table.entries {
+            if !keys.iter().any(|key| key.name == entry.key) {
+                let help = match nearest(&entry.key, keys.iter().map(|key| key.name)) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => {
+                        format!("the keys of {owner} are {}", one_of(keys.iter().map(|k| k.name)).replace(" or ", ", "))
+                    }
+                };
+                let message = format!("{owner} has no key `{}`", shown(&entry.key));
+                self.problems.push(Problem::new(&entry.key_place, shown(&entry.key), message).help(help));
+            }
+        }
+        for key in keys.iter().filter(|key| key.presence == Presence::Required) {
+            if table.get(key.name).is_none() {
+                let message = format!("`{}` is missing in {owner}: {}", key.name, schema::described(&key.takes));
+                let help = match key.takes {
+                    Takes::Study => "add a table [study] with kind = \"response\" and a frequency".to_owned(),
+                    _ => format!("add {} = {}", key.name, key.example),
+                };
+                self.problems.push(Problem::new(&table.place, key.name, message).help(help));
+            }
+        }
+    }
+
+    fn table(&mut self, table: &Table, keys: &[Key], owner: &str) -> StatedTable {
+        self.check_keys(table, keys, owner);
+        self.stated(table, keys)
+    }
+
+    /// The values of those keys that are known; unknown and missing ones are the matter of [`Reader::check_keys`].
+    fn stated(&mut self, table: &Table, keys: &[Key]) -> StatedTable {
+        let mut entries = Vec::with_capacity(keys.len());
+        for key in keys {
+            let (place, value) = match (table.get(key.name), key.presence) {
+                (Some(entry), _) => (entry.node.place.clone(), self.value(key, &entry.node)),
+                (None, Presence::Default(text)) => (table.place.clone(), self.standing_for(key, text, &table.place)),
+                (None, _) => continue,
+            };
+            entries.extend(value.map(|value| StatedEntry { key: key.name, place, value }));
+        }
+        StatedTable { place: table.place.clone(), entries }
+    }
+
+    /// The value that stands for an absent key.
+    fn standing_for(&mut self, key: &Key, text: &str, place: &Place) -> Option<Stated> {
+        let value = match key.takes {
+            Takes::Count(..) => {
+                let whole = text.parse::<i64>().ok();
+                Content::Number { value: whole.unwrap_or(0) as f64, whole }
+            }
+            Takes::Flag => Content::Flag(text == "true"),
+            _ => Content::Text { text: text.to_owned(), inner: None },
+        };
+        self.value(key, &Node { place: place.clone(), value })
+    }
+
+    fn wrong_type(&mut self, key: &Key, node: &Node) -> Option<Stated> {
+        let expected = schema::described(&key.takes);
+        self.problems.push(
+            Problem::new(&node.place, key.name, format!("expected {expected}, found {}", node.value.described()))
+                .help(format!("write it as in {} = {}", key.name, key.example)),
+        );
+        None
+    }
+
+    fn value(&mut self, key: &Key, node: &Node) -> Option<Stated> {
+        match (&key.takes, &node.value) {
+            (Takes::Text, Content::Text { text, .. }) => Some(Stated::Fixed(Given::Text(text.clone()))),
+            (Takes::Name, Content::Text { text, .. }) => {
+                self.name(key.name, text, &node.place)?;
+                Some(Stated::Fixed(Given::Text(text.clone())))
+            }
+            (Takes::Names, Content::Text { text, .. }) => {
+                self.name(key.name, text, &node.place)?;
+                Some(Stated::Names(vec![(text.clone(), node.place.clone())]))
+            }
+            (Takes::Names, Content::List(list)) if !list.is_empty() => self.names(key, list),
+            (Takes::Pair, Content::List(list)) if list.len() == 2 => self.names(key, list),
+            (Takes::Pair, Content::List(list)) => {
+                let message = format!("expected two names of places, found {}", list.len());
+                let help = format!("write it as in {} = {}", key.name, key.example);
+                self.problems.push(Problem::new(&node.place, key.name, message).help(help));
+                None
+            }
+            (Takes::Quantity(dimension, within), Content::Text { .. } | Content::Number { .. }) => {
+                let quantity = self.quantity(key.name, node)?;
+                let (dimension, within, example) = (*dimension, *within, key.example);
+                Some(Stated::Quantity { quantity, dimension, within, example })
+            }
+            (Takes::Count(from, to), Content::Number { whole: Some(whole), .. }) => {
+                if (*from..=*to).contains(whole) {
+                    return Some(Stated::Fixed(Given::Count(u64::try_from(*whole).unwrap_or(0))));
+                }
+                let message = format!("expected {}, found {whole}", schema::described(&key.takes));
+                let problem = Problem::new(&node.place, key.name, message);
+                let limit = *to == MOST_POINTS as i64;
+                let help = limit.then(|| format!("the limit of a study is {MOST_POINTS} points"));
+                self.problems.push(problem.maybe_help(help));
+                None
+            }
+            (Takes::Flag, Content::Flag(flag)) => Some(Stated::Fixed(Given::Flag(*flag))),
+            (Takes::Frequencies, Content::Text { .. } | Content::Number { .. }) => {
+                Some(Stated::List(vec![self.quantity(key.name, node)?]))
+            }
+            (Takes::Frequencies, Content::List(list)) => {
+                Some(Stated::List(self.quantities(key.name, list, &node.place)?))
+            }
+            (Takes::Frequencies, Content::Table(table)) => {
+                let (from, to, points) = self.range(table, key.name)?;
+                Some(Stated::Range { from, to, points })
+            }
+            (Takes::ByName(dimension), Content::Table(table)) => {
+                let mut names = Vec::new();
+                for entry in &table.entries {
+                    let quantity = self.quantity(&entry.key, &entry.node)?;
+                    names.push((entry.key.clone(), entry.key_place.clone(), quantity));
+                }
+                Some(Stated::ByName(names, *dimension))
+            }
+            (Takes::Table(keys), Content::Table(table)) => {
+                Some(Stated::Table(self.table(table, keys, &format!("`{}`", key.name))))
+            }
+            (Takes::Law, Content::Table(table)) => self.law(table),
+            (Takes::Choice(words), Content::Text { text, .. }) => {
+                let words = words();
+                if words.iter().any(|(word, _)| word == text) {
+                    return Some(Stated::Fixed(Given::Text(text.clone())));
+                }
+                self.unknown_word(key.name, text, &node.place, words.iter().map(|(word, _)| *word).collect());
+                None
+            }
+            _ => self.wrong_type(key, node),
+        }
+    }
+
+    fn unknown_word(&mut self, key: &str, word: &str, place: &Place, words: Vec<&str>) {
+        let message = format!("there is no `{}`, expected {}", shown(word), one_of(words.iter().copied()));
+        let help = nearest(word, words).map(|near| format!("did you mean `{near}`?"));
+        self.problems.push(Problem::new(place, key, message).maybe_help(help));
+    }
+
+    fn name(&mut self, key: &str, text: &str, place: &Place) -> Option<()> {
+        if is_identifier(text) {
+            return Some(());
+        }
+        let message = format!("`{}` is no name: a letter first, then letters, digits and `_`", shown(text));
+        self.problems.push(Problem::new(place, key, message));
+        None
+    }
+
+    fn names(&mut self, key: &Key, list: &[Node]) -> Option<Stated> {
+        let mut names = Vec::with_capacity(list.len());
+        for node in list {
+            let Content::Text { text, .. } = &node.value else { return self.wrong_type(key, node) };
+            self.name(key.name, text, &node.place)?;
+            names.push((text.clone(), node.place.clone()));
+        }
+        Some(Stated::Names(names))
+    }
+
+    fn quantity(&mut self, key: &str, node: &Node) -> Option<Quantity> {
+        let place = &node.place;
+        let problem = match &node.value {
+            Content::Text { text, inner } => match self.compile(text) {
+                Ok(expression) => {
+                    return Some(Quantity { place: place.clone(), inner: *inner, text: text.clone(), expression });
+                }
+                Err(fault) => Problem::fault(place, *inner, key, fault),
+            },
+            Content::Number { value, .. } if value.is_finite() => {
+                let text = value.to_string();
+                return Some(Quantity {
+                    place: place.clone(),
+                    inner: None,
+                    text,
+                    expression: Expression::number(*value),
+                });
+            }
+            Content::Number { value, .. } => {
+                Problem::new(place, key, format!("a finite number is needed, found {value}"))
+            }
+            other => Problem::new(place, key, format!("expected a quantity, found {}", other.described()))
+                .help("write a number with its unit in quotes, as in \"2 N\""),
+        };
+        self.problems.push(problem);
+        None
+    }
+
+    fn compile(&self, text: &str) -> Result<Expression, crate::units::Fault> {
+        let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
+        Expression::compile_with(text, &|name| self.index.get(name).copied(), &names)
+    }
+
+    fn quantities(&mut self, key: &str, list: &[Node], place: &Place) -> Option<Vec<Quantity>> {
+        if list.is_empty() {
+            let problem = Problem::new(place, key, "the list is empty, at least one value is needed");
+            self.problems.push(problem);
+            return None;
+        }
+        list.iter().map(|node| self.quantity(key, node)).collect()
+    }
+
+    fn range(&mut self, table: &Table, owner: &str) -> Option<(Quantity, Quantity, usize)> {
+        let before = self.problems.len();
+        let mut stated = self.table(table, schema::RANGE, &format!("the range of `{}`", shown(owner)));
+        if self.problems.len() > before {
+            return None;
+        }
+        let mut take = |key: &str| {
+            let at = stated.entries.iter().position(|entry| entry.key == key)?;
+            Some(stated.entries.swap_remove(at).value)
+        };
+        match (take("from")?, take("to")?, take("points")?) {
+            (
+                Stated::Quantity { quantity: from, .. },
+                Stated::Quantity { quantity: to, .. },
+                Stated::Fixed(Given::Count(points)),
+            ) => Some((from, to, usize::try_from(points).ok()?)),
+            _ => None,
+        }
+    }
+
+    /// The row named by `kind` in a table of laws, methods or study kinds.
+    fn kind<T: 'static>(
+        &mut self,
+        table: &Table,
+        (what, example): (&str, &str),
+        rows: &'static [T],
+        name: fn(&T) -> &'static str,
+    ) -> Option<&'static T> {
+        let words: Vec<&str> = rows.iter().map(name).collect();
+        let Some(entry) = table.get("kind") else {
+            let message = format!("`kind` is missing in {what}: one of {}", one_of(words));
+            self.problems.push(Problem::new(&table.place, "kind", message).help(format!("add kind = \"{example}\"")));
+            return None;
+        };
+        let place = &entry.node.place;
+        match &entry.node.value {
+            Content::Text { text, .. } => match rows.iter().find(|row| name(row) == text) {
+                Some(row) => Some(row),
+                None => {
+                    self.unknown_word("kind", text, place, words);
+                    None
+                }
+            },
+            other => {
+                let message = format!("expected one of {}, found {}", one_of(words), other.described());
+                self.problems.push(Problem::new(place, "kind", message));
+                None
+            }
+        }
+    }
+
+    fn law(&mut self, table: &Table) -> Option<Stated> {
+        let row = self.kind(table, ("the law", "coulomb"), law::TABLE, |row| row.name)?;
+        let mut keys = vec![schema::required("kind", Takes::Text, "law", "\"coulomb\"")];
+        keys.extend(row.parameters.iter().map(|p| Key {
+            name: p.key,
+            takes: Takes::Quantity(p.dimension, Within::Positive),
+            presence: Presence::Required,
+            doc: p.doc,
+            example: example_of(p.dimension),
+        }));
+        Some(Stated::Law(row, self.table(table, &keys, &format!("law `{}`", row.name))))
+    }
+
+    fn method(&mut self, root: &Table) -> Option<StatedTable> {
+        let absent = Table::default();
+        let table = match root.get("method").map(|entry| &entry.node) {
+            None => &absent,
+            Some(Node { value: Content::Table(table), .. }) => table,
+            Some(node) => {
+                let message = format!("expected a table, found {}", node.value.described());
+                self.problems
+                    .push(Problem::new(&node.place, "method", message).help("write [method] and below it its kind"));
+                return None;
+            }
+        };
+        let row = match table.get("kind") {
+            None => method::find("auto")?,
+            Some(_) => self.kind(table, ("[method]", "auto"), method::TABLE, |row| row.name)?,
+        };
+        let mut keys = schema::METHOD.to_vec();
+        keys.extend(row.options.iter().map(|option| Key {
+            name: option.key,
+            takes: if option.count {
+                Takes::Count(1, 1_000_000)
+            } else {
+                Takes::Quantity(option.dimension, Within::Positive)
+            },
+            presence: Presence::Optional,
+            doc: option.doc,
+            example: if option.count { "15" } else { example_of(option.dimension) },
+        }));
+        Some(self.table(table, &keys, &format!("method `{}`", row.name)))
+    }
+
+    fn request<'a>(&mut self, root: &'a Table) -> Option<(&'static kinds::Kind, StatedTable, Option<&'a Entry>)> {
+        let node = &root.get("study")?.node;
+        let Content::Table(table) = &node.value else {
+            let message = format!("expected a table, found {}", node.value.described());
+            self.problems.push(Problem::new(&node.place, "study", message).help("write [study] and below it its kind"));
+            return None;
+        };
+        let kind = self.kind(table, ("[study]", "response"), kinds::TABLE, |row| row.name)?;
+        let mut keys = STUDY.to_vec();
+        keys.extend(kind.keys);
+        // `vary` is not a value of the kind: it makes the cases
+        let owner = format!("a study of kind `{}`", kind.name);
+        self.check_keys(table, &keys, &owner);
+        let rest: Vec<Key> = keys.into_iter().filter(|key| !matches!(key.takes, Takes::Vary)).collect();
+        let stated = self.stated(table, &rest);
+        Some((kind, stated, table.get("vary")))
+    }
+
+    // ------------------------------------------------------------------------------------------ the model
+
+    /// The template of `[model]`, with its table.
+    fn template<'a>(&mut self, root: &'a Table) -> Option<(&'static Template, &'a Table)> {
+        let Content::Table(table) = &root.get("model")?.node.value else { return None };
+        let Content::Text { text, .. } = &table.get("template")?.node.value else { return None };
+        Some((templates::find(text)?, table))
+    }
+
+    fn with_template(&mut self, root: &Table, row: &'static Template, table: &Table) -> Option<Structure> {
+        for key in FILE.iter().filter(|key| matches!(key.takes, Takes::List(_))) {
+            if let Some(entry) = root.get(key.name) {
+                let message =
+                    format!("the template `{}` brings its own model, `{}` cannot be added to it", row.name, key.name);
+                let help = format!(
+                    "change its parameters, or start from `stickslip new {}`, which writes it out as lists",
+                    row.name
+                );
+                self.problems.push(Problem::new(&entry.node.place, key.name, message).help(help));
+            }
+        }
+        let Some(Takes::Table(keys)) = FILE.iter().find(|key| key.name == "model").map(|key| key.takes) else {
+            return None;
+        };
+        let table = self.table(table, keys, "[model]");
+        Some(Structure::Template(row, table))
+    }
+
+    fn lists(&mut self, root: &Table) -> Option<Structure> {
+        let mut lists = Lists::default();
+        for key in FILE {
+            let (node, name) = match root.get(key.name) {
+                Some(entry) => (&entry.node, key.name),
+                None => continue,
+            };
+            match (key.takes, &node.value) {
+                // a template that is unknown, or no table at all
+                (Takes::Table(keys), Content::Table(table)) => {
+                    self.table(table, keys, &format!("[{name}]"));
+                }
+                (Takes::Table(_), _) => {
+                    self.wrong_type(key, node);
+                }
+                (Takes::List(keys), Content::List(list)) => {
+                    if list.len() > MOST_ELEMENTS {
+                        let message = format!("{} elements; the limit is {MOST_ELEMENTS}", list.len());
+                        self.problems.push(Problem::new(&node.place, name, message));
+                        continue;
+                    }
+                    for (i, node) in list.iter().enumerate() {
+                        match &node.value {
+                            Content::Table(table) => {
+                                let stated = self.table(table, keys, &format!("{name} {}", i + 1));
+                                lists.get_mut(name)?.push(stated);
+                            }
+                            other => {
+                                let message = format!("expected a table, found {}", other.described());
+                                let problem = Problem::new(&node.place, name, message);
+                                self.problems.push(problem.help(format!("write [[{name}]] and its keys below")));
+                            }
+                        }
+                    }
+                }
+                (Takes::List(_), other) => {
+                    let message = format!("expected a list of tables, found {}", other.described());
+                    let problem = Problem::new(&node.place, name, message);
+                    self.problems.push(problem.help(format!("write [[{name}]] with two brackets")));
+                }
+                _ => {}
+            }
+        }
+        for spring in &lists.spring {
+            if spring.entry("stiffness").is_none() && spring.entry("damping").is_none() && self.problems.is_empty() {
+                let message = "a spring needs a stiffness, a damping, or both";
+                self.problems
+                    .push(Problem::new(&spring.place, "stiffness", message).help("add stiffness = \"105103 N/m\""));
+            }
+        }
+        Some(Structure::Lists(lists))
+    }
+
+    // ------------------------------------------------------------------------------------------ parameters
+
+    fn parameters(
+        &mut self,
+        root: &Table,
+        template: Option<&'static Template>,
+        overrides: &[(String, String)],
+    ) -> Option<Vec<Parameter>> {
+        struct Declared {
+            name: String,
+            node: Node,
+            dimension: Option<Dimension>,
+        }
+        let mut declared: Vec<Declared> = Vec::new();
+        for row in template.map_or(&[][..], |template| template.parameters) {
+            let place = self.text(format!("template parameter {}", row.key), row.default.to_owned());
+            let value = Content::Text { text: row.default.to_owned(), inner: Some(0) };
+            let node = Node { place, value };
+            declared.push(Declared { name: row.key.to_owned(), node, dimension: Some(row.dimension) });
+        }
+        let mut known: HashMap<String, usize> =
+            declared.iter().enumerate().map(|(i, parameter)| (parameter.name.clone(), i)).collect();
+        if let Some(entry) = root.get("parameters") {
+            let Content::Table(table) = &entry.node.value else {
+                let message = format!("expected a table of quantities, found {}", entry.node.value.described());
+                self.problems.push(Problem::new(&entry.node.place, "parameters", message));
+                return None;
+            };
+            for entry in &table.entries {
+                let problem = |message: String| Problem::new(&entry.key_place, shown(&entry.key), message);
+                if !is_identifier(&entry.key) {
+                    let message = "no name of a parameter: a letter first, then letters, digits and `_`";
+                    self.problems.push(problem(message.to_owned()));
+                } else if is_reserved(&entry.key) {
+                    self.problems.push(problem(format!("`{}` has a meaning of its own in expressions", entry.key)));
+                } else if let Some(&i) = known.get(&entry.key) {
+                    declared[i].node = entry.node.clone();
+                } else {
+                    known.insert(entry.key.clone(), declared.len());
+                    let (name, node) = (entry.key.clone(), entry.node.clone());
+                    declared.push(Declared { name, node, dimension: None });
+                }
+            }
+        }
+        self.names = declared.iter().map(|parameter| parameter.name.clone()).collect();
+        self.index = known;
+        let before = self.problems.len();
+        let mut parameters = Vec::with_capacity(declared.len());
+        for Declared { name, node, dimension } in declared {
+            let quantity = self.quantity(&name, &node);
+            parameters.extend(quantity.map(|quantity| Parameter { quantity, dimension }));
+        }
+        if self.problems.len() > before || parameters.len() < self.names.len() {
+            return None;
+        }
+        self.override_with(&mut parameters, overrides)?;
+        Some(parameters)
+    }
+
+    /// A text that is not in the file.
+    fn text(&mut self, name: String, text: String) -> Place {
+        let span = 0..text.len();
+        self.sources.push(Arc::new(Source { name, text }));
+        Place { source: self.sources.len() - 1, span }
+    }
+
+    fn override_with(&mut self, parameters: &mut [Parameter], overrides: &[(String, String)]) -> Option<()> {
+        if overrides.is_empty() {
+            return Some(());
+        }
+        self.settle_dimensions(parameters, &self.index.values().copied().collect::<Vec<_>>())?;
+        for (name, text) in overrides {
+            let place = self.text(format!("--set {}", shown(name)), text.clone());
+            let Some(&index) = self.index.get(name) else {
+                let message = format!("there is no parameter `{}` to set", shown(name));
+                let help = match nearest(name, self.names.iter().map(String::as_str)) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None if self.names.is_empty() => "the file has no [parameters]".to_owned(),
+                    None => format!(
+                        "the parameters are {}",
+                        one_of(self.names.iter().take(20).map(String::as_str)).replace(" or ", ", ")
+                    ),
+                };
+                self.problems.push(Problem::new(&place, shown(name), message).help(help));
+                continue;
+            };
+            let node = Node { place, value: Content::Text { text: text.clone(), inner: Some(0) } };
+            if let Some(quantity) = self.quantity(name, &node) {
+                parameters[index].quantity = quantity;
+            }
+        }
+        Some(())
+    }
+
+    /// Gives these parameters the dimension that they have in the file, so that other values must have it too.
+    fn settle_dimensions(&mut self, parameters: &mut [Parameter], which: &[usize]) -> Option<()> {
+        let order = self.order(parameters, &[])?;
+        let values = match crate::study::evaluate(&self.names, parameters, &order, &HashMap::new()) {
+            Ok(values) => values,
+            Err(problem) => {
+                self.problems.push(problem);
+                return None;
+            }
+        };
+        for &index in which {
+            parameters[index].dimension = parameters[index].dimension.or(values[index].dimension);
+        }
+        Some(())
+    }
+
+    fn vary(&mut self, entry: &Entry, parameters: &mut [Parameter]) -> Option<Vec<Varied>> {
+        let Content::Table(table) = &entry.node.value else {
+            let message = format!("expected a table from parameters to values, found {}", entry.node.value.described());
+            let problem = Problem::new(&entry.node.place, "vary", message);
+            self.problems.push(problem.help("write it as in vary = { Ft = [\"2 N\", \"4 N\"] }"));
+            return None;
+        };
+        let mut varied = Vec::new();
+        for entry in &table.entries {
+            let Some(&index) = self.index.get(&entry.key) else {
+                let message = format!("there is no parameter `{}` to vary", shown(&entry.key));
+                let help = match nearest(&entry.key, self.names.iter().map(String::as_str)) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!("add it to [parameters] and use it in the model: {} = \"…\"", shown(&entry.key)),
+                };
+                self.problems.push(Problem::new(&entry.key_place, shown(&entry.key), message).help(help));
+                continue;
+            };
+            let points = match &entry.node.value {
+                Content::List(list) => self.quantities(&entry.key, list, &entry.node.place).map(VariedPoints::List),
+                Content::Table(table) => {
+                    self.range(table, &entry.key).map(|(from, to, points)| VariedPoints::Range { from, to, points })
+                }
+                _ => self.quantity(&entry.key, &entry.node).map(|quantity| VariedPoints::List(vec![quantity])),
+            };
+            varied.extend(points.map(|points| Varied { index, place: entry.node.place.clone(), points }));
+        }
+        let which: Vec<usize> = varied.iter().map(|varied| varied.index).collect();
+        if self.problems.is_empty() {
+            self.settle_dimensions(parameters, &which)?;
+        }
+        Some(varied)
+    }
+
+    /// The order in which parameters can be evaluated; a circle is an error.
+    fn order(&mut self, parameters: &[Parameter], varied: &[Varied]) -> Option<Vec<usize>> {
+        let mut needs: Vec<Vec<usize>> =
+            parameters.iter().map(|p| p.quantity.expression.parameters().collect()).collect();
+        // a circle goes through one entry of each varied parameter, and the outer product contains that combination
+        for varied in varied {
+            needs[varied.index] = varied.points.quantities().flat_map(|q| q.expression.parameters()).collect();
+        }
+        match sorted(&needs) {
+            Ok(order) => Some(order),
+            Err(circle) => {
+                let first = circle[0];
+                let place = match varied.iter().find(|varied| varied.index == first) {
+                    Some(varied) => &varied.place,
+                    None => &parameters[first].quantity.place,
+                };
+                let mut shown: Vec<&str> = circle.iter().map(|&i| self.names[i].as_str()).collect();
+                shown.push(shown[0]);
+                if shown.len() > 12 {
+                    shown.splice(6..shown.len() - 5, ["…"]);
+                }
+                let message = format!("the parameters need each other in a circle: {}", shown.join(" -> "));
+                let problem = Problem::new(place, self.names[first].clone(), message);
+                self.problems.push(problem.help("give one of them a value of its own"));
+                None
+            }
+        }
+    }
+
+    fn limit_points(&mut self, study: &StatedTable, varied: &[Varied]) -> Option<()> {
+        let cases = varied.iter().fold(1usize, |product, varied| product.saturating_mul(varied.points.len()));
+        let frequency = study.entry("frequency");
+        let frequencies = match frequency.map(|entry| &entry.value) {
+            Some(Stated::List(list)) => list.len(),
+            Some(Stated::Range { points, .. }) => *points,
+            _ => 1,
+        };
+        if cases.saturating_mul(frequencies) <= MOST_POINTS {
+            return Some(());
+        }
+        let (place, key) = match (frequency, varied.first()) {
+            (Some(entry), _) if frequencies >= cases => (&entry.place, "frequency"),
+            (_, Some(varied)) => (&varied.place, "vary"),
+            _ => (&study.place, "frequency"),
+        };
+        let message =
+            format!("{cases} cases times {frequencies} frequencies are too many: the limit is {MOST_POINTS} points");
+        self.problems.push(Problem::new(place, key, message).help("split the study, or take fewer points"));
+        None
+    }
+}
+
+/// An example of a quantity, for messages.
+fn example_of(dimension: Dimension) -> &'static str {
+    match dimension {
+        Dimension::FORCE => "\"2 N\"",
+        Dimension::STIFFNESS => "\"10000 N/m\"",
+        Dimension::INVERSE_VELOCITY => "\"25 s/mm\"",
+        Dimension::VELOCITY => "\"0.1 mm/s\"",
+        Dimension::NONE => "1e-9",
+        Dimension::FREQUENCY => "\"121 Hz\"",
+        Dimension::TIME => "\"1 ms\"",
+        Dimension::LENGTH => "\"1 mm\"",
+        Dimension::MASS => "\"182 g\"",
+        Dimension::DAMPING => "\"0.2 kg/s\"",
+        _ => "",
+    }
+}
+
+/// Topological order of a graph, or a circle in it (starting at its lowest index). Not recursive: chains can be long.
+fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum State {
+        New,
+        Open,
+        Done,
+    }
+    let mut state = vec![State::New; needs.len()];
+    let mut order = Vec::with_capacity(needs.len());
+    for root in 0..needs.len() {
+        if state[root] != State::New {
+            continue;
+        }
+        let mut path = vec![(root, 0)];
+        state[root] = State::Open;
+        while let Some((node, next)) = path.last_mut() {
+            let node = *node;
+            match needs[node].get(*next) {
+                None => {
+                    state[node] = State::Done;
+                    order.push(node);
+                    path.pop();
+                }
+                Some(&need) => {
+                    *next += 1;
+                    match state[need] {
+                        State::New => {
+                            state[need] = State::Open;
+                            path.push((need, 0));
+                        }
+                        State::Open => {
+                            let start = path.iter().position(|(n, _)| *n == need).unwrap_or(0);
+                            let mut circle: Vec<usize> = path[start..].iter().map(|(n, _)| *n).collect();
+                            let lowest = (0..circle.len()).min_by_key(|i| circle[*i]).unwrap_or(0);
+                            circle.rotate_left(lowest);
+                            return Err(circle);
+                        }
+                        State::Done => {}
+                    }
+                }
+            }
+        }
+    }
+    Ok(order)
+}
+
+/// The value of a parameter in the dimension that it must have.
+pub(crate) fn settled(
+    quantity: &Quantity,
+    name: &str,
+    dimension: Option<Dimension>,
+    environment: &Environment<'_>,
+) -> Result<Value, Problem> {
+    let value = quantity.value(name, environment)?;
+    in_dimension(quantity, value, name, dimension, environment)
+}
+
+pub(crate) fn in_dimension(
+    quantity: &Quantity,
+    value: Value,
+    name: &str,
+    dimension: Option<Dimension>,
+    environment: &Environment<'_>,
+) -> Result<Value, Problem> {
+    let Some(dimension) = dimension else { return Ok(value) };
+    let number = quantity.convert(value, dimension, name, "", environment).map_err(|problem| match problem.help {
+        None => problem.help(format!("the parameter `{name}` is {}", described(dimension))),
+        Some(_) => problem,
+    })?;
+    Ok(Value::of(number, dimension))
+}

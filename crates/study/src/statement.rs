@@ -1,0 +1,202 @@
+//! What a file states, compiled: every expression parsed, every place known, nothing evaluated yet.
+
+use crate::error::{Place, Problem};
+use crate::expression::{Expression, Value, displayed};
+use crate::schema::Within;
+use crate::values::{Frequencies, Given, Values};
+use std::collections::BTreeMap;
+use stickslip::dimension::Dimension;
+use stickslip::law::LawInfo;
+
+/// A quantity as it stands in a text.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Quantity {
+    pub place: Place,
+    /// Where its text begins in the source, see [`crate::document::Content::Text`].
+    pub inner: Option<usize>,
+    pub text: String,
+    pub expression: Expression,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct StatedTable {
+    pub place: Place,
+    pub entries: Vec<StatedEntry>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct StatedEntry {
+    pub key: &'static str,
+    /// Its value; the table if it is a default.
+    pub place: Place,
+    pub value: Stated,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum Stated {
+    Fixed(Given),
+    Names(Vec<(String, Place)>),
+    Quantity { quantity: Quantity, dimension: Dimension, within: Within, example: &'static str },
+    List(Vec<Quantity>),
+    Range { from: Quantity, to: Quantity, points: usize },
+    ByName(Vec<(String, Place, Quantity)>, Dimension),
+    Law(&'static LawInfo, StatedTable),
+    Table(StatedTable),
+}
+
+impl StatedTable {
+    pub fn entry(&self, key: &str) -> Option<&StatedEntry> {
+        self.entries.iter().find(|entry| entry.key == key)
+    }
+
+    /// The place of a key's value, or of a name in it; the table's own if there is no such key.
+    pub fn place_of(&self, key: &str, name: Option<&str>) -> &Place {
+        let Some(entry) = self.entry(key) else { return &self.place };
+        let inside = name.and_then(|name| match &entry.value {
+            Stated::Names(names) => names.iter().find(|(n, _)| n == name).map(|(_, place)| place),
+            Stated::ByName(names, _) => names.iter().find(|(n, _, _)| n == name).map(|(_, place, _)| place),
+            _ => None,
+        });
+        inside.unwrap_or(&entry.place)
+    }
+}
+
+/// The values of the parameters of one case, by index.
+pub(crate) struct Environment<'a> {
+    pub names: &'a [String],
+    pub values: Vec<Value>,
+}
+
+impl Quantity {
+    /// The value, of whatever dimension.
+    pub fn value(&self, key: &str, environment: &Environment<'_>) -> Result<Value, Problem> {
+        self.expression
+            .evaluate(&environment.values)
+            .map_err(|fault| Problem::fault(&self.place, self.inner, key, fault))
+    }
+
+    /// The value in SI, of this dimension and in this range.
+    pub fn number(
+        &self,
+        key: &str,
+        (dimension, within): (Dimension, Within),
+        example: &str,
+        environment: &Environment<'_>,
+    ) -> Result<f64, Problem> {
+        let value = self.value(key, environment)?;
+        let number = self.convert(value, dimension, key, example, environment)?;
+        if within.holds(number) {
+            return Ok(number);
+        }
+        let message = format!("must be {}, found {}", within.described(), displayed(number, Some(dimension)));
+        Err(self.problem(key, message))
+    }
+
+    /// `value`, which this quantity has, as a number of this dimension.
+    pub fn convert(
+        &self,
+        value: Value,
+        dimension: Dimension,
+        key: &str,
+        example: &str,
+        environment: &Environment<'_>,
+    ) -> Result<f64, Problem> {
+        let number = value.to(dimension).map_err(|(message, help)| {
+            let bare = self.expression.parameters().find(|i| environment.values[*i].dimension.is_none());
+            let help = help
+                .or_else(|| {
+                    let name = &environment.names[bare?];
+                    Some(format!(
+                        "`{name}` has no unit, so it counts as a pure number in a product; give it one in [parameters]"
+                    ))
+                })
+                .or_else(|| (!example.is_empty()).then(|| format!("write it as in {key} = {example}")));
+            self.problem(key, message).maybe_help(help)
+        })?;
+        if number.is_finite() {
+            return Ok(number);
+        }
+        Err(self.problem(key, "this is not a finite number"))
+    }
+
+    pub fn problem(&self, key: &str, message: impl Into<String>) -> Problem {
+        let span = match self.inner {
+            Some(start) => start..start + self.text.len(),
+            None => self.place.span.clone(),
+        };
+        Problem::new(&Place { source: self.place.source, span }, key, message)
+    }
+}
+
+impl StatedTable {
+    /// The values of all keys. What is wrong goes to `problems`, and its key is left out.
+    pub fn values(&self, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Values {
+        let mut entries = Vec::with_capacity(self.entries.len());
+        for entry in &self.entries {
+            match entry.value.given(entry.key, environment, problems) {
+                Ok(given) => entries.push((entry.key, given)),
+                Err(problem) => problems.push(problem),
+            }
+        }
+        Values { entries }
+    }
+}
+
+impl Stated {
+    fn given(
+        &self,
+        key: &'static str,
+        environment: &Environment<'_>,
+        problems: &mut Vec<Problem>,
+    ) -> Result<Given, Problem> {
+        let frequency = (Dimension::FREQUENCY, Within::Positive);
+        Ok(match self {
+            Stated::Fixed(given) => given.clone(),
+            Stated::Names(names) => Given::Names(names.iter().map(|(name, _)| name.clone()).collect()),
+            Stated::Quantity { quantity, dimension, within, example } => {
+                Given::Quantity(quantity.number(key, (*dimension, *within), example, environment)?, *dimension)
+            }
+            Stated::List(list) => {
+                let numbers = list.iter().map(|q| q.number(key, frequency, "\"121 Hz\"", environment));
+                Given::Frequencies(Frequencies::List(numbers.collect::<Result<_, _>>()?))
+            }
+            Stated::Range { from, to, points } => {
+                let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
+                let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
+                not_empty(start, end, to, Some(Dimension::FREQUENCY))?;
+                Given::Frequencies(Frequencies::Range { from: start, to: end, points: *points })
+            }
+            Stated::ByName(names, dimension) => {
+                let mut table = BTreeMap::new();
+                for (name, _, quantity) in names {
+                    let number = quantity.number(name, (*dimension, Within::Finite), "", environment)?;
+                    table.insert(name.clone(), number);
+                }
+                Given::ByName(table, *dimension)
+            }
+            Stated::Law(row, table) => {
+                let before = problems.len();
+                let values = table.values(environment, problems);
+                if problems.len() > before {
+                    // already said; the caller only needs to know that there is no law
+                    return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.place, key, "")));
+                }
+                let numbers = row.parameters.iter().filter_map(|p| Some((p.key, values.quantity(p.key)?))).collect();
+                let law = row.build(&numbers).map_err(|error| Problem::new(&table.place, key, error.to_string()))?;
+                Given::Law(law)
+            }
+            Stated::Table(table) => Given::Table(table.values(environment, problems)),
+        })
+    }
+}
+
+/// Refuses a range whose end is not above its start.
+pub(crate) fn not_empty(from: f64, to: f64, end: &Quantity, dimension: Option<Dimension>) -> Result<(), Problem> {
+    if from < to {
+        return Ok(());
+    }
+    let (from, to) = (displayed(from, dimension), displayed(to, dimension));
+    Err(end
+        .problem("to", format!("the range is empty: `to` must be more than `from`, found {from} to {to}"))
+        .help("exchange the two, or write a single value"))
+}

@@ -1,0 +1,553 @@
+//! A study that has been read: its cases, each with its model and the values of its kind.
+
+use crate::error::{Place, Problem, Source, StudyError};
+use crate::expression::{Value, displayed};
+use crate::kinds::{Complaint, Kind};
+use crate::near::{nearest, one_of, shown};
+use crate::read::{in_dimension, settled};
+use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
+use crate::values::{Frequencies, Given, Values, between, quantity_json};
+use serde_json::{Value as Json, json};
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+use stickslip::dimension::Dimension;
+use stickslip::method::{self, Options};
+use stickslip::model::templates::Template;
+use stickslip::model::{Element, Force, Joint, Mass, Model, ModelError, Motion, Spring};
+
+/// A study file, read and checked.
+#[derive(Debug, Clone)]
+pub struct Study {
+    pub(crate) name: String,
+    pub(crate) title: String,
+    pub(crate) source: Option<String>,
+    pub(crate) text: String,
+    pub(crate) kind: &'static Kind,
+    pub(crate) overrides: Vec<(String, String)>,
+    pub(crate) sources: Vec<Arc<Source>>,
+    pub(crate) names: Vec<String>,
+    pub(crate) parameters: Vec<Parameter>,
+    pub(crate) order: Vec<usize>,
+    pub(crate) varied: Vec<Varied>,
+    pub(crate) structure: Structure,
+    pub(crate) study: StatedTable,
+    pub(crate) method: StatedTable,
+}
+
+/// A parameter: its value as stated, the dimension that it must have (if that is known).
+#[derive(Debug, Clone)]
+pub(crate) struct Parameter {
+    pub quantity: Quantity,
+    pub dimension: Option<Dimension>,
+}
+
+/// A parameter of `vary`.
+#[derive(Debug, Clone)]
+pub(crate) struct Varied {
+    pub index: usize,
+    pub place: Place,
+    pub points: VariedPoints,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum VariedPoints {
+    List(Vec<Quantity>),
+    Range { from: Quantity, to: Quantity, points: usize },
+}
+
+impl VariedPoints {
+    pub fn len(&self) -> usize {
+        match self {
+            VariedPoints::List(list) => list.len(),
+            VariedPoints::Range { points, .. } => *points,
+        }
+    }
+
+    pub fn quantities(&self) -> impl Iterator<Item = &Quantity> {
+        let (list, ends): (&[Quantity], [Option<&Quantity>; 2]) = match self {
+            VariedPoints::List(list) => (list, [None, None]),
+            VariedPoints::Range { from, to, .. } => (&[], [Some(from), Some(to)]),
+        };
+        list.iter().chain(ends.into_iter().flatten())
+    }
+}
+
+/// How the model is stated.
+#[derive(Debug, Clone)]
+pub(crate) enum Structure {
+    Lists(Lists),
+    Template(&'static Template, StatedTable),
+}
+
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Lists {
+    pub mass: Vec<StatedTable>,
+    pub spring: Vec<StatedTable>,
+    pub joint: Vec<StatedTable>,
+    pub force: Vec<StatedTable>,
+    pub motion: Vec<StatedTable>,
+}
+
+impl Lists {
+    pub fn get_mut(&mut self, name: &str) -> Option<&mut Vec<StatedTable>> {
+        match name {
+            "mass" => Some(&mut self.mass),
+            "spring" => Some(&mut self.spring),
+            "joint" => Some(&mut self.joint),
+            "force" => Some(&mut self.force),
+            "motion" => Some(&mut self.motion),
+            _ => None,
+        }
+    }
+
+    fn get(&self, name: &str) -> &[StatedTable] {
+        match name {
+            "mass" => &self.mass,
+            "spring" => &self.spring,
+            "joint" => &self.joint,
+            "force" => &self.force,
+            "motion" => &self.motion,
+            _ => &[],
+        }
+    }
+}
+
+/// The method of a study with its options.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MethodChoice {
+    /// Name, a row of [`stickslip::method::TABLE`].
+    pub name: String,
+    /// The options that were given, SI.
+    pub options: Options,
+}
+
+/// The value of a varied parameter in one case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VariedValue {
+    /// Name of the parameter.
+    pub name: String,
+    /// Its value in SI; of a parameter without a unit the number as written.
+    pub si: f64,
+    /// Its dimension, if the file tells.
+    pub dimension: Option<Dimension>,
+    /// For legends: `Ft = 2 N`.
+    pub text: String,
+}
+
+/// One case of a study: one combination of the varied parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Case {
+    /// Its number, from 0; the first varied parameter changes slowest.
+    pub index: usize,
+    /// The varied parameters, in the order of the file.
+    pub varied: Vec<VariedValue>,
+    /// Every parameter: its value in SI (of one without a unit, the number as written) and its dimension.
+    pub parameters: BTreeMap<String, (f64, Option<Dimension>)>,
+    /// The model; it assembles.
+    pub model: Model,
+    /// The values of the kind's keys of `[study]`.
+    pub values: Values,
+    /// The drive frequencies, if the study has any.
+    pub frequencies: Option<Frequencies>,
+    /// The method.
+    pub method: MethodChoice,
+}
+
+impl Case {
+    /// The varied parameters in words: `Ft = 2 N, kt = 1000 N/m`; empty if nothing is varied.
+    pub fn label(&self) -> String {
+        self.varied.iter().map(|varied| varied.text.as_str()).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Most cases that [`Study::resolved`] writes out; a run can be repeated from the text in any case.
+const MOST_RESOLVED: usize = 1_000;
+
+impl Study {
+    /// The stem of the file's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Title; the name if the file gives none.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// Where the study comes from, if the file says so.
+    pub fn source(&self) -> Option<&str> {
+        self.source.as_deref()
+    }
+
+    /// The text of the file.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The study kind.
+    pub fn kind(&self) -> &'static Kind {
+        self.kind
+    }
+
+    /// The names of the varied parameters, in the order of the file.
+    pub fn varied(&self) -> Vec<&str> {
+        self.varied.iter().map(|varied| self.names[varied.index].as_str()).collect()
+    }
+
+    /// Number of cases: the product of the numbers of values in `vary`; 1 if nothing is varied.
+    pub fn cases(&self) -> usize {
+        self.varied.iter().map(|varied| varied.points.len()).product()
+    }
+
+    /// Number of points: cases times frequencies.
+    pub fn points(&self) -> usize {
+        let frequencies = match self.study.entry("frequency").map(|entry| &entry.value) {
+            Some(Stated::List(list)) => list.len(),
+            Some(Stated::Range { points, .. }) => *points,
+            _ => 1,
+        };
+        self.cases() * frequencies
+    }
+
+    /// The case with this number.
+    ///
+    /// # Errors
+    /// [`StudyError`] if there is no such case. The cases of a study that was read have been checked.
+    pub fn case(&self, index: usize) -> Result<Case, StudyError> {
+        if index >= self.cases() {
+            let message = format!("there is no case {index}, the study has {}", self.cases());
+            return Err(StudyError::file(&self.sources[0].name, message, None));
+        }
+        let mut problems = Vec::new();
+        let parts = self.parts(index, &mut problems);
+        let error = StudyError::all(&self.sources, problems);
+        match (parts, error) {
+            (Some(parts), None) => Ok(self.finished(index, parts)),
+            (_, Some(error)) => Err(error),
+            (None, None) => Err(StudyError::file(&self.sources[0].name, "the case could not be resolved", None)),
+        }
+    }
+
+    /// The same study with another method. Options are kept if the file names this method.
+    ///
+    /// # Errors
+    /// [`StudyError`] if there is no such method.
+    pub fn with_method(mut self, name: &str) -> Result<Study, StudyError> {
+        let Some(row) = method::find(name) else {
+            let words = method::TABLE.iter().map(|row| row.name);
+            let source = Arc::new(Source { name: "--method".to_owned(), text: name.to_owned() });
+            let place = Place { source: 0, span: 0..name.len() };
+            let message = format!("there is no method `{}`, expected {}", shown(name), one_of(words.clone()));
+            let help = nearest(name, words).map(|near| format!("did you mean `{near}`?"));
+            return Err(StudyError::at(&[source], Problem::new(&place, "method", message).maybe_help(help)));
+        };
+        let same = |entry: &StatedEntry| matches!(&entry.value, Stated::Fixed(Given::Text(text)) if text == row.name);
+        if !self.method.entry("kind").is_some_and(same) {
+            let place = self.method.place.clone();
+            let kind = Stated::Fixed(Given::Text(row.name.to_owned()));
+            self.method.entries = vec![StatedEntry { key: "kind", place, value: kind }];
+        }
+        Ok(self)
+    }
+
+    /// An error that only shows when the study is run, placed at a key of the file: `table` is `study`, `method`, `mass`, `joint`, …,
+    /// `index` the element of a list. The table or the file stands in where the key is absent.
+    pub fn error_at(
+        &self,
+        table: &str,
+        index: usize,
+        key: &str,
+        message: impl Into<String>,
+        help: Option<String>,
+    ) -> StudyError {
+        let stated = match (table, &self.structure) {
+            ("study", _) => Some(&self.study),
+            ("method", _) => Some(&self.method),
+            (_, Structure::Lists(lists)) => lists.get(table).get(index),
+            (_, Structure::Template(_, table)) => Some(table),
+        };
+        let whole = Place::default();
+        let place = stated.map_or(&whole, |table| match (table.entry(key), &self.structure) {
+            (None, Structure::Template(..)) => table.place_of("template", None),
+            _ => table.place_of(key, None),
+        });
+        StudyError::at(&self.sources, Problem::new(place, key, message).maybe_help(help))
+    }
+
+    /// The study as it was understood, all values in SI, for the record of a run. The text of the file is in it.
+    pub fn resolved(&self) -> Json {
+        let mut cases = Vec::new();
+        for index in 0..self.cases().min(MOST_RESOLVED) {
+            if let Ok(case) = self.case(index) {
+                let quantities = case.parameters.iter().map(|(name, (si, d))| (name.clone(), quantity_json(*si, *d)));
+                cases.push(json!({
+                    "varied": case.varied.iter().map(|v| (v.name.clone(), quantity_json(v.si, v.dimension)))
+                        .collect::<serde_json::Map<_, _>>(),
+                    "parameters": quantities.collect::<serde_json::Map<_, _>>(),
+                    "model": case.model,
+                    "study": case.values.to_json(),
+                    "method": { "kind": case.method.name, "options": case.method.options },
+                }));
+            }
+        }
+        json!({
+            "schema": crate::schema::VERSION,
+            "name": self.name,
+            "title": self.title,
+            "source": self.source,
+            "kind": self.kind.name,
+            "file": self.text,
+            "set": self.overrides.iter().map(|(name, text)| json!([name, text])).collect::<Vec<_>>(),
+            "number_of_cases": self.cases(),
+            "cases": cases,
+        })
+    }
+
+    // ------------------------------------------------------------------------------------------ one case
+
+    /// Checks all cases; the first is assembled, the others differ from it in numbers only.
+    pub(crate) fn check(&self) -> Result<(), StudyError> {
+        for index in 0..self.cases() {
+            let mut problems = Vec::new();
+            self.parts(index, &mut problems);
+            if let Some(error) = StudyError::all(&self.sources, problems) {
+                return Err(error);
+            }
+        }
+        Ok(())
+    }
+
+    fn parts(&self, index: usize, problems: &mut Vec<Problem>) -> Option<Parts> {
+        let parts = self.resolve(index, problems);
+        // one case of many: say which
+        if self.cases() > 1 && index > 0 {
+            for problem in problems.iter_mut() {
+                problem.message = format!("{} (in case {} of {})", problem.message, index + 1, self.cases());
+            }
+        }
+        parts
+    }
+
+    fn resolve(&self, index: usize, problems: &mut Vec<Problem>) -> Option<Parts> {
+        let mut remainder = index;
+        let mut choice = HashMap::new();
+        for varied in self.varied.iter().rev() {
+            choice.insert(varied.index, (varied, remainder % varied.points.len()));
+            remainder /= varied.points.len();
+        }
+        let values = match evaluate(&self.names, &self.parameters, &self.order, &choice) {
+            Ok(values) => values,
+            Err(problem) => {
+                problems.push(problem);
+                return None;
+            }
+        };
+        let environment = Environment { names: &self.names, values };
+        let model = match &self.structure {
+            Structure::Lists(lists) => model_of(lists, &environment, problems),
+            Structure::Template(row, table) => self.template_model(row, table, &environment, problems),
+        };
+        let values = self.study.values(&environment, problems);
+        let method = self.method.values(&environment, problems);
+        if !problems.is_empty() {
+            return None;
+        }
+        if (index == 0 || !numbers_hold(&model))
+            && let Err(error) = model.assemble()
+        {
+            problems.push(self.model_problem(&error, &model));
+            return None;
+        }
+        if let Err(complaint) = (self.kind.check)(&values, &model) {
+            problems.push(self.complaint(complaint));
+            return None;
+        }
+        let choice = choice.into_values().map(|(varied, point)| (varied.index, point)).collect();
+        Some(Parts { environment: environment.values, model, values, method, choice })
+    }
+
+    fn template_model(
+        &self,
+        row: &'static Template,
+        table: &StatedTable,
+        environment: &Environment<'_>,
+        problems: &mut Vec<Problem>,
+    ) -> Model {
+        let changes: Vec<(&str, f64)> = row
+            .parameters
+            .iter()
+            .filter_map(|p| Some((p.key, environment.values[self.names.iter().position(|name| name == p.key)?].si)))
+            .collect();
+        let law = table.values(environment, problems).law("law");
+        let mut model = row.model_with(&changes).unwrap_or_default();
+        for joint in &mut model.joints {
+            joint.law = law.unwrap_or(joint.law);
+        }
+        model
+    }
+
+    fn finished(&self, index: usize, parts: Parts) -> Case {
+        let Parts { environment, model, values, method, choice } = parts;
+        let varied = self.varied.iter().map(|varied| {
+            let name = self.names[varied.index].clone();
+            let value = environment[varied.index];
+            let literal = match &varied.points {
+                VariedPoints::List(list) => choice.get(&varied.index).and_then(|&point| list.get(point)),
+                VariedPoints::Range { .. } => None,
+            };
+            // as the user wrote it, if that is a number with its unit
+            let text = match literal.filter(|q| q.inner.is_some() && q.expression.is_literal()) {
+                Some(quantity) if quantity.text.contains(|c: char| c.is_alphabetic() && c != 'e' && c != 'E') => {
+                    quantity.text.trim().to_owned()
+                }
+                _ => displayed(value.si, value.dimension),
+            };
+            VariedValue { text: format!("{name} = {text}"), name, si: value.si, dimension: value.dimension }
+        });
+        let varied = varied.collect();
+        let parameters = self
+            .names
+            .iter()
+            .zip(&environment)
+            .map(|(name, value)| (name.clone(), (value.si, value.dimension)))
+            .collect();
+        let options = method.entries.iter().filter_map(|(key, given)| match given {
+            Given::Quantity(value, _) => Some(((*key).to_owned(), *value)),
+            Given::Count(count) => Some(((*key).to_owned(), *count as f64)),
+            _ => None,
+        });
+        let method =
+            MethodChoice { name: method.text("kind").unwrap_or("auto").to_owned(), options: options.collect() };
+        let frequencies = values.frequencies("frequency").cloned();
+        Case { index, varied, parameters, model, values, frequencies, method }
+    }
+
+    fn model_problem(&self, error: &ModelError, model: &Model) -> Problem {
+        let (list, index) = match error.element {
+            Element::Mass(i) => ("mass", i),
+            Element::Spring(i) => ("spring", i),
+            Element::Joint(i) => ("joint", i),
+            Element::Force(i) => ("force", i),
+            Element::Motion(i) => ("motion", i),
+            Element::Whole => ("", 0),
+        };
+        let whole = Place::default();
+        let (place, message) = match &self.structure {
+            Structure::Lists(lists) => {
+                let table = lists.get(list).get(index);
+                let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
+                (place, error.message.clone())
+            }
+            Structure::Template(_, table) => {
+                let place = table.place_of(if error.key == "law" { "law" } else { "template" }, None);
+                let message = format!(
+                    "these parameters make {} of the template wrong: `{}` {}",
+                    error.element, error.key, error.message
+                );
+                (place, message)
+            }
+        };
+        let places = model.place_names();
+        let help = match &error.wrong_name {
+            Some(wrong) => Some(match nearest(wrong, places.iter().copied()) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!("the places are {}", one_of(places.into_iter().take(20)).replace(" or ", ", ")),
+            }),
+            None if error.element == Element::Whole => Some("add a [[mass]] or a [[motion]]".to_owned()),
+            None if error.key == "name" => Some("choose another name".to_owned()),
+            None => None,
+        };
+        Problem::new(place, error.key, message).maybe_help(help)
+    }
+
+    fn complaint(&self, complaint: Complaint) -> Problem {
+        let place = self.study.place_of(complaint.key, complaint.name.as_deref());
+        Problem::new(place, complaint.key, complaint.message).maybe_help(complaint.help)
+    }
+}
+
+struct Parts {
+    environment: Vec<Value>,
+    model: Model,
+    values: Values,
+    method: Values,
+    /// Which point of each varied parameter.
+    choice: HashMap<usize, usize>,
+}
+
+/// The values of all parameters, with the choices made for the varied ones.
+pub(crate) fn evaluate(
+    names: &[String],
+    parameters: &[Parameter],
+    order: &[usize],
+    choice: &HashMap<usize, (&Varied, usize)>,
+) -> Result<Vec<Value>, Problem> {
+    let mut environment = Environment { names, values: vec![Value::bare(f64::NAN); parameters.len()] };
+    for &index in order {
+        let (parameter, name) = (&parameters[index], &names[index]);
+        let dimension = parameter.dimension;
+        let value = match choice.get(&index).map(|(varied, point)| (&varied.points, *point)) {
+            None => settled(&parameter.quantity, name, dimension, &environment)?,
+            Some((VariedPoints::List(list), point)) => settled(&list[point], name, dimension, &environment)?,
+            Some((VariedPoints::Range { from, to, points }, point)) => {
+                let start = from.value("from", &environment)?;
+                let end = to.value("to", &environment)?;
+                let dimension = dimension.or(start.dimension).or(end.dimension);
+                let start = in_dimension(from, start, name, dimension, &environment)?;
+                let end = in_dimension(to, end, name, dimension, &environment)?;
+                not_empty(start.si, end.si, to, dimension)?;
+                Value { si: between(start.si, end.si, point, *points), ..start }
+            }
+        };
+        environment.values[index] = value;
+    }
+    Ok(environment.values)
+}
+
+fn model_of(lists: &Lists, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Model {
+    let mut model = Model::default();
+    let text = |values: &Values, key: &str| values.text(key).unwrap_or_default().to_owned();
+    let number = |values: &Values, key: &str| values.quantity(key).unwrap_or(0.0);
+    let between = |values: &Values| match values.names("between") {
+        Some([a, b]) => [a.clone(), b.clone()],
+        _ => Default::default(),
+    };
+    let harmonic = |values: &Values| values.count("harmonic").and_then(|h| u32::try_from(h).ok()).unwrap_or(1);
+    for table in &lists.mass {
+        let values = table.values(environment, problems);
+        model.masses.push(Mass { name: text(&values, "name"), mass: number(&values, "mass") });
+    }
+    for table in &lists.spring {
+        let values = table.values(environment, problems);
+        let (stiffness, damping) = (number(&values, "stiffness"), number(&values, "damping"));
+        model.springs.push(Spring { between: between(&values), stiffness, damping });
+    }
+    for table in &lists.joint {
+        let values = table.values(environment, problems);
+        // without a law there is a problem, and the model is not used
+        if let Some(law) = values.law("law") {
+            model.joints.push(Joint { name: text(&values, "name"), between: between(&values), law });
+        }
+    }
+    for table in &lists.force {
+        let values = table.values(environment, problems);
+        let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
+        model.forces.push(Force { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
+    }
+    for table in &lists.motion {
+        let values = table.values(environment, problems);
+        let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
+        model.motions.push(Motion { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
+    }
+    model
+}
+
+/// Whether the numbers of a model are in their ranges; its names are the same in every case.
+fn numbers_hold(model: &Model) -> bool {
+    let not_negative = |value: f64| value.is_finite() && value >= 0.0;
+    model.masses.iter().all(|mass| not_negative(mass.mass))
+        && model.springs.iter().all(|spring| not_negative(spring.stiffness) && spring.damping.is_finite())
+        && model.joints.iter().all(|joint| joint.law.check().is_ok())
+        && model.forces.iter().all(|force| force.amplitude.is_finite() && force.phase.is_finite())
+        && model.motions.iter().all(|motion| motion.amplitude.is_finite() && motion.phase.is_finite())
+}

@@ -1,0 +1,303 @@
+//! Study files that must be refused: where, about which key, in which words. And: no input makes the reader panic.
+
+use miette::{GraphicalReportHandler, GraphicalTheme};
+use proptest::prelude::*;
+use stickslip::model::templates;
+use stickslip_study::{StudyError, read_bytes, read_file, read_study};
+
+const EXAMPLE: &str = include_str!("design_example.toml");
+
+/// Everything that a reader of the error sees.
+fn rendered(error: &StudyError) -> String {
+    let mut text = String::new();
+    GraphicalReportHandler::new_themed(GraphicalTheme::none()).render_report(&mut text, error).unwrap();
+    text
+}
+
+/// The example with `from` replaced by `to` is refused at line and column, about this key, in these words.
+fn check(from: &str, to: &str, (line, column): (usize, usize), key: &str, words: &[&str]) {
+    assert!(EXAMPLE.contains(from), "{from}");
+    let error = read_study("bad.toml", &EXAMPLE.replacen(from, to, 1), &[]).map(|_| to).unwrap_err();
+    let all = format!("{error} — {}", error.help_text().unwrap_or_default());
+    assert_eq!((error.line(), error.column()), (Some(line), Some(column)), "{all}");
+    assert_eq!(error.key(), Some(key), "{all}");
+    for word in words {
+        assert!(all.contains(word), "{word}: {all}");
+    }
+    assert!(error.to_string().starts_with(&format!("bad.toml:{line}:{column}: `{key}`: ")), "{all}");
+    assert!(!error.to_string().contains('\n'), "{all}");
+    assert!(rendered(&error).contains(&format!("bad.toml:{line}:{column}")), "{}", rendered(&error));
+}
+
+#[test]
+fn keys() {
+    check("stiffness = \"k\"", "stifness = \"k\"", (25, 1), "stifness", &["has no key", "did you mean `stiffness`?"]);
+    check("[[joint]]", "[[joints]]", (34, 3), "joints", &["did you mean `joint`?"]);
+    check("name = \"shroud\"\n", "", (34, 1), "name", &["`name` is missing in joint 1", "add name ="]);
+    check("schema = 1\n", "", (1, 1), "schema", &["`schema` is missing", "add schema = 1"]);
+    check("schema = 1", "schema = 2", (1, 10), "schema", &["found 2", "reads schema 1"]);
+    check("schema = 1", "schema = 1.0", (1, 10), "schema", &["the number 1"]);
+    check("limit = \"Ft\"", "", (37, 7), "limit", &["`limit` is missing in law `coulomb`"]);
+    check("\"coulomb\"", "\"columb\"", (37, 16), "kind", &["there is no `columb`", "did you mean `coulomb`?"]);
+    check("\"response\"", "\"responce\"", (44, 8), "kind", &["did you mean `response`?"]);
+    check("\"event-driven\"", "\"event\"", (49, 8), "kind", &["did you mean `event-driven`?"]);
+    check(
+        "kind = \"event-driven\"",
+        "kind = \"event-driven\"\nwidth = 1",
+        (50, 1),
+        "width",
+        &["method `event-driven`"],
+    );
+    check("kind = \"response\"\n", "", (43, 1), "kind", &["`kind` is missing in [study]", "`transient`"]);
+    check("[[mass]]", "[mass]", (16, 3), "mass", &["stands twice"]);
+    check("points = 241", "points = \"many\"", (45, 61), "points", &["a whole number", "found the text \"many\""]);
+    check("[study]", "[[study]]", (43, 1), "study", &["expected a table, found a list"]);
+    check("[[joint]]", "[joint]", (34, 1), "joint", &["a list of tables", "[[joint]]"]);
+}
+
+#[test]
+fn quantities() {
+    check(
+        "stiffness = \"k\"",
+        "stiffness = \"10 kg\"",
+        (25, 14),
+        "stiffness",
+        &["expected stiffness (N/m)", "mass (kg)"],
+    );
+    check("stiffness = \"k\"", "stiffness = \"10 N/\"", (25, 18), "stiffness", &["after `/` a unit is missing"]);
+    check("stiffness = \"k\"", "stiffness = \"N\"", (25, 14), "stiffness", &["number before it"]);
+    check("stiffness = \"k\"", "stiffness = \"\"", (25, 14), "stiffness", &["empty"]);
+    check("stiffness = \"k\"", "stiffness = \"10 Nm\"", (25, 17), "stiffness", &["`N m`"]);
+    check(
+        "stiffness = \"k\"",
+        "stiffness = true",
+        (25, 13),
+        "stiffness",
+        &["expected stiffness (N/m)", "found `true`"],
+    );
+    check("stiffness = \"k\"", "stiffness = nan", (25, 13), "stiffness", &["finite number"]);
+    check("stiffness = \"k\"", "stiffness = -inf", (25, 13), "stiffness", &["finite number"]);
+    check("Ft = \"2 N\"", "Ft = \"nan N\"", (11, 7), "Ft", &["finite number", "`nan`"]);
+    check("Ft = \"2 N\"", "Ft = \"inf N\"", (11, 7), "Ft", &["finite number"]);
+    check("Ft = \"2 N\"", "Ft = \"1e999 N\"", (11, 7), "Ft", &["too large"]);
+    check("mass = \"m1\"", "mass = \"-1 g\"", (18, 9), "mass", &["must be zero or more", "-0.001 kg"]);
+    check("mass = \"m1\"", "mass = \"m1 - m\"", (18, 9), "mass", &["must be zero or more"]);
+    check("limit = \"Ft\"", "limit = \"0 N\"", (37, 36), "limit", &["must be more than zero, found 0 N"]);
+    check("mass = \"m - m1/2\"", "mass = \"m - (m1\"", (15, 13), "mass", &["not closed"]);
+    check("mass = \"m - m1/2\"", "mass = \"m - k/2\"", (15, 9), "mass", &["mass (kg) and stiffness (N/m)"]);
+    check("mass = \"m - m1/2\"", "mass = \"m - m2/2\"", (15, 13), "mass", &["no parameter `m2`", "did you mean"]);
+    check("mass = \"m - m1/2\"", "mass = \"m +\"", (15, 12), "mass", &["a value is missing here"]);
+}
+
+#[test]
+fn parameters() {
+    check("m = \"182 g\"", "m = \"100*m1\"", (6, 5), "m", &["in a circle: m -> m1 -> m"]);
+    check("m1 = \"m / 100\"", "m1 = \"m1\"", (7, 6), "m1", &["m1 -> m1"]);
+    check("m1 = \"m / 100\"", "m1 = \"m /\"", (7, 10), "m1", &["missing"]);
+    check("m1 = \"m / 100\"", "m1 = \"m / 0\"", (7, 7), "m1", &["divides by zero"]);
+    check("b = \"0.2 kg/s\"", "sqrt = 1", (9, 1), "sqrt", &["a meaning of its own"]);
+    check("b = \"0.2 kg/s\"", "b-b = 1", (9, 1), "b-b", &["a letter first"]);
+    check("b = \"0.2 kg/s\"", "b = [1]", (9, 5), "b", &["expected a quantity, found a list"]);
+    check("vary = { Ft", "vary = { FT", (46, 10), "FT", &["did you mean `Ft`?"]);
+    check("\"4 N\"", "\"4 kg\"", (46, 24), "Ft", &["expected force (N), found mass (kg)", "case 2 of 4"]);
+    check("[\"2 N\", \"4 N\", \"6 N\", \"8 N\"]", "[]", (46, 15), "Ft", &["empty"]);
+    check("\"4 N\"", "\"2*Ft\"", (46, 15), "Ft", &["Ft -> Ft"]);
+    check("\"4 N\"", "\"-4 N\"", (37, 36), "limit", &["must be more than zero", "case 2 of 4"]);
+}
+
+#[test]
+fn names() {
+    check(
+        "[\"contact\", \"blade3\"]",
+        "[\"contcat\", \"blade3\"]",
+        (31, 12),
+        "between",
+        &["no place", "did you mean `contact`?"],
+    );
+    check("between = [\"contact\", \"blade3\"]", "between = [\"x\", \"blade3\"]", (31, 12), "between", &["`ground`"]);
+    check("between = [\"contact\", \"blade3\"]", "between = [\"contact\"]", (31, 11), "between", &["two names"]);
+    check(
+        "between = [\"contact\", \"blade3\"]",
+        "between = [\"blade3\", \"blade3\"]",
+        (31, 11),
+        "between",
+        &["two different places"],
+    );
+    check("name = \"blade3\"", "name = \"blade1\"", (20, 8), "name", &["stands twice", "another name"]);
+    check("name = \"blade3\"", "name = \"blade 3\"", (20, 8), "name", &["a letter first"]);
+    check("name = \"blade3\"", "name = 3", (20, 8), "name", &["a name in quotes"]);
+    check("on = \"blade1\"", "on = \"blad1\"", (40, 6), "on", &["did you mean `blade1`?"]);
+    check("on = \"blade1\"", "on = \"ground\"", (40, 6), "on", &["moves nothing"]);
+}
+
+#[test]
+fn frequencies() {
+    let range = "{ from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }";
+    check("from = \"119.5 Hz\"", "from = \"123 Hz\"", (45, 38), "to", &["the range is empty", "123 Hz to 122.5 Hz"]);
+    check("points = 241", "points = 1", (45, 61), "points", &["from 2 to 1000000"]);
+    check("points = 241", "points = 10_000_000", (45, 61), "points", &["limit", "1000000 points"]);
+    check("points = 241", "points = 500_000", (45, 13), "frequency", &["4 cases times 500000", "limit is 1000000"]);
+    check(range, "\"-1 Hz\"", (45, 14), "frequency", &["more than zero, found -1 Hz"]);
+    check(range, "0", (45, 13), "frequency", &["more than zero"]);
+    check(range, "[]", (45, 13), "frequency", &["empty"]);
+    check(range, "\"121 1/s\"", (45, 19), "frequency", &["operator"]);
+    check(range, "\"121 s^-1\"", (45, 14), "frequency", &["radians or cycles"]);
+    check(range, "\"121 N\"", (45, 14), "frequency", &["expected frequency (Hz or rad/s), found force (N)"]);
+    check(&format!("frequency = {range}\n"), "", (43, 1), "frequency", &["`frequency` is missing"]);
+}
+
+#[test]
+fn kinds() {
+    let swap = |study: &str| format!("{}{study}", &EXAMPLE[..EXAMPLE.find("[study]").unwrap()]);
+    let check = |study: &str, line_column: (usize, usize), key: &str, words: &str| {
+        let error = read_study("bad.toml", &swap(study), &[]).unwrap_err();
+        let all = format!("{error} — {}", error.help_text().unwrap_or_default());
+        assert_eq!(
+            (error.line(), error.column(), error.key()),
+            (Some(line_column.0), Some(line_column.1), Some(key)),
+            "{all}"
+        );
+        assert!(all.contains(words), "{words}: {all}");
+    };
+    let head = |kind: &str| format!("[study]\nkind = \"{kind}\"\n");
+    let hysteresis = head("hysteresis") + "frequency = 1\n";
+    check(&(hysteresis.clone() + "loop = \"shrod\""), (46, 8), "loop", "did you mean `shroud`?");
+    check(&(hysteresis.clone() + "loop = [\"shroud\", \"blade1\"]"), (46, 19), "loop", "joint or moved place");
+    check(&(hysteresis + "samples = 1"), (46, 11), "samples", "from 8 to");
+    let transient = head("transient");
+    check(&transient, (43, 1), "duration", "how long");
+    check(&(transient.clone() + "duration = \"1 s\""), (43, 1), "time_step", "free decay");
+    check(&(transient.clone() + "cycles = 10"), (45, 10), "cycles", "`frequency`, which is absent");
+    check(&(transient.clone() + "duration = 1e9\nfrequency = 100"), (45, 12), "duration", "the limit is");
+    check(&(transient.clone() + "duration = 1\nfrequency = 1\nstart = { blad1 = 1 }"), (47, 11), "start", "`blade1`");
+    check(&(transient + "duration = 1\nrun_up = { from = 1, to = 2 }"), (46, 10), "duration", "missing in `run_up`");
+}
+
+#[test]
+fn templates_and_lists_exclude_each_other() {
+    let with = |model: &str| {
+        EXAMPLE.replace("[[mass]]\nname = \"blade1\"", &format!("[model]\n{model}\n[[mass]]\nname = \"blade1\""))
+    };
+    let error = read_study("bad.toml", &with("template = \"element\""), &[]).unwrap_err();
+    assert!(error.message().contains("brings its own model"), "{error}");
+    let error = read_study("bad.toml", &with("template = \"elment\""), &[]).unwrap_err();
+    assert_eq!(error.help_text(), Some("did you mean `element`?"));
+    let study = "[study]\nkind = \"orbit\"\nfrequency = 1\n[model]\ntemplate = \"blade-couple\"\n";
+    let bad = format!("schema = 1\n{study}[parameters]\nm1 = \"1 kg\"");
+    let error = read_study("bad.toml", &bad, &[]).unwrap_err();
+    assert_eq!((error.line(), error.underlined()), (Some(6), Some("\"blade-couple\"")), "{error}");
+    assert!(error.message().contains("mass 1"), "{error}");
+}
+
+#[test]
+fn several_errors_come_together_in_the_order_of_the_file() {
+    let text = EXAMPLE.replace("stiffness = \"k\"", "stiffness = \"2 s\"").replace("\"10 N\"", "\"10 m\"");
+    let error = read_study("bad.toml", &text, &[]).unwrap_err();
+    let lines: Vec<_> = error.others().iter().map(StudyError::line).collect();
+    assert_eq!((error.line(), lines), (Some(25), vec![Some(29), Some(41)]));
+}
+
+#[test]
+fn overrides() {
+    let check = |name: &str, value: &str, words: &str| {
+        let error = read_study("a.toml", EXAMPLE, &[(name.to_owned(), value.to_owned())]).unwrap_err();
+        let all = format!("{error} — {}", error.help_text().unwrap_or_default());
+        assert!(all.contains(words), "{words}: {all}");
+        assert_eq!(error.file_name(), format!("--set {name}"), "{all}");
+        rendered(&error);
+    };
+    check("kT", "2", "did you mean `kt`?");
+    check("kt", "2 kg", "expected stiffness (N/m), found mass (kg)");
+    check("kt", "2 N/", "missing");
+    check("kt", "", "empty");
+    check("m", "m1", "circle");
+}
+
+#[test]
+fn files_that_are_no_studies() {
+    let error = read_bytes("bad.toml", b"schema = 1\ntitle = \"\xff\"\n", &[]).unwrap_err();
+    assert_eq!((error.line(), error.column()), (Some(2), Some(10)), "{error}");
+    assert!(error.message().contains("not UTF-8") && error.message().contains("0xff"), "{error}");
+    rendered(&error);
+
+    let error = read_study("bad.toml", "schema = 1\nthis is not toml\n", &[]).unwrap_err();
+    assert_eq!(error.line(), Some(2), "{error}");
+    assert!(error.message().contains("not TOML"), "{error}");
+
+    let error = read_study("bad.toml", "", &[]).unwrap_err();
+    assert!(error.message().contains("`schema` is missing"), "{error}");
+
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let error = read_file(&folder.join("tests/design_exmple.toml"), &[]).unwrap_err();
+    assert!(error.to_string().contains("there is no such file") && error.line().is_none(), "{error}");
+    assert!(error.help_text().unwrap().contains("design_example.toml"));
+    let error = read_file(folder, &[]).unwrap_err();
+    assert!(error.message().contains("folder"), "{error}");
+    rendered(&error);
+    assert!(read_file(&folder.join("tests/design_example.toml"), &[]).is_ok());
+    let error = read_bytes("big.toml", &vec![b' '; 5 * 1024 * 1024], &[]).unwrap_err();
+    assert!(error.message().contains("too big"), "{error}");
+}
+
+/// Reads; if the study is refused, shows the error in both forms.
+fn survives(text: &str) {
+    match read_study("any.toml", text, &[]) {
+        Ok(study) => {
+            study.resolved();
+        }
+        Err(error) => {
+            let line = error.to_string();
+            assert!(!line.is_empty() && !line.contains('\n'), "{line:?}");
+            rendered(&error);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_text_makes_the_reader_panic(text in "\\PC{0,200}") {
+        survives(&text);
+    }
+
+    #[test]
+    fn no_toml_like_text_makes_the_reader_panic(
+        lines in prop::collection::vec(
+            "(\\[{1,2}(mass|study|joint|model|parameters|x)\\]{1,2}|(name|mass|kind|frequency|vary|between|a\\.b|law) = \
+             (\"[a-z0-9 *+/^().µ²-]{0,12}\"|-?[0-9]{1,3}(\\.[0-9])?|true|\\[\"a\", 1\\]|\\{ a = 1 \\}|nan|[0-9é\"]{0,3}))?",
+            0..20,
+        )
+    ) {
+        survives(&lines.join("\n"));
+        survives(&format!("schema = 1\n{}", lines.join("\n")));
+    }
+
+    #[test]
+    fn no_expression_makes_the_reader_panic(text in "[mkFt0-9 *+/^().,eNsgHzµ²°·√-]{0,30}") {
+        survives(&EXAMPLE.replace("m / 100", &text));
+        survives(&EXAMPLE.replacen("10 N", &text, 1));
+        survives(&EXAMPLE.replacen("119.5 Hz", &text, 1));
+    }
+
+    #[test]
+    fn no_mutation_of_a_good_study_makes_the_reader_panic(
+        template in 0..templates::TABLE.len(),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), 0usize..3, "[\\[\\]{}\"'=.,#\n a1é-]{0,4}"), 1..5),
+    ) {
+        let mut text: Vec<char> = templates::TABLE[template].study.chars().collect();
+        for (at, removed, put) in changes {
+            let at = at.index(text.len());
+            let end = (at + removed).min(text.len());
+            text.splice(at..end, put.chars());
+        }
+        survives(&text.into_iter().collect::<String>());
+    }
+
+    #[test]
+    fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..100)) {
+        if let Err(error) = read_bytes("any.toml", &bytes, &[]) {
+            rendered(&error);
+        }
+    }
+}

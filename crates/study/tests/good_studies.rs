@@ -1,0 +1,249 @@
+//! Study files that must read, and to what.
+
+use serde_json::Value as Json;
+use std::f64::consts::TAU;
+use stickslip::model::templates;
+use stickslip::{law, method};
+use stickslip_study::expression::quantity;
+use stickslip_study::{Study, kinds, read_study, schema};
+
+const EXAMPLE: &str = include_str!("design_example.toml");
+
+fn read(text: &str) -> Study {
+    read_study("example.toml", text, &[]).unwrap_or_else(|error| panic!("{:?}", miette::Report::new(error)))
+}
+
+fn set(name: &str, value: &str) -> Vec<(String, String)> {
+    vec![(name.to_owned(), value.to_owned())]
+}
+
+#[test]
+fn the_starting_study_of_every_template_states_its_model() {
+    for template in templates::TABLE {
+        // `vary` replaces a parameter in every case; without it the defaults stand
+        let text: String =
+            template.study.lines().filter(|line| !line.starts_with("vary")).map(|line| format!("{line}\n")).collect();
+        let case = read(&text).case(0).unwrap();
+        assert_eq!(case.model.assemble().unwrap(), template.model().assemble().unwrap(), "{}", template.name);
+        read(template.study);
+    }
+}
+
+#[test]
+fn a_template_named_in_the_file_is_its_model_with_its_defaults() {
+    for template in templates::TABLE {
+        let text = format!(
+            "schema = 1\nmodel = {{ template = \"{}\" }}\n[study]\nkind = \"orbit\"\nfrequency = 1\n",
+            template.name
+        );
+        let case = read(&text).case(0).unwrap();
+        assert_eq!(case.model, template.model(), "{}", template.name);
+        for parameter in template.parameters {
+            let (value, dimension) = case.parameters[parameter.key];
+            assert_eq!((value, dimension), (parameter.value, Some(parameter.dimension)), "{}", parameter.key);
+        }
+        let first = template.parameters[0];
+        assert_eq!(quantity(first.default, first.dimension), Ok(first.value));
+    }
+}
+
+#[test]
+fn a_template_takes_parameters_a_law_vary_and_set() {
+    let text = "
+schema = 1
+[parameters]
+m = 0.2                 # bare: kilograms, as the template says
+alpha = \"25 s/mm\"
+[model]
+template = \"blade-couple\"
+law = { kind = \"coulomb-arctan\", limit = \"Ft\", alpha = \"alpha\" }
+[study]
+kind = \"orbit\"
+frequency = \"121 Hz\"
+vary = { Ft = { from = \"2 N\", to = \"4 N\", points = 3 } }
+";
+    let study = read_study("a.toml", text, &set("m1", "m/50")).unwrap();
+    let case = study.case(1).unwrap();
+    assert_eq!(case.model.joints[0].law.values(), [3.0, 25_000.0]);
+    assert_eq!(case.model.masses[1].mass, 0.2 / 50.0);
+    assert_eq!(case.label(), "Ft = 3 N");
+    assert_eq!(study.cases(), 3);
+}
+
+#[test]
+fn the_example_of_the_design_reads() {
+    let study = read(EXAMPLE);
+    assert_eq!((study.cases(), study.points(), study.kind().name), (4, 964, "response"));
+    assert_eq!(study.title(), "Response curves of the blade couple, m1 = m/100");
+    assert_eq!(study.source(), Some("Pust, Pesek, Radolfova (2015), Fig. 6"));
+    let case = study.case(2).unwrap();
+    assert_eq!(
+        (case.varied[0].name.as_str(), case.varied[0].si, case.varied[0].text.as_str()),
+        ("Ft", 6.0, "Ft = 6 N")
+    );
+    assert_eq!(case.method.name, "event-driven");
+    assert_eq!(case.values.flag("peaks"), Some(true));
+    let frequencies = case.frequencies.unwrap();
+    assert_eq!((frequencies.len(), frequencies.get(0)), (241, Some(119.5 * TAU)));
+    assert!(study.case(4).is_err());
+    let resolved = study.resolved();
+    assert_eq!(resolved["cases"][3]["parameters"]["Ft"]["si"], 8.0);
+    assert_eq!(resolved["file"], EXAMPLE);
+}
+
+#[test]
+fn bare_numbers_take_the_unit_of_their_place_also_through_parameters() {
+    let text = EXAMPLE.replace("\"182 g\"", "0.182").replace("Ft = \"2 N\"\n", "Ft = 2\nf = 121\n").replace(
+        "{ from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }",
+        "[\"f\", 122, \"f + 2 Hz\", \"760 rad/s\"]",
+    );
+    let case = read(&text).case(0).unwrap();
+    assert_eq!(case.model.masses[0].mass, 0.182 - 0.182 / 100.0 / 2.0);
+    let frequencies: Vec<f64> = case.frequencies.unwrap().iter().collect();
+    assert_eq!(frequencies, [121.0 * TAU, 122.0 * TAU, 121.0 * TAU + 2.0 * TAU, 760.0]);
+}
+
+#[test]
+fn cases_are_the_outer_product_the_first_parameter_slowest() {
+    let text = EXAMPLE.replace("vary = { Ft = [", "vary = { kt = [5000, \"m * 1e5 s^-2\"], Ft = [");
+    let study = read(&text);
+    let labels: Vec<String> = (0..study.cases()).map(|i| study.case(i).unwrap().label()).collect();
+    assert_eq!(labels[0], "kt = 5000 N/m, Ft = 2 N");
+    assert_eq!(labels[1], "kt = 5000 N/m, Ft = 4 N");
+    assert_eq!(labels[4], "kt = 18200 N/m, Ft = 2 N");
+    assert_eq!(labels.len(), 8);
+    assert_eq!(study.varied(), ["kt", "Ft"]);
+}
+
+#[test]
+fn set_replaces_a_parameter_and_everything_that_follows_from_it() {
+    let study = read_study("a/b/fig06.toml", EXAMPLE, &set("m", "100 g")).unwrap();
+    assert_eq!(study.name(), "fig06");
+    assert_eq!(study.case(0).unwrap().model.masses[1].mass, 0.001);
+    let study = read_study("fig06.toml", EXAMPLE, &set("kt", "1")).unwrap();
+    assert_eq!(study.case(0).unwrap().model.springs[2].stiffness, 1.0);
+}
+
+#[test]
+fn transient_keys_arrive() {
+    let study_table = "[study]\nkind = \"transient\"\nrun_up = { from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }\n\
+                       start = { blade1 = \"1 mm\" }\n";
+    let text = format!("{}{study_table}", &EXAMPLE[..EXAMPLE.find("[study]").unwrap()]);
+    let case = read(&text).case(0).unwrap();
+    assert_eq!(case.values.by_name("start").unwrap()["blade1"], 0.001);
+    assert_eq!(case.values.table("run_up").unwrap().quantity("duration"), Some(10.0));
+    assert_eq!(case.values.count("samples_per_cycle"), Some(64));
+    assert!(case.frequencies.is_none());
+}
+
+#[test]
+fn the_method_can_be_changed() {
+    let text = EXAMPLE.replace("kind = \"event-driven\"", "kind = \"shooting\"\ntolerance = 1e-8\nwidth = \"1 mm/s\"");
+    let study = read(&text);
+    let options = study.case(0).unwrap().method.options;
+    assert_eq!((options["tolerance"], options["width"]), (1e-8, 1e-3));
+    let same = study.clone().with_method("shooting").unwrap();
+    assert_eq!(same.case(0).unwrap().method.options.len(), 2);
+    let other = study.clone().with_method("auto").unwrap().case(0).unwrap().method;
+    assert_eq!((other.name.as_str(), other.options.len()), ("auto", 0));
+    let error = study.clone().with_method("shoting").unwrap_err();
+    assert_eq!(error.help_text(), Some("did you mean `shooting`?"));
+    let error = study.error_at("method", 0, "kind", "no", None);
+    assert_eq!(error.underlined(), Some("\"shooting\""));
+    let error = study.error_at("joint", 0, "law", "no", None);
+    assert_eq!(error.line(), Some(36), "{error}");
+}
+
+/// A tiny check of JSON against the parts of JSON Schema that ours uses.
+fn accepts(root: &Json, schema: &Json, value: &Json) -> Result<(), String> {
+    if let Some(name) = schema["$ref"].as_str() {
+        return accepts(root, &root["$defs"][name.rsplit('/').next().unwrap()], value);
+    }
+    for (key, all) in [("anyOf", false), ("oneOf", true)] {
+        if let Some(list) = schema[key].as_array() {
+            let good = list.iter().filter(|s| accepts(root, s, value).is_ok()).count();
+            if good == 0 || (all && good > 1) {
+                return Err(format!("{key}: {good} fit {value}"));
+            }
+        }
+    }
+    if !schema["const"].is_null() && schema["const"] != *value {
+        return Err(format!("{value} is not {}", schema["const"]));
+    }
+    let types: Vec<&str> = match &schema["type"] {
+        Json::String(one) => vec![one],
+        Json::Array(several) => several.iter().filter_map(Json::as_str).collect(),
+        _ => vec![],
+    };
+    let fits = |name: &&str| match *name {
+        "object" => value.is_object(),
+        "array" => value.is_array(),
+        "string" => value.is_string(),
+        "integer" => value.is_i64(),
+        "number" => value.is_number(),
+        "boolean" => value.is_boolean(),
+        _ => false,
+    };
+    if !types.is_empty() && !types.iter().any(fits) {
+        return Err(format!("{value} is no {types:?}"));
+    }
+    for required in schema["required"].as_array().into_iter().flatten() {
+        if value.get(required.as_str().unwrap()).is_none() {
+            return Err(format!("{required} is missing in {value}"));
+        }
+    }
+    for (key, inner) in value.as_object().into_iter().flatten() {
+        match schema["properties"].get(key) {
+            Some(schema) => accepts(root, schema, inner)?,
+            None if schema["additionalProperties"] == false => return Err(format!("unknown {key}")),
+            None if schema["additionalProperties"].is_object() => {
+                accepts(root, &schema["additionalProperties"], inner)?;
+            }
+            None => {}
+        }
+    }
+    for item in value.as_array().into_iter().flatten() {
+        if schema["items"].is_object() {
+            accepts(root, &schema["items"], item)?;
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn the_json_schema_accepts_good_files_and_refuses_unknown_keys() {
+    let root = schema::json_schema();
+    let mut texts: Vec<String> = templates::TABLE.iter().map(|template| template.study.to_owned()).collect();
+    texts.push(EXAMPLE.to_owned());
+    for text in texts {
+        let value: Json = serde_json::to_value(toml::from_str::<toml::Value>(&text).unwrap()).unwrap();
+        accepts(&root, &root, &value).unwrap();
+        let wrong =
+            toml::from_str::<toml::Value>(&text.replace("points = 241", "point = 241").replace("on =", "onn ="));
+        assert!(accepts(&root, &root, &serde_json::to_value(wrong.unwrap()).unwrap()).is_err());
+    }
+    for row in law::TABLE {
+        assert!(root.to_string().contains(&format!("\"const\":\"{}\"", row.name)), "{}", row.name);
+    }
+}
+
+#[test]
+fn the_reference_names_every_key_law_method_kind_and_template() {
+    let book = schema::markdown();
+    let keys = kinds::TABLE.iter().flat_map(|kind| kind.keys).chain(schema::FILE).chain(schema::STUDY);
+    let names = keys.map(|key| key.name).chain(law::TABLE.iter().map(|row| row.name));
+    for name in names.chain(method::TABLE.iter().map(|row| row.name)).chain(templates::TABLE.iter().map(|row| row.name))
+    {
+        assert!(book.contains(&format!("`{name}`")), "{name}");
+    }
+}
+
+#[test]
+fn the_example_of_every_key_is_toml() {
+    for kind in kinds::TABLE {
+        for key in kind.keys.iter().chain(schema::FILE).chain(schema::STUDY) {
+            let text = format!("{} = {}", key.name, key.example);
+            assert!(toml::from_str::<toml::Value>(&text).is_ok(), "{text}");
+        }
+    }
+}
