@@ -31,7 +31,8 @@ pub(crate) fn document(title: &str, style: &str, body: &str) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{title}</title>\n<style>\n{STYLE}{style}\n</style>\n<script>{}</script>\n<script>{DRAW}</script>\n</head>\n\
+         <title>{title}</title>\n<style>\n{STYLE}{style}\n</style>\n\
+         <noscript><style>.live {{ display: none; }} .still {{ display: block; }}</style></noscript>\n<script>{}</script>\n<script>{DRAW}</script>\n</head>\n\
          <body>\n{body}\n</body>\n</html>\n",
         script()
     )
@@ -41,22 +42,22 @@ const STYLE: &str = "\
 body { margin: 0 auto; padding: 1.5rem; font: 16px/1.55 system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif; color: #1a1a1a; background: #fff; }
 h1 { font-size: 1.45rem; line-height: 1.25; margin: 0 0 .75rem; overflow-wrap: anywhere; }
 .figure { width: 100%; margin: .5rem 0 1rem; overflow-x: clip; }
-.figure svg.static { max-width: 100%; height: auto; }
+.still { display: none; text-align: center; }
+.still svg { max-width: 100%; height: auto; }
+@media print { .live { display: none; } .still { display: block; } }
 ";
 
 /// Draws a figure into its place: the same panels below each other where the page is narrow.
 const DRAW: &str = "
 function stickslip(id, figure) {
-  const place = document.getElementById(id), narrow = window.matchMedia('(max-width: 720px)');
+  const place = document.getElementById(id), narrow = window.matchMedia('(max-width: 900px)');
   const draw = () => {
-    const layout = narrow.matches && !window.matchMedia('print').matches ? figure.narrow : figure.wide;
+    const layout = narrow.matches ? figure.narrow : figure.wide;
     Plotly.react(place, figure.data, layout, {responsive: true, displaylogo: false,
       modeBarButtonsToRemove: ['select2d', 'lasso2d'], toImageButtonOptions: {format: 'svg', filename: 'figure'}});
   };
-  place.replaceChildren();
   draw();
   narrow.addEventListener('change', draw);
-  window.addEventListener('beforeprint', () => Plotly.Plots.resize(place));
 }
 ";
 
@@ -70,17 +71,17 @@ fn script() -> &'static str {
     })
 }
 
-/// The figure inside a page: its place, which holds the static figure until a script draws the live one.
+/// The figure inside a page: live on the screen, static on paper and where no script runs.
 pub(crate) fn fragment(figure: &Figure, id: &str) -> String {
     let (columns, _) = frame::grid(figure.panels.len());
     let data = json!({ "data": traces(figure), "wide": layout(figure, columns), "narrow": layout(figure, 1) });
     // `<` would let a label end the script element
     let data = data.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029");
     let height = layout(figure, columns)["height"].as_f64().unwrap_or(0.0);
-    let still = crate::svg::to_svg(figure).replacen("<svg ", "<svg class=\"static\" ", 1);
     format!(
-        "<div id=\"{id}\" class=\"figure\" style=\"min-height: {height}px\"><noscript>{still}</noscript></div>\n\
-         <script>stickslip(\"{id}\", {data});</script>"
+        "<div class=\"figure\">\n<div id=\"{id}\" class=\"live\" style=\"min-height: {height}px\"></div>\n\
+         <div class=\"still\">{}</div>\n</div>\n<script>stickslip(\"{id}\", {data});</script>",
+        crate::svg::to_svg(figure)
     )
 }
 

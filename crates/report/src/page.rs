@@ -1,6 +1,6 @@
 //! A report as one page: figures beside the claims made of them, with the numbers measured and a verdict on each.
 //!
-//! All figures share one embedded script; without scripts the static figures stand in their places.
+//! All figures share one embedded script; on paper and without scripts the static figures stand in their places.
 
 use crate::html::{document, fragment};
 use crate::output::{ReportError, write_file};
@@ -270,8 +270,7 @@ table.data { font-variant-numeric: tabular-nums; }
   body { padding: 0; max-width: none; font-size: 11pt; }
   nav { display: none; }
   .figure, table.claims tr, table.data tr { break-inside: avoid; }
-  h2, h3, caption { break-after: avoid; }
-  .modebar { display: none !important; }
+  h2, h3, caption, section > p { break-after: avoid; }
 }
 ";
 
