@@ -5,7 +5,7 @@ use stickslip::method::{Method, event_driven::EventDriven};
 use stickslip_verification::random_model;
 
 /// Models tried.
-const MODELS: u64 = 5000;
+const MODELS: u64 = 2000;
 
 #[test]
 fn random_models_converge_with_evidence() {

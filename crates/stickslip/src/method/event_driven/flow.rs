@@ -324,6 +324,9 @@ impl Flow {
         self.watched.clear();
         for (i, slider) in self.mechanics.sliders.iter().enumerate() {
             if shape.contacts[i] == Contact::Stick {
+                if shape.frozen[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
+                    continue; // its force is constant, whatever rounding says
+                }
                 let force = &segment.force[i * nb..(i + 1) * nb];
                 let now = real_dot(force, &self.values[..nb]);
                 for side in [1.0, -1.0] {

@@ -47,7 +47,8 @@ pub(super) fn orbit(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry
         .zip(&system.joints)
         .filter(|(motion, _)| motion.slip_fraction == 0.0)
         .map(|(_, j)| j.name.clone());
-    let reference = energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive));
+    let rest = super::NEAR_REST * flow.drive.energy_scale;
+    let reference = energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive)).max(NO_WORK * rest * rest);
     let balance = energy.work_in - energy.viscous - energy.friction;
     Orbit {
         method: NAME,

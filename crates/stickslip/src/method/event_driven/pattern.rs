@@ -29,6 +29,8 @@ pub(crate) struct Pattern {
     pub held: Vec<usize>,
     /// Whether fewer of them would hold the same motion, so that their forces are not unique.
     pub redundant: bool,
+    /// Sliders behind springs that the held ones keep from moving.
+    pub frozen: Vec<bool>,
     /// Exponents.
     pub lambda: Vec<Complex64>,
     /// x = Re(shape η), n × modes, column-major.
@@ -108,6 +110,14 @@ impl Pattern {
         let basis = free_directions(&mechanics.mass, &w);
         let modes =
             Modes::new(&(basis.transpose() * &mechanics.damping * &basis), &(basis.transpose() * &stiffness * &basis))?;
+        let frozen = mechanics
+            .sliders
+            .iter()
+            .map(|slider| {
+                let moves = (basis.transpose() * &slider.direction).amax();
+                slider.stiffness.is_some() && moves <= REDUNDANT.sqrt() * basis.amax() * slider.direction.amax()
+            })
+            .collect();
         let project = basis.transpose(); // forces to modal
         let coordinates = &project * &mechanics.mass; // displacements to q
         let complex = |m: &DMatrix<f64>| m.map(|x| Complex64::new(x, 0.0));
@@ -136,6 +146,7 @@ impl Pattern {
             contacts: contacts.to_vec(),
             held,
             redundant,
+            frozen,
             lambda,
             shape: complex(&basis) * &modes.shape,
             constant_from_state,
