@@ -149,6 +149,22 @@ impl StudyError {
     }
 }
 
+/// Longest line that is drawn, bytes: beyond it a picture helps nobody, and miette panics on columns above 65535.
+const LONGEST_LINE: usize = 2_000;
+
+impl StudyError {
+    /// The bytes to underline, if the lines there and their neighbours are short enough to be drawn.
+    fn drawable(&self) -> Option<&Range<usize>> {
+        let (span, _, _) = self.0.at.as_ref()?;
+        let text = &self.0.source.text;
+        let back = |from: usize| text[..from].rfind('\n');
+        let on = |from: usize| text[from..].find('\n').map_or(text.len(), |i| from + i);
+        let start = back(span.start).map_or(0, |end| back(end).map_or(0, |i| i + 1));
+        let end = on((on(span.end) + 1).min(text.len()));
+        text[start..end].split('\n').all(|line| line.len() <= LONGEST_LINE).then_some(span)
+    }
+}
+
 /// The nearest character boundary at or before `at`.
 fn boundary(text: &str, at: usize) -> usize {
     let mut at = at.min(text.len());
@@ -206,11 +222,11 @@ impl Diagnostic for StudyError {
     }
 
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.0.at.as_ref().map(|_| &*self.0.source as &dyn SourceCode)
+        self.drawable().map(|_| &*self.0.source as &dyn SourceCode)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let (span, _, _) = self.0.at.as_ref()?;
+        let span = self.drawable()?;
         let label = LabeledSpan::new(Some("here".to_owned()), span.start, span.len());
         Some(Box::new(std::iter::once(label)))
     }

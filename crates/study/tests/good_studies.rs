@@ -138,20 +138,27 @@ fn transient_keys_arrive() {
 
 #[test]
 fn the_method_can_be_changed() {
-    let text = EXAMPLE.replace("kind = \"event-driven\"", "kind = \"shooting\"\ntolerance = 1e-8\nwidth = \"1 mm/s\"");
-    let study = read(&text);
-    let options = study.case(0).unwrap().method.options;
-    assert_eq!((options["tolerance"], options["width"]), (1e-8, 1e-3));
-    let same = study.clone().with_method("shooting").unwrap();
-    assert_eq!(same.case(0).unwrap().method.options.len(), 2);
-    let other = study.clone().with_method("auto").unwrap().case(0).unwrap().method;
-    assert_eq!((other.name.as_str(), other.options.len()), ("auto", 0));
-    let error = study.clone().with_method("shoting").unwrap_err();
-    assert_eq!(error.help_text(), Some("did you mean `shooting`?"));
+    // the table grows: options are tried on whichever methods have some
+    for row in method::TABLE {
+        let mut table = format!("kind = \"{}\"\n", row.name);
+        for option in row.options {
+            table.push_str(&format!("{} = 3\n", option.key));
+        }
+        let study = read(&EXAMPLE.replace("kind = \"event-driven\"", &table));
+        let chosen = study.case(0).unwrap().method;
+        assert_eq!((chosen.name.as_str(), chosen.options.len()), (row.name, row.options.len()));
+        assert_eq!(study.clone().with_method(row.name).unwrap().case(0).unwrap().method, chosen);
+        let other = if row.name == "auto" { "event-driven" } else { "auto" };
+        let changed = study.with_method(other).unwrap().case(0).unwrap().method;
+        assert_eq!((changed.name.as_str(), changed.options.len()), (other, 0));
+    }
+    let study = read(EXAMPLE);
+    let error = study.clone().with_method("event-drivn").unwrap_err();
+    assert_eq!(error.help_text(), Some("did you mean `event-driven`?"));
     let error = study.error_at("method", 0, "kind", "no", None);
-    assert_eq!(error.underlined(), Some("\"shooting\""));
+    assert_eq!(error.underlined(), Some("\"event-driven\""));
     let error = study.error_at("joint", 0, "law", "no", None);
-    assert_eq!(error.line(), Some(36), "{error}");
+    assert_eq!(error.line(), Some(38), "{error}");
 }
 
 /// A tiny check of JSON against the parts of JSON Schema that ours uses.
