@@ -75,7 +75,7 @@ def with_integrals(Ft, w):
     return rhs_all, jac_all
 
 
-def measure(Ft, f, x0, scale, method, rtol, atol):
+def measure(Ft, f, x0, scale, method, rtol, atol, samples=SAMPLES):
     """Everything reported about the orbit through x0 at t = 0."""
     w, T = 2 * pi * f, 1 / f
     rhs, _ = equations(Ft, w)
@@ -83,10 +83,10 @@ def measure(Ft, f, x0, scale, method, rtol, atol):
     e = F0 * scale[0]
     scale_all = np.concatenate([scale, [e, e, e], np.repeat([scale[0], scale[0], scale[4]], 2) * T])
     flow = Flow(rhs_all, jac_all, scale_all, method, rtol, atol)
-    t = np.linspace(0, T, SAMPLES + 1)
+    t = np.linspace(0, T, samples + 1)
     z = flow.at(t, np.concatenate([x0, np.zeros(9)]))
     d = np.array([rhs(tt, zz) for tt, zz in zip(t, z[:, :6])])
-    # a second period appended, so that no extremum hides at the ends; oddness gives the minimum
+    # extrema of x and of -x
     out = {}
     for name, x, v, a in [("x1", z[:, 0], z[:, 1], d[:, 1]), ("x2", z[:, 0] - z[:, 2], z[:, 1] - z[:, 3], d[:, 1] - d[:, 3]),
                           ("x3", z[:, 4], z[:, 5], d[:, 5])]:
@@ -139,12 +139,15 @@ def main():
         def difference(other):
             return max(abs(found[other][2][n] / out[n] - 1) for n in names)
 
+        J = half_period_jacobian(Flow(rhs, jac, scale, "Radau", 1e-11, 1e-14), x0, T / 2)
         multipliers = np.sort(abs(np.linalg.eigvals(J)))[::-1]
         print("   half-period multipliers", multipliers)
         # free run from the orbit: does the motion stay?
         flow = Flow(rhs, jac, scale, "LSODA", 1e-11, 1e-14)
         z = flow.at(np.arange(periods + 1) * T, x0)
         drift = np.max(np.abs(z - x0) / scale, axis=1)
+        finer = measure(Ft, f, x0, scale, "Radau", 1e-11, 1e-14, 3 * SAMPLES)
+        print("   amplitudes with a grid three times finer change by", max(abs(finer[n] / out[n] - 1) for n in names[:3]))
         radau = Flow(rhs, jac, scale, "Radau", 1e-9, 1e-12).at(np.arange(301) * T, x0)
         drift_radau = np.max(np.abs(radau - x0) / scale, axis=1)
         # and does a neighbour come back? 1 % off, the same number of periods

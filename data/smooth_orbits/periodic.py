@@ -60,7 +60,7 @@ def half_period_jacobian(flow, x0, half, relative_step=1e-6):
     return columns
 
 
-def symmetric_orbit(flow, x0, half, jacobian=None, tolerance=1e-12, limit=30, verbose=False, refresh=0.1):
+def symmetric_orbit(flow, x0, half, jacobian=None, tolerance=1e-12, limit=15, verbose=False, refresh=0.1):
     """Newton on P(x0) + x0 = 0. Returns (x0, relative residual, dP/dx0, residual history).
 
     The residual is max |R_i| / scale_i. The Jacobian is renewed only when an iteration gains less than `refresh`.
@@ -84,7 +84,7 @@ def symmetric_orbit(flow, x0, half, jacobian=None, tolerance=1e-12, limit=30, ve
             trial = x0 + weight * step
             trial_residual = flow.over(0.0, half, trial) + trial
             trial_size = np.max(np.abs(trial_residual) / s)
-            if trial_size < size or weight < 1e-3:
+            if trial_size < size or weight < 0.02:
                 break
             weight *= 0.5
         if verbose:
@@ -101,6 +101,8 @@ def symmetric_orbit(flow, x0, half, jacobian=None, tolerance=1e-12, limit=30, ve
         history.append(size)
         if gain > refresh and size > 1e-9:
             jacobian, fresh = half_period_jacobian(flow, x0, half), True
+    if size > 1e-8:
+        raise RuntimeError(f"Newton ends at {size:.3e}")
     return x0, size, jacobian, history
 
 
