@@ -1,6 +1,9 @@
 //! Mathematics that knows no mechanics.
 
 pub mod complementarity;
+pub mod dense;
 pub mod dual;
+pub mod fourier;
 pub mod modes;
+pub mod radau;
 pub mod signal;

@@ -241,6 +241,12 @@ impl RateLaw for Rate {
 }
 
 impl Law {
+    /// Slip limit, N: the largest force of the law.
+    pub fn limit(&self) -> f64 {
+        let at = self.info().parameters.iter().position(|p| p.key == "limit");
+        at.map_or(f64::INFINITY, |at| self.values()[at])
+    }
+
     /// The row of [`TABLE`] that describes this law.
     pub fn info(&self) -> &'static LawInfo {
         // every variant has its row, by the macro

@@ -1,6 +1,6 @@
 //! Picks a method: event-driven for exact laws, shooting for smooth ones.
 
-use super::{Method, MethodError, MethodInfo, Solver, event_driven::EventDriven};
+use super::{Method, MethodError, MethodInfo, Solver, event_driven::EventDriven, shooting::Shooting};
 use crate::model::System;
 
 /// The row of this method in [`super::TABLE`].
@@ -20,6 +20,7 @@ impl Method for Auto {
         INFO.name
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        EventDriven.solver(system)
+        let exact = system.joints.iter().all(|joint| joint.law.network().is_some());
+        if exact { EventDriven.solver(system) } else { Shooting::default().solver(system) }
     }
 }

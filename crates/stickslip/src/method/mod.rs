@@ -4,9 +4,12 @@
 //! Of a [`Method`], [`Method::solver`] makes a [`Solver`] for one system, which keeps what can be reused from orbit to orbit.
 
 pub mod auto;
+mod drive;
 pub mod event_driven;
 mod guess;
 mod periodic;
+pub mod shooting;
+mod smooth;
 
 pub use event_driven::Contact;
 
@@ -229,7 +232,7 @@ pub struct MethodInfo {
 }
 
 /// Every method there is.
-pub const TABLE: &[MethodInfo] = &[auto::INFO, event_driven::INFO];
+pub const TABLE: &[MethodInfo] = &[auto::INFO, event_driven::INFO, shooting::INFO];
 
 /// The method with this name.
 pub fn find(name: &str) -> Option<&'static MethodInfo> {

@@ -1,9 +1,10 @@
 //! The motion over a stretch of time: closed-form segments joined at the switches, with its exact sensitivity.
 
 use super::decide::{AT_LIMIT, Decision, REST};
-use super::mechanics::{Contact, Drive, Mechanics};
+use super::mechanics::{Contact, Mechanics};
 use super::pattern::{Driven, Pattern, Work};
 use crate::method::Breakdown;
+use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::collections::BTreeMap;
@@ -49,6 +50,10 @@ impl Slot {
 pub(crate) struct Flow {
     pub mechanics: Mechanics,
     pub drive: Drive,
+    /// Square root of an energy that the loads can give, √J.
+    pub energy_scale: f64,
+    /// A velocity well below those of the moving structure, m/s: the scale of velocities near rest.
+    moving: f64,
     slots: Vec<Slot>,
     index: BTreeMap<Vec<Contact>, usize>,
     segments: Vec<Segment>,
@@ -78,6 +83,8 @@ impl Flow {
         Flow {
             mechanics,
             drive,
+            energy_scale: 0.0,
+            moving: 0.0,
             slots: Vec::new(),
             index: BTreeMap::new(),
             segments: Vec::new(),
@@ -174,7 +181,7 @@ impl Flow {
         let fastest = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
         // displacements count with the drive frequency, so that a start at a reversal has a scale too
         let widest = state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs())) * self.drive.omega;
-        fastest.max(widest).max(self.drive.velocity_scale)
+        fastest.max(widest).max(self.moving).max(f64::MIN_POSITIVE)
     }
 
     /// The pattern that was decided, with its response to the drive.
@@ -202,6 +209,11 @@ impl Flow {
     /// Changes the drive; patterns stay.
     pub fn set_drive(&mut self, drive: Drive) {
         self.work = Work::new(&self.mechanics, drive.rates.len());
+        let mechanics = &self.mechanics;
+        let springs = mechanics.sliders.iter().filter_map(|slider| Some(slider.limit / slider.stiffness?.sqrt()));
+        self.energy_scale = drive.energy_scale(&mechanics.mass, &mechanics.stiffness) + springs.sum::<f64>();
+        let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax().sqrt() };
+        self.moving = drive.imposed_velocity().max(super::NEAR_REST * self.energy_scale * mobility);
         self.drive = drive;
         self.slots.iter_mut().for_each(|slot| slot.driven = None);
     }

@@ -3,7 +3,6 @@
 use crate::method::MethodError;
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
-use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 /// Whether a slider rests or moves.
@@ -115,103 +114,13 @@ impl Mechanics {
         })
     }
 
+    /// The joint of every slider.
+    pub fn owners(&self) -> Vec<usize> {
+        self.sliders.iter().map(|slider| slider.joint).collect()
+    }
+
     /// Length of the state `(x, v, forces of sliders behind springs)`.
     pub fn states(&self) -> usize {
         2 * self.n + self.elastic
     }
-}
-
-/// The excitation at one drive frequency.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Drive {
-    /// Drive frequency Ω, rad/s.
-    pub omega: f64,
-    /// Frequencies hΩ of the harmonics that occur, rad/s, rising.
-    pub rates: Vec<f64>,
-    /// Force amplitudes, per harmonic, N.
-    pub forces: Vec<DVector<Complex64>>,
-    /// Constant force, N.
-    pub constant: DVector<f64>,
-    /// Imposed relative motion per harmonic and slider, m (without its constant part, which changes nothing).
-    pub imposed: Vec<Vec<Complex64>>,
-    /// Square root of an energy that the loads can give to the structure, √J: the scale of a state near rest.
-    pub energy_scale: f64,
-    /// A velocity well below those of a moving structure, m/s: the scale of velocities near rest.
-    pub velocity_scale: f64,
-}
-
-/// Velocities of a structure near rest are measured against this fraction of the velocity that its loads could cause.
-const NEAR_REST: f64 = 1e-3;
-
-impl Drive {
-    pub fn new(system: &System, mechanics: &Mechanics, omega: f64) -> Self {
-        let n = mechanics.n;
-        let excitation = system.excitation(omega);
-        let mut harmonics: Vec<u32> = excitation.iter().map(|(h, _)| *h).collect();
-        harmonics.extend(system.joints.iter().flat_map(|joint| joint.imposed.iter().map(|(h, _)| *h)));
-        harmonics.extend(system.moved.iter().flat_map(|place| place.motion.iter().map(|(h, _)| *h)));
-        harmonics.sort_unstable();
-        harmonics.dedup();
-        harmonics.retain(|&h| h > 0);
-        let force_at = |h: u32| excitation.iter().find(|(k, _)| *k == h).map(|(_, f)| f.clone());
-        let zero = || DVector::from_element(n, Complex64::new(0.0, 0.0));
-        let imposed_at = |h: u32| {
-            mechanics
-                .sliders
-                .iter()
-                .map(|slider| {
-                    let imposed = &system.joints[slider.joint].imposed;
-                    imposed.iter().find(|(k, _)| *k == h).map_or(Complex64::new(0.0, 0.0), |(_, g)| *g)
-                })
-                .collect()
-        };
-        let mut drive = Drive {
-            omega,
-            rates: harmonics.iter().map(|&h| f64::from(h) * omega).collect(),
-            forces: harmonics.iter().map(|&h| force_at(h).unwrap_or_else(zero)).collect(),
-            constant: force_at(0).map_or_else(|| DVector::zeros(n), |f| f.map(|z| z.re)),
-            imposed: harmonics.iter().map(|&h| imposed_at(h)).collect(),
-            ..Drive::default()
-        };
-        drive.set_scales(mechanics);
-        drive
-    }
-
-    fn set_scales(&mut self, mechanics: &Mechanics) {
-        let loads = (0..mechanics.n).map(|i| {
-            let force = self.constant[i].abs() + self.forces.iter().map(|f| f[i].norm()).sum::<f64>();
-            let inertia = self.omega * self.omega * mechanics.mass[(i, i)];
-            force / mechanics.stiffness[(i, i)].max(inertia).sqrt()
-        });
-        let springs = mechanics.sliders.iter().filter_map(|slider| Some(slider.limit / slider.stiffness?.sqrt()));
-        self.energy_scale = loads.chain(springs).sum();
-        let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax().sqrt() };
-        let imposed = self.imposed.iter().zip(&self.rates).flat_map(|(g, rate)| g.iter().map(move |g| g.norm() * rate));
-        self.velocity_scale = imposed.fold(NEAR_REST * self.energy_scale * mobility, f64::max).max(f64::MIN_POSITIVE);
-    }
-
-    /// The k-th time derivative of the force at `time`, added to `out`.
-    pub fn add_force(&self, time: f64, derivative: u32, out: &mut DVector<f64>) {
-        if derivative == 0 {
-            *out += &self.constant;
-        }
-        for (rate, force) in self.rates.iter().zip(&self.forces) {
-            let turn = phasor(*rate, time, derivative);
-            for (o, f) in out.iter_mut().zip(force.iter()) {
-                *o += (f * turn).re;
-            }
-        }
-    }
-
-    /// The k-th time derivative of the imposed motion of a slider.
-    pub fn imposed_at(&self, slider: usize, time: f64, derivative: u32) -> f64 {
-        self.rates.iter().zip(&self.imposed).map(|(rate, g)| (g[slider] * phasor(*rate, time, derivative)).re).sum()
-    }
-}
-
-/// `(jω)^k e^{jωt}`
-fn phasor(rate: f64, time: f64, derivative: u32) -> Complex64 {
-    let (sin, cos) = (rate * time).sin_cos();
-    let turn = Complex64::new(cos, sin);
-    if derivative == 0 { turn } else { turn * Complex64::new(0.0, rate).powu(derivative) }
 }

@@ -17,13 +17,14 @@ mod pattern;
 
 pub use mechanics::Contact;
 
+use super::drive::Drive;
 use super::guess::Guess;
 use super::periodic::{Aim, ReturnMap, close};
 use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, Solver};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
 use flow::Flow;
-use mechanics::{Drive, Mechanics};
+use mechanics::Mechanics;
 use nalgebra::DMatrix;
 
 pub(crate) const NAME: &str = "event-driven";
@@ -114,13 +115,13 @@ impl Solver for Exact<'_> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
-        let drive = Drive::new(self.system, &self.flow.mechanics, omega);
+        let drive = Drive::new(self.system, &self.flow.mechanics.owners(), omega);
         self.flow.set_drive(drive);
         self.set_weights(omega);
         let (symmetry, sign, share) =
             if self.system.is_odd() { (Symmetry::HalfPeriod, -1.0, 0.5) } else { (Symmetry::FullPeriod, 1.0, 1.0) };
         self.duration = share * std::f64::consts::TAU / omega;
-        let aim = Aim { method: NAME, omega, residual: CLOSED, sign, rest: NEAR_REST * self.flow.drive.energy_scale };
+        let aim = Aim { method: NAME, omega, residual: CLOSED, sign, rest: NEAR_REST * self.flow.energy_scale };
         let warm = start.filter(|state| state.len() == self.flow.mechanics.states());
         let closed = match warm.map(|state| close(self, state, aim)) {
             Some(Ok(closed)) => closed,

@@ -1,8 +1,9 @@
 //! The orbit's numbers from its closed-form segments.
 
+use super::NAME;
 use super::flow::{Flow, Segment};
 use super::mechanics::Contact;
-use super::{NAME, mechanics::Drive};
+use crate::method::drive::Drive;
 use crate::method::periodic::Closed;
 use crate::model::System;
 use crate::orbit::{Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
@@ -47,7 +48,7 @@ pub(super) fn orbit(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry
         .zip(&system.joints)
         .filter(|(motion, _)| motion.slip_fraction == 0.0)
         .map(|(_, j)| j.name.clone());
-    let rest = super::NEAR_REST * flow.drive.energy_scale;
+    let rest = super::NEAR_REST * flow.energy_scale;
     let reference = energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive)).max(NO_WORK * rest * rest);
     let balance = energy.work_in - energy.viscous - energy.friction;
     Orbit {
@@ -289,8 +290,7 @@ impl ExactPath {
 
     /// The force that moves a place, as a signal.
     fn reaction(&self, piece: &Piece, m: usize, flow: &Flow) -> Vec<Complex64> {
-        let owners: Vec<usize> = flow.mechanics.sliders.iter().map(|s| s.joint).collect();
-        self.reaction_of(piece, m, &owners)
+        self.reaction_of(piece, m, &flow.mechanics.owners())
     }
 
     fn reaction_of(&self, piece: &Piece, m: usize, owners: &[usize]) -> Vec<Complex64> {

@@ -5,7 +5,8 @@
 //! `S = M⁻¹Wₛ(WₛᵀM⁻¹Wₛ)⁺`, the motion is `x = N q + S (c - g)` and `q'' + NᵀCN q' + NᵀKₚN q = Nᵀ(forces)`, which the modes of
 //! [`stickslip_numerics::modes`] solve in closed form. Nothing here depends on time, drive frequency or slip direction.
 
-use super::mechanics::{Contact, Drive, Mechanics};
+use super::mechanics::{Contact, Mechanics};
+use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use num_complex::Complex64;
 use stickslip_numerics::modes::{Defective, Modes};

@@ -1,0 +1,73 @@
+//! Fourier series of sampled periodic signals: `u(θ) = Re Σ_h U_h e^{jhθ}`, sampled at `θ_i = 2π i / N`.
+
+use num_complex::Complex64;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use std::fmt;
+use std::sync::Arc;
+
+/// A plan for signals of one length, with its memory: transforms allocate nothing.
+///
+/// # Example
+/// ```
+/// use num_complex::Complex64;
+/// use stickslip_numerics::fourier::Fourier;
+/// let mut fourier = Fourier::new(16);
+/// let mut samples = vec![0.0; 16];
+/// fourier.synthesise(&[(0, Complex64::new(0.5, 0.0)), (3, Complex64::new(0.0, -2.0))], &mut samples);
+/// assert!((samples[1] - (0.5 + 2.0 * (3.0 * std::f64::consts::TAU / 16.0).sin())).abs() < 1e-14);
+/// let sums = fourier.sums(&mut samples);       // Σ u_i e^{-jhθ_i}
+/// assert!((sums[3] * (2.0 / 16.0) - Complex64::new(0.0, -2.0)).norm() < 1e-14);
+/// ```
+#[derive(Clone)]
+pub struct Fourier {
+    samples: usize,
+    forward: Arc<dyn RealToComplex<f64>>,
+    inverse: Arc<dyn ComplexToReal<f64>>,
+    spectrum: Vec<Complex64>,
+    scratch: Vec<Complex64>,
+}
+
+impl fmt::Debug for Fourier {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Fourier").field("samples", &self.samples).finish_non_exhaustive()
+    }
+}
+
+impl Fourier {
+    /// A plan for `samples` (even, at least 2) points per period.
+    pub fn new(samples: usize) -> Self {
+        let mut planner = RealFftPlanner::<f64>::new();
+        let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
+        let scratch = forward.get_scratch_len().max(inverse.get_scratch_len());
+        Fourier {
+            samples,
+            forward,
+            inverse,
+            spectrum: vec![Complex64::default(); samples / 2 + 1],
+            scratch: vec![Complex64::default(); scratch],
+        }
+    }
+
+    /// Points per period.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Samples of `Re Σ U_h e^{jhθ}` from pairs (h, U_h), `h < N/2`, into `out`, length N.
+    pub fn synthesise(&mut self, harmonics: &[(usize, Complex64)], out: &mut [f64]) {
+        self.spectrum.fill(Complex64::default());
+        for &(h, c) in harmonics {
+            // the inverse transform adds the conjugate half, which doubles all but the mean
+            self.spectrum[h] += if h == 0 { Complex64::new(c.re, 0.0) } else { c * 0.5 };
+        }
+        let scratch = &mut self.scratch[..self.inverse.get_scratch_len()];
+        self.inverse.process_with_scratch(&mut self.spectrum, out, scratch).expect("lengths are those of the plan");
+    }
+
+    /// `Σ_i u_i e^{-jhθ_i}` for h = 0..=N/2. The samples are overwritten.
+    pub fn sums(&mut self, samples: &mut [f64]) -> &[Complex64] {
+        let scratch = &mut self.scratch[..self.forward.get_scratch_len()];
+        self.forward.process_with_scratch(samples, &mut self.spectrum, scratch).expect("lengths are those of the plan");
+        &self.spectrum
+    }
+}

@@ -1,0 +1,93 @@
+//! The excitation at one drive frequency, as functions of time.
+
+use crate::model::System;
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+/// The excitation at one drive frequency.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Drive {
+    /// Drive frequency Ω, rad/s.
+    pub omega: f64,
+    /// Frequencies hΩ of the harmonics that occur, rad/s, rising.
+    pub rates: Vec<f64>,
+    /// Force amplitudes, per harmonic, N.
+    pub forces: Vec<DVector<Complex64>>,
+    /// Constant force, N.
+    pub constant: DVector<f64>,
+    /// Imposed relative motion per harmonic and contact, m (without its constant part, which changes nothing).
+    pub imposed: Vec<Vec<Complex64>>,
+}
+
+impl Drive {
+    /// `contacts` lists the joint that each contact (slider, or joint itself) belongs to.
+    pub fn new(system: &System, contacts: &[usize], omega: f64) -> Self {
+        let n = system.dofs();
+        let excitation = system.excitation(omega);
+        let mut harmonics: Vec<u32> = excitation.iter().map(|(h, _)| *h).collect();
+        harmonics.extend(system.joints.iter().flat_map(|joint| joint.imposed.iter().map(|(h, _)| *h)));
+        harmonics.extend(system.moved.iter().flat_map(|place| place.motion.iter().map(|(h, _)| *h)));
+        harmonics.sort_unstable();
+        harmonics.dedup();
+        harmonics.retain(|&h| h > 0);
+        let force_at = |h: u32| excitation.iter().find(|(k, _)| *k == h).map(|(_, f)| f.clone());
+        let zero = || DVector::from_element(n, Complex64::new(0.0, 0.0));
+        let imposed_at = |h: u32| {
+            contacts
+                .iter()
+                .map(|&joint| {
+                    let imposed = &system.joints[joint].imposed;
+                    imposed.iter().find(|(k, _)| *k == h).map_or(Complex64::new(0.0, 0.0), |(_, g)| *g)
+                })
+                .collect()
+        };
+        Drive {
+            omega,
+            rates: harmonics.iter().map(|&h| f64::from(h) * omega).collect(),
+            forces: harmonics.iter().map(|&h| force_at(h).unwrap_or_else(zero)).collect(),
+            constant: force_at(0).map_or_else(|| DVector::zeros(n), |f| f.map(|z| z.re)),
+            imposed: harmonics.iter().map(|&h| imposed_at(h)).collect(),
+        }
+    }
+
+    /// Square root of an energy that the loads can give to a structure with these masses and stiffnesses, √J: the scale of a
+    /// state near rest.
+    pub fn energy_scale(&self, mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> f64 {
+        let loads = (0..mass.nrows()).map(|i| {
+            let force = self.constant[i].abs() + self.forces.iter().map(|f| f[i].norm()).sum::<f64>();
+            force / stiffness[(i, i)].max(self.omega * self.omega * mass[(i, i)]).sqrt()
+        });
+        loads.sum()
+    }
+
+    /// The largest velocity among the imposed relative motions, m/s.
+    pub fn imposed_velocity(&self) -> f64 {
+        let rates = self.imposed.iter().zip(&self.rates);
+        rates.flat_map(|(g, rate)| g.iter().map(move |g| g.norm() * rate)).fold(0.0, f64::max)
+    }
+
+    /// The k-th time derivative of the force at `time`, added to `out`.
+    pub fn add_force(&self, time: f64, derivative: u32, out: &mut DVector<f64>) {
+        if derivative == 0 {
+            *out += &self.constant;
+        }
+        for (rate, force) in self.rates.iter().zip(&self.forces) {
+            let turn = phasor(*rate, time, derivative);
+            for (o, f) in out.iter_mut().zip(force.iter()) {
+                *o += (f * turn).re;
+            }
+        }
+    }
+
+    /// The k-th time derivative of the imposed motion of a contact.
+    pub fn imposed_at(&self, contact: usize, time: f64, derivative: u32) -> f64 {
+        self.rates.iter().zip(&self.imposed).map(|(rate, g)| (g[contact] * phasor(*rate, time, derivative)).re).sum()
+    }
+}
+
+/// `(jω)^k e^{jωt}`
+fn phasor(rate: f64, time: f64, derivative: u32) -> Complex64 {
+    let (sin, cos) = (rate * time).sin_cos();
+    let turn = Complex64::new(cos, sin);
+    if derivative == 0 { turn } else { turn * Complex64::new(0.0, rate).powu(derivative) }
+}

@@ -1,0 +1,172 @@
+//! The linear rest of a structure: what its places do under harmonic forces, in closed form for every frequency.
+//!
+//! With the modes `(λ, φ)` of `M x'' + C x' + K x`, computed once, the response to `Re(F e^{st})` is a sum of `φ (ψᵀF) / (s - λ)`.
+//! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored.
+
+use super::joints::Coordinate;
+use crate::model::System;
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use stickslip_numerics::modes::Modes;
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// A direction that nothing holds gets, for its mean position only, a spring that makes it as slow as this fraction of the drive
+/// frequency: its mean is arbitrary otherwise. The motion changes by the square of it.
+const HOLD: f64 = 1e-5;
+
+/// Receptance of the structure without its joints.
+#[derive(Debug, Clone)]
+pub(super) struct Rest {
+    n: usize,
+    modal: Option<Modal>,
+    mass: DMatrix<f64>,
+    damping: DMatrix<f64>,
+    stiffness: DMatrix<f64>,
+    /// Directions of the coordinates, n × q.
+    direction: DMatrix<f64>,
+}
+
+/// Modes, and what they are at the joints.
+#[derive(Debug, Clone)]
+struct Modal {
+    lambda: Vec<Complex64>,
+    /// n × modes, and modes × n.
+    shape: DMatrix<Complex64>,
+    left: DMatrix<Complex64>,
+    /// The same along the coordinates: q × modes, and modes × q.
+    shape_at: DMatrix<Complex64>,
+    left_at: DMatrix<Complex64>,
+    /// Free directions, n × r and r × q.
+    free: DMatrix<f64>,
+    free_at: DMatrix<f64>,
+}
+
+impl Rest {
+    pub fn new(system: &System, coordinates: &[Coordinate]) -> Self {
+        let n = system.dofs();
+        let direction =
+            DMatrix::from_fn(n, coordinates.len(), |i, q| system.joints[coordinates[q].joint].direction[(i, 0)]);
+        Rest {
+            n,
+            modal: modal(system, &direction),
+            mass: system.mass.clone(),
+            damping: system.damping.clone(),
+            stiffness: system.stiffness.clone(),
+            direction,
+        }
+    }
+
+    /// Displacements along the coordinates under unit forces along them, at `s = jhΩ`, q × q, m/N.
+    pub fn receptance(&self, harmonic: usize, omega: f64) -> DMatrix<Complex64> {
+        let q = self.direction.ncols();
+        let s = Complex64::new(0.0, harmonic as f64 * omega);
+        let Some(modal) = &self.modal else {
+            let Some(inverse) = self.dynamic(s).try_inverse() else { return DMatrix::from_element(q, q, ZERO) };
+            let direction = self.direction.map(|w| Complex64::new(w, 0.0));
+            return direction.transpose() * inverse * direction;
+        };
+        let mut sum = DMatrix::from_element(q, q, ZERO);
+        for (m, &lambda) in modal.lambda.iter().enumerate() {
+            let (up, down) = fractions(s, lambda, omega);
+            for b in 0..q {
+                for a in 0..q {
+                    let product = modal.shape_at[(a, m)] * modal.left_at[(m, b)];
+                    sum[(a, b)] += (product * up + product.conj() * down) * 0.5;
+                }
+            }
+        }
+        let free = free_fraction(s, omega);
+        for r in 0..modal.free_at.nrows() {
+            for b in 0..q {
+                for a in 0..q {
+                    sum[(a, b)] += modal.free_at[(r, a)] * modal.free_at[(r, b)] * free;
+                }
+            }
+        }
+        sum
+    }
+
+    /// Displacements of all places under the complex forces `force` (length n, N), m.
+    pub fn respond(&self, harmonic: usize, omega: f64, force: &DVector<Complex64>) -> DVector<Complex64> {
+        let s = Complex64::new(0.0, harmonic as f64 * omega);
+        let Some(modal) = &self.modal else {
+            return self.dynamic(s).lu().solve(force).unwrap_or_else(|| DVector::from_element(self.n, ZERO));
+        };
+        let mut x = DVector::from_element(self.n, ZERO);
+        for (m, &lambda) in modal.lambda.iter().enumerate() {
+            let (up, down) = fractions(s, lambda, omega);
+            let (mut one, mut two) = (ZERO, ZERO);
+            for i in 0..self.n {
+                one += modal.left[(m, i)] * force[i];
+                two += modal.left[(m, i)].conj() * force[i];
+            }
+            let (one, two) = (one * up * 0.5, two * down * 0.5);
+            for i in 0..self.n {
+                x[i] += modal.shape[(i, m)] * one + modal.shape[(i, m)].conj() * two;
+            }
+        }
+        let free = free_fraction(s, omega);
+        for r in 0..modal.free.ncols() {
+            let push: Complex64 = (0..self.n).map(|i| force[i] * modal.free[(i, r)]).sum::<Complex64>() * free;
+            for i in 0..self.n {
+                x[i] += push * modal.free[(i, r)];
+            }
+        }
+        x
+    }
+
+    /// `W f`: forces on all places from forces along the coordinates.
+    pub fn spread(&self, along: impl Fn(usize) -> Complex64) -> DVector<Complex64> {
+        let mut force = DVector::from_element(self.n, ZERO);
+        for q in 0..self.direction.ncols() {
+            let f = along(q);
+            for i in 0..self.n {
+                force[i] += f * self.direction[(i, q)];
+            }
+        }
+        force
+    }
+
+    fn dynamic(&self, s: Complex64) -> DMatrix<Complex64> {
+        DMatrix::from_fn(self.n, self.n, |i, k| {
+            s * s * self.mass[(i, k)] + s * self.damping[(i, k)] + self.stiffness[(i, k)]
+        })
+    }
+}
+
+/// `1/(s - λ)` and `1/(s - λ*)`.
+fn fractions(s: Complex64, lambda: Complex64, omega: f64) -> (Complex64, Complex64) {
+    let hold = HOLD * HOLD * omega;
+    let one = |d: Complex64| if d.norm() < hold { Complex64::new(1.0 / hold, 0.0) } else { 1.0 / d };
+    (one(s - lambda), one(s - lambda.conj()))
+}
+
+fn free_fraction(s: Complex64, omega: f64) -> Complex64 {
+    if s == ZERO { Complex64::new((HOLD * omega).powi(-2), 0.0) } else { 1.0 / (s * s) }
+}
+
+/// Modes in the structure's coordinates; `None` if a place has no mass or modes fall together: then frequencies are factored one
+/// by one.
+fn modal(system: &System, direction: &DMatrix<f64>) -> Option<Modal> {
+    let n = system.dofs();
+    if (0..n).any(|i| system.mass[(i, i)] <= 0.0) {
+        return None;
+    }
+    let scale: Vec<f64> = (0..n).map(|i| 1.0 / system.mass[(i, i)].sqrt()).collect();
+    let normalised = |matrix: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, k| scale[i] * matrix[(i, k)] * scale[k]);
+    let modes = Modes::new(&normalised(&system.damping), &normalised(&system.stiffness)).ok()?;
+    let shape = DMatrix::from_fn(n, modes.lambda.len(), |i, m| modes.shape[(i, m)] * scale[i]);
+    let left = DMatrix::from_fn(modes.lambda.len(), n, |m, i| modes.from_velocity[(m, i)] * scale[i]);
+    let free = DMatrix::from_fn(n, modes.free.ncols(), |i, r| modes.free[(i, r)] * scale[i]);
+    let complex = direction.map(|w| Complex64::new(w, 0.0));
+    Some(Modal {
+        shape_at: complex.transpose() * &shape,
+        left_at: &left * complex,
+        free_at: free.transpose() * direction,
+        lambda: modes.lambda,
+        shape,
+        left,
+        free,
+    })
+}

@@ -1,0 +1,409 @@
+//! The equations of harmonic balance and their solution.
+//!
+//! Unknown are the harmonics `c` of the motion along the joints; what the structure does between them is its receptance `R`:
+//! `c + R f(c) - c_lin = 0` per harmonic. Newton's method with the exact derivative; where it fails, friction is made smooth and
+//! sharpened step by step. Rigid sliders end with rounds of multipliers, after which the width has no influence.
+
+use super::joints::{Alternation, Coordinate, Sharpness};
+use super::rest::Rest;
+use crate::model::System;
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use stickslip_numerics::dense;
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// Residual relative to the motion at which the equations count as solved: a thousand times the rounding of a stiff system.
+pub(super) const SOLVED: f64 = 1e-10;
+/// Newton iterations at one sharpness; 3 to 6 are usual.
+const ITERATIONS: usize = 40;
+/// Halvings of a step.
+const HALVINGS: usize = 7;
+/// The width of rigid sliders at the end, relative to the largest velocity of the motion; multipliers remove its influence.
+const WIDTH: f64 = 1e-7;
+/// The smallest width relative to the velocity without friction: below it the equations lose all digits.
+const LEAST_WIDTH: f64 = 1e-9;
+/// Factor by which friction is sharpened, as long as Newton's method follows.
+const SHARPEN: f64 = 0.25;
+/// Rounds of multipliers.
+const ROUNDS: usize = 40;
+
+/// All that belongs to one number of harmonics.
+#[derive(Debug, Clone)]
+pub(super) struct Level {
+    pub alternation: Alternation,
+    /// Receptance per harmonic, q × q.
+    receptance: Vec<DMatrix<Complex64>>,
+    /// Motion of the coordinates without friction, [q][harmonic].
+    pub linear: Vec<Complex64>,
+    /// Motion of all places without friction, per harmonic.
+    pub free: Vec<DVector<Complex64>>,
+    tangents: Vec<f64>,
+    jacobian: Vec<f64>,
+    residual: Vec<f64>,
+    next: Vec<Vec<f64>>,
+}
+
+/// A solution or a start.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Motion {
+    /// Harmonics of the coordinates, [q][harmonic], m.
+    pub c: Vec<Complex64>,
+    /// Harmonics of the forces along them, N.
+    pub force: Vec<Complex64>,
+    /// Multipliers of rigid sliders, per sample, N.
+    pub multipliers: Vec<Vec<f64>>,
+    pub sharpness: Sharpness,
+    pub residual: f64,
+    pub iterations: usize,
+}
+
+impl Default for Sharpness {
+    fn default() -> Self {
+        Sharpness { width: 0.0, blur: 0.0, limits: 1.0 }
+    }
+}
+
+/// The search did not end.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lost {
+    pub iterations: usize,
+    pub residual: f64,
+}
+
+impl Level {
+    pub fn new(harmonics: Vec<usize>, samples: usize, coordinates: usize, rigid: usize) -> Self {
+        let nh = harmonics.len();
+        let size = 2 * nh * coordinates;
+        Level {
+            alternation: Alternation::new(harmonics, samples),
+            receptance: Vec::new(),
+            linear: vec![ZERO; nh * coordinates],
+            free: Vec::new(),
+            tangents: vec![0.0; 4 * nh * nh * coordinates],
+            jacobian: vec![0.0; size * size],
+            residual: vec![0.0; size],
+            next: vec![vec![0.0; samples]; rigid],
+        }
+    }
+
+    pub fn harmonics(&self) -> &[usize] {
+        &self.alternation.harmonics
+    }
+
+    /// Prepares for a drive frequency.
+    pub fn drive(&mut self, system: &System, coordinates: &[Coordinate], rest: &Rest, omega: f64) {
+        let n = system.dofs();
+        let excitation = system.excitation(omega);
+        let nh = self.harmonics().len();
+        self.receptance.clear();
+        self.free.clear();
+        for k in 0..nh {
+            let h = self.alternation.harmonics[k];
+            let mut receptance = rest.receptance(h, omega);
+            for (q, coordinate) in coordinates.iter().enumerate() {
+                receptance[(q, q)] += coordinate.series;
+            }
+            self.receptance.push(receptance);
+            let free = match excitation.iter().find(|(number, _)| *number as usize == h) {
+                Some((_, force)) => rest.respond(h, omega, force),
+                None => DVector::from_element(n, ZERO),
+            };
+            for (q, coordinate) in coordinates.iter().enumerate() {
+                let joint = &system.joints[coordinate.joint];
+                let imposed = joint.imposed.iter().find(|(number, _)| *number as usize == h).map_or(ZERO, |(_, g)| *g);
+                let u: Complex64 = (0..n).map(|i| free[i] * joint.direction[(i, 0)]).sum();
+                self.linear[q * nh + k] = u + imposed;
+            }
+            self.free.push(free);
+        }
+    }
+
+    /// Forces and residual at `motion.c`; the derivative into `self.jacobian` if `tangent`.
+    fn evaluate(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion, tangent: bool) -> f64 {
+        let (nh, count) = (self.harmonics().len(), coordinates.len());
+        let block = 4 * nh * nh;
+        for (q, coordinate) in coordinates.iter().enumerate() {
+            let range = q * nh..(q + 1) * nh;
+            let slot = &mut self.tangents[q * block..(q + 1) * block];
+            self.alternation.evaluate(
+                coordinate,
+                &motion.c[range.clone()],
+                omega,
+                motion.sharpness,
+                &motion.multipliers,
+                &mut self.next,
+                &mut motion.force[range],
+                tangent.then_some(slot),
+            );
+        }
+        let mut sum = 0.0;
+        for q in 0..count {
+            for k in 0..nh {
+                let mut r = motion.c[q * nh + k] - self.linear[q * nh + k];
+                for p in 0..count {
+                    r += self.receptance[k][(q, p)] * motion.force[p * nh + k];
+                }
+                let at = 2 * (q * nh + k);
+                (self.residual[at], self.residual[at + 1]) = (r.re, r.im);
+                sum += r.norm_sqr() * weight(self.alternation.harmonics[k]);
+            }
+        }
+        if tangent {
+            let size = 2 * nh * count;
+            self.jacobian.fill(0.0);
+            for q in 0..count {
+                for k in 0..nh {
+                    for p in 0..count {
+                        let r = self.receptance[k][(q, p)];
+                        let from = &self.tangents[p * block..(p + 1) * block];
+                        let (re, im) =
+                            (&from[2 * k * 2 * nh..(2 * k + 1) * 2 * nh], &from[(2 * k + 1) * 2 * nh..(2 * k + 2) * 2 * nh]);
+                        let row = 2 * (q * nh + k) * size + 2 * p * nh;
+                        let (first, second) = self.jacobian[row..].split_at_mut(size);
+                        for b in 0..2 * nh {
+                            first[b] += r.re * re[b] - r.im * im[b];
+                            second[b] += r.re * im[b] + r.im * re[b];
+                        }
+                    }
+                }
+            }
+            for i in 0..size {
+                self.jacobian[i * size + i] += 1.0;
+            }
+        }
+        sum.sqrt()
+    }
+
+    /// Size of the motion against which residuals are measured.
+    fn size(&self, motion: &Motion) -> f64 {
+        let nh = self.harmonics().len();
+        let norm = |c: &[Complex64]| {
+            c.iter().enumerate().map(|(i, z)| z.norm_sqr() * weight(self.alternation.harmonics[i % nh])).sum::<f64>().sqrt()
+        };
+        norm(&motion.c) + 1e-3 * norm(&self.linear)
+    }
+
+    /// Newton's method at the sharpness of `motion`.
+    pub fn newton(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion, most: usize) -> Result<(), Lost> {
+        let mut trial = motion.clone();
+        let mut residual = self.evaluate(coordinates, omega, motion, true);
+        for _ in 0..most {
+            motion.residual = residual / self.size(motion).max(f64::MIN_POSITIVE);
+            if motion.residual <= SOLVED || residual == 0.0 {
+                return Ok(());
+            }
+            let size = self.residual.len();
+            if !dense::solve(&mut self.jacobian, size, &mut self.residual) {
+                break;
+            }
+            motion.iterations += 1;
+            trial.sharpness = motion.sharpness;
+            let step: Vec<Complex64> =
+                self.residual.chunks_exact(2).map(|pair| Complex64::new(pair[0], pair[1])).collect();
+            let mut fraction = 1.0;
+            let mut accepted = false;
+            for _ in 0..=HALVINGS {
+                for ((t, c), d) in trial.c.iter_mut().zip(&motion.c).zip(&step) {
+                    *t = c - d * fraction;
+                }
+                let after = self.evaluate(coordinates, omega, &mut trial, true);
+                if after.is_finite() && after < (1.0 - 1e-3 * fraction) * residual {
+                    residual = after;
+                    std::mem::swap(&mut motion.c, &mut trial.c);
+                    std::mem::swap(&mut motion.force, &mut trial.force);
+                    accepted = true;
+                    break;
+                }
+                fraction *= 0.5;
+            }
+            if !accepted {
+                break;
+            }
+        }
+        motion.residual = residual / self.size(motion).max(f64::MIN_POSITIVE);
+        if motion.residual <= SOLVED {
+            return Ok(());
+        }
+        Err(Lost { iterations: motion.iterations, residual: motion.residual })
+    }
+
+    /// Largest velocity along a coordinate, m/s.
+    fn speed(&self, c: &[Complex64], omega: f64) -> f64 {
+        let nh = self.harmonics().len();
+        c.chunks_exact(nh)
+            .map(|c| c.iter().zip(self.harmonics()).map(|(z, &h)| h as f64 * omega * z.norm()).sum::<f64>())
+            .fold(0.0, f64::max)
+    }
+
+    /// From `start` (a solution nearby) or, without one, from smooth friction.
+    pub fn solve(
+        &mut self,
+        coordinates: &[Coordinate],
+        omega: f64,
+        start: Motion,
+        warm: bool,
+    ) -> Result<Motion, Lost> {
+        use super::joints::Slider;
+        let has = |test: fn(&Slider) -> bool| coordinates.iter().flat_map(|c| &c.sliders).any(test);
+        let rigid = has(|s| matches!(s, Slider::Rigid { .. }));
+        let smooth = has(|s| matches!(s, Slider::Smooth { .. }));
+        let free_speed = self.speed(&self.linear, omega).max(f64::MIN_POSITIVE);
+        let mut spent = 0;
+        if warm || !(rigid || smooth) {
+            let mut motion = start.clone();
+            motion.iterations = 0;
+            motion.sharpness = Sharpness::default();
+            motion.sharpness.width = (WIDTH * self.speed(&motion.c, omega)).max(LEAST_WIDTH * free_speed);
+            let done = self.newton(coordinates, omega, &mut motion, ITERATIONS).and_then(|()| {
+                if rigid { self.settle_multipliers(coordinates, omega, &mut motion) } else { Ok(()) }
+            });
+            match done {
+                Ok(()) => return Ok(motion),
+                Err(lost) => spent += lost.iterations,
+            }
+        }
+        let mut motion = start;
+        motion.iterations = spent;
+        motion.multipliers.iter_mut().for_each(|m| m.fill(0.0));
+        if !(rigid || smooth) {
+            self.lower_limits(coordinates, omega, &mut motion)?;
+            return Ok(motion);
+        }
+        self.sharpen(coordinates, omega, &mut motion, (rigid, smooth), free_speed)?;
+        if rigid {
+            self.settle_multipliers(coordinates, omega, &mut motion)?;
+        }
+        Ok(motion)
+    }
+
+    /// Velocity laws: from wide to sharp.
+    fn sharpen(
+        &mut self,
+        coordinates: &[Coordinate],
+        omega: f64,
+        motion: &mut Motion,
+        (rigid, smooth): (bool, bool),
+        free_speed: f64,
+    ) -> Result<(), Lost> {
+        motion.c.copy_from_slice(&self.linear);
+        let mut width = free_speed;
+        let mut factor = SHARPEN;
+        let mut good: Option<Motion> = None;
+        loop {
+            motion.sharpness = Sharpness { width, blur: width, limits: 1.0 };
+            match self.newton(coordinates, omega, motion, ITERATIONS) {
+                Ok(()) => {
+                    let target = (WIDTH * self.speed(&motion.c, omega)).max(LEAST_WIDTH * free_speed);
+                    good = Some(motion.clone());
+                    if width <= target {
+                        break;
+                    }
+                    width = (width * factor).max(0.999 * target);
+                    factor = (factor * 0.8).max(SHARPEN * SHARPEN);
+                }
+                Err(lost) => {
+                    let Some(good) = &good else { return Err(lost) };
+                    let iterations = motion.iterations;
+                    *motion = good.clone();
+                    motion.iterations = iterations;
+                    factor = factor.sqrt();
+                    if factor > 0.9 {
+                        return Err(lost);
+                    }
+                    width = good.sharpness.width * factor;
+                }
+            }
+        }
+        if smooth {
+            motion.sharpness.blur = 0.0;
+            self.newton(coordinates, omega, motion, ITERATIONS)?;
+        }
+        let _ = rigid;
+        Ok(())
+    }
+
+    /// Sliders behind springs: from slip limits that hold to those that are given.
+    fn lower_limits(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion) -> Result<(), Lost> {
+        let mut limits = 1.0;
+        // where everything sticks the equations are linear
+        for _ in 0..60 {
+            limits *= 4.0;
+            motion.sharpness = Sharpness { limits, ..Sharpness::default() };
+            if self.newton(coordinates, omega, motion, ITERATIONS).is_ok() {
+                break;
+            }
+        }
+        let mut good = motion.clone();
+        let mut factor: f64 = 0.5;
+        while good.sharpness.limits > 1.0 {
+            motion.sharpness.limits = (good.sharpness.limits * factor).max(1.0);
+            match self.newton(coordinates, omega, motion, ITERATIONS) {
+                Ok(()) => good = motion.clone(),
+                Err(lost) => {
+                    let iterations = motion.iterations;
+                    *motion = good.clone();
+                    motion.iterations = iterations;
+                    factor = factor.sqrt();
+                    if factor > 0.995 {
+                        return Err(lost);
+                    }
+                }
+            }
+        }
+        *motion = Motion { iterations: motion.iterations, ..good };
+        Ok(())
+    }
+
+    /// Replaces multipliers by the forces until that changes nothing: the width has no influence then.
+    fn settle_multipliers(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion) -> Result<(), Lost> {
+        for _ in 0..ROUNDS {
+            self.evaluate(coordinates, omega, motion, false);
+            for (multipliers, next) in motion.multipliers.iter_mut().zip(&self.next) {
+                multipliers.copy_from_slice(next);
+            }
+            let residual = self.evaluate(coordinates, omega, motion, false) / self.size(motion).max(f64::MIN_POSITIVE);
+            motion.residual = residual;
+            if residual <= SOLVED {
+                return Ok(());
+            }
+            self.newton(coordinates, omega, motion, ITERATIONS)?;
+        }
+        Err(Lost { iterations: motion.iterations, residual: motion.residual })
+    }
+}
+
+/// Weight of a harmonic in norms: that of its velocity.
+fn weight(h: usize) -> f64 {
+    ((h * h) as f64).max(1.0)
+}
+
+/// `motion` with other harmonics and samples: harmonics that are new are those that the forces are not known of, zero.
+pub(super) fn transfer(motion: &Motion, from: &[usize], to: &[usize], samples: usize, coordinates: usize) -> Motion {
+    let pick = |values: &[Complex64]| {
+        let mut out = Vec::with_capacity(coordinates * to.len());
+        for q in 0..coordinates {
+            for h in to {
+                let at = from.binary_search(h).ok();
+                out.push(at.map_or(ZERO, |k| values[q * from.len() + k]));
+            }
+        }
+        out
+    };
+    let resample = |values: &Vec<f64>| -> Vec<f64> {
+        let n = values.len();
+        (0..samples)
+            .map(|i| {
+                let x = i as f64 * n as f64 / samples as f64;
+                let (low, part) = (x.floor() as usize, x.fract());
+                (1.0 - part) * values[low % n] + part * values[(low + 1) % n]
+            })
+            .collect()
+    };
+    Motion {
+        c: pick(&motion.c),
+        force: pick(&motion.force),
+        multipliers: motion.multipliers.iter().map(resample).collect(),
+        ..*motion
+    }
+}

@@ -1,0 +1,172 @@
+//! Newton's method on the period of a stiff integration, for smooth laws.
+//!
+//! The arctan law creeps in stick with time constants of seconds, so that waiting for a transient to die proves nothing; the
+//! return map of the integrator with its exact derivative is closed by Newton's method instead.
+
+use super::drive::Drive;
+use super::guess::Guess;
+use super::periodic::{Aim, ReturnMap, close};
+use super::smooth::flow::SmoothFlow;
+use super::smooth::path;
+use super::smooth::step::Structure;
+use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver};
+use crate::dimension::Dimension;
+use crate::model::System;
+use crate::orbit::{Orbit, Symmetry};
+use nalgebra::DMatrix;
+
+const NAME: &str = "shooting";
+
+/// Relative error per step when none is given: orbits of the paper's couple are then within 1e-7 (see the verification tests).
+const TOLERANCE: f64 = 1e-8;
+/// Residual at which an orbit is closed: the steps are chosen anew in every run, so the map is smooth only to their error.
+const CLOSED: f64 = 1e-10;
+/// Energy gap above which an orbit is not reported as converged.
+const ENERGY_GAP: f64 = 1e-5;
+/// A state counts as rest below this fraction of what the loads could cause.
+const NEAR_REST: f64 = 1e-3;
+
+/// The row of this method in [`super::TABLE`].
+pub(super) const INFO: MethodInfo = MethodInfo {
+    name: NAME,
+    summary: "smooth laws: Newton on the period of a stiff integration, exact sensitivities",
+    options: &[
+        MethodOption {
+            key: "tolerance",
+            dimension: Dimension::NONE,
+            count: false,
+            doc: "relative error per step of the integration; 1e-8 when absent",
+        },
+        MethodOption {
+            key: "width",
+            dimension: Dimension::VELOCITY,
+            count: false,
+            doc: "replaces exact laws by smooth ones that change sign over this velocity; exact laws are refused when absent",
+        },
+    ],
+    build: |options| {
+        let tolerance = options.get("tolerance").copied().unwrap_or(TOLERANCE);
+        if !(1e-13..=1e-3).contains(&tolerance) {
+            let message = format!("must lie between 1e-13 and 1e-3, found {tolerance}");
+            return Err(MethodError::Option { method: NAME, key: "tolerance", message });
+        }
+        Ok(Box::new(Shooting { tolerance, width: options.get("width").copied() }))
+    },
+};
+
+/// Shooting on smooth laws.
+///
+/// # Example
+/// ```
+/// use stickslip::law::{CoulombArctan, Law};
+/// use stickslip::method::{Method, shooting::Shooting};
+/// let mut model = stickslip::model::templates::find("blade-couple").unwrap().model();
+/// model.joints[0].law = Law::CoulombArctan(CoulombArctan { limit: 2.0, alpha: 25e3 });
+/// let system = model.assemble().unwrap();
+/// let orbit = Shooting::default().solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25, None).unwrap();
+/// assert!(orbit.evidence.residual < 1e-9);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shooting {
+    /// Relative error per step of the integration.
+    pub tolerance: f64,
+    /// Velocity over which exact laws are smoothed, m/s; without it exact laws are refused.
+    pub width: Option<f64>,
+}
+
+impl Default for Shooting {
+    fn default() -> Self {
+        Shooting { tolerance: TOLERANCE, width: None }
+    }
+}
+
+impl Method for Shooting {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        let structure = Structure::new(system, self.width, NAME)?;
+        let weights = vec![1.0; structure.states()];
+        let owners = (0..system.joints.len()).collect();
+        Ok(Box::new(Smooth {
+            system,
+            flow: SmoothFlow::new(structure, self.tolerance),
+            owners,
+            weights,
+            duration: 0.0,
+        }))
+    }
+}
+
+struct Smooth<'a> {
+    system: &'a System,
+    flow: SmoothFlow,
+    owners: Vec<usize>,
+    weights: Vec<f64>,
+    duration: f64,
+}
+
+impl ReturnMap for Smooth<'_> {
+    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), Breakdown> {
+        self.flow.run(state, 0.0, self.duration, derivative)
+    }
+    fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+}
+
+impl Smooth<'_> {
+    /// Weights of the energy norm; internal states count with the scale of the motion.
+    fn set_weights(&mut self, omega: f64) {
+        let structure = &self.flow.structure;
+        let n = structure.n;
+        for i in 0..n {
+            let inertia = omega * omega * structure.mass[(i, i)];
+            self.weights[i] = structure.stiffness[(i, i)].max(inertia).sqrt();
+            self.weights[n + i] = structure.mass[(i, i)].sqrt();
+        }
+        let energy = self.flow.drive.energy_scale(&structure.mass, &structure.stiffness);
+        self.weights[2 * n..].fill(if energy > 0.0 { NEAR_REST * energy } else { 1.0 });
+    }
+
+    fn first_state(&self, omega: f64) -> Vec<f64> {
+        let structure = &self.flow.structure;
+        let mut state = Guess::new(self.system, omega).state(structure.n);
+        state.resize(structure.states(), 0.0);
+        state
+    }
+}
+
+impl Solver for Smooth<'_> {
+    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        if !(omega.is_finite() && omega > 0.0) {
+            return Err(OrbitError::Frequency { omega });
+        }
+        self.flow.drive = Drive::new(self.system, &self.owners, omega);
+        self.set_weights(omega);
+        let (symmetry, sign, share) =
+            if self.system.is_odd() { (Symmetry::HalfPeriod, -1.0, 0.5) } else { (Symmetry::FullPeriod, 1.0, 1.0) };
+        self.duration = share * std::f64::consts::TAU / omega;
+        let structure = &self.flow.structure;
+        let rest = NEAR_REST * self.flow.drive.energy_scale(&structure.mass, &structure.stiffness);
+        let aim = Aim { method: NAME, omega, residual: CLOSED, sign, rest };
+        self.flow.record = false;
+        let warm = start.filter(|state| state.len() == self.flow.structure.states());
+        let closed = match warm.map(|state| close(self, state, aim)) {
+            Some(Ok(closed)) => closed,
+            _ => {
+                let first = self.first_state(omega);
+                close(self, &first, aim)?
+            }
+        };
+        self.flow.record = true;
+        let mut end = closed.state.clone();
+        let broke = |cause| OrbitError::Breakdown { method: NAME, omega, cause };
+        self.flow.run(&mut end, 0.0, self.duration, None).map_err(broke)?;
+        let orbit = path::orbit(self.system, &self.flow, NAME, omega, symmetry, closed);
+        if orbit.evidence.energy_gap > ENERGY_GAP {
+            return Err(OrbitError::Evidence { method: NAME, omega, energy_gap: orbit.evidence.energy_gap });
+        }
+        Ok(orbit)
+    }
+}
