@@ -50,6 +50,15 @@ impl Drive {
         }
     }
 
+    /// No drive: only the constant forces are left.
+    pub fn without_harmonics(system: &System, contacts: &[usize]) -> Self {
+        let mut drive = Drive::new(system, contacts, 0.0);
+        drive.rates.clear();
+        drive.forces.clear();
+        drive.imposed.clear();
+        drive
+    }
+
     /// Square root of an energy that the loads can give to a structure with these masses and stiffnesses, √J: the scale of a
     /// state near rest.
     pub fn energy_scale(&self, mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> f64 {

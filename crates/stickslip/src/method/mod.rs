@@ -7,9 +7,11 @@ pub mod auto;
 mod drive;
 pub mod event_driven;
 mod guess;
+pub mod harmonic_balance;
 mod periodic;
 pub mod shooting;
 mod smooth;
+pub mod transient;
 
 pub use event_driven::Contact;
 
@@ -232,7 +234,7 @@ pub struct MethodInfo {
 }
 
 /// Every method there is.
-pub const TABLE: &[MethodInfo] = &[auto::INFO, event_driven::INFO, shooting::INFO];
+pub const TABLE: &[MethodInfo] = &[auto::INFO, event_driven::INFO, shooting::INFO, harmonic_balance::INFO];
 
 /// The method with this name.
 pub fn find(name: &str) -> Option<&'static MethodInfo> {

@@ -179,8 +179,9 @@ impl Flow {
     fn velocity_scale(&self, state: &[f64]) -> f64 {
         let n = self.mechanics.n;
         let fastest = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
-        // displacements count with the drive frequency, so that a start at a reversal has a scale too
-        let widest = state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs())) * self.drive.omega;
+        // displacements count with a frequency, so that a start at a reversal has a scale too
+        let widest =
+            state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs())) * self.drive.omega.max(self.mechanics.fastest);
         fastest.max(widest).max(self.moving).max(f64::MIN_POSITIVE)
     }
 

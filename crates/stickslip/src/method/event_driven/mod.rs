@@ -15,7 +15,10 @@ mod mechanics;
 mod path;
 mod pattern;
 
+pub(crate) use flow::Flow;
 pub use mechanics::Contact;
+pub(crate) use mechanics::Mechanics;
+pub(crate) use path::ExactPath;
 
 use super::drive::Drive;
 use super::guess::Guess;
@@ -23,8 +26,6 @@ use super::periodic::{Aim, ReturnMap, close};
 use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, Solver};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
-use flow::Flow;
-use mechanics::Mechanics;
 use nalgebra::DMatrix;
 
 pub(crate) const NAME: &str = "event-driven";

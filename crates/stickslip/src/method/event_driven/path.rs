@@ -18,12 +18,13 @@ const NO_WORK: f64 = 1e-6;
 
 /// The closed-form segments of one return, with all that is needed to evaluate them.
 #[derive(Debug, Clone)]
-struct ExactPath {
+pub(crate) struct ExactPath {
     system: System,
     pieces: Vec<Piece>,
     symmetry: Symmetry,
     period: f64,
     rates: Vec<f64>,
+    omega: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -38,11 +39,11 @@ struct Piece {
 
 /// Makes the orbit of the flow's last run.
 pub(super) fn orbit(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
-    let path = ExactPath::new(system, flow, omega, symmetry);
+    let path = ExactPath::new(system, flow, symmetry, std::f64::consts::TAU / omega);
     let times = if symmetry == Symmetry::HalfPeriod { 2 } else { 1 };
     let places = path.places(omega);
     let joints = path.joints(flow);
-    let energy = path.energy(flow, omega, &joints);
+    let energy = path.energy(flow, &joints);
     let stuck = joints
         .iter()
         .zip(&system.joints)
@@ -73,7 +74,8 @@ pub(super) fn orbit(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry
 }
 
 impl ExactPath {
-    fn new(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry) -> Self {
+    /// The segments of the flow's last run; `period` is the time after which they repeat (or, by symmetry, repeat mirrored twice).
+    pub fn new(system: &System, flow: &Flow, symmetry: Symmetry, period: f64) -> Self {
         let n = system.dofs();
         let pieces = flow
             .segments()
@@ -97,8 +99,8 @@ impl ExactPath {
                 }
             })
             .collect();
-        let period = std::f64::consts::TAU / omega;
-        ExactPath { system: system.clone(), pieces, symmetry, period, rates: flow.drive.rates.clone() }
+        let (rates, omega) = (flow.drive.rates.clone(), flow.drive.omega);
+        ExactPath { system: system.clone(), pieces, symmetry, period, rates, omega }
     }
 
     /// How often the segments are run through in a period.
@@ -208,21 +210,22 @@ impl ExactPath {
 
     /// Adds `Re Σ G_h e^{jhΩt}` to a signal of the piece.
     fn add_imposed(&self, piece: &Piece, imposed: &[(u32, Complex64)], signal: &mut [Complex64]) {
-        let omega = std::f64::consts::TAU / self.period;
+        let omega = self.omega;
         for &(harmonic, amplitude) in imposed {
             if harmonic == 0 {
                 signal[piece.basis.constant()].re += amplitude.re;
                 continue;
             }
             let rate = f64::from(harmonic) * omega;
-            // the drive lists every harmonic that occurs
-            let h = self.rates.iter().position(|r| (r - rate).abs() < 0.5 * omega).expect("listed");
+            let Some(h) = self.rates.iter().position(|r| (r - rate).abs() < 0.5 * omega) else {
+                continue; // without a drive nothing moves the place
+            };
             signal[piece.modes + h] += amplitude * Complex64::new(0.0, rate * piece.segment.start).exp();
         }
     }
 
     /// The force and the force-velocity product as they enter the energy balance; see [`System`] for the meaning of the parts.
-    fn energy(&self, flow: &Flow, omega: f64, joints: &[JointMotion]) -> Energy {
+    fn energy(&self, flow: &Flow, joints: &[JointMotion]) -> Energy {
         let n = self.system.dofs();
         let (mut work, mut viscous) = (0.0, 0.0);
         for piece in &self.pieces {
@@ -261,7 +264,6 @@ impl ExactPath {
                 }
             }
         }
-        let _ = omega;
         Energy {
             work_in: self.times() * work,
             viscous: self.times() * viscous,

@@ -158,7 +158,9 @@ impl SmoothFlow {
     /// Scales of displacement and velocity for the error norm.
     fn scales(&self, state: &[f64]) -> (f64, f64) {
         let n = self.structure.n;
-        let rate = self.drive.omega.max(f64::MIN_POSITIVE);
+        let natural = (0..n).map(|i| (self.structure.stiffness[(i, i)] / self.structure.mass[(i, i)]).sqrt());
+        // without a drive the structure's own frequencies set the time scale
+        let rate = if self.drive.omega > 0.0 { self.drive.omega } else { natural.fold(f64::MIN_POSITIVE, f64::max) };
         let x = state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs()));
         let v = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
         let mobility = if n == 0 { 0.0 } else { self.structure.inverse_mass.amax().sqrt() };

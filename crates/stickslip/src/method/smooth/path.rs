@@ -17,7 +17,7 @@ const SLIPS_ABOVE: f64 = 0.95;
 /// Turning points are refined until the step in time is below this fraction of the integration step.
 const REFINED: f64 = 1e-12;
 
-struct SteppedPath {
+pub(crate) struct SteppedPath {
     steps: Vec<StepRecord>,
     structure: Structure,
     drive: Drive,
@@ -40,14 +40,7 @@ pub(crate) fn orbit(
     let places = places(system, flow, omega, symmetry);
     let joints = joints(system, flow, period, symmetry);
     let energy = energy(system, flow, times);
-    let path = SteppedPath {
-        steps: flow.steps.clone(),
-        structure: flow.structure.clone(),
-        drive: flow.drive.clone(),
-        system: system.clone(),
-        symmetry,
-        period,
-    };
+    let path = SteppedPath::new(system, flow, symmetry, period);
     let balance = energy.work_in - energy.viscous - energy.friction;
     Orbit {
         method,
@@ -67,6 +60,20 @@ pub(crate) fn orbit(
         energy,
         return_map: closed.derivative,
         path: Arc::new(path),
+    }
+}
+
+impl SteppedPath {
+    /// The recorded steps of the flow's last run.
+    pub fn new(system: &System, flow: &SmoothFlow, symmetry: Symmetry, period: f64) -> Self {
+        SteppedPath {
+            steps: flow.steps.clone(),
+            structure: flow.structure.clone(),
+            drive: flow.drive.clone(),
+            system: system.clone(),
+            symmetry,
+            period,
+        }
     }
 }
 

@@ -1,0 +1,4 @@
+//! Families of orbits along a parameter.
+
+pub mod peak;
+pub mod sweep;
