@@ -4,9 +4,11 @@
 
 mod hysteresis;
 mod orbit;
+mod orbits;
 mod response;
 mod transient;
 
+use crate::run::{Context, Outcome, Prepared};
 use crate::schema::{Key, Takes, default, required};
 use crate::values::Values;
 use stickslip::model::Model;
@@ -22,6 +24,8 @@ pub struct Kind {
     pub keys: &'static [Key],
     /// What one key alone cannot tell: conditions between keys, and names that must exist in the model.
     pub check: fn(&Values, &Model) -> Result<(), Complaint>,
+    /// Computes the cases.
+    pub run: fn(&[Prepared], &Context<'_>) -> Outcome,
 }
 
 /// Every study kind there is, in the order in which lists show them.

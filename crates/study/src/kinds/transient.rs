@@ -1,10 +1,17 @@
 //! Transients: the motion in time from rest or from given displacements; free decay, switched-on drive, or run-up.
 
+use super::orbit::write_sample;
 use super::{Complaint, Kind, MOST_SAMPLES};
+use crate::dataset::{Axis, Panel, Series, Style};
+use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit, place_of};
 use crate::schema::{Key, Takes, Within, default, optional, required};
 use crate::values::Values;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
+use stickslip::method::transient::{Excitation, Transient, TransientError};
 use stickslip::model::Model;
+use stickslip::orbit::Sample;
 
 const FREQUENCY: Takes = Takes::Quantity(Dimension::FREQUENCY, Within::Positive);
 const DURATION: Takes = Takes::Quantity(Dimension::TIME, Within::Positive);
@@ -58,6 +65,7 @@ pub(super) const KIND: Kind = Kind {
         optional("time_step", DURATION, "distance of the points of the table; needed for a free decay", "\"0.1 ms\""),
     ],
     check,
+    run,
 };
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
@@ -116,4 +124,121 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
         return Err(Complaint::new("duration", message, "shorten `duration` or take fewer samples"));
     }
     Ok(())
+}
+
+/// One computed motion.
+struct Motion {
+    drive: Option<f64>,
+    samples: Vec<(f64, f64, Sample)>,
+    end: Result<(), TransientError>,
+    stopped: bool,
+}
+
+fn run(cases: &[Prepared], context: &Context<'_>) -> Outcome {
+    let mut outcome = Outcome::default();
+    let mut rows = Rows::default();
+    let all: Vec<Vec<Motion>> = cases.par_iter().map(|prepared| motions(prepared, context)).collect();
+    let several = cases.iter().any(|prepared| prepared.case.frequencies.as_ref().is_some_and(|f| f.len() > 1));
+    for (prepared, motions) in cases.iter().zip(all) {
+        for motion in motions {
+            let at = || match motion.drive {
+                Some(omega) => place_of(&prepared.case, omega),
+                None => prepared.case.label(),
+            };
+            match &motion.end {
+                Ok(()) if motion.stopped => outcome.count(at, NOT_REACHED, None),
+                Ok(()) => outcome.count(at, CONVERGED, None),
+                Err(error) => outcome.count(at, "breakdown", Some(error.to_string())),
+            }
+            for (time, omega, sample) in &motion.samples {
+                rows.varied(&prepared.case);
+                if several {
+                    rows.number("drive_frequency_Hz", motion.drive.unwrap_or(0.0) / TAU);
+                }
+                rows.number("time_s", *time);
+                rows.number("frequency_Hz", omega / TAU);
+                write_sample(prepared, sample, &mut rows);
+                rows.end();
+            }
+            outcome.figure.push(panel(prepared, at(), &motion));
+        }
+    }
+    outcome.figure.truncate(MOST_PANELS);
+    outcome.tables = vec![rows.table("motion")];
+    outcome
+}
+
+/// More panels than this say nothing; the table has all.
+const MOST_PANELS: usize = 12;
+
+fn motions(prepared: &Prepared, context: &Context<'_>) -> Vec<Motion> {
+    let values = &prepared.case.values;
+    let run_up = values.table("run_up").map(|table| Excitation::RunUp {
+        from: table.quantity("from").unwrap_or(0.0),
+        to: table.quantity("to").unwrap_or(0.0),
+        duration: table.quantity("duration").unwrap_or(0.0),
+    });
+    let drives: Vec<Option<f64>> = match &prepared.case.frequencies {
+        Some(frequencies) => frequencies.iter().map(Some).collect(),
+        None => vec![None],
+    };
+    let initial = |key: &str| -> Vec<f64> {
+        let given = values.by_name(key);
+        prepared.system.places.iter().map(|p| given.and_then(|g| g.get(p)).copied().unwrap_or(0.0)).collect()
+    };
+    drives
+        .into_iter()
+        .map(|drive| {
+            let excitation = drive.map(Excitation::Steady).or(run_up).unwrap_or(Excitation::Free);
+            let fastest = match excitation {
+                Excitation::Free => None,
+                Excitation::Steady(omega) => Some(omega),
+                Excitation::RunUp { from, to, .. } => Some(from.max(to)),
+            };
+            let cycles = values.count("cycles").zip(drive).map(|(cycles, omega)| cycles as f64 * TAU / omega);
+            let run_up_time = values.table("run_up").and_then(|table| table.quantity("duration"));
+            // `check` has made sure that one of each is there
+            let duration = values.quantity("duration").or(cycles).or(run_up_time).unwrap_or(0.0);
+            let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
+            let step = values.quantity("time_step").or(fastest.map(|w| TAU / w / per_cycle)).unwrap_or(duration);
+            let transient = Transient {
+                displacement: initial("start"),
+                velocity: initial("start_velocity"),
+                excitation,
+                duration,
+                step,
+                width: prepared.case.method.options.get("width").copied(),
+            };
+            let (mut samples, mut stopped) = (Vec::new(), false);
+            let end = transient.run(&prepared.system, &mut |time, omega, sample| {
+                samples.push((time, omega, sample.clone()));
+                stopped = context.stopped();
+                !stopped
+            });
+            (context.finished)();
+            Motion { drive, samples, end, stopped }
+        })
+        .collect()
+}
+
+fn panel(prepared: &Prepared, title: String, motion: &Motion) -> Panel {
+    let names = &prepared.system.places;
+    let largest = motion.samples.iter().flat_map(|(_, _, s)| s.displacement.iter()).fold(0.0f64, |a, x| a.max(x.abs()));
+    let (unit, factor) = display_unit(largest, "m");
+    Panel {
+        title,
+        x: Axis { quantity: "time".to_owned(), unit: "s".to_owned() },
+        y: Axis { quantity: "displacement".to_owned(), unit },
+        series: names
+            .iter()
+            .enumerate()
+            .map(|(i, name)| Series {
+                label: name.clone(),
+                x: motion.samples.iter().map(|(time, _, _)| *time).collect(),
+                y: motion.samples.iter().map(|(_, _, s)| s.displacement[i] * factor).collect(),
+                style: Style::Solid,
+                colour: i,
+            })
+            .collect(),
+    }
 }

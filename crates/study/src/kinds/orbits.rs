@@ -1,0 +1,45 @@
+//! What the kinds share that look at whole orbits: all orbits of a study, their instants, their failures.
+
+use crate::run::{Context, NOT_REACHED, Outcome, Prepared, place_of};
+use crate::study::Case;
+use rayon::prelude::*;
+use stickslip::curve::sweep::sweep;
+use stickslip::method::OrbitError;
+use stickslip::orbit::Orbit;
+
+/// A frequency (rad/s) and what was found there; `None` if the run was stopped before.
+pub(super) type Point = (f64, Option<Result<Orbit, OrbitError>>);
+
+/// The orbits of every case at every frequency.
+pub(super) fn all(cases: &[Prepared], context: &Context<'_>) -> Vec<Vec<Point>> {
+    cases
+        .par_iter()
+        .map(|prepared| {
+            let omegas: Vec<f64> = prepared.case.frequencies.iter().flat_map(|f| f.iter()).collect();
+            let keep = |_: usize, outcome: Result<&Orbit, &OrbitError>| outcome.cloned().map_err(Clone::clone);
+            let omega = |i: usize| omegas[i];
+            // the method took this system when the case was prepared
+            let points = sweep(&*prepared.method, &prepared.system, omegas.len(), &omega, context.watch(), &keep);
+            omegas.iter().copied().zip(points.unwrap_or_default()).collect()
+        })
+        .collect()
+}
+
+/// Counts a point that has no orbit.
+pub(super) fn count_missing(outcome: &mut Outcome, case: &Case, omega: f64, point: Option<&Result<Orbit, OrbitError>>) {
+    match point {
+        Some(Err(error)) => outcome.count(|| place_of(case, omega), error.status(), Some(error.to_string())),
+        _ => outcome.count(|| place_of(case, omega), NOT_REACHED, None),
+    }
+}
+
+/// `samples` equal steps over the period, both ends included, and every switch, rising, s.
+pub(super) fn times(orbit: &Orbit, samples: usize) -> Vec<f64> {
+    let period = orbit.period();
+    let mut times: Vec<f64> = (0..=samples).map(|i| period * i as f64 / samples as f64).collect();
+    times.extend(orbit.switch_times());
+    times.sort_by(f64::total_cmp);
+    // a switch on a grid point would stand twice
+    times.dedup_by(|a, b| (*a - *b).abs() <= 1e-12 * period);
+    times
+}
