@@ -72,6 +72,9 @@ impl Guess {
 
     fn response(&self, system: &System, h: u32, omega: f64, mut force: DVector<Complex64>) -> DVector<Complex64> {
         let n = system.dofs();
+        if n == 0 {
+            return force; // a joint that is only moved; an elimination without unknowns is refused below
+        }
         let s = Complex64::new(0.0, f64::from(h) * omega);
         let mut dynamic = DMatrix::from_fn(n, n, |i, k| {
             s * s * system.mass[(i, k)] + s * system.damping[(i, k)] + system.stiffness[(i, k)]

@@ -60,7 +60,7 @@ pub(crate) struct Flow {
     /// Number of segments of the last run.
     used: usize,
     /// Number of switches of the last run.
-    pub switches: usize,
+    switches: usize,
     decision: Decision,
     work: Work,
     scratch: Scratch,

@@ -40,7 +40,6 @@ struct Piece {
 /// Makes the orbit of the flow's last run.
 pub(super) fn orbit(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
     let path = ExactPath::new(system, flow, symmetry, std::f64::consts::TAU / omega);
-    let times = if symmetry == Symmetry::HalfPeriod { 2 } else { 1 };
     let places = path.places(omega);
     let joints = path.joints(flow);
     let energy = path.energy(flow, &joints);
@@ -60,7 +59,7 @@ pub(super) fn orbit(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry
         evidence: Evidence {
             residual: closed.residual,
             energy_gap: if reference > 0.0 { balance.abs() / reference } else { balance.abs() },
-            switches: times * flow.switches,
+            switches: joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
             truncation: None,
             stuck: stuck.collect(),
@@ -450,11 +449,16 @@ impl Path for ExactPath {
     }
 
     fn switch_times(&self) -> Vec<f64> {
-        let starts = self.pieces.iter().skip(1).map(|piece| piece.segment.start);
+        let inner = self.pieces.iter().skip(1).map(|piece| piece.segment.start);
+        // a switch may also fall on the instant at which the return is cut
+        let sign = if self.symmetry == Symmetry::HalfPeriod { -1.0 } else { 1.0 };
+        let at_cut = self.pieces.first().zip(self.pieces.last()).is_some_and(|(first, last)| {
+            first.contacts.iter().zip(&last.contacts).any(|(f, l)| l.sign() != sign * f.sign())
+        });
+        let first: Vec<f64> = at_cut.then_some(0.0).into_iter().chain(inner).collect();
         match self.symmetry {
-            Symmetry::FullPeriod => starts.collect(),
+            Symmetry::FullPeriod => first,
             Symmetry::HalfPeriod => {
-                let first: Vec<f64> = starts.collect();
                 let second: Vec<f64> = first.iter().map(|t| t + 0.5 * self.period).collect();
                 first.into_iter().chain(second).collect()
             }

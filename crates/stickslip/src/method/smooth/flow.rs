@@ -259,6 +259,9 @@ impl SmoothFlow {
     fn error(&self, state: &[f64], slope: &[f64], time: f64, h: f64, scale: (f64, f64)) -> f64 {
         let (n, j, internal, states) =
             (self.structure.n, self.structure.joints.len(), self.structure.internal, self.structure.states());
+        if states == 0 {
+            return self.error_of_work(time, h, scale.0);
+        }
         let mut raw = DVector::from_column_slice(slope);
         for (i, weight) in ERROR.iter().enumerate() {
             for k in 0..n {
@@ -325,6 +328,21 @@ impl SmoothFlow {
             }
         }
         size
+    }
+
+    /// The same for joints that are only moved: nothing is integrated there but their work, so its estimate chooses the steps.
+    fn error_of_work(&self, time: f64, h: f64, travel: f64) -> f64 {
+        let j = self.structure.joints.len();
+        let mut largest = 0.0f64;
+        for (q, joint) in self.structure.joints.iter().enumerate() {
+            let power = |k: usize| self.step.unknown[k * j + q] * self.step.force[k * j + q];
+            let mut raw = self.law_point(q, &[], time).force * self.drive.imposed_at(q, time, 1);
+            for (weight, row) in ERROR.iter().zip(A) {
+                raw += weight * row.iter().enumerate().map(|(k, a)| a * power(k)).sum::<f64>();
+            }
+            largest = largest.max((raw * h / REAL).abs() / (joint.limit * travel * self.tolerance));
+        }
+        largest
     }
 
     fn keep(&mut self, start: f64, length: f64, from: &[f64], to: &[f64], slope: &[f64], next: &[f64]) {

@@ -252,6 +252,27 @@ impl MovedAt {
     }
 }
 
+impl SteppedPath {
+    /// Force of a joint with internal states at `s` in [0, 1] of a step: the cubic through its value at the step's start and
+    /// those at the three stages.
+    fn force_between(&self, step: &StepRecord, q: usize, s: f64) -> f64 {
+        let (n, j, joint) = (self.structure.n, self.structure.joints.len(), &self.structure.joints[q]);
+        let along = |v: &[f64]| (0..n).map(|i| joint.direction[i] * v[i]).sum::<f64>();
+        let u = along(&step.from[..n]) + self.drive.imposed_at(q, step.start, 0);
+        let velocity = along(&step.from[n..2 * n]) + self.drive.imposed_at(q, step.start, 1);
+        let first = 2 * n + joint.first_state;
+        let begin = LawPoint::new(&joint.law, u, velocity, &step.from[first..first + joint.states]).force;
+        let nodes = [0.0, C[0], C[1], C[2]];
+        let values = [begin, step.joints[q].1, step.joints[j + q].1, step.joints[2 * j + q].1];
+        (0..nodes.len())
+            .map(|i| {
+                let others = nodes.iter().enumerate().filter(|(k, _)| *k != i);
+                values[i] * others.map(|(_, node)| (s - node) / (nodes[i] - node)).product::<f64>()
+            })
+            .sum()
+    }
+}
+
 impl Path for SteppedPath {
     fn sample(&self, time: f64) -> Sample {
         let half = 0.5 * self.period;
@@ -274,10 +295,10 @@ impl Path for SteppedPath {
                 let along = |v: &[f64]| (0..n).map(|i| joint.direction[i] * v[i]).sum::<f64>();
                 let u = along(&x) + self.drive.imposed_at(q, time, 0);
                 let velocity = along(&v) + self.drive.imposed_at(q, time, 1);
-                let first = 2 * n + joint.first_state;
-                let z: Vec<f64> =
-                    (first..first + joint.states).map(|k| step.from[k] + s * (step.to[k] - step.from[k])).collect();
-                let force = LawPoint::new(&joint.law, u, velocity, &z).force;
+                let force = match joint.states {
+                    0 => LawPoint::new(&joint.law, u, velocity, &[]).force,
+                    _ => self.force_between(step, q, s),
+                };
                 let slips = force.abs() >= SLIPS_ABOVE * joint.limit;
                 JointSample {
                     displacement: sign * u,
