@@ -1,9 +1,14 @@
 //! Tests of Stickslip against closed forms, published results and outside integrators; see `tests/`.
 //!
-//! The library part makes the random models that several tests share.
+//! The library part holds what several tests share: random models, templates with changes, and small numerics (search, quadrature)
+//! written apart from the library's own.
 
+use num_complex::Complex64;
+use std::collections::BTreeMap;
 use stickslip::law::{Coulomb, Jenkins, Law};
-use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring};
+use stickslip::method::{Method, event_driven::EventDriven};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, templates};
+use stickslip::orbit::{Orbit, Sample};
 
 /// A small generator of uniform numbers, so that every test can name its models by a seed.
 /// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators" (2014), SplitMix64.
@@ -63,11 +68,160 @@ pub fn random_model(seed: u64) -> (Model, f64) {
     for _ in 0..1 + random.below(2) {
         let harmonic = if random.unit() < 0.8 { 1 } else { 1 + random.below(3) as u32 };
         let on = name(1 + random.below(count));
-        model.forces.push(Force { on, amplitude: random.between(1.0, 10.0), phase: random.between(0.0, 6.0), harmonic });
+        model.forces.push(Force {
+            on,
+            amplitude: random.between(1.0, 10.0),
+            phase: random.between(0.0, 6.0),
+            harmonic,
+        });
     }
     let system = model.assemble().expect("random models are well formed");
     let at = random.below(count);
     let natural = (system.stiffness[(at, at)] / system.mass[(at, at)]).sqrt();
     let factor = if seed.is_multiple_of(3) { 1.0 } else { 3f64.powf(random.between(-1.0, 1.0)) };
     (model, natural * factor)
+}
+
+/// A template of the library with some parameters changed, assembled.
+pub fn template(name: &str, changes: &[(&str, f64)]) -> System {
+    let template = templates::find(name).unwrap_or_else(|| panic!("no template {name}"));
+    template.model_with(changes).unwrap_or_else(|key| panic!("no parameter {key}")).assemble().expect("well formed")
+}
+
+/// The same with the laws of all joints replaced by `law(limit)`, given the slip limit of each.
+pub fn template_with(name: &str, changes: &[(&str, f64)], law: impl Fn(f64) -> Law) -> System {
+    let template = templates::find(name).unwrap_or_else(|| panic!("no template {name}"));
+    let mut model = template.model_with(changes).unwrap_or_else(|key| panic!("no parameter {key}"));
+    for joint in &mut model.joints {
+        joint.law = law(joint.law.limit());
+    }
+    model.assemble().expect("well formed")
+}
+
+/// The exact orbit at `omega` (rad/s), found from nothing, with its evidence in bounds.
+pub fn exact(system: &System, omega: f64) -> Orbit {
+    let orbit = EventDriven.solver(system).expect("exact laws").orbit(omega, None).expect("an orbit");
+    assert!(orbit.evidence.residual < 1e-10 && orbit.evidence.energy_gap < 1e-9, "{orbit:?}");
+    orbit
+}
+
+/// Asserts that two numbers agree within a relative tolerance.
+#[track_caller]
+pub fn close(what: &str, actual: f64, expected: f64, relative: f64) {
+    let error = (actual - expected).abs() / expected.abs();
+    assert!(error <= relative, "{what}: {actual:.12e} instead of {expected:.12e}, relative error {error:.1e}");
+}
+
+/// Asserts that two numbers agree within an absolute tolerance.
+#[track_caller]
+pub fn near(what: &str, actual: f64, expected: f64, absolute: f64) {
+    let error = (actual - expected).abs();
+    assert!(error <= absolute, "{what}: {actual:.12e} instead of {expected:.12e}, error {error:.1e}");
+}
+
+/// Where `function` is largest in `[low, high]`, and its largest value there: a scan over `points` intervals, then golden-section
+/// search between the neighbours of the best one until the bracket is below `width`.
+pub fn maximum(mut function: impl FnMut(f64) -> f64, [low, high]: [f64; 2], points: usize, width: f64) -> (f64, f64) {
+    let at = |i: usize| low + (high - low) * i as f64 / points as f64;
+    let mut best = (f64::NEG_INFINITY, 0);
+    for i in 0..=points {
+        let value = function(at(i));
+        if value > best.0 {
+            best = (value, i);
+        }
+    }
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    let (mut a, mut b) = (at(best.1.saturating_sub(1)), at((best.1 + 1).min(points)));
+    let (mut c, mut d) = (b - golden * (b - a), a + golden * (b - a));
+    let (mut fc, mut fd) = (function(c), function(d));
+    while b - a > width {
+        if fc > fd {
+            (b, d, fd) = (d, c, fc);
+            c = b - golden * (b - a);
+            fc = function(c);
+        } else {
+            (a, c, fc) = (c, d, fd);
+            d = a + golden * (b - a);
+            fd = function(d);
+        }
+    }
+    let candidates = [(c, fc), (d, fd), (at(best.1), best.0)];
+    *candidates.iter().max_by(|x, y| x.1.total_cmp(&y.1)).expect("three candidates")
+}
+
+/// The zero of `function` in `[low, high]`, at whose ends it has different signs, by bisection to the last bit.
+pub fn zero(mut function: impl FnMut(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
+    let sign = function(low).signum();
+    assert!(function(high).signum() != sign, "no change of sign between {low} and {high}");
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if function(middle).signum() == sign { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// Integral of `function(t)` over `[0, end]`, smooth between the `breaks`: Gauss's rule with eight points on 16 parts of each piece.
+pub fn integral(mut function: impl FnMut(f64) -> f64, end: f64, breaks: &[f64]) -> f64 {
+    // abscissas and weights of Abramowitz and Stegun (1964), Table 25.4
+    const POINTS: [(f64, f64); 4] = [
+        (0.183_434_642_495_649_8, 0.362_683_783_378_362),
+        (0.525_532_409_916_329, 0.313_706_645_877_887_27),
+        (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
+        (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
+    ];
+    const PARTS: usize = 16;
+    let mut ends = vec![0.0];
+    ends.extend(breaks.iter().copied().filter(|t| *t > 0.0 && *t < end));
+    ends.push(end);
+    ends.sort_by(f64::total_cmp);
+    let mut sum = 0.0;
+    for pair in ends.windows(2) {
+        let half = 0.5 * (pair[1] - pair[0]) / PARTS as f64;
+        for part in 0..PARTS {
+            let centre = pair[0] + half * (2 * part + 1) as f64;
+            for (x, weight) in POINTS {
+                sum += half * weight * (function(centre - half * x) + function(centre + half * x));
+            }
+        }
+    }
+    sum
+}
+
+/// Harmonic `n` of a quantity of an orbit: `X` in `Re(X e^{jnΩt})`, by Gauss's rule between the switches.
+pub fn harmonic(orbit: &Orbit, n: u32, quantity: impl Fn(&Sample) -> f64) -> Complex64 {
+    let (period, mut breaks) = (orbit.period(), orbit.switch_times());
+    breaks.push(0.5 * period);
+    let rate = f64::from(n) * orbit.omega;
+    let part = |turn: fn(f64) -> f64| {
+        integral(|t| quantity(&orbit.sample(t)) * turn(rate * t), period, &breaks) * 2.0 / period
+    };
+    Complex64::new(part(f64::cos), -part(f64::sin))
+}
+
+/// Rows of a table of `data/`, each a map from column to text.
+pub fn table(path: &str) -> Vec<BTreeMap<String, String>> {
+    let path = format!("{}/../../data/{path}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
+    let cells = |line: &str| {
+        let (mut cells, mut quoted) = (vec![String::new()], false);
+        for c in line.chars() {
+            match c {
+                '"' => quoted = !quoted,
+                ',' if !quoted => cells.push(String::new()),
+                c => cells.last_mut().expect("one cell at least").push(c),
+            }
+        }
+        cells
+    };
+    let mut lines = text.lines();
+    let names = cells(lines.next().expect("a heading"));
+    lines.map(|line| names.iter().cloned().zip(cells(line)).collect()).collect()
+}
+
+/// A number in a row of a [`table`].
+pub fn number(row: &BTreeMap<String, String>, column: &str) -> f64 {
+    row[column].parse().unwrap_or_else(|_| panic!("column {column}: `{}` is no number", row[column]))
 }

@@ -1,0 +1,196 @@
+//! Den Hartog's oscillator, `m x'' + k x + F Sgn x' = P cos(Ωt)`, exact law: theory section 7.
+//!
+//! Source: Den Hartog, "Forced vibrations with combined Coulomb and viscous friction" (1931). `r = Ω √(m/k)`, `beta = F/P`.
+
+use std::f64::consts::{FRAC_PI_4, PI};
+use stickslip::law::{Coulomb, Law};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
+use stickslip::orbit::{Orbit, Symmetry};
+use stickslip_verification::{close, exact, maximum, near, zero};
+
+/// Slip limits and frequencies inside the region without stops, away from r = 1/2, 1/3, 1/4 … (theory 7.6).
+const CASES: [(f64, f64); 9] =
+    [(0.2, 0.8), (0.5, 0.8), (0.5, 1.2), (0.7, 1.2), (0.1, 0.4), (0.6, 0.7), (0.5, 3.0), (0.5, 2.0), (0.78, 0.99)];
+
+fn oscillator(m: f64, k: f64, limit: f64) -> Model {
+    Model {
+        masses: vec![Mass { name: "m".into(), mass: m }],
+        springs: vec![Spring { between: ["m".into(), GROUND.into()], stiffness: k, damping: 0.0 }],
+        joints: vec![Joint {
+            name: "rub".into(),
+            between: ["m".into(), GROUND.into()],
+            law: Law::Coulomb(Coulomb { limit }),
+        }],
+        ..Model::default()
+    }
+}
+
+/// The orbit with m = k = P = 1.
+fn orbit(beta: f64, r: f64) -> Orbit {
+    forced(1.0, 1.0, 1.0, beta, r)
+}
+
+fn forced(m: f64, k: f64, p: f64, beta: f64, r: f64) -> Orbit {
+    let mut model = oscillator(m, k, beta * p);
+    model.forces.push(Force { on: "m".into(), amplitude: p, phase: 0.0, harmonic: 1 });
+    exact(&model.assemble().unwrap(), r * (k / m).sqrt())
+}
+
+/// `U` and `V` of 7.2.
+fn functions(r: f64) -> (f64, f64) {
+    ((PI / (2.0 * r)).tan() / r, 1.0 / (1.0 - r * r))
+}
+
+/// Amplitude of 7.2 with m = k = P = 1.
+fn amplitude(beta: f64, r: f64) -> f64 {
+    let (u, v) = functions(r);
+    (v * v - beta * beta * u * u).sqrt()
+}
+
+/// `S` of 7.3: the largest value of its function on 0 < tau < pi, with the limit at 0.
+fn s(r: f64) -> f64 {
+    let tan = (PI / (2.0 * r)).tan();
+    let f = |tau: f64| ((tau / r).sin() + tan * (tau.cos() - (tau / r).cos())) / (r * tau.sin());
+    maximum(f, [1e-4, PI - 1e-4], 4000, 1e-10).1.max(1.0 / (r * r))
+}
+
+fn beta_max(r: f64) -> f64 {
+    let (u, v) = functions(r);
+    v.abs() / s(r).hypot(u)
+}
+
+#[test]
+fn theory_7_1_motion_between_reversals() {
+    for (beta, r) in CASES {
+        let (orbit, x0) = (orbit(beta, r), amplitude(beta, r));
+        let (u, v) = functions(r);
+        // tau = 0 at the positive maximum, where the force stands at the phase phi
+        let phase = (-beta * u / x0 * (x0 / v)).atan2(x0 * (x0 / v) / x0);
+        for i in 0..=100 {
+            let tau = f64::from(i) / 100.0 * PI;
+            let x = beta * (1.0 - (tau / r).cos()) - beta * (PI / (2.0 * r)).tan() * (tau / r).sin()
+                + x0 * tau.cos()
+                + beta * u * tau.sin();
+            let sample = orbit.sample((tau + phase) / r);
+            near(&format!("x(tau) at beta {beta}, r {r}, tau {tau}"), sample.displacement[0], x, 1e-9 * x0);
+        }
+    }
+}
+
+#[test]
+fn theory_7_2_amplitude_and_phase() {
+    for (beta, r) in CASES {
+        let (orbit, x0) = (orbit(beta, r), amplitude(beta, r));
+        assert_eq!((orbit.evidence.switches, orbit.symmetry), (2, Symmetry::HalfPeriod));
+        close("amplitude", orbit.places[0].maximum, x0, 1e-8);
+        near("one minus slip fraction", orbit.joints[0].slip_fraction, 1.0, 1e-12);
+        // phase of the maximum: the reversal in the first half period, or half a period later
+        let (u, v) = functions(r);
+        let (cos, sin) = (x0 / v, -beta * u / v);
+        let time = sin.atan2(cos).rem_euclid(2.0 * PI) / r;
+        let nearest = orbit.switch_times().iter().map(|t| (t - time).abs()).fold(f64::INFINITY, f64::min);
+        near("instant of the maximum", nearest, 0.0, 1e-8);
+    }
+    // the reference values of section 7
+    for (beta, r, x0) in [(0.2, 0.8, 2.7114152554), (0.5, 0.8, 2.3322349875), (0.5, 1.2, 1.6574674711)] {
+        near("printed amplitude", orbit(beta, r).places[0].maximum, x0, 0.5e-10);
+    }
+    // other units: x0 scales with P/k
+    close(
+        "other units",
+        forced(0.3, 2000.0, 7.0, 0.5, 0.8).places[0].maximum,
+        7.0 / 2000.0 * amplitude(0.5, 0.8),
+        1e-9,
+    );
+}
+
+#[test]
+fn theory_7_3_no_stop_limits() {
+    let printed = [(0.4, 0.143890), (0.7, 0.722071), (0.8, 0.817406), (1.2, 0.713207), (2.0, 0.596285), (3.0, 0.5625)];
+    for (r, printed) in printed {
+        let limit = beta_max(r);
+        near("printed limit", limit, printed, 0.6e-6);
+        // stops appear where the closed form says: orbits just below have none, orbits just above have two a period or more
+        let (below, above) = (orbit(limit * (1.0 - 1e-6), r), orbit(limit * (1.0 + 1e-6), r));
+        assert_eq!(below.evidence.switches, 2, "r {r}");
+        assert!(above.evidence.switches > 2 && above.joints[0].slip_fraction < 1.0, "r {r}: {above:?}");
+        let found = zero(
+            |beta| if orbit(beta, r).evidence.switches == 2 { 1.0 } else { -1.0 },
+            [limit * (1.0 - 1e-5), limit * (1.0 + 1e-5)],
+        );
+        println!("r {r}: no stop up to {limit:.12}, bisected {found:.12}, {:.1e}", (found / limit - 1.0).abs());
+        close("limit by bisection", found, limit, 1e-8);
+        if r >= 0.5 {
+            close("S = 1/r^2", s(r), 1.0 / (r * r), 1e-12);
+        }
+    }
+    close("r = 3 is 9/16", beta_max(3.0), 9.0 / 16.0, 1e-12);
+    close("r to infinity", beta_max(1e4), 1.0 / (1.0 + (PI / 2.0).powi(2)).sqrt(), 1e-7);
+}
+
+#[test]
+fn theory_7_4_friction_loss() {
+    for (beta, r) in CASES {
+        let orbit = orbit(beta, r);
+        let expected = 4.0 * beta * amplitude(beta, r);
+        close("loss", orbit.joints[0].dissipation, expected, 1e-8);
+        close("work in", orbit.energy.work_in, expected, 1e-8);
+        close("work in from the first harmonic", -PI * orbit.places[0].first_harmonic.im, expected, 1e-8);
+    }
+    // towards resonance: without stops the amplitude grows without bound below beta = pi/4, and above no such motion exists
+    for r in [0.99, 0.999, 0.9999, 1.0001, 1.001] {
+        let (u, v) = functions(r);
+        near("limit of boundedness", (v / u).abs(), FRAC_PI_4, 0.6 * (1.0 - r).abs());
+        close("amplitude near resonance", orbit(0.5, r).places[0].maximum, amplitude(0.5, r), 1e-8);
+        assert!(amplitude(0.9, r).is_nan());
+        let stops = orbit(0.9, r);
+        assert!(stops.joints[0].slip_fraction < 1.0 && stops.places[0].maximum < 10.0, "{stops:?}");
+    }
+}
+
+#[test]
+fn theory_7_5_determinant_of_the_return_map() {
+    for (beta, r) in CASES {
+        let (orbit, x0) = (orbit(beta, r), amplitude(beta, r));
+        let map = &orbit.return_map;
+        let determinant = map[(0, 0)] * map[(1, 1)] - map[(0, 1)] * map[(1, 0)];
+        close("determinant", determinant, (x0 * r * r - beta) / (x0 * r * r + beta), 1e-8);
+        // both multipliers of the full period have the modulus |det| (a pair of equal modulus over half a period, squared)
+        let multipliers = orbit.multipliers();
+        close("product", (multipliers[0] * multipliers[1]).re, determinant * determinant, 1e-8);
+        if multipliers[0].im != 0.0 {
+            close("modulus", multipliers[0].norm(), determinant, 1e-8);
+        }
+        assert!(orbit.is_stable());
+    }
+    let orbit = orbit(0.5, 0.8);
+    let map = &orbit.return_map;
+    near("printed", map[(0, 0)] * map[(1, 1)] - map[(0, 1)] * map[(1, 0)], 0.49815078, 0.5e-8);
+}
+
+/// Excitation of the base by `Y cos(Ωt)` with friction against the base: the relative motion obeys the same equation with
+/// `P = m Ω² Y`. Source: Hundal (1979).
+#[test]
+fn theory_7_base_excitation() {
+    for (beta, r, y) in [(0.5, 0.8, 0.01), (0.4, 1.3, 0.02), (0.5, 2.5, 0.01)] {
+        let (m, k) = (2.0f64, 50.0f64);
+        let omega = r * (k / m).sqrt();
+        let p = m * omega * omega * y;
+        let model = Model {
+            masses: vec![Mass { name: "m".into(), mass: m }],
+            springs: vec![Spring { between: ["m".into(), "base".into()], stiffness: k, damping: 0.0 }],
+            joints: vec![Joint {
+                name: "rub".into(),
+                between: ["m".into(), "base".into()],
+                law: Law::Coulomb(Coulomb { limit: beta * p }),
+            }],
+            motions: vec![Motion { on: "base".into(), amplitude: y, phase: 0.0, harmonic: 1 }],
+            ..Model::default()
+        };
+        let orbit = exact(&model.assemble().unwrap(), omega);
+        let x0 = p / k * amplitude(beta, r);
+        close("relative amplitude", orbit.joints[0].displacement.1, x0, 1e-8);
+        close("loss", orbit.joints[0].dissipation, 4.0 * beta * p * x0, 1e-8);
+        close("work of the base", orbit.energy.work_in, orbit.joints[0].dissipation, 1e-8);
+    }
+}
