@@ -1,1 +1,102 @@
-fn main() {}
+//! The `stickslip` command.
+
+mod args;
+mod list;
+mod paper;
+mod progress;
+mod run;
+
+use args::{Cli, Command};
+use clap::{CommandFactory, Parser};
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// How a command ends; the numbers are those of the exit status.
+#[derive(Debug)]
+pub enum Ending {
+    /// All points converged.
+    Done,
+    /// Results are written, some points failed.
+    SomeFailed,
+    /// The input is wrong; nothing was written. The report has been printed.
+    WrongInput,
+    /// Anything else, in words.
+    Failed(String),
+}
+
+impl Ending {
+    fn code(&self) -> ExitCode {
+        match self {
+            Ending::Done => ExitCode::SUCCESS,
+            Ending::Failed(_) => ExitCode::from(1),
+            Ending::WrongInput => ExitCode::from(2),
+            Ending::SomeFailed => ExitCode::from(3),
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let ending = match cli.command {
+        Command::Paper { place } => run::paper(&place),
+        Command::Run { files, place, set, method, only, json } => {
+            run::run(&run::Request { files: &files, set: &set, method: method.as_deref() }, &place, &only, json)
+        }
+        Command::Check { files, set, method } => {
+            run::check(&run::Request { files: &files, set: &set, method: method.as_deref() })
+        }
+        Command::New { template, file } => new(&template, file.as_deref()),
+        Command::List { what } => print(&list::text(what)),
+        Command::Schema => match serde_json::to_string_pretty(&stickslip_study::schema::json_schema()) {
+            Ok(text) => print(&(text + "\n")),
+            Err(error) => Ending::Failed(error.to_string()),
+        },
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "stickslip", &mut script);
+            print(&String::from_utf8_lossy(&script))
+        }
+        Command::Man => {
+            let mut page = Vec::new();
+            match clap_mangen::Man::new(Cli::command()).render(&mut page) {
+                Ok(()) => print(&String::from_utf8_lossy(&page)),
+                Err(error) => Ending::Failed(error.to_string()),
+            }
+        }
+    };
+    if let Ending::Failed(message) = &ending {
+        eprintln!("error: {message}");
+    }
+    ending.code()
+}
+
+/// Prints on standard output; a reader that has gone away (`| head`) is no error.
+fn print(text: &str) -> Ending {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Ending::Failed(error.to_string()),
+        _ => Ending::Done,
+    }
+}
+
+fn new(name: &str, file: Option<&Path>) -> Ending {
+    let Some(template) = stickslip::model::templates::find(name) else {
+        let names: Vec<&str> = stickslip::model::templates::TABLE.iter().map(|t| t.name).collect();
+        eprintln!("error: there is no template `{name}`; there are {}", names.join(", "));
+        return Ending::WrongInput;
+    };
+    let Some(file) = file else { return print(template.study) };
+    let written = std::fs::OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .open(file)
+        .and_then(|mut f| f.write_all(template.study.as_bytes()));
+    match written {
+        Ok(()) => Ending::Done,
+        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+            eprintln!("error: {} is there already and stays as it is; choose another name", file.display());
+            Ending::WrongInput
+        }
+        Err(error) => Ending::Failed(format!("{}: {error}", file.display())),
+    }
+}

@@ -125,6 +125,14 @@ pub fn run(study: &Study, context: &Context<'_>) -> Result<Dataset, StudyError> 
     })
 }
 
+/// Prepares every case and computes nothing: whether [`run()`] would begin.
+///
+/// # Errors
+/// [`StudyError`]: the method cannot take the model of a case.
+pub fn check(study: &Study) -> Result<(), StudyError> {
+    (0..study.cases()).try_for_each(|index| prepare(study, study.case(index)?).map(drop))
+}
+
 fn prepare(study: &Study, case: Case) -> Result<Prepared, StudyError> {
     let row = method::find(&case.method.name).ok_or_else(|| {
         study.error_at("method", 0, "kind", format!("there is no method `{}`", case.method.name), None)

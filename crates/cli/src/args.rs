@@ -1,0 +1,112 @@
+//! The command line: what can be typed.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// How structures with dry-friction joints vibrate.
+#[derive(Debug, Parser)]
+#[command(name = "stickslip", version, about, long_about = None, max_term_width = 100)]
+#[command(
+    after_help = "Exit status: 0 all points converged; 3 results written, some points failed; 2 the input is wrong, nothing \
+                        written; 1 anything else."
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Compute every figure of Pust, Pesek, Radolfova (2015) and check the paper's claims
+    Paper {
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Run study files
+    Run {
+        /// Study files (TOML)
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+        #[command(flatten)]
+        place: Place,
+        /// Change a parameter, for example --set Ft=3N (may be given several times)
+        #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
+        set: Vec<(String, String)>,
+        /// Use this method instead of the file's
+        #[arg(long)]
+        method: Option<String>,
+        /// Write only these outputs: csv, json, svg, png, html (comma between them)
+        #[arg(long, value_delimiter = ',')]
+        only: Vec<String>,
+        /// Print the whole dataset as JSON on standard output
+        #[arg(long)]
+        json: bool,
+    },
+    /// Check study files without running them
+    Check {
+        /// Study files (TOML)
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+        /// Change a parameter, for example --set Ft=3N (may be given several times)
+        #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
+        set: Vec<(String, String)>,
+        /// Use this method instead of the file's
+        #[arg(long)]
+        method: Option<String>,
+    },
+    /// Start a study file from a template
+    New {
+        /// Template (see `stickslip list templates`)
+        template: String,
+        /// File to write; standard output when absent
+        file: Option<PathBuf>,
+    },
+    /// List what there is
+    List {
+        /// What to list
+        what: What,
+    },
+    /// Print the JSON Schema of study files, for editors
+    Schema,
+    /// Print a completion script
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page (roff)
+    #[command(hide = true)]
+    Man,
+}
+
+/// Where results go and how many threads compute them.
+#[derive(Debug, Args)]
+pub struct Place {
+    /// Folder of the results; each study gets a folder of its name in it
+    #[arg(long, default_value = "stickslip-out")]
+    pub out: PathBuf,
+    /// Threads; all cores when absent. Results do not depend on it
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+}
+
+/// What `list` lists.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum What {
+    /// Friction laws
+    Laws,
+    /// Methods
+    Methods,
+    /// Model templates
+    Templates,
+    /// Study kinds
+    Studies,
+}
+
+fn assignment(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() => Ok((name.trim().to_owned(), value.trim().to_owned())),
+        _ => Err(format!("expected NAME=VALUE, for example Ft=3N, found `{text}`")),
+    }
+}

@@ -1,0 +1,46 @@
+//! `stickslip list`: the tables of laws, methods, templates and study kinds.
+
+use crate::args::What;
+use stickslip::{law, method, model::templates};
+use stickslip_study::kinds;
+
+/// The list as text.
+pub fn text(what: What) -> String {
+    let mut out = String::new();
+    let mut entry = |name: &str, summary: &str, keys: &[(String, String)]| {
+        out += &format!("{name}\n    {summary}\n");
+        let width = keys.iter().map(|(key, _)| key.chars().count()).max().unwrap_or(0);
+        for (key, doc) in keys {
+            out += &format!("      {key:width$}  {doc}\n");
+        }
+    };
+    match what {
+        What::Laws => {
+            for row in law::TABLE {
+                let keys: Vec<_> =
+                    row.parameters.iter().map(|p| (p.key.to_owned(), format!("{}: {}", p.dimension, p.doc))).collect();
+                entry(row.name, row.summary, &keys);
+            }
+        }
+        What::Methods => {
+            for row in method::TABLE {
+                let keys: Vec<_> = row.options.iter().map(|o| (o.key.to_owned(), o.doc.to_owned())).collect();
+                entry(row.name, row.summary, &keys);
+            }
+        }
+        What::Templates => {
+            for row in templates::TABLE {
+                let keys: Vec<_> =
+                    row.parameters.iter().map(|p| (format!("{} = {}", p.key, p.default), p.doc.to_owned())).collect();
+                entry(row.name, row.summary, &keys);
+            }
+        }
+        What::Studies => {
+            for row in kinds::TABLE {
+                let keys: Vec<_> = row.keys.iter().map(|k| (k.name.to_owned(), k.doc.to_owned())).collect();
+                entry(row.name, row.summary, &keys);
+            }
+        }
+    }
+    out
+}
