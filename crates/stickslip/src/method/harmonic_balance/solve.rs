@@ -4,7 +4,7 @@
 //! `c + R f(c) - c_lin = 0` per harmonic. Newton's method with the exact derivative; where it fails, friction is made smooth and
 //! sharpened step by step. Rigid sliders end with rounds of multipliers, after which the width has no influence.
 
-use super::joints::{Alternation, Coordinate, Sharpness};
+use super::joints::{Alternation, Coordinate, Seen, Sharpness};
 use super::rest::Rest;
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
@@ -17,6 +17,8 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 pub(super) const SOLVED: f64 = 1e-10;
 /// Newton iterations at one sharpness; 3 to 6 are usual.
 const ITERATIONS: usize = 40;
+/// Whole steps that may pass without coming closer.
+const PATIENCE: usize = 8;
 /// Halvings of a step.
 const HALVINGS: usize = 7;
 /// The width of rigid sliders at the end, relative to the largest velocity of the motion; multipliers remove its influence.
@@ -41,7 +43,9 @@ pub(super) struct Level {
     tangents: Vec<f64>,
     jacobian: Vec<f64>,
     residual: Vec<f64>,
-    next: Vec<Vec<f64>>,
+    step: Vec<f64>,
+    next: Vec<Vec<Seen>>,
+    seen: Vec<Vec<Seen>>,
 }
 
 /// A solution or a start.
@@ -60,7 +64,7 @@ pub(super) struct Motion {
 
 impl Default for Sharpness {
     fn default() -> Self {
-        Sharpness { width: 0.0, blur: 0.0, limits: 1.0 }
+        Sharpness { width: 0.0, blur: 0.0, limits: 1.0, hold: false }
     }
 }
 
@@ -83,7 +87,9 @@ impl Level {
             tangents: vec![0.0; 4 * nh * nh * coordinates],
             jacobian: vec![0.0; size * size],
             residual: vec![0.0; size],
-            next: vec![vec![0.0; samples]; rigid],
+            step: vec![0.0; size],
+            seen: Vec::new(),
+            next: vec![vec![Seen::Force(0.0); samples]; rigid],
         }
     }
 
@@ -157,8 +163,10 @@ impl Level {
                     for p in 0..count {
                         let r = self.receptance[k][(q, p)];
                         let from = &self.tangents[p * block..(p + 1) * block];
-                        let (re, im) =
-                            (&from[2 * k * 2 * nh..(2 * k + 1) * 2 * nh], &from[(2 * k + 1) * 2 * nh..(2 * k + 2) * 2 * nh]);
+                        let (re, im) = (
+                            &from[2 * k * 2 * nh..(2 * k + 1) * 2 * nh],
+                            &from[(2 * k + 1) * 2 * nh..(2 * k + 2) * 2 * nh],
+                        );
                         let row = 2 * (q * nh + k) * size + 2 * p * nh;
                         let (first, second) = self.jacobian[row..].split_at_mut(size);
                         for b in 0..2 * nh {
@@ -179,53 +187,93 @@ impl Level {
     fn size(&self, motion: &Motion) -> f64 {
         let nh = self.harmonics().len();
         let norm = |c: &[Complex64]| {
-            c.iter().enumerate().map(|(i, z)| z.norm_sqr() * weight(self.alternation.harmonics[i % nh])).sum::<f64>().sqrt()
+            c.iter()
+                .enumerate()
+                .map(|(i, z)| z.norm_sqr() * weight(self.alternation.harmonics[i % nh]))
+                .sum::<f64>()
+                .sqrt()
         };
         norm(&motion.c) + 1e-3 * norm(&self.linear)
     }
 
-    /// Newton's method at the sharpness of `motion`.
-    pub fn newton(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion, most: usize) -> Result<(), Lost> {
-        let mut trial = motion.clone();
+    /// Newton's method at the sharpness of `motion`: whole steps as long as they come closer within [`PATIENCE`] of them, which is
+    /// the rule when only the set of slipping samples is searched; shortened steps from the best motion where they do not.
+    pub fn newton(
+        &mut self,
+        coordinates: &[Coordinate],
+        omega: f64,
+        motion: &mut Motion,
+        most: usize,
+    ) -> Result<(), Lost> {
+        let size = self.residual.len();
         let mut residual = self.evaluate(coordinates, omega, motion, true);
+        let mut best = (residual, motion.c.clone());
+        let (mut waits, mut short) = (0, false);
         for _ in 0..most {
             motion.residual = residual / self.size(motion).max(f64::MIN_POSITIVE);
             if motion.residual <= SOLVED || residual == 0.0 {
                 return Ok(());
             }
-            let size = self.residual.len();
             if !dense::solve(&mut self.jacobian, size, &mut self.residual) {
                 break;
             }
             motion.iterations += 1;
-            trial.sharpness = motion.sharpness;
-            let step: Vec<Complex64> =
-                self.residual.chunks_exact(2).map(|pair| Complex64::new(pair[0], pair[1])).collect();
+            self.step.copy_from_slice(&self.residual);
+            let from = if short { best.1.clone() } else { motion.c.clone() };
             let mut fraction = 1.0;
             let mut accepted = false;
-            for _ in 0..=HALVINGS {
-                for ((t, c), d) in trial.c.iter_mut().zip(&motion.c).zip(&step) {
-                    *t = c - d * fraction;
+            for _ in 0..=if short { HALVINGS } else { 0 } {
+                for ((t, c), d) in motion.c.iter_mut().zip(&from).zip(self.step.chunks_exact(2)) {
+                    *t = c - Complex64::new(d[0], d[1]) * fraction;
                 }
-                let after = self.evaluate(coordinates, omega, &mut trial, true);
-                if after.is_finite() && after < (1.0 - 1e-3 * fraction) * residual {
-                    residual = after;
-                    std::mem::swap(&mut motion.c, &mut trial.c);
-                    std::mem::swap(&mut motion.force, &mut trial.force);
+                residual = self.evaluate(coordinates, omega, motion, true);
+                if residual.is_finite() && residual < (1.0 - 1e-3 * fraction) * best.0 {
                     accepted = true;
                     break;
                 }
                 fraction *= 0.5;
             }
-            if !accepted {
+            if accepted {
+                best.0 = residual;
+                best.1.copy_from_slice(&motion.c);
+                waits = 0;
+                continue;
+            }
+            waits += 1;
+            if short {
                 break;
             }
+            if waits > PATIENCE || !residual.is_finite() {
+                short = true;
+                motion.c.copy_from_slice(&best.1);
+                residual = self.evaluate(coordinates, omega, motion, true);
+            }
         }
+        motion.c.copy_from_slice(&best.1);
+        let residual = self.evaluate(coordinates, omega, motion, false);
         motion.residual = residual / self.size(motion).max(f64::MIN_POSITIVE);
         if motion.residual <= SOLVED {
             return Ok(());
         }
         Err(Lost { iterations: motion.iterations, residual: motion.residual })
+    }
+
+    /// One Newton step with every rigid slider left as free or as clamped as it was in the last evaluation.
+    fn hold_step(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion) {
+        let before = motion.c.clone();
+        motion.sharpness.hold = true;
+        self.evaluate(coordinates, omega, motion, true);
+        motion.sharpness.hold = false;
+        let size = self.residual.len();
+        if dense::solve(&mut self.jacobian, size, &mut self.residual) {
+            motion.iterations += 1;
+            for (c, d) in motion.c.iter_mut().zip(self.residual.chunks_exact(2)) {
+                *c -= Complex64::new(d[0], d[1]);
+            }
+            if !motion.c.iter().all(|c| c.is_finite()) {
+                motion.c = before;
+            }
+        }
     }
 
     /// Largest velocity along a coordinate, m/s.
@@ -237,13 +285,7 @@ impl Level {
     }
 
     /// From `start` (a solution nearby) or, without one, from smooth friction.
-    pub fn solve(
-        &mut self,
-        coordinates: &[Coordinate],
-        omega: f64,
-        start: Motion,
-        warm: bool,
-    ) -> Result<Motion, Lost> {
+    pub fn solve(&mut self, coordinates: &[Coordinate], omega: f64, start: Motion, warm: bool) -> Result<Motion, Lost> {
         use super::joints::Slider;
         let has = |test: fn(&Slider) -> bool| coordinates.iter().flat_map(|c| &c.sliders).any(test);
         let rigid = has(|s| matches!(s, Slider::Rigid { .. }));
@@ -255,9 +297,9 @@ impl Level {
             motion.iterations = 0;
             motion.sharpness = Sharpness::default();
             motion.sharpness.width = (WIDTH * self.speed(&motion.c, omega)).max(LEAST_WIDTH * free_speed);
-            let done = self.newton(coordinates, omega, &mut motion, ITERATIONS).and_then(|()| {
-                if rigid { self.settle_multipliers(coordinates, omega, &mut motion) } else { Ok(()) }
-            });
+            let done = self
+                .newton(coordinates, omega, &mut motion, ITERATIONS)
+                .and_then(|()| if rigid { self.settle_multipliers(coordinates, omega, &mut motion) } else { Ok(()) });
             match done {
                 Ok(()) => return Ok(motion),
                 Err(lost) => spent += lost.iterations,
@@ -287,28 +329,48 @@ impl Level {
         free_speed: f64,
     ) -> Result<(), Lost> {
         motion.c.copy_from_slice(&self.linear);
-        let mut width = free_speed;
-        let mut factor = SHARPEN;
+        let (mut width, mut factor) = (free_speed, SHARPEN);
         let mut good: Option<Motion> = None;
         loop {
-            motion.sharpness = Sharpness { width, blur: width, limits: 1.0 };
-            match self.newton(coordinates, omega, motion, ITERATIONS) {
+            motion.sharpness = Sharpness { width, blur: width, ..Sharpness::default() };
+            if good.is_some() && rigid {
+                self.hold_step(coordinates, omega, motion);
+            }
+            let mut done = self.newton(coordinates, omega, motion, ITERATIONS);
+            if let (Err(_), Some(good)) = (&done, &good) {
+                // the same without the step that guesses what is free
+                let iterations = motion.iterations;
+                *motion = Motion { iterations, ..good.clone() };
+                motion.sharpness = Sharpness { width, blur: width, ..Sharpness::default() };
+                done = self.newton(coordinates, omega, motion, ITERATIONS);
+            }
+            match done {
                 Ok(()) => {
                     let target = (WIDTH * self.speed(&motion.c, omega)).max(LEAST_WIDTH * free_speed);
-                    good = Some(motion.clone());
                     if width <= target {
                         break;
                     }
+                    if rigid {
+                        // with the forces as multipliers the velocity in stick goes to zero before the width does
+                        let before = motion.clone();
+                        self.take_multipliers(coordinates, omega, motion);
+                        self.hold_step(coordinates, omega, motion);
+                        if self.newton(coordinates, omega, motion, ITERATIONS).is_err() {
+                            *motion = Motion { iterations: motion.iterations, ..before };
+                        }
+                        self.evaluate(coordinates, omega, motion, false);
+                    }
+                    good = Some(motion.clone());
                     width = (width * factor).max(0.999 * target);
                     factor = (factor * 0.8).max(SHARPEN * SHARPEN);
                 }
                 Err(lost) => {
                     let Some(good) = &good else { return Err(lost) };
                     let iterations = motion.iterations;
-                    *motion = good.clone();
-                    motion.iterations = iterations;
+                    *motion = Motion { iterations, ..good.clone() };
+                    self.evaluate(coordinates, omega, motion, false);
                     factor = factor.sqrt();
-                    if factor > 0.9 {
+                    if factor > 0.97 {
                         return Err(lost);
                     }
                     width = good.sharpness.width * factor;
@@ -355,18 +417,32 @@ impl Level {
         Ok(())
     }
 
+    /// Replaces multipliers by the forces.
+    fn take_multipliers(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion) {
+        self.evaluate(coordinates, omega, motion, false);
+        self.seen.clone_from(&self.next);
+        for (multipliers, seen) in motion.multipliers.iter_mut().zip(&self.seen) {
+            for (multiplier, seen) in multipliers.iter_mut().zip(seen) {
+                *multiplier = match seen {
+                    Seen::Force(force) => *force,
+                    Seen::Crossing => 0.0,
+                };
+            }
+        }
+    }
+
     /// Replaces multipliers by the forces until that changes nothing: the width has no influence then.
     fn settle_multipliers(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion) -> Result<(), Lost> {
         for _ in 0..ROUNDS {
-            self.evaluate(coordinates, omega, motion, false);
-            for (multipliers, next) in motion.multipliers.iter_mut().zip(&self.next) {
-                multipliers.copy_from_slice(next);
-            }
+            self.take_multipliers(coordinates, omega, motion);
             let residual = self.evaluate(coordinates, omega, motion, false) / self.size(motion).max(f64::MIN_POSITIVE);
             motion.residual = residual;
             if residual <= SOLVED {
                 return Ok(());
             }
+            // which sliders are free is known from the solution, not from its evaluation with new multipliers
+            self.next.clone_from(&self.seen);
+            self.hold_step(coordinates, omega, motion);
             self.newton(coordinates, omega, motion, ITERATIONS)?;
         }
         Err(Lost { iterations: motion.iterations, residual: motion.residual })

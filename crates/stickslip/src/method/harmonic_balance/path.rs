@@ -1,0 +1,356 @@
+//! The orbit of a solution of harmonic balance.
+
+use super::joints::{Coordinate, Seen, Slider};
+use super::rest::Rest;
+use super::solve::{Level, Motion};
+use crate::method::Contact;
+use crate::model::{MovedPlace, System};
+use crate::orbit::{Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// Velocities below this many times the estimated error of the motion are rest: in stick a truncated series ripples.
+const RIPPLE: f64 = 3.0;
+/// The same if nothing is known of the error, as a fraction of the largest velocity.
+const REST: f64 = 1e-6;
+
+/// Harmonics of all places under the forces of a motion.
+pub(super) fn places(
+    level: &Level,
+    coordinates: &[Coordinate],
+    rest: &Rest,
+    omega: f64,
+    motion: &Motion,
+) -> Vec<DVector<Complex64>> {
+    let nh = level.harmonics().len();
+    (0..nh)
+        .map(|k| {
+            let forces = rest.spread(|q| motion.force[q * nh + k]);
+            let _ = coordinates;
+            &level.free[k] - rest.respond(level.harmonics()[k], omega, &forces)
+        })
+        .collect()
+}
+
+#[derive(Debug, Clone)]
+struct Series {
+    system: System,
+    omega: f64,
+    harmonics: Vec<usize>,
+    x: Vec<DVector<Complex64>>,
+    /// Force and contact per joint and sample.
+    force: Vec<Vec<f64>>,
+    contact: Vec<Vec<Contact>>,
+}
+
+/// What the solver knows beside the motion.
+pub(super) struct Context<'a> {
+    pub system: &'a System,
+    pub coordinates: &'a [Coordinate],
+    pub omega: f64,
+    pub odd: bool,
+    pub truncation: Option<f64>,
+    pub return_map: DMatrix<f64>,
+}
+
+/// Makes the orbit.
+pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec<DVector<Complex64>>) -> Orbit {
+    let Context { system, coordinates, omega, odd, truncation, return_map } = context;
+    let (n, nh) = (system.dofs(), level.harmonics().len());
+    let harmonics = level.harmonics().to_vec();
+    let samples = level.alternation.samples();
+    let mut force = vec![vec![0.0; samples]; system.joints.len()];
+    let mut contact = vec![vec![Contact::Stick; samples]; system.joints.len()];
+    let mut joints = Vec::new();
+    let mut elastic_states = Vec::new();
+    let mut stuck = Vec::new();
+    let mut next: Vec<Vec<Seen>> = motion.multipliers.iter().map(|m| vec![Seen::Force(0.0); m.len()]).collect();
+    for (q, coordinate) in coordinates.iter().enumerate() {
+        let c = &motion.c[q * nh..(q + 1) * nh];
+        let f = &motion.force[q * nh..(q + 1) * nh];
+        let j = coordinate.joint;
+        level.alternation.synthesise(c, omega);
+        let fastest = level.alternation.velocity.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let threshold = fastest * REST.max(RIPPLE * truncation.unwrap_or(0.0)).min(0.2);
+        for slider in &coordinate.sliders {
+            level.alternation.slide(slider, c, motion.sharpness, &motion.multipliers, &mut next);
+            if matches!(slider, Slider::Elastic { .. }) {
+                elastic_states.push(level.alternation.force[0]);
+            }
+            for i in 0..samples {
+                force[j][i] += level.alternation.force[i];
+                let moves = match slider {
+                    Slider::Elastic { .. } => level.alternation.slips[i],
+                    Slider::Rigid { .. } => {
+                        // within a stick interval the series passes through zero between samples of full force
+                        fastest > motion.sharpness.width && level.alternation.velocity[i].abs() > threshold
+                    }
+                    Slider::Smooth { .. } => level.alternation.slips[i],
+                };
+                if moves {
+                    let sign = match slider {
+                        Slider::Elastic { .. } => level.alternation.force[i],
+                        _ => level.alternation.velocity[i],
+                    };
+                    contact[j][i] = Contact::slip(sign);
+                }
+            }
+        }
+        // ∮ f du with the projected force: for the series it is the integral itself
+        let dissipation: f64 = (0..nh).map(|k| cycle_work(harmonics[k], f[k], c[k])).sum();
+        let u: Vec<(usize, Complex64)> = (0..nh).map(|k| (harmonics[k], c[k] + f[k] * coordinate.series)).collect();
+        let (low, high) = extremes(&u, level);
+        let slipping = contact[j].iter().filter(|c| **c != Contact::Stick).count();
+        let switches = (0..samples).filter(|&i| contact[j][i] != contact[j][(i + 1) % samples]).count();
+        if slipping == 0 {
+            stuck.push(system.joints[j].name.clone());
+        }
+        joints.push(JointMotion {
+            name: system.joints[j].name.clone(),
+            dissipation,
+            slip_fraction: slipping as f64 / samples as f64,
+            displacement: (low, high),
+            switches,
+        });
+    }
+    let places = (0..n)
+        .map(|i| {
+            let series: Vec<(usize, Complex64)> = (0..nh).map(|k| (harmonics[k], x[k][i])).collect();
+            let (minimum, maximum) = extremes(&series, level);
+            let at = |h: usize| harmonics.binary_search(&h).map_or(ZERO, |k| x[k][i]);
+            PlaceMotion { name: system.places[i].clone(), maximum, minimum, mean: at(0).re, first_harmonic: at(1) }
+        })
+        .collect();
+    let energy = energy(system, coordinates, omega, &harmonics, &x, motion, &joints);
+    let possible = possible_work(system, omega, &harmonics, &x) + energy.friction.abs();
+    let reference = energy.work_in.abs().max(NO_WORK * possible);
+    let balance = energy.work_in - energy.viscous - energy.friction;
+    let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
+    start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
+    start.extend(elastic_states);
+    Orbit {
+        method: super::NAME,
+        omega,
+        symmetry: if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod },
+        start,
+        places,
+        evidence: Evidence {
+            residual: motion.residual,
+            energy_gap: if reference > 0.0 { balance.abs() / reference } else { balance.abs() },
+            switches: joints.iter().map(|j| j.switches).sum(),
+            iterations: motion.iterations,
+            truncation,
+            stuck,
+        },
+        joints,
+        energy,
+        return_map,
+        path: Arc::new(Series { system: system.clone(), omega, harmonics, x, force, contact }),
+    }
+}
+
+/// Work below this fraction of what the loads could do is no yardstick for the energy gap: the motion is conservative.
+const NO_WORK: f64 = 1e-6;
+
+/// `∫ f u' dt` over a period of `Re(F e^{jhΩt})` and `Re(U e^{jhΩt})`.
+fn cycle_work(h: usize, f: Complex64, u: Complex64) -> f64 {
+    -PI * h as f64 * (f.conj() * u).im
+}
+
+/// Loads and imposed motion by harmonic.
+fn moved(place: &MovedPlace, h: usize) -> Complex64 {
+    place.motion.iter().find(|(k, _)| *k as usize == h).map_or(ZERO, |(_, g)| *g)
+}
+
+fn energy(
+    system: &System,
+    coordinates: &[Coordinate],
+    omega: f64,
+    harmonics: &[usize],
+    x: &[DVector<Complex64>],
+    motion: &Motion,
+    joints: &[JointMotion],
+) -> Energy {
+    let n = system.dofs();
+    let nh = harmonics.len();
+    let (mut work, mut viscous) = (0.0, 0.0);
+    let excitation = system.excitation(omega);
+    for (k, &h) in harmonics.iter().enumerate() {
+        let s = Complex64::new(0.0, h as f64 * omega);
+        let x = &x[k];
+        if let Some((_, load)) = excitation.iter().find(|(number, _)| *number as usize == h) {
+            work += (0..n).map(|i| cycle_work(h, load[i], x[i])).sum::<f64>();
+        }
+        for i in 0..n {
+            for l in 0..n {
+                let c = system.damping[(i, l)];
+                if c != 0.0 {
+                    viscous += cycle_work(h, s * x[l] * c, x[i]);
+                }
+            }
+        }
+        for (m, place) in system.moved.iter().enumerate() {
+            let g = moved(place, h);
+            let forces = |j: usize| -> Complex64 {
+                coordinates
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, c)| c.joint == j)
+                    .map(|(q, _)| motion.force[q * nh + k])
+                    .sum()
+            };
+            let joint_part: Complex64 = (0..system.joints.len()).map(|j| place.joints[j] * forces(j)).sum();
+            work += cycle_work(h, linear_reaction(system, m, h, s, x) + joint_part, g);
+            for i in 0..n {
+                let (stiffness, damping) = (place.stiffness.0[i], place.damping.0[i]);
+                // the load on the masses contains what the moved place does to them: that is no work from outside
+                work += cycle_work(h, g * (stiffness + s * damping), x[i]);
+                viscous += 2.0 * cycle_work(h, s * g * damping, x[i]);
+            }
+            for (other, c) in place.damping.1.iter().enumerate() {
+                viscous += cycle_work(h, s * moved(&system.moved[other], h) * *c, g);
+            }
+        }
+    }
+    Energy { work_in: work, viscous, friction: joints.iter().map(|joint| joint.dissipation).sum() }
+}
+
+/// The force that moves a place, without that of the joints.
+fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVector<Complex64>) -> Complex64 {
+    let place = &system.moved[m];
+    let mut force = moved(place, h) * s * s * place.mass;
+    for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
+        force += moved(&system.moved[other], h) * (*k + s * *c);
+    }
+    for i in 0..x.len() {
+        force += x[i] * (place.stiffness.0[i] + s * place.damping.0[i]);
+    }
+    force
+}
+
+/// What the loads could do: force amplitude times displacement amplitude.
+fn possible_work(system: &System, omega: f64, harmonics: &[usize], x: &[DVector<Complex64>]) -> f64 {
+    let mut sum = 0.0;
+    for (number, load) in system.excitation(omega) {
+        if let Ok(k) = harmonics.binary_search(&(number as usize)) {
+            sum += PI * number as f64 * (0..load.len()).map(|i| load[i].norm() * x[k][i].norm()).sum::<f64>();
+        }
+    }
+    sum
+}
+
+/// Least and largest value of a series: the extremes of its samples, moved to the zero of the slope.
+fn extremes(series: &[(usize, Complex64)], level: &mut Level) -> (f64, f64) {
+    let alternation = &mut level.alternation;
+    alternation.fourier.synthesise(series, &mut alternation.displacement);
+    let n = alternation.displacement.len();
+    let (mut lowest, mut highest) = (0, 0);
+    for i in 1..n {
+        if alternation.displacement[i] < alternation.displacement[lowest] {
+            lowest = i;
+        }
+        if alternation.displacement[i] > alternation.displacement[highest] {
+            highest = i;
+        }
+    }
+    let refined = |start: usize| {
+        let mut theta = start as f64 * TAU / n as f64;
+        let mut best = alternation.displacement[start];
+        for _ in 0..3 {
+            let (mut slope, mut bend) = (0.0, 0.0);
+            for &(h, c) in series {
+                let z = c * Complex64::cis(h as f64 * theta);
+                let h = h as f64;
+                slope -= h * z.im;
+                bend -= h * h * z.re;
+            }
+            let step = slope / bend;
+            if bend == 0.0 || !(step.abs() <= TAU / n as f64) {
+                break;
+            }
+            theta -= step;
+            best = series.iter().map(|&(h, c)| (c * Complex64::cis(h as f64 * theta)).re).sum();
+        }
+        best
+    };
+    let (low, high) = (refined(lowest), refined(highest));
+    (low.min(alternation.displacement[lowest]), high.max(alternation.displacement[highest]))
+}
+
+impl Path for Series {
+    fn sample(&self, time: f64) -> Sample {
+        let n = self.system.dofs();
+        let (mut x, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        let mut moved_now = vec![(0.0, 0.0); self.system.moved.len()];
+        for (&h, amplitude) in self.harmonics.iter().zip(&self.x) {
+            let s = Complex64::new(0.0, h as f64 * self.omega);
+            let turn = Complex64::cis(h as f64 * self.omega * time);
+            for i in 0..n {
+                let z = amplitude[i] * turn;
+                x[i] += z.re;
+                v[i] += (s * z).re;
+                a[i] += (s * s * z).re;
+            }
+            for (m, now) in moved_now.iter_mut().enumerate() {
+                now.0 += (moved(&self.system.moved[m], h) * turn).re;
+                now.1 += (linear_reaction(&self.system, m, h, s, amplitude) * turn).re;
+            }
+        }
+        let period = TAU / self.omega;
+        let joints: Vec<JointSample> = self
+            .system
+            .joints
+            .iter()
+            .enumerate()
+            .map(|(j, joint)| {
+                let samples = self.force[j].len();
+                let at = time / period * samples as f64;
+                let (low, part) = (at.floor() as usize, at.fract());
+                let (mut displacement, mut velocity) = (0.0, 0.0);
+                for i in 0..n {
+                    displacement += joint.direction[(i, 0)] * x[i];
+                    velocity += joint.direction[(i, 0)] * v[i];
+                }
+                for &(h, g) in &joint.imposed {
+                    let rate = f64::from(h) * self.omega;
+                    let z = g * Complex64::cis(rate * time);
+                    displacement += z.re;
+                    velocity -= rate * z.im;
+                }
+                JointSample {
+                    displacement,
+                    velocity,
+                    force: (1.0 - part) * self.force[j][low % samples] + part * self.force[j][(low + 1) % samples],
+                    contact: self.contact[j][(at.round() as usize) % samples],
+                }
+            })
+            .collect();
+        for (m, now) in moved_now.iter_mut().enumerate() {
+            now.1 +=
+                joints.iter().zip(&self.system.moved[m].joints).map(|(joint, sign)| joint.force * sign).sum::<f64>();
+        }
+        Sample { displacement: x, velocity: v, acceleration: a, joints, moved: moved_now }
+    }
+
+    fn switch_times(&self) -> Vec<f64> {
+        let period = TAU / self.omega;
+        let mut times: Vec<f64> = self
+            .contact
+            .iter()
+            .flat_map(|contact| {
+                let n = contact.len();
+                (0..n)
+                    .filter(|&i| contact[i] != contact[(i + n - 1) % n])
+                    .map(move |i| ((i as f64 - 0.5).rem_euclid(n as f64)) * period / n as f64)
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        times
+    }
+}
