@@ -1,6 +1,6 @@
 """Chain of eight blades with seven massless arctan joints: reference orbit by SciPy integration.
 
-    m x_i'' + b x_i' + k_i x_i + F_i - F_(i-1) = (i = 1) F0 cos(w t),      F_0 = F_8 = 0,      i = 1..8
+    m x_i'' + b x_i' + k_i x_i + F_i - F_(i-1) = F0 cos(w t) if i = 1 else 0,      F_0 = F_8 = 0,      i = 1..8
     F_j' = kt [u_j' - (1/alpha) tan(pi F_j / (2 Ft_j))],                   u_j = x_j - x_(j+1), j = 1..7
     k_i = 105103 (1 + 0.002 (i - 4.5)) N/m,   Ft_j = 1 + 0.5 j N
 
@@ -18,7 +18,7 @@ from periodic import Flow, half_period_jacobian, refined_maximum, symmetric_orbi
 
 N = 8
 m, b, kt, alpha, f = 0.182, 0.2, 1.0e4, 25000.0, 121.3
-FORCES = (10.0, 60.0)  # N; at 60 N several joints slip
+FORCES = (10.0, 60.0)  # N; in both cases joint 1 slips and the others only creep
 F0 = FORCES[0]
 w, T = 2 * pi * f, 1 / f
 k = 105103.0 * (1 + 0.002 * (np.arange(1, N + 1) - 4.5))

@@ -60,11 +60,11 @@ def half_period_jacobian(flow, x0, half, relative_step=1e-6):
     return columns
 
 
-def symmetric_orbit(flow, x0, half, jacobian=None, tolerance=1e-12, limit=15, verbose=False, refresh=0.1):
+def symmetric_orbit(flow, x0, half, jacobian=None, tolerance=1e-12, limit=30, verbose=False, refresh=0.1):
     """Newton on P(x0) + x0 = 0. Returns (x0, relative residual, dP/dx0, residual history).
 
     The residual is max |R_i| / scale_i. The Jacobian is renewed only when an iteration gains less than `refresh`.
-    Ends when the residual is below `tolerance`, or, after it has fallen below 1e-9, no longer falls.
+    Ends when the residual is below `tolerance`, or, below 1e-9, no longer falls with a fresh Jacobian.
     """
     x0 = np.array(x0, float)
     eye = np.eye(len(x0))
@@ -84,13 +84,13 @@ def symmetric_orbit(flow, x0, half, jacobian=None, tolerance=1e-12, limit=15, ve
             trial = x0 + weight * step
             trial_residual = flow.over(0.0, half, trial) + trial
             trial_size = np.max(np.abs(trial_residual) / s)
-            if trial_size < size or weight < 0.02:
+            if trial_size < size or weight < 1e-3:
                 break
             weight *= 0.5
         if verbose:
             print(f"    residual {size:.3e} -> {trial_size:.3e}  weight {weight:g}", flush=True)
         if trial_size >= size:
-            if size < 1e-9:
+            if fresh and size < 1e-9:
                 break
             if fresh:
                 raise RuntimeError(f"Newton stalls at {size:.3e}")
