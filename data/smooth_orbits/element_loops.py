@@ -224,7 +224,7 @@ def main():
                       f"others {rest[0]:.1e} {rest[1]:.1e}  multiplier {big:.2e}", flush=True)
                 rows.append([kind.__name__, "arctan", kt, a, w, W, 4 * Ft * (a - Ft / kt), size, *rest, big, "one orbit, period T"])
     print(f"{time.time() - begin:.0f} s", flush=True)
-    # the arctan element with mass and growing alpha must tend to the Coulomb one (it does like alpha^(-1/2), not monotonically)
+    # the arctan element with mass and growing alpha must tend to the Coulomb one (slowly, not monotonically)
     global alpha
     keep = alpha
     for alpha in (1e9, 1e11):
