@@ -120,18 +120,25 @@ pub fn near(what: &str, actual: f64, expected: f64, absolute: f64) {
 }
 
 /// Where `function` is largest in `[low, high]`, and its largest value there: a scan over `points` intervals, then golden-section
-/// search between the neighbours of the best one until the bracket is below `width`.
+/// search between the neighbours of each of the three highest maxima of the scan until the bracket is below `width`.
 pub fn maximum(mut function: impl FnMut(f64) -> f64, [low, high]: [f64; 2], points: usize, width: f64) -> (f64, f64) {
     let at = |i: usize| low + (high - low) * i as f64 / points as f64;
-    let mut best = (f64::NEG_INFINITY, 0);
-    for i in 0..=points {
-        let value = function(at(i));
-        if value > best.0 {
-            best = (value, i);
-        }
-    }
+    let values: Vec<f64> = (0..=points).map(|i| function(at(i))).collect();
+    let mut tops: Vec<usize> = (0..=points)
+        .filter(|&i| values[i] >= values[i.saturating_sub(1)] && values[i] >= values[(i + 1).min(points)])
+        .collect();
+    tops.sort_by(|&i, &j| values[j].total_cmp(&values[i]));
+    tops.truncate(3);
+    let refined = tops.iter().map(|&i| {
+        let (x, value) = golden(&mut function, [at(i.saturating_sub(1)), at((i + 1).min(points))], width);
+        if value > values[i] { (x, value) } else { (at(i), values[i]) }
+    });
+    refined.max_by(|x, y| x.1.total_cmp(&y.1)).expect("a scan has a maximum")
+}
+
+/// Golden-section search. Source: Kiefer (1953).
+fn golden(mut function: impl FnMut(f64) -> f64, [mut a, mut b]: [f64; 2], width: f64) -> (f64, f64) {
     let golden = 0.5 * (5f64.sqrt() - 1.0);
-    let (mut a, mut b) = (at(best.1.saturating_sub(1)), at((best.1 + 1).min(points)));
     let (mut c, mut d) = (b - golden * (b - a), a + golden * (b - a));
     let (mut fc, mut fd) = (function(c), function(d));
     while b - a > width {
@@ -145,8 +152,7 @@ pub fn maximum(mut function: impl FnMut(f64) -> f64, [low, high]: [f64; 2], poin
             fd = function(d);
         }
     }
-    let candidates = [(c, fc), (d, fd), (at(best.1), best.0)];
-    *candidates.iter().max_by(|x, y| x.1.total_cmp(&y.1)).expect("three candidates")
+    if fc > fd { (c, fc) } else { (d, fd) }
 }
 
 /// The zero of `function` in `[low, high]`, at whose ends it has different signs, by bisection to the last bit.
