@@ -184,6 +184,23 @@ pub enum OrbitError {
         /// The gap.
         energy_gap: f64,
     },
+    /// The series that the method may take is too short for the tolerance.
+    #[error(
+        "{method} reaches an estimated error of {estimate:.1e} at Ω = {omega:.4} rad/s with {harmonics} harmonics, not {tolerance:.1e}; \
+         raise `tolerance`, or use method `event-driven`"
+    )]
+    Truncation {
+        /// The method.
+        method: &'static str,
+        /// Drive frequency, rad/s.
+        omega: f64,
+        /// Highest harmonic tried.
+        harmonics: usize,
+        /// Error of the motion relative to its amplitude, estimated.
+        estimate: f64,
+        /// The error that was allowed.
+        tolerance: f64,
+    },
     /// The drive frequency is no positive finite number.
     #[error("the drive frequency must be positive and finite, found {omega} rad/s")]
     Frequency {
@@ -199,6 +216,7 @@ impl OrbitError {
             OrbitError::NotConverged { .. } => "not-converged",
             OrbitError::Breakdown { .. } => "breakdown",
             OrbitError::Evidence { .. } => "evidence-fails",
+            OrbitError::Truncation { .. } => "tolerance-not-reached",
             OrbitError::Frequency { .. } => "bad-frequency",
         }
     }

@@ -28,7 +28,9 @@ const LEAST_WIDTH: f64 = 1e-9;
 /// Factor by which friction is sharpened, as long as Newton's method follows.
 const SHARPEN: f64 = 0.25;
 /// Rounds of multipliers.
-const ROUNDS: usize = 40;
+const ROUNDS: usize = 20;
+/// A round that changes the motion by less than this share ends the search: the width has less influence still.
+const INDEPENDENT: f64 = 1e-8;
 
 /// All that belongs to one number of harmonics.
 #[derive(Debug, Clone)]
@@ -328,7 +330,8 @@ impl Level {
         (rigid, smooth): (bool, bool),
         free_speed: f64,
     ) -> Result<(), Lost> {
-        motion.c.copy_from_slice(&self.linear);
+        let guess = std::mem::replace(&mut motion.c, self.linear.clone());
+        let mut guess = Some(guess);
         let (mut width, mut factor) = (free_speed, SHARPEN);
         let mut good: Option<Motion> = None;
         loop {
@@ -365,8 +368,12 @@ impl Level {
                     factor = (factor * 0.8).max(SHARPEN * SHARPEN);
                 }
                 Err(lost) => {
-                    let Some(good) = &good else { return Err(lost) };
                     let iterations = motion.iterations;
+                    let Some(good) = &good else {
+                        // the first width failed from the motion without friction: once more from the first guess
+                        motion.c = guess.take().ok_or(lost)?;
+                        continue;
+                    };
                     *motion = Motion { iterations, ..good.clone() };
                     self.evaluate(coordinates, omega, motion, false);
                     factor = factor.sqrt();
@@ -442,8 +449,15 @@ impl Level {
             }
             // which sliders are free is known from the solution, not from its evaluation with new multipliers
             self.next.clone_from(&self.seen);
+            let before = motion.c.clone();
             self.hold_step(coordinates, omega, motion);
             self.newton(coordinates, omega, motion, ITERATIONS)?;
+            let (nh, size) = (self.harmonics().len(), self.size(motion));
+            let change = before.iter().zip(&motion.c).enumerate();
+            let change = change.map(|(i, (a, b))| (a - b).norm_sqr() * weight(self.alternation.harmonics[i % nh]));
+            if change.sum::<f64>().sqrt() <= INDEPENDENT * size {
+                return Ok(());
+            }
         }
         Err(Lost { iterations: motion.iterations, residual: motion.residual })
     }
