@@ -41,7 +41,9 @@ pub(crate) struct Closed {
 }
 
 /// Newton iterations in all; a warm start takes 2 to 4, a cold one 5 to 15.
-const ITERATIONS: usize = 200;
+const ITERATIONS: usize = 60;
+/// Times that the transient is let die before the search is given up.
+const RESCUES: usize = 6;
 /// Halvings of a Newton step before the transient is let die instead.
 const HALVINGS: usize = 4;
 /// Returns by which the transient dies between Newton attempts.
@@ -58,8 +60,10 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
     let mut derivative = DMatrix::identity(n, n);
     let mut gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
     let mut smallest = f64::INFINITY;
-    let mut returns = RETURNS;
+    let (mut returns, mut rescues) = (RETURNS, 0);
+    let mut iterations = 0;
     for iteration in 1..=ITERATIONS {
+        iterations = iteration;
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
         let residual = norm(map.weights(), gap.as_slice()) / size;
         smallest = smallest.min(residual);
@@ -83,6 +87,10 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
             fraction *= 0.5;
         }
         if !accepted {
+            if rescues == RESCUES {
+                break;
+            }
+            rescues += 1;
             for _ in 0..returns {
                 map.returned(&mut state, None).map_err(broke)?;
                 state.iter_mut().for_each(|z| *z *= aim.sign);
@@ -90,12 +98,12 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
                     return Err(broke(Breakdown::Unbounded { time: f64::INFINITY }));
                 }
             }
-            returns = (returns * 3 / 2).min(2000);
+            returns = returns * 3 / 2;
             derivative = DMatrix::identity(n, n);
             gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
         }
     }
-    Err(OrbitError::NotConverged { method: aim.method, omega: aim.omega, iterations: ITERATIONS, residual: smallest })
+    Err(OrbitError::NotConverged { method: aim.method, omega: aim.omega, iterations, residual: smallest })
 }
 
 /// `z - sign · R(z)`, with the derivative of R.

@@ -19,8 +19,10 @@ const NAME: &str = "shooting";
 
 /// Relative error per step when none is given: orbits of the paper's couple are then within 1e-7 (see the verification tests).
 const TOLERANCE: f64 = 1e-8;
-/// Residual at which an orbit is closed: the steps are chosen anew in every run, so the map is smooth only to their error.
-const CLOSED: f64 = 1e-10;
+/// Residual of the first search, in which every run chooses its steps anew: the map is then smooth only to about their error.
+const NEAR: f64 = 1e-6;
+/// Residual at which the orbit is closed on the steps of the last free run, on which the map is smooth.
+const CLOSED: f64 = 1e-11;
 /// Energy gap above which an orbit is not reported as converged.
 const ENERGY_GAP: f64 = 1e-5;
 /// A state counts as rest below this fraction of what the loads could cause.
@@ -149,19 +151,23 @@ impl Solver for Smooth<'_> {
         self.duration = share * std::f64::consts::TAU / omega;
         let structure = &self.flow.structure;
         let rest = NEAR_REST * self.flow.drive.energy_scale(&structure.mass, &structure.stiffness);
-        let aim = Aim { method: NAME, omega, residual: CLOSED, sign, rest };
-        self.flow.record = false;
+        let aim = Aim { method: NAME, omega, residual: NEAR, sign, rest };
+        (self.flow.record, self.flow.frozen) = (false, false);
         let warm = start.filter(|state| state.len() == self.flow.structure.states());
-        let closed = match warm.map(|state| close(self, state, aim)) {
+        let near = match warm.map(|state| close(self, state, aim)) {
             Some(Ok(closed)) => closed,
             _ => {
                 let first = self.first_state(omega);
                 close(self, &first, aim)?
             }
         };
+        let broke = |cause| OrbitError::Breakdown { method: NAME, omega, cause };
+        self.flow.run(&mut near.state.clone(), 0.0, self.duration, None).map_err(broke)?;
+        self.flow.frozen = true;
+        let mut closed = close(self, &near.state, Aim { residual: CLOSED, ..aim })?;
+        closed.iterations += near.iterations;
         self.flow.record = true;
         let mut end = closed.state.clone();
-        let broke = |cause| OrbitError::Breakdown { method: NAME, omega, cause };
         self.flow.run(&mut end, 0.0, self.duration, None).map_err(broke)?;
         let orbit = path::orbit(self.system, &self.flow, NAME, omega, symmetry, closed);
         if orbit.evidence.energy_gap > ENERGY_GAP {

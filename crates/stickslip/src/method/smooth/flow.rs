@@ -13,6 +13,8 @@ use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES};
 const LEVELS: usize = 44;
 /// The longest step is the stretch divided by `2^COARSEST`.
 const COARSEST: usize = 4;
+/// The first step of a run is the stretch divided by `2^FIRST_LEVEL`; the control corrects it at once.
+const FIRST_LEVEL: usize = 12;
 /// The new step aims at this share of the tolerance.
 const SAFETY: f64 = 0.8;
 /// Order of the error estimate plus one.
@@ -43,6 +45,10 @@ pub(crate) struct SmoothFlow {
     /// Whether accepted steps are kept.
     pub record: bool,
     pub steps: Vec<StepRecord>,
+    /// Whether runs repeat the step lengths of the last free run: the end state is then a smooth function of the start.
+    pub frozen: bool,
+    /// Levels of the accepted steps of the last free run, in order.
+    mesh: Vec<usize>,
     /// Accepted steps of the last run.
     pub accepted: usize,
     /// Rejected steps of the last run.
@@ -63,13 +69,15 @@ impl SmoothFlow {
             tolerance,
             record: false,
             steps: Vec::new(),
+            frozen: false,
+            mesh: Vec::new(),
             accepted: 0,
             rejected: 0,
             stretch: 0.0,
             eliminated: vec![None; LEVELS + 1],
             step,
             loads: StageLoads::default(),
-            level: 12,
+            level: FIRST_LEVEL,
         }
     }
 
@@ -92,11 +100,19 @@ impl SmoothFlow {
         let total = 1u64 << LEVELS;
         let mut position = 0u64;
         // level: the step is 2^(LEVELS - level) ticks; a run starts like every run of the same stretch does, for equal bits
-        self.level = 12;
+        self.level = FIRST_LEVEL;
+        let frozen = self.frozen && !self.mesh.is_empty();
+        if !frozen {
+            self.mesh.clear();
+        }
         let (n, j) = (self.structure.n, self.structure.joints.len());
         let mut slope = self.slope(state, start);
         let mut previous: Option<(f64, Vec<f64>)> = None;
         while position < total {
+            if frozen {
+                // the mesh covers the stretch exactly
+                self.level = self.mesh[self.accepted];
+            }
             let ticks = 1u64 << (LEVELS - self.level);
             let time = start + position as f64 * tick;
             let h = ticks as f64 * tick;
@@ -107,7 +123,12 @@ impl SmoothFlow {
             self.predict(state, h, previous.as_ref(), time);
             let eliminated = self.eliminated[self.level].as_ref().expect("just made");
             let solved = self.step.solve(&self.structure, eliminated, &self.loads, state, scale.1);
-            let error = if solved { self.error(state, &slope, time, h, scale) } else { f64::INFINITY };
+            let error = match (solved, frozen) {
+                (true, true) => 0.0,
+                (true, false) => self.error(state, &slope, time, h, scale),
+                (false, true) => return Err(Breakdown::Stalled { time, step: h }),
+                (false, false) => f64::INFINITY,
+            };
             if !error.is_finite() || error > 1.0 {
                 self.rejected += 1;
                 // an estimate of order 4 in h: how many halvings bring it below one
@@ -142,6 +163,9 @@ impl SmoothFlow {
             state.copy_from_slice(&next);
             slope = next_slope;
             self.accepted += 1;
+            if !frozen {
+                self.mesh.push(self.level);
+            }
             position += ticks;
             // a longer step only where it starts at a multiple of itself and its error is expected to pass
             while self.level > COARSEST
