@@ -48,6 +48,8 @@ const RESCUES: usize = 6;
 const HALVINGS: usize = 4;
 /// Returns by which the transient dies between Newton attempts.
 const RETURNS: usize = 40;
+/// A state this many times larger than rest (10^7 times what the loads do statically) is no orbit that could be checked.
+const LARGEST: f64 = 1e10;
 /// A step must leave at most this share of the residual.
 const DECREASE: f64 = 0.95;
 /// Singular values below this fraction of the largest belong to the continuum of stick offsets.
@@ -67,6 +69,10 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
         let residual = norm(map.weights(), gap.as_slice()) / size;
         smallest = smallest.min(residual);
+        if aim.rest > 0.0 && size > LARGEST * aim.rest {
+            // so large that the work of the loads drowns in rounding: an undamped resonance
+            return Err(OrbitError::NotConverged { method: aim.method, omega: aim.omega, iterations, residual: 1.0 });
+        }
         if residual <= aim.residual {
             return Ok(Closed { state, derivative, residual, iterations: iteration });
         }

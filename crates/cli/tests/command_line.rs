@@ -1,0 +1,231 @@
+//! The command line as a user meets it: exit status, files, messages, bits.
+
+use assert_cmd::Command;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+use tempfile::TempDir;
+
+fn stickslip(folder: &Path, arguments: &[&str]) -> Output {
+    Command::cargo_bin("stickslip").unwrap().current_dir(folder).args(arguments).output().unwrap()
+}
+
+/// A folder with the starting study of a template, edited.
+fn folder(template: &str, edits: &[(&str, &str)]) -> (TempDir, PathBuf) {
+    let folder = TempDir::new().unwrap();
+    let mut text = stickslip::model::templates::find(template).unwrap().study.to_owned();
+    for (from, to) in edits {
+        assert!(text.contains(from), "{from} is not in the template");
+        text = text.replacen(from, to, 1);
+    }
+    let path = folder.path().join("study.toml");
+    fs::write(&path, text).unwrap();
+    (folder, path)
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().expect("ended by itself")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn a_study_runs_and_every_output_is_there() {
+    let (folder, _) = folder("blade-couple", &[("points = 241", "points = 13")]);
+    let output = stickslip(folder.path(), &["run", "study.toml"]);
+    assert_eq!((code(&output), output.stdout.len()), (0, 0), "{}", stderr(&output));
+    let out = folder.path().join("stickslip-out/study");
+    for file in ["curve.csv", "peaks.csv", "figure.svg", "figure.png", "figure.html", "record.json"] {
+        assert!(fs::metadata(out.join(file)).unwrap().len() > 100, "{file}");
+    }
+    let curve = fs::read_to_string(out.join("curve.csv")).unwrap();
+    let header: Vec<&str> = curve.lines().next().unwrap().split(',').collect();
+    let expected = [
+        "Ft",
+        "frequency_Hz",
+        "blade1_amplitude_m",
+        "blade1_mean_m",
+        "blade1_phase_deg",
+        "contact_amplitude_m",
+        "contact_mean_m",
+        "contact_phase_deg",
+        "blade3_amplitude_m",
+        "blade3_mean_m",
+        "blade3_phase_deg",
+        "shroud_dissipation_J",
+        "shroud_slip_fraction",
+        "stable",
+        "residual",
+        "energy_gap",
+        "iterations",
+        "status",
+    ];
+    assert_eq!(header, expected);
+    assert_eq!(curve.lines().count(), 1 + 4 * 13);
+    assert!(curve.lines().skip(1).all(|line| line.ends_with(",converged")));
+}
+
+#[test]
+fn parameters_and_methods_change_from_outside() {
+    let (folder, _) = folder("element", &[]);
+    let output = stickslip(folder.path(), &["run", "study.toml", "--set", "Ft=2mN", "--only", "csv", "--json"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let dataset: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let summary = &dataset["tables"][1];
+    let loss = summary["columns"].as_array().unwrap().iter().find(|c| c["name"] == "dissipation_J").unwrap();
+    // 4 Ft (a - Ft/kt) at a = 2.75 mm, Ft = 2 mN, kt = 1 N/m
+    let last = loss["values"]["Number"][2].as_f64().unwrap();
+    assert!((last - 6e-6).abs() < 1e-15, "{last}");
+    assert!(!folder.path().join("stickslip-out/study/figure.png").exists());
+    let output = stickslip(folder.path(), &["run", "study.toml", "--method", "shooting"]);
+    assert_eq!(code(&output), 2);
+    let text = stderr(&output);
+    assert!(text.contains("shooting cannot take the law `jenkins`"), "{text}");
+}
+
+#[test]
+fn wrong_input_names_its_place_and_writes_nothing() {
+    let cases: &[(&str, &str, &[&str])] = &[
+        ("stiffness = \"kt\"", "stifness = \"kt\"", &["study.toml:37:1", "stifness", "did you mean `stiffness`?"]),
+        ("stiffness = \"kt\"", "stiffness = \"10 kg\"", &["study.toml:37:", "stiffness", "mass"]),
+        ("k = \"105103 N/m\"", "k = \"105103 N/\"", &["study.toml:7:", "unit"]),
+        ("k = \"105103 N/m\"", "k = nan", &["study.toml:7:"]),
+        ("k = \"105103 N/m\"", "k = inf", &["study.toml:7:"]),
+        ("m = \"182 g\"", "m = \"-182 g\"", &["study.toml:", "mass"]),
+        ("mass = \"m1\"", "mass = \"0 g\"", &["study.toml:19:", "contact", "jenkins"]),
+        (
+            "between = [\"contact\", \"blade3\"]",
+            "between = [\"contact\", \"blade4\"]",
+            &["study.toml:36:", "blade4", "did you mean"],
+        ),
+        ("name = \"contact\"", "name = \"blade1\"", &["study.toml:18:", "twice"]),
+        ("m1 = \"m / 100\"", "m1 = \"kt / 100 * m1 / m1\"", &["study.toml:", "m1 -> m1"]),
+        ("mass = \"m1\"", "mass = \"m1 +\"", &["study.toml:19:"]),
+        ("from = \"119.5 Hz\"", "from = \"123.5 Hz\"", &["study.toml:", "from"]),
+        ("points = 241", "points = 10000000", &["study.toml:", "1000000"]),
+        ("\"coulomb\"", "\"colomb\"", &["study.toml:", "did you mean `coulomb`"]),
+        ("[study]", "[study", &["study.toml:"]),
+    ];
+    for (from, to, words) in cases {
+        let (folder, _) = folder("blade-couple", &[(from, to)]);
+        let output = stickslip(folder.path(), &["run", "study.toml"]);
+        let text = stderr(&output);
+        assert_eq!(code(&output), 2, "{to}: {text}");
+        for word in *words {
+            assert!(text.contains(word), "{to}: no `{word}` in\n{text}");
+        }
+        assert!(!folder.path().join("stickslip-out").exists(), "{to}: something was written");
+    }
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("binary.toml"), [0x73, 0xff, 0xfe]).unwrap();
+    for (file, word) in [("nowhere.toml", "no such file"), ("binary.toml", "UTF-8"), (".", "folder")] {
+        let output = stickslip(folder.path(), &["run", file]);
+        assert_eq!(code(&output), 2, "{file}");
+        assert!(stderr(&output).contains(word), "{file}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn one_wrong_file_keeps_the_others_from_running() {
+    let (folder, path) = folder("element", &[]);
+    fs::copy(&path, folder.path().join("good.toml")).unwrap();
+    fs::write(&path, "schema = 2").unwrap();
+    let output = stickslip(folder.path(), &["run", "good.toml", "study.toml"]);
+    assert_eq!(code(&output), 2);
+    assert!(!folder.path().join("stickslip-out").exists());
+}
+
+#[test]
+fn the_bits_do_not_depend_on_threads() {
+    let (folder, _) = folder("blade-couple", &[]);
+    let tables: Vec<Vec<Vec<u8>>> = ["1", "2", "3"]
+        .iter()
+        .map(|threads| {
+            let output = stickslip(folder.path(), &["run", "study.toml", "--threads", threads, "--out", threads]);
+            assert_eq!(code(&output), 0, "{}", stderr(&output));
+            ["curve.csv", "peaks.csv", "figure.svg"]
+                .iter()
+                .map(|file| fs::read(folder.path().join(threads).join("study").join(file)).unwrap())
+                .collect()
+        })
+        .collect();
+    assert!(tables[0] == tables[1] && tables[1] == tables[2]);
+}
+
+/// An undamped resonance without a joint that slips has no periodic motion: the point fails, the others stand.
+#[test]
+fn a_failed_point_stays_in_the_curve_and_ends_with_3() {
+    let text = r#"
+schema = 1
+title = "Undamped oscillator through its resonance"
+[[mass]]
+name = "body"
+mass = "1 kg"
+[[spring]]
+between = ["body", "ground"]
+stiffness = "1 N/m"
+[[force]]
+on = "body"
+amplitude = "1 N"
+[study]
+kind = "response"
+frequency = ["0.5 rad/s", "1 rad/s", "2 rad/s"]
+"#;
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("study.toml"), text).unwrap();
+    let output = stickslip(folder.path(), &["run", "study.toml", "--only", "csv,json"]);
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert!(stderr(&output).contains("failed at frequency = 0.159155 Hz"), "{}", stderr(&output));
+    let curve = fs::read_to_string(folder.path().join("stickslip-out/study/curve.csv")).unwrap();
+    let rows: Vec<&str> = curve.lines().skip(1).collect();
+    assert_eq!(rows.len(), 3);
+    assert!(rows[0].ends_with("converged") && rows[2].ends_with("converged"));
+    assert!(!rows[1].contains("converged") || rows[1].ends_with("not-converged"), "{}", rows[1]);
+}
+
+/// Ctrl-C during a long sweep leaves the finished points readable.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_the_finished_points() {
+    let (folder, _) = folder("blade-couple", &[("points = 241", "points = 200000")]);
+    let child = std::process::Command::new(assert_cmd::cargo::cargo_bin("stickslip"))
+        .current_dir(folder.path())
+        .args(["run", "study.toml", "--only", "csv,json"])
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
+    let curve = fs::read_to_string(folder.path().join("stickslip-out/study/curve.csv")).unwrap();
+    let rows = curve.lines().count() - 1;
+    assert!(rows > 100 && rows < 800_000, "{rows}");
+    assert!(curve.lines().skip(1).all(|line| line.ends_with("converged")));
+    let record = fs::read_to_string(folder.path().join("stickslip-out/study/record.json")).unwrap();
+    assert!(record.contains("\"interrupted\": true"));
+}
+
+#[test]
+fn lists_templates_schema_and_completions() {
+    let folder = TempDir::new().unwrap();
+    for what in ["laws", "methods", "templates", "studies"] {
+        let output = stickslip(folder.path(), &["list", what]);
+        assert!(code(&output) == 0 && output.stdout.len() > 100, "{what}");
+    }
+    let output = stickslip(folder.path(), &["schema"]);
+    let schema: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(schema["properties"]["study"].is_object());
+    assert_eq!(code(&stickslip(folder.path(), &["completions", "bash"])), 0);
+    for template in stickslip::model::templates::TABLE {
+        let file = format!("{}.toml", template.name);
+        assert_eq!(code(&stickslip(folder.path(), &["new", template.name, &file])), 0);
+        assert_eq!(code(&stickslip(folder.path(), &["check", &file])), 0);
+        assert_eq!(code(&stickslip(folder.path(), &["new", template.name, &file])), 2, "an existing file stays");
+    }
+    let output = stickslip(folder.path(), &["new", "blade-cuple"]);
+    assert!(code(&output) == 2 && stderr(&output).contains("blade-couple"));
+}
