@@ -1,4 +1,7 @@
 //! Families of orbits along a parameter.
 
+pub mod modes;
 pub mod peak;
+pub mod performance;
 pub mod sweep;
+pub mod trace;

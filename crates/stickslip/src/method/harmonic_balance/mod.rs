@@ -10,6 +10,7 @@
 //! Source: Krack and Gross, "Harmonic Balance for Nonlinear Vibration Problems" (2019); Cameron and Griffin (1989).
 
 mod joints;
+mod mode;
 mod path;
 mod rest;
 mod solve;
@@ -20,6 +21,7 @@ use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::Orbit;
 use joints::{Coordinate, Slider};
+pub(crate) use mode::{ModeEquations, ModeState};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rest::Rest;
@@ -349,6 +351,37 @@ impl Solver for Balance<'_> {
         match self.method.harmonics {
             Some(top) => self.fixed(top, omega, warm),
             None => self.chosen(omega, warm),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The width at which rigid friction hands over to multipliers is a matter of numerics: a hundredfold changes nothing.
+    #[test]
+    fn rigid_friction_does_not_depend_on_the_width() {
+        let couple = crate::model::templates::find("blade-couple").unwrap();
+        for (limit, hertz) in [(2.0, 121.25), (4.0, 120.75), (6.0, 121.0), (8.0, 120.5)] {
+            let system = couple.model_with(&[("Ft", limit)]).unwrap().assemble().unwrap();
+            let coordinates = joints::coordinates(&system).unwrap();
+            let rest = Rest::new(&system, &coordinates);
+            let omega = std::f64::consts::TAU * hertz;
+            let solution = |width: f64| {
+                let mut level = Level::new((1..=15).step_by(2).collect(), 1024, 1, 1);
+                level.drive(&system, &coordinates, &rest, omega);
+                level.width = width;
+                let zero = vec![Complex64::new(0.0, 0.0); 8];
+                let start =
+                    Motion { c: zero.clone(), force: zero, multipliers: vec![vec![0.0; 1024]], ..Motion::default() };
+                let motion = level.solve(&coordinates, omega, start, false).unwrap();
+                path::places(&level, &coordinates, &rest, omega, &motion)
+            };
+            let (one, other) = (solution(1e-7), solution(1e-5));
+            for (a, b) in one.iter().zip(&other) {
+                assert!((a - b).norm() < 1e-8 * one[0].norm(), "{limit} N, {hertz} Hz: {:.1e}", (a - b).norm());
+            }
         }
     }
 }

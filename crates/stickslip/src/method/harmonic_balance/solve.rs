@@ -38,6 +38,8 @@ pub(super) struct Level {
     pub alternation: Alternation,
     /// Receptance per harmonic, q × q.
     receptance: Vec<DMatrix<Complex64>>,
+    /// See [`WIDTH`].
+    pub width: f64,
     /// Motion of the coordinates without friction, [q][harmonic].
     pub linear: Vec<Complex64>,
     /// Motion of all places without friction, per harmonic.
@@ -84,6 +86,7 @@ impl Level {
         Level {
             alternation: Alternation::new(harmonics, samples),
             receptance: Vec::new(),
+            width: WIDTH,
             linear: vec![ZERO; nh * coordinates],
             free: Vec::new(),
             tangents: vec![0.0; 4 * nh * nh * coordinates],
@@ -298,7 +301,7 @@ impl Level {
             let mut motion = start.clone();
             motion.iterations = 0;
             motion.sharpness = Sharpness::default();
-            motion.sharpness.width = (WIDTH * self.speed(&motion.c, omega)).max(LEAST_WIDTH * free_speed);
+            motion.sharpness.width = (self.width * self.speed(&motion.c, omega)).max(LEAST_WIDTH * free_speed);
             let done = self
                 .newton(coordinates, omega, &mut motion, ITERATIONS)
                 .and_then(|()| if rigid { self.settle_multipliers(coordinates, omega, &mut motion) } else { Ok(()) });
@@ -349,7 +352,7 @@ impl Level {
             }
             match done {
                 Ok(()) => {
-                    let target = (WIDTH * self.speed(&motion.c, omega)).max(LEAST_WIDTH * free_speed);
+                    let target = (self.width * self.speed(&motion.c, omega)).max(LEAST_WIDTH * free_speed);
                     if width <= target {
                         break;
                     }

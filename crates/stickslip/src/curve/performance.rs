@@ -1,0 +1,161 @@
+//! Performance curves: the resonance peak as a function of a design parameter, and the best value of the parameter.
+//!
+//! For every value the peak is maximised over frequency; the optimum over the values is then refined. With a slip limit as the
+//! parameter this is the classical curve of friction damping: free at the left, stuck at the right, a minimum between.
+//! Source: Griffin (1980), Fig. 4.
+
+use super::peak::{Peak, highest};
+use crate::method::{Method, MethodError};
+use crate::model::System;
+use crate::orbit::Orbit;
+use rayon::prelude::*;
+
+/// What is computed.
+#[derive(Clone, Copy)]
+pub struct Performance<'a, E> {
+    /// The system at a value of the parameter.
+    pub system: &'a (dyn Fn(f64) -> Result<System, E> + Sync),
+    /// The method that finds the orbits.
+    pub method: &'a dyn Method,
+    /// Frequencies between which the peak is sought, rad/s.
+    pub range: (f64, f64),
+    /// Grid points over the range, from which the peak is refined; their distance must not exceed the width of the peak.
+    pub points: usize,
+    /// What is maximised over frequency, for example an amplitude, m.
+    pub quantity: &'a (dyn Fn(&Orbit) -> f64 + Sync),
+}
+
+/// The peak at one value of the parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Value of the parameter.
+    pub value: f64,
+    /// The highest peak; `None` if no orbit converged.
+    pub peak: Option<Peak>,
+    /// Orbits of the grid that did not converge.
+    pub failed: usize,
+}
+
+/// A performance curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PerformanceCurve {
+    /// One row per value, in the order given.
+    pub rows: Vec<Row>,
+    /// The value with the lowest peak, refined between its neighbours; `None` if the lowest row stands at an end.
+    pub optimum: Option<Row>,
+}
+
+/// Why no curve was made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PerformanceError<E> {
+    /// The system could not be built.
+    #[error("no system at the value {value}: {cause}")]
+    System {
+        /// Value of the parameter.
+        value: f64,
+        /// The cause.
+        cause: E,
+    },
+    /// The method cannot take the system.
+    #[error(transparent)]
+    Method(MethodError),
+}
+
+/// Relative width at which the search for the optimum ends: the peak is known to 1e-10, and flat to second order or kinked there.
+const BRACKET: f64 = 1e-7;
+/// (√5 - 1)/2
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+impl<E: Send> Performance<'_, E> {
+    /// The peak at one value of the parameter.
+    ///
+    /// # Errors
+    /// The system cannot be built, or the method cannot take it.
+    pub fn peak(&self, value: f64) -> Result<Row, PerformanceError<E>> {
+        let system = (self.system)(value).map_err(|cause| PerformanceError::System { value, cause })?;
+        let mut solver = self.method.solver(&system).map_err(PerformanceError::Method)?;
+        let last = self.points.max(3) - 1;
+        let omegas: Vec<f64> =
+            (0..=last).map(|i| self.range.0 + (self.range.1 - self.range.0) * i as f64 / last as f64).collect();
+        let mut start: Option<Vec<f64>> = None;
+        let mut failed = 0;
+        let values: Vec<f64> = omegas
+            .iter()
+            .map(|omega| match solver.orbit(*omega, start.as_deref()) {
+                Ok(orbit) => {
+                    let value = (self.quantity)(&orbit);
+                    start = Some(orbit.start);
+                    value
+                }
+                Err(_) => {
+                    failed += 1;
+                    start = None;
+                    f64::NAN
+                }
+            })
+            .collect();
+        Ok(Row { value, peak: highest(&mut *solver, &omegas, &values, &|orbit| (self.quantity)(orbit)), failed })
+    }
+
+    /// The curve over `values` (rising), and its optimum.
+    ///
+    /// # Errors
+    /// The system cannot be built at some value, or the method cannot take it.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip::curve::performance::Performance;
+    /// use stickslip::method::event_driven::EventDriven;
+    /// use stickslip::model::templates;
+    /// let couple = templates::find("blade-couple").unwrap();
+    /// let curve = Performance {
+    ///     system: &|limit| couple.model_with(&[("Ft", limit)]).unwrap().assemble(),
+    ///     method: &EventDriven,
+    ///     range: (119.5 * std::f64::consts::TAU, 122.5 * std::f64::consts::TAU),
+    ///     points: 31,
+    ///     quantity: &|orbit| orbit.places[0].amplitude(),
+    /// }
+    /// .curve(&[5.5, 6.5, 7.5])
+    /// .unwrap();
+    /// let best = curve.optimum.unwrap();
+    /// assert!((best.value - 6.4).abs() < 0.1);
+    /// ```
+    pub fn curve(&self, values: &[f64]) -> Result<PerformanceCurve, PerformanceError<E>> {
+        let rows: Vec<Row> = values.par_iter().map(|value| self.peak(*value)).collect::<Result<_, _>>()?;
+        let height = |row: &Row| row.peak.map_or(f64::INFINITY, |peak| peak.value);
+        let lowest = (0..rows.len()).min_by(|&a, &b| height(&rows[a]).total_cmp(&height(&rows[b])));
+        let optimum = match lowest {
+            Some(i) if i > 0 && i + 1 < rows.len() && rows[i].peak.is_some() => {
+                Some(self.refine(rows[i - 1].value, rows[i], rows[i + 1].value)?)
+            }
+            _ => None,
+        };
+        Ok(PerformanceCurve { rows, optimum })
+    }
+
+    /// Golden-section search: the lowest of two rising branches is a kink as often as it is smooth.
+    fn refine(&self, low: f64, middle: Row, high: f64) -> Result<Row, PerformanceError<E>> {
+        let height = |row: &Row| row.peak.map_or(f64::INFINITY, |peak| peak.value);
+        let (mut a, mut b) = (low, high);
+        let mut best = middle;
+        let mut left = self.peak(b - GOLDEN * (b - a))?;
+        let mut right = self.peak(a + GOLDEN * (b - a))?;
+        while b - a > BRACKET * (a.abs() + b.abs()) {
+            if height(&left) <= height(&right) {
+                b = right.value;
+                right = left;
+                left = self.peak(b - GOLDEN * (b - a))?;
+            } else {
+                a = left.value;
+                left = right;
+                right = self.peak(a + GOLDEN * (b - a))?;
+            }
+            for row in [&left, &right] {
+                if height(row) < height(&best) {
+                    best = *row;
+                }
+            }
+        }
+        Ok(best)
+    }
+}
