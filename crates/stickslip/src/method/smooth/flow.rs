@@ -126,7 +126,16 @@ impl SmoothFlow {
             let error = match (solved, frozen) {
                 (true, true) => 0.0,
                 (true, false) => self.error(state, &slope, time, h, scale),
-                (false, true) => return Err(Breakdown::Stalled { time, step: h }),
+                (false, true) => {
+                    // a layer has moved out of its fine steps: from now on the mesh has two halves here
+                    if self.level == LEVELS {
+                        return Err(Breakdown::Stalled { time, step: h });
+                    }
+                    self.rejected += 1;
+                    self.mesh[self.accepted] += 1;
+                    self.mesh.insert(self.accepted, self.level + 1);
+                    continue;
+                }
                 (false, false) => f64::INFINITY,
             };
             if !error.is_finite() || error > 1.0 {
