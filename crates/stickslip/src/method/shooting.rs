@@ -20,7 +20,7 @@ const NAME: &str = "shooting";
 /// Relative error per step when none is given: orbits of the paper's couple are then within 1e-7 (see the verification tests).
 const TOLERANCE: f64 = 1e-8;
 /// Residual of the first search, in which every run chooses its steps anew: the map is then smooth only to about their error.
-const NEAR: f64 = 1e-6;
+const NEAR: f64 = 1e-4;
 /// Residual at which the orbit is closed on the steps of the last free run, on which the map is smooth.
 const CLOSED: f64 = 1e-11;
 /// Energy gap above which an orbit is not reported as converged.

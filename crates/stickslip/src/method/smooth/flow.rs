@@ -262,19 +262,26 @@ impl SmoothFlow {
         let n = self.structure.n;
         let mut force = DVector::zeros(n);
         self.drive.add_force(time, 0, &mut force);
-        force -= &self.structure.stiffness * DVector::from_column_slice(&state[..n]);
-        force -= &self.structure.damping * DVector::from_column_slice(&state[n..2 * n]);
         let mut slope = vec![0.0; state.len()];
+        for i in 0..n {
+            slope[n + i] = (0..n)
+                .map(|k| {
+                    self.structure.inverse_mass[(i, k)] * force[k]
+                        - self.structure.stiffness_rate[(i, k)] * state[k]
+                        - self.structure.damping_rate[(i, k)] * state[n + k]
+                })
+                .sum();
+        }
         for (q, joint) in self.structure.joints.iter().enumerate() {
             let point = self.law_point(q, state, time);
-            force.axpy(-point.force, &joint.direction, 1.0);
+            for i in 0..n {
+                slope[n + i] -= joint.mobility[i] * point.force;
+            }
             for s in 0..joint.states {
                 slope[2 * n + joint.first_state + s] = point.rate[s];
             }
         }
-        let acceleration = &self.structure.inverse_mass * force;
         slope[..n].copy_from_slice(&state[n..2 * n]);
-        slope[n..2 * n].copy_from_slice(acceleration.as_slice());
         slope
     }
 
@@ -307,35 +314,33 @@ impl SmoothFlow {
             }
         }
         let mut filter = DMatrix::from_diagonal_element(states, states, REAL / h);
-        let (mut k_slope, mut c_slope) = (self.structure.stiffness.clone(), self.structure.damping.clone());
+        for i in 0..n {
+            filter[(i, n + i)] -= 1.0;
+            for k in 0..n {
+                filter[(n + i, k)] += self.structure.stiffness_rate[(i, k)];
+                filter[(n + i, n + k)] += self.structure.damping_rate[(i, k)];
+            }
+        }
         for q in 0..j {
             let point = self.law_point(q, state, time);
             let joint = &self.structure.joints[q];
-            let outer = &joint.direction * joint.direction.transpose();
-            k_slope += &outer * point.force_slope[0];
-            c_slope += &outer * point.force_slope[1];
+            for i in 0..n {
+                for k in 0..n {
+                    let outer = joint.mobility[i] * joint.direction[k];
+                    filter[(n + i, k)] += outer * point.force_slope[0];
+                    filter[(n + i, n + k)] += outer * point.force_slope[1];
+                }
+            }
             for s in 0..joint.states {
                 let own = 2 * n + joint.first_state + s;
                 for k in 0..n {
                     filter[(own, k)] -= point.rate_slope[s][0] * joint.direction[k];
                     filter[(own, n + k)] -= point.rate_slope[s][1] * joint.direction[k];
-                }
-                let column = &self.structure.inverse_mass * &joint.direction * point.force_slope[2 + s];
-                for k in 0..n {
-                    filter[(n + k, own)] += column[k];
+                    filter[(n + k, own)] += joint.mobility[k] * point.force_slope[2 + s];
                 }
                 for t in 0..joint.states {
                     filter[(own, 2 * n + joint.first_state + t)] -= point.rate_slope[s][2 + t];
                 }
-            }
-        }
-        let k_rows = &self.structure.inverse_mass * k_slope;
-        let c_rows = &self.structure.inverse_mass * c_slope;
-        for i in 0..n {
-            filter[(i, n + i)] -= 1.0;
-            for k in 0..n {
-                filter[(n + i, k)] += k_rows[(i, k)];
-                filter[(n + i, n + k)] += c_rows[(i, k)];
             }
         }
         let factor = filter.lu();

@@ -46,6 +46,7 @@ impl Structure {
                 return Err(refused("a law with fewer internal states"));
             }
             joints.push(SmoothJoint {
+                mobility: &inverse_mass * joint.direction.column(0),
                 direction: joint.direction.column(0).into_owned(),
                 law: rate,
                 first_state: internal,
@@ -56,6 +57,8 @@ impl Structure {
         }
         Ok(Structure {
             n,
+            damping_rate: &inverse_mass * &system.damping,
+            stiffness_rate: &inverse_mass * &system.stiffness,
             mass: system.mass.clone(),
             inverse_mass,
             damping: system.damping.clone(),

@@ -18,6 +18,9 @@ pub(crate) struct Structure {
     pub inverse_mass: DMatrix<f64>,
     pub damping: DMatrix<f64>,
     pub stiffness: DMatrix<f64>,
+    /// `M⁻¹C` and `M⁻¹K`.
+    pub damping_rate: DMatrix<f64>,
+    pub stiffness_rate: DMatrix<f64>,
     pub joints: Vec<SmoothJoint>,
     /// Internal states of all laws.
     pub internal: usize,
@@ -26,6 +29,8 @@ pub(crate) struct Structure {
 #[derive(Debug, Clone)]
 pub(crate) struct SmoothJoint {
     pub direction: DVector<f64>,
+    /// `M⁻¹` times the direction: accelerations that a unit force takes away.
+    pub mobility: DVector<f64>,
     pub law: Rate,
     /// Index of its first internal state.
     pub first_state: usize,
