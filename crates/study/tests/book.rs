@@ -1,0 +1,159 @@
+//! The book under `docs/` and the README: what is generated is up to date, and every study in them reads and checks.
+//!
+//! After a change of the schema, a law, a method, a template or a study kind, write the generated parts anew:
+//! `STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-study --test book`
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
+use stickslip::{law, method};
+use stickslip_study::{read_study, run, schema};
+
+const UPDATE: &str = "STICKSLIP_UPDATE_BOOK";
+const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-study --test book";
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn text_of(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// Holds a file against what it should be, or writes it when asked to.
+fn up_to_date(path: &Path, expected: &str) {
+    if std::env::var_os(UPDATE).is_some() {
+        fs::write(path, expected).unwrap();
+    } else {
+        assert!(text_of(path) == expected, "{} {HINT}", path.display());
+    }
+}
+
+/// Every page with studies.
+fn pages() -> Vec<PathBuf> {
+    let folder = root().join("docs/src");
+    let mut pages: Vec<PathBuf> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    pages.retain(|path| path.extension().is_some_and(|e| e == "md"));
+    pages.sort();
+    pages.push(root().join("README.md"));
+    pages
+}
+
+/// The TOML blocks of a page, each with the line where it begins.
+fn blocks(text: &str) -> Vec<(usize, String)> {
+    let mut blocks = Vec::new();
+    let mut open: Option<(usize, String)> = None;
+    for (number, line) in text.lines().enumerate() {
+        match &mut open {
+            None if line == "```toml" => open = Some((number + 2, String::new())),
+            None => {}
+            Some(_) if line == "```" => blocks.extend(open.take()),
+            Some((_, block)) => *block += &format!("{line}\n"),
+        }
+    }
+    assert!(open.is_none(), "a block does not end");
+    blocks
+}
+
+/// A block that states a schema version is a whole study and must read and check; any other is a part and must be TOML.
+#[test]
+fn every_study_in_the_book_checks() {
+    let mut studies = 0;
+    for page in pages() {
+        for (line, block) in blocks(&text_of(&page)) {
+            let place = format!("{}:{line}", page.display());
+            if !block.contains("schema = ") {
+                assert!(toml::from_str::<toml::Value>(&block).is_ok(), "{place} is not TOML");
+                continue;
+            }
+            let study = read_study("example.toml", &block, &[]).and_then(|study| run::check(&study));
+            if let Err(error) = study {
+                panic!("{place}: {:?}", miette::Report::new(error));
+            }
+            studies += 1;
+        }
+    }
+    assert!(studies >= 6, "only {studies} studies were found");
+}
+
+#[test]
+fn the_reference_of_keys_is_up_to_date() {
+    let head = "<!-- Generated from the schema by crates/study/tests/book.rs; do not edit. -->\n\n# Every key\n\n\
+                What the columns mean: *takes* says what may stand there (a quantity is a string with a unit, an expression over \
+                `[parameters]`, or a bare number in SI); *without it* says what holds when the key is absent.\n\n";
+    up_to_date(&root().join("docs/src/study_file_keys.md"), &format!("{head}{}", schema::markdown()));
+}
+
+const BEGIN: &str = "<!-- begin generated: methods x laws -->\n";
+const END: &str = "<!-- end generated: methods x laws -->";
+
+/// A mass on a spring that rubs on the ground with this law.
+fn rubbing(law: law::Law) -> System {
+    let between = || ["body".to_owned(), GROUND.to_owned()];
+    Model {
+        masses: vec![Mass { name: "body".to_owned(), mass: 1.0 }],
+        springs: vec![Spring { between: between(), stiffness: 1e4, damping: 1.0 }],
+        joints: vec![Joint { name: "foot".to_owned(), between: between(), law }],
+        forces: vec![Force { on: "body".to_owned(), amplitude: 1.0, phase: 0.0, harmonic: 1 }],
+        ..Model::default()
+    }
+    .assemble()
+    .unwrap()
+}
+
+/// Which method takes which law, asked of the methods.
+fn methods_by_laws() -> String {
+    let mut table = "| method |".to_owned();
+    table.extend(law::TABLE.iter().map(|law| format!(" `{}` |", law.name)));
+    table += "\n| --- |";
+    table.extend(law::TABLE.iter().map(|_| " --- |"));
+    for row in method::TABLE {
+        table += &format!("\n| `{}` |", row.name);
+        for law in law::TABLE {
+            let system = rubbing((law.sample)());
+            let takes = |options: &method::Options| (row.build)(options).unwrap().solver(&system).is_ok();
+            let width = row.options.iter().any(|option| option.key == "width");
+            let word = if takes(&method::Options::new()) {
+                "yes"
+            } else if width && takes(&method::Options::from([("width".to_owned(), 1e-5)])) {
+                "(`width`)"
+            } else {
+                "no"
+            };
+            table += &format!(" {word} |");
+        }
+    }
+    table + "\n"
+}
+
+#[test]
+fn the_table_of_methods_and_laws_is_up_to_date() {
+    for page in ["docs/src/laws_and_methods.md", "README.md"] {
+        let path = root().join(page);
+        let text = text_of(&path);
+        let begin = text.find(BEGIN).unwrap_or_else(|| panic!("{page} has no `{BEGIN}`")) + BEGIN.len();
+        let end = begin + text[begin..].find(END).unwrap_or_else(|| panic!("{page} has no `{END}`"));
+        up_to_date(&path, &format!("{}{}{}", &text[..begin], methods_by_laws(), &text[end..]));
+    }
+}
+
+/// Every page of the summary exists, every page is in the summary, and links between pages lead somewhere.
+#[test]
+fn every_page_is_in_the_summary_and_every_link_leads_to_a_file() {
+    let folder = root().join("docs/src");
+    let summary = text_of(&folder.join("SUMMARY.md"));
+    for page in pages() {
+        let name = page.file_name().unwrap().to_str().unwrap().to_owned();
+        if name != "SUMMARY.md" && name != "README.md" {
+            assert!(summary.contains(&format!("]({name})")), "{name} is not in the summary");
+        }
+        for link in text_of(&page).split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let target = link.split('#').next().unwrap_or_default();
+            // the picture is an output of the program, not a page
+            let page_link = !target.is_empty() && !target.contains("://") && !target.starts_with("docs/images/");
+            if page_link {
+                assert!(page.parent().unwrap().join(target).exists(), "{name}: {link} leads nowhere");
+            }
+        }
+    }
+}
