@@ -1,10 +1,26 @@
 //! `stickslip paper`: every figure of the paper, and its claims beside measured numbers.
+//!
+//! Source: Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and Computational Mechanics 9 (2015) 31-40.
 
+mod couple;
+mod elements;
+mod evidence;
+mod measure;
+mod optimum;
+mod studies;
+mod verdict;
+
+use optimum::Optimum;
 use std::error::Error;
+use std::fmt::Write;
 use std::path::Path;
-use stickslip_study::run::Context;
+use std::sync::atomic::Ordering;
+use stickslip_report::{Claim, Outputs, Page, Section, Verdict, write_dataset};
+use stickslip_study::run::{Context, run};
+use studies::{FILES, Results, read};
 
 /// How the job ended.
+#[derive(Debug)]
 pub struct Outcome {
     /// What the terminal shows.
     pub summary: String,
@@ -12,11 +28,252 @@ pub struct Outcome {
     pub failed: u64,
 }
 
-/// Computes and writes everything.
-pub fn paper(
-    _out: &Path,
-    _context: &Context<'_>,
-    _say: &dyn Fn(&str),
-) -> Result<Outcome, Box<dyn Error + Send + Sync>> {
-    Err("not there yet".into())
+/// What can go wrong: a file cannot be written.
+type Failure = Box<dyn Error + Send + Sync>;
+
+/// A claim with the short name that the terminal shows.
+#[derive(Debug, Clone)]
+struct Finding {
+    name: &'static str,
+    claim: Claim,
+}
+
+fn finding(name: &'static str, text: &str, measured: String, verdict: Verdict) -> Finding {
+    Finding { name, claim: Claim { text: text.to_owned(), measured, verdict } }
+}
+
+/// A section of the report before its claims are handed over.
+#[derive(Debug, Clone, Default)]
+struct Part {
+    section: Section,
+    findings: Vec<Finding>,
+}
+
+/// How much is computed; tests take less.
+struct Extent {
+    points: Option<usize>,
+    outputs: Outputs,
+}
+
+/// Computes all figures of the paper and writes, under `out`, a folder of results per figure and `report.html`: each figure beside what
+/// the paper's text claims of it, the measured number and a verdict. `say` gets a line per figure.
+///
+/// An interrupted run writes what is finished and measures what is complete.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn paper(out: &Path, context: &Context<'_>, say: &dyn Fn(&str)) -> Result<Outcome, Failure> {
+    produce(out, context, say, &Extent { points: None, outputs: Outputs::all() })
+}
+
+fn produce(out: &Path, context: &Context<'_>, say: &dyn Fn(&str), extent: &Extent) -> Result<Outcome, Failure> {
+    let mut results = Results::default();
+    for (name, _) in FILES {
+        if context.stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let dataset = run(&read(name, extent.points, &[])?, context)?;
+        write_dataset(&dataset, out, &extent.outputs)?;
+        let points: u64 = dataset.record.points.values().sum();
+        let failed = dataset.failures.len();
+        let failed = if failed > 0 { format!(", {failed} failed") } else { String::new() };
+        say(&format!("{}: {points} points{failed}, {:.2} s", dataset.title, dataset.record.wall_time_s));
+        results.insert(dataset);
+    }
+    say("Further cases that the claims ask for: other slip limits, contact stiffnesses, frequencies");
+    let further = Further::new(context, extent);
+    let parts: Vec<Part> = [
+        elements::exact(&results),
+        elements::approximate(&results, &further),
+        elements::coulomb(&results),
+        couple::figure6(&results, &further),
+        couple::figure7(&results),
+        couple::figure8(&results),
+        couple::figure10(&results),
+        couple::optimum(&further),
+        couple::laws(&results),
+        Some(evidence::open(&further)),
+        Some(evidence::record(&results)),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let summary = summary(out, &parts, &results);
+    page(parts).write(&out.join("report.html"))?;
+    Ok(Outcome { summary, failed: results.failed() })
+}
+
+/// Cases beyond the figures that the claims ask for; absent if the run was interrupted.
+#[derive(Debug, Default)]
+struct Further {
+    /// Contact stiffness (N/m) and the curves of Fig. 6 with it.
+    stiffness: Vec<(f64, Vec<measure::Curve>)>,
+    /// Peaks over the slip limit, non-symmetric element.
+    couple: Option<Optimum>,
+    /// The same with m1 = m/200.
+    light: Option<Optimum>,
+    /// The same with the symmetric element.
+    symmetric: Option<Optimum>,
+    /// Frequency of the loops (rad/s), and those of Figs. 3 and 4.
+    omega: Vec<(f64, Vec<measure::Loop>, Vec<measure::Loop>)>,
+}
+
+/// Contact stiffnesses for the claim about `kt`.
+const STIFFNESSES: [(f64, &str); 4] = [(5e3, "5000 N/m"), (1e4, "10000 N/m"), (2e4, "20000 N/m"), (4e4, "40000 N/m")];
+/// Frequencies for the inference of the loops' frequency.
+const OMEGAS: [(f64, &str); 4] =
+    [(0.5, "0.5 rad/s"), (1.0, "1 rad/s"), (2.0, "2 rad/s"), (std::f64::consts::TAU, "6.283185307179586 rad/s")];
+
+impl Further {
+    fn new(context: &Context<'_>, extent: &Extent) -> Further {
+        // an interrupted or failed extra case only leaves its claim unmeasured
+        let with =
+            |name: &str, key: &str, value: &str| run(&read(name, extent.points, &[(key, value)]).ok()?, context).ok();
+        let stopped = || context.stop.load(Ordering::Relaxed);
+        if stopped() {
+            return Further::default();
+        }
+        let stiffness = STIFFNESSES
+            .iter()
+            .filter_map(|(kt, text)| Some((*kt, measure::curves(&with("fig06", "kt", text)?)?)))
+            .collect();
+        let all = |names: [&str; 2], text: &str| {
+            let mut all = Vec::new();
+            for name in names {
+                all.extend(measure::loops(&with(name, "omega", text)?)?);
+            }
+            Some(all)
+        };
+        let omega = OMEGAS
+            .iter()
+            .filter_map(|(w, text)| Some((*w, all(["fig03a", "fig03b"], text)?, all(["fig04a", "fig04b"], text)?)))
+            .collect();
+        let optimum = |name: &str| Optimum::new(&read(name, extent.points, &[]).ok()?, context);
+        let further = Further {
+            stiffness,
+            omega,
+            couple: optimum("fig06"),
+            light: optimum("fig07"),
+            symmetric: optimum("fig10"),
+        };
+        if stopped() { Further::default() } else { further }
+    }
+}
+
+fn page(parts: Vec<Part>) -> Page {
+    Page {
+        title: "Blade couple with dry friction connection: figures and claims".to_owned(),
+        introduction: vec![
+            "Every figure of Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and Computational Mechanics 9 \
+             (2015) 31-40, computed anew, beside what its text claims of it."
+                .to_owned(),
+            format!(
+                "Every verdict follows from the measured number by a fixed rule: two quantities are similar up to {:.0} %, \
+                 approximately the same up to {:.0} %, and nobody would call them similar beyond {:.0} %; a frequency is met within {} Hz, half \
+                 the step in which the paper prints it; a claim about several cases needs all of them, and is qualified if \
+                 only some agree. Unless said otherwise friction is exact Coulomb friction; the last sections compare the paper's arctangent law, \
+                 and list what the paper leaves open and had to be inferred.",
+                100.0 * verdict::SIMILAR,
+                100.0 * verdict::APPROXIMATE,
+                100.0 * verdict::DIFFERENT,
+                verdict::PRINTED
+            ),
+        ],
+        sections: parts
+            .into_iter()
+            .map(|part| Section { claims: part.findings.into_iter().map(|f| f.claim).collect(), ..part.section })
+            .collect(),
+    }
+}
+
+/// The claims for the terminal.
+fn summary(out: &Path, parts: &[Part], results: &Results) -> String {
+    let mut text = String::new();
+    for part in parts.iter().filter(|part| !part.findings.is_empty()) {
+        let _ = writeln!(text, "{}", part.section.heading);
+        for Finding { name, claim } in &part.findings {
+            let _ = writeln!(text, "  {name:<64} {}", claim.verdict.words());
+        }
+    }
+    let claims: Vec<Verdict> = parts.iter().flat_map(|part| &part.findings).map(|f| f.claim.verdict).collect();
+    let count = |verdict| claims.iter().filter(|v| **v == verdict).count();
+    let _ = writeln!(
+        text,
+        "{} claims: {} hold, {} hold with a qualification, {} do not hold",
+        claims.len(),
+        count(Verdict::Holds),
+        count(Verdict::HoldsWithQualification),
+        count(Verdict::DoesNotHold)
+    );
+    for dataset in results.all().filter(|dataset| !dataset.failures.is_empty()) {
+        let _ = writeln!(text, "{}: {} points failed, see record.json", dataset.name, dataset.failures.len());
+    }
+    let _ = writeln!(text, "{}", out.join("report.html").display());
+    text
+}
+
+/// Numbers in a row, with digits after the point.
+fn list(values: impl IntoIterator<Item = f64>, digits: usize) -> String {
+    values.into_iter().map(|value| format!("{value:.digits$}")).collect::<Vec<_>>().join(", ")
+}
+
+/// A small part as per cent: enough digits for what it is.
+fn percent(part: f64) -> String {
+    let value = 100.0 * part;
+    match value.abs() {
+        v if v >= 10.0 => format!("{value:.0} %"),
+        v if v >= 1.0 => format!("{value:.1} %"),
+        v if v >= 0.01 => format!("{value:.2} %"),
+        0.0 => "0 %".to_owned(),
+        _ => format!("{value:.1e} %"),
+    }
+}
+
+/// The largest of some numbers; NaN if there is none.
+fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(f64::NAN, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicBool;
+
+    fn reduced(stop: bool) -> (tempfile::TempDir, Outcome) {
+        let out = tempfile::tempdir().unwrap();
+        let context = Context { threads: 1, stop: &AtomicBool::new(stop), finished: &|| () };
+        let extent = Extent { points: Some(25), outputs: Outputs::only(&["csv", "json", "svg"]).unwrap() };
+        let outcome = produce(out.path(), &context, &|_| (), &extent).unwrap();
+        (out, outcome)
+    }
+
+    #[test]
+    fn the_job_writes_every_figure_and_the_report() {
+        let (out, outcome) = reduced(false);
+        assert_eq!(outcome.failed, 0, "{}", outcome.summary);
+        for (name, _) in FILES {
+            for file in ["record.json", "figure.svg"] {
+                assert!(out.path().join(name).join(file).is_file(), "{name}/{file}");
+            }
+        }
+        let report = std::fs::read_to_string(out.path().join("report.html")).unwrap();
+        for heading in
+            ["Fig. 2", "Figs. 3 and 4", "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 10", "What the paper leaves open"]
+        {
+            assert!(report.contains(&format!("<h2>{heading}")), "{heading}");
+        }
+        assert!(outcome.summary.contains("claims:") && outcome.summary.contains("report.html"), "{}", outcome.summary);
+    }
+
+    #[test]
+    fn a_job_stopped_at_once_leaves_a_report_without_claims() {
+        let (out, outcome) = reduced(true);
+        assert!(outcome.summary.contains("0 claims"), "{}", outcome.summary);
+        assert!(out.path().join("report.html").is_file());
+    }
+
+    #[test]
+    fn per_cent_keep_two_digits() {
+        assert_eq!([0.65, 0.0123, 0.00046, 1e-9, 0.0].map(percent), ["65 %", "1.2 %", "0.05 %", "1.0e-7 %", "0 %"]);
+    }
 }

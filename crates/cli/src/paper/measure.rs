@@ -1,0 +1,251 @@
+//! Numbers read off datasets: peaks and differences of response curves, corners and areas of loops.
+
+use stickslip_study::dataset::{Dataset, Table, Values};
+
+/// The response at one slip limit.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Curve {
+    /// Slip limit, N.
+    pub limit: f64,
+    /// Frequencies, Hz.
+    pub frequency: Vec<f64>,
+    /// Amplitudes (m) by mass, then frequency.
+    pub amplitude: Vec<Vec<f64>>,
+    /// Refined peak of every mass: frequency (Hz), amplitude (m).
+    pub peak: Vec<(f64, f64)>,
+}
+
+/// A loop of force over displacement.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Loop {
+    /// Tangential stiffness, N/m.
+    pub stiffness: f64,
+    /// Amplitude of the imposed motion, m.
+    pub amplitude: f64,
+    /// Instants, s; both ends of the period are there.
+    pub time: Vec<f64>,
+    /// Displacement, m.
+    pub displacement: Vec<f64>,
+    /// Force, N.
+    pub force: Vec<f64>,
+    /// Loss per cycle, J.
+    pub area: f64,
+}
+
+fn table<'a>(dataset: &'a Dataset, name: &str) -> Option<&'a Table> {
+    dataset.tables.iter().find(|table| table.name == name)
+}
+
+/// Runs of equal keys as ranges of rows.
+fn runs(keys: &[(f64, f64)]) -> Vec<std::ops::Range<usize>> {
+    let mut ranges = Vec::new();
+    let mut from = 0;
+    for run in keys.chunk_by(|a, b| a == b) {
+        ranges.push(from..from + run.len());
+        from += run.len();
+    }
+    ranges
+}
+
+/// The curves of a response study that varies `Ft`.
+pub fn curves(dataset: &Dataset) -> Option<Vec<Curve>> {
+    let (curve, peaks) = (table(dataset, "curve")?, table(dataset, "peaks")?);
+    let places: Vec<&str> = curve.columns.iter().filter_map(|c| c.name.strip_suffix("_amplitude_m")).collect();
+    let limit = curve.numbers("Ft")?;
+    let frequency = curve.numbers("frequency_Hz")?;
+    let (peak_limit, peak_frequency, peak_amplitude) =
+        (peaks.numbers("Ft")?, peaks.numbers("frequency_Hz")?, peaks.numbers("amplitude_m")?);
+    let Values::Text(masses) = &peaks.columns.iter().find(|column| column.name == "mass")?.values else { return None };
+    let keys: Vec<(f64, f64)> = limit.iter().map(|limit| (*limit, 0.0)).collect();
+    runs(&keys)
+        .into_iter()
+        .map(|rows| {
+            let limit = limit[rows.start];
+            let peak_of = |place: &str| {
+                let row = (0..peaks.rows()).find(|&i| peak_limit[i] == limit && masses[i] == place)?;
+                Some((peak_frequency[row], peak_amplitude[row]))
+            };
+            Some(Curve {
+                limit,
+                frequency: frequency[rows.clone()].to_vec(),
+                amplitude: places
+                    .iter()
+                    .map(|place| Some(curve.numbers(&format!("{place}_amplitude_m"))?[rows.clone()].to_vec()))
+                    .collect::<Option<_>>()?,
+                peak: places.iter().map(|place| peak_of(place)).collect::<Option<_>>()?,
+            })
+        })
+        .collect()
+}
+
+/// The loops of a hysteresis study that varies `kt` and `a`.
+pub fn loops(dataset: &Dataset) -> Option<Vec<Loop>> {
+    let (points, summary) = (table(dataset, "loops")?, table(dataset, "loops_summary")?);
+    let column = |name: &str| points.numbers(name);
+    let (kt, a, time, u, force) =
+        (column("kt")?, column("a")?, column("time_s")?, column("displacement_m")?, column("force_N")?);
+    let keys: Vec<(f64, f64)> = kt.iter().copied().zip(a.iter().copied()).collect();
+    let areas = summary.numbers("dissipation_J")?;
+    let runs = runs(&keys);
+    (runs.len() == areas.len()).then(|| {
+        runs.into_iter()
+            .zip(areas)
+            .map(|(rows, area)| Loop {
+                stiffness: kt[rows.start],
+                amplitude: a[rows.start],
+                time: time[rows.clone()].to_vec(),
+                displacement: u[rows.clone()].to_vec(),
+                force: force[rows].to_vec(),
+                area: *area,
+            })
+            .collect()
+    })
+}
+
+impl Curve {
+    /// The highest of the peaks, m.
+    pub fn highest(&self) -> f64 {
+        self.peak.iter().map(|peak| peak.1).fold(f64::NAN, f64::max)
+    }
+
+    /// Largest difference to another curve at the same frequencies, after `factor` has been applied to the other, as a part
+    /// of the highest peak.
+    pub fn difference(&self, other: &Curve, factor: f64) -> f64 {
+        let pairs = self.amplitude.iter().zip(&other.amplitude).flat_map(|(a, b)| a.iter().zip(b));
+        let largest = pairs.map(|(a, b)| (a - factor * b).abs()).fold(f64::NAN, f64::max);
+        largest / self.highest()
+    }
+
+    /// Largest distance of the masses' amplitudes at one frequency, as a part of the highest peak, and that frequency, Hz.
+    pub fn spread(&self) -> (f64, f64) {
+        let at = |i: usize| {
+            let values = || self.amplitude.iter().map(|a| a[i]);
+            values().fold(f64::NAN, f64::max) - values().fold(f64::NAN, f64::min)
+        };
+        let mut widest = (f64::NAN, f64::NAN);
+        for i in 0..self.frequency.len() {
+            if widest.0.is_nan() || at(i) > widest.0 {
+                widest = (at(i), self.frequency[i]);
+            }
+        }
+        (widest.0 / self.highest(), widest.1)
+    }
+
+    /// Largest distance of the peaks of all masses, as a part of the highest.
+    pub fn peak_spread(&self) -> f64 {
+        let lowest = self.peak.iter().map(|peak| peak.1).fold(f64::NAN, f64::min);
+        1.0 - lowest / self.highest()
+    }
+}
+
+/// A change of slope counts from this part of the steepest slope on. Rounding of the samples is a million times smaller, and the
+/// corners of the exact loop change the slope by all of it.
+const CORNER: f64 = 0.01;
+
+impl Loop {
+    /// The slopes of the loop's straight pieces in order; two neighbours never have the same, nor do the last and the first.
+    pub fn slopes(&self) -> Vec<f64> {
+        let largest = self.displacement.iter().fold(0.0f64, |a, u| a.max(u.abs()));
+        let mut slopes: Vec<f64> = Vec::new();
+        let steepest = std::cell::Cell::new(0.0f64);
+        let new = |last: f64, slope: f64| (slope - last).abs() > CORNER * steepest.get().max(slope.abs());
+        for (u, f) in self.displacement.windows(2).zip(self.force.windows(2)) {
+            // the imposed motion stands still at its ends: steps there say nothing about the slope
+            if (u[1] - u[0]).abs() < 1e-6 * largest {
+                continue;
+            }
+            let slope = (f[1] - f[0]) / (u[1] - u[0]);
+            if slopes.last().is_none_or(|last| new(*last, slope)) {
+                slopes.push(slope);
+            }
+            steepest.set(steepest.get().max(slope.abs()));
+        }
+        if slopes.len() > 1 && !new(slopes[0], slopes[slopes.len() - 1]) {
+            slopes.pop();
+        }
+        slopes
+    }
+
+    /// Number of break points in one cycle: at each the slope changes.
+    pub fn break_points(&self) -> usize {
+        match self.slopes().len() {
+            1 => 0,
+            pieces => pieces,
+        }
+    }
+
+    /// Largest force, N.
+    pub fn highest(&self) -> f64 {
+        self.force.iter().fold(0.0f64, |a, f| a.max(f.abs()))
+    }
+
+    /// The force at `time`, between samples by straight lines.
+    fn force_at(&self, time: f64) -> f64 {
+        let next = self.time.partition_point(|t| *t < time).clamp(1, self.time.len() - 1);
+        let (t, f) = (&self.time[next - 1..=next], &self.force[next - 1..=next]);
+        f[0] + (f[1] - f[0]) * ((time - t[0]) / (t[1] - t[0])).clamp(0.0, 1.0)
+    }
+
+    /// Largest difference of the force to another loop of the same motion, N.
+    pub fn difference(&self, other: &Loop) -> f64 {
+        if other.time.len() < 2 {
+            return f64::NAN;
+        }
+        self.time.iter().zip(&self.force).map(|(t, f)| (f - other.force_at(*t)).abs()).fold(f64::NAN, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn polygon(corners: &[(f64, f64)]) -> Loop {
+        let mut points = Vec::new();
+        for (i, a) in corners.iter().enumerate() {
+            let b = corners[(i + 1) % corners.len()];
+            points.extend((0..50).map(|k| {
+                let s = f64::from(k) / 50.0;
+                (a.0 + s * (b.0 - a.0), a.1 + s * (b.1 - a.1))
+            }));
+        }
+        points.push(points[0]);
+        Loop {
+            time: (0..points.len()).map(|i| i as f64).collect(),
+            displacement: points.iter().map(|p| p.0).collect(),
+            force: points.iter().map(|p| p.1).collect(),
+            ..Loop::default()
+        }
+    }
+
+    #[test]
+    fn corners_are_counted_wherever_the_cycle_starts() {
+        let parallelogram = [(2.0, 1.0), (0.0, -1.0), (-2.0, -1.0), (0.0, 1.0)];
+        assert_eq!(polygon(&parallelogram).break_points(), 4);
+        let inside = [(1.0, 1.0), (2.0, 1.0), (0.0, -1.0), (-2.0, -1.0), (0.0, 1.0)];
+        assert_eq!(polygon(&inside).break_points(), 4);
+        assert_eq!(polygon(&[(1.0, 1.0), (-1.0, -1.0)]).break_points(), 0);
+        let hexagon = [(2.0, 1.0), (1.0, -0.5), (0.0, -1.0), (-2.0, -1.0), (-1.0, 0.5), (0.0, 1.0)];
+        assert_eq!(polygon(&hexagon).break_points(), 6);
+    }
+
+    #[test]
+    fn forces_are_compared_at_equal_times() {
+        let a = polygon(&[(2.0, 1.0), (0.0, -1.0), (-2.0, -1.0), (0.0, 1.0)]);
+        let b = Loop { force: a.force.iter().map(|f| 1.1 * f).collect(), ..a.clone() };
+        assert!((a.difference(&b) - 0.1).abs() < 1e-12);
+        assert!(a.difference(&Loop::default()).is_nan());
+    }
+
+    #[test]
+    fn curves_are_compared_with_their_peak() {
+        let a = Curve {
+            limit: 2.0,
+            frequency: vec![1.0, 2.0],
+            amplitude: vec![vec![1.0, 4.0], vec![1.0, 2.0]],
+            peak: vec![(2.0, 4.0), (2.0, 2.0)],
+        };
+        let tenth = Curve { amplitude: vec![vec![0.1, 0.4], vec![0.1, 0.24]], ..a.clone() };
+        assert!((a.difference(&tenth, 10.0) - 0.1).abs() < 1e-12);
+        assert_eq!((a.spread(), a.peak_spread()), ((0.5, 2.0), 0.5));
+    }
+}
