@@ -13,17 +13,13 @@
 //! A joint acts along a direction matrix `W` (n × d): `u = Wᵀ x`, force on the structure `-W f`. All laws that exist now have
 //! d = 1; [`Relative`] carries three components and a normal force, so that laws of sliding in a plane fit the same traits.
 //!
-//! To add a law: write its file, then one line in [`friction_laws!`](self) below.
+//! To add a law: write its file, declare it with `mod`, then one line in `friction_laws!` below. Everything else (the variant of [`Law`], its
+//! name in study files, its row of [`TABLE`], its place among the smooth laws) follows from that line.
 
 mod coulomb;
 mod coulomb_arctan;
 mod jenkins;
 mod jenkins_arctan;
-
-pub use coulomb::Coulomb;
-pub use coulomb_arctan::CoulombArctan;
-pub use jenkins::Jenkins;
-pub use jenkins_arctan::JenkinsArctan;
 
 use crate::dimension::Dimension;
 use num_complex::Complex64;
@@ -145,13 +141,15 @@ pub struct LawInfo {
     pub summary: &'static str,
     /// Its parameters.
     pub parameters: &'static [Parameter],
-    /// A typical instance, for examples and for the conformance tests.
+    /// A typical instance, for examples and for tests that run over all laws.
     pub sample: fn() -> Law,
     build: fn(&[f64]) -> Law,
 }
 
 macro_rules! friction_laws {
-    ($($variant:ident $name:literal [$($sample:expr),*];)*) => {
+    ($($file:ident::$variant:ident $name:literal [$($sample:expr),*] $(rate $smooth:ident)?;)*) => {
+        $(pub use $file::$variant;)*
+
         /// A friction law, as data.
         #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "kind")]
@@ -204,40 +202,33 @@ macro_rules! friction_laws {
                 match self { $(Law::$variant(law) => law.regularised(width),)* }
             }
         }
+
+        /// The smooth laws behind one type, so that inner loops call them without dynamic dispatch.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub enum Rate {
+            $($(#[doc = concat!("See [`struct@", stringify!($smooth), "`].")]
+            $smooth($smooth),)?)*
+        }
+
+        impl RateLaw for Rate {
+            #[inline]
+            fn states(&self) -> usize {
+                match self { $($(Rate::$smooth(law) => law.states(),)?)* }
+            }
+            #[inline]
+            fn evaluate<S: Real>(&self, contact: &Relative<S>, z: &[S], z_rate: &mut [S]) -> [S; 3] {
+                match self { $($(Rate::$smooth(law) => law.evaluate(contact, z, z_rate),)?)* }
+            }
+        }
     };
 }
 
+// file :: type, name in study files, values of a sample in the order of PARAMETERS; `rate` and the type again if it is a RateLaw
 friction_laws! {
-    Coulomb "coulomb" [2.0];
-    CoulombArctan "coulomb-arctan" [2.0, 25_000.0];
-    Jenkins "jenkins" [10_000.0, 2.0];
-    JenkinsArctan "jenkins-arctan" [10_000.0, 2.0, 25_000.0];
-}
-
-/// The smooth laws behind one type, so that inner loops call them without dynamic dispatch.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Rate {
-    /// See [`struct@CoulombArctan`].
-    CoulombArctan(CoulombArctan),
-    /// See [`struct@JenkinsArctan`].
-    JenkinsArctan(JenkinsArctan),
-}
-
-impl RateLaw for Rate {
-    #[inline]
-    fn states(&self) -> usize {
-        match self {
-            Rate::CoulombArctan(law) => law.states(),
-            Rate::JenkinsArctan(law) => law.states(),
-        }
-    }
-    #[inline]
-    fn evaluate<S: Real>(&self, contact: &Relative<S>, z: &[S], z_rate: &mut [S]) -> [S; 3] {
-        match self {
-            Rate::CoulombArctan(law) => law.evaluate(contact, z, z_rate),
-            Rate::JenkinsArctan(law) => law.evaluate(contact, z, z_rate),
-        }
-    }
+    coulomb::Coulomb "coulomb" [2.0];
+    coulomb_arctan::CoulombArctan "coulomb-arctan" [2.0, 25_000.0] rate CoulombArctan;
+    jenkins::Jenkins "jenkins" [10_000.0, 2.0];
+    jenkins_arctan::JenkinsArctan "jenkins-arctan" [10_000.0, 2.0, 25_000.0] rate JenkinsArctan;
 }
 
 impl Law {
