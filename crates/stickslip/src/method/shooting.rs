@@ -5,7 +5,7 @@
 
 use super::drive::Drive;
 use super::guess::Guess;
-use super::periodic::{Aim, ReturnMap, close};
+use super::periodic::{Aim, Closed, ReturnMap, close, norm};
 use super::smooth::flow::SmoothFlow;
 use super::smooth::path;
 use super::smooth::step::Structure;
@@ -20,9 +20,14 @@ const NAME: &str = "shooting";
 /// Relative error per step when none is given: orbits of the paper's couple are then within 1e-7 (see the verification tests).
 const TOLERANCE: f64 = 1e-8;
 /// Residual of the first search, in which every run chooses its steps anew: the map is then smooth only to about their error.
-const NEAR: f64 = 1e-4;
+const NEAR: f64 = 1e-6;
 /// Residual at which the orbit is closed on the steps of the last free run, on which the map is smooth.
 const CLOSED: f64 = 1e-11;
+/// Meshes made for one orbit: the first is as good as the first search, the second nearly always enough.
+const MESHES: usize = 6;
+/// A mesh is good when closing the orbit on it moves the state by at most this many times the error per step: that is what the
+/// choice of the steps alone does.
+const SETTLED: f64 = 100.0;
 /// Energy gap above which an orbit is not reported as converged.
 const ENERGY_GAP: f64 = 1e-5;
 /// A state counts as rest below this fraction of what the loads could cause.
@@ -162,10 +167,21 @@ impl Solver for Smooth<'_> {
             }
         };
         let broke = |cause| OrbitError::Breakdown { method: NAME, omega, cause };
-        self.flow.run(&mut near.state.clone(), 0.0, self.duration, None).map_err(broke)?;
-        self.flow.frozen = true;
-        let mut closed = close(self, &near.state, Aim { residual: CLOSED, ..aim })?;
-        closed.iterations += near.iterations;
+        // steps made for a state close the orbit only as well as they fit it: make them anew until that moves it no more
+        let mut closed = near;
+        for _ in 0..MESHES {
+            self.flow.frozen = false;
+            self.flow.run(&mut closed.state.clone(), 0.0, self.duration, None).map_err(broke)?;
+            self.flow.frozen = true;
+            let again = close(self, &closed.state, Aim { residual: CLOSED, ..aim })?;
+            let moved: Vec<f64> = again.state.iter().zip(&closed.state).map(|(a, b)| a - b).collect();
+            let size = norm(&self.weights, &again.state).max(rest).max(f64::MIN_POSITIVE);
+            let settled = norm(&self.weights, &moved) <= SETTLED * self.flow.tolerance * size;
+            closed = Closed { iterations: closed.iterations + again.iterations, ..again };
+            if settled {
+                break;
+            }
+        }
         self.flow.record = true;
         let mut end = closed.state.clone();
         self.flow.run(&mut end, 0.0, self.duration, None).map_err(broke)?;
