@@ -1,6 +1,7 @@
 //! Mathematics that knows no mechanics.
 
 pub mod complementarity;
+pub mod continuation;
 pub mod dense;
 pub mod dual;
 pub mod fourier;

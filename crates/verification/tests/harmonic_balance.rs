@@ -224,10 +224,25 @@ fn theory_6_6_performance_of_the_couple() {
         let found = 100.0 * row.peak.unwrap().value;
         assert!((found / cm - 1.0).abs() < 0.02, "{limit} N: {found} cm instead of {cm}");
     }
-    let c = performance.curve(&[5.5, 6.0, 6.25, 6.5, 7.0]).unwrap();
-    eprintln!("{c:?}");
-    let best = c.optimum.unwrap();
-    assert!((best.value - 6.4).abs() < 0.15, "{best:?}");
+    // the minimum, which 6.6 puts near 6.4 N: with the exact law it stands higher, as the grids below show
+    let best = performance.curve(&[5.5, 6.0, 6.5, 7.0]).unwrap().optimum.unwrap();
+    let lowest = best.peak.unwrap().value;
+    for limit in [6.2, 6.4, 6.6, 6.65, 6.7, 6.75, 6.8, 7.0] {
+        // a grid of 0.002 Hz without any search: its maximum is no higher than the peak, and no grid maximum is below the optimum
+        let system = couple.model_with(&[("Ft", limit)]).unwrap().assemble().unwrap();
+        let mut solver = EventDriven.solver(&system).unwrap();
+        let mut start: Option<Vec<f64>> = None;
+        let highest = (0..500).fold(0.0, |highest: f64, i| {
+            let orbit = solver.orbit(TAU * (120.5 + 0.002 * f64::from(i)), start.as_deref()).unwrap();
+            let amplitude = orbit.places[0].amplitude();
+            start = Some(orbit.start);
+            highest.max(amplitude)
+        });
+        let peak = performance.peak(limit).unwrap().peak.unwrap().value;
+        assert!(highest <= peak * (1.0 + 1e-12) && highest > peak * (1.0 - 1e-3), "{limit} N: {highest} {peak}");
+        assert!(highest > lowest * (1.0 - 1e-9), "{limit} N: {highest} is below the optimum {best:?}");
+    }
+    assert!((best.value - 6.684).abs() < 0.01, "{best:?}");
 }
 
 /// A generator of repeatable random numbers. Source: Knuth's MMIX constants.
@@ -313,4 +328,20 @@ fn the_error_estimate_is_honest() {
         within += usize::from(estimate < 3.0 * error && estimate > error / 3.0);
     }
     assert!(judged > 150 && within * 100 >= judged * 95, "{within} of {judged}");
+}
+
+/// Floquet multipliers by the judge of the exact method: those of the orbit that it finds itself.
+#[test]
+fn stability_by_the_same_judge() {
+    let couple = templates::find("blade-couple-massless").unwrap();
+    let system = couple.model_with(&[("Ft", 2.0)]).unwrap().assemble().unwrap();
+    for hertz in [120.0, 121.0, 121.25, 122.0] {
+        let found = orbit(&balance(31, 4096), &system, TAU * hertz);
+        let judge = orbit(&EventDriven, &system, TAU * hertz);
+        assert!(found.is_stable());
+        for (a, b) in found.multipliers().iter().zip(judge.multipliers()) {
+            // a switch that is off by the error of the series, 1e-6 of the period
+            assert!((a.norm() - b.norm()).abs() < 1e-4, "{hertz} Hz: {a} {b}");
+        }
+    }
 }

@@ -9,7 +9,9 @@
 //! odd excitation only odd harmonics occur. The error of a solution is estimated from a second one with twice the harmonics.
 //! Source: Krack and Gross, "Harmonic Balance for Nonlinear Vibration Problems" (2019); Cameron and Griffin (1989).
 
+mod branch;
 mod joints;
+mod judge;
 mod mode;
 mod path;
 mod rest;
@@ -20,9 +22,11 @@ use super::{Method, MethodError, MethodInfo, MethodOption, Options, OrbitError, 
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::Orbit;
+pub(crate) use branch::BranchEquations;
 use joints::{Coordinate, Slider};
+use judge::Judge;
 pub(crate) use mode::{ModeEquations, ModeState};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use num_complex::Complex64;
 use rest::Rest;
 use solve::{Level, Lost, Motion};
@@ -147,6 +151,7 @@ impl Method for HarmonicBalance {
             rigid,
             odd,
             first: FIRST.max(highest),
+            judge: Judge::new(system),
             levels: BTreeMap::new(),
             last: None,
         }))
@@ -168,6 +173,7 @@ struct Balance<'a> {
     rigid: usize,
     odd: bool,
     first: usize,
+    judge: Judge,
     levels: BTreeMap<usize, Level>,
     /// The last orbit: its state at t = 0, its highest harmonic and its motion.
     last: Option<(Vec<f64>, usize, Motion)>,
@@ -284,7 +290,7 @@ impl Balance<'_> {
             omega,
             odd: self.odd,
             truncation,
-            return_map: DMatrix::zeros(0, 0),
+            judge: Some(&mut self.judge),
         };
         let level = self.levels.get_mut(&top).expect("solved");
         let orbit = path::orbit(context, level, &motion, x);

@@ -1,6 +1,7 @@
 //! The orbit of a solution of harmonic balance.
 
 use super::joints::{Coordinate, Seen, Slider};
+use super::judge::Judge;
 use super::rest::Rest;
 use super::solve::{Level, Motion};
 use crate::method::Contact;
@@ -54,12 +55,12 @@ pub(super) struct Context<'a> {
     pub omega: f64,
     pub odd: bool,
     pub truncation: Option<f64>,
-    pub return_map: DMatrix<f64>,
+    pub judge: Option<&'a mut Judge>,
 }
 
 /// Makes the orbit.
 pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec<DVector<Complex64>>) -> Orbit {
-    let Context { system, coordinates, omega, odd, truncation, return_map } = context;
+    let Context { system, coordinates, omega, odd, truncation, judge } = context;
     let (n, nh) = (system.dofs(), level.harmonics().len());
     let harmonics = level.harmonics().to_vec();
     let samples = level.alternation.samples();
@@ -132,6 +133,7 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
     start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
     start.extend(elastic_states);
+    let return_map = judge.map_or_else(|| DMatrix::zeros(0, 0), |judge| judge.derivative(system, omega, odd, &start));
     Orbit {
         method: super::NAME,
         omega,
@@ -269,7 +271,7 @@ fn extremes(series: &[(usize, Complex64)], level: &mut Level) -> (f64, f64) {
                 bend -= h * h * z.re;
             }
             let step = slope / bend;
-            if bend == 0.0 || !(step.abs() <= TAU / n as f64) {
+            if !step.is_finite() || step.abs() > TAU / n as f64 {
                 break;
             }
             theta -= step;

@@ -188,6 +188,21 @@ impl Level {
         sum.sqrt()
     }
 
+    /// The residual at `motion`, and its derivative into `jacobian` if wanted.
+    pub fn residual_at(
+        &mut self,
+        coordinates: &[Coordinate],
+        omega: f64,
+        motion: &mut Motion,
+        jacobian: Option<&mut [f64]>,
+    ) -> &[f64] {
+        self.evaluate(coordinates, omega, motion, jacobian.is_some());
+        if let Some(jacobian) = jacobian {
+            jacobian.copy_from_slice(&self.jacobian);
+        }
+        &self.residual
+    }
+
     /// Size of the motion against which residuals are measured.
     fn size(&self, motion: &Motion) -> f64 {
         let nh = self.harmonics().len();
