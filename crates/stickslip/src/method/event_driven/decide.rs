@@ -129,7 +129,7 @@ impl Decision {
         self.undecided.clear();
         for (k, &i) in self.at_rest.iter().enumerate() {
             if relative[k].abs() > BALANCED * size {
-                self.contacts[i] = Contact::slip(lambda[k]);
+                self.contacts[i] = Contact::slip(relative[k]); // a joint that is only moved has no force here
             } else if lambda[k].abs() >= limits[k] * (1.0 - AT_LIMIT) {
                 self.undecided.push(i);
             }

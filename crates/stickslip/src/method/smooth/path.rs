@@ -269,7 +269,8 @@ impl SteppedPath {
                 let others = nodes.iter().enumerate().filter(|(k, _)| *k != i);
                 values[i] * others.map(|(_, node)| (s - node) / (nodes[i] - node)).product::<f64>()
             })
-            .sum()
+            .sum::<f64>()
+            .clamp(-joint.limit, joint.limit) // the cubic may overshoot at a layer, the law never does
     }
 }
 
