@@ -69,8 +69,8 @@ fn section(results: &Results, name: &str, heading: &str, paragraph: &str) -> Opt
     })
 }
 
-/// A parameter of the study's first case, SI.
-fn parameter(results: &Results, study: &str, name: &str) -> Option<f64> {
+/// The mass of this name in the study's first case, kg.
+fn mass_of(results: &Results, study: &str, name: &str) -> Option<f64> {
     results.get(study)?.record.study["cases"][0]["model"]["masses"].as_array().and_then(|masses| {
         let mass = masses.iter().find(|mass| mass["name"] == name)?;
         mass["mass"].as_f64()
@@ -85,7 +85,7 @@ fn falling(curves: &[Curve], optimum: Option<&Optimum>) -> (String, Verdict) {
         && optimum.interior
     {
         measured += &format!(
-            " Lowest at Ft = {:.3} N with {:.4} cm; beyond, it rises again to {:.2} cm at {} N, where the contact sticks for good.",
+            " Lowest at Ft = {:.3} N with {:.4} cm; beyond, it rises again to {:.2} cm at {} N.",
             optimum.lowest.0,
             100.0 * optimum.lowest.1,
             100.0 * optimum.peaks[optimum.peaks.len() - 1],
@@ -105,8 +105,7 @@ pub fn figure6(results: &Results, further: &Further) -> Option<Part> {
     let (a2, a3) = (heights(&curves, CONTACT), heights(&curves, BLADE3));
     let (f1, f3) = (frequencies(&curves, BLADE1), frequencies(&curves, BLADE3));
     let at = limits(&curves);
-    // k is not in the study's table of masses, so the eigenfrequencies follow from the ratio of masses and 121.25 Hz
-    let (blade, small_mass) = (parameter(results, "fig06", "blade1")?, parameter(results, "fig06", "contact")?);
+    let (blade, small_mass) = (mass_of(results, "fig06", "blade1")?, mass_of(results, "fig06", "contact")?);
     let stiffness = results.get("fig06")?.record.study["cases"][0]["model"]["springs"][0]["stiffness"].as_f64()?;
     let first = (stiffness / blade).sqrt() / TAU;
     let second = (stiffness / (blade + small_mass)).sqrt() / TAU;
@@ -134,8 +133,7 @@ pub fn figure6(results: &Results, further: &Further) -> Option<Part> {
             "120.75 Hz is that of the connected bodies m + m1/2",
             "The second peak \u{201c}is given by connected bodies m + m1/2\u{201d}. (Sec. 4)",
             format!(
-                "\u{221a}(k/(m + m1/2))/2\u{3c0} = {second:.4} Hz; a3 peaks {} Hz beside it ({at}): at 2 N it is met, then the \
-                 peak moves up with Ft towards the resonance of the stuck couple.",
+                "\u{221a}(k/(m + m1/2))/2\u{3c0} = {second:.4} Hz; a3 peaks {} Hz beside it ({at}).",
                 list(f3.iter().map(|f| f - second), 3)
             ),
             in_all(&f3.iter().map(|f| (f - second).abs() <= PRINTED).collect::<Vec<_>>()),
@@ -240,14 +238,14 @@ fn stiffness_claims(curves: &[Curve], further: &[(f64, Vec<Curve>)]) -> Vec<supe
 }
 
 /// Fig. 7.
-pub fn figure7(results: &Results) -> Option<Part> {
+pub fn figure7(results: &Results, further: &Further) -> Option<Part> {
     let curves = results.curves("fig07")?;
     let heavy = results.curves("fig06")?;
     let at = limits(&curves);
     let (here, before) = (shifts(&curves, BLADE1, BLADE3), shifts(&heavy, BLADE1, BLADE3));
     let apart = here.iter().map(|shift| *shift > 0.0).collect::<Vec<_>>();
     let nearer = here.iter().zip(&before).map(|(a, b)| a.abs() < b.abs()).collect::<Vec<_>>();
-    let (measured, verdict) = falling(&curves, None);
+    let (measured, verdict) = falling(&curves, further.light.as_ref());
     let (a2, a3) = (heights(&curves, CONTACT), heights(&curves, BLADE3));
     let top = largest(curves.iter().chain(&heavy).map(Curve::highest));
     let findings = vec![
@@ -313,6 +311,53 @@ pub fn figure7(results: &Results) -> Option<Part> {
     Some(Part { section, findings })
 }
 
+/// The conclusion about all parameters.
+pub fn dependence(results: &Results, further: &Further) -> Option<Part> {
+    let (heavy, light) = (results.curves("fig06")?, results.curves("fig07")?);
+    let case = &results.get("fig06")?.record.study["cases"][0]["model"];
+    // half-power width of a blade's resonance, Hz
+    let width = case["springs"][0]["damping"].as_f64()? / (TAU * mass_of(results, "fig06", "blade1")?);
+    let double = further.stiffness.iter().find(|(kt, _)| *kt == 2e4).map(|(_, curves)| curves)?;
+    let changes = [("Ft doubled", heavy.get(1)?), ("kt doubled", double.first()?), ("m1 halved", light.first()?)];
+    let base = heavy.first()?;
+    let mut strong = Vec::new();
+    let mut rows = Vec::new();
+    for (what, curve) in changes {
+        let mut row = vec![what.to_owned()];
+        let mut most = (0.0f64, 0.0f64);
+        for (_, mass) in MASSES {
+            let (height, shift) =
+                (curve.peak[mass].1 / base.peak[mass].1 - 1.0, curve.peak[mass].0 - base.peak[mass].0);
+            most = (most.0.max(height.abs()), most.1.max(shift.abs()));
+            row.extend([format!("{:+.1}", 100.0 * height), format!("{shift:+.3}")]);
+        }
+        strong.extend([most.0 > DIFFERENT, most.1 > 0.5 * width]);
+        rows.push(row.into_iter().map(|cell| cell.replace('-', "\u{2212}")).collect());
+    }
+    let findings = vec![finding(
+        "heights and positions depend strongly on all parameters",
+        "\u{201c}Their heights and positions strongly depend on all parameters of 3V characteristic of connecting element.\u{201d} (Sec. 6)",
+        format!(
+            "From Fig. 6 at Ft = 2 N, each of Ft, kt, m1 changed by a factor of two: {} of 6 largest changes are strong, that is more than {} in height, \
+             or more than half the half-power width ({:.3} Hz) in frequency.",
+            strong.iter().filter(|s| **s).count(),
+            percent(DIFFERENT),
+            0.5 * width
+        ),
+        in_all(&strong),
+    )];
+    let section = Section {
+        heading: "What the peaks depend on".to_owned(),
+        tables: vec![PageTable {
+            caption: "Change of the refined peaks of Fig. 6 at Ft = 2 N".to_owned(),
+            header: words(&["change", "a1, %", "Hz", "a2, %", "Hz", "a3, %", "Hz"]),
+            rows,
+        }],
+        ..Section::default()
+    };
+    Some(Part { section, findings })
+}
+
 /// Largest difference between the curves of Fig. 6 and ten times those of a study with a tenth of the forces.
 fn image(results: &Results, large: &str, small: &str) -> Option<f64> {
     let (large, small) = (results.curves(large)?, results.curves(small)?);
@@ -328,9 +373,7 @@ pub fn figure8(results: &Results) -> Option<Part> {
     let mut findings = vec![finding(
         "ten times smaller forces give the same picture",
         "\u{201c}For ten times lower forces \u{2026} the amplitudes reduce as well, but the character of the responses remain similar.\u{201d} (Sec. 4)",
-        format!(
-            "Ten times Fig. 8 and Fig. 6 differ by {exact:.1e} of the highest peak: with Coulomb friction the image is exact."
-        ),
+        format!("Ten times Fig. 8 and Fig. 6 differ by {exact:.1e} of the highest peak (exact Coulomb friction)."),
         small(exact, SIMILAR, APPROXIMATE),
     )];
     if let (Some(kept), Some(scaled)) =
@@ -341,7 +384,7 @@ pub fn figure8(results: &Results) -> Option<Part> {
             "\u{201c}\u{2026} valid also for vibration with small amplitudes, of course when the conditions of physical similarity such as the ratio \
              of forces F0/Ft0 are fulfilled.\u{201d} (Sec. 4)",
             format!(
-                "With the paper\u{2019}s arctangent law it is not the only one: \u{3b1} F0/\u{221a}(km) must be kept too. Difference to Fig. 6, as a part of the \
+                "With the paper\u{2019}s arctangent law \u{3b1} F0/\u{221a}(km) is a condition too. Difference to Fig. 6, as a part of the \
                  highest peak of its panel: {kept:.1e} with \u{3b1} = 25 s/mm kept, {scaled:.1e} with \u{3b1} = 250 s/mm."
             ),
             small(kept, IMAGE, SIMILAR),
@@ -369,6 +412,11 @@ pub fn figure10(results: &Results) -> Option<Part> {
     let first = |curves: &[Curve], mass: usize| curves.first().map_or(f64::NAN, |curve| 100.0 * curve.peak[mass].1);
     let excited = first(&symmetric, BLADE1) / first(&couple, BLADE1) - 1.0;
     let other = first(&symmetric, BLADE4) / first(&couple, BLADE3) - 1.0;
+    let case = &results.get("fig10")?.record.study["cases"][0]["model"];
+    let number = |list: &str, key: &str| case[list][0][key].as_f64();
+    let mass = number("masses", "mass")? + mass_of(results, "fig10", "contact2")?;
+    let floor = 100.0 * number("forces", "amplitude")?
+        / (2.0 * number("springs", "damping")? * (number("springs", "stiffness")? / mass).sqrt());
     let excess: Vec<f64> =
         heights(&symmetric, BLADE1).iter().zip(heights(&couple, BLADE1)).map(|(s, c)| s / c - 1.0).collect();
     let findings = vec![
@@ -405,8 +453,8 @@ pub fn figure10(results: &Results) -> Option<Part> {
             "\u{201c}The courses of responses in both cases are different, but the damping effect of symmetric and non-symmetric structure are \
              approximately the same.\u{201d} (Sec. 5)",
             format!(
-                "{at}: peak of the excited blade {} cm symmetric, {} cm non-symmetric: {} higher. Friction between equal blades damps only their \
-                 motion against each other; the peak cannot fall below the other half, F0/(2 b \u{3c9}0) = 3.29 cm.",
+                "{at}: peak of the excited blade {} cm symmetric, {} cm non-symmetric; excess {}. Friction between equal blades damps only their \
+                 motion against each other; their common motion alone peaks at F0/(2 b \u{3c9}0) = {floor:.2} cm.",
                 list(heights(&symmetric, BLADE1), 3),
                 list(heights(&couple, BLADE1), 3),
                 excess.iter().map(|v| percent(*v)).collect::<Vec<_>>().join(", ")

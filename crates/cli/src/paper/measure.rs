@@ -179,6 +179,39 @@ impl Loop {
         self.force.iter().fold(0.0f64, |a, f| a.max(f.abs()))
     }
 
+    /// Number of turns of the force in one cycle that are larger than `small` (N): a loop of flat or rounded sides has two.
+    pub fn turns(&self, small: f64) -> usize {
+        let (mut turns, mut rising, mut extreme) = (0, None, self.force.first().copied().unwrap_or(0.0));
+        // the cycle twice: the first time round only finds the direction at the start
+        for round in 0..2 {
+            for force in &self.force {
+                let up = rising == Some(true);
+                if rising.is_some() && (force - extreme) * if up { 1.0 } else { -1.0 } >= 0.0 {
+                    extreme = *force;
+                } else if (force - extreme).abs() > small {
+                    rising = Some(*force > extreme);
+                    extreme = *force;
+                    turns += round;
+                }
+            }
+        }
+        turns
+    }
+
+    /// Largest distance of a point of either loop from the other loop, with displacements measured in the amplitude of the motion
+    /// and forces in `limit` (N).
+    pub fn distance(&self, other: &Loop, limit: f64) -> f64 {
+        let scaled = |l: &Loop| -> Vec<(f64, f64)> {
+            l.displacement.iter().zip(&l.force).map(|(u, f)| (u / self.amplitude, f / limit)).collect()
+        };
+        let (a, b) = (scaled(self), scaled(other));
+        let farthest = |from: &[(f64, f64)], to: &[(f64, f64)]| {
+            let nearest = |p: &(f64, f64)| to.windows(2).map(|s| from_segment(*p, s[0], s[1])).fold(f64::NAN, f64::min);
+            from.iter().map(nearest).fold(f64::NAN, f64::max)
+        };
+        farthest(&a, &b).max(farthest(&b, &a))
+    }
+
     /// The force at `time`, between samples by straight lines.
     fn force_at(&self, time: f64) -> f64 {
         let next = self.time.partition_point(|t| *t < time).clamp(1, self.time.len() - 1);
@@ -193,6 +226,14 @@ impl Loop {
         }
         self.time.iter().zip(&self.force).map(|(t, f)| (f - other.force_at(*t)).abs()).fold(f64::NAN, f64::max)
     }
+}
+
+/// Distance of a point from a segment.
+fn from_segment(p: (f64, f64), a: (f64, f64), b: (f64, f64)) -> f64 {
+    let (d, r) = ((b.0 - a.0, b.1 - a.1), (p.0 - a.0, p.1 - a.1));
+    let length = d.0 * d.0 + d.1 * d.1;
+    let along = if length > 0.0 { ((r.0 * d.0 + r.1 * d.1) / length).clamp(0.0, 1.0) } else { 0.0 };
+    (r.0 - along * d.0).hypot(r.1 - along * d.1)
 }
 
 #[cfg(test)]
@@ -234,6 +275,23 @@ mod tests {
         let b = Loop { force: a.force.iter().map(|f| 1.1 * f).collect(), ..a.clone() };
         assert!((a.difference(&b) - 0.1).abs() < 1e-12);
         assert!(a.difference(&Loop::default()).is_nan());
+    }
+
+    #[test]
+    fn forms_are_compared_by_their_distance() {
+        let a = Loop { amplitude: 2.0, ..polygon(&[(2.0, 1.0), (0.0, -1.0), (-2.0, -1.0), (0.0, 1.0)]) };
+        let late = Loop { time: a.time.iter().map(|t| t + 1.0).collect(), ..a.clone() };
+        assert!(a.distance(&late, 1.0) < 1e-12);
+        let high = Loop { force: a.force.iter().map(|f| 1.1 * f).collect(), ..a.clone() };
+        assert!((a.distance(&high, 1.0) - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn turns_of_the_force_are_counted() {
+        let a = polygon(&[(2.0, 1.0), (0.0, -1.0), (-2.0, -1.0), (0.0, 1.0)]);
+        assert_eq!(a.turns(0.01), 2);
+        let ringing = polygon(&[(2.0, 1.0), (0.0, -1.0), (-1.0, -0.8), (-2.0, -1.0), (0.0, 1.0), (1.0, 0.8)]);
+        assert_eq!((ringing.turns(0.01), ringing.turns(0.5)), (6, 2));
     }
 
     #[test]
