@@ -99,7 +99,8 @@ pub fn run(study: &Study, context: &Context<'_>) -> Result<Dataset, StudyError> 
     for index in 0..study.cases() {
         cases.push(prepare(study, study.case(index)?)?);
     }
-    let mut outcome = (study.kind().run)(&cases, context);
+    let mut outcome = (study.kind().run)(study, &cases, context)
+        .map_err(|(index, error)| refused(study, &cases[index].case, &error))?;
     let interrupted = outcome.points.contains_key(NOT_REACHED);
     if interrupted {
         outcome.notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
@@ -140,8 +141,7 @@ fn prepare(study: &Study, case: Case) -> Result<Prepared, StudyError> {
     let method = (row.build)(&case.method.options).map_err(|error| refused(study, &case, &error))?;
     let system =
         case.model.assemble().map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
-    // a transient follows exact and smooth laws alike and asks no method
-    if study.kind().name != "transient" {
+    if study.kind().uses_method {
         method.solver(&system).map_err(|error| refused(study, &case, &error))?;
     }
     Ok(Prepared { case, system, method })
@@ -307,10 +307,10 @@ impl Summary {
     }
 }
 
-/// The unit that shows `largest` (SI) with one to three digits before the point: its name and the factor from SI.
+/// The unit in which `largest` (SI) lies between 0.5 and 500: its name and the factor from SI.
 pub(crate) fn display_unit(largest: f64, si: &str) -> (String, f64) {
     for (prefix, factor) in [("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)] {
-        if largest * factor >= 1.0 {
+        if largest * factor >= 0.5 {
             return (format!("{prefix}{si}"), factor);
         }
     }
