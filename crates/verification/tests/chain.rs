@@ -1,5 +1,7 @@
 //! Several joints: a chain of eight blades, joints that switch at the same instant, and joints listed in another order.
 
+#![allow(clippy::print_stdout)] // tests say what they measured
+
 use std::f64::consts::{FRAC_PI_2, TAU};
 use stickslip::law::{Coulomb, Jenkins, JenkinsArctan, Law};
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};

@@ -2,8 +2,11 @@
 //!
 //! Source: Den Hartog, "Forced vibrations with combined Coulomb and viscous friction" (1931). `r = Ω √(m/k)`, `beta = F/P`.
 
+#![allow(clippy::print_stdout)] // tests say what they measured
+
 use std::f64::consts::{FRAC_PI_4, PI};
 use stickslip::law::{Coulomb, Law};
+use stickslip::method::transient::{Excitation, Transient};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
 use stickslip::orbit::{Orbit, Symmetry};
 use stickslip_verification::{close, exact, maximum, near, zero};
@@ -193,4 +196,41 @@ fn theory_7_base_excitation() {
         close("loss", orbit.joints[0].dissipation, 4.0 * beta * p * x0, 1e-8);
         close("work of the base", orbit.energy.work_in, orbit.joints[0].dissipation, 1e-8);
     }
+}
+
+/// Free decay: each half cycle of duration π √(m/k) takes `2 F/k` off the turning point, until it is within `F/k`: there it stops.
+#[test]
+fn theory_7_free_decay() {
+    let (m, k, limit, x0) = (0.7f64, 30.0f64, 0.9, 0.5);
+    let xf = limit / k;
+    let half = PI * (m / k).sqrt();
+    let mut model = oscillator(m, k, limit);
+    model.forces.clear();
+    let system = model.assemble().unwrap();
+    let motion = Transient {
+        displacement: vec![x0],
+        velocity: vec![0.0],
+        excitation: Excitation::Free,
+        duration: 20.0 * half,
+        step: half,
+        width: None,
+    };
+    let mut found = Vec::new();
+    motion
+        .run(&system, &mut |_, _, state| {
+            found.push((state.displacement[0], state.velocity[0]));
+            true
+        })
+        .unwrap();
+    let (mut expected, mut stops) = (x0, 0);
+    for (i, (x, v)) in found.iter().enumerate() {
+        near(&format!("turning point {i}"), *x, expected, 1e-12 * x0);
+        near(&format!("velocity at turning point {i}"), *v, 0.0, 1e-10 * x0 * (k / m).sqrt());
+        if expected.abs() > xf {
+            expected = -(expected.abs() - 2.0 * xf) * expected.signum();
+        } else {
+            stops += 1;
+        }
+    }
+    assert!(found.len() >= 20 && stops > 10, "{} {stops}", found.len());
 }

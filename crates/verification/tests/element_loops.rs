@@ -1,5 +1,7 @@
 //! Loops of a single element moved by `a cos Ωt`: theory sections 2 and 3 (the paper's Figs. 2, 3, 4).
 
+#![allow(clippy::print_stdout)] // tests say what they measured
+
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, TAU};
 use stickslip::law::{CoulombArctan, FrictionLaw, Jenkins, JenkinsArctan, Law};
@@ -93,6 +95,7 @@ fn theory_2_3_dissipation_of_the_parallelogram() {
 }
 
 #[test]
+#[allow(clippy::approx_constant)] // 0.318310 is a printed number
 fn theory_2_4_describing_function() {
     // the table of section 2: keq, w ceq, slip angle in degrees, x1 in mm at the onset of slip
     let printed = [

@@ -1,6 +1,8 @@
 //! Energy of orbits: theory section 9, for every template and several joints. Work, viscous loss and friction loss are computed
 //! here from harmonics and samples, apart from the library's own closed forms.
 
+#![allow(clippy::print_stdout)] // tests say what they measured
+
 use std::f64::consts::{PI, TAU};
 use stickslip::law::{CoulombArctan, Law};
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};

@@ -1,6 +1,8 @@
 //! What every law of the table must do, whatever it is: give no energy, stay at rest, be the same at any speed if it claims to be
 //! rate-independent, tend to its exact neighbour, and have the tangent that its dual numbers say.
 
+#![allow(clippy::print_stdout)] // tests say what they measured
+
 use std::f64::consts::TAU;
 use stickslip::law::{Law, RateLaw, Relative, TABLE};
 use stickslip::method::auto::Auto;

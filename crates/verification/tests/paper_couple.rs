@@ -2,13 +2,15 @@
 //!
 //! Linear limits are solved here by complex 2 × 2 elimination; `data/smooth_orbits/stick_borders.csv` has them by NumPy.
 
+#![allow(clippy::print_stdout)] // tests say what they measured
+
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use stickslip::law::{CoulombArctan, Law};
 use stickslip::method::{Method, Solver, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
-use stickslip_verification::{close, exact, maximum, near, number, table, template, template_with, zero};
+use stickslip_verification::{Random, close, exact, maximum, near, number, table, template, template_with, zero};
 
 const M: f64 = 0.182;
 const K: f64 = 105_103.0;
@@ -69,6 +71,23 @@ fn check_peaks(name: &str, changes: &[(&str, f64)], printed: &[(f64, f64)]) {
         assert!(found.0 >= at && found.0 < 1.005 * at, "{found:?} {at}");
         near(&format!("{name} {changes:?}: frequency of place {i}"), found.1, printed.1, 0.02);
     }
+}
+
+/// How k and b were inferred from the paper's text.
+#[test]
+fn theory_6_1_parameters() {
+    let (m, m1) = (0.182, 0.001_82);
+    let k = |hertz: f64| (TAU * hertz).powi(2) * (m - m1 / 2.0);
+    near("k from 121.25 Hz", k(121.25), 105_103.63, 0.5e-2);
+    near("frequency of k = 105 000 N/m", (105e3f64 / (m - m1 / 2.0)).sqrt() / TAU, 121.190, 0.5e-3);
+    // a1 ~ (F0 - 4 Ft0/π)/(b w): 5 cm at 2 N gives b, and b = 0.2 kg/s gives 4.89 cm
+    let w = TAU * 121.25;
+    near("b from 5 cm", (F0 - 8.0 / PI) / (0.05 * w), 0.1957, 0.5e-4);
+    let peak = peaks(&template("blade-couple", &[("Ft", 2.0)]))[0].0;
+    near("peak in cm with b = 0.2", peak, 4.89, 0.5e-2);
+    close("the estimate", peak, 100.0 * (F0 - 8.0 / PI) / (B * w), 1e-3);
+    near("damping ratio", B / (2.0 * (K * m).sqrt()), 7.23e-4, 0.5e-6);
+    near("Q", (K * m).sqrt() / B, 691.5, 0.1);
 }
 
 #[test]
@@ -420,6 +439,25 @@ fn theory_13_orbits_are_stable_and_shift_with_the_force() {
             close("amplitude", b.amplitude(), a.amplitude(), 1e-9);
             let turned = a.first_harmonic * Complex64::from_polar(1.0, PI / 3.0);
             assert!((b.first_harmonic - turned).norm() < 1e-9 * turned.norm(), "{hertz} Hz: {a:?} {b:?}");
+        }
+    }
+}
+
+/// Dissipative and with one contact of constant limit: one orbit, whatever the start.
+#[test]
+fn theory_13_orbits_are_unique() {
+    let mut random = Random::new(13);
+    for (ft, hertz) in [(2.0, 121.25), (4.0, 120.75), (8.0, 121.0), (6.0, 121.1)] {
+        let system = template("blade-couple", &[("Ft", ft)]);
+        let reference = exact(&system, TAU * hertz);
+        let mut solver = EventDriven.solver(&system).unwrap();
+        for _ in 0..10 {
+            let start: Vec<f64> =
+                (0..6).map(|i| random.between(-1.0, 1.0) * if i < 3 { 0.1 } else { 0.1 * TAU * hertz }).collect();
+            let orbit = solver.orbit(TAU * hertz, Some(&start)).unwrap();
+            for (a, b) in reference.places.iter().zip(&orbit.places) {
+                close("amplitude", b.amplitude(), a.amplitude(), 1e-9);
+            }
         }
     }
 }

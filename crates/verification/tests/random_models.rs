@@ -1,5 +1,7 @@
 //! Random models: every one ends in an orbit with its evidence, or in an error that says why.
 
+#![allow(clippy::print_stdout)] // tests say what they measured
+
 use std::time::Instant;
 use stickslip::method::{Method, event_driven::EventDriven};
 use stickslip_verification::random_model;
@@ -32,7 +34,9 @@ fn random_models_converge_with_evidence() {
             slowest = (took, seed);
         }
     }
-    println!("{converged} of {MODELS} converged; largest energy gap {gap:.1e}, residual {residual:.1e}; slowest {slowest:?}");
+    println!(
+        "{converged} of {MODELS} converged; largest energy gap {gap:.1e}, residual {residual:.1e}; slowest {slowest:?}"
+    );
     failures.iter().for_each(|failure| println!("{failure}"));
     assert!(converged * 100 >= MODELS * 98, "{} of {MODELS} converged", converged);
     assert!(gap < 1e-9 && residual < 1e-10);

@@ -1,5 +1,7 @@
 //! Similarity of the blade couple: theory section 5. Lengths scale with `F0/k`, times with `√(m/k)`.
 
+#![allow(clippy::print_stdout)] // tests say what they measured
+
 use std::f64::consts::TAU;
 use stickslip::law::{CoulombArctan, JenkinsArctan, Law};
 use stickslip::method::{Method, shooting::Shooting};

@@ -1,6 +1,8 @@
 //! Shooting on the smooth law: against orbits that SciPy integrated (`data/smooth_orbits`), on every point of the paper's Fig. 6,
 //! and towards the exact law as the arctangent steepens.
 
+#![allow(clippy::print_stdout)] // tests say what they measured
+
 use std::f64::consts::TAU;
 use std::time::Instant;
 use stickslip::law::{CoulombArctan, Law};

@@ -2,6 +2,8 @@
 //!
 //! Half the sum of the blades' motions is linear whatever the contact does; only half their difference rubs.
 
+#![allow(clippy::print_stdout)] // tests say what they measured
+
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip::law::{CoulombArctan, Law};

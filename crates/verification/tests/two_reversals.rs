@@ -3,6 +3,8 @@
 //!
 //! Source: Den Hartog (1931) and Ferri and Dowell (1988), with damping and many degrees of freedom.
 
+#![allow(clippy::print_stdout)] // tests say what they measured
+
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use stickslip::model::System;
