@@ -1,5 +1,6 @@
 //! Mathematics that knows no mechanics.
 
+pub mod banded;
 pub mod complementarity;
 pub mod continuation;
 pub mod dense;

@@ -345,3 +345,35 @@ fn stability_by_the_same_judge() {
         }
     }
 }
+
+/// The banded form of large systems gives what the condensed form gives: a chain beyond its border against the same chain whose
+/// far end is cut off by blades that nothing drives.
+#[test]
+fn long_chains_take_the_banded_form() {
+    let chain = |blades: usize| {
+        let name = |i: usize| format!("b{i}");
+        let mut model = Model::default();
+        for i in 0..blades {
+            model.masses.push(Mass { name: name(i), mass: 0.182 });
+            model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness: 105_103.0, damping: 0.2 });
+            if i > 0 && i < 12 {
+                let law = Law::Jenkins(Jenkins { stiffness: 1e4, limit: 2.0 });
+                model.joints.push(Joint { name: format!("j{i}"), between: [name(i - 1), name(i)], law });
+            }
+            if i < 12 {
+                let phase = 0.7 * i as f64;
+                model.forces.push(Force { on: name(i), amplitude: 10.0, phase, harmonic: 1 });
+            }
+        }
+        model.assemble().unwrap()
+    };
+    let (short, long) = (chain(12), chain(60));
+    let omega = TAU * 121.3;
+    let (a, b) = (orbit(&balance(5, 1024), &short, omega), orbit(&balance(5, 1024), &long, omega));
+    let judge = orbit(&EventDriven, &short, omega);
+    let largest = a.places.iter().map(|p| p.amplitude()).fold(0.0, f64::max);
+    for i in 0..12 {
+        assert!((a.places[i].amplitude() - b.places[i].amplitude()).abs() < 1e-8 * largest, "{i}");
+        assert!((a.places[i].amplitude() - judge.places[i].amplitude()).abs() < 1e-3 * largest, "{i}");
+    }
+}

@@ -48,7 +48,7 @@ impl<'a> BranchEquations<'a> {
         let harmonics: Vec<usize> = if odd { (1..=top).step_by(2).collect() } else { (0..=top).collect() };
         let samples = method.samples.unwrap_or(1024.max((16 * (top + 1)).next_power_of_two()));
         let rigid = coordinates.iter().flat_map(|c| &c.sliders).filter(|s| matches!(s, Slider::Rigid { .. })).count();
-        let level = Level::new(harmonics, samples, coordinates.len(), rigid);
+        let level = Level::new(harmonics, samples, (coordinates.len(), rigid), None);
         let zero = vec![Complex64::new(0.0, 0.0); level.linear.len()];
         let motion =
             Motion { c: zero.clone(), force: zero, multipliers: vec![vec![0.0; samples]; rigid], ..Motion::default() };
@@ -138,7 +138,7 @@ impl<'a> BranchEquations<'a> {
         self.set(value);
         self.unpack(x);
         self.level.newton(&self.coordinates, self.omega, &mut self.motion, 10).ok()?;
-        let places = path::places(&self.level, &self.coordinates, &self.rest, self.omega, &self.motion);
+        let places = path::places(&mut self.level, &self.rest, self.omega, &self.motion);
         let context = path::Context {
             system: &self.system,
             coordinates: &self.coordinates,

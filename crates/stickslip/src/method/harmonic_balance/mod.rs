@@ -16,6 +16,7 @@ mod mode;
 mod path;
 mod rest;
 mod solve;
+mod sparse;
 
 use super::guess::Guess;
 use super::{Method, MethodError, MethodInfo, MethodOption, Options, OrbitError, Solver};
@@ -30,6 +31,7 @@ use nalgebra::DVector;
 use num_complex::Complex64;
 use rest::Rest;
 use solve::{Level, Lost, Motion};
+use sparse::Sparse;
 use std::collections::BTreeMap;
 
 pub(crate) const NAME: &str = "harmonic-balance";
@@ -185,7 +187,11 @@ impl Balance<'_> {
         let harmonics: Vec<usize> = if self.odd { (1..=top).step_by(2).collect() } else { (0..=top).collect() };
         let samples = self.samples(top);
         let (count, rigid) = (self.coordinates.len(), self.rigid);
-        let level = self.levels.entry(top).or_insert_with(|| Level::new(harmonics, samples, count, rigid));
+        let (system, coordinates) = (self.system, &self.coordinates);
+        let level = self.levels.entry(top).or_insert_with(|| {
+            let sparse = Sparse::new(system, coordinates, &harmonics);
+            Level::new(harmonics, samples, (count, rigid), sparse)
+        });
         level.drive(self.system, &self.coordinates, &self.rest, omega);
         level
     }
@@ -221,8 +227,10 @@ impl Balance<'_> {
 
     /// The describing function's motion.
     fn guess(&mut self, top: usize, omega: f64) -> Motion {
-        let guess = Guess::new(self.system, omega);
         let n = self.system.dofs();
+        // the guess solves the whole structure densely: large systems begin without friction
+        let guess = (n < sparse::LARGE).then(|| Guess::new(self.system, omega));
+        let guess = guess.map_or_else(Vec::new, |guess| guess.harmonics);
         let coordinates = self.coordinates.clone();
         let (system, rigid) = (self.system, self.rigid);
         let level = self.level(top, omega);
@@ -231,7 +239,7 @@ impl Balance<'_> {
         let mut c = level.linear.clone();
         for (q, coordinate) in coordinates.iter().enumerate() {
             let joint = &system.joints[coordinate.joint];
-            for (rate, x) in &guess.harmonics {
+            for (rate, x) in &guess {
                 let h = (rate / omega).round() as usize;
                 if let Ok(k) = level.harmonics().binary_search(&h) {
                     let g = joint.imposed.iter().find(|(k, _)| *k as usize == h).map_or(zero, |(_, g)| *g);
@@ -252,8 +260,8 @@ impl Balance<'_> {
     }
 
     /// Harmonics of the places.
-    fn places(&self, top: usize, omega: f64, motion: &Motion) -> Vec<DVector<Complex64>> {
-        path::places(&self.levels[&top], &self.coordinates, &self.rest, omega, motion)
+    fn places(&mut self, top: usize, omega: f64, motion: &Motion) -> Vec<DVector<Complex64>> {
+        path::places(self.levels.get_mut(&top).expect("solved"), &self.rest, omega, motion)
     }
 
     /// Distance of two motions, as the largest of the places, relative to the largest motion of a place; without means.
@@ -303,7 +311,9 @@ impl Balance<'_> {
         let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(omega, l))?;
         let x = self.places(top, omega, &motion);
         let double = 2 * top + 1;
-        let truncation = if self.unknowns(double) <= LARGEST { self.check(top, omega, &motion, &x) } else { None };
+        let sparse = self.levels[&top].sparse.is_some();
+        let truncation =
+            if sparse || self.unknowns(double) <= LARGEST { self.check(top, omega, &motion, &x) } else { None };
         Ok(self.finish(top, omega, motion, x, truncation))
     }
 
@@ -375,14 +385,14 @@ mod tests {
             let rest = Rest::new(&system, &coordinates);
             let omega = std::f64::consts::TAU * hertz;
             let solution = |width: f64| {
-                let mut level = Level::new((1..=15).step_by(2).collect(), 1024, 1, 1);
+                let mut level = Level::new((1..=15).step_by(2).collect(), 1024, (1, 1), None);
                 level.drive(&system, &coordinates, &rest, omega);
                 level.width = width;
                 let zero = vec![Complex64::new(0.0, 0.0); 8];
                 let start =
                     Motion { c: zero.clone(), force: zero, multipliers: vec![vec![0.0; 1024]], ..Motion::default() };
                 let motion = level.solve(&coordinates, omega, start, false).unwrap();
-                path::places(&level, &coordinates, &rest, omega, &motion)
+                path::places(&mut level, &rest, omega, &motion)
             };
             let (one, other) = (solution(1e-7), solution(1e-5));
             for (a, b) in one.iter().zip(&other) {

@@ -40,6 +40,9 @@ pub(crate) struct ModeEquations<'a> {
     next: Vec<Vec<Seen>>,
 }
 
+/// Share of the joints' stiffness that tells the equal modes of a structure without joints apart.
+const TRACE: f64 = 1e-9;
+
 impl<'a> ModeEquations<'a> {
     /// # Errors
     /// A law with several directions, or with an inner coordinate of its own.
@@ -71,13 +74,15 @@ impl<'a> ModeEquations<'a> {
     pub fn linear(&mut self, index: usize, stuck: bool, a: f64) -> Option<ModeState> {
         let n = self.system.dofs();
         let mut stiffness = self.system.stiffness.clone();
-        if stuck {
-            for coordinate in &self.coordinates {
-                let w = self.system.joints[coordinate.joint].direction.column(0);
-                for slider in &coordinate.sliders {
-                    if let Slider::Elastic { stiffness: kt, .. } = slider {
-                        stiffness += w * w.transpose() * *kt;
-                    }
+        // without joints a trace of them stays, so that equal blades move with or against each other as the joints make them
+        let share = if stuck { 1.0 } else { TRACE };
+        for coordinate in &self.coordinates {
+            let w = self.system.joints[coordinate.joint].direction.column(0);
+            for slider in &coordinate.sliders {
+                match slider {
+                    Slider::Elastic { stiffness: kt, .. } => stiffness += w * w.transpose() * (share * *kt),
+                    _ if !stuck => stiffness += w * w.transpose() * (TRACE * self.system.stiffness.amax()),
+                    _ => {}
                 }
             }
         }

@@ -20,19 +20,19 @@ const RIPPLE: f64 = 3.0;
 const REST: f64 = 1e-6;
 
 /// Harmonics of all places under the forces of a motion.
-pub(super) fn places(
-    level: &Level,
-    coordinates: &[Coordinate],
-    rest: &Rest,
-    omega: f64,
-    motion: &Motion,
-) -> Vec<DVector<Complex64>> {
+pub(super) fn places(level: &mut Level, rest: &Rest, omega: f64, motion: &Motion) -> Vec<DVector<Complex64>> {
     let nh = level.harmonics().len();
     (0..nh)
         .map(|k| {
             let forces = rest.spread(|q| motion.force[q * nh + k]);
-            let _ = coordinates;
-            &level.free[k] - rest.respond(level.harmonics()[k], omega, &forces)
+            let Some(sparse) = &mut level.sparse else {
+                return &level.free[k] - rest.respond(level.harmonics()[k], omega, &forces);
+            };
+            let mut x = level.free[k].clone();
+            let mut moved = x.clone();
+            sparse.respond(k, |i| forces[i], moved.as_mut_slice());
+            x -= moved;
+            x
         })
         .collect()
 }

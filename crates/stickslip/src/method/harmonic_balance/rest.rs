@@ -4,6 +4,7 @@
 //! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored.
 
 use super::joints::Coordinate;
+use super::sparse::Sparse;
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -49,7 +50,8 @@ impl Rest {
             DMatrix::from_fn(n, coordinates.len(), |i, q| system.joints[coordinates[q].joint].direction[(i, 0)]);
         Rest {
             n,
-            modal: modal(system, &direction),
+            // where the banded form takes over, the modes are not needed
+            modal: if Sparse::new(system, coordinates, &[1]).is_some() { None } else { modal(system, &direction) },
             mass: system.mass.clone(),
             damping: system.damping.clone(),
             stiffness: system.stiffness.clone(),

@@ -6,6 +6,7 @@
 
 use super::joints::{Alternation, Coordinate, Seen, Sharpness};
 use super::rest::Rest;
+use super::sparse::Sparse;
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -44,6 +45,8 @@ pub(super) struct Level {
     pub linear: Vec<Complex64>,
     /// Motion of all places without friction, per harmonic.
     pub free: Vec<DVector<Complex64>>,
+    /// In place of receptance and Jacobian, for large systems.
+    pub sparse: Option<Sparse>,
     tangents: Vec<f64>,
     jacobian: Vec<f64>,
     residual: Vec<f64>,
@@ -80,7 +83,12 @@ pub(super) struct Lost {
 }
 
 impl Level {
-    pub fn new(harmonics: Vec<usize>, samples: usize, coordinates: usize, rigid: usize) -> Self {
+    pub fn new(
+        harmonics: Vec<usize>,
+        samples: usize,
+        (coordinates, rigid): (usize, usize),
+        sparse: Option<Sparse>,
+    ) -> Self {
         let nh = harmonics.len();
         let size = 2 * nh * coordinates;
         Level {
@@ -90,7 +98,8 @@ impl Level {
             linear: vec![ZERO; nh * coordinates],
             free: Vec::new(),
             tangents: vec![0.0; 4 * nh * nh * coordinates],
-            jacobian: vec![0.0; size * size],
+            jacobian: vec![0.0; if sparse.is_some() { 0 } else { size * size }],
+            sparse,
             residual: vec![0.0; size],
             step: vec![0.0; size],
             seen: Vec::new(),
@@ -109,17 +118,30 @@ impl Level {
         let nh = self.harmonics().len();
         self.receptance.clear();
         self.free.clear();
+        if let Some(sparse) = &mut self.sparse
+            && !sparse.drive(omega)
+        {
+            // a singular frequency: the next number has none of its zeros
+            sparse.drive(omega * (1.0 + f64::EPSILON));
+        }
         for k in 0..nh {
             let h = self.alternation.harmonics[k];
-            let mut receptance = rest.receptance(h, omega);
-            for (q, coordinate) in coordinates.iter().enumerate() {
-                receptance[(q, q)] += coordinate.series;
+            let load = excitation.iter().find(|(number, _)| *number as usize == h);
+            let mut free = DVector::from_element(n, ZERO);
+            if let Some(sparse) = &mut self.sparse {
+                if let Some((_, force)) = load {
+                    sparse.respond(k, |i| force[i], free.as_mut_slice());
+                }
+            } else {
+                let mut receptance = rest.receptance(h, omega);
+                for (q, coordinate) in coordinates.iter().enumerate() {
+                    receptance[(q, q)] += coordinate.series;
+                }
+                self.receptance.push(receptance);
+                if let Some((_, force)) = load {
+                    free = rest.respond(h, omega, force);
+                }
             }
-            self.receptance.push(receptance);
-            let free = match excitation.iter().find(|(number, _)| *number as usize == h) {
-                Some((_, force)) => rest.respond(h, omega, force),
-                None => DVector::from_element(n, ZERO),
-            };
             for (q, coordinate) in coordinates.iter().enumerate() {
                 let joint = &system.joints[coordinate.joint];
                 let imposed = joint.imposed.iter().find(|(number, _)| *number as usize == h).map_or(ZERO, |(_, g)| *g);
@@ -149,6 +171,23 @@ impl Level {
             );
         }
         let mut sum = 0.0;
+        if let Some(sparse) = &mut self.sparse {
+            for k in 0..nh {
+                let (residual, weight) = (&mut self.residual, weight(self.alternation.harmonics[k]));
+                let (c, linear) = (&motion.c, &self.linear);
+                sparse.receive(
+                    k,
+                    |q| motion.force[q * nh + k],
+                    |q, u| {
+                        let r = c[q * nh + k] - linear[q * nh + k] + u;
+                        let at = 2 * (q * nh + k);
+                        (residual[at], residual[at + 1]) = (r.re, r.im);
+                        sum += r.norm_sqr() * weight;
+                    },
+                );
+            }
+            return sum.sqrt();
+        }
         for q in 0..count {
             for k in 0..nh {
                 let mut r = motion.c[q * nh + k] - self.linear[q * nh + k];
@@ -225,7 +264,6 @@ impl Level {
         motion: &mut Motion,
         most: usize,
     ) -> Result<(), Lost> {
-        let size = self.residual.len();
         let mut residual = self.evaluate(coordinates, omega, motion, true);
         let mut best = (residual, motion.c.clone());
         let (mut waits, mut short) = (0, false);
@@ -234,7 +272,7 @@ impl Level {
             if motion.residual <= SOLVED || residual == 0.0 {
                 return Ok(());
             }
-            if !dense::solve(&mut self.jacobian, size, &mut self.residual) {
+            if !self.newton_step() {
                 break;
             }
             motion.iterations += 1;
@@ -278,14 +316,24 @@ impl Level {
         Err(Lost { iterations: motion.iterations, residual: motion.residual })
     }
 
+    /// Replaces the residual of the last evaluation by the step that removes it.
+    fn newton_step(&mut self) -> bool {
+        match &mut self.sparse {
+            Some(sparse) => sparse.step(&self.tangents, &mut self.residual),
+            None => {
+                let size = self.residual.len();
+                dense::solve(&mut self.jacobian, size, &mut self.residual)
+            }
+        }
+    }
+
     /// One Newton step with every rigid slider left as free or as clamped as it was in the last evaluation.
     fn hold_step(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion) {
         let before = motion.c.clone();
         motion.sharpness.hold = true;
         self.evaluate(coordinates, omega, motion, true);
         motion.sharpness.hold = false;
-        let size = self.residual.len();
-        if dense::solve(&mut self.jacobian, size, &mut self.residual) {
+        if self.newton_step() {
             motion.iterations += 1;
             for (c, d) in motion.c.iter_mut().zip(self.residual.chunks_exact(2)) {
                 *c -= Complex64::new(d[0], d[1]);

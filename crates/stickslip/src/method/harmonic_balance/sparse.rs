@@ -1,0 +1,181 @@
+//! Large systems with local coupling: the receptance along the joints is not formed, its products are banded solves.
+//!
+//! With `Z` the dynamic stiffness and `K` the derivative of the joint forces, the Newton step of `c + R f - c_lin = r`, `R = Wᵀ Z⁻¹ W`, is
+//! `(1 + R K)⁻¹ r = r - Wᵀ (Z + W K Wᵀ)⁻¹ W K r` (Woodbury), and `Z + W K Wᵀ` has the band of the structure.
+
+use super::joints::Coordinate;
+use crate::model::System;
+use num_complex::Complex64;
+use stickslip_numerics::banded::{Banded, order};
+
+/// Degrees of freedom from which a system counts as large.
+pub(super) const LARGE: usize = 40;
+
+/// The banded form of a system at one drive frequency.
+#[derive(Debug, Clone)]
+pub(super) struct Sparse {
+    n: usize,
+    position: Vec<usize>,
+    /// Entries of (mass, damping, stiffness) that are not all zero.
+    entries: Vec<(usize, usize, [f64; 3])>,
+    /// Per coordinate: (place, direction).
+    ends: Vec<Vec<(usize, f64)>>,
+    harmonics: Vec<f64>,
+    omega: f64,
+    /// Z per harmonic, factored.
+    factors: Vec<Banded>,
+    tangent: Banded,
+    right: Vec<f64>,
+    whole: Vec<f64>,
+}
+
+impl Sparse {
+    /// `None` if the system is small, has inner coordinates, or is coupled all over.
+    pub fn new(system: &System, coordinates: &[Coordinate], harmonics: &[usize]) -> Option<Self> {
+        let n = system.dofs();
+        if n < LARGE || coordinates.iter().any(|c| c.series > 0.0) {
+            return None;
+        }
+        let mut entries = Vec::new();
+        for i in 0..n {
+            for k in 0..n {
+                let values = [system.mass[(i, k)], system.damping[(i, k)], system.stiffness[(i, k)]];
+                if values.iter().any(|v| *v != 0.0) {
+                    entries.push((i, k, values));
+                }
+            }
+        }
+        let ends: Vec<Vec<(usize, f64)>> = coordinates
+            .iter()
+            .map(|c| {
+                let w = system.joints[c.joint].direction.column(0);
+                (0..n).filter(|&i| w[i] != 0.0).map(|i| (i, w[i])).collect()
+            })
+            .collect();
+        let mut links: Vec<(usize, usize)> = entries.iter().map(|(i, k, _)| (*i, *k)).collect();
+        for ends in &ends {
+            links.extend(ends.iter().flat_map(|a| ends.iter().map(|b| (a.0, b.0))));
+        }
+        let position = order(n, &links);
+        let band = links.iter().map(|&(a, b)| position[a].abs_diff(position[b])).max().unwrap_or(0);
+        if band * 4 > n {
+            return None;
+        }
+        let nh = harmonics.len();
+        Some(Sparse {
+            n,
+            position,
+            entries,
+            ends,
+            harmonics: harmonics.iter().map(|h| *h as f64).collect(),
+            omega: 0.0,
+            factors: vec![Banded::new(2 * n, 2 * band + 1); nh],
+            tangent: Banded::new(2 * n * nh, (band + 1) * 2 * nh - 1),
+            right: vec![0.0; 2 * n],
+            whole: vec![0.0; 2 * n * nh],
+        })
+    }
+
+    /// Factors the dynamic stiffness. False if it is singular at a harmonic.
+    pub fn drive(&mut self, omega: f64) -> bool {
+        self.omega = omega;
+        for (k, factor) in self.factors.iter_mut().enumerate() {
+            factor.clear();
+            let rate = self.harmonics[k] * omega;
+            for &(i, l, [m, c, s]) in &self.entries {
+                let (row, column) = (2 * self.position[i], 2 * self.position[l]);
+                let z = Complex64::new(s - rate * rate * m, rate * c);
+                factor.add(row, column, z.re);
+                factor.add(row, column + 1, -z.im);
+                factor.add(row + 1, column, z.im);
+                factor.add(row + 1, column + 1, z.re);
+            }
+            if !factor.factor() {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Displacements of all places at harmonic number `k` of the list, from forces on them: `values(place)`, into `out`.
+    pub fn respond(&mut self, k: usize, values: impl Fn(usize) -> Complex64, out: &mut [Complex64]) {
+        for i in 0..self.n {
+            let f = values(i);
+            (self.right[2 * self.position[i]], self.right[2 * self.position[i] + 1]) = (f.re, f.im);
+        }
+        self.factors[k].solve(&mut self.right);
+        for i in 0..self.n {
+            out[i] = Complex64::new(self.right[2 * self.position[i]], self.right[2 * self.position[i] + 1]);
+        }
+    }
+
+    /// Motion along the coordinates at harmonic number `k` under the forces `force(q)` along them, into `out`.
+    pub fn receive(&mut self, k: usize, force: impl Fn(usize) -> Complex64, mut out: impl FnMut(usize, Complex64)) {
+        self.right.fill(0.0);
+        for (q, ends) in self.ends.iter().enumerate() {
+            let f = force(q);
+            for &(i, w) in ends {
+                self.right[2 * self.position[i]] += w * f.re;
+                self.right[2 * self.position[i] + 1] += w * f.im;
+            }
+        }
+        self.factors[k].solve(&mut self.right);
+        for (q, ends) in self.ends.iter().enumerate() {
+            let mut u = Complex64::new(0.0, 0.0);
+            for &(i, w) in ends {
+                let at = 2 * self.position[i];
+                u += Complex64::new(self.right[at], self.right[at + 1]) * w;
+            }
+            out(q, u);
+        }
+    }
+
+    /// Replaces the residual by the Newton step; `tangents` holds K, one block per coordinate. False if it is singular.
+    pub fn step(&mut self, tangents: &[f64], residual: &mut [f64]) -> bool {
+        let nh = self.harmonics.len();
+        let (size, block) = (2 * nh, 4 * nh * nh);
+        self.tangent.clear();
+        for &(i, l, [m, c, s]) in &self.entries {
+            for k in 0..nh {
+                let rate = self.harmonics[k] * self.omega;
+                let (row, column) = (self.position[i] * size + 2 * k, self.position[l] * size + 2 * k);
+                let z = Complex64::new(s - rate * rate * m, rate * c);
+                self.tangent.add(row, column, z.re);
+                self.tangent.add(row, column + 1, -z.im);
+                self.tangent.add(row + 1, column, z.im);
+                self.tangent.add(row + 1, column + 1, z.re);
+            }
+        }
+        self.whole.fill(0.0);
+        for (q, ends) in self.ends.iter().enumerate() {
+            let k = &tangents[q * block..(q + 1) * block];
+            let r = &residual[q * size..(q + 1) * size];
+            for a in 0..size {
+                let row = &k[a * size..(a + 1) * size];
+                let pull: f64 = row.iter().zip(r).map(|(k, r)| k * r).sum();
+                for &(i, w) in ends {
+                    let at = self.position[i] * size + a;
+                    self.whole[at] += w * pull;
+                    for &(l, v) in ends {
+                        let column = self.position[l] * size;
+                        for (b, value) in row.iter().enumerate() {
+                            self.tangent.add(at, column + b, w * v * value);
+                        }
+                    }
+                }
+            }
+        }
+        if !self.tangent.factor() {
+            return false;
+        }
+        self.tangent.solve(&mut self.whole);
+        for (q, ends) in self.ends.iter().enumerate() {
+            for a in 0..size {
+                for &(i, w) in ends {
+                    residual[q * size + a] -= w * self.whole[self.position[i] * size + a];
+                }
+            }
+        }
+        residual.iter().all(|r| r.is_finite())
+    }
+}
