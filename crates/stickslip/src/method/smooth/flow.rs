@@ -177,12 +177,11 @@ impl SmoothFlow {
             }
             position += ticks;
             // a longer step only where it starts at a multiple of itself and its error is expected to pass
-            while self.level > COARSEST
+            if self.level > COARSEST
                 && position.is_multiple_of(1u64 << (LEVELS - self.level + 1))
                 && error * 2f64.powf(ORDER) < SAFETY
             {
                 self.level -= 1;
-                break;
             }
         }
         Ok(())
