@@ -690,7 +690,7 @@ impl Reader {
     /// Gives these parameters the dimension that they have in the file, so that other values must have it too.
     fn settle_dimensions(&mut self, parameters: &mut [Parameter], which: &[usize]) -> Option<()> {
         let order = self.order(parameters, &[])?;
-        let values = match crate::study::evaluate(&self.names, parameters, &order, &HashMap::new()) {
+        let values = match crate::study::evaluate(&self.names, parameters, &order, &HashMap::new(), None) {
             Ok(values) => values,
             Err(problem) => {
                 self.problems.push(problem);

@@ -214,12 +214,30 @@ impl Study {
     /// # Errors
     /// [`StudyError`] if there is no such case. The cases of a study that was read have been checked.
     pub fn case(&self, index: usize) -> Result<Case, StudyError> {
+        self.case_where(index, None)
+    }
+
+    /// Case `index` with the parameter `name` at a value (SI) that no case needs to have, for searches between the cases.
+    ///
+    /// # Errors
+    /// [`StudyError`]: no such case or parameter, or the value is none that the model can have.
+    pub fn case_with(&self, index: usize, name: &str, si: f64) -> Result<Case, StudyError> {
+        match self.names.iter().position(|n| n == name) {
+            Some(parameter) => self.case_where(index, Some((parameter, si))),
+            None => {
+                let message = format!("there is no parameter `{}`", shown(name));
+                Err(StudyError::file(&self.sources[0].name, message, None))
+            }
+        }
+    }
+
+    fn case_where(&self, index: usize, fixed: Option<(usize, f64)>) -> Result<Case, StudyError> {
         if index >= self.cases() {
             let message = format!("there is no case {index}, the study has {}", self.cases());
             return Err(StudyError::file(&self.sources[0].name, message, None));
         }
         let mut problems = Vec::new();
-        let parts = self.parts(index, &mut problems);
+        let parts = self.parts(index, fixed, &mut problems);
         let error = StudyError::all(&self.sources, problems);
         match (parts, error) {
             (Some(parts), None) => Ok(self.finished(index, parts)),
@@ -309,7 +327,7 @@ impl Study {
     pub(crate) fn check(&self) -> Result<(), StudyError> {
         for index in 0..self.cases() {
             let mut problems = Vec::new();
-            self.parts(index, &mut problems);
+            self.parts(index, None, &mut problems);
             if let Some(error) = StudyError::all(&self.sources, problems) {
                 return Err(error);
             }
@@ -317,8 +335,8 @@ impl Study {
         Ok(())
     }
 
-    fn parts(&self, index: usize, problems: &mut Vec<Problem>) -> Option<Parts> {
-        let parts = self.resolve(index, problems);
+    fn parts(&self, index: usize, fixed: Option<(usize, f64)>, problems: &mut Vec<Problem>) -> Option<Parts> {
+        let parts = self.resolve(index, fixed, problems);
         // one case of many: say which
         if self.cases() > 1 && index > 0 {
             for problem in problems.iter_mut() {
@@ -328,14 +346,14 @@ impl Study {
         parts
     }
 
-    fn resolve(&self, index: usize, problems: &mut Vec<Problem>) -> Option<Parts> {
+    fn resolve(&self, index: usize, fixed: Option<(usize, f64)>, problems: &mut Vec<Problem>) -> Option<Parts> {
         let mut remainder = index;
         let mut choice = HashMap::new();
         for varied in self.varied.iter().rev() {
             choice.insert(varied.index, (varied, remainder % varied.points.len()));
             remainder /= varied.points.len();
         }
-        let values = match evaluate(&self.names, &self.parameters, &self.order, &choice) {
+        let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed) {
             Ok(values) => values,
             Err(problem) => {
                 problems.push(problem);
@@ -481,6 +499,7 @@ pub(crate) fn evaluate(
     parameters: &[Parameter],
     order: &[usize],
     choice: &HashMap<usize, (&Varied, usize)>,
+    fixed: Option<(usize, f64)>,
 ) -> Result<Vec<Value>, Problem> {
     let mut environment = Environment { names, values: vec![Value::bare(f64::NAN); parameters.len()] };
     for &index in order {
@@ -499,7 +518,10 @@ pub(crate) fn evaluate(
                 Value { si: between(start.si, end.si, point, *points), ..start }
             }
         };
-        environment.values[index] = value;
+        environment.values[index] = match fixed {
+            Some((parameter, si)) if parameter == index => Value { si, ..value },
+            _ => value,
+        };
     }
     Ok(environment.values)
 }

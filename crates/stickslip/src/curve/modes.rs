@@ -46,6 +46,8 @@ pub struct ModeRequest {
     pub samples: usize,
 }
 
+/// Multiples of the largest amplitude at which a mode may begin.
+const STARTS: [f64; 4] = [1.0, 10.0, 100.0, 1e4];
 /// Steps between two points that may be halved.
 const HALVINGS: u32 = 12;
 
@@ -71,10 +73,14 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
     let last = request.points.max(2) - 1;
     let amplitude = |i: usize| low * (high / low).powf(i as f64 / last as f64);
     let mut points = Vec::with_capacity(last + 1);
-    let Some(first) = equations.linear(request.mode, false, high) else {
+    // joints matter the less the larger the motion: begin as far above the range as the linear mode is a good guess
+    let begin = STARTS.iter().find_map(|factor| {
+        let linear = equations.linear(request.mode, false, factor * high)?;
+        follow(&mut equations, &(factor * high, linear), high).map(|state| (high, state))
+    });
+    let Some(mut now) = begin else {
         return Ok(Mode { points, lost: Some(high) });
     };
-    let mut now = (high, first);
     let mut lost = None;
     for i in (0..=last).rev() {
         match follow(&mut equations, &now, amplitude(i)) {

@@ -87,6 +87,19 @@ impl System {
             .collect()
     }
 
+    /// `√(φᵀMφ)` of mode `index` of the structure without its joints, scaled to a largest displacement of one: the modal amplitude
+    /// (m √kg) of a metre at the place that moves most. Modes count by rising frequency from 0; zero if there is no such mode.
+    pub fn modal_unit(&self, index: usize) -> f64 {
+        let Some(factor) = self.mass.clone().cholesky() else { return 0.0 };
+        let n = self.dofs();
+        let Some(inverse) = factor.l().solve_lower_triangular(&DMatrix::identity(n, n)) else { return 0.0 };
+        let eigen = nalgebra::SymmetricEigen::new(&inverse * &self.stiffness * inverse.transpose());
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+        // an M-normalised shape has φᵀMφ = 1
+        order.get(index).map_or(0.0, |&k| 1.0 / (inverse.transpose() * eigen.eigenvectors.column(k)).amax())
+    }
+
     /// Whether the excitation changes its sign after half a period, as do all friction laws: then an orbit with
     /// `x(t + T/2) = -x(t)` exists.
     pub fn is_odd(&self) -> bool {

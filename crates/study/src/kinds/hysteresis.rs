@@ -4,8 +4,10 @@ use super::{Complaint, FREQUENCY, Kind, SAMPLES, orbits};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, Outcome, Prepared, Rows, display_unit, place_of};
 use crate::schema::{Takes, optional};
+use crate::study::Study;
 use crate::values::Values;
 use std::f64::consts::TAU;
+use stickslip::method::MethodError;
 use stickslip::model::Model;
 use stickslip::orbit::{Orbit, Sample};
 
@@ -23,6 +25,7 @@ pub(super) const KIND: Kind = Kind {
         SAMPLES,
     ],
     check,
+    uses_method: true,
     run,
 };
 
@@ -67,7 +70,7 @@ impl Source {
     }
 }
 
-fn run(cases: &[Prepared], context: &Context<'_>) -> Outcome {
+fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Result<Outcome, (usize, MethodError)> {
     let mut outcome = Outcome::default();
     let (mut table, mut summary) = (Rows::default(), Rows::default());
     let mut loops = Vec::new();
@@ -120,7 +123,7 @@ fn run(cases: &[Prepared], context: &Context<'_>) -> Outcome {
     }
     outcome.tables = vec![table.table("loops"), summary.table("loops_summary")];
     outcome.figure = panels(cases, &loops, several);
-    outcome
+    Ok(outcome)
 }
 
 /// The loops that the study asks for.

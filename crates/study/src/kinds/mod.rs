@@ -3,14 +3,18 @@
 //! A kind states its keys of `[study]`; the reader checks them and hands over their [`Values`] for every case.
 
 mod hysteresis;
+mod modes;
 mod orbit;
 mod orbits;
+mod performance;
 mod response;
 mod transient;
 
 use crate::run::{Context, Outcome, Prepared};
 use crate::schema::{Key, Takes, default, required};
+use crate::study::Study;
 use crate::values::Values;
+use stickslip::method::MethodError;
 use stickslip::model::Model;
 
 /// A row of the table of study kinds.
@@ -24,12 +28,15 @@ pub struct Kind {
     pub keys: &'static [Key],
     /// What one key alone cannot tell: conditions between keys, and names that must exist in the model.
     pub check: fn(&Values, &Model) -> Result<(), Complaint>,
-    /// Computes the cases.
-    pub run: fn(&[Prepared], &Context<'_>) -> Outcome,
+    /// Whether it finds its orbits with the method of `[method]`, which must then be able to take the model.
+    pub uses_method: bool,
+    /// Computes the cases; an error is the index of a case and why its model cannot be taken.
+    pub run: fn(&Study, &[Prepared], &Context<'_>) -> Result<Outcome, (usize, MethodError)>,
 }
 
 /// Every study kind there is, in the order in which lists show them.
-pub const TABLE: &[Kind] = &[hysteresis::KIND, orbit::KIND, response::KIND, transient::KIND];
+pub const TABLE: &[Kind] =
+    &[hysteresis::KIND, orbit::KIND, response::KIND, transient::KIND, performance::KIND, modes::KIND];
 
 /// The kind with this name.
 pub fn find(name: &str) -> Option<&'static Kind> {

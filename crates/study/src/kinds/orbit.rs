@@ -3,7 +3,9 @@
 use super::{FREQUENCY, Kind, SAMPLES, orbits};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, Outcome, Prepared, Rows, Summary, display_unit, place_of};
+use crate::study::Study;
 use std::f64::consts::TAU;
+use stickslip::method::MethodError;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
 pub(super) const KIND: Kind = Kind {
@@ -11,10 +13,11 @@ pub(super) const KIND: Kind = Kind {
     summary: "the steady motion over one period: displacements, velocities, joint forces",
     keys: &[FREQUENCY, SAMPLES],
     check: |_, _| Ok(()),
+    uses_method: true,
     run,
 };
 
-fn run(cases: &[Prepared], context: &Context<'_>) -> Outcome {
+fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Result<Outcome, (usize, MethodError)> {
     let mut outcome = Outcome::default();
     let (mut motion, mut summary, mut multipliers) = (Rows::default(), Rows::default(), Rows::default());
     for (prepared, points) in cases.iter().zip(orbits::all(cases, context)) {
@@ -69,7 +72,7 @@ fn run(cases: &[Prepared], context: &Context<'_>) -> Outcome {
     }
     outcome.figure.truncate(MOST_PANELS);
     outcome.tables = vec![motion.table("orbit"), summary.table("orbits"), multipliers.table("multipliers")];
-    outcome
+    Ok(outcome)
 }
 
 /// More panels than this say nothing; the tables have all.

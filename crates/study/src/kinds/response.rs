@@ -4,11 +4,13 @@ use super::{FREQUENCY, Kind};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{Context, NOT_REACHED, Outcome, Prepared, Rows, Summary, display_unit, place_of};
 use crate::schema::{Takes, default};
+use crate::study::Study;
 use crate::values::Frequencies;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use stickslip::curve::peak::{Peak, highest};
 use stickslip::curve::sweep::sweep;
+use stickslip::method::MethodError;
 
 pub(super) const KIND: Kind = Kind {
     name: "response",
@@ -24,6 +26,7 @@ pub(super) const KIND: Kind = Kind {
         ),
     ],
     check: |_, _| Ok(()),
+    uses_method: true,
     run,
 };
 
@@ -38,7 +41,7 @@ struct Curve {
     peaks: Vec<Option<Peak>>,
 }
 
-fn run(cases: &[Prepared], context: &Context<'_>) -> Outcome {
+fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Result<Outcome, (usize, MethodError)> {
     let curves: Vec<Curve> = cases.par_iter().map(|prepared| curve(prepared, context)).collect();
     let mut outcome = Outcome::default();
     let (mut rows, mut peaks) = (Rows::default(), Rows::default());
@@ -78,7 +81,7 @@ fn run(cases: &[Prepared], context: &Context<'_>) -> Outcome {
         outcome.tables.push(peaks.table("peaks"));
     }
     outcome.figure = panels(cases, &curves);
-    outcome
+    Ok(outcome)
 }
 
 fn curve(prepared: &Prepared, context: &Context<'_>) -> Curve {

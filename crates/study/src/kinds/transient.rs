@@ -5,10 +5,12 @@ use super::{Complaint, Kind, MOST_SAMPLES};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit, place_of};
 use crate::schema::{Key, Takes, Within, default, optional, required};
+use crate::study::Study;
 use crate::values::Values;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
+use stickslip::method::MethodError;
 use stickslip::method::transient::{Excitation, Transient, TransientError};
 use stickslip::model::Model;
 use stickslip::orbit::Sample;
@@ -65,6 +67,8 @@ pub(super) const KIND: Kind = Kind {
         optional("time_step", DURATION, "distance of the points of the table; needed for a free decay", "\"0.1 ms\""),
     ],
     check,
+    // exact and smooth laws alike are followed in time; there is no orbit to be found
+    uses_method: false,
     run,
 };
 
@@ -134,7 +138,7 @@ struct Motion {
     stopped: bool,
 }
 
-fn run(cases: &[Prepared], context: &Context<'_>) -> Outcome {
+fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Result<Outcome, (usize, MethodError)> {
     let mut outcome = Outcome::default();
     let mut rows = Rows::default();
     let all: Vec<Vec<Motion>> = cases.par_iter().map(|prepared| motions(prepared, context)).collect();
@@ -165,7 +169,7 @@ fn run(cases: &[Prepared], context: &Context<'_>) -> Outcome {
     }
     outcome.figure.truncate(MOST_PANELS);
     outcome.tables = vec![rows.table("motion")];
-    outcome
+    Ok(outcome)
 }
 
 /// More panels than this say nothing; the table has all.
