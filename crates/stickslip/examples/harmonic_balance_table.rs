@@ -10,7 +10,7 @@ use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::Har
 use stickslip::model::templates;
 
 /// Points of a curve, 119.5 to 122.5 Hz.
-const POINTS: u32 = 241;
+const POINTS: u32 = 49;
 
 fn main() {
     let cases: [(&str, &str, &[(&str, f64)]); 4] = [

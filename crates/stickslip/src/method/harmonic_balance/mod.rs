@@ -297,7 +297,7 @@ impl Balance<'_> {
             coordinates: &self.coordinates,
             omega,
             odd: self.odd,
-            truncation,
+            truncation: truncation.map(|error| error + motion.left),
             judge: Some(&mut self.judge),
         };
         let level = self.levels.get_mut(&top).expect("solved");

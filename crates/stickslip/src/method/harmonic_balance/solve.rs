@@ -28,6 +28,13 @@ const WIDTH: f64 = 1e-7;
 const LEAST_WIDTH: f64 = 1e-9;
 /// Factor by which friction is sharpened, as long as Newton's method follows.
 const SHARPEN: f64 = 0.25;
+/// The same where that failed.
+const SLOWLY: f64 = 0.6;
+/// The first width from a neighbour that was not near enough, relative to its velocity.
+const NEAR: f64 = 1e-2;
+/// Smoothing that may be left where the set of slipping samples cannot be found, at the very onset of slip, relative to the velocity
+/// without friction.
+const LEFT: f64 = 1e-4;
 /// Rounds of multipliers.
 const ROUNDS: usize = 20;
 /// A round that changes the motion by less than this share ends the search: the width has less influence still.
@@ -52,6 +59,8 @@ pub(super) struct Level {
     residual: Vec<f64>,
     step: Vec<f64>,
     next: Vec<Vec<Seen>>,
+    /// The sharpest motion of a search that did not end.
+    sharpest: Option<Motion>,
     seen: Vec<Vec<Seen>>,
 }
 
@@ -67,6 +76,8 @@ pub(super) struct Motion {
     pub sharpness: Sharpness,
     pub residual: f64,
     pub iterations: usize,
+    /// Smoothing that could not be removed, as a share of the velocity.
+    pub left: f64,
 }
 
 impl Default for Sharpness {
@@ -103,6 +114,7 @@ impl Level {
             residual: vec![0.0; size],
             step: vec![0.0; size],
             seen: Vec::new(),
+            sharpest: None,
             next: vec![vec![Seen::Force(0.0); samples]; rigid],
         }
     }
@@ -252,7 +264,7 @@ impl Level {
                 .sum::<f64>()
                 .sqrt()
         };
-        norm(&motion.c) + 1e-3 * norm(&self.linear)
+        norm(&motion.c) + 1e-2 * norm(&self.linear)
     }
 
     /// Newton's method at the sharpness of `motion`: whole steps as long as they come closer within [`PATIENCE`] of them, which is
@@ -353,12 +365,19 @@ impl Level {
     }
 
     /// From `start` (a solution nearby) or, without one, from smooth friction.
-    pub fn solve(&mut self, coordinates: &[Coordinate], omega: f64, start: Motion, warm: bool) -> Result<Motion, Lost> {
+    pub fn solve(
+        &mut self,
+        coordinates: &[Coordinate],
+        omega: f64,
+        mut start: Motion,
+        warm: bool,
+    ) -> Result<Motion, Lost> {
         use super::joints::Slider;
         let has = |test: fn(&Slider) -> bool| coordinates.iter().flat_map(|c| &c.sliders).any(test);
         let rigid = has(|s| matches!(s, Slider::Rigid { .. }));
         let smooth = has(|s| matches!(s, Slider::Smooth { .. }));
         let free_speed = self.speed(&self.linear, omega).max(f64::MIN_POSITIVE);
+        start.left = 0.0;
         let mut spent = 0;
         if warm || !(rigid || smooth) {
             let mut motion = start.clone();
@@ -373,6 +392,7 @@ impl Level {
                 Err(lost) => spent += lost.iterations,
             }
         }
+        let neighbour = start.clone();
         let mut motion = start;
         motion.iterations = spent;
         motion.multipliers.iter_mut().for_each(|m| m.fill(0.0));
@@ -380,11 +400,38 @@ impl Level {
             self.lower_limits(coordinates, omega, &mut motion)?;
             return Ok(motion);
         }
-        self.sharpen(coordinates, omega, &mut motion, (rigid, smooth), free_speed)?;
-        if rigid {
-            self.settle_multipliers(coordinates, omega, &mut motion)?;
+        let mut attempts: Vec<(Motion, f64, f64)> = Vec::new();
+        if warm {
+            // a little smoothing often is enough
+            let width = NEAR * self.speed(&neighbour.c, omega);
+            attempts.push((neighbour, width.max(LEAST_WIDTH * free_speed), SHARPEN));
         }
-        Ok(motion)
+        let mut free = motion.clone();
+        free.c.copy_from_slice(&self.linear);
+        attempts.push((free.clone(), free_speed, SHARPEN));
+        attempts.push((motion, free_speed, SHARPEN));
+        attempts.push((free, free_speed, SLOWLY));
+        let mut lost = Lost { iterations: spent, residual: f64::INFINITY };
+        self.sharpest = None;
+        for (mut motion, width, pace) in attempts {
+            motion.iterations = lost.iterations;
+            let sharp = self.sharpen(coordinates, omega, &mut motion, (rigid, smooth), (width, free_speed), pace);
+            let done = sharp
+                .and_then(|()| if rigid { self.settle_multipliers(coordinates, omega, &mut motion) } else { Ok(()) });
+            match done {
+                Ok(()) => return Ok(motion),
+                Err(failure) => lost = failure,
+            }
+        }
+        // a width that is left is an error like that of the missing harmonics: it is reported with it
+        match self.sharpest.take() {
+            Some(mut motion) if motion.sharpness.width <= LEFT * free_speed => {
+                motion.left = motion.sharpness.width / free_speed;
+                motion.iterations = lost.iterations;
+                Ok(motion)
+            }
+            _ => Err(lost),
+        }
     }
 
     /// Velocity laws: from wide to sharp.
@@ -394,11 +441,10 @@ impl Level {
         omega: f64,
         motion: &mut Motion,
         (rigid, smooth): (bool, bool),
-        free_speed: f64,
+        (mut width, free_speed): (f64, f64),
+        pace: f64,
     ) -> Result<(), Lost> {
-        let guess = std::mem::replace(&mut motion.c, self.linear.clone());
-        let mut guess = Some(guess);
-        let (mut width, mut factor) = (free_speed, SHARPEN);
+        let mut factor = pace;
         let mut good: Option<Motion> = None;
         loop {
             motion.sharpness = Sharpness { width, blur: width, ..Sharpness::default() };
@@ -430,16 +476,15 @@ impl Level {
                         self.evaluate(coordinates, omega, motion, false);
                     }
                     good = Some(motion.clone());
+                    if !smooth && self.sharpest.as_ref().is_none_or(|sharpest| width < sharpest.sharpness.width) {
+                        self.sharpest = good.clone();
+                    }
                     width = (width * factor).max(0.999 * target);
-                    factor = (factor * 0.8).max(SHARPEN * SHARPEN);
+                    factor = (factor * 0.8).max(pace * pace);
                 }
                 Err(lost) => {
                     let iterations = motion.iterations;
-                    let Some(good) = &good else {
-                        // the first width failed from the motion without friction: once more from the first guess
-                        motion.c = guess.take().ok_or(lost)?;
-                        continue;
-                    };
+                    let Some(good) = &good else { return Err(lost) };
                     *motion = Motion { iterations, ..good.clone() };
                     self.evaluate(coordinates, omega, motion, false);
                     factor = factor.sqrt();
