@@ -1,13 +1,12 @@
 //! Hysteresis loops: force over displacement of joints and moved places, over one period of the steady motion.
 
-use super::{Complaint, FREQUENCY, Kind, SAMPLES, orbits};
+use super::{Complaint, Computed, FREQUENCY, Kind, SAMPLES, orbits};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, Outcome, Prepared, Rows, display_unit, place_of};
 use crate::schema::{Takes, optional};
 use crate::study::Study;
 use crate::values::Values;
 use std::f64::consts::TAU;
-use stickslip::method::MethodError;
 use stickslip::model::Model;
 use stickslip::orbit::{Orbit, Sample};
 
@@ -70,7 +69,7 @@ impl Source {
     }
 }
 
-fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Result<Outcome, (usize, MethodError)> {
+fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let mut outcome = Outcome::default();
     let (mut table, mut summary) = (Rows::default(), Rows::default());
     let mut loops = Vec::new();

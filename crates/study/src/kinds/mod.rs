@@ -30,9 +30,12 @@ pub struct Kind {
     pub check: fn(&Values, &Model) -> Result<(), Complaint>,
     /// Whether it finds its orbits with the method of `[method]`, which must then be able to take the model.
     pub uses_method: bool,
-    /// Computes the cases; an error is the index of a case and why its model cannot be taken.
-    pub run: fn(&Study, &[Prepared], &Context<'_>) -> Result<Outcome, (usize, MethodError)>,
+    /// Computes the cases.
+    pub run: fn(&Study, &[Prepared], &Context<'_>) -> Computed,
 }
+
+/// What a kind computed, or the index of a case and why its model cannot be taken.
+pub type Computed = Result<Outcome, (usize, MethodError)>;
 
 /// Every study kind there is, in the order in which lists show them.
 pub const TABLE: &[Kind] =

@@ -1,6 +1,6 @@
 //! Nonlinear modes: frequency and equivalent damping over amplitude.
 
-use super::{Complaint, Kind};
+use super::{Complaint, Computed, Kind};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit};
 use crate::schema::{Key, Takes, Within, default, required};
@@ -59,7 +59,7 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     Ok(())
 }
 
-fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Result<Outcome, (usize, MethodError)> {
+fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let found: Vec<Result<Option<Mode>, MethodError>> = cases
         .par_iter()
         .map(|prepared| {

@@ -1,11 +1,10 @@
 //! Orbits: the steady motion over one period, in time.
 
-use super::{FREQUENCY, Kind, SAMPLES, orbits};
+use super::{Computed, FREQUENCY, Kind, SAMPLES, orbits};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, Outcome, Prepared, Rows, Summary, display_unit, place_of};
 use crate::study::Study;
 use std::f64::consts::TAU;
-use stickslip::method::MethodError;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
 pub(super) const KIND: Kind = Kind {
@@ -17,7 +16,7 @@ pub(super) const KIND: Kind = Kind {
     run,
 };
 
-fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Result<Outcome, (usize, MethodError)> {
+fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let mut outcome = Outcome::default();
     let (mut motion, mut summary, mut multipliers) = (Rows::default(), Rows::default(), Rows::default());
     for (prepared, points) in cases.iter().zip(orbits::all(cases, context)) {

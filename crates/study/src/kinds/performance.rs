@@ -1,6 +1,6 @@
 //! Performance curves: the resonance peak as a function of a design parameter, and its best value.
 
-use super::{Complaint, FREQUENCY, Kind};
+use super::{Complaint, Computed, FREQUENCY, Kind};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit};
 use crate::schema::{Takes, optional};
@@ -55,7 +55,7 @@ struct Group<'a> {
     curve: PerformanceCurve,
 }
 
-fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Result<Outcome, (usize, MethodError)> {
+fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let mut outcome = Outcome::default();
     let outer = |prepared: &Prepared| -> Vec<u64> {
         let varied = &prepared.case.varied;

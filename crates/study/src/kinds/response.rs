@@ -1,6 +1,6 @@
 //! Response curves: amplitude over drive frequency.
 
-use super::{FREQUENCY, Kind};
+use super::{Computed, FREQUENCY, Kind};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{Context, NOT_REACHED, Outcome, Prepared, Rows, Summary, display_unit, place_of};
 use crate::schema::{Takes, default};
@@ -10,7 +10,6 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 use stickslip::curve::peak::{Peak, highest};
 use stickslip::curve::sweep::sweep;
-use stickslip::method::MethodError;
 
 pub(super) const KIND: Kind = Kind {
     name: "response",
@@ -41,7 +40,7 @@ struct Curve {
     peaks: Vec<Option<Peak>>,
 }
 
-fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Result<Outcome, (usize, MethodError)> {
+fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let curves: Vec<Curve> = cases.par_iter().map(|prepared| curve(prepared, context)).collect();
     let mut outcome = Outcome::default();
     let (mut rows, mut peaks) = (Rows::default(), Rows::default());

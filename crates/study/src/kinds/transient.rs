@@ -1,7 +1,7 @@
 //! Transients: the motion in time from rest or from given displacements; free decay, switched-on drive, or run-up.
 
 use super::orbit::write_sample;
-use super::{Complaint, Kind, MOST_SAMPLES};
+use super::{Complaint, Computed, Kind, MOST_SAMPLES};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit, place_of};
 use crate::schema::{Key, Takes, Within, default, optional, required};
@@ -10,7 +10,6 @@ use crate::values::Values;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
-use stickslip::method::MethodError;
 use stickslip::method::transient::{Excitation, Transient, TransientError};
 use stickslip::model::Model;
 use stickslip::orbit::Sample;
@@ -110,7 +109,7 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
         (None, Some(r)) => r.quantity("from").into_iter().chain(r.quantity("to")).reduce(f64::max),
         (None, None) => None,
     };
-    let period = |omega: f64| std::f64::consts::TAU / omega;
+    let period = |omega: f64| TAU / omega;
     let time = duration
         .or_else(|| Some(cycles? as f64 * period(lowest?)))
         .or_else(|| run_up.and_then(|run_up| run_up.quantity("duration")));
@@ -138,7 +137,7 @@ struct Motion {
     stopped: bool,
 }
 
-fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Result<Outcome, (usize, MethodError)> {
+fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let mut outcome = Outcome::default();
     let mut rows = Rows::default();
     let all: Vec<Vec<Motion>> = cases.par_iter().map(|prepared| motions(prepared, context)).collect();

@@ -2,7 +2,7 @@
 
 use super::decide::{AT_LIMIT, Decision, REST};
 use super::mechanics::{Contact, Mechanics};
-use super::pattern::{Driven, Pattern, Work};
+use super::pattern::{Beginning, Driven, Pattern, Work};
 use crate::method::Breakdown;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
@@ -229,15 +229,8 @@ impl Flow {
         (segment.start, segment.pattern) = (time, pattern);
         segment.displacement.resize(n * nb, ZERO);
         segment.force.resize(sliders * nb, ZERO);
-        shape.displacement(
-            &self.mechanics,
-            &self.drive,
-            driven,
-            time,
-            state,
-            &mut self.work,
-            &mut segment.displacement,
-        );
+        let beginning = Beginning { driven, time, state };
+        shape.displacement(&self.mechanics, &self.drive, beginning, &mut self.work, &mut segment.displacement);
         self.velocity.resize(n * nb, ZERO);
         self.acceleration.resize(n * nb, ZERO);
         for row in 0..n {

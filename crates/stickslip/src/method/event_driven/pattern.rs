@@ -61,6 +61,17 @@ pub(crate) struct Pattern {
     pub inverse_delassus: DMatrix<f64>,
 }
 
+/// Where a stretch of motion begins.
+#[derive(Clone, Copy)]
+pub(crate) struct Beginning<'a> {
+    /// The pattern's response to the drive.
+    pub driven: &'a Driven,
+    /// Time, s.
+    pub time: f64,
+    /// State (x, v, f).
+    pub state: &'a [f64],
+}
+
 /// What a pattern adds at one drive frequency.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Driven {
@@ -214,9 +225,7 @@ impl Pattern {
         &self,
         mechanics: &Mechanics,
         drive: &Drive,
-        driven: &Driven,
-        time: f64,
-        state: &[f64],
+        Beginning { driven, time, state }: Beginning<'_>,
         work: &mut Work,
         out: &mut [Complex64],
     ) {

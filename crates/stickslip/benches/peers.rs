@@ -1,0 +1,142 @@
+//! The same orbits with Stickslip and with SciPy, in the same run, as ratios.
+//!
+//! `cargo bench -p stickslip --bench peers` makes a virtual environment under `target/` and installs SciPy there; it needs Python 3 and
+//! the package index. Every orbit starts from its neighbour 0.0125 Hz below.
+
+#![allow(clippy::print_stdout)] // a bench prints its table
+
+use std::f64::consts::TAU;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+use stickslip::law::{CoulombArctan, Law};
+use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
+use stickslip::model::{System, templates};
+
+/// Slip limit (N) and frequency (Hz): slip only, stick-slip, stick-slip.
+const CASES: [(f64, f64); 3] = [(2.0, 121.25), (4.0, 120.75), (8.0, 121.0)];
+/// The paper's steepness, s/m.
+const ALPHA: f64 = 25e3;
+/// Runs of ours per case, of which the median counts.
+const RUNS: usize = 101;
+
+fn main() {
+    // cargo test --benches passes --test: there is nothing to test here
+    if std::env::args().any(|a| a == "--test") {
+        return;
+    }
+    let ours: Vec<Ours> = CASES.iter().map(|case| Ours::new(*case)).collect();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let theirs = match python(&root).and_then(|python| scipy(&python, &root, &ours)) {
+        Ok(theirs) => theirs,
+        Err(reason) => {
+            println!("SciPy could not be measured: {reason}");
+            Vec::new()
+        }
+    };
+    println!("one orbit, warm start, one core       time        amplitude of blade 1     SciPy / Stickslip");
+    for (i, (ft, hertz)) in CASES.iter().enumerate() {
+        println!("Ft = {ft} N, {hertz} Hz");
+        println!("  Stickslip, exact law            {:9.3} ms   {:.9} m", ours[i].exact.0 * 1e3, ours[i].exact.1);
+        println!("  Stickslip, arctan, shooting     {:9.3} ms   {:.9} m", ours[i].smooth.0 * 1e3, ours[i].smooth.1);
+        for line in theirs.iter().skip(2 * i).take(2) {
+            let seconds = number(line, "seconds").unwrap_or(f64::NAN);
+            let ratios =
+                format!("{:.0} (arctan), {:.0} (exact)", seconds / ours[i].smooth.0, seconds / ours[i].exact.0);
+            let method = if line.contains("LSODA") { "LSODA" } else { "Radau" };
+            match number(line, "amplitude") {
+                Some(amplitude) => {
+                    println!(
+                        "  SciPy {method}, arctan, shooting  {:9.3} ms   {amplitude:.9} m            {ratios}",
+                        seconds * 1e3
+                    );
+                }
+                None => println!("  SciPy {method}, arctan, shooting  {:9.3} ms   failed: {line}", seconds * 1e3),
+            }
+        }
+    }
+}
+
+struct Ours {
+    exact: (f64, f64),
+    smooth: (f64, f64),
+    start: Vec<f64>,
+}
+
+impl Ours {
+    fn new((ft, hertz): (f64, f64)) -> Self {
+        let couple = |smooth: bool| -> System {
+            let mut model = templates::find("blade-couple").unwrap().model_with(&[("Ft", ft)]).unwrap();
+            if smooth {
+                model.joints[0].law = Law::CoulombArctan(CoulombArctan { limit: ft, alpha: ALPHA });
+            }
+            model.assemble().unwrap()
+        };
+        let (_, exact) = time(&EventDriven, &couple(false), hertz);
+        let (start, smooth) = time(&Shooting::default(), &couple(true), hertz);
+        Ours { exact, smooth, start }
+    }
+}
+
+/// Start state, and median seconds and amplitude of the orbit.
+fn time(method: &dyn Method, system: &System, hertz: f64) -> (Vec<f64>, (f64, f64)) {
+    let mut solver = method.solver(system).unwrap();
+    let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().start;
+    let mut amplitude = 0.0;
+    let mut seconds: Vec<f64> = (0..RUNS)
+        .map(|_| {
+            let begin = Instant::now();
+            let orbit = solver.orbit(TAU * hertz, Some(&start)).unwrap();
+            let seconds = begin.elapsed().as_secs_f64();
+            amplitude = orbit.places[0].amplitude();
+            seconds
+        })
+        .collect();
+    seconds.sort_by(f64::total_cmp);
+    (start, (seconds[RUNS / 2], amplitude))
+}
+
+/// The Python of a virtual environment that has SciPy.
+fn python(root: &Path) -> Result<PathBuf, String> {
+    let folder = root.join("target/peers");
+    let python = folder.join("bin/python");
+    let run = |command: &mut Command| match command.stdout(Stdio::null()).status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(format!("{command:?} ended with {status}")),
+        Err(error) => Err(format!("{command:?}: {error}")),
+    };
+    if run(Command::new(&python).args(["-c", "import scipy"]).stderr(Stdio::null())).is_err() {
+        run(Command::new("python3").args(["-m", "venv"]).arg(&folder))?;
+        run(Command::new(&python).args(["-m", "pip", "install", "--quiet", "scipy==1.17.1"]))?;
+    }
+    Ok(python)
+}
+
+fn scipy(python: &Path, root: &Path, ours: &[Ours]) -> Result<Vec<String>, String> {
+    let cases: Vec<String> = CASES
+        .iter()
+        .zip(ours)
+        .map(|((ft, hertz), ours)| {
+            format!("{{\"ft\": {ft}, \"hertz\": {hertz}, \"alpha\": {ALPHA}, \"start\": {:?}}}", &ours.start[..6])
+        })
+        .collect();
+    let mut child = Command::new(python)
+        .arg(root.join("benches/peers/scipy_couple.py"))
+        .env("OMP_NUM_THREADS", "1")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .map_err(|error| error.to_string())?;
+    let mut input = child.stdin.take().ok_or("no standard input")?;
+    input.write_all(format!("[{}]", cases.join(", ")).as_bytes()).map_err(|error| error.to_string())?;
+    drop(input);
+    let output = child.wait_with_output().map_err(|error| error.to_string())?;
+    Ok(String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect())
+}
+
+/// The number behind `"key":` in a line of JSON.
+fn number(line: &str, key: &str) -> Option<f64> {
+    let rest = line.split_once(&format!("\"{key}\":"))?.1;
+    rest.split([',', '}']).next()?.trim().parse().ok()
+}
