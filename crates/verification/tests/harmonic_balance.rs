@@ -377,3 +377,54 @@ fn long_chains_take_the_banded_form() {
         assert!((a.places[i].amplitude() - judge.places[i].amplitude()).abs() < 1e-3 * largest, "{i}");
     }
 }
+
+/// The arctan laws against shooting on the same smooth equations, within three times the reported error.
+#[test]
+fn smooth_laws_against_shooting() {
+    use stickslip::law::JenkinsArctan;
+    use stickslip::method::shooting::Shooting;
+    let couple = templates::find("blade-couple-massless").unwrap();
+    for alpha in [250.0, 25_000.0] {
+        let mut model = couple.model_with(&[("Ft", 2.0)]).unwrap();
+        model.joints[0].law = Law::JenkinsArctan(JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha });
+        let mut with_mass = templates::find("blade-couple").unwrap().model_with(&[("Ft", 2.0)]).unwrap();
+        with_mass.joints[0].law = Law::CoulombArctan(CoulombArctan { limit: 2.0, alpha });
+        for model in [model, with_mass] {
+            let system = model.assemble().unwrap();
+            for hertz in [121.0, 121.25] {
+                let judge = orbit(&Shooting::default(), &system, TAU * hertz);
+                let method = HarmonicBalance { harmonics: Some(31), ..HarmonicBalance::default() };
+                let found = orbit(&method, &system, TAU * hertz);
+                let estimate = found.evidence.truncation.unwrap();
+                let error = distance(&found, &judge);
+                assert!(
+                    error < 3.0 * estimate + 1e-6,
+                    "alpha {alpha}, {hertz} Hz: {error:.1e}, estimate {estimate:.1e}"
+                );
+            }
+        }
+    }
+}
+
+/// What a user reads where harmonic balance cannot help: too few harmonics, too few samples, a tolerance out of reach, no motion at all.
+#[test]
+fn clear_words_instead_of_wrong_amplitudes() {
+    let mut model = griffin(1.0, 0.0);
+    model.forces.push(Force { on: "m".into(), amplitude: 0.1, phase: 0.0, harmonic: 5 });
+    let system = model.assemble().unwrap();
+    let refused = |method: HarmonicBalance| method.solver(&system).err().expect("refused").to_string();
+    assert_eq!(
+        refused(HarmonicBalance { harmonics: Some(3), ..HarmonicBalance::default() }),
+        "option `harmonics` of harmonic-balance: must be 5 (the excitation's) to 10000, found 3"
+    );
+    assert_eq!(refused(balance(9, 20)), "option `samples` of harmonic-balance: must be even and at least 40, found 20");
+    // rigid friction with stick: the series converges slowly
+    let system = templates::find("blade-couple").unwrap().model_with(&[("Ft", 6.0)]).unwrap().assemble().unwrap();
+    let method = HarmonicBalance { tolerance: Some(1e-7), ..HarmonicBalance::default() };
+    let error = method.solver(&system).unwrap().orbit(TAU * 121.0, None).unwrap_err();
+    assert_eq!(error.status(), "tolerance-not-reached");
+    // (10.1): without damping and with a limit below pi F0/4 the resonance has no bound
+    let system = griffin(0.5, 0.0).assemble().unwrap();
+    let outcome = balance(1, 1024).solver(&system).unwrap().orbit(1.0, None);
+    assert!(outcome.as_ref().map_or(true, |orbit| orbit.places[0].amplitude() > 1e3), "{outcome:?}");
+}

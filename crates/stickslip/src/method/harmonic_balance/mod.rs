@@ -394,9 +394,14 @@ mod tests {
                 let motion = level.solve(&coordinates, omega, start, false).unwrap();
                 path::places(&mut level, &rest, omega, &motion)
             };
-            let (one, other) = (solution(1e-7), solution(1e-5));
+            let (one, other) = (solution(1e-8), solution(1e-6));
             for (a, b) in one.iter().zip(&other) {
-                assert!((a - b).norm() < 1e-8 * one[0].norm(), "{limit} N, {hertz} Hz: {:.1e}", (a - b).norm());
+                // the equations are solved to 1e-10, and the resonance (Q = 700) multiplies what is left
+                assert!(
+                    (a - b).norm() < 700.0 * solve::SOLVED * one[0].norm(),
+                    "{limit} N, {hertz} Hz: {:.1e}",
+                    (a - b).norm()
+                );
             }
         }
     }
