@@ -12,8 +12,11 @@ use stickslip::model::templates;
 /// Points of a curve, 119.5 to 122.5 Hz.
 const POINTS: u32 = 49;
 
+/// Figure, template, changed parameters.
+type Case = (&'static str, &'static str, &'static [(&'static str, f64)]);
+
 fn main() {
-    let cases: [(&str, &str, &[(&str, f64)]); 4] = [
+    let cases: [Case; 4] = [
         ("Fig. 6", "blade-couple", &[]),
         ("Fig. 7", "blade-couple", &[("m1", 0.00091)]),
         ("Fig. 10", "symmetric-couple", &[]),
@@ -50,7 +53,9 @@ fn main() {
                 let mut start: Option<Vec<f64>> = None;
                 let (mut worst, mut estimate, mut failed, mut reason) = (0.0f64, 0.0f64, 0, "");
                 let begin = Instant::now();
-                for (omega, judge) in omegas.iter().zip(&reference) {
+                // many harmonics take long: every eighth point is enough to see what they reach
+                let stride = if method.tolerance.is_some_and(|tolerance| tolerance < 1e-3) { 8 } else { 1 };
+                for (omega, judge) in omegas.iter().zip(&reference).step_by(stride) {
                     match solver.orbit(*omega, start.as_deref()) {
                         Ok(orbit) => {
                             let size = judge.iter().copied().fold(0.0, f64::max);
@@ -67,7 +72,7 @@ fn main() {
                         }
                     }
                 }
-                let time = begin.elapsed().as_secs_f64() * 1e6 / omegas.len() as f64;
+                let time = begin.elapsed().as_secs_f64() * 1e6 * stride as f64 / omegas.len() as f64;
                 println!(
                     "{figure:9} {limit:4} {name:>8}  {worst:.1e}   {estimate:.1e}   {failed:6}  {reason:24} {time:10.0}"
                 );
