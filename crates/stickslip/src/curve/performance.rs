@@ -118,7 +118,7 @@ impl<E: Send> Performance<'_, E> {
     /// .curve(&[5.5, 6.5, 7.5])
     /// .unwrap();
     /// let best = curve.optimum.unwrap();
-    /// assert!((best.value - 6.4).abs() < 0.1);
+    /// assert!((best.value - 6.684).abs() < 0.01);
     /// ```
     pub fn curve(&self, values: &[f64]) -> Result<PerformanceCurve, PerformanceError<E>> {
         let rows: Vec<Row> = values.par_iter().map(|value| self.peak(*value)).collect::<Result<_, _>>()?;
