@@ -131,10 +131,7 @@ impl Solver for Exact<'_> {
                 close(self, &first, aim)?
             }
         };
-        // the last run of the iteration was a trial only if it was accepted: run the orbit itself once more for its segments
-        let mut end = closed.state.clone();
-        let broke = |cause| OrbitError::Breakdown { method: NAME, omega, cause };
-        self.flow.run(&mut end, 0.0, self.duration, None).map_err(broke)?;
+        // the last run of the iteration was that of the closed state: its segments are the orbit
         let orbit = path::orbit(self.system, &self.flow, omega, symmetry, closed);
         if orbit.evidence.energy_gap > ENERGY_GAP {
             return Err(OrbitError::Evidence { method: NAME, omega, energy_gap: orbit.evidence.energy_gap });
