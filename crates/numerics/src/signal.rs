@@ -175,7 +175,7 @@ impl Basis {
             self.differentiate(g, &mut first[k * nb..(k + 1) * nb]);
             self.differentiate(&first[k * nb..(k + 1) * nb], &mut second[k * nb..(k + 1) * nb]);
             for b in 0..nb {
-                weights[k * nb + b] = second[k * nb + b].norm();
+                weights[k * nb + b] = second[k * nb + b].norm_sqr().sqrt(); // no overflow here: hypot would only cost
             }
         }
         self.magnitudes(0.0, end, magnitudes);
