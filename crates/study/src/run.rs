@@ -252,7 +252,7 @@ impl Summary {
             Ok(orbit) => Summary {
                 places: orbit.places.iter().map(|p| [p.amplitude(), p.mean, p.phase_deg()]).collect(),
                 joints: orbit.joints.iter().map(|j| [j.dissipation, j.slip_fraction]).collect(),
-                stable: Some(orbit.is_stable()),
+                stable: orbit.is_stable(),
                 residual: orbit.evidence.residual,
                 energy_gap: orbit.evidence.energy_gap,
                 truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),

@@ -164,7 +164,7 @@ fn theory_7_5_determinant_of_the_return_map() {
         if multipliers[0].im != 0.0 {
             close("modulus", multipliers[0].norm(), determinant, 1e-8);
         }
-        assert!(orbit.is_stable());
+        assert_eq!(orbit.is_stable(), Some(true));
     }
     let orbit = orbit(0.5, 0.8);
     let map = &orbit.return_map;

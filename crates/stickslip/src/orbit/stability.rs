@@ -25,8 +25,12 @@ impl Orbit {
         multipliers
     }
 
-    /// Whether no small disturbance grows.
-    pub fn is_stable(&self) -> bool {
-        self.multipliers().first().is_none_or(|m| m.norm() <= 1.0 + NEUTRAL)
+    /// Whether no small disturbance grows; `None` if the method made no return map to tell (harmonic balance of many degrees of
+    /// freedom).
+    pub fn is_stable(&self) -> Option<bool> {
+        if self.return_map.is_empty() && !self.places.is_empty() {
+            return None;
+        }
+        Some(self.multipliers().first().is_none_or(|m| m.norm() <= 1.0 + NEUTRAL))
     }
 }
