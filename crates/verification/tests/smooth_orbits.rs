@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 use std::time::Instant;
 use stickslip::law::{CoulombArctan, Law};
-use stickslip::method::{Method, shooting::Shooting};
+use stickslip::method::{Method, event_driven::EventDriven, settling::Settling, shooting::Shooting};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
 use stickslip_verification::{close, exact, near, number, table, template, template_with};
@@ -152,5 +152,27 @@ fn width_is_one_over_alpha() {
     let smooth = shoot(&couple(4.0, 25e3), TAU * 120.75, 1e-9);
     for (a, b) in smoothed.places.iter().zip(&smooth.places) {
         close("amplitude", a.amplitude(), b.amplitude(), 1e-12);
+    }
+}
+
+/// Waiting for the transient to die ends in the orbit that Newton's method finds, within what it says is missing; smooth and exact.
+#[test]
+fn settling_agrees_with_newton_within_its_own_estimate() {
+    for (smooth, omega) in [(false, TAU * 120.75), (true, TAU * 121.25)] {
+        let system = if smooth { couple(4.0, 25e3) } else { template("blade-couple", &[("Ft", 4.0)]) };
+        let settling = Settling { tolerance: 1e-4, ..Settling::default() };
+        let waited = settling.solver(&system).unwrap().orbit(omega, None).unwrap();
+        let found = if smooth {
+            Shooting::default().solver(&system).unwrap().orbit(omega, None).unwrap()
+        } else {
+            EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap()
+        };
+        let missing = waited.evidence.truncation.unwrap();
+        assert!(missing <= 1e-4, "{missing}");
+        for (waited, found) in waited.places.iter().zip(&found.places) {
+            let error = (waited.amplitude() / found.amplitude() - 1.0).abs();
+            // the estimate is of the whole state in the energy norm; a light place may be off by more
+            assert!(error < 10.0 * missing, "{}: {error:e} against {missing:e}", found.name);
+        }
     }
 }

@@ -9,6 +9,7 @@ pub mod event_driven;
 mod guess;
 pub mod harmonic_balance;
 mod periodic;
+pub mod settling;
 pub mod shooting;
 mod smooth;
 pub mod transient;
@@ -252,7 +253,8 @@ pub struct MethodInfo {
 }
 
 /// Every method there is.
-pub const TABLE: &[MethodInfo] = &[auto::INFO, event_driven::INFO, shooting::INFO, harmonic_balance::INFO];
+pub const TABLE: &[MethodInfo] =
+    &[auto::INFO, event_driven::INFO, settling::INFO, shooting::INFO, harmonic_balance::INFO];
 
 /// The method with this name.
 pub fn find(name: &str) -> Option<&'static MethodInfo> {

@@ -38,7 +38,85 @@ pub(crate) struct Closed {
     pub derivative: DMatrix<f64>,
     pub residual: f64,
     pub iterations: usize,
+    /// Estimated distance to the orbit relative to the state, where the search stopped before it was at rounding.
+    pub missing: Option<f64>,
 }
+
+/// How the state that returns to itself is looked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Search {
+    /// Newton's method.
+    Newton,
+    /// Waiting until the transient has died.
+    Settle {
+        /// Estimated distance to the orbit, relative to the state, at which it counts as dead.
+        tolerance: f64,
+        /// Returns after which the search is given up.
+        returns: usize,
+    },
+}
+
+impl Search {
+    /// From `start` to the closed orbit.
+    pub fn close(self, map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<Closed, OrbitError> {
+        match self {
+            Search::Newton => close(map, start, aim),
+            Search::Settle { tolerance, returns } => settle(map, start, aim, tolerance, returns),
+        }
+    }
+}
+
+/// Returns over which the rate of decay is measured: beats of neighbouring modes average out.
+const DECAY_WINDOW: usize = 256;
+
+/// Iterates the return map. "The period changed by little" proves nothing where a motion creeps: with the decay rate `ρ` per return, measured
+/// over a window, a change `d` leaves about `d ρ / (1 - ρ)` to go, and that is what must be small.
+fn settle(
+    map: &mut dyn ReturnMap,
+    start: &[f64],
+    aim: Aim,
+    tolerance: f64,
+    returns: usize,
+) -> Result<Closed, OrbitError> {
+    let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
+    let n = start.len();
+    let mut state = start.to_vec();
+    let mut sums = Vec::new(); // changes summed over windows
+    let (mut sum, mut smallest) = (0.0, f64::INFINITY);
+    for count in 1..=returns {
+        let before = state.clone();
+        map.returned(&mut state, None).map_err(broke)?;
+        state.iter_mut().for_each(|z| *z *= aim.sign);
+        if state.iter().any(|z| !z.is_finite()) {
+            return Err(broke(Breakdown::Unbounded { time: f64::INFINITY }));
+        }
+        let change: Vec<f64> = state.iter().zip(&before).map(|(a, b)| a - b).collect();
+        let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
+        let residual = norm(map.weights(), &change) / size;
+        smallest = f64::min(smallest, residual);
+        sum += residual;
+        if count % DECAY_WINDOW != 0 {
+            continue;
+        }
+        sums.push(std::mem::take(&mut sum));
+        let [.., earlier, last] = sums[..] else { continue };
+        // the decay of a whole window; all later windows together move the state by a geometric series of this one
+        let decay: f64 = if earlier > 0.0 { last / earlier } else { 0.0 };
+        let missing = if decay < 1.0 { last * decay / (1.0 - decay) } else { f64::INFINITY };
+        let at_rounding = last <= DECAY_WINDOW as f64 * ROUNDING;
+        if at_rounding || missing <= tolerance {
+            let mut derivative = DMatrix::identity(n, n);
+            let gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
+            let residual = norm(map.weights(), gap.as_slice()) / size;
+            let missing = if at_rounding { ROUNDING } else { missing };
+            return Ok(Closed { state, derivative, residual, iterations: count, missing: Some(missing) });
+        }
+    }
+    Err(OrbitError::NotConverged { method: aim.method, omega: aim.omega, iterations: returns, residual: smallest })
+}
+
+/// A change per return below this is rounding.
+const ROUNDING: f64 = 1e-14;
 
 /// Newton iterations in all; a warm start takes 2 to 4, a cold one 5 to 15.
 const ITERATIONS: usize = 60;
@@ -74,7 +152,7 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
             return Err(OrbitError::NotConverged { method: aim.method, omega: aim.omega, iterations, residual: 1.0 });
         }
         if residual <= aim.residual {
-            return Ok(Closed { state, derivative, residual, iterations: iteration });
+            return Ok(Closed { state, derivative, residual, iterations: iteration, missing: None });
         }
         let step = newton_step(&derivative, &gap, aim.sign, map.weights());
         let before = norm(map.weights(), gap.as_slice());

@@ -4,8 +4,9 @@
 //! return map of the integrator with its exact derivative is closed by Newton's method instead.
 
 use super::drive::Drive;
+use super::event_driven::MISSING_WORK;
 use super::guess::Guess;
-use super::periodic::{Aim, Closed, ReturnMap, close, norm};
+use super::periodic::{Aim, Closed, ReturnMap, Search, close, norm};
 use super::smooth::flow::SmoothFlow;
 use super::smooth::path;
 use super::smooth::step::Structure;
@@ -92,21 +93,16 @@ impl Method for Shooting {
         NAME
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        let structure = Structure::new(system, self.width, NAME)?;
-        let weights = vec![1.0; structure.states()];
-        let owners = (0..system.joints.len()).collect();
-        Ok(Box::new(Smooth {
-            system,
-            flow: SmoothFlow::new(structure, self.tolerance),
-            owners,
-            weights,
-            duration: 0.0,
-        }))
+        Ok(Box::new(Smooth::new(system, *self, NAME, Search::Newton)?))
     }
 }
 
-struct Smooth<'a> {
+/// Finds orbits by stiff integration, with either search.
+pub(super) struct Smooth<'a> {
     system: &'a System,
+    /// The method that it works for.
+    name: &'static str,
+    search: Search,
     flow: SmoothFlow,
     owners: Vec<usize>,
     weights: Vec<f64>,
@@ -122,7 +118,17 @@ impl ReturnMap for Smooth<'_> {
     }
 }
 
-impl Smooth<'_> {
+impl<'a> Smooth<'a> {
+    /// # Errors
+    /// See [`Structure::new`].
+    pub fn new(system: &'a System, options: Shooting, name: &'static str, search: Search) -> Result<Self, MethodError> {
+        let structure = Structure::new(system, options.width, name)?;
+        let weights = vec![1.0; structure.states()];
+        let owners = (0..system.joints.len()).collect();
+        let flow = SmoothFlow::new(structure, options.tolerance);
+        Ok(Smooth { system, name, search, flow, owners, weights, duration: 0.0 })
+    }
+
     /// Weights of the energy norm; internal states count with the scale of the motion.
     fn set_weights(&mut self, omega: f64) {
         let structure = &self.flow.structure;
@@ -156,20 +162,23 @@ impl Solver for Smooth<'_> {
         self.duration = share * std::f64::consts::TAU / omega;
         let structure = &self.flow.structure;
         let rest = NEAR_REST * self.flow.drive.energy_scale(&structure.mass, &structure.stiffness);
-        let aim = Aim { method: NAME, omega, residual: NEAR, sign, rest };
+        let (name, search) = (self.name, self.search);
+        let aim = Aim { method: name, omega, residual: NEAR, sign, rest };
         (self.flow.record, self.flow.frozen) = (false, false);
         let warm = start.filter(|state| state.len() == self.flow.structure.states());
-        let near = match warm.map(|state| close(self, state, aim)) {
+        let near = match warm.map(|state| search.close(self, state, aim)) {
             Some(Ok(closed)) => closed,
             _ => {
                 let first = self.first_state(omega);
-                close(self, &first, aim)?
+                search.close(self, &first, aim)?
             }
         };
-        let broke = |cause| OrbitError::Breakdown { method: NAME, omega, cause };
+        let broke = |cause| OrbitError::Breakdown { method: name, omega, cause };
         // steps made for a state close the orbit only as well as they fit it: make them anew until that moves it no more
         let mut closed = near;
-        for _ in 0..MESHES {
+        // a settled motion is left as it is: nothing but time has found it
+        let meshes = if search == Search::Newton { MESHES } else { 0 };
+        for _ in 0..meshes {
             self.flow.frozen = false;
             self.flow.run(&mut closed.state.clone(), 0.0, self.duration, None).map_err(broke)?;
             self.flow.frozen = true;
@@ -185,9 +194,10 @@ impl Solver for Smooth<'_> {
         self.flow.record = true;
         let mut end = closed.state.clone();
         self.flow.run(&mut end, 0.0, self.duration, None).map_err(broke)?;
-        let orbit = path::orbit(self.system, &self.flow, NAME, omega, symmetry, closed);
-        if orbit.evidence.energy_gap > ENERGY_GAP {
-            return Err(OrbitError::Evidence { method: NAME, omega, energy_gap: orbit.evidence.energy_gap });
+        let orbit = path::orbit(self.system, &self.flow, name, omega, symmetry, closed);
+        let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
+        if orbit.evidence.energy_gap > allowed {
+            return Err(OrbitError::Evidence { method: name, omega, energy_gap: orbit.evidence.energy_gap });
         }
         Ok(orbit)
     }

@@ -61,7 +61,7 @@ pub(super) fn orbit(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry
             energy_gap: if reference > 0.0 { balance.abs() / reference } else { balance.abs() },
             switches: joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
-            truncation: None,
+            truncation: closed.missing,
             stuck: stuck.collect(),
         },
         places,

@@ -52,7 +52,7 @@ pub(crate) fn orbit(
             energy_gap: if energy.work_in.abs() > 0.0 { balance.abs() / energy.work_in.abs() } else { balance.abs() },
             switches: joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
-            truncation: None,
+            truncation: closed.missing,
             stuck: joints.iter().filter(|joint| joint.slip_fraction == 0.0).map(|joint| joint.name.clone()).collect(),
         },
         places,

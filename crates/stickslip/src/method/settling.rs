@@ -1,0 +1,98 @@
+//! Brute force: the motion is followed until its transient has died.
+//!
+//! Exact laws are followed by events, smooth ones by stiff integration. What is still missing when the search stops is estimated from the
+//! measured decay and reported as the orbit's truncation: a lightly damped structure needs hundreds of periods per digit, and a smooth law
+//! creeps for seconds. It needs no derivative and no luck, so it is an independent check of the other methods.
+
+use super::event_driven::Exact;
+use super::periodic::Search;
+use super::shooting::{Shooting, Smooth};
+use super::{Method, MethodError, MethodInfo, MethodOption, Solver};
+use crate::dimension::Dimension;
+use crate::model::System;
+
+const NAME: &str = "transient";
+
+/// Estimated distance to the orbit, relative to it, at which a motion counts as settled when none is given.
+const TOLERANCE: f64 = 1e-7;
+/// Periods after which the search is given up when none are given: ten times what a structure with Q of 700 takes.
+const PERIODS: usize = 50_000;
+
+/// The row of this method in [`super::TABLE`].
+pub(super) const INFO: MethodInfo = MethodInfo {
+    name: NAME,
+    summary: "brute force: follow the motion until its transient has died, with an estimate of the rest",
+    options: &[
+        MethodOption {
+            key: "tolerance",
+            dimension: Dimension::NONE,
+            count: false,
+            doc: "estimated relative distance to the orbit at which the motion counts as settled; 1e-7 when absent",
+        },
+        MethodOption {
+            key: "periods",
+            dimension: Dimension::NONE,
+            count: true,
+            doc: "periods after which the search is given up; 50000 when absent",
+        },
+        MethodOption {
+            key: "width",
+            dimension: Dimension::VELOCITY,
+            count: false,
+            doc: "replaces exact laws by smooth ones that change sign over this velocity; exact laws are followed exactly when absent",
+        },
+    ],
+    build: |options| {
+        let tolerance = options.get("tolerance").copied().unwrap_or(TOLERANCE);
+        if !(1e-12..=1e-2).contains(&tolerance) {
+            let message = format!("must lie between 1e-12 and 1e-2, found {tolerance}");
+            return Err(MethodError::Option { method: NAME, key: "tolerance", message });
+        }
+        let periods = options.get("periods").map_or(PERIODS, |periods| *periods as usize);
+        Ok(Box::new(Settling { tolerance, periods, width: options.get("width").copied() }))
+    },
+};
+
+/// Waiting for the transient to die.
+///
+/// # Example
+/// ```
+/// use stickslip::method::{Method, event_driven::EventDriven, settling::Settling};
+/// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+/// let omega = std::f64::consts::TAU * 121.25;
+/// let waited = Settling::default().solver(&system).unwrap().orbit(omega, None).unwrap();
+/// let found = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+/// assert!((waited.places[0].amplitude() / found.places[0].amplitude() - 1.0).abs() < 1e-6);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settling {
+    /// Estimated relative distance to the orbit at which the motion counts as settled.
+    pub tolerance: f64,
+    /// Periods after which the search is given up.
+    pub periods: usize,
+    /// Velocity over which exact laws are smoothed, m/s; they are followed exactly without it.
+    pub width: Option<f64>,
+}
+
+impl Default for Settling {
+    fn default() -> Self {
+        Settling { tolerance: TOLERANCE, periods: PERIODS, width: None }
+    }
+}
+
+impl Method for Settling {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        // an odd system returns twice a period
+        let returns = if system.is_odd() { 2 * self.periods } else { self.periods };
+        let search = Search::Settle { tolerance: self.tolerance, returns };
+        let exact = self.width.is_none() && system.joints.iter().all(|joint| joint.law.network().is_some());
+        if exact {
+            return Ok(Box::new(Exact::new(system, NAME, search)?));
+        }
+        let options = Shooting { width: self.width, ..Shooting::default() };
+        Ok(Box::new(Smooth::new(system, options, NAME, search)?))
+    }
+}
