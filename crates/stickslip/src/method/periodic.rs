@@ -57,8 +57,26 @@ pub(crate) enum Search {
 }
 
 impl Search {
+    /// From the state of a neighbouring orbit if there is one of the right length and it leads anywhere, else from a first guess.
+    pub fn find<M: ReturnMap>(
+        self,
+        map: &mut M,
+        neighbour: Option<&[f64]>,
+        guess: impl FnOnce(&M) -> Vec<f64>,
+        aim: Aim,
+    ) -> Result<Closed, OrbitError> {
+        let states = map.weights().len();
+        if let Some(start) = neighbour.filter(|state| state.len() == states)
+            && let Ok(closed) = self.close(map, start, aim)
+        {
+            return Ok(closed);
+        }
+        let first = guess(map);
+        self.close(map, &first, aim)
+    }
+
     /// From `start` to the closed orbit.
-    pub fn close(self, map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<Closed, OrbitError> {
+    fn close(self, map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<Closed, OrbitError> {
         match self {
             Search::Newton => close(map, start, aim),
             Search::Settle { tolerance, returns } => settle(map, start, aim, tolerance, returns),

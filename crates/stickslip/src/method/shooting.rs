@@ -165,14 +165,7 @@ impl Solver for Smooth<'_> {
         let (name, search) = (self.name, self.search);
         let aim = Aim { method: name, omega, residual: NEAR, sign, rest };
         (self.flow.record, self.flow.frozen) = (false, false);
-        let warm = start.filter(|state| state.len() == self.flow.structure.states());
-        let near = match warm.map(|state| search.close(self, state, aim)) {
-            Some(Ok(closed)) => closed,
-            _ => {
-                let first = self.first_state(omega);
-                search.close(self, &first, aim)?
-            }
-        };
+        let near = search.find(self, start, |smooth| smooth.first_state(omega), aim)?;
         let broke = |cause| OrbitError::Breakdown { method: name, omega, cause };
         // steps made for a state close the orbit only as well as they fit it: make them anew until that moves it no more
         let mut closed = near;

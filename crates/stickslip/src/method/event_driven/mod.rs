@@ -137,14 +137,7 @@ impl Solver for Exact<'_> {
         self.duration = share * std::f64::consts::TAU / omega;
         let (name, search) = (self.name, self.search);
         let aim = Aim { method: name, omega, residual: CLOSED, sign, rest: NEAR_REST * self.flow.energy_scale };
-        let warm = start.filter(|state| state.len() == self.flow.mechanics.states());
-        let closed = match warm.map(|state| search.close(self, state, aim)) {
-            Some(Ok(closed)) => closed,
-            _ => {
-                let first = self.first_state(omega);
-                search.close(self, &first, aim)?
-            }
-        };
+        let closed = search.find(self, start, |exact| exact.first_state(omega), aim)?;
         // the last run of the iteration was that of the closed state: its segments are the orbit
         let mut orbit = path::orbit(self.system, &self.flow, omega, symmetry, closed);
         orbit.method = name;
