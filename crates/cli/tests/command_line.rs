@@ -185,6 +185,30 @@ frequency = ["0.5 rad/s", "1 rad/s", "2 rad/s"]
     assert!(!rows[1].contains("converged") || rows[1].ends_with("not-converged"), "{}", rows[1]);
 }
 
+/// Methods that estimate their truncation have a column for it, also where a point failed or sticks.
+#[test]
+fn every_method_fills_the_table() {
+    let edits = [
+        ("points = 241", "points = 5"),
+        ("from = \"119.5 Hz\", to = \"122.5 Hz\"", "from = \"110 Hz\", to = \"121 Hz\""),
+    ];
+    let (folder, _) = folder("blade-couple-massless", &edits);
+    for method in stickslip::method::TABLE.iter().map(|row| row.name).filter(|name| *name != "shooting") {
+        for kind in ["response", "orbit"] {
+            let path = folder.path().join(format!("{kind}.toml"));
+            let text = fs::read_to_string(folder.path().join("study.toml")).unwrap();
+            fs::write(&path, text.replace("kind = \"response\"", &format!("kind = \"{kind}\""))).unwrap();
+            let file = path.to_str().unwrap();
+            let output = stickslip(folder.path(), &["run", file, "--method", method, "--only", "csv", "--out", method]);
+            assert!([0, 3].contains(&code(&output)), "{method} {kind}: {}", stderr(&output));
+            let table = if kind == "response" { "curve.csv" } else { "orbits.csv" };
+            let text = fs::read_to_string(folder.path().join(method).join(kind).join(table)).unwrap();
+            let estimates = ["transient", "harmonic-balance"].contains(&method);
+            assert_eq!(text.lines().next().unwrap().contains("truncation"), estimates, "{method} {kind}");
+        }
+    }
+}
+
 /// Ctrl-C during a long sweep leaves the finished points readable.
 #[cfg(unix)]
 #[test]

@@ -285,8 +285,9 @@ impl Summary {
         }
     }
 
-    /// The cells of the row, after the varied parameters and the frequency.
-    pub fn write(&self, system: &System, rows: &mut Rows) {
+    /// The cells of the row, after the varied parameters and the frequency; `truncated` says whether any row of the table has an
+    /// estimate of its truncation.
+    pub fn write(&self, system: &System, truncated: bool, rows: &mut Rows) {
         for (place, [amplitude, mean, phase]) in system.places.iter().zip(&self.places) {
             rows.number(&format!("{place}_amplitude_m"), *amplitude);
             rows.number(&format!("{place}_mean_m"), *mean);
@@ -299,7 +300,7 @@ impl Summary {
         rows.flag("stable", self.stable);
         rows.number("residual", self.residual);
         rows.number("energy_gap", self.energy_gap);
-        if !self.truncation.is_nan() {
+        if truncated {
             rows.number("truncation", self.truncation);
         }
         rows.integer("iterations", self.iterations);

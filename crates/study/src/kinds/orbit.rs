@@ -19,7 +19,10 @@ pub(super) const KIND: Kind = Kind {
 fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let mut outcome = Outcome::default();
     let (mut motion, mut summary, mut multipliers) = (Rows::default(), Rows::default(), Rows::default());
-    for (prepared, points) in cases.iter().zip(orbits::all(cases, context)) {
+    let all = orbits::all(cases, context);
+    let estimated = |point: &orbits::Point| matches!(&point.1, Some(Ok(orbit)) if orbit.evidence.truncation.is_some());
+    let truncated = all.iter().flatten().any(estimated);
+    for (prepared, points) in cases.iter().zip(all) {
         for (omega, point) in points {
             let orbit = match point {
                 Some(Ok(orbit)) => orbit,
@@ -42,7 +45,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             }
             summary.varied(&prepared.case);
             summary.number("frequency_Hz", omega / TAU);
-            Summary::new(&prepared.system, Ok(&orbit)).write(&prepared.system, &mut summary);
+            Summary::new(&prepared.system, Ok(&orbit)).write(&prepared.system, truncated, &mut summary);
             summary.number("work_in_J", orbit.energy.work_in);
             summary.number("viscous_J", orbit.energy.viscous);
             summary.number("friction_J", orbit.energy.friction);

@@ -44,6 +44,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let curves: Vec<Curve> = cases.par_iter().map(|prepared| curve(prepared, context)).collect();
     let mut outcome = Outcome::default();
     let (mut rows, mut peaks) = (Rows::default(), Rows::default());
+    let truncated = curves.iter().any(|curve| curve.rows.iter().any(|row| !row.truncation.is_nan()));
     for (prepared, curve) in cases.iter().zip(&curves) {
         let mut stuck = 0;
         for (omega, row) in curve.omegas.iter().zip(&curve.rows) {
@@ -54,7 +55,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             stuck += usize::from(row.stuck);
             rows.varied(&prepared.case);
             rows.number("frequency_Hz", omega / TAU);
-            row.write(&prepared.system, &mut rows);
+            row.write(&prepared.system, truncated, &mut rows);
             rows.end();
         }
         if stuck > 0 {
