@@ -262,16 +262,14 @@ impl Basis {
 
     /// `∫ g e^{-jντ} dτ` over `[0, length]`.
     pub fn fourier_integral(&self, coefficients: &[Complex64], nu: f64, length: f64) -> Complex64 {
-        let mut harmonic = vec![Complex64::new(0.0, 0.0); 2 * self.len()];
-        let (cosine, sine) = harmonic.split_at_mut(self.len());
         let probe = Basis { exponents: vec![Complex64::new(0.0, nu)], ..Basis::default() };
-        cosine[0] = Complex64::new(1.0, 0.0);
-        sine[0] = Complex64::new(0.0, -1.0); // Re(-j e^{jντ}) = sin ντ
-        let n = probe.len();
-        Complex64::new(
-            integral_of_product((self, coefficients), (&probe, &cosine[..n.min(self.len())]), length),
-            -integral_of_product((self, coefficients), (&probe, &sine[..n.min(self.len())]), length),
-        )
+        let part = |turn: Complex64| {
+            let mut harmonic = [Complex64::new(0.0, 0.0); 1 + POLYNOMIALS];
+            harmonic[0] = turn;
+            integral_of_product((self, coefficients), (&probe, &harmonic), length)
+        };
+        // Re e^{jντ} = cos ντ, Re(-j e^{jντ}) = sin ντ
+        Complex64::new(part(Complex64::new(1.0, 0.0)), -part(Complex64::new(0.0, -1.0)))
     }
 
     fn is_exponential(&self, coefficients: &[Complex64]) -> bool {

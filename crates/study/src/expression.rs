@@ -111,11 +111,6 @@ pub(crate) fn displayed(si: f64, dimension: Option<Dimension>) -> String {
 /// The functions of expressions.
 pub const FUNCTIONS: &[&str] = &["sqrt", "sin", "cos", "tan", "exp", "ln", "abs", "min", "max"];
 
-/// Whether `name` is an identifier `[A-Za-z][A-Za-z0-9_]*`.
-pub(crate) fn is_identifier(name: &str) -> bool {
-    name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-}
-
 /// Whether a parameter cannot have this name.
 pub(crate) fn is_reserved(name: &str) -> bool {
     FUNCTIONS.contains(&name) || name == "pi" || is_not_finite(name)

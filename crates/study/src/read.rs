@@ -2,7 +2,7 @@
 
 use crate::document::{self, Content, Entry, Node, Table};
 use crate::error::{Place, Problem, Source, StudyError};
-use crate::expression::{Expression, Value, described, is_identifier, is_reserved};
+use crate::expression::{Expression, Value, described, is_reserved};
 use crate::kinds;
 use crate::near::{nearest, one_of, shown};
 use crate::schema::{self, FILE, Key, MOST_BYTES, MOST_ELEMENTS, MOST_POINTS, Presence, STUDY, Takes, Within};
@@ -14,6 +14,7 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
+use stickslip::model::is_identifier;
 use stickslip::model::templates::{self, Template};
 use stickslip::{law, method};
 

@@ -3,7 +3,7 @@
 //! `f = limit · Sgn(u')`: any force in `[-limit, limit]` while the faces stick, `±limit` while they slip.
 //! Source: the "2V" law of Pust, Pesek, Radolfova (2015), Sec. 1; as a set-valued law Moreau (1988).
 
-use super::{Branch, CoulombArctan, FrictionLaw, Law, Parameter, ReturnMap};
+use super::{Branch, CoulombArctan, FrictionLaw, Law, Parameter};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
@@ -36,10 +36,6 @@ impl FrictionLaw for Coulomb {
     }
     fn network(&self) -> Option<Vec<Branch>> {
         Some(vec![Branch { stiffness: None, limit: self.limit }])
-    }
-    fn return_map(&self) -> Option<ReturnMap> {
-        // a rigid slider has no force as a function of displacement
-        None
     }
     fn regularised(&self, width: f64) -> Option<Law> {
         Some(Law::CoulombArctan(CoulombArctan { limit: self.limit, alpha: 1.0 / width }))

@@ -4,7 +4,7 @@
 //! The paper prints Eq. (1) with the sign of the spring force reversed; the form here is the consistent one.
 //! Source: Jenkins (1962); Pust, Pesek, Radolfova (2015), Fig. 1a and Eq. (1).
 
-use super::{Branch, FrictionLaw, JenkinsArctan, Law, Parameter, ReturnMap};
+use super::{Branch, FrictionLaw, JenkinsArctan, Law, Parameter};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
@@ -43,9 +43,6 @@ impl FrictionLaw for Jenkins {
     #[doc(alias = "eq1")]
     fn network(&self) -> Option<Vec<Branch>> {
         Some(vec![Branch { stiffness: Some(self.stiffness), limit: self.limit }]) // Eq. (1)
-    }
-    fn return_map(&self) -> Option<ReturnMap> {
-        self.network().map(|branches| ReturnMap { branches })
     }
     fn regularised(&self, width: f64) -> Option<Law> {
         Some(Law::JenkinsArctan(JenkinsArctan { stiffness: self.stiffness, limit: self.limit, alpha: 1.0 / width }))

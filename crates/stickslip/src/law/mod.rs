@@ -5,9 +5,8 @@
 //!
 //! | view | what it is | who asks |
 //! | --- | --- | --- |
-//! | [`FrictionLaw::network`] | ideal sliders, each behind a spring or rigid | event-driven |
-//! | [`FrictionLaw::rate`] | `z' = g(u, u', z)`, `f = h(u, u', z)`, smooth | transient, shooting |
-//! | [`FrictionLaw::return_map`] | the next force from a displacement step | harmonic balance |
+//! | [`FrictionLaw::network`] | ideal sliders, each behind a spring or rigid | event-driven, harmonic balance |
+//! | [`FrictionLaw::rate`] | `z' = g(u, u', z)`, `f = h(u, u', z)`, smooth | transient, shooting, harmonic balance |
 //! | [`FrictionLaw::regularised`] | the smooth neighbour of an exact law | comparison of the two |
 //!
 //! A joint acts along a direction matrix `W` (n × d): `u = Wᵀ x`, force on the structure `-W f`. All laws that exist now have
@@ -99,23 +98,12 @@ pub trait FrictionLaw {
     fn rate(&self) -> Option<Rate> {
         None
     }
-    /// Discrete hysteretic view, for harmonic balance.
-    fn return_map(&self) -> Option<ReturnMap> {
-        None
-    }
     /// Complex stiffness of the first harmonic under `u = amplitude cos Ωt` (N/m): where methods begin to search.
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64;
     /// The smooth law that tends to this one as `width` (m/s, the velocity over which friction changes its sign) goes to zero.
     fn regularised(&self, _width: f64) -> Option<Law> {
         None
     }
-}
-
-/// The return map of a law: ideal springs-and-sliders, forces updated from displacement to displacement.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ReturnMap {
-    /// The parallel branches; every stiffness is finite.
-    pub branches: Vec<Branch>,
 }
 
 /// Why a law's parameters are refused.
@@ -188,10 +176,6 @@ macro_rules! friction_laws {
             /// Smooth view, see [`FrictionLaw::rate`].
             pub fn rate(&self) -> Option<Rate> {
                 match self { $(Law::$variant(law) => law.rate(),)* }
-            }
-            /// Discrete hysteretic view, see [`FrictionLaw::return_map`].
-            pub fn return_map(&self) -> Option<ReturnMap> {
-                match self { $(Law::$variant(law) => law.return_map(),)* }
             }
             /// First-harmonic stiffness, see [`FrictionLaw::linearised`].
             pub fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {

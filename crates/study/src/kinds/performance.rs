@@ -6,7 +6,6 @@ use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, displ
 use crate::schema::{Takes, optional};
 use crate::study::{Study, VariedValue};
 use crate::values::Values;
-use rayon::prelude::*;
 use std::f64::consts::TAU;
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError};
 use stickslip::method::MethodError;
@@ -142,7 +141,7 @@ fn curve(study: &Study, group: &[Prepared], context: &Context<'_>) -> Result<Per
         points: frequencies.len(),
         quantity: &|orbit| orbit.places[place].amplitude(),
     };
-    let values: Vec<f64> = group.par_iter().map(|p| split(p).map_or(0.0, |(_, inner)| inner.si)).collect();
+    let values: Vec<f64> = group.iter().map(|p| split(p).map_or(0.0, |(_, inner)| inner.si)).collect();
     let result = performance.curve(&values);
     (0..group.len() * frequencies.len()).for_each(|_| (context.finished)());
     match result {
