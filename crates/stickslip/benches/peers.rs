@@ -5,15 +5,16 @@
 
 #![allow(clippy::print_stdout)] // a bench prints its table
 
+mod python;
+
+use python::{Peer, number};
 use std::f64::consts::TAU;
-use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use std::time::Instant;
 use stickslip::law::{CoulombArctan, Law};
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::{System, templates};
 
+const SCIPY: Peer = Peer { package: "scipy", version: "1.17.1", folder: "peers" };
 /// Slip limit (N) and frequency (Hz): slip only, stick-slip, stick-slip.
 const CASES: [(f64, f64); 3] = [(2.0, 121.25), (4.0, 120.75), (8.0, 121.0)];
 /// The paper's steepness, s/m.
@@ -27,8 +28,7 @@ fn main() {
         return;
     }
     let ours: Vec<Ours> = CASES.iter().map(|case| Ours::new(*case)).collect();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let theirs = match python(&root).and_then(|python| scipy(&python, &root, &ours)) {
+    let theirs = match scipy(&ours) {
         Ok(theirs) => theirs,
         Err(reason) => {
             println!("SciPy could not be measured: {reason}");
@@ -97,23 +97,7 @@ fn time(method: &dyn Method, system: &System, hertz: f64) -> (Vec<f64>, (f64, f6
     (start, (seconds[RUNS / 2], amplitude))
 }
 
-/// The Python of a virtual environment that has SciPy.
-fn python(root: &Path) -> Result<PathBuf, String> {
-    let folder = root.join("target/peers");
-    let python = folder.join("bin/python");
-    let run = |command: &mut Command| match command.stdout(Stdio::null()).status() {
-        Ok(status) if status.success() => Ok(()),
-        Ok(status) => Err(format!("{command:?} ended with {status}")),
-        Err(error) => Err(format!("{command:?}: {error}")),
-    };
-    if run(Command::new(&python).args(["-c", "import scipy"]).stderr(Stdio::null())).is_err() {
-        run(Command::new("python3").args(["-m", "venv"]).arg(&folder))?;
-        run(Command::new(&python).args(["-m", "pip", "install", "--quiet", "scipy==1.17.1"]))?;
-    }
-    Ok(python)
-}
-
-fn scipy(python: &Path, root: &Path, ours: &[Ours]) -> Result<Vec<String>, String> {
+fn scipy(ours: &[Ours]) -> Result<Vec<String>, String> {
     let cases: Vec<String> = CASES
         .iter()
         .zip(ours)
@@ -121,22 +105,5 @@ fn scipy(python: &Path, root: &Path, ours: &[Ours]) -> Result<Vec<String>, Strin
             format!("{{\"ft\": {ft}, \"hertz\": {hertz}, \"alpha\": {ALPHA}, \"start\": {:?}}}", &ours.start[..6])
         })
         .collect();
-    let mut child = Command::new(python)
-        .arg(root.join("benches/peers/scipy_couple.py"))
-        .env("OMP_NUM_THREADS", "1")
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .map_err(|error| error.to_string())?;
-    let mut input = child.stdin.take().ok_or("no standard input")?;
-    input.write_all(format!("[{}]", cases.join(", ")).as_bytes()).map_err(|error| error.to_string())?;
-    drop(input);
-    let output = child.wait_with_output().map_err(|error| error.to_string())?;
-    Ok(String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect())
-}
-
-/// The number behind `"key":` in a line of JSON.
-fn number(line: &str, key: &str) -> Option<f64> {
-    let rest = line.split_once(&format!("\"{key}\":"))?.1;
-    rest.split([',', '}']).next()?.trim().parse().ok()
+    SCIPY.measure("scipy_couple.py", &format!("[{}]", cases.join(", ")))
 }
