@@ -1,6 +1,6 @@
 //! The equations of harmonic balance with a parameter, for continuation.
 
-use super::joints::{Coordinate, Slider};
+use super::joints::Coordinate;
 use super::judge::Judge;
 use super::rest::Rest;
 use super::solve::{Level, Motion};
@@ -31,7 +31,8 @@ pub(crate) struct BranchEquations<'a> {
     rest_of: System,
     level: Level,
     motion: Motion,
-    scale: f64,
+    /// Unit of motions, m.
+    length: f64,
     judge: Judge,
     odd: bool,
 }
@@ -47,11 +48,8 @@ impl<'a> BranchEquations<'a> {
         let odd = system.is_odd();
         let harmonics: Vec<usize> = if odd { (1..=top).step_by(2).collect() } else { (0..=top).collect() };
         let samples = method.samples.unwrap_or(1024.max((16 * (top + 1)).next_power_of_two()));
-        let rigid = coordinates.iter().flat_map(|c| &c.sliders).filter(|s| matches!(s, Slider::Rigid { .. })).count();
-        let level = Level::new(harmonics, samples, (coordinates.len(), rigid), None);
-        let zero = vec![Complex64::new(0.0, 0.0); level.linear.len()];
-        let motion =
-            Motion { c: zero.clone(), force: zero, multipliers: vec![vec![0.0; samples]; rigid], ..Motion::default() };
+        let level = Level::new(harmonics, samples, coordinates.len(), None);
+        let motion = Motion::rest(level.linear.len());
         Ok(BranchEquations {
             at,
             rest_of: system.clone(),
@@ -63,7 +61,7 @@ impl<'a> BranchEquations<'a> {
             rest,
             level,
             motion,
-            scale: 1.0,
+            length: 1.0,
             odd,
         })
     }
@@ -93,16 +91,6 @@ impl<'a> BranchEquations<'a> {
         (self.system, self.omega, self.value) = (system, omega, value);
     }
 
-    fn unpack(&mut self, x: &[f64]) {
-        for (c, pair) in self.motion.c.iter_mut().zip(x.chunks_exact(2)) {
-            *c = Complex64::new(pair[0], pair[1]) * self.scale;
-        }
-    }
-
-    fn pack(&self) -> Vec<f64> {
-        self.motion.c.iter().flat_map(|c| [c.re / self.scale, c.im / self.scale]).collect()
-    }
-
     fn lost(&self, iterations: usize, residual: f64) -> OrbitError {
         OrbitError::NotConverged { method: super::NAME, omega: self.omega, iterations, residual }
     }
@@ -111,33 +99,20 @@ impl<'a> BranchEquations<'a> {
     pub fn start(&mut self, value: f64) -> Result<Vec<f64>, OrbitError> {
         self.set(value);
         let guess = Guess::new(&self.system, self.omega);
-        let nh = self.level.harmonics().len();
-        let mut start = self.motion.clone();
-        start.c.copy_from_slice(&self.level.linear);
-        for (q, coordinate) in self.coordinates.iter().enumerate() {
-            let joint = &self.system.joints[coordinate.joint];
-            for (rate, x) in &guess.harmonics {
-                let h = (rate / self.omega).round() as usize;
-                if let Ok(k) = self.level.harmonics().binary_search(&h) {
-                    let g = joint.imposed.iter().find(|(k, _)| *k as usize == h).map(|(_, g)| *g).unwrap_or_default();
-                    let u: Complex64 = (0..x.len()).map(|i| x[i] * joint.direction[(i, 0)]).sum();
-                    start.c[q * nh + k] = u + g;
-                }
-            }
-        }
-        let solved = self.level.solve(&self.coordinates, self.omega, start, false);
+        let start = self.level.begin(&self.system, &self.coordinates, Some(&guess), self.omega);
+        let solved = self.level.solve(&self.coordinates, self.omega, start);
         self.motion = solved.map_err(|lost| self.lost(lost.iterations, lost.residual))?;
         let norm = |c: &[Complex64]| c.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
         let size = norm(&self.motion.c).max(1e-3 * norm(&self.level.linear));
-        self.scale = (RESONANCE * size).max(f64::MIN_POSITIVE);
-        Ok(self.pack())
+        self.length = (RESONANCE * size).max(f64::MIN_POSITIVE);
+        Ok(self.level.pack(&self.coordinates, &self.motion, self.length))
     }
 
     /// The orbit of a point of the branch.
     pub fn orbit(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
         self.set(value);
-        self.unpack(x);
-        self.level.newton(&self.coordinates, self.omega, &mut self.motion, 10).ok()?;
+        self.level.unpack(&self.coordinates, (x, self.length), &mut self.motion);
+        self.level.polish(&self.coordinates, self.omega, &mut self.motion, 10).ok()?;
         let places = path::places(&mut self.level, &self.rest, self.omega, &self.motion);
         let context = path::Context {
             system: &self.system,
@@ -152,12 +127,8 @@ impl<'a> BranchEquations<'a> {
 
     /// The orbit at `value` that Newton's method finds from the point `x` nearby.
     pub fn near(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
-        self.set(value);
-        self.unpack(x);
-        let start = self.motion.clone();
-        self.motion = self.level.solve(&self.coordinates, self.omega, start, true).ok()?;
-        let x = self.pack();
-        self.orbit(&x, value)
+        let mut x = x.to_vec();
+        self.leap(&mut x, value).then(|| self.orbit(&x, value))?
     }
 }
 
@@ -174,61 +145,33 @@ impl Equations for BranchEquations<'_> {
         if !p.is_finite() || x.iter().any(|x| !x.is_finite()) {
             return false;
         }
-        self.unpack(x);
         let step = DIFFERENCE * p.abs().max(f64::MIN_POSITIVE);
         for (sign, at) in [(1.0, p + step), (-1.0, p - step)] {
             self.set(at);
             if self.omega <= 0.0 {
                 return false;
             }
-            let residual = self.level.residual_at(&self.coordinates, self.omega, &mut self.motion, None);
-            for (d, r) in by_p.iter_mut().zip(residual) {
-                *d = if sign > 0.0 { *r } else { (*d - *r) / (2.0 * step * self.scale) };
+            self.level.residual_at(&self.coordinates, self.omega, (x, self.length), &mut self.motion, f, None);
+            for (d, r) in by_p.iter_mut().zip(f.iter()) {
+                *d = if sign > 0.0 { *r } else { (*d - *r) / (2.0 * step) };
             }
         }
         self.set(p);
-        let residual = self.level.residual_at(&self.coordinates, self.omega, &mut self.motion, Some(by_x));
-        for (f, r) in f.iter_mut().zip(residual) {
-            *f = r / self.scale;
-        }
+        self.level.residual_at(&self.coordinates, self.omega, (x, self.length), &mut self.motion, f, Some(by_x));
         true
-    }
-
-    fn folds(&self) -> bool {
-        // rigid sliders dissipate and nothing else: their branches are followed by the parameter, which the renewal of multipliers needs
-        self.motion.multipliers.is_empty()
     }
 
     fn leap(&mut self, x: &mut [f64], p: f64) -> bool {
-        // with rigid friction the sets of slipping samples change in jumps; smoothed friction finds the way between
         self.set(p);
-        self.unpack(x);
-        let start = self.motion.clone();
-        let warm = self.level.solve(&self.coordinates, self.omega, start, true);
-        let Ok(motion) = warm else { return false };
+        let mut start = self.motion.clone();
+        self.level.unpack(&self.coordinates, (x, self.length), &mut start);
+        let Ok(motion) = self.level.solve(&self.coordinates, self.omega, start) else { return false };
         self.motion = motion;
-        x.copy_from_slice(&self.pack());
+        x.copy_from_slice(&self.level.pack(&self.coordinates, &self.motion, self.length));
         true
     }
 
-    fn accept(&mut self, x: &mut [f64], p: f64) -> bool {
-        if self.motion.multipliers.is_empty() {
-            return true;
-        }
-        // rigid friction: renew the multipliers at this point
-        self.set(p);
-        self.unpack(x);
-        let start = self.motion.clone();
-        match self.level.solve(&self.coordinates, self.omega, start.clone(), true) {
-            Ok(motion) => {
-                self.motion = motion;
-                x.copy_from_slice(&self.pack());
-                true
-            }
-            Err(_) => {
-                self.motion = start;
-                false
-            }
-        }
+    fn accept(&mut self, _x: &mut [f64], _p: f64) -> bool {
+        true
     }
 }

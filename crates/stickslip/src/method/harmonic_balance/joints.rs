@@ -1,15 +1,14 @@
-//! Friction in the alternation between frequency and time: from the harmonics of a relative motion to the harmonics of the
-//! friction force, with the exact derivative.
+//! Friction in the alternation between frequency and time: from the harmonics of a motion to the harmonics of the friction force, with
+//! the exact derivative.
 //!
 //! - A slider behind a spring keeps a history. It is run until it repeats, which takes one period: a slider that moves once
 //!   forgets everything before. In stick `f = ±limit + kt (u - u*)`, with `u*` the turning point of `u` that ended the slip
 //!   before, so `δf = kt (δu - δu*)`; in slip `δf = 0`. Every stick interval adds one product of a column and a row to the derivative.
-//! - A rigid slider's force is set-valued: `λ ∈ limit Sgn(v)`. It is written as a projection,
-//!   `λ = proj[-limit, limit](λ₀ + limit v / width)`, with a multiplier `λ₀` that is replaced by λ until nothing changes.
-//!   At `λ₀ = λ` the condition is `λ ∈ limit Sgn(v)` whatever the width. Source: Alart and Curnier (1991); Nacivet et al. (2003).
-//! - Sharp laws of velocity change within a sample. Their power `φ(v)` is averaged over it for a velocity `v + cξ`, `-1 < ξ < 1`,
-//!   that is linear there, and the forces are the derivative of that mean: so a zero of the velocity is placed within its sample,
-//!   and the forces stay what friction must be, the gradient of a convex function.
+//! - A law of velocity, `λ = φ(v)`, rigid or smooth, is taken by its resolvent: for any `ε > 0` it says the same as `λ = J(λ + ε v)` with
+//!   `J = (1 + ε φ⁻¹)⁻¹`, which for rigid friction is the projection onto `[-limit, limit]`. `J` never rises faster than its argument,
+//!   however steep φ is. Source: Alart and Curnier (1991); Nacivet et al. (2003); Parikh and Boyd, "Proximal Algorithms" (2014).
+//! - Steep maps change within a sample. Their mean over it is taken for an argument `y + eξ`, `-1 < ξ < 1`, that is linear there: so a
+//!   zero of the velocity is placed within its sample, and the forces stay the gradient of a convex function.
 
 use crate::law::Rate;
 use crate::method::MethodError;
@@ -24,34 +23,51 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// then exact to spectral accuracy, and the mean would be the less accurate of the two.
 const SMOOTH: f64 = 0.1;
 
-/// One slider of a coordinate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Slider {
-    /// Behind a spring (N/m).
-    Elastic { stiffness: f64, limit: f64 },
-    /// Rigid; `index` numbers the multipliers.
-    Rigid { limit: f64, index: usize },
-    /// Arctangent of the velocity.
-    Smooth { limit: f64, alpha: f64 },
+/// What acts along a coordinate.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Element {
+    /// Sliders behind springs, side by side.
+    Springs(Vec<Spring>),
+    /// A force that the velocity alone decides.
+    Velocity(Velocity),
 }
 
-/// An unknown relative motion: that of a joint, or of a joint's inner slider behind a spring.
+/// A slider behind a spring (N/m, N).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Spring {
+    pub stiffness: f64,
+    pub limit: f64,
+}
+
+/// A law of velocity: limit in N, steepness in s/m, infinite for rigid friction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Velocity {
+    pub limit: f64,
+    pub alpha: f64,
+}
+
+impl Velocity {
+    pub fn is_rigid(self) -> bool {
+        self.alpha.is_infinite()
+    }
+}
+
+/// A relative motion with what acts along it: that of a joint, or of a joint's inner slider behind a spring. A joint has one for its
+/// sliders behind springs and one for its rigid ones; both move alike.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Coordinate {
     /// The joint.
     pub joint: usize,
     /// Compliance of the spring between the joint and this coordinate, m/N; zero if it is the joint's own motion.
     pub series: f64,
-    /// What acts on it, side by side.
-    pub sliders: Vec<Slider>,
+    pub element: Element,
 }
 
-/// The coordinates of a system.
+/// The coordinates of a system; a joint that carries no force has none.
 ///
 /// # Errors
 /// A law with more than one direction.
 pub(super) fn coordinates(system: &System) -> Result<Vec<Coordinate>, MethodError> {
-    let mut rigid = 0;
     let mut list = Vec::new();
     for (j, joint) in system.joints.iter().enumerate() {
         let unsupported = |instead| MethodError::Law {
@@ -63,61 +79,46 @@ pub(super) fn coordinates(system: &System) -> Result<Vec<Coordinate>, MethodErro
         if joint.direction.ncols() != 1 {
             return Err(unsupported("a law with one direction"));
         }
+        let mut add = |series, element| list.push(Coordinate { joint: j, series, element });
         if let Some(branches) = joint.law.network() {
-            let sliders = branches
-                .iter()
-                .map(|branch| match branch.stiffness {
-                    Some(stiffness) => Slider::Elastic { stiffness, limit: branch.limit },
-                    None => {
-                        rigid += 1;
-                        Slider::Rigid { limit: branch.limit, index: rigid - 1 }
-                    }
-                })
-                .collect();
-            list.push(Coordinate { joint: j, series: 0.0, sliders });
+            let springs = branches.iter().filter_map(|branch| {
+                let stiffness = branch.stiffness?;
+                Some(Spring { stiffness, limit: branch.limit })
+            });
+            let springs: Vec<Spring> = springs.collect();
+            if !springs.is_empty() {
+                add(0.0, Element::Springs(springs));
+            }
+            // rigid sliders side by side are one
+            let limit: f64 =
+                branches.iter().filter(|branch| branch.stiffness.is_none()).map(|branch| branch.limit).sum();
+            if limit > 0.0 {
+                add(0.0, Element::Velocity(Velocity { limit, alpha: f64::INFINITY }));
+            }
             continue;
         }
-        list.push(match joint.law.rate() {
-            Some(Rate::CoulombArctan(law)) => {
-                let sliders = vec![Slider::Smooth { limit: law.limit, alpha: law.alpha }];
-                Coordinate { joint: j, series: 0.0, sliders }
-            }
-            Some(Rate::JenkinsArctan(law)) => {
-                let sliders = vec![Slider::Smooth { limit: law.limit, alpha: law.alpha }];
-                Coordinate { joint: j, series: 1.0 / law.stiffness, sliders }
-            }
+        let (series, law) = match joint.law.rate() {
+            Some(Rate::CoulombArctan(law)) => (0.0, Velocity { limit: law.limit, alpha: law.alpha }),
+            Some(Rate::JenkinsArctan(law)) => (1.0 / law.stiffness, Velocity { limit: law.limit, alpha: law.alpha }),
             #[allow(unreachable_patterns)] // a law of rate form that is added later
             _ => return Err(unsupported("method `shooting`")),
-        });
+        };
+        if law.limit > 0.0 {
+            add(series, Element::Velocity(law));
+        }
     }
     Ok(list)
 }
 
-/// How sharp friction is at present; the end of every search is [`Sharpness::EXACT`] but for the width of multipliers.
+/// A map from a signal to a force, sample by sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sharpness {
-    /// Velocity over which rigid sliders hold on to their multiplier, m/s.
-    pub width: f64,
-    /// Velocity that is added to the width `1/alpha` of smooth laws, m/s.
-    pub blur: f64,
-    /// Factor on the slip limit of sliders behind springs.
-    pub limits: f64,
-    /// Rigid sliders that were free (inside their limits) in the forces found last are left unclamped, and the others where they are:
-    /// the first step after a change of width or multipliers.
-    pub hold: bool,
-}
-
-/// Velocity changes over a sample beyond this many widths need no multiplier: the sample has a zero of the velocity, and its mean force
-/// is known from where the zero is, whatever the width.
-const CROSSES: f64 = 2.0;
-
-/// What a sample of a rigid slider was found to be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Seen {
-    /// It carries this force, N: inside the limits the slider is free to take any other, at a limit it slips.
-    Force(f64),
-    /// The velocity passes through zero within the sample.
-    Crossing,
+pub(super) enum Map {
+    /// The projection onto `[-limit, limit]`.
+    Projection { limit: f64 },
+    /// The arctangent law itself, of a velocity.
+    Arctangent { limit: f64, alpha: f64 },
+    /// The resolvent of the arctangent law: `λ` with `λ + ε φ⁻¹(λ) = y`.
+    Resolvent { limit: f64, alpha: f64, penalty: f64 },
 }
 
 /// The transform's memory for one number of harmonics and samples.
@@ -126,8 +127,9 @@ pub(super) struct Alternation {
     pub harmonics: Vec<usize>,
     pub fourier: Fourier,
     pairs: Vec<(usize, Complex64)>,
-    pub displacement: Vec<f64>,
-    pub velocity: Vec<f64>,
+    /// The signal that was synthesised last.
+    pub signal: Vec<f64>,
+    argument: Vec<Complex64>,
     /// Force of the slider evaluated last, per sample.
     pub force: Vec<f64>,
     /// Per sample of the slider evaluated last: it moves.
@@ -142,6 +144,7 @@ pub(super) struct Alternation {
     spectrum_first: Vec<Complex64>,
     spectrum_second: Vec<Complex64>,
     column: Vec<Complex64>,
+    row: Vec<Complex64>,
     /// The sampled force is the mean over a sample, not the value at its middle.
     mean: bool,
 }
@@ -152,6 +155,16 @@ struct Stick {
     first: usize,
     last: usize,
     anchor: Option<f64>,
+    onset: Option<Onset>,
+}
+
+/// What the start of the slip that ends a stick adds to the force of its first sample, see [`Alternation::history`]: the sample, and
+/// the derivatives, over the stiffness, by the way since the anchor and by that within the sample.
+#[derive(Debug, Clone, Copy)]
+struct Onset {
+    at: usize,
+    since: f64,
+    within: f64,
 }
 
 impl Alternation {
@@ -161,8 +174,7 @@ impl Alternation {
         Alternation {
             fourier: Fourier::new(samples),
             pairs: harmonics.iter().map(|&h| (h, ZERO)).collect(),
-            displacement: zeros.clone(),
-            velocity: zeros.clone(),
+            signal: zeros.clone(),
             force: zeros.clone(),
             slips: vec![false; samples],
             work: zeros.clone(),
@@ -175,74 +187,135 @@ impl Alternation {
             spectrum_first: vec![ZERO; 2 * top + 1],
             spectrum_second: vec![ZERO; 2 * top + 1],
             column: vec![ZERO; harmonics.len()],
+            row: vec![ZERO; harmonics.len()],
+            argument: vec![ZERO; harmonics.len()],
             harmonics,
             mean: false,
         }
     }
 
     pub fn samples(&self) -> usize {
-        self.displacement.len()
+        self.signal.len()
     }
 
-    /// Samples of the motion with harmonics `c`, and of its velocity.
-    pub fn synthesise(&mut self, c: &[Complex64], omega: f64) {
+    /// Samples of the signal with harmonics `c`.
+    pub fn synthesise(&mut self, c: &[Complex64]) {
         for (pair, value) in self.pairs.iter_mut().zip(c) {
             pair.1 = *value;
         }
-        self.fourier.synthesise(&self.pairs, &mut self.displacement);
-        for (pair, value) in self.pairs.iter_mut().zip(c) {
-            pair.1 = value * Complex64::new(0.0, pair.0 as f64 * omega);
-        }
-        self.fourier.synthesise(&self.pairs, &mut self.velocity);
+        self.fourier.synthesise(&self.pairs, &mut self.signal);
     }
 
-    /// Harmonics of the force of all sliders of a coordinate that moves with the harmonics `c`, into `force`; the derivative with
-    /// respect to (Re, Im) of the harmonics into `tangent` (row-major, 2 × harmonics squared). `multipliers` holds λ₀, `next` gets λ.
-    #[allow(clippy::too_many_arguments)] // buffers of one kernel
-    pub fn evaluate(
+    /// Harmonics of the force of springs with sliders that move with the harmonics `c`, into `force`, with slip limits times `limits`; the
+    /// derivative with respect to (Re, Im) of the harmonics into `tangent` (row-major, 2 × harmonics squared).
+    pub fn springs(
         &mut self,
-        coordinate: &Coordinate,
+        springs: &[Spring],
+        limits: f64,
         c: &[Complex64],
-        omega: f64,
-        sharpness: Sharpness,
-        multipliers: &[Vec<f64>],
-        next: &mut [Vec<Seen>],
         force: &mut [Complex64],
         mut tangent: Option<&mut [f64]>,
     ) {
-        self.synthesise(c, omega);
+        self.synthesise(c);
         force.fill(ZERO);
         if let Some(tangent) = tangent.as_deref_mut() {
             tangent.fill(0.0);
         }
-        for slider in &coordinate.sliders {
-            self.slide(slider, c, sharpness, multipliers, next);
+        for spring in springs {
+            self.slide(spring, limits, c);
             self.add_force(force);
             if let Some(tangent) = tangent.as_deref_mut() {
-                match slider {
-                    Slider::Elastic { stiffness, .. } => self.add_elastic_tangent(*stiffness, tangent),
-                    _ => self.add_velocity_tangent(omega, tangent),
+                self.add_elastic_tangent(spring.stiffness, tangent);
+            }
+        }
+    }
+
+    /// Force samples of one spring with its slider; the motion `c` has been synthesised.
+    pub fn slide(&mut self, spring: &Spring, limits: f64, c: &[Complex64]) {
+        let mean = if self.harmonics.first() == Some(&0) { c[0].re } else { 0.0 };
+        self.history(spring.stiffness, spring.limit * limits, mean);
+    }
+
+    /// Harmonics of the force that a map makes of the signal `y`, and their derivative, as in [`Alternation::springs`].
+    pub fn map(&mut self, map: Map, y: &[Complex64], force: &mut [Complex64], tangent: Option<&mut [f64]>) {
+        self.synthesise(y);
+        let rough = self.signal.len();
+        let highest = self.harmonics.last().map_or(1.0, |&h| h as f64);
+        let largest = self.signal.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        self.mean = match map {
+            // a contact that sticks all the time is linear
+            Map::Projection { limit } => largest > limit,
+            // a signal whose map is smooth over a sample is exact to spectral accuracy in its middle
+            Map::Arctangent { alpha, .. } => alpha * largest * TAU * highest / rough as f64 >= SMOOTH,
+            Map::Resolvent { limit, .. } => largest / limit * TAU * highest / rough as f64 >= SMOOTH,
+        };
+        match map {
+            Map::Projection { limit } => self.each(1.0 / limit, limit, 1.0, Mean::saturation),
+            Map::Arctangent { limit, alpha } => {
+                self.each(alpha, limit * FRAC_2_PI, limit * FRAC_2_PI * alpha, Mean::arctangent);
+            }
+            Map::Resolvent { limit, alpha, penalty } => {
+                let steepness = alpha * limit / penalty;
+                self.each(1.0 / limit, limit, 1.0, |y, e| Mean::resolvent(y, e, steepness));
+            }
+        }
+        force.fill(ZERO);
+        self.add_force(force);
+        if let Some(tangent) = tangent {
+            tangent.fill(0.0);
+            self.add_map_tangent(tangent);
+        }
+    }
+
+    /// Harmonics of a law of velocity of the motion with harmonics `c`, and their derivative; rigid friction changes its sign over the
+    /// velocity `width`.
+    pub fn velocity(
+        &mut self,
+        law: Velocity,
+        width: f64,
+        omega: f64,
+        c: &[Complex64],
+        force: &mut [Complex64],
+        mut tangent: Option<&mut [f64]>,
+    ) {
+        let (map, factor) = if law.is_rigid() {
+            (Map::Projection { limit: law.limit }, law.limit / width.max(f64::MIN_POSITIVE))
+        } else {
+            (Map::Arctangent { limit: law.limit, alpha: law.alpha }, 1.0)
+        };
+        let mut signal = std::mem::take(&mut self.argument);
+        for ((y, c), &h) in signal.iter_mut().zip(c).zip(&self.harmonics) {
+            *y = c * Complex64::new(0.0, factor * h as f64 * omega);
+        }
+        self.map(map, &signal, force, tangent.as_deref_mut());
+        self.argument = signal;
+        if let Some(tangent) = tangent {
+            // δv = jkΩ δU: x goes to the imaginary and y to the negative real part
+            let width = 2 * self.harmonics.len();
+            for row in tangent.chunks_exact_mut(width) {
+                for (pair, &k) in row.chunks_exact_mut(2).zip(&self.harmonics) {
+                    let rate = factor * k as f64 * omega;
+                    (pair[0], pair[1]) = (pair[1] * rate, -pair[0] * rate);
                 }
             }
         }
     }
 
-    /// Force and derivative samples of one slider; [`Alternation::synthesise`] has been called.
-    pub fn slide(
-        &mut self,
-        slider: &Slider,
-        c: &[Complex64],
-        sharpness: Sharpness,
-        multipliers: &[Vec<f64>],
-        next: &mut [Vec<Seen>],
-    ) {
-        match *slider {
-            Slider::Elastic { stiffness, limit } => {
-                let mean = if self.harmonics.first() == Some(&0) { c[0].re } else { 0.0 };
-                self.history(stiffness, limit * sharpness.limits, mean);
-            }
-            Slider::Rigid { limit, index } => self.rigid(limit, sharpness, &multipliers[index], &mut next[index]),
-            Slider::Smooth { limit, alpha } => self.smooth(limit, 1.0 / (1.0 / alpha + sharpness.blur)),
+    /// The map `mean` of every sample times `scale`, where `mean` is told the value in the middle and half of the change.
+    fn each(&mut self, scale: f64, force: f64, stiffness: f64, mean: impl Fn(f64, f64) -> Mean) {
+        let n = self.samples();
+        for i in 0..n {
+            let y = scale * self.signal[i];
+            let (before, after) =
+                (self.signal[if i == 0 { n - 1 } else { i - 1 }], self.signal[if i + 1 == n { 0 } else { i + 1 }]);
+            let e = if self.mean { 0.25 * scale * (after - before) } else { 0.0 };
+            let mean = mean(y, e);
+            self.slips[i] = mean.slips;
+            self.force[i] = force * mean.zeroth;
+            self.moment[i] = force * mean.first;
+            self.slope[i] = stiffness * mean.slope;
+            self.slope_first[i] = stiffness * mean.slope_first;
+            self.slope_second[i] = stiffness * mean.slope_second;
         }
     }
 
@@ -250,7 +323,7 @@ impl Alternation {
     fn history(&mut self, kt: f64, limit: f64, mean: f64) {
         let n = self.samples();
         self.mean = false;
-        let u = &self.displacement;
+        let u = &self.signal;
         // force and displacement at the anchor; where the anchor is, in samples; the sign of the slip now
         let (mut hold, mut from, mut anchor, mut slip) = (0.0, mean, None, 0.0f64);
         self.sticks.clear();
@@ -273,7 +346,7 @@ impl Alternation {
                 slip = 0.0;
             }
             let moves = trial.abs() > limit;
-            let mut late = 0.0;
+            let (mut late, mut onset) = (0.0, None);
             if moves {
                 if slip == 0.0 {
                     // the slip began between the samples: what the chord through them leaves out of the area, less what the sum over
@@ -283,7 +356,9 @@ impl Alternation {
                     let rise = kt * (now - before) * trial.signum();
                     let missing = missing.clamp(0.0, rise.max(0.0));
                     if rise > 0.0 {
-                        late = (0.5 * missing * (1.0 - missing / rise) - rise / 12.0) * trial.signum();
+                        let share = missing / rise;
+                        late = (0.5 * missing * (1.0 - share) - rise / 12.0) * trial.signum();
+                        onset = Some(Onset { at: i, since: share - 0.5, within: 0.5 * share * share - 1.0 / 12.0 });
                     }
                 }
                 slip = trial.signum();
@@ -295,9 +370,9 @@ impl Alternation {
                 self.slips[i] = moves;
                 match (moves, &mut open) {
                     (false, Some(stick)) => stick.last = i,
-                    (false, None) => open = Some(Stick { first: i, last: i, anchor }),
+                    (false, None) => open = Some(Stick { first: i, last: i, anchor, onset: None }),
                     (true, Some(stick)) => {
-                        self.sticks.push(*stick);
+                        self.sticks.push(Stick { onset, ..*stick });
                         open = None;
                     }
                     (true, None) => {}
@@ -305,62 +380,6 @@ impl Alternation {
             }
         }
         self.sticks.extend(open);
-    }
-
-    fn rigid(&mut self, limit: f64, sharpness: Sharpness, multipliers: &[f64], next: &mut [Seen]) {
-        let Sharpness { width, hold, .. } = sharpness;
-        let n = self.samples();
-        self.mean = true;
-        let (stiffness, inverse) = (limit / width, 1.0 / width);
-        for i in 0..n {
-            let y = self.velocity[i] * inverse + multipliers[i] / limit;
-            let e = 0.25 * inverse * (self.velocity[(i + 1) % n] - self.velocity[(i + n - 1) % n]);
-            let mean = match next[i] {
-                Seen::Force(force) if hold && force.abs() >= limit => {
-                    Mean { zeroth: force.signum(), ..Mean::default() }
-                }
-                Seen::Force(_) if hold => Mean::linear(y, e),
-                _ => Mean::saturation(y, e),
-            };
-            if !hold {
-                next[i] = if e.abs() > CROSSES && mean.slope > 0.0 {
-                    Seen::Crossing
-                } else {
-                    Seen::Force(limit * mean.zeroth)
-                };
-            }
-            self.slips[i] = mean.zeroth.abs() >= 1.0;
-            self.store(i, &mean, limit, stiffness);
-        }
-    }
-
-    fn smooth(&mut self, limit: f64, alpha: f64) {
-        let n = self.samples();
-        let factor = limit * FRAC_2_PI;
-        let speed = self.velocity.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        let highest = self.harmonics.last().map_or(1.0, |&h| h as f64);
-        let pointwise = alpha * speed * TAU * highest / (n as f64) < SMOOTH;
-        self.mean = !pointwise;
-        for i in 0..n {
-            let y = alpha * self.velocity[i];
-            let e = 0.25 * alpha * (self.velocity[(i + 1) % n] - self.velocity[(i + n - 1) % n]);
-            let mean = if pointwise {
-                Mean { zeroth: y.atan(), slope: 1.0 / (1.0 + y * y), ..Mean::default() }
-            } else {
-                Mean::arctangent(y, e)
-            };
-            self.slips[i] = y.abs() > 1.0;
-            self.store(i, &mean, factor, factor * alpha);
-        }
-    }
-
-    #[inline]
-    fn store(&mut self, i: usize, mean: &Mean, force: f64, stiffness: f64) {
-        self.force[i] = force * mean.zeroth;
-        self.moment[i] = force * mean.first;
-        self.slope[i] = stiffness * mean.slope;
-        self.slope_first[i] = stiffness * mean.slope_first;
-        self.slope_second[i] = stiffness * mean.slope_second;
     }
 
     /// Adds the harmonics of the sampled force.
@@ -400,28 +419,35 @@ impl Alternation {
             }
         }
         for stick in &self.sticks {
+            let moved = |k: usize, at: f64| Complex64::cis(k as f64 * at * TAU / n as f64);
+            // δu* = Re(row δU) = row.re x - row.im y
+            let anchor = |k: usize| match stick.anchor {
+                Some(at) => moved(k, at),
+                None => Complex64::new(if k == 0 { 1.0 } else { 0.0 }, 0.0),
+            };
+            let scale = |h: usize| kt * if h == 0 { 1.0 } else { 2.0 } / n as f64;
             for (value, &h) in self.column.iter_mut().zip(&self.harmonics) {
-                let scale = if h == 0 { 1.0 } else { 2.0 };
-                *value = interval_sum(stick, h, n) * (-kt * scale / n as f64);
+                *value = interval_sum(stick, h, n) * -scale(h);
             }
-            for (b, &k) in self.harmonics.iter().enumerate() {
-                let row = match stick.anchor {
-                    Some(at) => Complex64::cis(k as f64 * at * TAU / n as f64),
-                    None if k == 0 => Complex64::new(1.0, 0.0),
-                    None => continue,
-                };
-                // δu* = Re(row δU) = row.re x - row.im y
-                for (a, &h) in self.harmonics.iter().enumerate() {
-                    let f = self.column[a];
-                    let block = [f.re * row.re, -f.re * row.im, f.im * row.re, -f.im * row.im];
-                    add_entries(tangent, size, (a, h), (b, k), block);
+            for (value, &k) in self.row.iter_mut().zip(&self.harmonics) {
+                *value = anchor(k);
+            }
+            add_product(tangent, &self.harmonics, &self.column, &self.row);
+            if let Some(Onset { at, since, within }) = stick.onset {
+                for (value, &h) in self.column.iter_mut().zip(&self.harmonics) {
+                    *value = moved(h, at as f64).conj() * scale(h);
                 }
+                for (value, &k) in self.row.iter_mut().zip(&self.harmonics) {
+                    let (before, now) = (moved(k, at as f64 - 1.0), moved(k, at as f64));
+                    *value = (before - *value) * since + (now - before) * within;
+                }
+                add_product(tangent, &self.harmonics, &self.column, &self.row);
             }
         }
     }
 
-    /// The same for forces that depend on velocity, and on its change over the sample.
-    fn add_velocity_tangent(&mut self, omega: f64, tangent: &mut [f64]) {
+    /// The same for a map of a signal, and of its change over the sample.
+    fn add_map_tangent(&mut self, tangent: &mut [f64]) {
         let n = self.samples();
         let top = self.spectrum.len();
         for (values, spectrum) in [
@@ -450,10 +476,7 @@ impl Alternation {
                     plus += (row + column.conj()) * plus_1 + row * column.conj() * plus_2;
                 }
                 let block = [minus.re + plus.re, plus.im - minus.im, minus.im + plus.im, minus.re - plus.re];
-                // columns: δv = jkΩ δU, so x goes to the imaginary and y to the negative real part
-                let rate = k as f64 * omega;
-                let turned = [block[1] * rate, -block[0] * rate, block[3] * rate, -block[2] * rate];
-                add_block(tangent, size, (a, h), (b, k), turned);
+                add_block(tangent, size, (a, h), (b, k), block);
             }
         }
     }
@@ -472,13 +495,15 @@ struct Mean {
     slope: f64,
     slope_first: f64,
     slope_second: f64,
+    /// The contact counts as slipping: at its limit, or for the arctangent above half of it, where `alpha v` exceeds one.
+    slips: bool,
 }
 
 impl Mean {
     /// g(x) = x.
     #[inline]
     fn linear(y: f64, e: f64) -> Mean {
-        Mean { zeroth: y, first: e / 3.0, slope: 1.0, slope_first: 0.0, slope_second: 1.0 / 3.0 }
+        Mean { zeroth: y, first: e / 3.0, slope: 1.0, slope_second: 1.0 / 3.0, ..Mean::default() }
     }
 
     /// g(x) = x cut off at ±1.
@@ -486,7 +511,7 @@ impl Mean {
     fn saturation(y: f64, e: f64) -> Mean {
         let (at, reach) = (y.abs(), e.abs());
         if at >= 1.0 + reach {
-            return Mean { zeroth: y.signum(), ..Mean::default() };
+            return Mean { zeroth: y.signum(), slips: true, ..Mean::default() };
         }
         if at + reach <= 1.0 {
             return Mean::linear(y, e);
@@ -500,6 +525,7 @@ impl Mean {
                 slope: 0.5 * (t + 1.0),
                 slope_first: 0.25 * (t * t - 1.0),
                 slope_second: (t * t * t + 1.0) / 6.0,
+                slips: at >= 1.0,
             }
         } else {
             // both ends: from ξ = s to ξ = t
@@ -513,6 +539,7 @@ impl Mean {
                 slope: 0.5 * r1,
                 slope_first: 0.5 * r2,
                 slope_second: 0.5 * r3,
+                slips: at >= 1.0,
             }
         };
         if y < 0.0 {
@@ -528,20 +555,12 @@ impl Mean {
     #[inline]
     fn arctangent(y: f64, e: f64) -> Mean {
         let reach = e.abs();
+        let slips = y.abs() > 1.0;
+        if reach == 0.0 {
+            return Mean { zeroth: y.atan(), slope: 1.0 / (1.0 + y * y), slips, ..Mean::default() };
+        }
         if reach < GENTLE * (1.0 + y.abs()) {
-            let mut mean = Mean::default();
-            for (node, weight) in GAUSS {
-                for xi in [-node, node] {
-                    let x = y + e * xi;
-                    let (value, slope) = (x.atan(), 1.0 / (1.0 + x * x));
-                    mean.zeroth += 0.5 * weight * value;
-                    mean.first += 0.5 * weight * xi * value;
-                    mean.slope += 0.5 * weight * slope;
-                    mean.slope_first += 0.5 * weight * xi * slope;
-                    mean.slope_second += 0.5 * weight * xi * xi * slope;
-                }
-            }
-            return mean;
+            return Mean { slips, ..Mean::quadrature(y, e, |x| (x.atan(), 1.0 / (1.0 + x * x))) };
         }
         let (low, high) = (y - reach, y + reach);
         let (low_value, high_value) = (low.atan(), high.atan());
@@ -559,9 +578,59 @@ impl Mean {
             slope,
             slope_first: ((high_value + low_value) / (2.0 * reach) - zeroth / reach) * sign,
             slope_second: slope - 2.0 * first / reach,
+            slips,
         }
     }
+
+    /// g = the resolvent of `λ = (2/π) atan(s w)`: λ with `λ + w = y`.
+    #[inline]
+    fn resolvent(y: f64, e: f64, steepness: f64) -> Mean {
+        if e == 0.0 {
+            let (zeroth, slope) = resolve(y, steepness);
+            return Mean { zeroth, slope, slips: zeroth.abs() > 0.5, ..Mean::default() };
+        }
+        let mean = Mean::quadrature(y, e, |y| resolve(y, steepness));
+        Mean { slips: mean.zeroth.abs() > 0.5, ..mean }
+    }
+
+    /// By quadrature of g and g'.
+    #[inline]
+    fn quadrature(y: f64, e: f64, g: impl Fn(f64) -> (f64, f64)) -> Mean {
+        let mut mean = Mean::default();
+        for (node, weight) in GAUSS {
+            for xi in [-node, node] {
+                let (value, slope) = g(y + e * xi);
+                mean.zeroth += 0.5 * weight * value;
+                mean.first += 0.5 * weight * xi * value;
+                mean.slope += 0.5 * weight * slope;
+                mean.slope_first += 0.5 * weight * xi * slope;
+                mean.slope_second += 0.5 * weight * xi * xi * slope;
+            }
+        }
+        mean
+    }
 }
+
+/// `λ` and `dλ/dy` of `λ + w = y`, `λ = (2/π) atan(s w)`.
+fn resolve(y: f64, s: f64) -> (f64, f64) {
+    let target = y.abs();
+    // the left side rises with a falling slope in w: Newton's method from a w that is too small never passes the root
+    let mut w = (target - 1.0).max(target / (1.0 + FRAC_2_PI * s));
+    for _ in 0..RESOLVED {
+        let left = w + FRAC_2_PI * (s * w).atan() - target;
+        let slope = 1.0 + FRAC_2_PI * s / (1.0 + s * s * w * w);
+        let step = left / slope;
+        w -= step;
+        if step.abs() <= f64::EPSILON * target {
+            break;
+        }
+    }
+    let slope = FRAC_2_PI * s / (1.0 + s * s * w * w);
+    ((target - w).copysign(y), slope / (1.0 + slope))
+}
+
+/// Iterations of [`resolve`], which doubles its digits.
+const RESOLVED: usize = 60;
 
 /// Change of the argument over a sample, relative to the length over which the arctangent changes, up to which the quadrature is
 /// exact to rounding.
@@ -597,6 +666,16 @@ fn add_entries(tangent: &mut [f64], size: usize, (a, h): (usize, usize), (b, k):
         tangent[at + size] += block[2];
         if k > 0 {
             tangent[at + size + 1] += block[3];
+        }
+    }
+}
+
+/// Adds the force `column` times the displacement `Re Σ row_k U_k`.
+fn add_product(tangent: &mut [f64], harmonics: &[usize], column: &[Complex64], row: &[Complex64]) {
+    let size = 2 * harmonics.len();
+    for (a, (&h, f)) in harmonics.iter().zip(column).enumerate() {
+        for (b, (&k, r)) in harmonics.iter().zip(row).enumerate() {
+            add_entries(tangent, size, (a, h), (b, k), [f.re * r.re, -f.re * r.im, f.im * r.re, -f.im * r.im]);
         }
     }
 }

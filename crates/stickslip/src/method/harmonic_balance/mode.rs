@@ -5,7 +5,7 @@
 //! Unknown are the harmonics of all places, ω and ζ, at a given modal amplitude `a`: `X₁ᴴ M X₁ = a²`.
 //! Source: Krack (2015), "Nonlinear modal analysis of nonconservative systems: extension of the periodic motion concept".
 
-use super::joints::{Alternation, Coordinate, Seen, Sharpness, Slider, coordinates};
+use super::joints::{Alternation, Coordinate, Element, coordinates};
 use crate::method::MethodError;
 use crate::model::System;
 use nalgebra::DMatrix;
@@ -36,8 +36,6 @@ pub(crate) struct ModeEquations<'a> {
     coordinates: Vec<Coordinate>,
     alternation: Alternation,
     reference: usize,
-    none: Vec<Vec<f64>>,
-    next: Vec<Vec<Seen>>,
 }
 
 /// Share of the joints' stiffness that tells the equal modes of a structure without joints apart.
@@ -57,16 +55,8 @@ impl<'a> ModeEquations<'a> {
                 instead: "the exact law `jenkins` for nonlinear modes",
             });
         }
-        let rigid = coordinates.iter().flat_map(|c| &c.sliders).filter(|s| matches!(s, Slider::Rigid { .. })).count();
         let odd: Vec<usize> = (1..=harmonics).step_by(2).collect();
-        Ok(ModeEquations {
-            system,
-            coordinates,
-            alternation: Alternation::new(odd, samples),
-            reference: 0,
-            none: vec![vec![0.0; samples]; rigid],
-            next: vec![vec![Seen::Force(0.0); samples]; rigid],
-        })
+        Ok(ModeEquations { system, coordinates, alternation: Alternation::new(odd, samples), reference: 0 })
     }
 
     /// The linear mode number `index` (by rising frequency) of the structure with the springs of its elastic joints (`stuck`), or
@@ -78,12 +68,15 @@ impl<'a> ModeEquations<'a> {
         let share = if stuck { 1.0 } else { TRACE };
         for coordinate in &self.coordinates {
             let w = self.system.joints[coordinate.joint].direction.column(0);
-            for slider in &coordinate.sliders {
-                match slider {
-                    Slider::Elastic { stiffness: kt, .. } => stiffness += w * w.transpose() * (share * *kt),
-                    _ if !stuck => stiffness += w * w.transpose() * (TRACE * self.system.stiffness.amax()),
-                    _ => {}
+            match &coordinate.element {
+                Element::Springs(springs) => {
+                    let kt: f64 = springs.iter().map(|spring| spring.stiffness).sum();
+                    stiffness += w * w.transpose() * (share * kt);
                 }
+                Element::Velocity(_) if !stuck => {
+                    stiffness += w * w.transpose() * (TRACE * self.system.stiffness.amax());
+                }
+                Element::Velocity(_) => {}
             }
         }
         let scale: Vec<f64> = (0..n).map(|i| 1.0 / self.system.mass[(i, i)].sqrt()).collect();
@@ -161,10 +154,14 @@ impl<'a> ModeEquations<'a> {
             let w = self.system.joints[coordinate.joint].direction.column(0);
             let c: Vec<Complex64> =
                 (0..nh).map(|k| (0..n).map(|i| state.x[k * n + i] * w[i]).sum::<Complex64>()).collect();
-            let speed: f64 = c.iter().zip(&harmonics).map(|(z, h)| z.norm() * *h as f64 * omega).sum();
-            let sharpness = Sharpness { width: WIDTH * speed.max(f64::MIN_POSITIVE), ..Sharpness::default() };
             let wanted = jacobian.is_some().then_some(&mut tangent[..]);
-            self.alternation.evaluate(coordinate, &c, omega, sharpness, &self.none, &mut self.next, &mut force, wanted);
+            match &coordinate.element {
+                Element::Springs(springs) => self.alternation.springs(springs, 1.0, &c, &mut force, wanted),
+                Element::Velocity(law) => {
+                    let speed: f64 = c.iter().zip(&harmonics).map(|(z, h)| z.norm() * *h as f64 * omega).sum();
+                    self.alternation.velocity(*law, WIDTH * speed, omega, &c, &mut force, wanted);
+                }
+            }
             for k in 0..nh {
                 for i in (0..n).filter(|&i| w[i] != 0.0) {
                     let row = 2 * (k * n + i);

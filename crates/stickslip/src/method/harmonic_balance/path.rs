@@ -1,6 +1,6 @@
 //! The orbit of a solution of harmonic balance.
 
-use super::joints::{Coordinate, Seen, Slider};
+use super::joints::{Alternation, Coordinate, Element};
 use super::judge::Judge;
 use super::rest::Rest;
 use super::solve::{Level, Motion};
@@ -13,11 +13,6 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
-
-/// Velocities below this many times the estimated error of the motion are rest: in stick a truncated series ripples.
-const RIPPLE: f64 = 3.0;
-/// The same if nothing is known of the error, as a fraction of the largest velocity.
-const REST: f64 = 1e-6;
 
 /// Harmonics of all places under the forces of a motion.
 pub(super) fn places(level: &mut Level, rest: &Rest, omega: f64, motion: &Motion) -> Vec<DVector<Complex64>> {
@@ -69,49 +64,52 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     let mut joints = Vec::new();
     let mut elastic_states = Vec::new();
     let mut stuck = Vec::new();
-    let mut next: Vec<Vec<Seen>> = motion.multipliers.iter().map(|m| vec![Seen::Force(0.0); m.len()]).collect();
-    for (q, coordinate) in coordinates.iter().enumerate() {
-        let c = &motion.c[q * nh..(q + 1) * nh];
-        let f = &motion.force[q * nh..(q + 1) * nh];
-        let j = coordinate.joint;
-        level.alternation.synthesise(c, omega);
-        let fastest = level.alternation.velocity.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        let threshold = fastest * REST.max(RIPPLE * truncation.unwrap_or(0.0)).min(0.2);
-        for slider in &coordinate.sliders {
-            level.alternation.slide(slider, c, motion.sharpness, &motion.multipliers, &mut next);
-            if matches!(slider, Slider::Elastic { .. }) {
-                elastic_states.push(level.alternation.force[0]);
-            }
-            for i in 0..samples {
-                force[j][i] += level.alternation.force[i];
-                let moves = match slider {
-                    Slider::Elastic { .. } => level.alternation.slips[i],
-                    Slider::Rigid { .. } => {
-                        // within a stick interval the series passes through zero between samples of full force
-                        fastest > motion.sharpness.width && level.alternation.velocity[i].abs() > threshold
+    for (j, joint) in system.joints.iter().enumerate() {
+        // ∮ f du with the projected force: for the series it is the integral itself
+        let mut dissipation = 0.0;
+        for (q, coordinate) in coordinates.iter().enumerate().filter(|(_, coordinate)| coordinate.joint == j) {
+            let range = q * nh..(q + 1) * nh;
+            let (c, f) = (&motion.c[range.clone()], &motion.force[range]);
+            dissipation += (0..nh).map(|k| cycle_work(harmonics[k], f[k], c[k])).sum::<f64>();
+            let mut add = |alternation: &Alternation| {
+                for i in 0..samples {
+                    force[j][i] += alternation.force[i];
+                    if alternation.slips[i] {
+                        contact[j][i] = Contact::slip(alternation.force[i]);
                     }
-                    Slider::Smooth { .. } => level.alternation.slips[i],
-                };
-                if moves {
-                    let sign = match slider {
-                        Slider::Elastic { .. } => level.alternation.force[i],
-                        _ => level.alternation.velocity[i],
-                    };
-                    contact[j][i] = Contact::slip(sign);
+                }
+            };
+            match &coordinate.element {
+                Element::Springs(springs) => {
+                    level.alternation.synthesise(c);
+                    for spring in springs {
+                        level.alternation.slide(spring, 1.0, c);
+                        elastic_states.push(level.alternation.force[0]);
+                        add(&level.alternation);
+                    }
+                }
+                Element::Velocity(law) => {
+                    level.apply(*law, q, omega, motion);
+                    add(&level.alternation);
                 }
             }
         }
-        // ∮ f du with the projected force: for the series it is the integral itself
-        let dissipation: f64 = (0..nh).map(|k| cycle_work(harmonics[k], f[k], c[k])).sum();
-        let u: Vec<(usize, Complex64)> = (0..nh).map(|k| (harmonics[k], c[k] + f[k] * coordinate.series)).collect();
+        let u: Vec<(usize, Complex64)> = harmonics
+            .iter()
+            .zip(&x)
+            .map(|(&h, x)| {
+                let imposed = joint.imposed.iter().find(|(k, _)| *k as usize == h).map_or(ZERO, |(_, g)| *g);
+                (h, imposed + (0..n).map(|i| x[i] * joint.direction[(i, 0)]).sum::<Complex64>())
+            })
+            .collect();
         let (low, high) = extremes(&u, level);
         let slipping = contact[j].iter().filter(|c| **c != Contact::Stick).count();
         let switches = (0..samples).filter(|&i| contact[j][i] != contact[j][(i + 1) % samples]).count();
         if slipping == 0 {
-            stuck.push(system.joints[j].name.clone());
+            stuck.push(joint.name.clone());
         }
         joints.push(JointMotion {
-            name: system.joints[j].name.clone(),
+            name: joint.name.clone(),
             dissipation,
             slip_fraction: slipping as f64 / samples as f64,
             displacement: (low, high),
@@ -248,20 +246,20 @@ fn possible_work(system: &System, omega: f64, harmonics: &[usize], x: &[DVector<
 /// Least and largest value of a series: the extremes of its samples, moved to the zero of the slope.
 fn extremes(series: &[(usize, Complex64)], level: &mut Level) -> (f64, f64) {
     let alternation = &mut level.alternation;
-    alternation.fourier.synthesise(series, &mut alternation.displacement);
-    let n = alternation.displacement.len();
+    alternation.fourier.synthesise(series, &mut alternation.signal);
+    let n = alternation.signal.len();
     let (mut lowest, mut highest) = (0, 0);
     for i in 1..n {
-        if alternation.displacement[i] < alternation.displacement[lowest] {
+        if alternation.signal[i] < alternation.signal[lowest] {
             lowest = i;
         }
-        if alternation.displacement[i] > alternation.displacement[highest] {
+        if alternation.signal[i] > alternation.signal[highest] {
             highest = i;
         }
     }
     let refined = |start: usize| {
         let mut theta = start as f64 * TAU / n as f64;
-        let mut best = alternation.displacement[start];
+        let mut best = alternation.signal[start];
         for _ in 0..3 {
             let (mut slope, mut bend) = (0.0, 0.0);
             for &(h, c) in series {
@@ -280,7 +278,7 @@ fn extremes(series: &[(usize, Complex64)], level: &mut Level) -> (f64, f64) {
         best
     };
     let (low, high) = (refined(lowest), refined(highest));
-    (low.min(alternation.displacement[lowest]), high.max(alternation.displacement[highest]))
+    (low.min(alternation.signal[lowest]), high.max(alternation.signal[highest]))
 }
 
 impl Path for Series {

@@ -1,12 +1,21 @@
 //! The equations of harmonic balance and their solution.
 //!
-//! Unknown are the harmonics `c` of the motion along the joints; what the structure does between them is its receptance `R`:
-//! `c + R f(c) - c_lin = 0` per harmonic. Newton's method with the exact derivative; where it fails, friction is made smooth and
-//! sharpened step by step. Rigid sliders end with rounds of multipliers, after which the width has no influence.
+//! What the structure does between the coordinates is its receptance `R`: `c = c_lin - R f` per harmonic. Unknown are
+//! - along springs with sliders the motion `c`: `c - c_lin + R f = 0`, `f = f(c)`;
+//! - along a law of velocity the force `λ` itself: `λ - P J(λ + ε c') = 0` with the resolvent `J` of the law and `P` the harmonics that
+//!   are kept. Where the contact sticks, the force is then free to be what the motion asks for, and no velocity is multiplied by a
+//!   penalty stiffness.
+//!
+//! `ε` is no free parameter: it is the impedance of the structure at the contact at the highest harmonic, the resolution of the series
+//! ([`RIPPLE`]). The solution differs from that with another ε by less than the harmonics that are missing.
+//!
+//! Newton's method with the exact derivative; where it fails, slip limits are lowered from where everything sticks.
+//! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian frequency-time method".
 
-use super::joints::{Alternation, Coordinate, Seen, Sharpness};
+use super::joints::{Alternation, Coordinate, Element, Map, Velocity};
 use super::rest::Rest;
-use super::sparse::Sparse;
+use super::sparse::{Along, Sparse};
+use crate::method::guess::Guess;
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -14,31 +23,31 @@ use stickslip_numerics::dense;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Residual relative to the motion at which the equations count as solved: a thousand times the rounding of a stiff system.
+/// Residual relative to the motion, and to the slip limits, at which the equations count as solved: a thousand times the rounding of a
+/// stiff system.
 pub(super) const SOLVED: f64 = 1e-10;
-/// Newton iterations at one sharpness; 3 to 6 are usual.
-const ITERATIONS: usize = 40;
-/// Whole steps that may pass without coming closer.
-const PATIENCE: usize = 8;
+/// Newton iterations; 3 to 15 are usual.
+const ITERATIONS: usize = 60;
 /// Halvings of a step.
 const HALVINGS: usize = 7;
-/// The width of rigid sliders at the end, relative to the largest velocity of the motion; multipliers remove its influence.
-const WIDTH: f64 = 1e-7;
-/// The smallest width relative to the velocity without friction: below it the equations lose all digits.
-const LEAST_WIDTH: f64 = 1e-9;
-/// Factor by which friction is sharpened, as long as Newton's method follows.
-const SHARPEN: f64 = 0.25;
-/// The same where that failed.
-const SLOWLY: f64 = 0.6;
-/// The first width from a neighbour that was not near enough, relative to its velocity.
-const NEAR: f64 = 1e-2;
-/// Smoothing that may be left where the set of slipping samples cannot be found, at the very onset of slip, relative to the velocity
-/// without friction.
-const LEFT: f64 = 1e-4;
-/// Rounds of multipliers.
-const ROUNDS: usize = 20;
-/// A round that changes the motion by less than this share ends the search: the width has less influence still.
-const INDEPENDENT: f64 = 1e-8;
+/// Growth of the residual in a whole step beyond which the search is lost.
+const GROWS: f64 = 100.0;
+/// Share of its length by which a step has to shorten the residual.
+const SHORTENS: f64 = 1e-3;
+/// The penalty ε is the contact's impedance at the highest harmonic times `1 + RIPPLE / highest`. Above that harmonic a series cannot
+/// follow the force: with a larger ε it chatters in stick, with a smaller one a passage through zero is blurred. The second term
+/// makes the passage sharp where the harmonics are few and do not chatter, so that one harmonic is the describing function.
+const RIPPLE: f64 = 30.0;
+/// Shares of the penalty that are tried first if Newton's method fails with the whole.
+const GENTLE: [f64; 3] = [0.04, 0.2, 1.0];
+/// What is added to the diagonal of the force equations, so that forces which nothing decides stay as they are: the mean in a contact
+/// that sticks all the time, and forces in redundant contacts. Newton's method leaves this share of the force as an error.
+const STAY: [f64; 2] = [1e-9, 1e-12];
+/// Where the structure cannot move along a contact, because its motion is imposed, rigid friction changes its sign over this
+/// share of the velocity.
+const IMPOSED: f64 = 1e-9;
+/// The receptance below which motion counts as imposed, relative to that of the excited structure.
+const RIGID: f64 = 1e-14;
 
 /// All that belongs to one number of harmonics.
 #[derive(Debug, Clone)]
@@ -46,8 +55,8 @@ pub(super) struct Level {
     pub alternation: Alternation,
     /// Receptance per harmonic, q × q.
     receptance: Vec<DMatrix<Complex64>>,
-    /// See [`WIDTH`].
-    pub width: f64,
+    /// ε per coordinate, N s/m; infinite where the motion is imposed.
+    penalty: Vec<f64>,
     /// Motion of the coordinates without friction, [q][harmonic].
     pub linear: Vec<Complex64>,
     /// Motion of all places without friction, per harmonic.
@@ -57,11 +66,12 @@ pub(super) struct Level {
     tangents: Vec<f64>,
     jacobian: Vec<f64>,
     residual: Vec<f64>,
+    before: Motion,
+    best: Motion,
     step: Vec<f64>,
-    next: Vec<Vec<Seen>>,
-    /// The sharpest motion of a search that did not end.
-    sharpest: Option<Motion>,
-    seen: Vec<Vec<Seen>>,
+    signal: Vec<Complex64>,
+    image: Vec<Complex64>,
+    row: Vec<f64>,
 }
 
 /// A solution or a start.
@@ -71,20 +81,33 @@ pub(super) struct Motion {
     pub c: Vec<Complex64>,
     /// Harmonics of the forces along them, N.
     pub force: Vec<Complex64>,
-    /// Multipliers of rigid sliders, per sample, N.
-    pub multipliers: Vec<Vec<f64>>,
-    pub sharpness: Sharpness,
     pub residual: f64,
     pub iterations: usize,
-    /// Smoothing that could not be removed, as a share of the velocity.
-    pub left: f64,
 }
 
-impl Default for Sharpness {
-    fn default() -> Self {
-        Sharpness { width: 0.0, blur: 0.0, limits: 1.0, hold: false }
+impl Motion {
+    pub fn rest(length: usize) -> Self {
+        Motion { c: vec![ZERO; length], force: vec![ZERO; length], ..Motion::default() }
+    }
+
+    /// The same without new memory.
+    fn copy(&mut self, other: &Motion) {
+        self.c.clone_from(&other.c);
+        self.force.clone_from(&other.force);
+        (self.residual, self.iterations) = (other.residual, other.iterations);
     }
 }
+
+/// The equations between the given ones and those that are easier to solve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Ease {
+    /// Factor on slip limits.
+    limits: f64,
+    /// Factor on the penalty.
+    penalty: f64,
+}
+
+const GIVEN: Ease = Ease { limits: 1.0, penalty: 1.0 };
 
 /// The search did not end.
 #[derive(Debug, Clone, Copy)]
@@ -94,28 +117,25 @@ pub(super) struct Lost {
 }
 
 impl Level {
-    pub fn new(
-        harmonics: Vec<usize>,
-        samples: usize,
-        (coordinates, rigid): (usize, usize),
-        sparse: Option<Sparse>,
-    ) -> Self {
+    pub fn new(harmonics: Vec<usize>, samples: usize, coordinates: usize, sparse: Option<Sparse>) -> Self {
         let nh = harmonics.len();
         let size = 2 * nh * coordinates;
         Level {
             alternation: Alternation::new(harmonics, samples),
             receptance: Vec::new(),
-            width: WIDTH,
+            penalty: vec![0.0; coordinates],
             linear: vec![ZERO; nh * coordinates],
             free: Vec::new(),
             tangents: vec![0.0; 4 * nh * nh * coordinates],
             jacobian: vec![0.0; if sparse.is_some() { 0 } else { size * size }],
             sparse,
             residual: vec![0.0; size],
+            before: Motion::rest(nh * coordinates),
+            best: Motion::rest(nh * coordinates),
             step: vec![0.0; size],
-            seen: Vec::new(),
-            sharpest: None,
-            next: vec![vec![Seen::Force(0.0); samples]; rigid],
+            signal: vec![ZERO; nh],
+            image: vec![ZERO; nh],
+            row: vec![0.0; 2 * nh],
         }
     }
 
@@ -162,101 +182,269 @@ impl Level {
             }
             self.free.push(free);
         }
+        let top = self.alternation.harmonics[nh - 1].max(1);
+        let stiff = 1.0 / system.stiffness.amax().max(omega * omega * system.mass.amax()).max(f64::MIN_POSITIVE);
+        for (q, coordinate) in coordinates.iter().enumerate() {
+            if !matches!(coordinate.element, Element::Velocity(_)) {
+                continue;
+            }
+            let receptance = match &mut self.sparse {
+                Some(sparse) => sparse.own(nh - 1, q),
+                None => self.receptance[nh - 1][(q, q)].norm(),
+            };
+            let impedance = 1.0 / (receptance * top as f64 * omega);
+            let imposed = receptance <= RIGID * stiff / (top * top) as f64;
+            self.penalty[q] = if imposed { f64::INFINITY } else { impedance * (1.0 + RIPPLE / top as f64) };
+        }
     }
 
-    /// Forces and residual at `motion.c`; the derivative into `self.jacobian` if `tangent`.
-    fn evaluate(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion, tangent: bool) -> f64 {
+    /// The motion to begin with: that of the describing functions, or without friction.
+    pub fn begin(&self, system: &System, coordinates: &[Coordinate], guess: Option<&Guess>, omega: f64) -> Motion {
+        let nh = self.harmonics().len();
+        let mut motion = Motion { c: self.linear.clone(), ..Motion::rest(self.linear.len()) };
+        let Some(guess) = guess else { return motion };
+        for (q, coordinate) in coordinates.iter().enumerate() {
+            let joint = &system.joints[coordinate.joint];
+            for (rate, x) in &guess.harmonics {
+                let h = (rate / omega).round() as usize;
+                let Ok(k) = self.harmonics().binary_search(&h) else { continue };
+                let imposed = joint.imposed.iter().find(|(k, _)| *k as usize == h).map_or(ZERO, |(_, g)| *g);
+                let u = (0..x.len()).map(|i| x[i] * joint.direction[(i, 0)]).sum::<Complex64>() + imposed;
+                let force = guess.joints[coordinate.joint] * u;
+                motion.c[q * nh + k] = u - force * coordinate.series;
+                motion.force[q * nh + k] = force;
+            }
+        }
+        motion
+    }
+
+    /// Forces and residual at the unknowns in `motion`; the rest of it follows. The derivative goes into `self.tangents` and, in the dense
+    /// form, `self.jacobian` if `tangent`. Returns the size of the residual, relative.
+    fn evaluate(
+        &mut self,
+        coordinates: &[Coordinate],
+        omega: f64,
+        motion: &mut Motion,
+        ease: Ease,
+        length: f64,
+        tangent: bool,
+    ) -> f64 {
         let (nh, count) = (self.harmonics().len(), coordinates.len());
         let block = 4 * nh * nh;
         for (q, coordinate) in coordinates.iter().enumerate() {
-            let range = q * nh..(q + 1) * nh;
-            let slot = &mut self.tangents[q * block..(q + 1) * block];
-            self.alternation.evaluate(
-                coordinate,
-                &motion.c[range.clone()],
-                omega,
-                motion.sharpness,
-                &motion.multipliers,
-                &mut self.next,
-                &mut motion.force[range],
-                tangent.then_some(slot),
-            );
-        }
-        let mut sum = 0.0;
-        if let Some(sparse) = &mut self.sparse {
-            for k in 0..nh {
-                let (residual, weight) = (&mut self.residual, weight(self.alternation.harmonics[k]));
-                let (c, linear) = (&motion.c, &self.linear);
-                sparse.receive(
-                    k,
-                    |q| motion.force[q * nh + k],
-                    |q, u| {
-                        let r = c[q * nh + k] - linear[q * nh + k] + u;
-                        let at = 2 * (q * nh + k);
-                        (residual[at], residual[at + 1]) = (r.re, r.im);
-                        sum += r.norm_sqr() * weight;
-                    },
-                );
+            if let Element::Springs(springs) = &coordinate.element {
+                let range = q * nh..(q + 1) * nh;
+                let slot = tangent.then_some(&mut self.tangents[q * block..(q + 1) * block]);
+                let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
+                self.alternation.springs(springs, ease.limits, c, force, slot);
             }
-            return sum.sqrt();
         }
-        for q in 0..count {
-            for k in 0..nh {
-                let mut r = motion.c[q * nh + k] - self.linear[q * nh + k];
-                for p in 0..count {
-                    r += self.receptance[k][(q, p)] * motion.force[p * nh + k];
+        // what the structure does: into the residual of motions, and into the motions whose force is unknown
+        for k in 0..nh {
+            let (residual, linear) = (&mut self.residual, &self.linear);
+            let (c, force) = (&mut motion.c, &motion.force);
+            let mut follow = |q: usize, u: Complex64| {
+                let at = q * nh + k;
+                let moved = linear[at] - u;
+                if matches!(coordinates[q].element, Element::Springs(_)) {
+                    let r = c[at] - moved;
+                    (residual[2 * at], residual[2 * at + 1]) = (r.re, r.im);
+                } else {
+                    c[at] = moved;
                 }
-                let at = 2 * (q * nh + k);
-                (self.residual[at], self.residual[at + 1]) = (r.re, r.im);
-                sum += r.norm_sqr() * weight(self.alternation.harmonics[k]);
-            }
-        }
-        if tangent {
-            let size = 2 * nh * count;
-            self.jacobian.fill(0.0);
-            for q in 0..count {
-                for k in 0..nh {
-                    for p in 0..count {
-                        let r = self.receptance[k][(q, p)];
-                        let from = &self.tangents[p * block..(p + 1) * block];
-                        let (re, im) = (
-                            &from[2 * k * 2 * nh..(2 * k + 1) * 2 * nh],
-                            &from[(2 * k + 1) * 2 * nh..(2 * k + 2) * 2 * nh],
-                        );
-                        let row = 2 * (q * nh + k) * size + 2 * p * nh;
-                        let (first, second) = self.jacobian[row..].split_at_mut(size);
-                        for b in 0..2 * nh {
-                            first[b] += r.re * re[b] - r.im * im[b];
-                            second[b] += r.re * im[b] + r.im * re[b];
-                        }
+            };
+            match &mut self.sparse {
+                Some(sparse) => sparse.receive(k, |q| force[q * nh + k], follow),
+                None => {
+                    for q in 0..count {
+                        follow(q, (0..count).map(|p| self.receptance[k][(q, p)] * force[p * nh + k]).sum());
                     }
                 }
             }
-            for i in 0..size {
-                self.jacobian[i * size + i] += 1.0;
+        }
+        for (q, coordinate) in coordinates.iter().enumerate() {
+            let Element::Velocity(law) = coordinate.element else { continue };
+            let range = q * nh..(q + 1) * nh;
+            let law = Velocity { limit: law.limit * ease.limits, ..law };
+            let penalty = self.penalty[q] * ease.penalty;
+            let (c, force) = (&motion.c[range.clone()], &motion.force[range]);
+            let slot = &mut self.tangents[q * block..(q + 1) * block];
+            slot.fill(0.0);
+            let slot = tangent.then_some(slot);
+            apply(&mut self.alternation, (law, penalty), omega, (c, force), (&mut self.signal, &mut self.image), slot);
+            for k in 0..nh {
+                let r = force[k] - self.image[k];
+                let at = 2 * (q * nh + k);
+                (self.residual[at], self.residual[at + 1]) = (r.re, r.im);
+            }
+        }
+        if tangent && self.sparse.is_none() {
+            self.assemble(coordinates, omega, ease, length);
+        }
+        // relative to the motion, weighted as velocities are, and to the limits
+        let mut sum = 0.0;
+        for (q, coordinate) in coordinates.iter().enumerate() {
+            for (k, &h) in self.alternation.harmonics.iter().enumerate() {
+                let at = 2 * (q * nh + k);
+                let square = self.residual[at] * self.residual[at] + self.residual[at + 1] * self.residual[at + 1];
+                let unit = unit(coordinate, length);
+                let weight = if matches!(coordinate.element, Element::Springs(_)) { weight(h) } else { 1.0 };
+                sum += square * weight / (unit * unit);
             }
         }
         sum.sqrt()
     }
 
-    /// The residual at `motion`, and its derivative into `jacobian` if wanted.
+    /// Samples of the force of a law of velocity, into the alternation.
+    pub fn apply(&mut self, law: Velocity, q: usize, omega: f64, motion: &Motion) {
+        let nh = self.harmonics().len();
+        let range = q * nh..(q + 1) * nh;
+        let along = (&motion.c[range.clone()], &motion.force[range]);
+        let memory = (&mut self.signal[..], &mut self.image[..]);
+        apply(&mut self.alternation, (law, self.penalty[q]), omega, along, memory, None);
+    }
+
+    /// The Jacobian from the tangents: rows and columns in units of the motion's length and of the limits.
+    fn assemble(&mut self, coordinates: &[Coordinate], omega: f64, ease: Ease, length: f64) {
+        let (nh, count) = (self.harmonics().len(), coordinates.len());
+        let (block, width) = (4 * nh * nh, 2 * nh);
+        let size = width * count;
+        self.jacobian.fill(0.0);
+        for (q, row) in coordinates.iter().enumerate() {
+            for (p, column) in coordinates.iter().enumerate() {
+                let scale = unit(column, length) / unit(row, length);
+                let (tangents, receptance) = (&self.tangents, &self.receptance);
+                let own = &tangents[q * block..(q + 1) * block];
+                let other = &tangents[p * block..(p + 1) * block];
+                let corner = q * width * size + p * width;
+                match (&row.element, &column.element) {
+                    (Element::Springs(_), Element::Springs(_)) => {
+                        // R K
+                        for k in 0..nh {
+                            let r = receptance[k][(q, p)] * scale;
+                            let (re, im) = (
+                                &other[2 * k * width..(2 * k + 1) * width],
+                                &other[(2 * k + 1) * width..(2 * k + 2) * width],
+                            );
+                            let (first, second) = self.jacobian[corner + 2 * k * size..].split_at_mut(size);
+                            for b in 0..width {
+                                first[b] += r.re * re[b] - r.im * im[b];
+                                second[b] += r.re * im[b] + r.im * re[b];
+                            }
+                        }
+                    }
+                    (Element::Springs(_), Element::Velocity(_)) => {
+                        for k in 0..nh {
+                            let r = receptance[k][(q, p)] * scale;
+                            let at = corner + 2 * k * size + 2 * k;
+                            self.jacobian[at] += r.re;
+                            self.jacobian[at + 1] -= r.im;
+                            self.jacobian[at + size] += r.im;
+                            self.jacobian[at + size + 1] += r.re;
+                        }
+                    }
+                    (Element::Velocity(_), _) if self.penalty[q].is_infinite() => {}
+                    (Element::Velocity(_), Element::Velocity(_)) => {
+                        // ε T D R
+                        for (k, &h) in self.alternation.harmonics.iter().enumerate() {
+                            let turn = Complex64::new(0.0, self.penalty[q] * ease.penalty * h as f64 * omega);
+                            let z = turn * receptance[k][(q, p)] * scale;
+                            for a in 0..width {
+                                let (x, y) = (own[a * width + 2 * k], own[a * width + 2 * k + 1]);
+                                let at = corner + a * size + 2 * k;
+                                self.jacobian[at] += x * z.re + y * z.im;
+                                self.jacobian[at + 1] += y * z.re - x * z.im;
+                            }
+                        }
+                    }
+                    (Element::Velocity(_), Element::Springs(_)) => {
+                        // ε T D R K
+                        for a in 0..width {
+                            self.row.fill(0.0);
+                            for (k, &h) in self.alternation.harmonics.iter().enumerate() {
+                                let turn = Complex64::new(0.0, self.penalty[q] * ease.penalty * h as f64 * omega);
+                                let z = turn * receptance[k][(q, p)] * scale;
+                                let (x, y) = (own[a * width + 2 * k], own[a * width + 2 * k + 1]);
+                                let (x, y) = (x * z.re + y * z.im, y * z.re - x * z.im);
+                                let (re, im) = (
+                                    &other[2 * k * width..(2 * k + 1) * width],
+                                    &other[(2 * k + 1) * width..(2 * k + 2) * width],
+                                );
+                                for (sum, (re, im)) in self.row.iter_mut().zip(re.iter().zip(im)) {
+                                    *sum += x * re + y * im;
+                                }
+                            }
+                            let at = corner + a * size;
+                            for (j, sum) in self.jacobian[at..at + width].iter_mut().zip(&self.row) {
+                                *j += sum;
+                            }
+                        }
+                    }
+                }
+            }
+            let forces = matches!(row.element, Element::Velocity(_));
+            for a in 0..width {
+                let at = (q * width + a) * size + q * width;
+                if forces {
+                    let own = &self.tangents[q * block + a * width..q * block + (a + 1) * width];
+                    for (j, t) in self.jacobian[at..at + width].iter_mut().zip(own) {
+                        *j -= t;
+                    }
+                }
+                self.jacobian[at + a] += 1.0 + if forces { stay(self.alternation.harmonics[a / 2]) } else { 0.0 };
+            }
+        }
+    }
+
+    /// Residual of the equations at `unknowns` (per coordinate a motion or a force, relative to [`unit`]) into `residual`, in the same
+    /// units; the derivative into `jacobian`, row-major. Only in the dense form.
     pub fn residual_at(
         &mut self,
         coordinates: &[Coordinate],
         omega: f64,
+        (unknowns, length): (&[f64], f64),
         motion: &mut Motion,
+        residual: &mut [f64],
         jacobian: Option<&mut [f64]>,
-    ) -> &[f64] {
-        self.evaluate(coordinates, omega, motion, jacobian.is_some());
+    ) {
+        self.unpack(coordinates, (unknowns, length), motion);
+        self.evaluate(coordinates, omega, motion, GIVEN, length, jacobian.is_some());
+        let width = 2 * self.harmonics().len();
+        for (i, (out, r)) in residual.iter_mut().zip(&self.residual).enumerate() {
+            *out = r / unit(&coordinates[i / width], length);
+        }
         if let Some(jacobian) = jacobian {
             jacobian.copy_from_slice(&self.jacobian);
         }
-        &self.residual
     }
 
-    /// Size of the motion against which residuals are measured.
-    fn size(&self, motion: &Motion) -> f64 {
+    /// The unknowns of a motion, see [`Level::residual_at`].
+    pub fn pack(&self, coordinates: &[Coordinate], motion: &Motion, length: f64) -> Vec<f64> {
         let nh = self.harmonics().len();
+        let value = |i: usize| {
+            let coordinate = &coordinates[i / nh];
+            let values = if matches!(coordinate.element, Element::Springs(_)) { &motion.c } else { &motion.force };
+            values[i] / unit(coordinate, length)
+        };
+        (0..nh * coordinates.len()).flat_map(|i| [value(i).re, value(i).im]).collect()
+    }
+
+    /// The other way round.
+    pub fn unpack(&self, coordinates: &[Coordinate], (unknowns, length): (&[f64], f64), motion: &mut Motion) {
+        let nh = self.harmonics().len();
+        for (i, pair) in unknowns.chunks_exact(2).enumerate() {
+            let coordinate = &coordinates[i / nh];
+            let value = Complex64::new(pair[0], pair[1]) * unit(coordinate, length);
+            match coordinate.element {
+                Element::Springs(_) => motion.c[i] = value,
+                Element::Velocity(_) => motion.force[i] = value,
+            }
+        }
+    }
+
+    /// The yardstick of motions: their size, or a hundredth of that without friction, as velocities relative to the drive frequency.
+    pub fn length(&self, motion: &Motion) -> f64 {
+        let nh = self.alternation.harmonics.len();
         let norm = |c: &[Complex64]| {
             c.iter()
                 .enumerate()
@@ -264,266 +452,166 @@ impl Level {
                 .sum::<f64>()
                 .sqrt()
         };
-        norm(&motion.c) + 1e-2 * norm(&self.linear)
+        (norm(&motion.c) + 1e-2 * norm(&self.linear)).max(f64::MIN_POSITIVE)
     }
 
-    /// Newton's method at the sharpness of `motion`: whole steps as long as they come closer within [`PATIENCE`] of them, which is
-    /// the rule when only the set of slipping samples is searched; shortened steps from the best motion where they do not.
-    pub fn newton(
+    /// Newton's method: the longest of the halved steps that comes closer, and where none does the whole one, which may lead out of a
+    /// set of slipping samples that repeats.
+    fn newton(
+        &mut self,
+        coordinates: &[Coordinate],
+        omega: f64,
+        motion: &mut Motion,
+        ease: Ease,
+        most: usize,
+    ) -> Result<(), Lost> {
+        let mut length = self.length(motion);
+        let mut residual = self.evaluate(coordinates, omega, motion, ease, length, true);
+        let mut least = f64::INFINITY;
+        for _ in 0..most {
+            if residual <= SOLVED {
+                break;
+            }
+            if !self.newton_step(coordinates, ease, length) {
+                break;
+            }
+            motion.iterations += 1;
+            self.before.copy(motion);
+            let mut fraction = 1.0;
+            let mut after = f64::INFINITY;
+            for halving in 0..=HALVINGS + 1 {
+                if halving > HALVINGS {
+                    fraction = 1.0;
+                }
+                self.advance(coordinates, motion, fraction, length);
+                after = self.evaluate(coordinates, omega, motion, ease, length, true);
+                if after < (1.0 - SHORTENS * fraction) * residual {
+                    break;
+                }
+                fraction *= 0.5;
+            }
+            if !after.is_finite() || after > GROWS * residual {
+                break;
+            }
+            residual = after;
+            if residual < least {
+                least = residual;
+                self.best.copy(motion);
+            }
+            let now = self.length(motion);
+            if now < 0.5 * length || now > 2.0 * length {
+                // the motion was far from what it began with: its own size counts
+                length = now;
+                residual = self.evaluate(coordinates, omega, motion, ease, length, true);
+                least = f64::INFINITY;
+            }
+        }
+        if residual > SOLVED && least < f64::INFINITY {
+            let iterations = motion.iterations;
+            motion.c.clone_from(&self.best.c);
+            motion.force.clone_from(&self.best.force);
+            motion.iterations = iterations;
+            residual = self.evaluate(coordinates, omega, motion, ease, length, false);
+        }
+        motion.residual = residual;
+        if residual <= SOLVED { Ok(()) } else { Err(Lost { iterations: motion.iterations, residual }) }
+    }
+
+    /// The Newton step into `self.step`, in the unknowns' units.
+    fn newton_step(&mut self, coordinates: &[Coordinate], ease: Ease, length: f64) -> bool {
+        let width = 2 * self.harmonics().len();
+        self.step.copy_from_slice(&self.residual);
+        match &mut self.sparse {
+            Some(sparse) => {
+                let along = Along { penalty: &self.penalty, ease: ease.penalty };
+                if !sparse.step(&along, &self.tangents, &mut self.step) {
+                    return false;
+                }
+                for (i, d) in self.step.iter_mut().enumerate() {
+                    *d /= unit(&coordinates[i / width], length);
+                }
+                true
+            }
+            None => {
+                for (i, d) in self.step.iter_mut().enumerate() {
+                    *d /= unit(&coordinates[i / width], length);
+                }
+                let size = self.step.len();
+                dense::solve(&mut self.jacobian, size, &mut self.step)
+            }
+        }
+    }
+
+    /// `self.before` less a fraction of the step, into `motion`.
+    fn advance(&self, coordinates: &[Coordinate], motion: &mut Motion, fraction: f64, length: f64) {
+        let nh = self.harmonics().len();
+        for (i, d) in self.step.chunks_exact(2).enumerate() {
+            let coordinate = &coordinates[i / nh];
+            let d = Complex64::new(d[0], d[1]) * (fraction * unit(coordinate, length));
+            match coordinate.element {
+                Element::Springs(_) => motion.c[i] = self.before.c[i] - d,
+                Element::Velocity(_) => motion.force[i] = self.before.force[i] - d,
+            }
+        }
+    }
+
+    /// The solution that Newton's method finds from `motion`, which is nearby.
+    pub fn polish(
         &mut self,
         coordinates: &[Coordinate],
         omega: f64,
         motion: &mut Motion,
         most: usize,
     ) -> Result<(), Lost> {
-        let mut residual = self.evaluate(coordinates, omega, motion, true);
-        let mut best = (residual, motion.c.clone());
-        let (mut waits, mut short) = (0, false);
-        for _ in 0..most {
-            motion.residual = residual / self.size(motion).max(f64::MIN_POSITIVE);
-            if motion.residual <= SOLVED || residual == 0.0 {
-                return Ok(());
-            }
-            if !self.newton_step() {
-                break;
-            }
-            motion.iterations += 1;
-            self.step.copy_from_slice(&self.residual);
-            let from = if short { best.1.clone() } else { motion.c.clone() };
-            let mut fraction = 1.0;
-            let mut accepted = false;
-            for _ in 0..=if short { HALVINGS } else { 0 } {
-                for ((t, c), d) in motion.c.iter_mut().zip(&from).zip(self.step.chunks_exact(2)) {
-                    *t = c - Complex64::new(d[0], d[1]) * fraction;
-                }
-                residual = self.evaluate(coordinates, omega, motion, true);
-                if residual.is_finite() && residual < (1.0 - 1e-3 * fraction) * best.0 {
-                    accepted = true;
-                    break;
-                }
-                fraction *= 0.5;
-            }
-            if accepted {
-                best.0 = residual;
-                best.1.copy_from_slice(&motion.c);
-                waits = 0;
-                continue;
-            }
-            waits += 1;
-            if short {
-                break;
-            }
-            if waits > PATIENCE || !residual.is_finite() {
-                short = true;
-                motion.c.copy_from_slice(&best.1);
-                residual = self.evaluate(coordinates, omega, motion, true);
-            }
-        }
-        motion.c.copy_from_slice(&best.1);
-        let residual = self.evaluate(coordinates, omega, motion, false);
-        motion.residual = residual / self.size(motion).max(f64::MIN_POSITIVE);
-        if motion.residual <= SOLVED {
-            return Ok(());
-        }
-        Err(Lost { iterations: motion.iterations, residual: motion.residual })
+        self.newton(coordinates, omega, motion, GIVEN, most)
     }
 
-    /// Replaces the residual of the last evaluation by the step that removes it.
-    fn newton_step(&mut self) -> bool {
-        match &mut self.sparse {
-            Some(sparse) => sparse.step(&self.tangents, &mut self.residual),
-            None => {
-                let size = self.residual.len();
-                dense::solve(&mut self.jacobian, size, &mut self.residual)
-            }
-        }
-    }
-
-    /// One Newton step with every rigid slider left as free or as clamped as it was in the last evaluation.
-    fn hold_step(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion) {
-        let before = motion.c.clone();
-        motion.sharpness.hold = true;
-        self.evaluate(coordinates, omega, motion, true);
-        motion.sharpness.hold = false;
-        if self.newton_step() {
-            motion.iterations += 1;
-            for (c, d) in motion.c.iter_mut().zip(self.residual.chunks_exact(2)) {
-                *c -= Complex64::new(d[0], d[1]);
-            }
-            if !motion.c.iter().all(|c| c.is_finite()) {
-                motion.c = before;
-            }
-        }
-    }
-
-    /// Largest velocity along a coordinate, m/s.
-    fn speed(&self, c: &[Complex64], omega: f64) -> f64 {
-        let nh = self.harmonics().len();
-        c.chunks_exact(nh)
-            .map(|c| c.iter().zip(self.harmonics()).map(|(z, &h)| h as f64 * omega * z.norm()).sum::<f64>())
-            .fold(0.0, f64::max)
-    }
-
-    /// From `start` (a solution nearby) or, without one, from smooth friction.
-    pub fn solve(
-        &mut self,
-        coordinates: &[Coordinate],
-        omega: f64,
-        mut start: Motion,
-        warm: bool,
-    ) -> Result<Motion, Lost> {
-        use super::joints::Slider;
-        let has = |test: fn(&Slider) -> bool| coordinates.iter().flat_map(|c| &c.sliders).any(test);
-        let rigid = has(|s| matches!(s, Slider::Rigid { .. }));
-        let smooth = has(|s| matches!(s, Slider::Smooth { .. }));
-        let free_speed = self.speed(&self.linear, omega).max(f64::MIN_POSITIVE);
-        start.left = 0.0;
-        let mut spent = 0;
-        if warm || !(rigid || smooth) {
-            let mut motion = start.clone();
-            motion.iterations = 0;
-            motion.sharpness = Sharpness::default();
-            motion.sharpness.width = (self.width * self.speed(&motion.c, omega)).max(LEAST_WIDTH * free_speed);
-            let done = self
-                .newton(coordinates, omega, &mut motion, ITERATIONS)
-                .and_then(|()| if rigid { self.settle_multipliers(coordinates, omega, &mut motion) } else { Ok(()) });
-            match done {
-                Ok(()) => return Ok(motion),
-                Err(lost) => spent += lost.iterations,
-            }
-        }
-        let neighbour = start.clone();
-        let mut motion = start;
-        motion.iterations = spent;
-        motion.multipliers.iter_mut().for_each(|m| m.fill(0.0));
-        if !(rigid || smooth) {
-            self.lower_limits(coordinates, omega, &mut motion)?;
+    /// The solution, from `start`.
+    pub fn solve(&mut self, coordinates: &[Coordinate], omega: f64, mut start: Motion) -> Result<Motion, Lost> {
+        start.iterations = 0;
+        let mut motion = start.clone();
+        if self.newton(coordinates, omega, &mut motion, GIVEN, ITERATIONS).is_ok() {
             return Ok(motion);
         }
-        let mut attempts: Vec<(Motion, f64, f64)> = Vec::new();
-        if warm {
-            // a little smoothing often is enough
-            let width = NEAR * self.speed(&neighbour.c, omega);
-            attempts.push((neighbour, width.max(LEAST_WIDTH * free_speed), SHARPEN));
-        }
-        let mut free = motion.clone();
-        free.c.copy_from_slice(&self.linear);
-        attempts.push((free.clone(), free_speed, SHARPEN));
-        attempts.push((motion, free_speed, SHARPEN));
-        attempts.push((free, free_speed, SLOWLY));
-        let mut lost = Lost { iterations: spent, residual: f64::INFINITY };
-        self.sharpest = None;
-        for (mut motion, width, pace) in attempts {
-            motion.iterations = lost.iterations;
-            let sharp = self.sharpen(coordinates, omega, &mut motion, (rigid, smooth), (width, free_speed), pace);
-            let done = sharp
-                .and_then(|()| if rigid { self.settle_multipliers(coordinates, omega, &mut motion) } else { Ok(()) });
-            match done {
-                Ok(()) => return Ok(motion),
-                Err(failure) => lost = failure,
+        if coordinates.iter().any(|c| matches!(c.element, Element::Velocity(_))) {
+            let iterations = motion.iterations;
+            motion = Motion { iterations, ..start };
+            let mut found = Ok(());
+            for penalty in GENTLE {
+                found = self.newton(coordinates, omega, &mut motion, Ease { penalty, ..GIVEN }, ITERATIONS);
+            }
+            if found.is_ok() {
+                return Ok(motion);
             }
         }
-        // a width that is left is an error like that of the missing harmonics: it is reported with it
-        match self.sharpest.take() {
-            Some(mut motion) if motion.sharpness.width <= LEFT * free_speed => {
-                motion.left = motion.sharpness.width / free_speed;
-                motion.iterations = lost.iterations;
-                Ok(motion)
-            }
-            _ => Err(lost),
-        }
+        self.lower_limits(coordinates, omega, &mut motion)?;
+        Ok(motion)
     }
 
-    /// Velocity laws: from wide to sharp.
-    fn sharpen(
-        &mut self,
-        coordinates: &[Coordinate],
-        omega: f64,
-        motion: &mut Motion,
-        (rigid, smooth): (bool, bool),
-        (mut width, free_speed): (f64, f64),
-        pace: f64,
-    ) -> Result<(), Lost> {
-        let mut factor = pace;
-        let mut good: Option<Motion> = None;
-        loop {
-            motion.sharpness = Sharpness { width, blur: width, ..Sharpness::default() };
-            if good.is_some() && rigid {
-                self.hold_step(coordinates, omega, motion);
-            }
-            let mut done = self.newton(coordinates, omega, motion, ITERATIONS);
-            if let (Err(_), Some(good)) = (&done, &good) {
-                // the same without the step that guesses what is free
-                let iterations = motion.iterations;
-                *motion = Motion { iterations, ..good.clone() };
-                motion.sharpness = Sharpness { width, blur: width, ..Sharpness::default() };
-                done = self.newton(coordinates, omega, motion, ITERATIONS);
-            }
-            match done {
-                Ok(()) => {
-                    let target = (self.width * self.speed(&motion.c, omega)).max(LEAST_WIDTH * free_speed);
-                    if width <= target {
-                        break;
-                    }
-                    if rigid {
-                        // with the forces as multipliers the velocity in stick goes to zero before the width does
-                        let before = motion.clone();
-                        self.take_multipliers(coordinates, omega, motion);
-                        self.hold_step(coordinates, omega, motion);
-                        if self.newton(coordinates, omega, motion, ITERATIONS).is_err() {
-                            *motion = Motion { iterations: motion.iterations, ..before };
-                        }
-                        self.evaluate(coordinates, omega, motion, false);
-                    }
-                    good = Some(motion.clone());
-                    if !smooth && self.sharpest.as_ref().is_none_or(|sharpest| width < sharpest.sharpness.width) {
-                        self.sharpest = good.clone();
-                    }
-                    width = (width * factor).max(0.999 * target);
-                    factor = (factor * 0.8).max(pace * pace);
-                }
-                Err(lost) => {
-                    let iterations = motion.iterations;
-                    let Some(good) = &good else { return Err(lost) };
-                    *motion = Motion { iterations, ..good.clone() };
-                    self.evaluate(coordinates, omega, motion, false);
-                    factor = factor.sqrt();
-                    if factor > 0.97 {
-                        return Err(lost);
-                    }
-                    width = good.sharpness.width * factor;
-                }
-            }
-        }
-        if smooth {
-            motion.sharpness.blur = 0.0;
-            self.newton(coordinates, omega, motion, ITERATIONS)?;
-        }
-        let _ = rigid;
-        Ok(())
-    }
-
-    /// Sliders behind springs: from slip limits that hold to those that are given.
+    /// From slip limits that hold to those that are given.
     fn lower_limits(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion) -> Result<(), Lost> {
+        let mut good = Motion { iterations: motion.iterations, ..Motion::rest(motion.c.len()) };
+        good.c.copy_from_slice(&self.linear);
         let mut limits = 1.0;
         // where everything sticks the equations are linear
         for _ in 0..60 {
             limits *= 4.0;
-            motion.sharpness = Sharpness { limits, ..Sharpness::default() };
-            if self.newton(coordinates, omega, motion, ITERATIONS).is_ok() {
+            if self.newton(coordinates, omega, &mut good, Ease { limits, ..GIVEN }, ITERATIONS).is_ok() {
                 break;
             }
         }
-        let mut good = motion.clone();
         let mut factor: f64 = 0.5;
-        while good.sharpness.limits > 1.0 {
-            motion.sharpness.limits = (good.sharpness.limits * factor).max(1.0);
-            match self.newton(coordinates, omega, motion, ITERATIONS) {
-                Ok(()) => good = motion.clone(),
+        while limits > 1.0 {
+            motion.copy(&good);
+            let next = (limits * factor).max(1.0);
+            let done = self.newton(coordinates, omega, motion, Ease { limits: next, ..GIVEN }, ITERATIONS);
+            good.iterations = motion.iterations;
+            match done {
+                Ok(()) => {
+                    good.copy(motion);
+                    limits = next;
+                }
                 Err(lost) => {
-                    let iterations = motion.iterations;
-                    *motion = good.clone();
-                    motion.iterations = iterations;
                     factor = factor.sqrt();
                     if factor > 0.995 {
                         return Err(lost);
@@ -531,47 +619,46 @@ impl Level {
                 }
             }
         }
-        *motion = Motion { iterations: motion.iterations, ..good };
+        motion.copy(&good);
         Ok(())
     }
+}
 
-    /// Replaces multipliers by the forces.
-    fn take_multipliers(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion) {
-        self.evaluate(coordinates, omega, motion, false);
-        self.seen.clone_from(&self.next);
-        for (multipliers, seen) in motion.multipliers.iter_mut().zip(&self.seen) {
-            for (multiplier, seen) in multipliers.iter_mut().zip(seen) {
-                *multiplier = match seen {
-                    Seen::Force(force) => *force,
-                    Seen::Crossing => 0.0,
-                };
-            }
-        }
+/// The image of a force λ along a motion c: `P J(λ + ε c')`, or the law itself where the motion is imposed, which λ does not change.
+fn apply(
+    alternation: &mut Alternation,
+    (law, penalty): (Velocity, f64),
+    omega: f64,
+    (c, force): (&[Complex64], &[Complex64]),
+    (signal, image): (&mut [Complex64], &mut [Complex64]),
+    tangent: Option<&mut [f64]>,
+) {
+    if penalty.is_infinite() {
+        let speed: f64 = c.iter().zip(&alternation.harmonics).map(|(c, &h)| c.norm() * h as f64 * omega).sum();
+        return alternation.velocity(law, IMPOSED * speed, omega, c, image, None);
     }
+    for (k, &h) in alternation.harmonics.iter().enumerate() {
+        signal[k] = force[k] + c[k] * Complex64::new(0.0, penalty * h as f64 * omega);
+    }
+    let map = if law.is_rigid() {
+        Map::Projection { limit: law.limit }
+    } else {
+        Map::Resolvent { limit: law.limit, alpha: law.alpha, penalty }
+    };
+    alternation.map(map, signal, image, tangent);
+}
 
-    /// Replaces multipliers by the forces until that changes nothing: the width has no influence then.
-    fn settle_multipliers(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion) -> Result<(), Lost> {
-        for _ in 0..ROUNDS {
-            self.take_multipliers(coordinates, omega, motion);
-            let residual = self.evaluate(coordinates, omega, motion, false) / self.size(motion).max(f64::MIN_POSITIVE);
-            motion.residual = residual;
-            if residual <= SOLVED {
-                return Ok(());
-            }
-            // which sliders are free is known from the solution, not from its evaluation with new multipliers
-            self.next.clone_from(&self.seen);
-            let before = motion.c.clone();
-            self.hold_step(coordinates, omega, motion);
-            self.newton(coordinates, omega, motion, ITERATIONS)?;
-            let (nh, size) = (self.harmonics().len(), self.size(motion));
-            let change = before.iter().zip(&motion.c).enumerate();
-            let change = change.map(|(i, (a, b))| (a - b).norm_sqr() * weight(self.alternation.harmonics[i % nh]));
-            if change.sum::<f64>().sqrt() <= INDEPENDENT * size {
-                return Ok(());
-            }
-        }
-        Err(Lost { iterations: motion.iterations, residual: motion.residual })
+/// Unit of a coordinate's unknown: the motion's length, m, or the slip limit, N.
+fn unit(coordinate: &Coordinate, length: f64) -> f64 {
+    match &coordinate.element {
+        Element::Springs(_) => length,
+        Element::Velocity(law) => law.limit,
     }
+}
+
+/// See [`STAY`].
+pub(super) fn stay(h: usize) -> f64 {
+    STAY[h.min(1)]
 }
 
 /// Weight of a harmonic in norms: that of its velocity.
@@ -579,8 +666,8 @@ fn weight(h: usize) -> f64 {
     ((h * h) as f64).max(1.0)
 }
 
-/// `motion` with other harmonics and samples: harmonics that are new are those that the forces are not known of, zero.
-pub(super) fn transfer(motion: &Motion, from: &[usize], to: &[usize], samples: usize, coordinates: usize) -> Motion {
+/// `motion` with other harmonics: those that are new are zero.
+pub(super) fn transfer(motion: &Motion, from: &[usize], to: &[usize], coordinates: usize) -> Motion {
     let pick = |values: &[Complex64]| {
         let mut out = Vec::with_capacity(coordinates * to.len());
         for q in 0..coordinates {
@@ -591,20 +678,153 @@ pub(super) fn transfer(motion: &Motion, from: &[usize], to: &[usize], samples: u
         }
         out
     };
-    let resample = |values: &Vec<f64>| -> Vec<f64> {
-        let n = values.len();
-        (0..samples)
-            .map(|i| {
-                let x = i as f64 * n as f64 / samples as f64;
-                let (low, part) = (x.floor() as usize, x.fract());
-                (1.0 - part) * values[low % n] + part * values[(low + 1) % n]
-            })
-            .collect()
-    };
-    Motion {
-        c: pick(&motion.c),
-        force: pick(&motion.force),
-        multipliers: motion.multipliers.iter().map(resample).collect(),
-        ..*motion
+    Motion { c: pick(&motion.c), force: pick(&motion.force), ..*motion }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{joints, path};
+    use super::*;
+    use crate::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, Law};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, templates};
+
+    /// A row of masses with joints of every law between them, driven with or without a mean.
+    fn mixed(masses: usize, constant: f64) -> System {
+        let name = |i: usize| format!("m{i}");
+        let mut model = Model::default();
+        let laws = [
+            Law::Jenkins(Jenkins { stiffness: 2.0, limit: 0.3 }),
+            Law::Coulomb(Coulomb { limit: 0.2 }),
+            Law::CoulombArctan(CoulombArctan { limit: 0.25, alpha: 5.0 }),
+            Law::JenkinsArctan(JenkinsArctan { stiffness: 3.0, limit: 0.2, alpha: 8.0 }),
+        ];
+        for i in 0..masses {
+            model.masses.push(Mass { name: name(i), mass: 1.0 + 0.1 * i as f64 });
+            model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness: 1.0, damping: 0.05 });
+            if i > 0 {
+                let law = laws[i % if masses < 10 { 4 } else { 3 }];
+                model.joints.push(Joint { name: format!("j{i}"), between: [name(i - 1), name(i)], law });
+            }
+        }
+        model.forces.push(Force { on: name(0), amplitude: 1.0, phase: 0.2, harmonic: 1 });
+        if constant != 0.0 {
+            model.forces.push(Force { on: name(1), amplitude: constant, phase: 0.0, harmonic: 0 });
+        }
+        model.assemble().unwrap()
+    }
+
+    struct Case {
+        system: System,
+        coordinates: Vec<Coordinate>,
+        rest: Rest,
+        omega: f64,
+    }
+
+    impl Case {
+        fn new(system: System, omega: f64) -> Self {
+            let coordinates = joints::coordinates(&system).unwrap();
+            let rest = Rest::new(&system, &coordinates);
+            Case { system, coordinates, rest, omega }
+        }
+
+        fn level(&self, harmonics: Vec<usize>, sparse: bool) -> Level {
+            let sparse = sparse.then(|| Sparse::new(&self.system, &self.coordinates, &harmonics).unwrap());
+            let mut level = Level::new(harmonics, 256, self.coordinates.len(), sparse);
+            level.drive(&self.system, &self.coordinates, &self.rest, self.omega);
+            level
+        }
+    }
+
+    /// Values without a pattern between -1 and 1.
+    fn noise(i: usize) -> f64 {
+        ((i * 7919 + 13) as f64).sin()
+    }
+
+    /// The Jacobian against central differences, for all laws together, with and without a mean.
+    #[test]
+    fn the_jacobian_is_the_derivative() {
+        for (constant, harmonics) in [(0.0, vec![1, 3, 5]), (0.2, vec![0, 1, 2, 3])] {
+            let case = Case::new(mixed(6, constant), 0.9);
+            let mut level = case.level(harmonics, false);
+            let size = level.residual.len();
+            let mut motion = Motion::rest(level.linear.len());
+            // the mean has no imaginary part
+            let real = |i: usize| level.harmonics()[(i / 2) % level.harmonics().len()] == 0 && i % 2 == 1;
+            let x: Vec<f64> = (0..size).map(|i| if real(i) { 0.0 } else { 0.4 * noise(i) }).collect();
+            let imaginary: Vec<bool> = (0..size).map(real).collect();
+            let (mut r, mut j) = (vec![0.0; size], vec![0.0; size * size]);
+            let mut at = |x: &[f64], j: Option<&mut [f64]>| {
+                level.residual_at(&case.coordinates, case.omega, (x, 1.5), &mut motion, &mut r, j);
+                r.clone()
+            };
+            at(&x, Some(&mut j));
+            let step = 1e-6;
+            // a turning point is taken to move with the motion at its time, and not with the parabola through three samples that finds it
+            let parabola = (5.0 * std::f64::consts::TAU / 256.0f64).powi(3);
+            let largest = j.iter().fold(0.0, |m: f64, j| m.max(j.abs()));
+            let mut wrong = 0;
+            for k in (0..size).filter(|&k| !imaginary[k]) {
+                let moved = |by: f64| {
+                    let mut x = x.clone();
+                    x[k] += by;
+                    x
+                };
+                let (up, down) = (at(&moved(step), None), at(&moved(-step), None));
+                for i in 0..size {
+                    let difference = (up[i] - down[i]) / (2.0 * step);
+                    wrong += usize::from((difference - j[i * size + k]).abs() > parabola * largest);
+                }
+            }
+            assert_eq!(wrong, 0, "of {}", size * size);
+        }
+    }
+
+    /// The banded form finds the motion of the dense one, with every law that it takes.
+    #[test]
+    fn banded_and_dense_agree() {
+        let case = Case::new(mixed(44, 0.0), 0.9);
+        let solve = |sparse: bool| {
+            let mut level = case.level(vec![1, 3, 5], sparse);
+            let start = level.begin(&case.system, &case.coordinates, None, case.omega);
+            level.solve(&case.coordinates, case.omega, start).unwrap()
+        };
+        let (dense, banded) = (solve(false), solve(true));
+        for (a, b) in dense.c.iter().zip(&banded.c).chain(dense.force.iter().zip(&banded.force)) {
+            assert!((a - b).norm() < 1e-8, "{a} {b}");
+        }
+    }
+
+    /// ε belongs to the resolution, and is no stiffness: from half to double of it, the motion changes by no more than
+    /// the estimated error may be off, a factor of three.
+    #[test]
+    fn the_penalty_matters_less_than_missing_harmonics() {
+        let couple = templates::find("blade-couple").unwrap();
+        for limit in [2.0, 4.0, 6.0, 8.0] {
+            for hertz in [120.0, 121.0, 121.1, 121.25, 122.0] {
+                let system = couple.model_with(&[("Ft", limit)]).unwrap().assemble().unwrap();
+                let case = Case::new(system, std::f64::consts::TAU * hertz);
+                let solution = |top: usize, factor: f64| {
+                    let mut level = case.level((1..=top).step_by(2).collect(), false);
+                    level.penalty[0] *= factor;
+                    let start = level.begin(&case.system, &case.coordinates, None, case.omega);
+                    let motion = level.solve(&case.coordinates, case.omega, start).unwrap();
+                    path::places(&mut level, &case.rest, case.omega, &motion)
+                };
+                let distance = |a: &[DVector<Complex64>], b: &[DVector<Complex64>]| {
+                    let zero = DVector::from_element(3, ZERO);
+                    let apart = b.iter().enumerate().map(|(k, b)| (a.get(k).unwrap_or(&zero) - b).norm_squared());
+                    apart.sum::<f64>().sqrt() / b[0].norm()
+                };
+                let given = solution(15, 1.0);
+                let missing = super::super::RIGID_SHARE * distance(&given, &solution(31, 1.0));
+                for factor in [0.5, 2.0] {
+                    let change = distance(&given, &solution(15, factor));
+                    assert!(
+                        change <= 3.0 * missing + 1e-9,
+                        "{limit} N, {hertz} Hz, {factor}: {change:.1e} {missing:.1e}"
+                    );
+                }
+            }
+        }
     }
 }

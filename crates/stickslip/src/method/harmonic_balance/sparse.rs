@@ -1,15 +1,26 @@
 //! Large systems with local coupling: the receptance along the joints is not formed, its products are banded solves.
 //!
 //! With `Z` the dynamic stiffness and `K` the derivative of the joint forces, the Newton step of `c + R f - c_lin = r`, `R = Wᵀ Z⁻¹ W`, is
-//! `(1 + R K)⁻¹ r = r - Wᵀ (Z + W K Wᵀ)⁻¹ W K r` (Woodbury), and `Z + W K Wᵀ` has the band of the structure.
+//! `(1 + R K)⁻¹ r = r - Wᵀ (Z + W K Wᵀ)⁻¹ W K r` (Woodbury), and `Z + W K Wᵀ` has the band of the structure. Forces that are unknown
+//! themselves, along laws of velocity, border it as if each contact were one more place: `Z y - W δλ = 0` and
+//! `(1 - T) δλ + ε T D Wᵀ y = r`.
 
-use super::joints::Coordinate;
+use super::joints::{Coordinate, Element};
+use super::solve::stay;
 use crate::model::System;
 use num_complex::Complex64;
 use stickslip_numerics::banded::{Banded, order};
 
 /// Degrees of freedom from which a system counts as large.
 pub(super) const LARGE: usize = 40;
+
+/// What the laws along the coordinates add to the tangents.
+pub(super) struct Along<'a> {
+    /// ε per coordinate, N s/m.
+    pub penalty: &'a [f64],
+    /// Factor on it.
+    pub ease: f64,
+}
 
 /// The banded form of a system at one drive frequency.
 #[derive(Debug, Clone)]
@@ -18,6 +29,8 @@ pub(super) struct Sparse {
     position: Vec<usize>,
     /// Entries of (mass, damping, stiffness) that are not all zero.
     entries: Vec<(usize, usize, [f64; 3])>,
+    /// Per coordinate: its number among the unknown forces.
+    forces: Vec<Option<usize>>,
     /// Per coordinate: (place, direction).
     ends: Vec<Vec<(usize, f64)>>,
     harmonics: Vec<f64>,
@@ -56,7 +69,21 @@ impl Sparse {
         for ends in &ends {
             links.extend(ends.iter().flat_map(|a| ends.iter().map(|b| (a.0, b.0))));
         }
-        let position = order(n, &links);
+        let mut unknown = 0;
+        let forces: Vec<Option<usize>> = coordinates
+            .iter()
+            .map(|c| {
+                matches!(c.element, Element::Velocity(_)).then(|| {
+                    unknown += 1;
+                    n + unknown - 1
+                })
+            })
+            .collect();
+        for (ends, force) in ends.iter().zip(&forces) {
+            links.extend(force.iter().flat_map(|f| ends.iter().map(|(i, _)| (*f, *i))));
+        }
+        let whole = n + unknown;
+        let position = order(whole, &links);
         let band = links.iter().map(|&(a, b)| position[a].abs_diff(position[b])).max().unwrap_or(0);
         if band * 4 > n {
             return None;
@@ -66,13 +93,14 @@ impl Sparse {
             n,
             position,
             entries,
+            forces,
             ends,
             harmonics: harmonics.iter().map(|h| *h as f64).collect(),
             omega: 0.0,
-            factors: vec![Banded::new(2 * n, 2 * band + 1); nh],
-            tangent: Banded::new(2 * n * nh, (band + 1) * 2 * nh - 1),
-            right: vec![0.0; 2 * n],
-            whole: vec![0.0; 2 * n * nh],
+            factors: vec![Banded::new(2 * whole, 2 * band + 1); nh],
+            tangent: Banded::new(2 * whole * nh, (band + 1) * 2 * nh - 1),
+            right: vec![0.0; 2 * whole],
+            whole: vec![0.0; 2 * whole * nh],
         })
     }
 
@@ -90,6 +118,12 @@ impl Sparse {
                 factor.add(row + 1, column, z.im);
                 factor.add(row + 1, column + 1, z.re);
             }
+            // the rows of unknown forces play no part here
+            for &force in self.forces.iter().flatten() {
+                let at = 2 * self.position[force];
+                factor.add(at, at, 1.0);
+                factor.add(at + 1, at + 1, 1.0);
+            }
             if !factor.factor() {
                 return false;
             }
@@ -99,6 +133,7 @@ impl Sparse {
 
     /// Displacements of all places at harmonic number `k` of the list, from forces on them: `values(place)`, into `out`.
     pub fn respond(&mut self, k: usize, values: impl Fn(usize) -> Complex64, out: &mut [Complex64]) {
+        self.right.fill(0.0);
         for i in 0..self.n {
             let f = values(i);
             (self.right[2 * self.position[i]], self.right[2 * self.position[i] + 1]) = (f.re, f.im);
@@ -130,8 +165,20 @@ impl Sparse {
         }
     }
 
-    /// Replaces the residual by the Newton step; `tangents` holds K, one block per coordinate. False if it is singular.
-    pub fn step(&mut self, tangents: &[f64], residual: &mut [f64]) -> bool {
+    /// Receptance of coordinate `q` at harmonic number `k`, m/N.
+    pub fn own(&mut self, k: usize, q: usize) -> f64 {
+        let mut own = 0.0;
+        let unit = |p: usize| Complex64::new(if p == q { 1.0 } else { 0.0 }, 0.0);
+        self.receive(k, unit, |p, u| {
+            if p == q {
+                own = u.norm();
+            }
+        });
+        own
+    }
+
+    /// Replaces the residual by the Newton step; `tangents` holds K or T, one block per coordinate. False if it is singular.
+    pub fn step(&mut self, along: &Along, tangents: &[f64], residual: &mut [f64]) -> bool {
         let nh = self.harmonics.len();
         let (size, block) = (2 * nh, 4 * nh * nh);
         self.tangent.clear();
@@ -148,19 +195,45 @@ impl Sparse {
         }
         self.whole.fill(0.0);
         for (q, ends) in self.ends.iter().enumerate() {
-            let k = &tangents[q * block..(q + 1) * block];
+            let tangent = &tangents[q * block..(q + 1) * block];
             let r = &residual[q * size..(q + 1) * size];
-            for a in 0..size {
-                let row = &k[a * size..(a + 1) * size];
-                let pull: f64 = row.iter().zip(r).map(|(k, r)| k * r).sum();
-                for &(i, w) in ends {
-                    let at = self.position[i] * size + a;
-                    self.whole[at] += w * pull;
-                    for &(l, v) in ends {
-                        let column = self.position[l] * size;
-                        for (b, value) in row.iter().enumerate() {
-                            self.tangent.add(at, column + b, w * v * value);
+            let Some(force) = self.forces[q] else {
+                for a in 0..size {
+                    let row = &tangent[a * size..(a + 1) * size];
+                    let pull: f64 = row.iter().zip(r).map(|(k, r)| k * r).sum();
+                    for &(i, w) in ends {
+                        let at = self.position[i] * size + a;
+                        self.whole[at] += w * pull;
+                        for &(l, v) in ends {
+                            let column = self.position[l] * size;
+                            for (b, value) in row.iter().enumerate() {
+                                self.tangent.add(at, column + b, w * v * value);
+                            }
                         }
+                    }
+                }
+                continue;
+            };
+            let base = self.position[force] * size;
+            let penalty = along.penalty[q] * along.ease;
+            for a in 0..size {
+                let row = &tangent[a * size..(a + 1) * size];
+                self.whole[base + a] = r[a];
+                self.tangent.add(base + a, base + a, 1.0 + stay(self.harmonics[a / 2] as usize));
+                for (b, value) in row.iter().enumerate() {
+                    self.tangent.add(base + a, base + b, -value);
+                }
+                for &(i, w) in ends {
+                    let column = self.position[i] * size;
+                    self.tangent.add(column + a, base + a, -w);
+                    if penalty.is_infinite() {
+                        continue;
+                    }
+                    for (k, &h) in self.harmonics.iter().enumerate() {
+                        // ε T jhΩ
+                        let rate = penalty * h * self.omega * w;
+                        self.tangent.add(base + a, column + 2 * k, row[2 * k + 1] * rate);
+                        self.tangent.add(base + a, column + 2 * k + 1, -row[2 * k] * rate);
                     }
                 }
             }
@@ -171,8 +244,13 @@ impl Sparse {
         self.tangent.solve(&mut self.whole);
         for (q, ends) in self.ends.iter().enumerate() {
             for a in 0..size {
-                for &(i, w) in ends {
-                    residual[q * size + a] -= w * self.whole[self.position[i] * size + a];
+                match self.forces[q] {
+                    Some(force) => residual[q * size + a] = self.whole[self.position[force] * size + a],
+                    None => {
+                        for &(i, w) in ends {
+                            residual[q * size + a] -= w * self.whole[self.position[i] * size + a];
+                        }
+                    }
                 }
             }
         }
