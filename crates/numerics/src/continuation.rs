@@ -12,12 +12,6 @@ pub trait Equations {
     fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool;
     /// Size of F at which a point counts as solved.
     fn tolerance(&self) -> f64;
-    /// Called when a point is accepted, so that what is kept from point to point can be renewed. False if the point is refused.
-    fn accept(&mut self, x: &mut [f64], p: f64) -> bool;
-    /// Whether the branch may turn back. If not, the parameter is held in every correction, and it never reverses.
-    fn folds(&self) -> bool {
-        true
-    }
     /// A point at p by other means than from its neighbour: called where short steps fail, at kinks that the corrector cannot pass.
     /// False if there is none.
     fn leap(&mut self, _x: &mut [f64], _p: f64) -> bool {
@@ -72,10 +66,11 @@ pub enum End {
     Stopped,
 }
 
-/// Corrector iterations; a step is lengthened at fewer than half of them.
-const ITERATIONS: usize = 12;
-/// A tangent with less of the parameter than this predicts nothing.
-const STEEP: f64 = 1e-3;
+/// Corrector iterations. A step that took at most [`FEW`] of them is lengthened: where equations have kinks, Newton's method first has to
+/// find on which side of each it is, and takes more than the usual three without being in danger.
+const ITERATIONS: usize = 20;
+/// See [`ITERATIONS`].
+const FEW: usize = 10;
 /// A step below this fraction of the longest asks for a leap.
 const LEAP: f64 = 32.0;
 
@@ -93,7 +88,6 @@ const LEAP: f64 = 32.0;
 ///         true
 ///     }
 ///     fn tolerance(&self) -> f64 { 1e-12 }
-///     fn accept(&mut self, _x: &mut [f64], _p: f64) -> bool { true }
 /// }
 /// let steps = Steps { unit: 1.0, points: 200, ..Steps::between(-2.0, 2.0, 0.1) };
 /// let mut lowest = 1.0f64;
@@ -125,12 +119,6 @@ pub fn trace<E: Equations>(
             fresh = false;
         }
         let (low, high) = steps.range;
-        if !equations.folds() {
-            // steps are measured by the parameter alone
-            let scale = if tangent[n].abs() > STEEP { steps.direction / tangent[n] } else { 0.0 };
-            tangent.iter_mut().for_each(|t| *t *= scale);
-            tangent[n] = steps.direction;
-        }
         let mut next: Vec<f64> = x.iter().zip(&tangent).map(|(x, t)| x + length * t).collect();
         let mut q = p + length * tangent[n] * steps.unit;
         // a step that leaves the range ends on its border, with the parameter held
@@ -148,7 +136,6 @@ pub fn trace<E: Equations>(
                 q = value;
                 work.correct(equations, &mut next, &mut q, steps.unit, None)
             }
-            None if !equations.folds() => work.correct(equations, &mut next, &mut q, steps.unit, None),
             None => {
                 let predicted = (next.clone(), q);
                 work.correct(equations, &mut next, &mut q, steps.unit, Some((&tangent, &predicted)))
@@ -158,9 +145,9 @@ pub fn trace<E: Equations>(
         // a corrector that runs away has found another branch
         let moved: f64 = next.iter().zip(&x).map(|(a, b)| (a - b) * (a - b)).sum::<f64>()
             + ((q - p) / steps.unit) * ((q - p) / steps.unit);
-        let near = !equations.folds() || moved.sqrt() <= 2.0 * length + 1e-12;
+        let near = moved.sqrt() <= 2.0 * length + 1e-12;
         let accepted = match solved {
-            Some(iterations) if inside && near && equations.accept(&mut next, q) => Some(iterations),
+            Some(iterations) if inside && near => Some(iterations),
             _ => None,
         };
         let Some(iterations) = accepted else {
@@ -196,10 +183,8 @@ pub fn trace<E: Equations>(
         if border.is_some() {
             return End::Border;
         }
-        if iterations * 2 < ITERATIONS {
+        if iterations <= FEW {
             length = (1.5 * length).min(steps.longest);
-        } else {
-            length *= 0.7;
         }
     }
     End::Points

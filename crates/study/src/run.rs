@@ -71,7 +71,7 @@ impl Outcome {
     }
 }
 
-/// The status of a point that converged.
+/// The status of a point that converged, [`Accuracy::Converged`](stickslip::orbit::Accuracy::Converged).
 pub const CONVERGED: &str = "converged";
 /// The status of a point that an interrupted run did not reach.
 pub const NOT_REACHED: &str = "not-reached";
@@ -257,7 +257,7 @@ impl Summary {
                 energy_gap: orbit.evidence.energy_gap,
                 truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),
                 iterations: orbit.evidence.iterations as u64,
-                status: CONVERGED.to_owned(),
+                status: orbit.evidence.accuracy.status().to_owned(),
                 failure: None,
                 stuck: orbit.is_one_of_many(),
             },

@@ -4,8 +4,8 @@ use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use stickslip::curve::performance::Performance;
 use stickslip::curve::trace::Trace;
-use stickslip::law::{Jenkins, Law};
-use stickslip::method::harmonic_balance::HarmonicBalance;
+use stickslip::law::{Coulomb, Jenkins, Law};
+use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, templates};
 use stickslip::orbit::Orbit;
 use stickslip_numerics::continuation::End;
@@ -43,6 +43,48 @@ fn along_frequency_to_the_peak() {
             let peak = performance.peak(limit).unwrap().peak.unwrap();
             let highest = branch.peaks.iter().map(|p| p.1).fold(0.0, f64::max);
             assert!((highest / peak.value - 1.0).abs() < 1e-7, "{template} {limit} N: {highest} {peak:?}");
+        }
+    }
+}
+
+/// Figs. 6, 7 and 10 by continuation: rigid friction with a contact mass, whole curves for all four slip limits. The branch goes from end to
+/// end without a turn, and its points are those that the method finds one by one.
+#[test]
+fn figures_6_7_and_10_by_continuation() {
+    let cases: [(&str, &[(&str, f64)]); 3] =
+        [("blade-couple", &[]), ("blade-couple", &[("m1", 0.00091)]), ("symmetric-couple", &[])];
+    for (template, changes) in cases {
+        for limit in [2.0, 4.0, 6.0, 8.0] {
+            let mut all = changes.to_vec();
+            all.push(("Ft", limit));
+            let system = templates::find(template).unwrap().model_with(&all).unwrap().assemble().unwrap();
+            for harmonics in [3, 9] {
+                let method = balance(harmonics);
+                let branch = Trace {
+                    at: &|omega| (system.clone(), omega),
+                    method,
+                    range: (TAU * 119.5, TAU * 122.5),
+                    step: TAU * 0.05,
+                    quantity: &|orbit: &Orbit| orbit.places[0].amplitude(),
+                }
+                .branch()
+                .unwrap();
+                assert_eq!(
+                    branch.end,
+                    End::Border,
+                    "{template} {all:?} H = {harmonics}: {} points",
+                    branch.points.len()
+                );
+                // a structure that only dissipates, with friction whose limit is constant, has one periodic motion at a frequency
+                assert!(branch.turns.is_empty());
+                assert!(branch.points.windows(2).all(|pair| pair[1].value - pair[0].value < TAU * 0.06));
+                let mut solver = method.solver(&system).unwrap();
+                for point in branch.points.iter().step_by(20) {
+                    let alone = solver.orbit(point.value, None).unwrap();
+                    let (a, b) = (alone.places[0].amplitude(), point.orbit.places[0].amplitude());
+                    assert!((a / b - 1.0).abs() < 1e-9, "{template} {all:?} H = {harmonics}, {}: {a} {b}", point.value);
+                }
+            }
         }
     }
 }
@@ -85,4 +127,70 @@ fn along_a_force_around_a_turning_point() {
         let force = (Complex64::new(1.0 - omega * omega, damping * omega) + stiffness).norm() * a;
         assert!((force - point.value).abs() < 1e-7, "amplitude {a}: {force} instead of {}", point.value);
     }
+}
+
+/// Rigid friction on an oscillator with negative damping, along the force: from slip without stops past the force below which no such motion
+/// exists, back through motions that no waiting finds, around the onset of large slip and down into stick. The judge is the exact method,
+/// started from the points of the branch.
+#[test]
+fn rigid_friction_around_two_turning_points() {
+    let omega = 1.1f64.sqrt();
+    let system = |force: f64| {
+        let model = Model {
+            masses: vec![Mass { name: "m".into(), mass: 1.0 }],
+            springs: vec![Spring { between: ["m".into(), GROUND.into()], stiffness: 1.0, damping: -0.03 }],
+            joints: vec![Joint {
+                name: "contact".into(),
+                between: ["m".into(), GROUND.into()],
+                law: Law::Coulomb(Coulomb { limit: 1.0 }),
+            }],
+            forces: vec![Force { on: "m".into(), amplitude: force, phase: 0.0, harmonic: 1 }],
+            ..Model::default()
+        };
+        model.assemble().unwrap()
+    };
+    let branch = Trace {
+        at: &|force| (system(force), omega),
+        method: balance(31),
+        range: (2.0, 0.5),
+        step: 0.02,
+        quantity: &|orbit: &Orbit| orbit.places[0].amplitude(),
+    }
+    .branch()
+    .unwrap();
+    assert_eq!((branch.end, branch.turns.len()), (End::Border, 2));
+    // one harmonic puts the first turn at F² = ((1 - ω²) a)² + (4/π - 0.03 ω a)², least over a
+    let first = |a: f64| (0.1 * a).hypot(4.0 / PI - 0.03 * omega * a);
+    let lowest = (0..1000).map(|i| first(0.01 * f64::from(i))).fold(f64::INFINITY, f64::min);
+    let turn = branch.points[branch.turns[0]].value;
+    assert!((turn / lowest - 1.0).abs() < 0.05, "{turn} {lowest}");
+    let (mut judged, mut failed) = (0, 0);
+    for (i, point) in branch.points.iter().enumerate() {
+        let a = point.orbit.places[0].amplitude();
+        let between = i > branch.turns[0] && i < branch.turns[1];
+        let beside = branch.turns.iter().any(|turn| i.abs_diff(*turn) < 3);
+        assert!(beside || point.orbit.is_stable() == Some(!between), "{i} {} {a}", point.value);
+        if point.value < 1.0 {
+            assert!(a < 1e-9, "{} {a}", point.value);
+            continue;
+        }
+        // near the turns the amplitude is no function of the force, and there the exact method may find the other branch
+        if a < 1e-3 || branch.turns.iter().any(|turn| (branch.points[*turn].value - point.value).abs() < 5e-3) {
+            continue;
+        }
+        judged += 1;
+        let Ok(exact) = EventDriven.solver(&system(point.value)).unwrap().orbit(omega, Some(&point.orbit.start)) else {
+            failed += 1;
+            continue;
+        };
+        // the branch is flat between the turns: the force there differs by less than a hundredth
+        let bound = if point.value > 1.3 { 0.01 } else { 0.15 };
+        assert!(
+            (a / exact.places[0].amplitude() - 1.0).abs() < bound,
+            "{i} {} {a} {}",
+            point.value,
+            exact.places[0].amplitude()
+        );
+    }
+    assert!(judged > 300 && failed == 0, "{failed} of {judged}");
 }

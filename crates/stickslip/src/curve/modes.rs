@@ -1,7 +1,8 @@
 //! Nonlinear modes: frequency and equivalent damping of a free vibration over its amplitude, and self-excited orbits.
 //!
-//! At small amplitude elastic joints stick and the mode is the linear one with their springs; at large amplitude it is the linear
-//! one without joints; the damping vanishes at both ends and has a maximum between.
+//! At small amplitude joints stick and the mode is the linear one with their springs, or with rigid contacts closed; at large amplitude
+//! it is the linear one without joints; the damping vanishes at both ends and has a maximum between. Where friction pulls two
+//! frequencies together, both modes become one, and which of those below that amplitude is followed is not determined.
 //! The equations are those of the extended periodic motion concept, Krack (2015).
 
 use crate::method::MethodError;
@@ -54,7 +55,7 @@ const HALVINGS: u32 = 12;
 /// Follows a mode from its large end, where joints hardly matter, to its small one.
 ///
 /// # Errors
-/// A law that the equations cannot take.
+/// A law with several directions, a place without mass.
 ///
 /// # Example
 /// ```
@@ -75,7 +76,7 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
     let mut points = Vec::with_capacity(last + 1);
     // joints matter the less the larger the motion: begin as far above the range as the linear mode is a good guess
     let begin = STARTS.iter().find_map(|factor| {
-        let linear = equations.linear(request.mode, false, factor * high)?;
+        let linear = equations.linear(request.mode, factor * high)?;
         follow(&mut equations, &(factor * high, linear), high).map(|state| (high, state))
     });
     let Some(mut now) = begin else {
@@ -99,7 +100,7 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
 /// Self-excited orbits along a mode: the amplitudes at which its damping changes its sign. Stable ones have rising damping there.
 ///
 /// # Errors
-/// A law that the equations cannot take.
+/// A law with several directions, a place without mass.
 pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoint>, MethodError> {
     let mut equations = ModeEquations::new(system, request.harmonics, request.samples)?;
     let found = mode(system, request)?;
@@ -108,7 +109,7 @@ pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoi
         if (pair[0].damping < 0.0) == (pair[1].damping < 0.0) {
             continue;
         }
-        let Some(linear) = equations.linear(request.mode, false, request.range.1) else { continue };
+        let Some(linear) = equations.linear(request.mode, request.range.1) else { continue };
         let Some(upper) = follow(&mut equations, &(request.range.1, linear), pair[1].amplitude) else { continue };
         let mut at = (pair[1].amplitude, upper);
         // regula falsi on the logarithm of the amplitude, with the Illinois weight

@@ -7,7 +7,7 @@
 use super::peak::{Peak, highest};
 use crate::method::{Method, MethodError};
 use crate::model::System;
-use crate::orbit::Orbit;
+use crate::orbit::{Accuracy, Orbit};
 use rayon::prelude::*;
 
 /// What is computed.
@@ -32,8 +32,10 @@ pub struct Row {
     pub value: f64,
     /// The highest peak; `None` if no orbit converged.
     pub peak: Option<Peak>,
-    /// Orbits of the grid that did not converge.
+    /// Orbits of the grid that were not found.
     pub failed: usize,
+    /// Orbits of the grid whose series is too short for the tolerance, or whose error was not estimated.
+    pub inaccurate: usize,
 }
 
 /// A performance curve.
@@ -78,12 +80,13 @@ impl<E: Send> Performance<'_, E> {
         let omegas: Vec<f64> =
             (0..=last).map(|i| self.range.0 + (self.range.1 - self.range.0) * i as f64 / last as f64).collect();
         let mut start: Option<Vec<f64>> = None;
-        let mut failed = 0;
+        let (mut failed, mut inaccurate) = (0, 0);
         let values: Vec<f64> = omegas
             .iter()
             .map(|omega| match solver.orbit(*omega, start.as_deref()) {
                 Ok(orbit) => {
                     let value = (self.quantity)(&orbit);
+                    inaccurate += usize::from(orbit.evidence.accuracy != Accuracy::Converged);
                     start = Some(orbit.start);
                     value
                 }
@@ -94,7 +97,8 @@ impl<E: Send> Performance<'_, E> {
                 }
             })
             .collect();
-        Ok(Row { value, peak: highest(&mut *solver, &omegas, &values, &|orbit| (self.quantity)(orbit)), failed })
+        let peak = highest(&mut *solver, &omegas, &values, &|orbit| (self.quantity)(orbit));
+        Ok(Row { value, peak, failed, inaccurate })
     }
 
     /// The curve over `values` (rising), and its optimum.

@@ -96,6 +96,28 @@ pub struct Energy {
     pub friction: f64,
 }
 
+/// Whether an orbit, whose equations are solved, is as accurate as it was asked to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Accuracy {
+    /// It is: exactly, or by the estimate of its error.
+    Converged,
+    /// The estimated error of its series is larger than the tolerance.
+    Truncated,
+    /// It is a series whose error was not estimated.
+    Unchecked,
+}
+
+impl Accuracy {
+    /// The status that tables show.
+    pub fn status(self) -> &'static str {
+        match self {
+            Accuracy::Converged => "converged",
+            Accuracy::Truncated => "truncated",
+            Accuracy::Unchecked => "unchecked",
+        }
+    }
+}
+
 /// The numbers that say how far an orbit may be trusted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
@@ -109,6 +131,8 @@ pub struct Evidence {
     pub iterations: usize,
     /// Estimated relative error of the amplitudes from discretisation; `None` for a method that has none.
     pub truncation: Option<f64>,
+    /// Whether that is as little as was asked for.
+    pub accuracy: Accuracy,
     /// Names of joints that stick for the whole period: their offset is not unique, the orbit is one of a continuum
     /// (the symmetric one, with [`Symmetry::HalfPeriod`]).
     pub stuck: Vec<String>,

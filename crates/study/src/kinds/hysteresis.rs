@@ -2,7 +2,7 @@
 
 use super::{Complaint, Computed, FREQUENCY, Kind, SAMPLES, orbits};
 use crate::dataset::{Axis, Panel, Series, Style};
-use crate::run::{CONVERGED, Context, Outcome, Prepared, Rows, display_unit, place_of};
+use crate::run::{Context, Outcome, Prepared, Rows, display_unit, place_of};
 use crate::schema::{Takes, optional};
 use crate::study::Study;
 use crate::values::Values;
@@ -73,6 +73,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let mut outcome = Outcome::default();
     let (mut table, mut summary) = (Rows::default(), Rows::default());
     let mut loops = Vec::new();
+    let mut inaccurate = orbits::Inaccurate::default();
     let several = cases.iter().any(|prepared| prepared.case.frequencies.as_ref().is_some_and(|f| f.len() > 1));
     for (index, (prepared, points)) in cases.iter().zip(orbits::all(cases, context)).enumerate() {
         let sources = sources(prepared);
@@ -84,7 +85,8 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
                     continue;
                 }
             };
-            outcome.count(|| place_of(&prepared.case, omega), CONVERGED, None);
+            outcome.count(|| place_of(&prepared.case, omega), orbit.evidence.accuracy.status(), None);
+            inaccurate.add(&orbit);
             let times = orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
             let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();
             for (name, source) in &sources {
@@ -115,11 +117,12 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
                 summary.number("equivalent_damping_kg_per_s", first.damping);
                 summary.number("residual", orbit.evidence.residual);
                 summary.number("energy_gap", orbit.evidence.energy_gap);
-                summary.text("status", CONVERGED);
+                summary.text("status", orbit.evidence.accuracy.status());
                 summary.end();
             }
         }
     }
+    outcome.notes.extend(inaccurate.note());
     outcome.tables = vec![table.table("loops"), summary.table("loops_summary")];
     outcome.figure = panels(cases, &loops, several);
     Ok(outcome)

@@ -2,7 +2,7 @@
 
 use super::{Computed, FREQUENCY, Kind, SAMPLES, orbits};
 use crate::dataset::{Axis, Panel, Series, Style};
-use crate::run::{CONVERGED, Context, Outcome, Prepared, Rows, Summary, display_unit, place_of};
+use crate::run::{Context, Outcome, Prepared, Rows, Summary, display_unit, place_of};
 use crate::study::Study;
 use std::f64::consts::TAU;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
@@ -22,6 +22,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let all = orbits::all(cases, context);
     let estimated = |point: &orbits::Point| matches!(&point.1, Some(Ok(orbit)) if orbit.evidence.truncation.is_some());
     let truncated = all.iter().flatten().any(estimated);
+    let mut inaccurate = orbits::Inaccurate::default();
     for (prepared, points) in cases.iter().zip(all) {
         for (omega, point) in points {
             let orbit = match point {
@@ -31,7 +32,8 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
                     continue;
                 }
             };
-            outcome.count(|| place_of(&prepared.case, omega), CONVERGED, None);
+            outcome.count(|| place_of(&prepared.case, omega), orbit.evidence.accuracy.status(), None);
+            inaccurate.add(&orbit);
             if orbit.is_one_of_many() {
                 let which = match orbit.symmetry {
                     Symmetry::HalfPeriod => "the symmetric one is shown",
@@ -72,6 +74,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             outcome.figure.extend(panels(prepared, &orbit, &times, &samples));
         }
     }
+    outcome.notes.extend(inaccurate.note());
     outcome.figure.truncate(MOST_PANELS);
     outcome.tables = vec![motion.table("orbit"), summary.table("orbits"), multipliers.table("multipliers")];
     Ok(outcome)

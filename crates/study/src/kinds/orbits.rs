@@ -5,7 +5,7 @@ use crate::study::Case;
 use rayon::prelude::*;
 use stickslip::curve::sweep::sweep;
 use stickslip::method::OrbitError;
-use stickslip::orbit::Orbit;
+use stickslip::orbit::{Accuracy, Orbit};
 
 /// A frequency (rad/s) and what was found there; `None` if the run was stopped before.
 pub(super) type Point = (f64, Option<Result<Orbit, OrbitError>>);
@@ -23,6 +23,41 @@ pub(super) fn all(cases: &[Prepared], context: &Context<'_>) -> Vec<Vec<Point>> 
             omegas.iter().copied().zip(points.unwrap_or_default()).collect()
         })
         .collect()
+}
+
+/// Points whose series is too short.
+#[derive(Default)]
+pub(super) struct Inaccurate {
+    points: usize,
+    largest: f64,
+}
+
+impl Inaccurate {
+    pub fn add(&mut self, orbit: &Orbit) {
+        if orbit.evidence.accuracy == Accuracy::Truncated {
+            self.count(orbit.evidence.truncation.unwrap_or(0.0));
+        }
+    }
+
+    /// A point with this estimated error, beyond its tolerance.
+    pub fn count(&mut self, estimate: f64) {
+        self.points += 1;
+        self.largest = self.largest.max(estimate);
+    }
+
+    /// What the reader has to know about them.
+    pub fn note(&self) -> Option<String> {
+        (self.points > 0).then(|| {
+            format!(
+                "At {} point{} the series is too short: its estimated error is beyond the `tolerance` of the method, and up to {:.1e}. \
+                 Leave `harmonics` out or raise it, raise `tolerance` if that is good enough, or use `event-driven` \
+                 where the laws are exact.",
+                self.points,
+                if self.points == 1 { "" } else { "s" },
+                self.largest
+            )
+        })
+    }
 }
 
 /// Counts a point that has no orbit.

@@ -10,6 +10,7 @@ use std::f64::consts::TAU;
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError};
 use stickslip::method::MethodError;
 use stickslip::model::Model;
+use stickslip::orbit::Accuracy;
 
 pub(super) const KIND: Kind = Kind {
     name: "performance",
@@ -79,7 +80,11 @@ fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     for group in &groups {
         for (prepared, row) in group.cases.iter().zip(&group.curve.rows) {
             let failed = row.failed > 0 || row.peak.is_none();
-            let status = if failed { "some-failed" } else { CONVERGED };
+            let status = match (failed, row.inaccurate) {
+                (true, _) => "some-failed",
+                (false, 0) => CONVERGED,
+                (false, _) => Accuracy::Truncated.status(),
+            };
             let reason = || format!("{} of the orbits on the frequency grid did not converge", row.failed);
             outcome.count(|| prepared.case.label(), status, failed.then(reason));
             rows.varied(&prepared.case);

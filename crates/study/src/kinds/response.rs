@@ -1,5 +1,6 @@
 //! Response curves: amplitude over drive frequency.
 
+use super::orbits::Inaccurate;
 use super::{Computed, FREQUENCY, Kind};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{Context, NOT_REACHED, Outcome, Prepared, Rows, Summary, display_unit, place_of};
@@ -10,6 +11,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 use stickslip::curve::peak::{Peak, highest};
 use stickslip::curve::sweep::sweep;
+use stickslip::orbit::Accuracy;
 
 pub(super) const KIND: Kind = Kind {
     name: "response",
@@ -45,6 +47,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let mut outcome = Outcome::default();
     let (mut rows, mut peaks) = (Rows::default(), Rows::default());
     let truncated = curves.iter().any(|curve| curve.rows.iter().any(|row| !row.truncation.is_nan()));
+    let mut inaccurate = Inaccurate::default();
     for (prepared, curve) in cases.iter().zip(&curves) {
         let mut stuck = 0;
         for (omega, row) in curve.omegas.iter().zip(&curve.rows) {
@@ -53,6 +56,9 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
                 continue;
             }
             stuck += usize::from(row.stuck);
+            if row.status == Accuracy::Truncated.status() {
+                inaccurate.count(row.truncation);
+            }
             rows.varied(&prepared.case);
             rows.number("frequency_Hz", omega / TAU);
             row.write(&prepared.system, truncated, &mut rows);
@@ -76,6 +82,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             peaks.end();
         }
     }
+    outcome.notes.extend(inaccurate.note());
     outcome.tables.push(rows.table("curve"));
     if curves.iter().any(|curve| !curve.peaks.is_empty()) {
         outcome.tables.push(peaks.table("peaks"));

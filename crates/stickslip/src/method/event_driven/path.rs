@@ -6,7 +6,7 @@ use super::mechanics::Contact;
 use crate::method::drive::Drive;
 use crate::method::periodic::Closed;
 use crate::model::System;
-use crate::orbit::{Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
+use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::signal::{Basis, Begin, FirstZero, Scratch, integral_of_product, real_dot};
@@ -62,6 +62,7 @@ pub(super) fn orbit(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry
             switches: joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
             truncation: closed.missing,
+            accuracy: Accuracy::Converged,
             stuck: stuck.collect(),
         },
         places,

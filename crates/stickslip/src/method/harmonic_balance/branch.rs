@@ -120,6 +120,7 @@ impl<'a> BranchEquations<'a> {
             omega: self.omega,
             odd: self.odd,
             truncation: None,
+            tolerance: 0.0,
             judge: Some(&mut self.judge),
         };
         Some(path::orbit(context, &mut self.level, &self.motion, places))
@@ -168,10 +169,6 @@ impl Equations for BranchEquations<'_> {
         let Ok(motion) = self.level.solve(&self.coordinates, self.omega, start) else { return false };
         self.motion = motion;
         x.copy_from_slice(&self.level.pack(&self.coordinates, &self.motion, self.length));
-        true
-    }
-
-    fn accept(&mut self, _x: &mut [f64], _p: f64) -> bool {
         true
     }
 }

@@ -238,17 +238,23 @@ impl Alternation {
 
     /// Harmonics of the force that a map makes of the signal `y`, and their derivative, as in [`Alternation::springs`].
     pub fn map(&mut self, map: Map, y: &[Complex64], force: &mut [Complex64], tangent: Option<&mut [f64]>) {
-        self.synthesise(y);
-        let rough = self.signal.len();
         let highest = self.harmonics.last().map_or(1.0, |&h| h as f64);
-        let largest = self.signal.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let largest: f64 = y.iter().map(|y| y.norm()).sum();
+        let change_by = |scale: f64| scale * largest * TAU * highest / self.samples() as f64;
+        // a signal whose map is smooth over a sample is exact to spectral accuracy in its middle; the projection has kinks wherever it goes
         self.mean = match map {
-            // a contact that sticks all the time is linear
-            Map::Projection { limit } => largest > limit,
-            // a signal whose map is smooth over a sample is exact to spectral accuracy in its middle
-            Map::Arctangent { alpha, .. } => alpha * largest * TAU * highest / rough as f64 >= SMOOTH,
-            Map::Resolvent { limit, .. } => largest / limit * TAU * highest / rough as f64 >= SMOOTH,
+            Map::Projection { .. } => true,
+            Map::Arctangent { alpha, .. } => change_by(alpha) >= SMOOTH,
+            Map::Resolvent { limit, .. } => change_by(1.0 / limit) >= SMOOTH,
         };
+        // where the map is the identity, the force of a sticking contact has to be the signal: the mean over a sample is undone before
+        let undo = self.mean && !matches!(map, Map::Arctangent { .. });
+        let n = self.samples();
+        let widen = |h: usize| if undo { 1.0 / (1.0 + change(h, n).norm_sqr() / 3.0) } else { 1.0 };
+        for (pair, y) in self.pairs.iter_mut().zip(y) {
+            pair.1 = y * widen(pair.0);
+        }
+        self.fourier.synthesise(&self.pairs, &mut self.signal);
         match map {
             Map::Projection { limit } => self.each(1.0 / limit, limit, 1.0, Mean::saturation),
             Map::Arctangent { limit, alpha } => {
@@ -264,20 +270,18 @@ impl Alternation {
         if let Some(tangent) = tangent {
             tangent.fill(0.0);
             self.add_map_tangent(tangent);
+            if undo {
+                for row in tangent.chunks_exact_mut(2 * self.harmonics.len()) {
+                    for (pair, &h) in row.chunks_exact_mut(2).zip(&self.harmonics) {
+                        pair.iter_mut().for_each(|t| *t *= widen(h));
+                    }
+                }
+            }
         }
     }
 
-    /// Harmonics of a law of velocity of the motion with harmonics `c`, and their derivative; rigid friction changes its sign over the
-    /// velocity `width`.
-    pub fn velocity(
-        &mut self,
-        law: Velocity,
-        width: f64,
-        omega: f64,
-        c: &[Complex64],
-        force: &mut [Complex64],
-        mut tangent: Option<&mut [f64]>,
-    ) {
+    /// Harmonics of a law of velocity of the motion with harmonics `c`; rigid friction changes its sign over the velocity `width`.
+    pub fn velocity(&mut self, law: Velocity, width: f64, omega: f64, c: &[Complex64], force: &mut [Complex64]) {
         let (map, factor) = if law.is_rigid() {
             (Map::Projection { limit: law.limit }, law.limit / width.max(f64::MIN_POSITIVE))
         } else {
@@ -287,18 +291,8 @@ impl Alternation {
         for ((y, c), &h) in signal.iter_mut().zip(c).zip(&self.harmonics) {
             *y = c * Complex64::new(0.0, factor * h as f64 * omega);
         }
-        self.map(map, &signal, force, tangent.as_deref_mut());
+        self.map(map, &signal, force, None);
         self.argument = signal;
-        if let Some(tangent) = tangent {
-            // δv = jkΩ δU: x goes to the imaginary and y to the negative real part
-            let width = 2 * self.harmonics.len();
-            for row in tangent.chunks_exact_mut(width) {
-                for (pair, &k) in row.chunks_exact_mut(2).zip(&self.harmonics) {
-                    let rate = factor * k as f64 * omega;
-                    (pair[0], pair[1]) = (pair[1] * rate, -pair[0] * rate);
-                }
-            }
-        }
     }
 
     /// The map `mean` of every sample times `scale`, where `mean` is told the value in the middle and half of the change.

@@ -51,13 +51,15 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             key: "samples",
             dimension: Dimension::NONE,
             count: true,
-            doc: "samples per period, even, at least 4 (harmonics + 1); absent: 16 per harmonic, at least 1024",
+            doc: "samples per period, even, at least 4 (harmonics + 1), and 16 per harmonic if `harmonics` is absent; absent: 16 per \
+                  harmonic, at least 1024",
         },
         MethodOption {
             key: "tolerance",
             dimension: Dimension::NONE,
             count: false,
-            doc: "error of the motion relative to the largest amplitude that is aimed at when `harmonics` is absent; 0.001",
+            doc: "error of the motion relative to the largest amplitude: aimed at when `harmonics` is absent, and beyond it a \
+                  point is `truncated`; 0.001",
         },
     ],
     build: |options| Ok(Box::new(HarmonicBalance::from_options(options)?)),
@@ -70,7 +72,7 @@ const FIRST: usize = 7;
 /// Highest harmonic that the program chooses itself; it is checked with twice as many.
 const MOST: usize = 511;
 /// Unknowns beyond which no error is estimated: the elimination would take seconds.
-const LARGEST: usize = 1100;
+const LARGEST: usize = 2100;
 /// Laws of velocity begin with this many harmonics at most, and double them from there: the sets of slipping samples are then nearly
 /// known.
 const COLD: usize = 15;
@@ -98,7 +100,9 @@ pub struct HarmonicBalance {
     pub harmonics: Option<usize>,
     /// Samples per period; chosen if absent.
     pub samples: Option<usize>,
-    /// Error relative to the largest amplitude, aimed at when `harmonics` is absent.
+    /// Error relative to the largest amplitude: aimed at when `harmonics` is absent; an orbit beyond it is [`Accuracy::Truncated`].
+    ///
+    /// [`Accuracy::Truncated`]: crate::orbit::Accuracy::Truncated
     pub tolerance: Option<f64>,
 }
 
@@ -204,12 +208,15 @@ impl Balance<'_> {
         level
     }
 
+    /// Samples at a number of harmonics: what the user gave holds for the user's harmonics; the solution that checks it takes as many as
+    /// it needs, so that too few are seen in the estimate.
     fn samples(&self, top: usize) -> usize {
         let needed = (SAMPLES_PER_HARMONIC * (top + 1)).next_power_of_two();
-        match self.method.samples {
-            Some(samples) if samples >= 4 * (top + 1) => samples,
-            Some(samples) => samples * 2,
-            None => needed.max(SAMPLES),
+        match (self.method.samples, self.method.harmonics) {
+            (Some(samples), Some(harmonics)) if top <= harmonics => samples,
+            (Some(samples), Some(_)) => samples.max(needed).max(SAMPLES),
+            (Some(samples), None) => samples.max(needed),
+            (None, _) => needed.max(SAMPLES),
         }
     }
 
@@ -283,6 +290,7 @@ impl Balance<'_> {
             omega,
             odd: self.odd,
             truncation,
+            tolerance: self.method.tolerance.unwrap_or(TOLERANCE),
             judge: Some(&mut self.judge),
         };
         let level = self.levels.get_mut(&top).expect("solved");

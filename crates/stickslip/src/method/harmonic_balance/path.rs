@@ -6,7 +6,7 @@ use super::rest::Rest;
 use super::solve::{Level, Motion};
 use crate::method::Contact;
 use crate::model::{MovedPlace, System};
-use crate::orbit::{Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
+use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
@@ -50,12 +50,14 @@ pub(super) struct Context<'a> {
     pub omega: f64,
     pub odd: bool,
     pub truncation: Option<f64>,
+    /// The error that it is compared with.
+    pub tolerance: f64,
     pub judge: Option<&'a mut Judge>,
 }
 
 /// Makes the orbit.
 pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec<DVector<Complex64>>) -> Orbit {
-    let Context { system, coordinates, omega, odd, truncation, judge } = context;
+    let Context { system, coordinates, omega, odd, truncation, tolerance, judge } = context;
     let (n, nh) = (system.dofs(), level.harmonics().len());
     let harmonics = level.harmonics().to_vec();
     let samples = level.alternation.samples();
@@ -144,6 +146,11 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
             switches: joints.iter().map(|j| j.switches).sum(),
             iterations: motion.iterations,
             truncation,
+            accuracy: match truncation {
+                Some(error) if error <= tolerance => Accuracy::Converged,
+                Some(_) => Accuracy::Truncated,
+                None => Accuracy::Unchecked,
+            },
             stuck,
         },
         joints,

@@ -29,11 +29,11 @@ pub(super) const SOLVED: f64 = 1e-10;
 /// Newton iterations; 3 to 15 are usual.
 const ITERATIONS: usize = 60;
 /// Halvings of a step.
-const HALVINGS: usize = 7;
+pub(super) const HALVINGS: usize = 7;
 /// Growth of the residual in a whole step beyond which the search is lost.
 const GROWS: f64 = 100.0;
 /// Share of its length by which a step has to shorten the residual.
-const SHORTENS: f64 = 1e-3;
+pub(super) const SHORTENS: f64 = 1e-3;
 /// The penalty ε is the contact's impedance at the highest harmonic times `1 + RIPPLE / highest`. Above that harmonic a series cannot
 /// follow the force: with a larger ε it chatters in stick, with a smaller one a passage through zero is blurred. The second term
 /// makes the passage sharp where the harmonics are few and do not chatter, so that one harmonic is the describing function.
@@ -192,9 +192,8 @@ impl Level {
                 Some(sparse) => sparse.own(nh - 1, q),
                 None => self.receptance[nh - 1][(q, q)].norm(),
             };
-            let impedance = 1.0 / (receptance * top as f64 * omega);
             let imposed = receptance <= RIGID * stiff / (top * top) as f64;
-            self.penalty[q] = if imposed { f64::INFINITY } else { impedance * (1.0 + RIPPLE / top as f64) };
+            self.penalty[q] = if imposed { f64::INFINITY } else { penalty(receptance, top, omega) };
         }
     }
 
@@ -211,6 +210,9 @@ impl Level {
                 let imposed = joint.imposed.iter().find(|(k, _)| *k as usize == h).map_or(ZERO, |(_, g)| *g);
                 let u = (0..x.len()).map(|i| x[i] * joint.direction[(i, 0)]).sum::<Complex64>() + imposed;
                 let force = guess.joints[coordinate.joint] * u;
+                if !force.is_finite() {
+                    continue; // rigid friction that does not move at all
+                }
                 motion.c[q * nh + k] = u - force * coordinate.series;
                 motion.force[q * nh + k] = force;
             }
@@ -624,8 +626,14 @@ impl Level {
     }
 }
 
+/// The penalty ε (N s/m) of a contact with the receptance (m/N) of the highest harmonic `top`, see [`RIPPLE`].
+pub(super) fn penalty(receptance: f64, top: usize, omega: f64) -> f64 {
+    let impedance = 1.0 / (receptance * top as f64 * omega);
+    impedance * (1.0 + RIPPLE / top as f64)
+}
+
 /// The image of a force λ along a motion c: `P J(λ + ε c')`, or the law itself where the motion is imposed, which λ does not change.
-fn apply(
+pub(super) fn apply(
     alternation: &mut Alternation,
     (law, penalty): (Velocity, f64),
     omega: f64,
@@ -635,7 +643,7 @@ fn apply(
 ) {
     if penalty.is_infinite() {
         let speed: f64 = c.iter().zip(&alternation.harmonics).map(|(c, &h)| c.norm() * h as f64 * omega).sum();
-        return alternation.velocity(law, IMPOSED * speed, omega, c, image, None);
+        return alternation.velocity(law, IMPOSED * speed, omega, c, image);
     }
     for (k, &h) in alternation.harmonics.iter().enumerate() {
         signal[k] = force[k] + c[k] * Complex64::new(0.0, penalty * h as f64 * omega);

@@ -5,7 +5,7 @@ use crate::method::Contact;
 use crate::method::drive::Drive;
 use crate::method::periodic::Closed;
 use crate::model::System;
-use crate::orbit::{Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
+use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::radau::{C, quintic};
@@ -53,6 +53,7 @@ pub(crate) fn orbit(
             switches: joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
             truncation: closed.missing,
+            accuracy: Accuracy::Converged,
             stuck: joints.iter().filter(|joint| joint.slip_fraction == 0.0).map(|joint| joint.name.clone()).collect(),
         },
         places,

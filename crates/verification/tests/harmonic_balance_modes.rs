@@ -1,0 +1,168 @@
+//! Nonlinear modes with laws of velocity: against describing functions, against the elastic law that they tend to, and against the
+//! linear modes at both ends.
+
+use std::f64::consts::{PI, TAU};
+use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode};
+use stickslip::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, Law};
+use stickslip::model::{GROUND, Joint, Mass, Model, Spring, System, templates};
+
+/// One mass of 1 kg on a spring of 1 N/m with a joint to the ground.
+fn oscillator(law: Law) -> System {
+    Model {
+        masses: vec![Mass { name: "m".into(), mass: 1.0 }],
+        springs: vec![Spring { between: ["m".into(), GROUND.into()], stiffness: 1.0, damping: 0.0 }],
+        joints: vec![Joint { name: "damper".into(), between: ["m".into(), GROUND.into()], law }],
+        ..Model::default()
+    }
+    .assemble()
+    .unwrap()
+}
+
+/// The whole mode.
+fn followed(system: &System, request: ModeRequest) -> Mode {
+    let mode = mode(system, request).unwrap();
+    assert_eq!(mode.lost, None, "{request:?}");
+    assert_eq!(mode.points.len(), request.points);
+    mode
+}
+
+/// Relative error of a frequency or a damping ratio: solved to 1e-11, by equations that a damping ratio up to 20 makes stiffer.
+const ROUNDING: f64 = 1e-8;
+
+/// Velocity taken as linear over one of 4096 samples: (2π/4096)²/6 at a sharp passage through zero, and five times that where all of the
+/// law is curved.
+const SAMPLES: f64 = 2e-6;
+
+/// The penalty that the oscillator's force has with one harmonic, N s/m, at 1 rad/s: the impedances of mass and spring together,
+/// 1 + 30 times.
+const PENALTY: f64 = 62.0;
+
+/// Rigid friction with one harmonic: the force is `4 Ft/π` against the velocity `a ω`, so that `ω² = k/m` and
+/// `ζ = (4 Ft/π)/(2 ω² m a) = 2 Ft/(π k a)`.
+#[test]
+fn rigid_friction_is_its_describing_function() {
+    let limit = 1.5;
+    let system = oscillator(Law::Coulomb(Coulomb { limit }));
+    let request = ModeRequest { mode: 0, range: (0.05, 100.0), points: 41, harmonics: 1, samples: 4096 };
+    for point in followed(&system, request).points {
+        assert!((point.omega - 1.0).abs() < ROUNDING, "{point:?}");
+        let expected = 2.0 * limit / (PI * point.amplitude);
+        // a cosine of amplitude ε a ω, cut off at the limit, in place of a rectangle: (limit/(ε a ω))²/6 is missing
+        let blurred = (limit / (PENALTY * point.amplitude)).powi(2) / 6.0;
+        assert!((point.damping / expected - 1.0).abs() < blurred + SAMPLES, "{point:?} instead of {expected}");
+    }
+}
+
+/// The arctangent with one harmonic, (3.1).
+#[test]
+fn arctangent_is_its_describing_function() {
+    for alpha in [0.1, 1.0, 30.0, 1e4] {
+        let system = oscillator(Law::CoulombArctan(CoulombArctan { limit: 1.0, alpha }));
+        let request = ModeRequest { mode: 0, range: (0.1, 100.0), points: 31, harmonics: 1, samples: 4096 };
+        for point in followed(&system, request).points {
+            assert!((point.omega - 1.0).abs() < ROUNDING, "{point:?}");
+            let z = alpha * point.amplitude;
+            let expected = 2.0 / (PI * point.amplitude) * z / ((1.0 + z * z).sqrt() + 1.0);
+            let blurred = MISSING / (PENALTY * point.amplitude);
+            let error = point.damping / expected - 1.0;
+            assert!(error.abs() < blurred + SAMPLES, "{alpha}: {point:?} instead of {expected}");
+        }
+    }
+}
+
+/// Share of the slip limit by which the missing harmonics of a force may change the first one, relative to ε times the velocity: they are
+/// a third of the force and less, act in the resolvent as the velocity λ₃/ε, and only where the law is curved; measured 0.047.
+const MISSING: f64 = 0.06;
+
+/// A steep arctangent behind a spring tends to the slider behind a spring. Both are right up to the missing harmonics, but of different
+/// unknowns, the slider's force and the motion: their distance falls with the harmonics.
+#[test]
+fn steep_jenkins_arctan_is_jenkins() {
+    let (stiffness, limit) = (0.2, 1.0);
+    let distance = |harmonics: usize| {
+        let request = ModeRequest { mode: 0, range: (0.5, 1e3), points: 41, harmonics, samples: 4096 };
+        let elastic = followed(&oscillator(Law::Jenkins(Jenkins { stiffness, limit })), request);
+        let steep = Law::JenkinsArctan(JenkinsArctan { stiffness, limit, alpha: 1e6 });
+        let steep = followed(&oscillator(steep), request);
+        let apart = |read: fn(&ModePoint) -> f64| {
+            let pairs = steep.points.iter().zip(&elastic.points);
+            pairs.map(|(a, b)| (read(a) - read(b)).abs()).fold(0.0, f64::max)
+        };
+        (apart(|point| point.omega), apart(|point| point.damping))
+    };
+    let (few, many) = (distance(15), distance(63));
+    // the force has kinks: its harmonics fall as 1/h², and with them the distance by more than four from 15 to 63
+    assert!(many.0 < 0.25 * few.0 && many.1 < 0.25 * few.1, "{few:?} {many:?}");
+    // the frequency changes by a tenth along the mode, the damping ratio goes up to 0.029
+    assert!(many.0 < 1e-4 && many.1 < 1e-4, "{many:?}");
+}
+
+/// The smaller and the larger solution λ of `a λ² - b λ + c = 0`.
+fn roots(a: f64, b: f64, c: f64) -> (f64, f64) {
+    let root = (b * b - 4.0 * a * c).sqrt();
+    ((b - root) / (2.0 * a), (b + root) / (2.0 * a))
+}
+
+/// What friction of 2 N leaves of itself at an amplitude of 1 m √kg: it changes ω and ζ by no more than its force relative to the
+/// elastic ones, 2/(105 103 · 2), twice over.
+const FAINT: f64 = 2e-5;
+
+/// The symmetric couple from end to end. Against each other, blade and contact mass are a chain of two when they slip freely; when they
+/// stick, the contact masses stand still. In step nothing ever slips, and the whole is linear.
+#[test]
+fn symmetric_couple_from_free_to_stuck() {
+    let (blade, small, k, kt, b) = (0.182 - 0.00091, 0.00091, 105_103.0, 1e4, 0.2);
+    let system = templates::find("symmetric-couple").unwrap().model().assemble().unwrap();
+    let chain = roots(blade * small, (k + kt) * small + kt * blade, (k + kt) * kt - kt * kt).0.sqrt();
+    let stuck = ((k + kt) / blade).sqrt();
+    for harmonics in [1, 3, 9, 15, 31] {
+        let request = ModeRequest { mode: 1, range: (1e-7, 1.0), points: 43, harmonics, samples: 1024 };
+        let against = followed(&system, request).points;
+        let (smallest, largest) = (&against[0], &against[42]);
+        assert!((smallest.omega / stuck - 1.0).abs() < ROUNDING, "{harmonics}: {smallest:?} instead of {stuck}");
+        assert!((smallest.damping - b / (2.0 * blade * stuck)).abs() < ROUNDING, "{harmonics}: {smallest:?}");
+        assert!(smallest.places[1] < ROUNDING * smallest.places[0], "{harmonics}: {smallest:?}");
+        assert!((largest.omega / chain - 1.0).abs() < FAINT, "{harmonics}: {largest:?} instead of {chain}");
+        // modal damping of the free chain, with the contact mass at kt/(kt - ω² small) of the blade
+        let ratio = kt / (kt - chain * chain * small);
+        let free = b / (2.0 * chain * (blade + ratio * ratio * small));
+        assert!((largest.damping - free).abs() < FAINT, "{harmonics}: {largest:?} instead of {free}");
+        for point in followed(&system, ModeRequest { mode: 0, ..request }).points {
+            assert!((point.omega / chain - 1.0).abs() < ROUNDING, "{harmonics}: {point:?} instead of {chain}");
+        }
+    }
+}
+
+/// The non-symmetric couple from end to end. Large motions are those of one blade, and of the other with the contact mass. Friction pulls
+/// both frequencies together until, at one amplitude, both modes are one. Below it there are two again: the blades slip against each
+/// other, until they stick in that mode, or stick in the one in which they move together. Either is right.
+#[test]
+fn blade_couple_from_free_to_stuck() {
+    let (blade, small, k, kt) = (0.182 - 0.00091, 0.00182, 105_103.0_f64, 1e4);
+    let system = templates::find("blade-couple").unwrap().model().assemble().unwrap();
+    let alone = (k / blade).sqrt();
+    let carrying = roots(blade * small, (k + kt) * small + kt * blade, (k + kt) * kt - kt * kt).0.sqrt();
+    let heavy = blade + small;
+    let stuck = roots(heavy * blade, (k + kt) * (heavy + blade), (k + kt) * (k + kt) - kt * kt);
+    for harmonics in [1, 3, 9, 15, 31] {
+        let request = ModeRequest { mode: 0, range: (1e-7, 1.0), points: 57, harmonics, samples: 1024 };
+        let lower = followed(&system, request).points;
+        let upper = followed(&system, ModeRequest { mode: 1, ..request }).points;
+        for (mode, free) in [(&lower, carrying), (&upper, alone)] {
+            assert!((mode[56].omega / free - 1.0).abs() < FAINT, "{harmonics}: {:?} instead of {free}", mode[56]);
+            let away = |square: f64| (mode[0].omega / square.sqrt() - 1.0).abs();
+            assert!(
+                away(stuck.0).min(away(stuck.1)) < ROUNDING,
+                "{harmonics}: {:?} instead of one of {stuck:?}",
+                mode[0]
+            );
+        }
+        for (a, b) in lower.iter().zip(&upper).filter(|(a, _)| a.amplitude > TWO) {
+            assert!(b.omega - a.omega > TAU * 0.3, "{harmonics}: {a:?} {b:?}");
+        }
+    }
+}
+
+/// Modal amplitude, m √kg, above which both modes are two. With one harmonic they meet where friction makes up for half of the
+/// difference of the free frequencies, δ: at `a = (4 Ft/π)/(2 ω √m δ)` = 1.9e-3.
+const TWO: f64 = 4e-3;
