@@ -6,9 +6,10 @@ use std::collections::BTreeSet;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
+use stickslip::orbit::Accuracy;
 use stickslip_report::{Outputs, terminal::Terminal, write_dataset};
 use stickslip_study::dataset::Dataset;
-use stickslip_study::run::{Context, check as check_study, run as run_study};
+use stickslip_study::run::{CONVERGED, Context, check as check_study, run as run_study};
 use stickslip_study::{Study, StudyError, read_file};
 
 /// The studies that a command line names.
@@ -108,7 +109,7 @@ pub fn run(request: &Request<'_>, place: &Place, only: &[String], json: bool) ->
                 return Ending::WrongInput;
             }
         };
-        failed |= !dataset.failures.is_empty();
+        failed |= dataset.record.points.keys().any(|status| status != CONVERGED);
         if let Err(ending) = write(&dataset, &place.out, &outputs, json) {
             return ending;
         }
@@ -126,6 +127,14 @@ fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result
     let files = write_dataset(dataset, out, outputs).map_err(|error| Ending::Failed(error.to_string()))?;
     for failure in dataset.failures.iter().take(NAMED_FAILURES) {
         eprintln!("{}: failed at {}: {}", dataset.name, failure.at, failure.reason);
+    }
+    for status in [Accuracy::Truncated, Accuracy::Unchecked].map(Accuracy::status) {
+        if let Some(points) = dataset.record.points.get(status) {
+            eprintln!(
+                "{}: {points} {status}, less accurate than was asked; the notes in record.json say how far",
+                dataset.name
+            );
+        }
     }
     if dataset.failures.len() > NAMED_FAILURES {
         eprintln!(

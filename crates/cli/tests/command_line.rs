@@ -186,6 +186,32 @@ frequency = ["0.5 rad/s", "1 rad/s", "2 rad/s"]
 }
 
 /// Methods that estimate their truncation have a column for it, also where a point failed or sticks.
+/// Three harmonics are too few for rigid friction with a contact mass: the points keep their numbers, but none of them looks converged.
+#[test]
+fn a_series_that_is_too_short_says_so_and_ends_with_3() {
+    let series = "\n[method]\nkind = \"harmonic-balance\"\nharmonics = 3\n";
+    let (folder, path) = folder("blade-couple", &[("points = 241", "points = 13")]);
+    let text = fs::read_to_string(&path).unwrap() + series;
+    fs::write(&path, &text).unwrap();
+    let output = stickslip(folder.path(), &["run", "study.toml", "--only", "csv,json"]);
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert!(stderr(&output).contains("truncated, less accurate than was asked"), "{}", stderr(&output));
+    let out = folder.path().join("stickslip-out/study");
+    let curve = fs::read_to_string(out.join("curve.csv")).unwrap();
+    let column = curve.lines().next().unwrap().split(',').position(|name| name == "truncation").unwrap();
+    let mut truncated = 0;
+    for line in curve.lines().skip(1) {
+        let error: f64 = line.split(',').nth(column).unwrap().parse().unwrap();
+        assert!(line.ends_with(if error > 1e-3 { ",truncated" } else { ",converged" }), "{line}");
+        truncated += usize::from(error > 1e-3);
+    }
+    assert!(truncated > 10);
+    assert!(fs::read_to_string(out.join("record.json")).unwrap().contains("the series is too short"));
+    // the user who says that half is good enough gets it
+    fs::write(&path, text + "tolerance = 0.5\n").unwrap();
+    assert_eq!(code(&stickslip(folder.path(), &["run", "study.toml", "--only", "csv"])), 0);
+}
+
 #[test]
 fn every_method_fills_the_table() {
     let edits = [

@@ -87,6 +87,14 @@ fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             };
             let reason = || format!("{} of the orbits on the frequency grid did not converge", row.failed);
             outcome.count(|| prepared.case.label(), status, failed.then(reason));
+            if row.inaccurate > 0 {
+                outcome.notes.push(format!(
+                    "{}: at {} frequencies of the grid the series is too short for the `tolerance` of the method; look at one with \
+                     kind = \"response\".",
+                    prepared.case.label(),
+                    row.inaccurate
+                ));
+            }
             rows.varied(&prepared.case);
             rows.number("frequency_Hz", row.peak.map_or(f64::NAN, |peak| peak.omega / TAU));
             rows.number("amplitude_m", row.peak.map_or(f64::NAN, |peak| peak.value));
