@@ -1,14 +1,69 @@
 //! Speed of harmonic balance, on one core: the massless couple of the paper by number of harmonics, its hard neighbour whole, chains.
 
+#![allow(clippy::print_stdout)] // a bench prints its result
+
 use divan::Bencher;
 use std::f64::consts::TAU;
+use std::time::Instant;
 use stickslip::curve::performance::Performance;
 use stickslip::law::{Jenkins, Law};
-use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
+use stickslip::method::{Method, Solver, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, templates};
+
+/// Blades of the chains.
+const CHAINS: [usize; 4] = [10, 30, 100, 300];
 
 fn main() {
     divan::main();
+    // cargo test --benches passes --test, and a filter asks for something else
+    if std::env::args().skip(1).all(|argument| argument == "--bench") {
+        println!("time of a point of a chain ~ blades^{:.2}", growth());
+    }
+}
+
+/// Exponent of the time per point over the number of blades, by least squares in the logarithms.
+fn growth() -> f64 {
+    let points: Vec<(f64, f64)> = CHAINS
+        .iter()
+        .map(|&blades| {
+            let system = chain(blades);
+            let mut series = ChainPoints::new(&system);
+            let mut seconds: Vec<f64> = (0..11)
+                .map(|_| {
+                    let begin = Instant::now();
+                    series.next();
+                    begin.elapsed().as_secs_f64()
+                })
+                .collect();
+            seconds.sort_by(f64::total_cmp);
+            ((blades as f64).ln(), seconds[5].ln())
+        })
+        .collect();
+    let mean = |read: fn(&(f64, f64)) -> f64| points.iter().map(read).sum::<f64>() / points.len() as f64;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>()
+        / points.iter().map(|p| (p.0 - x) * (p.0 - x)).sum::<f64>()
+}
+
+/// Neighbouring points of a chain at 121 Hz, each started from the one before.
+struct ChainPoints<'a> {
+    solver: Box<dyn Solver + Send + 'a>,
+    start: Vec<f64>,
+    count: u32,
+}
+
+impl<'a> ChainPoints<'a> {
+    fn new(system: &'a System) -> Self {
+        let mut solver = balance(5).solver(system).unwrap();
+        let start = solver.orbit(TAU * 121.0, None).unwrap().start;
+        ChainPoints { solver, start, count: 0 }
+    }
+
+    fn next(&mut self) {
+        self.count += 1;
+        let omega = TAU * (121.0 + 0.02 * f64::from(self.count % 2));
+        self.start = self.solver.orbit(omega, Some(&self.start)).unwrap().start;
+    }
 }
 
 fn balance(harmonics: usize) -> HarmonicBalance {
@@ -60,17 +115,11 @@ fn chain(blades: usize) -> System {
 }
 
 /// One point of a chain of blades with a joint between neighbours, five harmonics, started from the point 0.02 Hz below.
-#[divan::bench(args = [10, 30, 100, 300], sample_count = 5)]
+#[divan::bench(args = CHAINS, sample_count = 5)]
 fn chain_point(bencher: Bencher, blades: usize) {
     let system = chain(blades);
-    let mut solver = balance(5).solver(&system).unwrap();
-    let mut start = solver.orbit(TAU * 121.0, None).unwrap().start;
-    let mut point = 0u32;
-    bencher.bench_local(|| {
-        point += 1;
-        let orbit = solver.orbit(TAU * (121.0 + 0.02 * f64::from(point % 2)), Some(&start)).unwrap();
-        start = orbit.start;
-    });
+    let mut series = ChainPoints::new(&system);
+    bencher.bench_local(|| series.next());
 }
 
 /// A performance curve of 50 slip limits with its optimum, by the exact method.
