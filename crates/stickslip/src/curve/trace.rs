@@ -1,13 +1,15 @@
 //! Branches of orbits by arc length: along the drive frequency, or along any parameter.
 //!
 //! A branch is followed around turning points; its maxima are refined. A kink (the onset of slip) is stepped over: the corrector
-//! converges on either side of it, and the step is halved until it does.
+//! converges on either side of it, with steps that are halved until it does, or with a search of its own a little further on.
 
 use crate::method::harmonic_balance::{BranchEquations, HarmonicBalance};
 use crate::method::{MethodError, OrbitError};
 use crate::model::System;
 use crate::orbit::Orbit;
-use stickslip_numerics::continuation::{self, End, Steps};
+use stickslip_numerics::continuation::{self, Steps};
+
+pub use stickslip_numerics::continuation::End;
 
 /// What is followed.
 #[derive(Clone, Copy)]
@@ -57,6 +59,9 @@ pub enum TraceError {
     Start(#[from] OrbitError),
 }
 
+/// Maxima below this share of the largest are those of rounding, where a joint holds all motion.
+const ROUNDING: f64 = 1e-9;
+
 impl Trace<'_> {
     /// Follows the branch from the start of the range until it leaves it.
     ///
@@ -93,6 +98,7 @@ impl Trace<'_> {
             true
         });
         let heights: Vec<f64> = points.iter().map(|point| (self.quantity)(&point.orbit)).collect();
+        let rounding = ROUNDING * heights.iter().fold(0.0f64, |largest, height| largest.max(height.abs()));
         let mut peaks = Vec::new();
         let mut turns = Vec::new();
         for i in 1..points.len().saturating_sub(1) {
@@ -100,7 +106,7 @@ impl Trace<'_> {
             if (b - a) * (c - b) < 0.0 {
                 turns.push(i);
             }
-            if heights[i] >= heights[i - 1] && heights[i] > heights[i + 1] {
+            if heights[i] > rounding && heights[i] >= heights[i - 1] && heights[i] > heights[i + 1] {
                 peaks.push(self.refine(&mut equations, &arc[i - 1..=i + 1], (b, heights[i])));
             }
         }

@@ -2,6 +2,7 @@
 //!
 //! A kind states its keys of `[study]`; the reader checks them and hands over their [`Values`] for every case.
 
+mod branch;
 mod hysteresis;
 mod modes;
 mod orbit;
@@ -39,7 +40,7 @@ pub type Computed = Result<Outcome, (usize, MethodError)>;
 
 /// Every study kind there is, in the order in which lists show them.
 pub const TABLE: &[Kind] =
-    &[hysteresis::KIND, orbit::KIND, response::KIND, transient::KIND, performance::KIND, modes::KIND];
+    &[hysteresis::KIND, orbit::KIND, response::KIND, transient::KIND, performance::KIND, modes::KIND, branch::KIND];
 
 /// The kind with this name.
 pub fn find(name: &str) -> Option<&'static Kind> {

@@ -3,8 +3,8 @@
 use super::joints::Coordinate;
 use super::judge::Judge;
 use super::rest::Rest;
-use super::solve::{Level, Motion};
-use super::{HarmonicBalance, highest_excitation, path};
+use super::solve::{Level, Motion, transfer};
+use super::{HarmonicBalance, LARGEST, TOLERANCE, estimate, has_rigid, highest_excitation, kept, path};
 use crate::method::guess::Guess;
 use crate::method::{MethodError, OrbitError};
 use crate::model::System;
@@ -17,6 +17,8 @@ const HARMONICS: usize = 15;
 /// Step of the difference with respect to the parameter, relative to it: the cube root of rounding, for central differences.
 const DIFFERENCE: f64 = 1e-6;
 
+/// Newton iterations for the solution that tells the error.
+const CHECK: usize = 30;
 /// Motions grow towards resonance: the unknowns are measured by this many times the first motion, so that they stay of order one.
 const RESONANCE: f64 = 30.0;
 
@@ -30,6 +32,9 @@ pub(crate) struct BranchEquations<'a> {
     rest: Rest,
     rest_of: System,
     level: Level,
+    /// Twice the harmonics, which tell the error, unless they are too many.
+    finer: Option<Level>,
+    tolerance: f64,
     motion: Motion,
     /// Unit of motions, m.
     length: f64,
@@ -46,9 +51,10 @@ impl<'a> BranchEquations<'a> {
         let coordinates = super::joints::coordinates(&system)?;
         let rest = Rest::new(&system, &coordinates);
         let odd = system.is_odd();
-        let harmonics: Vec<usize> = if odd { (1..=top).step_by(2).collect() } else { (0..=top).collect() };
-        let samples = method.samples.unwrap_or(1024.max((16 * (top + 1)).next_power_of_two()));
-        let level = Level::new(harmonics, samples, coordinates.len(), None);
+        let method = HarmonicBalance { harmonics: Some(top), ..method };
+        let level = |top: usize| Level::new(kept(odd, top), method.samples_at(top), coordinates.len(), None);
+        let few = 2 * coordinates.len() * kept(odd, 2 * top + 1).len() <= LARGEST;
+        let (finer, level) = (few.then(|| level(2 * top + 1)), level(top));
         let motion = Motion::rest(level.linear.len());
         Ok(BranchEquations {
             at,
@@ -60,22 +66,33 @@ impl<'a> BranchEquations<'a> {
             coordinates,
             rest,
             level,
+            finer,
+            tolerance: method.tolerance.unwrap_or(TOLERANCE),
             motion,
             length: 1.0,
             odd,
         })
     }
 
-    /// Makes everything that depends on the parameter.
-    fn set(&mut self, value: f64) {
+    /// Makes everything that depends on the parameter. False if there is no drive, or if a joint has gone or has another law, so that the
+    /// unknowns are others.
+    fn set(&mut self, value: f64) -> bool {
         if value == self.value {
-            return;
+            return true;
         }
         let (system, omega) = (self.at)(value);
-        if let Ok(coordinates) = super::joints::coordinates(&system)
-            && coordinates.len() == self.coordinates.len()
-        {
-            self.coordinates = coordinates;
+        let same_place = |a: &Coordinate, b: &Coordinate| {
+            a.joint == b.joint && std::mem::discriminant(&a.element) == std::mem::discriminant(&b.element)
+        };
+        match super::joints::coordinates(&system) {
+            Ok(found)
+                if omega > 0.0
+                    && found.len() == self.coordinates.len()
+                    && found.iter().zip(&self.coordinates).all(|(a, b)| same_place(a, b)) =>
+            {
+                self.coordinates = found;
+            }
+            _ => return false,
         }
         let same = system.mass == self.rest_of.mass
             && system.damping == self.rest_of.damping
@@ -89,6 +106,7 @@ impl<'a> BranchEquations<'a> {
             self.judge = Judge::new(&system);
         }
         (self.system, self.omega, self.value) = (system, omega, value);
+        true
     }
 
     fn lost(&self, iterations: usize, residual: f64) -> OrbitError {
@@ -97,7 +115,9 @@ impl<'a> BranchEquations<'a> {
 
     /// The first point, found from the describing function.
     pub fn start(&mut self, value: f64) -> Result<Vec<f64>, OrbitError> {
-        self.set(value);
+        if !self.set(value) {
+            return Err(OrbitError::Frequency { omega: self.omega });
+        }
         let guess = Guess::new(&self.system, self.omega);
         let start = self.level.begin(&self.system, &self.coordinates, Some(&guess), self.omega);
         let solved = self.level.solve(&self.coordinates, self.omega, start);
@@ -110,17 +130,29 @@ impl<'a> BranchEquations<'a> {
 
     /// The orbit of a point of the branch.
     pub fn orbit(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
-        self.set(value);
+        if !self.set(value) {
+            return None;
+        }
         self.level.unpack(&self.coordinates, (x, self.length), &mut self.motion);
         self.level.polish(&self.coordinates, self.omega, &mut self.motion, 10).ok()?;
         let places = path::places(&mut self.level, &self.rest, self.omega, &self.motion);
+        let truncation = self.finer.as_mut().and_then(|finer| {
+            finer.drive(&self.system, &self.coordinates, &self.rest, self.omega);
+            let start = transfer(&self.motion, self.level.harmonics(), finer.harmonics(), self.coordinates.len());
+            // Newton's method alone: a search would find another branch where this one turns
+            let mut motion = start;
+            finer.polish(&self.coordinates, self.omega, &mut motion, CHECK).ok()?;
+            let better = path::places(finer, &self.rest, self.omega, &motion);
+            let rigid = has_rigid(&self.coordinates);
+            Some(estimate(rigid, (self.level.harmonics(), &places), (finer.harmonics(), &better)))
+        });
         let context = path::Context {
             system: &self.system,
             coordinates: &self.coordinates,
             omega: self.omega,
             odd: self.odd,
-            truncation: None,
-            tolerance: 0.0,
+            truncation,
+            tolerance: self.tolerance,
             judge: Some(&mut self.judge),
         };
         Some(path::orbit(context, &mut self.level, &self.motion, places))
@@ -148,8 +180,7 @@ impl Equations for BranchEquations<'_> {
         }
         let step = DIFFERENCE * p.abs().max(f64::MIN_POSITIVE);
         for (sign, at) in [(1.0, p + step), (-1.0, p - step)] {
-            self.set(at);
-            if self.omega <= 0.0 {
+            if !self.set(at) {
                 return false;
             }
             self.level.residual_at(&self.coordinates, self.omega, (x, self.length), &mut self.motion, f, None);
@@ -157,13 +188,17 @@ impl Equations for BranchEquations<'_> {
                 *d = if sign > 0.0 { *r } else { (*d - *r) / (2.0 * step) };
             }
         }
-        self.set(p);
+        if !self.set(p) {
+            return false;
+        }
         self.level.residual_at(&self.coordinates, self.omega, (x, self.length), &mut self.motion, f, Some(by_x));
         true
     }
 
     fn leap(&mut self, x: &mut [f64], p: f64) -> bool {
-        self.set(p);
+        if !self.set(p) {
+            return false;
+        }
         let mut start = self.motion.clone();
         self.level.unpack(&self.coordinates, (x, self.length), &mut start);
         let Ok(motion) = self.level.solve(&self.coordinates, self.omega, start) else { return false };

@@ -118,6 +118,18 @@ impl HarmonicBalance {
         Ok(method)
     }
 
+    /// Samples at a number of harmonics: what the user gave holds for the user's harmonics; the solution that checks it takes as many as
+    /// it needs, so that too few are seen in the estimate.
+    fn samples_at(&self, top: usize) -> usize {
+        let needed = (SAMPLES_PER_HARMONIC * (top + 1)).next_power_of_two();
+        match (self.samples, self.harmonics) {
+            (Some(samples), Some(harmonics)) if top <= harmonics => samples,
+            (Some(samples), Some(_)) => samples.max(needed).max(SAMPLES),
+            (Some(samples), None) => samples.max(needed),
+            (None, _) => needed.max(SAMPLES),
+        }
+    }
+
     /// Whether the options fit each other and excitation up to harmonic `highest`.
     fn check(&self, highest: usize) -> Result<(), MethodError> {
         let option = |key, message| Err(MethodError::Option { method: NAME, key, message });
@@ -151,7 +163,7 @@ impl Method for HarmonicBalance {
         self.check(highest)?;
         let coordinates = joints::coordinates(system)?;
         let rest = Rest::new(system, &coordinates);
-        let rigid = coordinates.iter().any(|c| matches!(c.element, Element::Velocity(law) if law.is_rigid()));
+        let rigid = has_rigid(&coordinates);
         let velocity = coordinates.iter().any(|c| matches!(c.element, Element::Velocity(_)));
         let odd = system.is_odd();
         Ok(Box::new(Balance {
@@ -177,6 +189,37 @@ fn highest_excitation(system: &System) -> usize {
     loads.chain(imposed).chain(moved).max().unwrap_or(0) as usize
 }
 
+/// The harmonics that are kept up to `top`.
+fn kept(odd: bool, top: usize) -> Vec<usize> {
+    if odd { (1..=top).step_by(2).collect() } else { (0..=top).collect() }
+}
+
+/// The error of a motion by a finer one, both as harmonics and, per harmonic, the motions of the places: their distance, as the largest of
+/// the places, relative to the largest motion of a place, without means, times the share that the finer one may be off itself.
+fn estimate(
+    rigid: bool,
+    (few, coarse): (&[usize], &[DVector<Complex64>]),
+    (many, fine): (&[usize], &[DVector<Complex64>]),
+) -> f64 {
+    let (mut distance, mut size) = (0.0f64, 0.0f64);
+    for i in 0..fine.first().map_or(0, |x| x.len()) {
+        let (mut d, mut s) = (0.0, 0.0);
+        for (h, y) in many.iter().zip(fine).filter(|(h, _)| **h > 0) {
+            let x = few.binary_search(h).map_or(Complex64::new(0.0, 0.0), |l| coarse[l][i]);
+            d += (x - y[i]).norm_sqr();
+            s += y[i].norm_sqr();
+        }
+        (distance, size) = (distance.max(d), size.max(s));
+    }
+    let share = if rigid { RIGID_SHARE } else { 1.0 };
+    if size > 0.0 { share * (distance / size).sqrt() } else { 0.0 }
+}
+
+/// Whether there is rigid friction.
+fn has_rigid(coordinates: &[Coordinate]) -> bool {
+    coordinates.iter().any(|c| matches!(c.element, Element::Velocity(law) if law.is_rigid()))
+}
+
 struct Balance<'a> {
     system: &'a System,
     method: HarmonicBalance,
@@ -196,8 +239,8 @@ struct Balance<'a> {
 impl Balance<'_> {
     /// The level of highest harmonic `top`, ready for `omega`.
     fn level(&mut self, top: usize, omega: f64) -> &mut Level {
-        let harmonics: Vec<usize> = if self.odd { (1..=top).step_by(2).collect() } else { (0..=top).collect() };
-        let samples = self.samples(top);
+        let harmonics = kept(self.odd, top);
+        let samples = self.method.samples_at(top);
         let count = self.coordinates.len();
         let (system, coordinates) = (self.system, &self.coordinates);
         let level = self.levels.entry(top).or_insert_with(|| {
@@ -208,20 +251,8 @@ impl Balance<'_> {
         level
     }
 
-    /// Samples at a number of harmonics: what the user gave holds for the user's harmonics; the solution that checks it takes as many as
-    /// it needs, so that too few are seen in the estimate.
-    fn samples(&self, top: usize) -> usize {
-        let needed = (SAMPLES_PER_HARMONIC * (top + 1)).next_power_of_two();
-        match (self.method.samples, self.method.harmonics) {
-            (Some(samples), Some(harmonics)) if top <= harmonics => samples,
-            (Some(samples), Some(_)) => samples.max(needed).max(SAMPLES),
-            (Some(samples), None) => samples.max(needed),
-            (None, _) => needed.max(SAMPLES),
-        }
-    }
-
     fn unknowns(&self, top: usize) -> usize {
-        2 * self.coordinates.len() * if self.odd { top.div_ceil(2) } else { top + 1 }
+        2 * self.coordinates.len() * kept(self.odd, top).len()
     }
 
     /// Solves at `top`, from a motion at another number of harmonics or from the first guess.
@@ -254,26 +285,6 @@ impl Balance<'_> {
     /// Harmonics of the places.
     fn places(&mut self, top: usize, omega: f64, motion: &Motion) -> Vec<DVector<Complex64>> {
         path::places(self.levels.get_mut(&top).expect("solved"), &self.rest, omega, motion)
-    }
-
-    /// Distance of two motions, as the largest of the places, relative to the largest motion of a place; without means.
-    fn distance(&self, coarse: (usize, &[DVector<Complex64>]), fine: (usize, &[DVector<Complex64>])) -> f64 {
-        let (few, many) = (self.levels[&coarse.0].harmonics(), self.levels[&fine.0].harmonics());
-        let n = self.system.dofs();
-        let (mut distance, mut size) = (0.0f64, 0.0f64);
-        for i in 0..n {
-            let (mut d, mut s) = (0.0, 0.0);
-            for (k, h) in many.iter().enumerate() {
-                if *h == 0 {
-                    continue;
-                }
-                let x = few.binary_search(h).map_or(Complex64::new(0.0, 0.0), |l| coarse.1[l][i]);
-                d += (x - fine.1[k][i]).norm_sqr();
-                s += fine.1[k][i].norm_sqr();
-            }
-            (distance, size) = (distance.max(d), size.max(s));
-        }
-        if size > 0.0 { (distance / size).sqrt() } else { 0.0 }
     }
 
     fn finish(
@@ -320,8 +331,8 @@ impl Balance<'_> {
         let double = 2 * top + 1;
         let better = self.solve(double, omega, Some((top, motion)))?;
         let y = self.places(double, omega, &better);
-        let share = if self.rigid { RIGID_SHARE } else { 1.0 };
-        Ok((share * self.distance((top, x), (double, &y)), better, y))
+        let harmonics = |top: usize| self.levels[&top].harmonics();
+        Ok((estimate(self.rigid, (harmonics(top), x), (harmonics(double), &y)), better, y))
     }
 
     /// As many harmonics as the tolerance needs. The solution that is returned is not the finest that was found, but the one whose error

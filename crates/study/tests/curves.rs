@@ -1,0 +1,136 @@
+//! Kinds that follow something: performance curves, nonlinear modes, branches, as a study file asks for them.
+
+use std::sync::atomic::AtomicBool;
+use stickslip_study::dataset::{Dataset, Style, Table};
+use stickslip_study::{
+    read_study,
+    run::{Context, run},
+};
+
+fn dataset(text: &str) -> Dataset {
+    let study = read_study("study.toml", text, &[]).unwrap();
+    run(&study, &Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| () }).unwrap()
+}
+
+fn table<'a>(dataset: &'a Dataset, name: &str) -> &'a Table {
+    dataset.tables.iter().find(|table| table.name == name).unwrap()
+}
+
+/// An oscillator of 1 kg and 1 N/m with a joint to the ground.
+fn oscillator(damping: &str, law: &str, study: &str) -> Dataset {
+    dataset(&format!(
+        r#"
+schema = 1
+title = "Oscillator"
+[parameters]
+F0 = "1 N"
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "1 N/m"
+damping = "{damping}"
+[[joint]]
+name = "contact"
+between = ["m", "ground"]
+law = {law}
+[[force]]
+on = "m"
+amplitude = "F0"
+[study]
+{study}
+"#
+    ))
+}
+
+/// Theory 6.6 in a study: the slip limit that makes the peak of blade 1 lowest.
+#[test]
+fn performance_finds_the_best_slip_limit() {
+    let text = r#"
+schema = 1
+title = "Best slip limit"
+[model]
+template = "blade-couple"
+[study]
+kind = "performance"
+frequency = { from = "120 Hz", to = "121.5 Hz", points = 31 }
+vary = { Ft = ["5.5 N", "6.5 N", "7.5 N"] }
+"#;
+    let found = dataset(text);
+    assert!(found.failures.is_empty());
+    let best = table(&found, "optimum");
+    assert!((best.numbers("Ft").unwrap()[0] - 6.684).abs() < 0.01);
+    assert!((best.numbers("amplitude_m").unwrap()[0] - 0.019_747).abs() < 1e-6);
+    // the same with a series that is too short does not look converged
+    let short = dataset(&(text.to_owned() + "[method]\nkind = \"harmonic-balance\"\nharmonics = 3\n"));
+    assert_eq!(short.record.points.get("truncated"), Some(&3), "{:?}", short.record.points);
+    assert!(short.notes.iter().any(|note| note.contains("too short")), "{:?}", short.notes);
+}
+
+/// (10.3) at its ends: stuck with the spring of the joint, free without it.
+#[test]
+fn modes_go_from_stuck_to_free() {
+    let law = r#"{ kind = "jenkins", stiffness = "0.2 N/m", limit = "1 N" }"#;
+    let found =
+        oscillator("0 kg/s", law, "kind = \"modes\"\namplitude = { from = \"1 m\", to = \"10000 m\", points = 21 }");
+    let modes = table(&found, "modes");
+    let omega: Vec<f64> = modes.numbers("frequency_Hz").unwrap().iter().map(|f| f * std::f64::consts::TAU).collect();
+    assert!((omega[0] - 1.2f64.sqrt()).abs() < 1e-9, "{omega:?}");
+    assert!((omega[20] - 1.0).abs() < 1e-4, "{omega:?}");
+    let damping = modes.numbers("damping_ratio").unwrap();
+    assert!(damping[0].abs() < 1e-9 && damping[20] < 1e-3 && damping.iter().any(|zeta| *zeta > 0.025), "{damping:?}");
+}
+
+/// A branch along a force that turns twice: two turns in its table, and an unstable stretch in its figure.
+#[test]
+fn a_branch_turns() {
+    let study = r#"kind = "branch"
+frequency = "1.04880885 rad/s"
+vary = { F0 = ["2 N", "0.5 N"] }
+steps = 75
+harmonics = 31
+tolerance = 0.3"#;
+    let found = oscillator("-0.03 kg/s", r#"{ kind = "coulomb", limit = "1 N" }"#, study);
+    assert!(found.failures.is_empty(), "{:?}", found.failures);
+    let turns = table(&found, "turns").numbers("F0").unwrap();
+    // the first where (0.1 a)² + (4/π - 0.03 ω a)² is least, up to the higher harmonics; the second above the force of stick
+    assert!(turns.len() == 2 && (turns[0] - 1.21).abs() < 0.05 && turns[1] > turns[0], "{turns:?}");
+    let values = table(&found, "branch").numbers("F0").unwrap();
+    assert_eq!((values[0], *values.last().unwrap()), (2.0, 0.5));
+    let styles: Vec<Style> = found.figure.panels[0].series.iter().map(|series| series.style).collect();
+    assert_eq!(styles, [Style::Solid, Style::Dashed, Style::Solid]);
+}
+
+/// Along frequency a branch ends where its range does, and its peak is that of the response curve.
+#[test]
+fn a_branch_along_frequency_has_the_peak_of_the_curve() {
+    let text = r#"
+schema = 1
+title = "Blade couple"
+[model]
+template = "blade-couple-massless"
+[study]
+kind = "KIND"
+frequency = { from = "120 Hz", to = "122 Hz", points = 41 }
+vary = { Ft = ["2 N", "4 N"] }
+"#;
+    let branch = dataset(&text.replace("KIND", "branch"));
+    let curve = dataset(&text.replace("KIND", "response"));
+    assert_eq!(branch.record.points.keys().collect::<Vec<_>>(), ["converged"]);
+    let peaks = table(&branch, "peaks").numbers("amplitude_m").unwrap();
+    let places = table(&curve, "peaks").numbers("amplitude_m").unwrap();
+    // blade 1 is the first of the two places of the curve; fifteen harmonics are within 3e-5 of the exact curve
+    assert_eq!(peaks.len(), 2);
+    for (peak, expected) in peaks.iter().zip(places.iter().step_by(2)) {
+        assert!((peak / expected - 1.0).abs() < 3e-5, "{peaks:?} {places:?}");
+    }
+}
+
+/// A branch without a range says what it needs.
+#[test]
+fn a_branch_without_a_range_fails_with_words() {
+    let law = r#"{ kind = "coulomb", limit = "1 N" }"#;
+    let found = oscillator("0.1 kg/s", law, "kind = \"branch\"\nfrequency = \"1 rad/s\"");
+    assert!(found.failures[0].reason.contains("a branch needs a range"), "{:?}", found.failures);
+}
