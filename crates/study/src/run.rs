@@ -159,7 +159,11 @@ fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyError {
             let index = model.masses.iter().position(|m| m.name == *place).unwrap_or(0);
             study.error_at("mass", index, "mass", error.to_string(), None)
         }
-        MethodError::Option { key, .. } => study.error_at("method", 0, key, error.to_string(), None),
+        // a kind that needs no method has the method's options among its own keys
+        MethodError::Option { key, .. } => {
+            let table = if study.kind().uses_method { "method" } else { "study" };
+            study.error_at(table, 0, key, error.to_string(), None)
+        }
         _ => study.error_at("method", 0, "kind", error.to_string(), None),
     }
 }

@@ -134,3 +134,30 @@ fn a_branch_without_a_range_fails_with_words() {
     let found = oscillator("0.1 kg/s", law, "kind = \"branch\"\nfrequency = \"1 rad/s\"");
     assert!(found.failures[0].reason.contains("a branch needs a range"), "{:?}", found.failures);
 }
+
+/// Options that only the model shows to be wrong are shown where they stand.
+#[test]
+fn harmonics_below_the_excitation_are_refused_in_their_place() {
+    let text = r#"
+schema = 1
+title = "Fifth harmonic"
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "1 N/m"
+[[force]]
+on = "m"
+amplitude = "1 N"
+harmonic = 5
+[study]
+kind = "branch"
+frequency = { from = "1 rad/s", to = "2 rad/s", points = 2 }
+harmonics = 3
+"#;
+    let study = read_study("study.toml", text, &[]).unwrap();
+    let error = run(&study, &Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| () }).unwrap_err();
+    assert_eq!(error.key(), Some("harmonics"));
+    assert_eq!(error.line(), Some(17), "{error}");
+}

@@ -53,6 +53,7 @@ impl<'a> BranchEquations<'a> {
         let odd = system.is_odd();
         let method = HarmonicBalance { harmonics: Some(top), ..method };
         let level = |top: usize| Level::new(kept(odd, top), method.samples_at(top), coordinates.len(), None);
+        super::check_size(2 * coordinates.len() * kept(odd, top).len())?;
         let few = 2 * coordinates.len() * kept(odd, 2 * top + 1).len() <= LARGEST;
         let (finer, level) = (few.then(|| level(2 * top + 1)), level(top));
         let motion = Motion::rest(level.linear.len());

@@ -73,6 +73,8 @@ const FIRST: usize = 7;
 const MOST: usize = 511;
 /// Unknowns beyond which no error is estimated: the elimination would take seconds.
 const LARGEST: usize = 2100;
+/// Unknowns beyond which nothing is begun: the matrices would fill gigabytes.
+const POSSIBLE: usize = 8192;
 /// Laws of velocity begin with this many harmonics at most, and double them from there: the sets of slipping samples are then nearly
 /// known.
 const COLD: usize = 15;
@@ -154,6 +156,16 @@ impl HarmonicBalance {
     }
 }
 
+/// Whether so many harmonics along so many coordinates can be solved at all.
+fn check_size(unknowns: usize) -> Result<(), MethodError> {
+    if unknowns <= POSSIBLE {
+        return Ok(());
+    }
+    let message =
+        format!("there would be {unknowns} unknowns, and {POSSIBLE} are possible: fewer harmonics, or fewer joints");
+    Err(MethodError::Option { method: NAME, key: "harmonics", message })
+}
+
 impl Method for HarmonicBalance {
     fn name(&self) -> &'static str {
         NAME
@@ -166,6 +178,11 @@ impl Method for HarmonicBalance {
         let rigid = has_rigid(&coordinates);
         let velocity = coordinates.iter().any(|c| matches!(c.element, Element::Velocity(_)));
         let odd = system.is_odd();
+        let first = FIRST.max(highest);
+        let harmonics = kept(odd, self.harmonics.unwrap_or(first));
+        if Sparse::new(system, &coordinates, &[1]).is_none() {
+            check_size(2 * coordinates.len() * harmonics.len())?;
+        }
         Ok(Box::new(Balance {
             system,
             method: *self,
@@ -174,7 +191,7 @@ impl Method for HarmonicBalance {
             rigid,
             velocity,
             odd,
-            first: FIRST.max(highest),
+            first,
             judge: Judge::new(system),
             levels: BTreeMap::new(),
             last: None,
