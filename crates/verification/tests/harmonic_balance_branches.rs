@@ -77,7 +77,8 @@ fn figures_6_7_and_10_by_continuation() {
                 );
                 // a structure that only dissipates, with friction whose limit is constant, has one periodic motion at a frequency
                 assert!(branch.turns.is_empty());
-                assert!(branch.points.windows(2).all(|pair| pair[1].value - pair[0].value < TAU * 0.06));
+                // the corrector may go as far again as the step
+                assert!(branch.points.windows(2).all(|pair| pair[1].value - pair[0].value < TAU * 0.1));
                 let mut solver = method.solver(&system).unwrap();
                 for point in branch.points.iter().step_by(20) {
                     let alone = solver.orbit(point.value, None).unwrap();

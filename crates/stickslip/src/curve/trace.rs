@@ -86,7 +86,7 @@ impl Trace<'_> {
     /// assert_eq!(branch.peaks.len(), 1);
     /// ```
     pub fn branch(&self) -> Result<Branch, TraceError> {
-        let mut equations = BranchEquations::new(self.at, self.method, self.range.0)?;
+        let mut equations = BranchEquations::new(self.at, self.method, self.range)?;
         let start = equations.start(self.range.0)?;
         let steps = Steps::between(self.range.0, self.range.1, self.step);
         let mut points: Vec<TracePoint> = Vec::new();

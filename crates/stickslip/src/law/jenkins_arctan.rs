@@ -61,6 +61,17 @@ impl FrictionLaw for JenkinsArctan {
     }
 }
 
+impl JenkinsArctan {
+    /// The internal state at which the element carries `force`, N; forces beyond the limit count as just below it.
+    pub(crate) fn state(&self, force: f64) -> f64 {
+        let share = (force / self.limit).clamp(-BELOW, BELOW);
+        (share / FRAC_2_PI).tan().asinh()
+    }
+}
+
+/// The share of the limit that a force can have, but for rounding.
+const BELOW: f64 = 1.0 - 1e-12;
+
 impl RateLaw for JenkinsArctan {
     #[inline]
     fn states(&self) -> usize {

@@ -188,7 +188,7 @@ pub enum OrbitError {
     /// The series that the method may take is too short for the tolerance.
     #[error(
         "{method} reaches an estimated error of {estimate:.1e} at Ω = {omega:.4} rad/s with {harmonics} harmonics, not {tolerance:.1e}; \
-         raise `tolerance`, or use method `event-driven`"
+         raise `tolerance`, or use method `event-driven` (exact laws) or `shooting` (smooth ones)"
     )]
     Truncation {
         /// The method.
@@ -201,6 +201,17 @@ pub enum OrbitError {
         estimate: f64,
         /// The error that was allowed.
         tolerance: f64,
+    },
+    /// Nothing holds the structure against the mean of the forces, or only friction does.
+    #[error(
+        "{method} finds no motion at Ω = {omega:.4} rad/s that stays where it is: nothing but friction holds the structure against \
+         a mean force; add the spring that holds it, or use method `event-driven` if friction is enough"
+    )]
+    Drift {
+        /// The method.
+        method: &'static str,
+        /// Drive frequency, rad/s.
+        omega: f64,
     },
     /// The drive frequency is no positive finite number.
     #[error("the drive frequency must be positive and finite, found {omega} rad/s")]
@@ -218,6 +229,7 @@ impl OrbitError {
             OrbitError::Breakdown { .. } => "breakdown",
             OrbitError::Evidence { .. } => "evidence-fails",
             OrbitError::Truncation { .. } => "tolerance-not-reached",
+            OrbitError::Drift { .. } => "drifts",
             OrbitError::Frequency { .. } => "bad-frequency",
         }
     }

@@ -109,7 +109,8 @@ impl System {
                 || load.force.iter().chain(load.by_velocity.iter()).all(|z| *z == Complex64::new(0.0, 0.0))
         });
         let imposed = self.joints.iter().flat_map(|joint| &joint.imposed);
-        loads && imposed.clone().all(|(h, z)| !even(*h) || *z == Complex64::new(0.0, 0.0))
+        let moved = self.moved.iter().flat_map(|place| &place.motion);
+        loads && imposed.chain(moved).all(|(h, z)| !even(*h) || *z == Complex64::new(0.0, 0.0))
     }
 }
 

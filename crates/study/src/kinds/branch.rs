@@ -1,7 +1,7 @@
 //! Branches of orbits by arc length, along the drive frequency or along a design parameter, around turning points.
 
 use super::orbits::Inaccurate;
-use super::{Complaint, Computed, FREQUENCY, Kind};
+use super::{Complaint, Computed, FREQUENCY, HARMONICS, Kind, SERIES_SAMPLES, check_samples};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{Context, NOT_REACHED, Outcome, Prepared, Rows, Summary, display_unit};
 use crate::schema::{Takes, Within, default, optional};
@@ -13,10 +13,6 @@ use stickslip::curve::trace::{Branch, End, Trace, TraceError, TracePoint};
 use stickslip::dimension::Dimension;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::model::{Model, System};
-
-/// Harmonics and samples when none are given.
-const HARMONICS: u64 = 15;
-const SAMPLES: u64 = 1024;
 
 pub(super) const KIND: Kind = Kind {
     name: "branch",
@@ -69,13 +65,7 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
             "0.001 is a thousandth of the amplitude",
         ));
     }
-    let (harmonics, samples) =
-        (values.count("harmonics").unwrap_or(HARMONICS), values.count("samples").unwrap_or(SAMPLES));
-    if samples < 4 * (harmonics + 1) || samples % 2 == 1 {
-        let message = format!("{samples} samples are too few or odd for {harmonics} harmonics");
-        return Err(Complaint::new("samples", message, "write an even number, at least 4 (harmonics + 1)"));
-    }
-    Ok(())
+    check_samples(values)
 }
 
 /// A branch that was asked for.
@@ -159,7 +149,7 @@ fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
         }
         branches.push((prepared, along, branch));
     }
-    outcome.notes.extend(inaccurate.note());
+    outcome.notes.extend(inaccurate.notes());
     outcome.tables = vec![rows.table("branch"), peaks.table("peaks"), turns.table("turns")];
     outcome.figure = panel(&branches).into_iter().collect();
     Ok(outcome)
@@ -222,7 +212,7 @@ fn follow<'a>(study: &Study, group: &'a [Prepared], context: &Context<'_>) -> Fo
             at: &at,
             method: HarmonicBalance {
                 harmonics: Some(count("harmonics", HARMONICS)),
-                samples: Some(count("samples", SAMPLES)),
+                samples: Some(count("samples", SERIES_SAMPLES)),
                 tolerance: values.quantity("tolerance"),
             },
             range,

@@ -122,7 +122,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             }
         }
     }
-    outcome.notes.extend(inaccurate.note());
+    outcome.notes.extend(inaccurate.notes());
     outcome.tables = vec![table.table("loops"), summary.table("loops_summary")];
     outcome.figure = panels(cases, &loops, several);
     Ok(outcome)

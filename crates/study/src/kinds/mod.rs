@@ -80,6 +80,21 @@ impl Complaint {
 /// Most samples per period.
 const MOST_SAMPLES: i64 = 100_000;
 
+/// Harmonics and samples of the kinds that solve series of their own, when none are given.
+const HARMONICS: u64 = 15;
+const SERIES_SAMPLES: u64 = 1024;
+
+/// Whether such a kind has enough samples for its harmonics.
+fn check_samples(values: &Values) -> Result<(), Complaint> {
+    let harmonics = values.count("harmonics").unwrap_or(HARMONICS);
+    let samples = values.count("samples").unwrap_or(SERIES_SAMPLES);
+    if samples >= 4 * (harmonics + 1) && samples.is_multiple_of(2) {
+        return Ok(());
+    }
+    let message = format!("{samples} samples are too few or odd for {harmonics} harmonics");
+    Err(Complaint::new("samples", message, "write an even number, at least 4 (harmonics + 1)"))
+}
+
 /// The key `frequency` of the kinds that need a drive.
 const FREQUENCY: Key = required(
     "frequency",

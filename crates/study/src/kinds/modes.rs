@@ -1,6 +1,6 @@
 //! Nonlinear modes: frequency and equivalent damping over amplitude.
 
-use super::{Complaint, Computed, Kind};
+use super::{Complaint, Computed, HARMONICS, Kind, SERIES_SAMPLES, check_samples};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit};
 use crate::schema::{Key, Takes, Within, default, required};
@@ -51,6 +51,7 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     {
         return Err(Complaint::new("amplitude", "the range is empty", "`from` must be below `to`"));
     }
+    check_samples(values)?;
     let (number, masses) = (values.count("mode").unwrap_or(1), model.masses.len() as u64);
     if number > masses {
         let message = format!("there is no mode {number}: the structure has {masses}");
@@ -109,8 +110,8 @@ fn follow(prepared: &Prepared) -> Result<Mode, MethodError> {
             mode: number,
             range: (end("from") * unit, end("to") * unit),
             points: range.and_then(|t| t.count("points")).unwrap_or(61) as usize,
-            harmonics: values.count("harmonics").unwrap_or(15) as usize,
-            samples: values.count("samples").unwrap_or(1024) as usize,
+            harmonics: values.count("harmonics").unwrap_or(HARMONICS) as usize,
+            samples: values.count("samples").unwrap_or(SERIES_SAMPLES) as usize,
         },
     )
 }

@@ -74,7 +74,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             outcome.figure.extend(panels(prepared, &orbit, &times, &samples));
         }
     }
-    outcome.notes.extend(inaccurate.note());
+    outcome.notes.extend(inaccurate.notes());
     outcome.figure.truncate(MOST_PANELS);
     outcome.tables = vec![motion.table("orbit"), summary.table("orbits"), multipliers.table("multipliers")];
     Ok(outcome)

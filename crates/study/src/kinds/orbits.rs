@@ -25,38 +25,48 @@ pub(super) fn all(cases: &[Prepared], context: &Context<'_>) -> Vec<Vec<Point>> 
         .collect()
 }
 
-/// Points whose series is too short.
+/// Points whose series is too short, or was not compared with a longer one.
 #[derive(Default)]
 pub(super) struct Inaccurate {
-    points: usize,
+    truncated: usize,
     largest: f64,
+    unchecked: usize,
 }
 
 impl Inaccurate {
     pub fn add(&mut self, orbit: &Orbit) {
-        if orbit.evidence.accuracy == Accuracy::Truncated {
-            self.count(orbit.evidence.truncation.unwrap_or(0.0));
-        }
+        self.count(orbit.evidence.accuracy.status(), orbit.evidence.truncation.unwrap_or(0.0));
     }
 
-    /// A point with this estimated error, beyond its tolerance.
-    pub fn count(&mut self, estimate: f64) {
-        self.points += 1;
-        self.largest = self.largest.max(estimate);
+    /// A point with this status and estimated error.
+    pub fn count(&mut self, status: &str, estimate: f64) {
+        if status == Accuracy::Truncated.status() {
+            self.truncated += 1;
+            self.largest = self.largest.max(estimate);
+        }
+        self.unchecked += usize::from(status == Accuracy::Unchecked.status());
     }
 
     /// What the reader has to know about them.
-    pub fn note(&self) -> Option<String> {
-        (self.points > 0).then(|| {
+    pub fn notes(&self) -> Vec<String> {
+        let points = |count: usize| format!("{count} point{}", if count == 1 { "" } else { "s" });
+        let truncated = (self.truncated > 0).then(|| {
             format!(
-                "At {} point{} the series is too short: its estimated error is beyond the `tolerance` of the method, and up to {:.1e}. \
-                 Leave `harmonics` out or raise it, raise `tolerance` if that is good enough, or use `event-driven` \
-                 where the laws are exact.",
-                self.points,
-                if self.points == 1 { "" } else { "s" },
+                "At {} the series is too short: its estimated error is beyond the `tolerance` of the method, and up to {:.1e}. \
+                 Leave `harmonics` out or raise it, raise `tolerance` if that is good enough, or use `event-driven` where the laws \
+                 are exact.",
+                points(self.truncated),
                 self.largest
             )
-        })
+        });
+        let unchecked = (self.unchecked > 0).then(|| {
+            format!(
+                "At {} nothing is known of the error of the series: the longer one that tells it has too many unknowns or was not found. \
+                 Try fewer `harmonics`.",
+                points(self.unchecked)
+            )
+        });
+        truncated.into_iter().chain(unchecked).collect()
     }
 }
 

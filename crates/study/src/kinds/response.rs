@@ -11,7 +11,6 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 use stickslip::curve::peak::{Peak, highest};
 use stickslip::curve::sweep::sweep;
-use stickslip::orbit::Accuracy;
 
 pub(super) const KIND: Kind = Kind {
     name: "response",
@@ -56,9 +55,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
                 continue;
             }
             stuck += usize::from(row.stuck);
-            if row.status == Accuracy::Truncated.status() {
-                inaccurate.count(row.truncation);
-            }
+            inaccurate.count(&row.status, row.truncation);
             rows.varied(&prepared.case);
             rows.number("frequency_Hz", omega / TAU);
             row.write(&prepared.system, truncated, &mut rows);
@@ -82,7 +79,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             peaks.end();
         }
     }
-    outcome.notes.extend(inaccurate.note());
+    outcome.notes.extend(inaccurate.notes());
     outcome.tables.push(rows.table("curve"));
     if curves.iter().any(|curve| !curve.peaks.is_empty()) {
         outcome.tables.push(peaks.table("peaks"));

@@ -4,7 +4,7 @@ use super::joints::Coordinate;
 use super::judge::Judge;
 use super::rest::Rest;
 use super::solve::{Level, Motion, transfer};
-use super::{HarmonicBalance, LARGEST, TOLERANCE, estimate, has_rigid, highest_excitation, kept, path};
+use super::{Compared, HarmonicBalance, Kept, LARGEST, TOLERANCE, above, estimate, path};
 use crate::method::guess::Guess;
 use crate::method::{MethodError, OrbitError};
 use crate::model::System;
@@ -14,7 +14,8 @@ use stickslip_numerics::continuation::Equations;
 
 /// Harmonics when none are given.
 const HARMONICS: usize = 15;
-/// Step of the difference with respect to the parameter, relative to it: the cube root of rounding, for central differences.
+/// Step of the difference with respect to the parameter, relative to it or to its range, the larger of the two: near the cube root of
+/// rounding, for central differences.
 const DIFFERENCE: f64 = 1e-6;
 
 /// Newton iterations for the solution that tells the error.
@@ -28,6 +29,7 @@ pub(crate) struct BranchEquations<'a> {
     system: System,
     omega: f64,
     value: f64,
+    span: f64,
     coordinates: Vec<Coordinate>,
     rest: Rest,
     rest_of: System,
@@ -39,23 +41,28 @@ pub(crate) struct BranchEquations<'a> {
     /// Unit of motions, m.
     length: f64,
     judge: Judge,
-    odd: bool,
+    kept: Kept,
 }
 
 impl<'a> BranchEquations<'a> {
-    pub fn new(at: &'a dyn Fn(f64) -> (System, f64), method: HarmonicBalance, value: f64) -> Result<Self, MethodError> {
-        let (system, omega) = at(value);
-        let highest = highest_excitation(&system);
-        method.check(highest)?;
-        let top = method.harmonics.unwrap_or(HARMONICS.max(highest));
+    /// Along a range that begins at `range.0`.
+    pub fn new(
+        at: &'a dyn Fn(f64) -> (System, f64),
+        method: HarmonicBalance,
+        range: (f64, f64),
+    ) -> Result<Self, MethodError> {
+        let (system, omega) = at(range.0);
+        // a force that is zero at the first value may not be so later
+        let kept = Kept::new(&system, |_| true);
+        method.check(kept.highest)?;
+        let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
         let coordinates = super::joints::coordinates(&system)?;
         let rest = Rest::new(&system, &coordinates);
-        let odd = system.is_odd();
         let method = HarmonicBalance { harmonics: Some(top), ..method };
-        let level = |top: usize| Level::new(kept(odd, top), method.samples_at(top), coordinates.len(), None);
-        super::check_size(2 * coordinates.len() * kept(odd, top).len())?;
-        let few = 2 * coordinates.len() * kept(odd, 2 * top + 1).len() <= LARGEST;
-        let (finer, level) = (few.then(|| level(2 * top + 1)), level(top));
+        let level = |top: usize| Level::new(kept.up_to(top), method.samples_at(top), coordinates.len(), None);
+        super::check_size(2 * coordinates.len() * kept.up_to(top).len())?;
+        let few = 2 * coordinates.len() * kept.up_to(kept.double(top)).len() <= LARGEST;
+        let (finer, level) = (few.then(|| level(kept.double(top))), level(top));
         let motion = Motion::rest(level.linear.len());
         Ok(BranchEquations {
             at,
@@ -64,6 +71,7 @@ impl<'a> BranchEquations<'a> {
             system,
             omega,
             value: f64::NAN,
+            span: (range.1 - range.0).abs(),
             coordinates,
             rest,
             level,
@@ -71,7 +79,7 @@ impl<'a> BranchEquations<'a> {
             tolerance: method.tolerance.unwrap_or(TOLERANCE),
             motion,
             length: 1.0,
-            odd,
+            kept,
         })
     }
 
@@ -144,19 +152,21 @@ impl<'a> BranchEquations<'a> {
             let mut motion = start;
             finer.polish(&self.coordinates, self.omega, &mut motion, CHECK).ok()?;
             let better = path::places(finer, &self.rest, self.omega, &motion);
-            let rigid = has_rigid(&self.coordinates);
-            Some(estimate(rigid, (self.level.harmonics(), &places), (finer.harmonics(), &better)))
+            let above = above(finer, &self.rest, &self.coordinates, self.kept, self.omega, &motion);
+            let coarse = Compared { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
+            let fine = Compared { harmonics: finer.harmonics(), places: &better, along: &motion.c };
+            Some(estimate(&self.coordinates, &coarse, &fine, &above))
         });
         let context = path::Context {
             system: &self.system,
             coordinates: &self.coordinates,
             omega: self.omega,
-            odd: self.odd,
+            odd: self.kept.half_period(),
             truncation,
             tolerance: self.tolerance,
             judge: Some(&mut self.judge),
         };
-        Some(path::orbit(context, &mut self.level, &self.motion, places))
+        path::orbit(context, &mut self.level, &self.motion, places)
     }
 
     /// The orbit at `value` that Newton's method finds from the point `x` nearby.
@@ -179,7 +189,7 @@ impl Equations for BranchEquations<'_> {
         if !p.is_finite() || x.iter().any(|x| !x.is_finite()) {
             return false;
         }
-        let step = DIFFERENCE * p.abs().max(f64::MIN_POSITIVE);
+        let step = DIFFERENCE * p.abs().max(self.span);
         for (sign, at) in [(1.0, p + step), (-1.0, p - step)] {
             if !self.set(at) {
                 return false;

@@ -12,6 +12,7 @@
 
 use crate::law::Rate;
 use crate::method::MethodError;
+use crate::method::smooth::path::SLIPS_ABOVE;
 use crate::model::System;
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
@@ -376,6 +377,16 @@ impl Alternation {
         self.sticks.extend(open);
     }
 
+    /// Any harmonics below half of the samples of the force that was sampled last.
+    pub fn add_harmonics(&mut self, wanted: &[usize], mut add: impl FnMut(usize, Complex64)) {
+        let n = self.samples();
+        self.work.copy_from_slice(&self.force);
+        let sums = self.fourier.sums(&mut self.work);
+        for (k, &h) in wanted.iter().enumerate().filter(|(_, h)| 2 * **h < n) {
+            add(k, sums[h] * 2.0 / n as f64);
+        }
+    }
+
     /// Adds the harmonics of the sampled force.
     fn add_force(&mut self, force: &mut [Complex64]) {
         let n = self.samples();
@@ -489,7 +500,7 @@ struct Mean {
     slope: f64,
     slope_first: f64,
     slope_second: f64,
-    /// The contact counts as slipping: at its limit, or for the arctangent above half of it, where `alpha v` exceeds one.
+    /// The contact counts as slipping: at its limit, or for the arctangent above [`SLIPS_ABOVE`] of it.
     slips: bool,
 }
 
@@ -510,7 +521,7 @@ impl Mean {
         if at + reach <= 1.0 {
             return Mean::linear(y, e);
         }
-        let mut mean = if reach <= 1.0 - at + 2.0 * (at.min(1.0)) && at - reach >= -1.0 {
+        let mut mean = if at - reach >= -1.0 {
             // only the upper end of the ramp lies within the sample, at ξ = t
             let t = ((1.0 - at) / reach).clamp(-1.0, 1.0);
             Mean {
@@ -549,7 +560,7 @@ impl Mean {
     #[inline]
     fn arctangent(y: f64, e: f64) -> Mean {
         let reach = e.abs();
-        let slips = y.abs() > 1.0;
+        let slips = y.abs() >= (SLIPS_ABOVE / FRAC_2_PI).tan();
         if reach == 0.0 {
             return Mean { zeroth: y.atan(), slope: 1.0 / (1.0 + y * y), slips, ..Mean::default() };
         }
@@ -581,10 +592,10 @@ impl Mean {
     fn resolvent(y: f64, e: f64, steepness: f64) -> Mean {
         if e == 0.0 {
             let (zeroth, slope) = resolve(y, steepness);
-            return Mean { zeroth, slope, slips: zeroth.abs() > 0.5, ..Mean::default() };
+            return Mean { zeroth, slope, slips: zeroth.abs() >= SLIPS_ABOVE, ..Mean::default() };
         }
         let mean = Mean::quadrature(y, e, |y| resolve(y, steepness));
-        Mean { slips: mean.zeroth.abs() > 0.5, ..mean }
+        Mean { slips: mean.zeroth.abs() >= SLIPS_ABOVE, ..mean }
     }
 
     /// By quadrature of g and g'.

@@ -171,15 +171,13 @@ impl Method for HarmonicBalance {
         NAME
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        let highest = highest_excitation(system);
-        self.check(highest)?;
+        let kept = Kept::new(system, |z| z != Complex64::new(0.0, 0.0));
+        self.check(kept.highest)?;
         let coordinates = joints::coordinates(system)?;
         let rest = Rest::new(system, &coordinates);
-        let rigid = has_rigid(&coordinates);
         let velocity = coordinates.iter().any(|c| matches!(c.element, Element::Velocity(_)));
-        let odd = system.is_odd();
-        let first = FIRST.max(highest);
-        let harmonics = kept(odd, self.harmonics.unwrap_or(first));
+        let first = (FIRST * kept.unit).max(kept.highest);
+        let harmonics = kept.up_to(self.harmonics.unwrap_or(first));
         if Sparse::new(system, &coordinates, &[1]).is_none() {
             check_size(2 * coordinates.len() * harmonics.len())?;
         }
@@ -188,9 +186,8 @@ impl Method for HarmonicBalance {
             method: *self,
             coordinates,
             rest,
-            rigid,
             velocity,
-            odd,
+            kept,
             first,
             judge: Judge::new(system),
             levels: BTreeMap::new(),
@@ -199,37 +196,108 @@ impl Method for HarmonicBalance {
     }
 }
 
-fn highest_excitation(system: &System) -> usize {
-    let loads = system.loads.iter().map(|load| load.harmonic);
-    let imposed = system.joints.iter().flat_map(|joint| joint.imposed.iter().map(|(h, _)| *h));
-    let moved = system.moved.iter().flat_map(|place| place.motion.iter().map(|(h, _)| *h));
-    loads.chain(imposed).chain(moved).max().unwrap_or(0) as usize
+/// Which harmonics the motion has: the multiples of `unit`, the greatest common divisor of the excitation's, and of these the odd ones if
+/// the excitation has no others. Any other would be found zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Kept {
+    unit: usize,
+    odd: bool,
+    /// The excitation's highest.
+    highest: usize,
 }
 
-/// The harmonics that are kept up to `top`.
-fn kept(odd: bool, top: usize) -> Vec<usize> {
-    if odd { (1..=top).step_by(2).collect() } else { (0..=top).collect() }
+impl Kept {
+    /// By the harmonics of the excitation that `counts` accepts, by their amplitudes.
+    fn new(system: &System, counts: impl Fn(Complex64) -> bool) -> Self {
+        let loads = system
+            .loads
+            .iter()
+            .filter(|load| load.force.iter().chain(load.by_velocity.iter()).any(|z| counts(*z)))
+            .map(|load| load.harmonic);
+        let imposed = system.joints.iter().flat_map(|joint| &joint.imposed);
+        let moved = system.moved.iter().flat_map(|place| &place.motion);
+        let motions = imposed.chain(moved).filter(|(_, z)| counts(*z)).map(|(h, _)| *h);
+        let present: Vec<usize> = loads.chain(motions).map(|h| h as usize).collect();
+        let unit = present.iter().fold(0, |a, &b| common_divisor(a, b)).max(1);
+        let highest = present.iter().copied().max().unwrap_or(0);
+        Kept { unit, odd: present.iter().all(|h| (h / unit) % 2 == 1), highest }
+    }
+
+    /// The harmonics up to `top`.
+    fn up_to(self, top: usize) -> Vec<usize> {
+        let first = if self.odd { self.unit } else { 0 };
+        (first..=top.max(first)).step_by(if self.odd { 2 * self.unit } else { self.unit }).collect()
+    }
+
+    fn has(self, h: usize) -> bool {
+        h.is_multiple_of(self.unit) && !(self.odd && (h / self.unit).is_multiple_of(2))
+    }
+
+    /// Twice as many.
+    fn double(self, top: usize) -> usize {
+        2 * top + self.unit
+    }
+
+    /// The motion changes its sign after half a period.
+    fn half_period(self) -> bool {
+        self.odd && self.unit % 2 == 1
+    }
 }
 
-/// The error of a motion by a finer one, both as harmonics and, per harmonic, the motions of the places: their distance, as the largest of
-/// the places, relative to the largest motion of a place, without means, times the share that the finer one may be off itself.
-fn estimate(
-    rigid: bool,
-    (few, coarse): (&[usize], &[DVector<Complex64>]),
-    (many, fine): (&[usize], &[DVector<Complex64>]),
-) -> f64 {
+fn common_divisor(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { common_divisor(b, a % b) }
+}
+
+/// A motion for the comparison with a finer one: its harmonics and, per harmonic, the motions of the places and of the coordinates.
+struct Compared<'a> {
+    harmonics: &'a [usize],
+    places: &'a [DVector<Complex64>],
+    along: &'a [Complex64],
+}
+
+/// The error of a motion by a finer one: their distance, as the largest of the places and of the inner sliders behind springs, relative to
+/// the largest of these motions, without means, times the share that the finer one may be off itself. `above` is what the finer one lacks
+/// at resonances beyond its own harmonics, per harmonic and place.
+fn estimate(coordinates: &[Coordinate], coarse: &Compared, fine: &Compared, above: &[DVector<Complex64>]) -> f64 {
     let (mut distance, mut size) = (0.0f64, 0.0f64);
-    for i in 0..fine.first().map_or(0, |x| x.len()) {
-        let (mut d, mut s) = (0.0, 0.0);
-        for (h, y) in many.iter().zip(fine).filter(|(h, _)| **h > 0) {
-            let x = few.binary_search(h).map_or(Complex64::new(0.0, 0.0), |l| coarse[l][i]);
-            d += (x - y[i]).norm_sqr();
-            s += y[i].norm_sqr();
+    let mut compare = |coarse_at: &dyn Fn(usize) -> Complex64, fine_at: &dyn Fn(usize) -> Complex64, missing: f64| {
+        let (mut d, mut s) = (missing, missing);
+        for (k, h) in fine.harmonics.iter().enumerate().filter(|(_, h)| **h > 0) {
+            let x = coarse.harmonics.binary_search(h).map_or(Complex64::new(0.0, 0.0), coarse_at);
+            d += (x - fine_at(k)).norm_sqr();
+            s += fine_at(k).norm_sqr();
         }
         (distance, size) = (distance.max(d), size.max(s));
+    };
+    for i in 0..fine.places.first().map_or(0, |x| x.len()) {
+        let missing = above.iter().map(|x| x[i].norm_sqr()).sum();
+        compare(&|k| coarse.places[k][i], &|k| fine.places[k][i], missing);
     }
-    let share = if rigid { RIGID_SHARE } else { 1.0 };
+    let (few, many) = (coarse.harmonics.len(), fine.harmonics.len());
+    for (q, _) in coordinates.iter().enumerate().filter(|(_, coordinate)| coordinate.series > 0.0) {
+        compare(&|k| coarse.along[q * few + k], &|k| fine.along[q * many + k], 0.0);
+    }
+    let share = if has_rigid(coordinates) { RIGID_SHARE } else { 1.0 };
     if size > 0.0 { share * (distance / size).sqrt() } else { 0.0 }
+}
+
+/// What a solution lacks at the resonances above its harmonics: the motions of the places there, under the forces that it has.
+fn above(
+    level: &mut Level,
+    rest: &Rest,
+    coordinates: &[Coordinate],
+    kept: Kept,
+    omega: f64,
+    motion: &Motion,
+) -> Vec<DVector<Complex64>> {
+    let top = *level.harmonics().last().expect("a series has harmonics");
+    let mut wanted = rest.resonances_above(top, omega);
+    wanted.retain(|h| kept.has(*h));
+    if wanted.is_empty() {
+        return Vec::new();
+    }
+    let forces = level.forces_at(coordinates, omega, motion, &wanted);
+    wanted.iter().zip(&forces).map(|(h, forces)| rest.respond(*h, omega, &rest.spread(|q| forces[q]))).collect()
 }
 
 /// Whether there is rigid friction.
@@ -242,10 +310,9 @@ struct Balance<'a> {
     method: HarmonicBalance,
     coordinates: Vec<Coordinate>,
     rest: Rest,
-    /// There is rigid friction, and a law of velocity at all.
-    rigid: bool,
+    /// There is a law of velocity.
     velocity: bool,
-    odd: bool,
+    kept: Kept,
     first: usize,
     judge: Judge,
     levels: BTreeMap<usize, Level>,
@@ -256,7 +323,7 @@ struct Balance<'a> {
 impl Balance<'_> {
     /// The level of highest harmonic `top`, ready for `omega`.
     fn level(&mut self, top: usize, omega: f64) -> &mut Level {
-        let harmonics = kept(self.odd, top);
+        let harmonics = self.kept.up_to(top);
         let samples = self.method.samples_at(top);
         let count = self.coordinates.len();
         let (system, coordinates) = (self.system, &self.coordinates);
@@ -269,7 +336,7 @@ impl Balance<'_> {
     }
 
     fn unknowns(&self, top: usize) -> usize {
-        2 * self.coordinates.len() * kept(self.odd, top).len()
+        2 * self.coordinates.len() * self.kept.up_to(top).len()
     }
 
     /// Solves at `top`, from a motion at another number of harmonics or from the first guess.
@@ -280,7 +347,7 @@ impl Balance<'_> {
                 let coordinates = self.coordinates.len();
                 solve::transfer(motion, &harmonics, self.level(top, omega).harmonics(), coordinates)
             }
-            None if self.velocity && top > COLD && top / 2 >= self.first => {
+            None if self.velocity && top > COLD * self.kept.unit && top / 2 >= self.first => {
                 let coarse = self.solve(top / 2, omega, None)?;
                 return self.solve(top, omega, Some((top / 2, &coarse)));
             }
@@ -311,20 +378,20 @@ impl Balance<'_> {
         motion: Motion,
         x: Vec<DVector<Complex64>>,
         truncation: Option<f64>,
-    ) -> Orbit {
+    ) -> Result<Orbit, OrbitError> {
         let context = path::Context {
             system: self.system,
             coordinates: &self.coordinates,
             omega,
-            odd: self.odd,
+            odd: self.kept.half_period(),
             truncation,
             tolerance: self.method.tolerance.unwrap_or(TOLERANCE),
             judge: Some(&mut self.judge),
         };
         let level = self.levels.get_mut(&top).expect("solved");
-        let orbit = path::orbit(context, level, &motion, x);
+        let orbit = path::orbit(context, level, &motion, x).ok_or(OrbitError::Drift { method: NAME, omega })?;
         self.last = Some((orbit.start.clone(), top, motion));
-        orbit
+        Ok(orbit)
     }
 
     /// The user's number of harmonics, with an estimate of its error.
@@ -332,9 +399,9 @@ impl Balance<'_> {
         let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(omega, l))?;
         let x = self.places(top, omega, &motion);
         let sparse = self.levels[&top].sparse.is_some();
-        let known = sparse || self.unknowns(2 * top + 1) <= LARGEST;
+        let known = sparse || self.unknowns(self.kept.double(top)) <= LARGEST;
         let truncation = if known { self.compare(top, omega, &motion, &x).ok().map(|(error, ..)| error) } else { None };
-        Ok(self.finish(top, omega, motion, x, truncation))
+        self.finish(top, omega, motion, x, truncation)
     }
 
     /// Error of `motion` by one with twice the harmonics, which is returned too.
@@ -345,11 +412,14 @@ impl Balance<'_> {
         motion: &Motion,
         x: &[DVector<Complex64>],
     ) -> Result<(f64, Motion, Vec<DVector<Complex64>>), Lost> {
-        let double = 2 * top + 1;
+        let double = self.kept.double(top);
         let better = self.solve(double, omega, Some((top, motion)))?;
         let y = self.places(double, omega, &better);
-        let harmonics = |top: usize| self.levels[&top].harmonics();
-        Ok((estimate(self.rigid, (harmonics(top), x), (harmonics(double), &y)), better, y))
+        let finer = self.levels.get_mut(&double).expect("solved");
+        let above = above(finer, &self.rest, &self.coordinates, self.kept, omega, &better);
+        let coarse = Compared { harmonics: self.levels[&top].harmonics(), places: x, along: &motion.c };
+        let fine = Compared { harmonics: self.levels[&double].harmonics(), places: &y, along: &better.c };
+        Ok((estimate(&self.coordinates, &coarse, &fine, &above), better, y))
     }
 
     /// As many harmonics as the tolerance needs. The solution that is returned is not the finest that was found, but the one whose error
@@ -360,15 +430,18 @@ impl Balance<'_> {
         let mut motion =
             self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(omega, l))?;
         let mut x = self.places(top, omega, &motion);
-        let mut estimate = f64::INFINITY;
-        while top <= MOST && self.unknowns(2 * top + 1) <= LARGEST {
+        // nothing is known of the error until two solutions can be compared
+        let (mut checked, mut estimate) = (top, 1.0);
+        let sparse = self.levels[&top].sparse.is_some();
+        while top <= MOST * self.kept.unit && (sparse || self.unknowns(self.kept.double(top)) <= LARGEST) {
             let (error, finer, y) = self.compare(top, omega, &motion, &x).map_err(|l| self.lost(omega, l))?;
             if error <= tolerance {
-                return Ok(self.finish(top, omega, motion, x, Some(error)));
+                return self.finish(top, omega, motion, x, Some(error));
             }
-            (top, motion, x, estimate) = (2 * top + 1, finer, y, error);
+            (checked, estimate) = (top, error);
+            (top, motion, x) = (self.kept.double(top), finer, y);
         }
-        Err(OrbitError::Truncation { method: NAME, omega, harmonics: top / 2, estimate, tolerance })
+        Err(OrbitError::Truncation { method: NAME, omega, harmonics: checked, estimate, tolerance })
     }
 }
 

@@ -4,6 +4,7 @@ use super::joints::{Alternation, Coordinate, Element};
 use super::judge::Judge;
 use super::rest::Rest;
 use super::solve::{Level, Motion};
+use crate::law::Rate;
 use crate::method::Contact;
 use crate::model::{MovedPlace, System};
 use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
@@ -32,6 +33,34 @@ pub(super) fn places(level: &mut Level, rest: &Rest, omega: f64, motion: &Motion
         .collect()
 }
 
+/// Share of the mean forces that may be left over: a direction that nothing holds was given a spring to have a mean position at all, and
+/// what that spring carries is missing elsewhere.
+const UNHELD: f64 = 1e-6;
+
+/// Whether the mean forces balance without the springs that hold free directions.
+pub(super) fn stays(context: &Context, level: &Level, motion: &Motion, x: &[DVector<Complex64>]) -> bool {
+    let (system, nh) = (context.system, level.harmonics().len());
+    if level.harmonics()[0] != 0 {
+        return true;
+    }
+    let excitation = system.excitation(context.omega);
+    let mut left = excitation
+        .iter()
+        .find(|(h, _)| *h == 0)
+        .map_or_else(|| DVector::from_element(system.dofs(), ZERO), |(_, load)| load.clone());
+    let mut size = left.norm();
+    for (q, coordinate) in context.coordinates.iter().enumerate() {
+        let force = motion.force[q * nh].re;
+        let direction = system.joints[coordinate.joint].direction.column(0);
+        left -= direction.map(|w| Complex64::new(w * force, 0.0));
+        size += direction.norm() * force.abs();
+    }
+    let held = &system.stiffness * x[0].map(|z| z.re);
+    // positions far away have forces that are rounding
+    let rounding = f64::EPSILON * system.stiffness.amax() * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+    (left.map(|z| z.re) - held).norm() <= UNHELD * size + 1e3 * rounding
+}
+
 #[derive(Debug, Clone)]
 struct Series {
     system: System,
@@ -56,7 +85,11 @@ pub(super) struct Context<'a> {
 }
 
 /// Makes the orbit.
-pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec<DVector<Complex64>>) -> Orbit {
+/// `None` if it does not stay where it is.
+pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec<DVector<Complex64>>) -> Option<Orbit> {
+    if !stays(&context, level, motion, &x) {
+        return None;
+    }
     let Context { system, coordinates, omega, odd, truncation, tolerance, judge } = context;
     let (n, nh) = (system.dofs(), level.harmonics().len());
     let harmonics = level.harmonics().to_vec();
@@ -92,6 +125,9 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
                 }
                 Element::Velocity(law) => {
                     level.apply(*law, q, omega, motion);
+                    if let Some(Rate::JenkinsArctan(law)) = joint.law.rate() {
+                        elastic_states.push(law.state((0..nh).map(|k| f[k].re).sum()));
+                    }
                     add(&level.alternation);
                 }
             }
@@ -134,7 +170,7 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
     start.extend(elastic_states);
     let return_map = judge.map_or_else(|| DMatrix::zeros(0, 0), |judge| judge.derivative(system, omega, odd, &start));
-    Orbit {
+    Some(Orbit {
         method: super::NAME,
         omega,
         symmetry: if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod },
@@ -157,7 +193,7 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
         energy,
         return_map,
         path: Arc::new(Series { system: system.clone(), omega, harmonics, x, force, contact }),
-    }
+    })
 }
 
 /// Work below this fraction of what the loads could do is no yardstick for the energy gap: the motion is conservative.

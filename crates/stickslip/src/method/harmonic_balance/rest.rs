@@ -14,7 +14,10 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// A direction that nothing holds gets, for its mean position only, a spring that makes it as slow as this fraction of the drive
 /// frequency: its mean is arbitrary otherwise. The motion changes by the square of it.
-const HOLD: f64 = 1e-5;
+pub(super) const HOLD: f64 = 1e-5;
+
+/// Harmonics that nobody samples.
+const HIGHEST: f64 = 1e6;
 
 /// Receptance of the structure without its joints.
 #[derive(Debug, Clone)]
@@ -61,8 +64,12 @@ impl Rest {
 
     /// Displacements along the coordinates under unit forces along them, at `s = jhΩ`, q × q, m/N.
     pub fn receptance(&self, harmonic: usize, omega: f64) -> DMatrix<Complex64> {
+        self.receptance_at(Complex64::new(0.0, harmonic as f64 * omega), omega)
+    }
+
+    /// The same at any `s`; on the positive real axis it has no resonances.
+    pub fn receptance_at(&self, s: Complex64, omega: f64) -> DMatrix<Complex64> {
         let q = self.direction.ncols();
-        let s = Complex64::new(0.0, harmonic as f64 * omega);
         let Some(modal) = &self.modal else {
             let Some(inverse) = self.dynamic(s).try_inverse() else { return DMatrix::from_element(q, q, ZERO) };
             let direction = self.direction.map(|w| Complex64::new(w, 0.0));
@@ -116,6 +123,20 @@ impl Rest {
             }
         }
         x
+    }
+
+    /// The harmonics next to the resonances above harmonic `top`.
+    pub fn resonances_above(&self, top: usize, omega: f64) -> Vec<usize> {
+        let lambda = self.modal.iter().flat_map(|modal| &modal.lambda);
+        let mut found: Vec<usize> = lambda
+            .map(|lambda| (lambda.im.abs() / omega).floor())
+            .filter(|h| *h < HIGHEST)
+            .flat_map(|h| [h as usize, h as usize + 1])
+            .filter(|h| *h > top)
+            .collect();
+        found.sort_unstable();
+        found.dedup();
+        found
     }
 
     /// `W f`: forces on all places from forces along the coordinates.

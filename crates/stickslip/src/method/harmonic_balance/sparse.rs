@@ -6,6 +6,7 @@
 //! `(1 - T) δλ + ε T D Wᵀ y = r`.
 
 use super::joints::{Coordinate, Element};
+use super::rest::HOLD;
 use super::solve::stay;
 use crate::model::System;
 use num_complex::Complex64;
@@ -38,6 +39,8 @@ pub(super) struct Sparse {
     /// Z per harmonic, factored.
     factors: Vec<Banded>,
     tangent: Banded,
+    /// The structure at a real rate.
+    smooth: Banded,
     right: Vec<f64>,
     whole: Vec<f64>,
 }
@@ -98,6 +101,7 @@ impl Sparse {
             harmonics: harmonics.iter().map(|h| *h as f64).collect(),
             omega: 0.0,
             factors: vec![Banded::new(2 * whole, 2 * band + 1); nh],
+            smooth: Banded::new(whole, band),
             tangent: Banded::new(2 * whole * nh, (band + 1) * 2 * nh - 1),
             right: vec![0.0; 2 * whole],
             whole: vec![0.0; 2 * whole * nh],
@@ -112,7 +116,9 @@ impl Sparse {
             let rate = self.harmonics[k] * omega;
             for &(i, l, [m, c, s]) in &self.entries {
                 let (row, column) = (2 * self.position[i], 2 * self.position[l]);
-                let z = Complex64::new(s - rate * rate * m, rate * c);
+                // a direction that nothing holds has a mean position by the spring that the dense form gives it
+                let hold = if rate == 0.0 { (HOLD * omega).powi(2) } else { 0.0 };
+                let z = Complex64::new(s - rate * rate * m + hold * m, rate * c);
                 factor.add(row, column, z.re);
                 factor.add(row, column + 1, -z.im);
                 factor.add(row + 1, column, z.im);
@@ -165,16 +171,29 @@ impl Sparse {
         }
     }
 
-    /// Receptance of coordinate `q` at harmonic number `k`, m/N.
-    pub fn own(&mut self, k: usize, q: usize) -> f64 {
-        let mut own = 0.0;
-        let unit = |p: usize| Complex64::new(if p == q { 1.0 } else { 0.0 }, 0.0);
-        self.receive(k, unit, |p, u| {
-            if p == q {
-                own = u.norm();
-            }
-        });
-        own
+    /// Receptances of the coordinates at the real rate `s`, 1/s, where there are no resonances, m/N.
+    pub fn own_at(&mut self, s: f64) -> Vec<f64> {
+        self.smooth.clear();
+        for &(i, l, [mass, damping, stiffness]) in &self.entries {
+            let value = stiffness + s * damping + s * s * mass;
+            self.smooth.add(self.position[i], self.position[l], value);
+        }
+        for &force in self.forces.iter().flatten() {
+            self.smooth.add(self.position[force], self.position[force], 1.0);
+        }
+        if !self.smooth.factor() {
+            return vec![0.0; self.ends.len()];
+        }
+        let mut right = vec![0.0; self.position.len()];
+        self.ends
+            .iter()
+            .map(|ends| {
+                right.fill(0.0);
+                ends.iter().for_each(|&(i, w)| right[self.position[i]] += w);
+                self.smooth.solve(&mut right);
+                ends.iter().map(|&(i, w)| w * right[self.position[i]]).sum()
+            })
+            .collect()
     }
 
     /// Replaces the residual by the Newton step; `tangents` holds K or T, one block per coordinate. False if it is singular.
@@ -186,7 +205,8 @@ impl Sparse {
             for k in 0..nh {
                 let rate = self.harmonics[k] * self.omega;
                 let (row, column) = (self.position[i] * size + 2 * k, self.position[l] * size + 2 * k);
-                let z = Complex64::new(s - rate * rate * m, rate * c);
+                let hold = if rate == 0.0 { (HOLD * self.omega).powi(2) } else { 0.0 };
+                let z = Complex64::new(s - rate * rate * m + hold * m, rate * c);
                 self.tangent.add(row, column, z.re);
                 self.tangent.add(row, column + 1, -z.im);
                 self.tangent.add(row + 1, column, z.im);

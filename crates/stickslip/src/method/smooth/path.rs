@@ -13,7 +13,7 @@ use stickslip_numerics::radau::{C, quintic};
 use super::step::{LawPoint, Structure};
 
 /// A smooth joint counts as slipping while its force is above this fraction of its limit: a smooth law never quite sticks.
-const SLIPS_ABOVE: f64 = 0.95;
+pub(crate) const SLIPS_ABOVE: f64 = 0.95;
 /// Turning points are refined until the step in time is below this fraction of the integration step.
 const REFINED: f64 = 1e-12;
 

@@ -1,0 +1,159 @@
+//! Harmonic balance at the edges of what it can do: what it must find, and what it must refuse.
+
+use std::f64::consts::TAU;
+use stickslip::law::{Coulomb, Jenkins, JenkinsArctan, Law};
+use stickslip::method::shooting::Shooting;
+use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System};
+use stickslip::orbit::{Accuracy, Orbit};
+
+fn mass(name: &str, mass: f64) -> Mass {
+    Mass { name: name.into(), mass }
+}
+
+fn spring(a: &str, b: &str, stiffness: f64, damping: f64) -> Spring {
+    Spring { between: [a.into(), b.into()], stiffness, damping }
+}
+
+fn joint(a: &str, b: &str, law: Law) -> Joint {
+    Joint { name: "joint".into(), between: [a.into(), b.into()], law }
+}
+
+fn force(on: &str, amplitude: f64, harmonic: u32) -> Force {
+    Force { on: on.into(), amplitude, phase: 0.0, harmonic }
+}
+
+fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
+    method.solver(system).unwrap().orbit(omega, None).unwrap()
+}
+
+/// The amplitudes of both methods agree within three times the reported error, which is within the tolerance.
+fn agrees(model: &Model, omega: f64) {
+    let system = model.assemble().unwrap();
+    let (found, exact) = (orbit(&HarmonicBalance::default(), &system, omega), orbit(&EventDriven, &system, omega));
+    let estimate = found.evidence.truncation.unwrap();
+    assert_eq!(found.evidence.accuracy, Accuracy::Converged);
+    let largest = exact.places.iter().map(|place| place.amplitude()).fold(0.0, f64::max);
+    for (a, b) in found.places.iter().zip(&exact.places) {
+        let error = (a.amplitude() - b.amplitude()).abs() / largest;
+        assert!(error < 3.0 * estimate + 1e-9, "{a:?} {b:?}, estimate {estimate:.1e}");
+    }
+}
+
+/// Excitation of the sixth harmonic alone: the motion has its multiples, which are what has to be doubled.
+#[test]
+fn excitation_without_a_fundamental() {
+    let law = Law::Jenkins(Jenkins { stiffness: 0.5, limit: 0.15 });
+    let model = Model {
+        masses: vec![mass("a", 1.0), mass("tip", 0.01)],
+        springs: vec![spring("a", GROUND, 1.0, 0.01), spring("a", "tip", 0.09, 0.0)],
+        joints: vec![joint("tip", GROUND, law)],
+        forces: vec![force("a", 0.3, 6)],
+        ..Model::default()
+    };
+    for omega in [0.175, 0.18, 0.19] {
+        agrees(&model, omega);
+    }
+}
+
+/// A light part that resonates at the seventeenth harmonic, above a first comparison of seven with fifteen.
+#[test]
+fn a_resonance_above_the_series() {
+    let model = Model {
+        masses: vec![mass("body", 1.0), mass("tail", 0.001)],
+        springs: vec![spring("body", GROUND, 0.1, 0.01), spring("body", "tail", 0.288_711, 1.7e-7)],
+        joints: vec![joint("body", GROUND, Law::Jenkins(Jenkins { stiffness: 5.0, limit: 0.5 }))],
+        forces: vec![force("body", 1.0, 1)],
+        ..Model::default()
+    };
+    agrees(&model, 1.0);
+}
+
+/// The highest harmonic meets an undamped resonance: the force of the contact is resolved nevertheless.
+#[test]
+fn a_resonance_at_the_highest_harmonic() {
+    let model = Model {
+        masses: vec![mass("a", 1.0)],
+        springs: vec![spring("a", GROUND, 225.0, 0.0)],
+        joints: vec![joint("a", GROUND, Law::Coulomb(Coulomb { limit: 0.1 }))],
+        forces: vec![force("a", 1.0, 1)],
+        ..Model::default()
+    };
+    let system = model.assemble().unwrap();
+    for omega in [1.0, 1.0001] {
+        let method = HarmonicBalance { harmonics: Some(15), ..HarmonicBalance::default() };
+        let (found, exact) = (orbit(&method, &system, omega), orbit(&EventDriven, &system, omega));
+        let error = (found.places[0].amplitude() / exact.places[0].amplitude() - 1.0).abs();
+        assert!(error < 3.0 * found.evidence.truncation.unwrap(), "{error:.1e} {:?}", found.evidence);
+    }
+}
+
+/// A free body: a mean force that friction cannot hold pushes it away, and one that it holds does not.
+#[test]
+fn a_free_body_drifts_or_sticks() {
+    let model = |limit: f64| Model {
+        masses: vec![mass("body", 1.0)],
+        joints: vec![joint("body", GROUND, Law::Coulomb(Coulomb { limit }))],
+        forces: vec![force("body", 5.0, 1), force("body", 1.0, 0)],
+        ..Model::default()
+    };
+    let drifting = model(3.0).assemble().unwrap();
+    let error = HarmonicBalance::default().solver(&drifting).unwrap().orbit(1.0, None).unwrap_err();
+    assert_eq!(error.status(), "drifts");
+    let held = orbit(&HarmonicBalance::default(), &model(30.0).assemble().unwrap(), 1.0);
+    assert!(held.places[0].amplitude() < 1e-9 && held.evidence.stuck == ["joint"], "{held:?}");
+}
+
+/// Without excitation there is rest.
+#[test]
+fn no_excitation_is_rest() {
+    for law in [Law::Jenkins(Jenkins { stiffness: 2.0, limit: 0.5 }), Law::Coulomb(Coulomb { limit: 0.5 })] {
+        let model = Model {
+            masses: vec![mass("a", 1.0)],
+            springs: vec![spring("a", GROUND, 1.0, 0.05)],
+            joints: vec![joint("a", GROUND, law)],
+            ..Model::default()
+        };
+        let found = orbit(&HarmonicBalance::default(), &model.assemble().unwrap(), 0.9);
+        assert_eq!(found.places[0].amplitude(), 0.0);
+    }
+}
+
+/// An even harmonic that moves a place which touches no mass: the work there is that of its spring's damper, π c h Ω a².
+#[test]
+fn a_moved_place_without_a_mass() {
+    let motion = |on: &str, harmonic| Motion { on: on.into(), amplitude: 1.0, phase: 0.0, harmonic };
+    let model = Model {
+        masses: vec![mass("a", 1.0)],
+        springs: vec![spring("mover", GROUND, 1.0, 0.1), spring("a", "other", 3.0, 0.1)],
+        joints: vec![joint("a", GROUND, Law::Jenkins(Jenkins { stiffness: 1.0, limit: 1.0 }))],
+        motions: vec![motion("mover", 2), motion("other", 1)],
+        ..Model::default()
+    };
+    let system = model.assemble().unwrap();
+    let (found, exact) = (orbit(&HarmonicBalance::default(), &system, 1.0), orbit(&EventDriven, &system, 1.0));
+    assert!((found.energy.viscous / exact.energy.viscous - 1.0).abs() < 1e-3, "{:?} {:?}", found.energy, exact.energy);
+    assert!(found.energy.viscous > TAU / 2.0 * 0.1 * 2.0);
+}
+
+/// Multipliers of an element with an inner slider do not depend on the phase of the force, and are those of shooting.
+#[test]
+fn multipliers_of_an_inner_slider() {
+    let law = Law::JenkinsArctan(JenkinsArctan { stiffness: 1.0, limit: 1.0, alpha: 3.0 });
+    for phase in [0.0, 1.2] {
+        let model = Model {
+            masses: vec![mass("body", 1.0)],
+            springs: vec![spring("body", GROUND, 1.0, 0.02)],
+            joints: vec![joint("body", GROUND, law)],
+            forces: vec![Force { phase, ..force("body", 1.0, 1) }],
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let (found, judge) =
+            (orbit(&HarmonicBalance::default(), &system, 1.3), orbit(&Shooting::default(), &system, 1.3));
+        for (a, b) in found.multipliers().iter().zip(judge.multipliers()) {
+            // the series is within 1e-3 of the motion
+            assert!((a.norm() - b.norm()).abs() < 1e-3, "{phase}: {a} {b}");
+        }
+    }
+}
