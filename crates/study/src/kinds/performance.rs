@@ -7,7 +7,7 @@ use crate::schema::{Takes, optional};
 use crate::study::{Study, VariedValue};
 use crate::values::Values;
 use std::f64::consts::TAU;
-use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError};
+use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
 use stickslip::method::MethodError;
 use stickslip::model::Model;
 use stickslip::orbit::Accuracy;
@@ -79,12 +79,7 @@ fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let (mut rows, mut optima) = (Rows::default(), Rows::default());
     for group in &groups {
         for (prepared, row) in group.cases.iter().zip(&group.curve.rows) {
-            let failed = row.failed > 0 || row.peak.is_none();
-            let status = match (failed, row.inaccurate) {
-                (true, _) => "some-failed",
-                (false, 0) => CONVERGED,
-                (false, _) => Accuracy::Truncated.status(),
-            };
+            let (failed, status) = (row.failed > 0 || row.peak.is_none(), status(row));
             let reason = || format!("{} of the orbits on the frequency grid did not converge", row.failed);
             outcome.count(|| prepared.case.label(), status, failed.then(reason));
             if row.inaccurate > 0 {
@@ -111,6 +106,7 @@ fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
         optima.number(&inner.name, best.map_or(f64::NAN, |row| row.value));
         optima.number("frequency_Hz", best.and_then(|row| row.peak).map_or(f64::NAN, |peak| peak.omega / TAU));
         optima.number("amplitude_m", best.and_then(|row| row.peak).map_or(f64::NAN, |peak| peak.value));
+        optima.text("status", best.as_ref().map_or("none", status));
         optima.end();
         if best.is_none() {
             let at = if varied.is_empty() { String::new() } else { format!(" at {}", varied_text(varied)) };
@@ -122,6 +118,15 @@ fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     outcome.tables = vec![rows.table("performance"), optima.table("optimum")];
     outcome.figure = panel(&groups).into_iter().collect();
     Ok(outcome)
+}
+
+/// How far the orbits behind a peak may be trusted.
+fn status(row: &Row) -> &'static str {
+    match (row.failed > 0 || row.peak.is_none(), row.inaccurate) {
+        (true, _) => "some-failed",
+        (false, 0) => CONVERGED,
+        (false, _) => Accuracy::Truncated.status(),
+    }
 }
 
 /// The outer varied parameters of a case, and the last.
