@@ -1,9 +1,9 @@
 //! The equations of harmonic balance with a parameter, for continuation.
 
+use super::equations::{Level, Motion, transfer};
 use super::joints::Coordinate;
 use super::judge::Judge;
 use super::rest::Rest;
-use super::solve::{Level, Motion, transfer};
 use super::{Compared, HarmonicBalance, Kept, LARGEST, TOLERANCE, above, estimate, path};
 use crate::method::guess::Guess;
 use crate::method::{MethodError, OrbitError};
@@ -182,7 +182,7 @@ impl Equations for BranchEquations<'_> {
     }
 
     fn tolerance(&self) -> f64 {
-        super::solve::SOLVED / RESONANCE
+        super::equations::SOLVED / RESONANCE
     }
 
     fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool {

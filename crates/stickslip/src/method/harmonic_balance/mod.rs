@@ -2,14 +2,17 @@
 //!
 //! - `joints`: from the harmonics of relative motions to those of friction forces, with the exact derivative;
 //! - `rest`: the receptance of the linear rest, in closed form from its modes;
-//! - `solve`: the equations along the joints, and Newton's method on them;
+//! - `equations`: those along the joints, and their derivative;
+//! - `solve`: Newton's method on them;
 //! - `path`: the orbit's numbers from its harmonics.
 //!
-//! The unknowns are the harmonics of the joints' relative motions: the cost follows joints and harmonics, not degrees of freedom. Under
-//! odd excitation only odd harmonics occur. The error of a solution is estimated from a second one with twice the harmonics.
+//! The unknowns are the harmonics of the joints' relative motions, or of their forces where the velocity alone decides them: the cost
+//! follows joints and harmonics, not degrees of freedom. Only multiples of the excitation's common divisor occur, and only the odd ones if
+//! it has no others. The error of a solution is estimated from a second one with twice the harmonics.
 //! Source: Krack and Gross, "Harmonic Balance for Nonlinear Vibration Problems" (2019); Cameron and Griffin (1989).
 
 mod branch;
+mod equations;
 mod joints;
 mod judge;
 mod mode;
@@ -24,13 +27,14 @@ use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::Orbit;
 pub(crate) use branch::BranchEquations;
+use equations::{Level, Motion};
 use joints::{Coordinate, Element};
 use judge::Judge;
 pub(crate) use mode::{ModeEquations, ModeState};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use rest::Rest;
-use solve::{Level, Lost, Motion};
+use solve::Lost;
 use sparse::Sparse;
 use std::collections::BTreeMap;
 
@@ -345,7 +349,7 @@ impl Balance<'_> {
             Some((other, motion)) => {
                 let harmonics = self.levels[&other].harmonics().to_vec();
                 let coordinates = self.coordinates.len();
-                solve::transfer(motion, &harmonics, self.level(top, omega).harmonics(), coordinates)
+                equations::transfer(motion, &harmonics, self.level(top, omega).harmonics(), coordinates)
             }
             None if self.velocity && top > COLD * self.kept.unit && top / 2 >= self.first => {
                 let coarse = self.solve(top / 2, omega, None)?;

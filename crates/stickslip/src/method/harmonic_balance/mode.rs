@@ -7,8 +7,9 @@
 //! spring `k`: rigid friction is not smoothed, and a contact that sticks is a constraint.
 //! Source: Krack (2015), "Nonlinear modal analysis of nonconservative systems: extension of the periodic motion concept".
 
+use super::equations::{apply, penalty, stay};
 use super::joints::{Alternation, Coordinate, Element, Velocity, coordinates};
-use super::solve::{HALVINGS, SHORTENS, apply, penalty, stay};
+use super::solve::{HALVINGS, SHORTENS};
 use crate::method::MethodError;
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
@@ -120,7 +121,7 @@ impl<'a> ModeEquations<'a> {
         2 * self.alternation.harmonics.len() * (self.system.dofs() + self.contacts.len()) + 2
     }
 
-    /// ε of every contact, N s/m, see [`super::solve::penalty`]. In place of the receptance of the highest harmonic stands that without
+    /// ε of every contact, N s/m, see [`super::equations::penalty`]. In place of the receptance of the highest harmonic stands that without
     /// its resonances, `wᵀ (K + h² ω² M)⁻¹ w`: it changes smoothly along the mode, and where the harmonics are many it is the same.
     fn penalties(&self, omega: f64) -> Vec<f64> {
         if self.contacts.is_empty() {

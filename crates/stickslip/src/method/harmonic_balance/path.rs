@@ -1,9 +1,9 @@
 //! The orbit of a solution of harmonic balance.
 
+use super::equations::{Level, Motion};
 use super::joints::{Alternation, Coordinate, Element};
 use super::judge::Judge;
 use super::rest::Rest;
-use super::solve::{Level, Motion};
 use crate::law::Rate;
 use crate::method::Contact;
 use crate::model::{MovedPlace, System};

@@ -5,9 +5,9 @@
 //! themselves, along laws of velocity, border it as if each contact were one more place: `Z y - W δλ = 0` and
 //! `(1 - T) δλ + ε T D Wᵀ y = r`.
 
+use super::equations::stay;
 use super::joints::{Coordinate, Element};
 use super::rest::HOLD;
-use super::solve::stay;
 use crate::model::System;
 use num_complex::Complex64;
 use stickslip_numerics::banded::{Banded, order};
