@@ -156,8 +156,13 @@ pub struct Case {
 impl Case {
     /// The varied parameters in words: `Ft = 2 N, kt = 1000 N/m`; empty if nothing is varied.
     pub fn label(&self) -> String {
-        self.varied.iter().map(|varied| varied.text.as_str()).collect::<Vec<_>>().join(", ")
+        varied_text(&self.varied)
     }
+}
+
+/// Varied parameters in words.
+pub(crate) fn varied_text(varied: &[VariedValue]) -> String {
+    varied.iter().map(|varied| varied.text.as_str()).collect::<Vec<_>>().join(", ")
 }
 
 /// Most cases that [`Study::resolved`] writes out; a run can be repeated from the text in any case.

@@ -103,14 +103,19 @@ impl System {
     /// Whether the excitation changes its sign after half a period, as do all friction laws: then an orbit with
     /// `x(t + T/2) = -x(t)` exists.
     pub fn is_odd(&self) -> bool {
-        let even = |h: u32| h.is_multiple_of(2);
-        let loads = self.loads.iter().all(|load| {
-            !even(load.harmonic)
-                || load.force.iter().chain(load.by_velocity.iter()).all(|z| *z == Complex64::new(0.0, 0.0))
-        });
+        self.harmonics_of_excitation(|z| z != Complex64::new(0.0, 0.0)).iter().all(|h| !h.is_multiple_of(2))
+    }
+
+    /// The harmonics of loads and imposed motions whose amplitudes `counts` accepts; some may stand more than once.
+    pub(crate) fn harmonics_of_excitation(&self, counts: impl Fn(Complex64) -> bool) -> Vec<u32> {
+        let loads = self
+            .loads
+            .iter()
+            .filter(|load| load.force.iter().chain(load.by_velocity.iter()).any(|z| counts(*z)))
+            .map(|load| load.harmonic);
         let imposed = self.joints.iter().flat_map(|joint| &joint.imposed);
         let moved = self.moved.iter().flat_map(|place| &place.motion);
-        loads && imposed.chain(moved).all(|(h, z)| !even(*h) || *z == Complex64::new(0.0, 0.0))
+        loads.chain(imposed.chain(moved).filter(|(_, z)| counts(*z)).map(|(h, _)| *h)).collect()
     }
 }
 

@@ -1,11 +1,12 @@
 //! Branches of orbits by arc length, along the drive frequency or along a design parameter, around turning points.
 
 use super::orbits::Inaccurate;
+use super::peak_of::{check_peak_of, peak_place};
 use super::{Complaint, Computed, FREQUENCY, HARMONICS, Kind, SERIES_SAMPLES, check_samples};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{Context, NOT_REACHED, Outcome, Prepared, Rows, Summary, display_unit};
 use crate::schema::{Takes, Within, default, optional};
-use crate::study::{Study, VariedValue};
+use crate::study::{Study, VariedValue, varied_text};
 use crate::values::Values;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -50,14 +51,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
-    let masses: Vec<&str> = model.masses.iter().map(|mass| mass.name.as_str()).collect();
-    let names = values.names("peak_of").unwrap_or_default();
-    if let Some(name) = names.iter().find(|name| !masses.contains(&name.as_str())) {
-        return Err(Complaint::unknown("peak_of", "mass", name, &masses));
-    }
-    if values.names("peak_of").is_some() && names.len() != 1 {
-        return Err(Complaint::new("peak_of", "one mass is needed", "name the mass whose peaks are to be refined"));
-    }
+    check_peak_of(values, model, "name the mass whose peaks are to be refined")?;
     if values.quantity("tolerance").is_some_and(|tolerance| tolerance >= 1.0) {
         return Err(Complaint::new(
             "tolerance",
@@ -165,21 +159,9 @@ fn split(prepared: &Prepared) -> (&[VariedValue], Option<&VariedValue>) {
     }
 }
 
-fn varied_text(varied: &[VariedValue]) -> String {
-    varied.iter().map(|v| v.text.as_str()).collect::<Vec<_>>().join(", ")
-}
-
 /// Name of the column of what a branch runs along, and its factor from SI.
 fn axis(along: Option<&VariedValue>) -> (String, f64) {
     along.map_or_else(|| ("frequency_Hz".to_owned(), 1.0 / TAU), |parameter| (parameter.name.clone(), 1.0))
-}
-
-/// The place whose peaks are refined.
-fn peak_place(prepared: &Prepared) -> usize {
-    let named = prepared.case.values.names("peak_of").and_then(|names| names.first().cloned());
-    let driven = prepared.case.model.forces.first().map(|force| force.on.clone());
-    let name = named.or(driven);
-    name.and_then(|name| prepared.system.places.iter().position(|place| *place == name)).unwrap_or(0)
 }
 
 fn follow<'a>(study: &Study, group: &'a [Prepared], context: &Context<'_>) -> Followed<'a> {

@@ -7,6 +7,7 @@ mod hysteresis;
 mod modes;
 mod orbit;
 mod orbits;
+mod peak_of;
 mod performance;
 mod response;
 mod transient;

@@ -1,10 +1,11 @@
 //! Performance curves: the resonance peak as a function of a design parameter, and its best value.
 
+use super::peak_of::{check_peak_of, peak_place};
 use super::{Complaint, Computed, FREQUENCY, Kind};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit};
 use crate::schema::{Takes, optional};
-use crate::study::{Study, VariedValue};
+use crate::study::{Study, VariedValue, varied_text};
 use crate::values::Values;
 use std::f64::consts::TAU;
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
@@ -33,15 +34,7 @@ pub(super) const KIND: Kind = Kind {
 const FEWEST_VALUES: usize = 3;
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
-    let masses: Vec<&str> = model.masses.iter().map(|mass| mass.name.as_str()).collect();
-    for name in values.names("peak_of").unwrap_or_default() {
-        if !masses.contains(&name.as_str()) {
-            return Err(Complaint::unknown("peak_of", "mass", name, &masses));
-        }
-    }
-    if values.names("peak_of").is_some_and(|names| names.len() != 1) {
-        return Err(Complaint::new("peak_of", "one mass is needed", "name the mass whose peak is to be low"));
-    }
+    check_peak_of(values, model, "name the mass whose peak is to be low")?;
     if values.frequencies("frequency").is_some_and(|f| f.len() < FEWEST_VALUES) {
         let help = "write frequency = { from = …, to = …, points = … } around the resonance";
         return Err(Complaint::new("frequency", "a peak needs a range of frequencies", help));
@@ -134,16 +127,10 @@ fn split(prepared: &Prepared) -> Option<(&[VariedValue], &VariedValue)> {
     prepared.case.varied.split_last().map(|(last, outer)| (outer, last))
 }
 
-fn varied_text(varied: &[VariedValue]) -> String {
-    varied.iter().map(|v| v.text.as_str()).collect::<Vec<_>>().join(", ")
-}
-
 fn curve(study: &Study, group: &[Prepared], context: &Context<'_>) -> Result<PerformanceCurve, MethodError> {
     let first = &group[0];
     let system = &first.system;
-    let named = first.case.values.names("peak_of").and_then(|names| names.first().cloned());
-    let driven = first.case.model.forces.first().map(|force| force.on.clone());
-    let place = named.or(driven).and_then(|name| system.places.iter().position(|p| *p == name)).unwrap_or(0);
+    let place = peak_place(first);
     let frequencies: Vec<f64> = first.case.frequencies.iter().flat_map(|f| f.iter()).collect();
     let range = frequencies.iter().fold((f64::INFINITY, 0.0f64), |(a, b), w| (a.min(*w), b.max(*w)));
     let parameter = split(first).map(|(_, inner)| inner.name.clone());

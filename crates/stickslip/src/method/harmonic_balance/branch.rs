@@ -4,7 +4,7 @@ use super::equations::{Level, Motion, transfer};
 use super::joints::Coordinate;
 use super::judge::Judge;
 use super::rest::Rest;
-use super::{Compared, HarmonicBalance, Kept, LARGEST, TOLERANCE, above, estimate, path};
+use super::{Compared, HarmonicBalance, Kept, LARGEST, TOLERANCE, estimate, path};
 use crate::method::guess::Guess;
 use crate::method::{MethodError, OrbitError};
 use crate::model::System;
@@ -147,15 +147,13 @@ impl<'a> BranchEquations<'a> {
         let places = path::places(&mut self.level, &self.rest, self.omega, &self.motion);
         let truncation = self.finer.as_mut().and_then(|finer| {
             finer.drive(&self.system, &self.coordinates, &self.rest, self.omega);
-            let start = transfer(&self.motion, self.level.harmonics(), finer.harmonics(), self.coordinates.len());
+            let mut motion = transfer(&self.motion, self.level.harmonics(), finer.harmonics(), self.coordinates.len());
             // Newton's method alone: a search would find another branch where this one turns
-            let mut motion = start;
             finer.polish(&self.coordinates, self.omega, &mut motion, CHECK).ok()?;
             let better = path::places(finer, &self.rest, self.omega, &motion);
-            let above = above(finer, &self.rest, &self.coordinates, self.kept, self.omega, &motion);
             let coarse = Compared { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
-            let fine = Compared { harmonics: finer.harmonics(), places: &better, along: &motion.c };
-            Some(estimate(&self.coordinates, &coarse, &fine, &above))
+            let at = (self.kept, self.omega);
+            Some(estimate(&self.coordinates, &self.rest, at, &coarse, (finer, &motion, &better)))
         });
         let context = path::Context {
             system: &self.system,

@@ -213,15 +213,7 @@ struct Kept {
 impl Kept {
     /// By the harmonics of the excitation that `counts` accepts, by their amplitudes.
     fn new(system: &System, counts: impl Fn(Complex64) -> bool) -> Self {
-        let loads = system
-            .loads
-            .iter()
-            .filter(|load| load.force.iter().chain(load.by_velocity.iter()).any(|z| counts(*z)))
-            .map(|load| load.harmonic);
-        let imposed = system.joints.iter().flat_map(|joint| &joint.imposed);
-        let moved = system.moved.iter().flat_map(|place| &place.motion);
-        let motions = imposed.chain(moved).filter(|(_, z)| counts(*z)).map(|(h, _)| *h);
-        let present: Vec<usize> = loads.chain(motions).map(|h| h as usize).collect();
+        let present: Vec<usize> = system.harmonics_of_excitation(counts).into_iter().map(|h| h as usize).collect();
         let unit = present.iter().fold(0, |a, &b| common_divisor(a, b)).max(1);
         let highest = present.iter().copied().max().unwrap_or(0);
         Kept { unit, odd: present.iter().all(|h| (h / unit) % 2 == 1), highest }
@@ -260,9 +252,17 @@ struct Compared<'a> {
 }
 
 /// The error of a motion by a finer one: their distance, as the largest of the places and of the inner sliders behind springs, relative to
-/// the largest of these motions, without means, times the share that the finer one may be off itself. `above` is what the finer one lacks
-/// at resonances beyond its own harmonics, per harmonic and place.
-fn estimate(coordinates: &[Coordinate], coarse: &Compared, fine: &Compared, above: &[DVector<Complex64>]) -> f64 {
+/// the largest of these motions, without means, times the share that the finer one may be off itself. What the finer one lacks at
+/// resonances above its own harmonics counts too. The finer one is its level, its motion and, per harmonic, the motions of the places.
+fn estimate(
+    coordinates: &[Coordinate],
+    rest: &Rest,
+    (kept, omega): (Kept, f64),
+    coarse: &Compared,
+    (finer, better, places): (&mut Level, &Motion, &[DVector<Complex64>]),
+) -> f64 {
+    let above = above(finer, rest, coordinates, kept, omega, better);
+    let fine = Compared { harmonics: finer.harmonics(), places, along: &better.c };
     let (mut distance, mut size) = (0.0f64, 0.0f64);
     let mut compare = |coarse_at: &dyn Fn(usize) -> Complex64, fine_at: &dyn Fn(usize) -> Complex64, missing: f64| {
         let (mut d, mut s) = (missing, missing);
@@ -420,10 +420,9 @@ impl Balance<'_> {
         let better = self.solve(double, omega, Some((top, motion)))?;
         let y = self.places(double, omega, &better);
         let finer = self.levels.get_mut(&double).expect("solved");
-        let above = above(finer, &self.rest, &self.coordinates, self.kept, omega, &better);
-        let coarse = Compared { harmonics: self.levels[&top].harmonics(), places: x, along: &motion.c };
-        let fine = Compared { harmonics: self.levels[&double].harmonics(), places: &y, along: &better.c };
-        Ok((estimate(&self.coordinates, &coarse, &fine, &above), better, y))
+        let coarse = Compared { harmonics: &self.kept.up_to(top), places: x, along: &motion.c };
+        let at = (self.kept, omega);
+        Ok((estimate(&self.coordinates, &self.rest, at, &coarse, (finer, &better, &y)), better, y))
     }
 
     /// As many harmonics as the tolerance needs. The solution that is returned is not the finest that was found, but the one whose error

@@ -114,11 +114,9 @@ impl Sparse {
         for (k, factor) in self.factors.iter_mut().enumerate() {
             factor.clear();
             let rate = self.harmonics[k] * omega;
-            for &(i, l, [m, c, s]) in &self.entries {
+            for &(i, l, entry) in &self.entries {
                 let (row, column) = (2 * self.position[i], 2 * self.position[l]);
-                // a direction that nothing holds has a mean position by the spring that the dense form gives it
-                let hold = if rate == 0.0 { (HOLD * omega).powi(2) } else { 0.0 };
-                let z = Complex64::new(s - rate * rate * m + hold * m, rate * c);
+                let z = dynamic(entry, rate, omega);
                 factor.add(row, column, z.re);
                 factor.add(row, column + 1, -z.im);
                 factor.add(row + 1, column, z.im);
@@ -201,12 +199,11 @@ impl Sparse {
         let nh = self.harmonics.len();
         let (size, block) = (2 * nh, 4 * nh * nh);
         self.tangent.clear();
-        for &(i, l, [m, c, s]) in &self.entries {
+        for &(i, l, entry) in &self.entries {
             for k in 0..nh {
                 let rate = self.harmonics[k] * self.omega;
                 let (row, column) = (self.position[i] * size + 2 * k, self.position[l] * size + 2 * k);
-                let hold = if rate == 0.0 { (HOLD * self.omega).powi(2) } else { 0.0 };
-                let z = Complex64::new(s - rate * rate * m + hold * m, rate * c);
+                let z = dynamic(entry, rate, self.omega);
                 self.tangent.add(row, column, z.re);
                 self.tangent.add(row, column + 1, -z.im);
                 self.tangent.add(row + 1, column, z.im);
@@ -276,4 +273,11 @@ impl Sparse {
         }
         residual.iter().all(|r| r.is_finite())
     }
+}
+
+/// An entry of the dynamic stiffness from those of mass, damping and stiffness, at a harmonic's rate (rad/s).
+fn dynamic([mass, damping, stiffness]: [f64; 3], rate: f64, omega: f64) -> Complex64 {
+    // a direction that nothing holds has a mean position by the spring that the dense form gives it
+    let hold = if rate == 0.0 { (HOLD * omega).powi(2) } else { 0.0 };
+    Complex64::new(stiffness - rate * rate * mass + hold * mass, rate * damping)
 }
