@@ -1,7 +1,13 @@
-//! Peaks of response curves, maximised over frequency.
+//! Peaks of response curves, refined between the points of the curve.
+//!
+//! Near a resonance the inverse square of an amplitude is a parabola in the frequency (exactly so for a linear oscillator of light
+//! damping), so that parabolas through `1/a²` find the peak in a few orbits. Where the highest point is a kink, the onset of slip, two
+//! straight lines do. All quantities of an orbit share the orbits: what one mass asks for narrows the brackets of all others.
 
-use crate::method::Solver;
+use crate::method::{Method, MethodError, Solver};
+use crate::model::System;
 use crate::orbit::Orbit;
+use rayon::prelude::*;
 
 /// A refined peak.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,18 +20,52 @@ pub struct Peak {
     pub at_end: bool,
 }
 
-/// Relative width of the frequency bracket at which the search ends. The amplitude is flat at its peak (error of second order in
-/// the frequency), and at a kink (onset of slip) of first order: there it is found to this.
-const BRACKET: f64 = 1e-10;
-/// Orbits that one refinement may take; Brent's method takes 10 to 40.
-const ORBITS: usize = 80;
+/// A point of a curve on which peaks are sought.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// Frequency, rad/s.
+    pub omega: f64,
+    /// The quantities; empty if there is no orbit.
+    pub values: Vec<f64>,
+    /// State of the orbit, a start for its neighbours.
+    pub start: Option<Vec<f64>>,
+}
+
+impl Point {
+    /// What a curve keeps of an orbit.
+    pub fn new(orbit: &Orbit, quantities: &dyn Fn(&Orbit) -> Vec<f64>) -> Self {
+        Point { omega: orbit.omega, values: quantities(orbit), start: Some(orbit.start.clone()) }
+    }
+
+    /// A frequency at which no orbit was found.
+    pub fn failed(omega: f64) -> Self {
+        Point { omega, values: Vec::new(), start: None }
+    }
+
+    /// A quantity; below all others if there is no orbit.
+    fn value(&self, quantity: usize) -> f64 {
+        self.values.get(quantity).copied().filter(|value| value.is_finite()).unwrap_or(f64::NEG_INFINITY)
+    }
+}
+
+/// Relative rise of a quantity, as the parabola predicts it, below which its peak counts as found: a hundred times the rounding of a
+/// closed orbit. The frequency is then known to 1e-5 of the width of the peak.
+const RISE: f64 = 1e-10;
+/// A point that stands out from its neighbours by less than this share is the rounding of a level curve, not a peak.
+const LEVEL: f64 = 1e-10;
+/// Two orbits closer than this share of the first bracket tell nothing but rounding.
+const CLOSEST: f64 = 1e-7;
+/// Share of the rise that a parabola predicts which must come true for the next trial to be a parabola again.
+const KEPT: f64 = 0.5;
+/// Broken promises after which only halving is left.
+const JUMP: usize = 15;
+/// Orbits that the peak of one quantity may take beside those that others have asked for; smooth peaks take 3 to 6, kinks up to 15.
+const ORBITS: usize = 40;
 /// Grid maxima below this share of the highest cannot hide the highest peak between grid points, unless the grid is far too coarse.
 const CANDIDATE: f64 = 0.8;
-/// (3 - √5)/2
-const GOLDEN: f64 = 0.381_966_011_250_105_1;
 
 /// The highest peak of `quantity` over a curve whose points are `omegas` (rising, rad/s) with `values` (NaN at failed points),
-/// refined between its neighbours with orbits of `solver`, by Brent's method.
+/// refined between its neighbours with orbits of `solver`.
 ///
 /// Returns `None` if no point converged.
 ///
@@ -47,13 +87,18 @@ pub fn highest(
     values: &[f64],
     quantity: &dyn Fn(&Orbit) -> f64,
 ) -> Option<Peak> {
-    let n = omegas.len();
-    let best = (0..n).filter(|&i| values[i].is_finite()).max_by(|&a, &b| values[a].total_cmp(&values[b]))?;
-    let mut peak = Peak { omega: omegas[best], value: values[best], at_end: best == 0 || best + 1 == n };
-    for i in 1..n.saturating_sub(1) {
-        let (left, here, right) = (values[i - 1], values[i], values[i + 1]);
-        if here >= left && here >= right && here >= CANDIDATE * values[best] {
-            let refined = refine(solver, [omegas[i - 1], omegas[i], omegas[i + 1]], here, quantity);
+    let points: Vec<Point> = omegas
+        .iter()
+        .zip(values)
+        .map(|(omega, value)| Point { omega: *omega, values: vec![*value], start: None })
+        .collect();
+    let finite = (0..points.len()).filter(|&i| values[i].is_finite());
+    let best = finite.max_by(|&a, &b| values[a].total_cmp(&values[b]))?;
+    let at_end = best == 0 || best + 1 == points.len();
+    let mut peak = Peak { omega: omegas[best], value: values[best], at_end };
+    for i in (1..points.len().saturating_sub(1)).filter(|&i| values[i] >= CANDIDATE * values[best]) {
+        if is_maximum(&points[i - 1..=i + 1], 0) {
+            let refined = refine(solver, &points[i - 1..=i + 1], &[0], &|orbit| vec![quantity(orbit)])[0];
             if refined.value > peak.value || (refined.value == peak.value && peak.at_end) {
                 peak = refined;
             }
@@ -62,75 +107,269 @@ pub fn highest(
     Some(peak)
 }
 
-/// Brent's maximisation inside `[low, middle, high]`. Source: Brent (1973), Ch. 5.
+/// Every local maximum of every quantity among the inner points of `points` (rising), refined, by frequency: the number of the quantity,
+/// and the peak.
+///
+/// # Errors
+/// The method cannot take the system.
+///
+/// # Example
+/// ```
+/// use stickslip::curve::peak::{Point, all};
+/// use stickslip::method::{Method, event_driven::EventDriven};
+/// use stickslip::orbit::Orbit;
+/// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+/// let amplitudes = |orbit: &Orbit| orbit.places.iter().map(|place| place.amplitude()).collect();
+/// let mut solver = EventDriven.solver(&system).unwrap();
+/// let points: Vec<Point> = (0..9)
+///     .map(|i| solver.orbit(std::f64::consts::TAU * (120.5 + 0.2 * f64::from(i)), None).unwrap())
+///     .map(|orbit| Point::new(&orbit, &amplitudes))
+///     .collect();
+/// let peaks = all(&EventDriven, &system, &points, &amplitudes).unwrap();
+/// assert_eq!(peaks.iter().filter(|(mass, _)| *mass == 0).count(), 1);
+/// ```
+pub fn all(
+    method: &dyn Method,
+    system: &System,
+    points: &[Point],
+    quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
+) -> Result<Vec<(usize, Peak)>, MethodError> {
+    let count = points.iter().map(|point| point.values.len()).max().unwrap_or(0);
+    let found: Vec<Result<Vec<(usize, Peak)>, MethodError>> = (1..points.len().saturating_sub(1))
+        .into_par_iter()
+        .map(|i| {
+            let near = &points[i - 1..=i + 1];
+            let wanted: Vec<usize> = (0..count).filter(|&quantity| is_maximum(near, quantity)).collect();
+            if wanted.is_empty() {
+                return Ok(Vec::new());
+            }
+            let mut solver = method.solver(system)?;
+            let mut peaks: Vec<(usize, Peak)> =
+                wanted.iter().copied().zip(refine(&mut *solver, near, &wanted, quantities)).collect();
+            peaks.sort_by(|a, b| a.1.omega.total_cmp(&b.1.omega));
+            Ok(peaks)
+        })
+        .collect();
+    let mut peaks = Vec::new();
+    for some in found {
+        peaks.extend(some?);
+    }
+    Ok(peaks)
+}
+
+/// Whether the middle one of three points stands out; of two equal ones the second does.
+fn is_maximum(near: &[Point], quantity: usize) -> bool {
+    let [left, here, right] = [0, 1, 2].map(|i| near[i].value(quantity));
+    let known = near.iter().all(|point| !point.values.is_empty());
+    known && here >= left && here > right && here - left.min(right) > LEVEL * here.abs()
+}
+
+/// The peaks of the `wanted` quantities, each of which is largest at the middle one of three points.
 fn refine(
     solver: &mut dyn Solver,
-    [low, middle, high]: [f64; 3],
-    value: f64,
-    quantity: &dyn Fn(&Orbit) -> f64,
-) -> Peak {
-    let mut start: Option<Vec<f64>> = None;
-    let mut at = |omega: f64| match solver.orbit(omega, start.as_deref()) {
-        Ok(orbit) => {
-            let value = quantity(&orbit);
-            start = Some(orbit.start);
-            -value
-        }
-        Err(_) => f64::INFINITY, // a failed orbit is no peak
-    };
-    let (mut a, mut b) = (low, high);
-    let (mut x, mut w, mut v) = (middle, middle, middle);
-    let (mut fx, mut fw, mut fv) = (-value, -value, -value);
-    let (mut step, mut before): (f64, f64) = (0.0, 0.0);
-    for _ in 0..ORBITS {
-        let centre = 0.5 * (a + b);
-        let tolerance = BRACKET * x.abs();
-        if (x - centre).abs() <= 2.0 * tolerance - 0.5 * (b - a) {
-            break;
-        }
-        let mut golden = true;
-        if before.abs() > tolerance && fw.is_finite() && fv.is_finite() {
-            let (r, q) = ((x - w) * (fx - fv), (x - v) * (fx - fw));
-            let mut p = (x - v) * q - (x - w) * r;
-            let mut q = 2.0 * (q - r);
-            if q > 0.0 {
-                p = -p;
-            }
-            q = q.abs();
-            if p.abs() < (0.5 * q * before).abs() && p > q * (a - x) && p < q * (b - x) {
-                (before, step) = (step, p / q);
-                let trial = x + step;
-                if trial - a < 2.0 * tolerance || b - trial < 2.0 * tolerance {
-                    step = tolerance.copysign(centre - x);
-                }
-                golden = false;
-            }
-        }
-        if golden {
-            before = if x < centre { b - x } else { a - x };
-            step = GOLDEN * before;
-        }
-        let trial = x + if step.abs() >= tolerance { step } else { tolerance.copysign(step) };
-        let f = at(trial);
-        if f <= fx {
-            if trial < x {
-                b = x
-            } else {
-                a = x
-            }
-            (v, fv, w, fw, x, fx) = (w, fw, x, fx, trial, f);
-        } else {
-            if trial < x {
-                a = trial
-            } else {
-                b = trial
-            }
-            if f <= fw || w == x {
-                (v, fv, w, fw) = (w, fw, trial, f);
-            } else if f <= fv || v == x || v == w {
-                (v, fv) = (trial, f);
-            }
+    near: &[Point],
+    wanted: &[usize],
+    quantities: &dyn Fn(&Orbit) -> Vec<f64>,
+) -> Vec<Peak> {
+    let mut points = near.to_vec();
+    let closest = CLOSEST * (near[2].omega - near[0].omega);
+    for &quantity in wanted {
+        let mut shrink = Shrink::default();
+        for _ in 0..ORBITS {
+            let best = best(&points, quantity);
+            let Some(omega) = shrink.next(&points, best, quantity, closest) else { break };
+            // the orbit's neighbour on the side of the new point is as good a start as any
+            let start = points[best].start.as_deref();
+            let point = match solver.orbit(omega, start) {
+                Ok(orbit) => Point { omega, ..Point::new(&orbit, quantities) },
+                Err(_) => Point::failed(omega),
+            };
+            let at = points.partition_point(|point| point.omega < omega);
+            points.insert(at, point);
         }
     }
-    Peak { omega: x, value: -fx, at_end: false }
+    wanted
+        .iter()
+        .map(|&quantity| {
+            let point = &points[best(&points, quantity)];
+            Peak { omega: point.omega, value: point.value(quantity), at_end: false }
+        })
+        .collect()
+}
+
+/// The highest inner point; the first and the last one are not above it.
+fn best(points: &[Point], quantity: usize) -> usize {
+    (1..points.len() - 1)
+        .max_by(|&a, &b| points[a].value(quantity).total_cmp(&points[b].value(quantity)))
+        .unwrap_or(points.len() / 2)
+}
+
+/// How the bracket of one quantity shrinks: by parabolas as long as they keep what they promise, else by crossing lines and by halving.
+#[derive(Debug, Default)]
+struct Shrink {
+    /// The quantity that the last trial was to reach.
+    promised: Option<f64>,
+    /// Trials that did not keep their promise since one did.
+    broken: usize,
+    /// Where the last trial was two lines that cross: the form there, as promised.
+    kink: Option<(f64, f64)>,
+}
+
+impl Shrink {
+    /// The frequency of the next orbit; `None` if the peak is found.
+    fn next(&mut self, points: &[Point], best: usize, quantity: usize, closest: f64) -> Option<f64> {
+        let [left, middle, right] = [best - 1, best, best + 1].map(|i| points[i].omega);
+        let value = points[best].value(quantity);
+        let (rise, vertex) = parabola(points, best, quantity);
+        let floor = closest.max(4.0 * f64::EPSILON * middle);
+        let at_kink = self.kink.is_some_and(|(omega, promised)| {
+            omega == middle && (form(value) - promised).abs() <= RISE * promised.abs()
+        });
+        match self.promised {
+            Some(promised) if value < promised => self.broken += 1,
+            _ => self.broken = 0,
+        }
+        // a promise that nothing more is to be had counts only from who has kept the last one
+        if (rise <= RISE && self.broken == 0) || right - left <= 2.0 * floor || at_kink {
+            return None;
+        }
+        self.promised = Some(value * (1.0 + KEPT * rise));
+        self.kink = None;
+        let wider = if right - middle > middle - left { 0.5 * (middle + right) } else { 0.5 * (left + middle) };
+        let inside = |omega: &f64| *omega > left + floor && *omega < right - floor;
+        // what neither describes is a jump
+        let form = if self.broken < JUMP { self.broken % 3 } else { 2 };
+        let trial = match form {
+            0 => vertex.filter(inside),
+            1 => {
+                self.kink = crossing(points, best, quantity).filter(|(omega, _)| inside(omega));
+                self.kink.map(|(omega, _)| omega)
+            }
+            _ => None,
+        };
+        let mut trial = trial.unwrap_or(wider);
+        if (trial - middle).abs() < floor {
+            // a step to the side on which the bracket is wider closes it there
+            trial = middle + if right - middle > middle - left { floor } else { -floor };
+        }
+        inside(&trial).then_some(trial)
+    }
+}
+
+/// What is interpolated: `1/a²` of positive quantities, which falls where they rise.
+fn form(value: f64) -> f64 {
+    if value > 0.0 { -1.0 / (value * value) } else { f64::NEG_INFINITY }
+}
+
+/// Of the parabola through a point and its neighbours: how far its vertex lies above the point, as a share of the quantity, and where.
+/// Without one (a failed neighbour, a straight line) the rise is unbounded.
+fn parabola(points: &[Point], best: usize, quantity: usize) -> (f64, Option<f64>) {
+    let [a, x, b] = [best - 1, best, best + 1].map(|i| points[i].omega);
+    let [fa, fx, fb] = [best - 1, best, best + 1].map(|i| form(points[i].value(quantity)));
+    let (left, right) = ((fx - fa) / (x - a), (fx - fb) / (b - x));
+    let curvature = (left + right) / (b - a);
+    if !(curvature.is_finite() && curvature > 0.0) {
+        return (f64::INFINITY, None);
+    }
+    // slope of the parabola at the middle point
+    let slope = (left * (b - x) - right * (x - a)) / (b - a);
+    let rise = slope * slope / (4.0 * curvature);
+    // f = -a⁻²: a relative rise r of the quantity is 2 r |f|
+    (0.5 * rise / fx.abs(), Some(x + 0.5 * slope / curvature))
+}
+
+/// Where the two straight lines cross that the points left and right of the best one lie on, and the form there.
+fn crossing(points: &[Point], best: usize, quantity: usize) -> Option<(f64, f64)> {
+    let at = |i: usize| Some((points.get(i)?.omega, form(points.get(i)?.value(quantity))));
+    let (before, after) = (at(best.checked_sub(2)?)?, at(best + 2)?);
+    let (left, here, right) = (at(best - 1)?, at(best)?, at(best + 1)?);
+    let slope = |p: (f64, f64), q: (f64, f64)| (q.1 - p.1) / (q.0 - p.0);
+    let meet = |p: (f64, f64), s: f64, q: (f64, f64), t: f64| {
+        let omega = p.0 + (q.1 - p.1 - t * (q.0 - p.0)) / (s - t);
+        (omega, p.1 + s * (omega - p.0))
+    };
+    // the best point lies on the one line or on the other
+    let rising = meet(here, slope(left, here), right, slope(right, after));
+    let falling = meet(left, slope(before, left), here, slope(here, right));
+    // a crossing below the best point is none
+    [rising, falling].into_iter().find(|(omega, form)| *omega > left.0 && *omega < right.0 && *form >= here.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::OrbitError;
+
+    /// A solver for curves that are given: every orbit fails, the value is noted before.
+    struct Formula<'a> {
+        curve: &'a dyn Fn(f64) -> f64,
+    }
+
+    /// Refines the middle one of three points of a formula; returns frequency, value, and evaluations.
+    fn check(curve: &dyn Fn(f64) -> f64, [a, x, b]: [f64; 3]) -> (f64, f64, usize) {
+        let formula = Formula { curve };
+        let point = |omega: f64| Point { omega, values: vec![(formula.curve)(omega)], start: None };
+        let mut points = vec![point(a), point(x), point(b)];
+        let mut shrink = Shrink::default();
+        let mut count = 0;
+        while count < ORBITS {
+            let top = best(&points, 0);
+            let Some(omega) = shrink.next(&points, top, 0, CLOSEST * (b - a)) else { break };
+            let at = points.partition_point(|point| point.omega < omega);
+            points.insert(at, point(omega));
+            count += 1;
+        }
+        let top = &points[best(&points, 0)];
+        (top.omega, top.value(0), count)
+    }
+
+    #[test]
+    fn the_peak_of_a_linear_oscillator_takes_a_handful_of_orbits() {
+        // |1/(1 - w² + 2 j ζ w)| is highest at w² = 1 - 2 ζ² with 1/(2 ζ √(1 - ζ²))
+        let zeta: f64 = 1e-3;
+        let curve = |w: f64| 1.0 / (1.0 - w * w).hypot(2.0 * zeta * w);
+        let (omega, value, count) = check(&curve, [0.99, 0.9991, 1.01]);
+        assert!((value * 2.0 * zeta * (1.0 - zeta * zeta).sqrt() - 1.0).abs() < 1e-10, "{value}");
+        assert!((omega - (1.0 - 2.0 * zeta * zeta).sqrt()).abs() < 1e-5 * zeta, "{omega}");
+        assert!(count <= 8, "{count}");
+    }
+
+    #[test]
+    fn a_kink_is_found_as_well() {
+        let curve = |w: f64| if w < 1.05 { 1.0 + 3.0 * (w - 1.05) } else { 1.0 - 0.2 * (w - 1.05) + (w - 1.05).powi(2) };
+        let (omega, value, count) = check(&curve, [0.9, 1.1, 1.2]);
+        assert!((value - 1.0).abs() < 1e-7 && (omega - 1.05).abs() < 1e-7, "{omega} {value} {count}");
+        assert!(count <= 24, "{count}");
+    }
+
+    #[test]
+    fn a_jump_ends_within_the_bound() {
+        let (omega, _, count) = check(&|w| if w < 1.05 { 1.0 + w } else { 0.1 }, [0.9, 1.0, 1.2]);
+        // the points below the jump lie on a slope that a parabola creeps up: it ends close to the edge
+        assert!((omega - 1.05).abs() < 1e-4 * 0.3, "{omega}");
+        assert!(count <= ORBITS, "{count}");
+    }
+
+    #[test]
+    fn level_curves_and_failed_neighbours_have_no_peak() {
+        let point = |values: &[f64]| Point { omega: 1.0, values: values.to_vec(), start: None };
+        assert!(!is_maximum(&[point(&[1.0]), point(&[1.0 + 1e-13]), point(&[1.0])], 0));
+        assert!(!is_maximum(&[point(&[]), point(&[2.0]), point(&[1.0])], 0));
+        assert!(is_maximum(&[point(&[1.0]), point(&[2.0]), point(&[1.0])], 0));
+    }
+
+    impl Solver for Formula<'_> {
+        fn orbit(&mut self, omega: f64, _: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+            Err(OrbitError::Frequency { omega })
+        }
+    }
+
+    #[test]
+    fn orbits_that_fail_leave_the_point_of_the_grid() {
+        let curve = |w: f64| 2.0 - (w - 1.0).powi(2);
+        let mut formula = Formula { curve: &curve };
+        let near = [0.9, 1.01, 1.1].map(|omega| Point { omega, values: vec![curve(omega)], start: None });
+        let peak = refine(&mut formula, &near, &[0], &|_| Vec::new())[0];
+        assert_eq!((peak.omega, peak.value), (1.01, curve(1.01)));
+    }
 }
