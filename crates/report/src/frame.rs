@@ -306,7 +306,7 @@ mod tests {
 
     #[test]
     fn units_and_powers_stand_in_brackets() {
-        let axis = |quantity: &str, unit: &str| Axis { quantity: quantity.into(), unit: unit.into() };
+        let axis = |quantity: &str, unit: &str| Axis::new(quantity, unit);
         assert_eq!(axis_title(&axis("frequency", "Hz"), 0), "frequency (Hz)");
         assert_eq!(axis_title(&axis("energy", "J"), -6), "energy (10⁻⁶ J)");
         assert_eq!(axis_title(&axis("slip fraction", ""), 0), "slip fraction");

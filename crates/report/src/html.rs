@@ -156,7 +156,7 @@ fn dash(style: Style) -> &'static str {
     match style {
         Style::Dashed => "7px,4px",
         Style::Dotted => "2px,3px",
-        Style::Solid | Style::Marks => "solid",
+        Style::Solid | Style::Marks | Style::Band | Style::Bars => "solid",
     }
 }
 

@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use stickslip_study::dataset::*;
 
 fn axis(quantity: &str, unit: &str) -> Axis {
-    Axis { quantity: quantity.into(), unit: unit.into() }
+    Axis::new(quantity, unit)
 }
 
 fn series(label: &str, x: Vec<f64>, y: Vec<f64>, style: Style, colour: usize) -> Series {
-    Series { label: label.into(), x, y, style, colour }
+    Series { label: label.into(), x, y, style, colour, ..Series::default() }
 }
 
 fn number(name: &str, values: Vec<f64>) -> Column {
@@ -105,7 +105,9 @@ pub(crate) fn response() -> Dataset {
                 ],
             },
         ],
-        figure: Figure { title: "Response curves of the blade couple, m₁ = m/100".into(), panels },
+        figure: Figure {
+            title: "Response curves of the blade couple, m₁ = m/100".into(), panels, ..Figure::default()
+        },
         notes: vec!["Amplitudes are half peak to peak over one period.".into()],
         failures: vec![],
         record: record(&[("converged", 964)]),
@@ -150,7 +152,7 @@ pub(crate) fn hysteresis() -> Dataset {
                 number("equivalent_damping_kg_per_s", loss.iter().map(|e| 3.3e3 * e).collect()),
             ],
         }],
-        figure: Figure { title: "Hysteresis loops of elastic dry friction".into(), panels },
+        figure: Figure { title: "Hysteresis loops of elastic dry friction".into(), panels, ..Figure::default() },
         notes: vec![],
         failures: vec![],
         record: record(&[("converged", 6)]),
@@ -218,7 +220,7 @@ pub(crate) fn hostile() -> Dataset {
             Table { name: "empty".into(), columns: vec![number("a_m", vec![])] },
             Table { name: "none".into(), columns: vec![] },
         ],
-        figure: Figure { title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž, with a title that has so many words that it must be broken into more than one line of text to fit the figure, which is not all that narrow".into(), panels },
+        figure: Figure { title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž, with a title that has so many words that it must be broken into more than one line of text to fit the figure, which is not all that narrow".into(), panels, ..Figure::default() },
         notes: vec!["A <note> & more.".into()],
         failures: (0..9).map(|i| Failure { at: format!("Ft = 2 N, frequency = {} Hz", 121.0 + 0.25 * f64::from(i)),
             reason: "shooting stopped after 50 iterations, residual 3.1e-4; try more harmonics <or> start from a neighbour".into() }).collect(),
@@ -247,6 +249,7 @@ pub(crate) fn many() -> Dataset {
                 y: axis("displacement", "mm"),
                 series: list.collect(),
             }],
+            ..Figure::default()
         },
         kind: "transient".into(),
         ..hysteresis()

@@ -56,7 +56,7 @@ pub fn to_svg(figure: &Figure) -> String {
 /// The dashes of a line style, if it has any.
 fn dashes(style: Style) -> Option<&'static str> {
     match style {
-        Style::Solid | Style::Marks => None,
+        Style::Solid | Style::Marks | Style::Band | Style::Bars => None,
         Style::Dashed => Some("7 4"),
         Style::Dotted => Some("2 3"),
     }
@@ -506,7 +506,7 @@ mod tests {
 
     #[test]
     fn a_gap_interrupts_the_curve() {
-        let svg = to_svg(&Figure { panels: samples::hostile().figure.panels[..1].to_vec(), title: String::new() });
+        let svg = to_svg(&Figure { panels: samples::hostile().figure.panels[..1].to_vec(), ..Figure::default() });
         // before the gap, after it, after the two single failures; the point between these is a dot; and the legend
         assert_eq!(svg.matches("fill=\"none\" stroke=\"#0072b2\"").count(), 3 + 1);
         assert_eq!(svg.matches("r=\"2\"").count(), 1);
@@ -560,7 +560,7 @@ mod tests {
 
     #[test]
     fn an_empty_figure_is_still_a_figure() {
-        let svg = to_svg(&Figure { title: String::new(), panels: vec![] });
+        let svg = to_svg(&Figure::default());
         assert!(roxmltree::Document::parse(&svg).is_ok());
     }
 }

@@ -90,16 +90,36 @@ impl Table {
 }
 
 /// A figure of one or several panels, side by side in rows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Figure {
     /// Title above the panels.
     pub title: String,
     /// The panels, in reading order.
     pub panels: Vec<Panel>,
+    /// Whether panels of the same quantity and unit have the same axes.
+    #[serde(default)]
+    pub sharing: Sharing,
+    /// What [`Series::value`] means, for the title and the scale of the colour bar; its range is that of the colours.
+    #[serde(default)]
+    pub varied: Option<Axis>,
+}
+
+/// Whether panels that show the same quantity in the same unit and scale share the range of that axis.
+///
+/// A panel whose axis differs from that of such a panel says so in the title of the axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Sharing {
+    /// Where each panel still fills a good part of its axis.
+    #[default]
+    WhereLegible,
+    /// All of them: the panels are there to be compared.
+    Always,
+    /// None: every panel fills its own axes.
+    Never,
 }
 
 /// One pair of axes with its curves.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Panel {
     /// Title of the panel, for example `Ft = 2 N`.
     pub title: String,
@@ -112,18 +132,50 @@ pub struct Panel {
 }
 
 /// An axis: what it shows and in which unit. The values of the series are already in this unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Axis {
     /// Quantity, for example `frequency`.
     pub quantity: String,
     /// Unit, for example `Hz`.
     pub unit: String,
+    /// How values become lengths.
+    #[serde(default)]
+    pub scale: Scale,
+    /// Its two ends, the smaller first; without them the data decide. Ends that are equal, not finite, or not positive
+    /// on a logarithmic axis count as absent.
+    #[serde(default)]
+    pub range: Option<[f64; 2]>,
+}
+
+/// How the values of an axis become lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Scale {
+    /// Equal differences are equal lengths.
+    #[default]
+    Linear,
+    /// Equal ratios are equal lengths; values that are not positive interrupt a curve.
+    Log,
+}
+
+impl Axis {
+    /// A linear axis whose range follows from the data.
+    pub fn new(quantity: impl Into<String>, unit: impl Into<String>) -> Axis {
+        Axis { quantity: quantity.into(), unit: unit.into(), ..Axis::default() }
+    }
+    /// The same axis, logarithmic.
+    pub fn log(self) -> Axis {
+        Axis { scale: Scale::Log, ..self }
+    }
+    /// The same axis between two fixed ends.
+    pub fn between(self, from: f64, to: f64) -> Axis {
+        Axis { range: Some([from.min(to), from.max(to)]), ..self }
+    }
 }
 
 /// A curve of a panel. A point with a NaN interrupts it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Series {
-    /// Legend; curves with the same label share one legend entry.
+    /// Legend; curves with the same label share one legend entry, a curve without label has none.
     pub label: String,
     /// Abscissae in the axis' unit.
     pub x: Vec<f64>,
@@ -131,14 +183,70 @@ pub struct Series {
     pub y: Vec<f64>,
     /// How it is drawn.
     pub style: Style,
-    /// Index into the palette; curves that belong together share it.
+    /// Index into the palette; curves that belong together share it. Motions count from 0, joints go on where the
+    /// motions end, so that a figure of both never gives two of them one colour.
     pub colour: usize,
+    /// How much it stands out.
+    #[serde(default)]
+    pub emphasis: Emphasis,
+    /// The varied parameter, in the unit of [`Figure::varied`]. More than seven different values in a figure that says
+    /// what they are get a sequential scale of colours and a colour bar instead of legend entries; `colour` does not
+    /// count then.
+    #[serde(default)]
+    pub value: Option<f64>,
+    /// Lower edge of a band, foot of a bar, in the axis' unit; empty: zero, or the lower end of the axis.
+    #[serde(default)]
+    pub base: Vec<f64>,
+}
+
+impl Series {
+    /// A continuous line.
+    pub fn line(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
+        Series { label: label.into(), x, y, colour, ..Series::default() }
+    }
+    /// Marks without a line.
+    pub fn marks(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
+        Series { style: Style::Marks, ..Series::line(label, x, y, colour) }
+    }
+    /// A filled band between two curves over the same abscissae, for example percentiles.
+    pub fn band(label: impl Into<String>, x: Vec<f64>, lower: Vec<f64>, upper: Vec<f64>, colour: usize) -> Series {
+        Series { style: Style::Band, base: lower, ..Series::line(label, x, upper, colour) }
+    }
+    /// Bars from zero, for example harmonics.
+    pub fn bars(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
+        Series { style: Style::Bars, ..Series::line(label, x, y, colour) }
+    }
+    /// The same curve, pale: one of many behind the one that matters.
+    pub fn pale(self) -> Series {
+        Series { emphasis: Emphasis::Pale, ..self }
+    }
+    /// The same curve as a reference: dashed, grey, behind all others.
+    pub fn reference(self) -> Series {
+        Series { emphasis: Emphasis::Reference, ..self }
+    }
+    /// The same curve, of this value of the varied parameter.
+    pub fn of(self, value: f64) -> Series {
+        Series { value: Some(value), ..self }
+    }
+}
+
+/// How much a curve stands out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Emphasis {
+    /// A result.
+    #[default]
+    Normal,
+    /// One of many behind the one that matters: thin and pale.
+    Pale,
+    /// What a result is compared with (all joints free, all joints stuck): grey and dashed, behind all others.
+    Reference,
 }
 
 /// How a curve is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Style {
     /// Continuous line.
+    #[default]
     Solid,
     /// Dashes.
     Dashed,
@@ -146,6 +254,10 @@ pub enum Style {
     Dotted,
     /// Marks without a line (peaks, failed points).
     Marks,
+    /// Filled between [`Series::base`] and `y`.
+    Band,
+    /// A bar at every abscissa, from [`Series::base`] to `y`; several series of bars stand side by side.
+    Bars,
 }
 
 /// A point that did not converge: where, and why.

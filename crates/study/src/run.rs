@@ -111,7 +111,7 @@ pub fn run(study: &Study, context: &Context<'_>) -> Result<Dataset, StudyError> 
         source: study.source().map(str::to_owned),
         kind: study.kind().name.to_owned(),
         tables: outcome.tables,
-        figure: Figure { title: study.title().to_owned(), panels: outcome.figure },
+        figure: Figure { title: study.title().to_owned(), panels: outcome.figure, ..Figure::default() },
         notes: outcome.notes,
         failures: outcome.failures,
         record: Record {

@@ -549,8 +549,8 @@ pub fn laws(results: &Results) -> Option<Part> {
     let (exact, arctan) = (results.curves("fig06")?, results.curves("fig06_arctan")?);
     let panels = exact.iter().zip(&arctan).map(|(a, b)| Panel {
         title: format!("Ft = {} N", a.limit),
-        x: Axis { quantity: "frequency".to_owned(), unit: "Hz".to_owned() },
-        y: Axis { quantity: "arctangent \u{2212} exact".to_owned(), unit: "mm".to_owned() },
+        x: Axis::new("frequency", "Hz"),
+        y: Axis::new("arctangent \u{2212} exact", "mm"),
         series: ["blade1", "contact", "blade3"]
             .iter()
             .enumerate()
@@ -560,12 +560,14 @@ pub fn laws(results: &Results) -> Option<Part> {
                 y: b.amplitude[mass].iter().zip(&a.amplitude[mass]).map(|(b, a)| 1e3 * (b - a)).collect(),
                 style: if mass == CONTACT { Style::Dashed } else { Style::Solid },
                 colour: mass,
+                ..Series::default()
             })
             .collect(),
     });
     let figure = Figure {
         title: "Fig. 6 in the arctangent law minus Fig. 6 in the exact law".to_owned(),
         panels: panels.collect(),
+        ..Figure::default()
     };
     let findings = vec![finding(
         "alpha = 25 s/mm is sufficiently great",

@@ -21,7 +21,7 @@ fn merged(results: &Results, title: &str, figures: &[(&str, &str)]) -> Option<Fi
             panels.push(Panel { title: format!("{number}, {}", panel.title), ..panel.clone() });
         }
     }
-    Some(Figure { title: title.to_owned(), panels })
+    Some(Figure { title: title.to_owned(), panels, ..Figure::default() })
 }
 
 /// Fig. 2.

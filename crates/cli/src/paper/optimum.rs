@@ -69,7 +69,7 @@ pub fn figure(curves: &[(&str, &Optimum)]) -> Figure {
     for (colour, (label, curve)) in curves.iter().enumerate() {
         let y = curve.peaks.iter().map(|p| p * 1e3).collect();
         let x = curve.limits.clone();
-        series.push(Series { label: (*label).to_owned(), x, y, style: Style::Solid, colour });
+        series.push(Series { label: (*label).to_owned(), x, y, style: Style::Solid, colour, ..Series::default() });
         if curve.interior {
             series.push(Series {
                 label: "lowest peak".to_owned(),
@@ -77,6 +77,7 @@ pub fn figure(curves: &[(&str, &Optimum)]) -> Figure {
                 y: vec![curve.lowest.1 * 1e3],
                 style: Style::Marks,
                 colour,
+                ..Series::default()
             });
         }
     }
@@ -84,9 +85,10 @@ pub fn figure(curves: &[(&str, &Optimum)]) -> Figure {
         title: "Highest resonance peak of the excited blade over the slip limit".to_owned(),
         panels: vec![Panel {
             title: String::new(),
-            x: Axis { quantity: "slip limit Ft".to_owned(), unit: "N".to_owned() },
-            y: Axis { quantity: "peak amplitude".to_owned(), unit: "mm".to_owned() },
+            x: Axis::new("slip limit Ft", "N"),
+            y: Axis::new("peak amplitude", "mm"),
             series,
         }],
+        ..Figure::default()
     }
 }

@@ -241,17 +241,13 @@ fn panel(branches: &[(&Prepared, Option<&VariedValue>, Branch)]) -> Option<Panel
                     y: shown.iter().map(|point| point.orbit.places[place].amplitude() * factor).collect(),
                     style: if dashed { Style::Dashed } else { Style::Solid },
                     colour,
+                    ..Series::default()
                 });
             }
             colour += 1;
         }
     }
-    Some(Panel {
-        title: String::new(),
-        x: Axis { quantity, unit: si.to_owned() },
-        y: Axis { quantity: height, unit },
-        series,
-    })
+    Some(Panel { title: String::new(), x: Axis::new(quantity, si), y: Axis::new(height, unit), series })
 }
 
 fn unstable(point: &TracePoint) -> bool {

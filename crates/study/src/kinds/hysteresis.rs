@@ -227,8 +227,8 @@ fn panels(cases: &[Prepared], loops: &[Loop], several: bool) -> Vec<Panel> {
         let at = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
             panels.push(Panel {
                 title: title.clone(),
-                x: Axis { quantity: "displacement".to_owned(), unit: x_unit.clone() },
-                y: Axis { quantity: "force".to_owned(), unit: y_unit.clone() },
+                x: Axis::new("displacement", x_unit.clone()),
+                y: Axis::new("force", y_unit.clone()),
                 series: Vec::new(),
             });
             panels.len() - 1
@@ -240,6 +240,7 @@ fn panels(cases: &[Prepared], loops: &[Loop], several: bool) -> Vec<Panel> {
             y: one.force.iter().map(|f| f * y_factor).collect(),
             style: Style::Solid,
             colour,
+            ..Series::default()
         });
     }
     panels

@@ -126,11 +126,11 @@ fn panels(modes: &[(&Prepared, Mode)]) -> Vec<Panel> {
         .flat_map(|(_, mode)| mode.points.iter().flat_map(|p| p.places.iter()))
         .fold(0.0f64, |a, x| a.max(*x));
     let (unit, factor) = display_unit(largest, "m");
-    let x = Axis { quantity: "log₁₀ amplitude".to_owned(), unit };
+    let x = Axis::new("log₁₀ amplitude", unit);
     let panel = |quantity: &str, unit: &str, read: fn(&stickslip::curve::modes::ModePoint) -> f64| Panel {
         title: String::new(),
         x: x.clone(),
-        y: Axis { quantity: quantity.to_owned(), unit: unit.to_owned() },
+        y: Axis::new(quantity, unit),
         series: modes
             .iter()
             .enumerate()
@@ -146,6 +146,7 @@ fn panels(modes: &[(&Prepared, Mode)]) -> Vec<Panel> {
                     y: mode.points.iter().map(read).collect(),
                     style: Style::Solid,
                     colour,
+                    ..Series::default()
                 })
             })
             .collect(),

@@ -115,8 +115,8 @@ fn panels(prepared: &Prepared, orbit: &Orbit, times: &[f64], samples: &[Sample])
         let (unit, factor) = display_unit(largest, si);
         Panel {
             title: title.clone(),
-            x: Axis { quantity: "time".to_owned(), unit: time_unit.clone() },
-            y: Axis { quantity: what.to_owned(), unit },
+            x: Axis::new("time", time_unit.clone()),
+            y: Axis::new(what.to_owned(), unit),
             series: names
                 .iter()
                 .enumerate()
@@ -126,6 +126,7 @@ fn panels(prepared: &Prepared, orbit: &Orbit, times: &[f64], samples: &[Sample])
                     y: samples.iter().map(|s| read(s, i) * factor).collect(),
                     style: Style::Solid,
                     colour: i,
+                    ..Series::default()
                 })
                 .collect(),
         }

@@ -167,16 +167,23 @@ fn panel(groups: &[Group<'_>]) -> Option<Panel> {
         let rows = || group.curve.rows.iter().filter_map(|row| Some((row.value, row.peak?.value * factor)));
         let label = split(&group.cases[0]).map(|(outer, _)| varied_text(outer)).filter(|t| !t.is_empty());
         let (x, y) = rows().unzip();
-        series.push(Series { label: label.unwrap_or_else(|| "peak".to_owned()), x, y, style: Style::Solid, colour });
+        series.push(Series {
+            label: label.unwrap_or_else(|| "peak".to_owned()),
+            x,
+            y,
+            style: Style::Solid,
+            colour,
+            ..Series::default()
+        });
         if let Some((value, peak)) = group.curve.optimum.and_then(|row| Some((row.value, row.peak?))) {
             let (x, y) = (vec![value], vec![peak.value * factor]);
-            series.push(Series { label: "optimum".to_owned(), x, y, style: Style::Marks, colour });
+            series.push(Series { label: "optimum".to_owned(), x, y, style: Style::Marks, colour, ..Series::default() });
         }
     }
     Some(Panel {
         title: String::new(),
-        x: Axis { quantity: inner.name.clone(), unit: si.to_owned() },
-        y: Axis { quantity: "resonance peak".to_owned(), unit },
+        x: Axis::new(inner.name.clone(), si),
+        y: Axis::new("resonance peak", unit),
         series,
     })
 }

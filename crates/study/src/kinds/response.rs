@@ -126,8 +126,8 @@ fn panels(cases: &[Prepared], curves: &[Curve]) -> Vec<Panel> {
     let (unit, factor) = display_unit(largest, "m");
     let panel = |title: String| Panel {
         title,
-        x: Axis { quantity: "frequency".to_owned(), unit: "Hz".to_owned() },
-        y: Axis { quantity: "amplitude".to_owned(), unit: unit.clone() },
+        x: Axis::new("frequency", "Hz"),
+        y: Axis::new("amplitude", unit.clone()),
         series: Vec::new(),
     };
     let line = |case: usize, place: usize, label: String, colour: usize, style: Style| Series {
@@ -136,6 +136,7 @@ fn panels(cases: &[Prepared], curves: &[Curve]) -> Vec<Panel> {
         y: curves[case].rows.iter().map(|row| row.places[place][0] * factor).collect(),
         style,
         colour,
+        ..Series::default()
     };
     let mark = |case: usize, place: usize, colour: usize| {
         let peak = (*curves[case].peaks.get(place)?)?;
@@ -146,6 +147,7 @@ fn panels(cases: &[Prepared], curves: &[Curve]) -> Vec<Panel> {
             y: vec![point.1],
             style: Style::Marks,
             colour,
+            ..Series::default()
         })
     };
     let style = |case: usize, place: usize| {

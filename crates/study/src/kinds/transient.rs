@@ -230,8 +230,8 @@ fn panel(prepared: &Prepared, title: String, motion: &Motion) -> Panel {
     let (unit, factor) = display_unit(largest, "m");
     Panel {
         title,
-        x: Axis { quantity: "time".to_owned(), unit: "s".to_owned() },
-        y: Axis { quantity: "displacement".to_owned(), unit },
+        x: Axis::new("time", "s"),
+        y: Axis::new("displacement", unit),
         series: names
             .iter()
             .enumerate()
@@ -241,6 +241,7 @@ fn panel(prepared: &Prepared, title: String, motion: &Motion) -> Panel {
                 y: motion.samples.iter().map(|(_, _, s)| s.displacement[i] * factor).collect(),
                 style: Style::Solid,
                 colour: i,
+                ..Series::default()
             })
             .collect(),
     }
