@@ -1,21 +1,21 @@
 //! A progress bar on a terminal, silence in a pipe, and Ctrl-C that keeps what is finished.
 
 use indicatif::{ProgressBar, ProgressStyle};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Set by Ctrl-C; a second Ctrl-C ends the program at once.
-static STOP: AtomicBool = AtomicBool::new(false);
-
-/// The flag that Ctrl-C sets.
-pub fn stop_flag() -> &'static AtomicBool {
+/// The flag that Ctrl-C sets; a second Ctrl-C ends the program at once.
+pub fn stop_flag() -> Arc<AtomicBool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = stop.clone();
     // a second handler in the same process is an error that changes nothing
-    let _ = ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
+    let _ = ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(1);
         }
         eprintln!("\nstopping: finished points are kept; press Ctrl-C again to stop at once");
     });
-    &STOP
+    stop
 }
 
 /// A bar over `points`; it draws nothing unless standard error is a terminal.

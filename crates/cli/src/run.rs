@@ -5,6 +5,7 @@ use crate::{Ending, paper, print, progress};
 use std::collections::BTreeSet;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use stickslip::orbit::Accuracy;
 use stickslip_report::{Outputs, terminal::Terminal, write_dataset};
@@ -99,8 +100,9 @@ pub fn run(request: &Request<'_>, place: &Place, only: &[String], json: bool) ->
     let mut failed = false;
     for study in &studies {
         let bar = progress::bar(study.points() as u64, study.name());
-        let finished = || bar.inc(1);
-        let result = run_study(study, &Context { threads, stop, finished: &finished });
+        let counter = bar.clone();
+        let context = Context { threads, stop: stop.clone(), finished: Arc::new(move || counter.inc(1)) };
+        let result = run_study(study, &context);
         bar.finish_and_clear();
         let dataset = match result {
             Ok(dataset) => dataset,
@@ -162,7 +164,7 @@ pub fn paper(place: &Place) -> Ending {
         Ok(threads) => threads,
         Err(ending) => return ending,
     };
-    let context = Context { threads, stop: progress::stop_flag(), finished: &|| () };
+    let context = Context { stop: progress::stop_flag(), ..Context::unwatched(threads) };
     let say = |line: &str| {
         if std::io::stderr().is_terminal() {
             eprintln!("{line}");
@@ -174,7 +176,7 @@ pub fn paper(place: &Place) -> Ending {
             if let ending @ Ending::Failed(_) = print(&outcome.summary) {
                 return ending;
             }
-            if context.stop.load(Ordering::Relaxed) {
+            if context.stopped() {
                 Ending::Failed("interrupted; the finished figures are written".to_owned())
             } else if outcome.failed > 0 {
                 Ending::SomeFailed

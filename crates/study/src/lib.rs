@@ -5,17 +5,22 @@
 
 pub mod dataset;
 mod document;
+mod drawing;
 mod error;
 pub mod expression;
 pub mod kinds;
 mod near;
+mod note;
+mod point;
 mod read;
+mod rows;
 pub mod run;
 pub mod schema;
 mod statement;
 mod study;
 pub mod units;
 mod values;
+pub mod work;
 
 pub use error::StudyError;
 pub use read::{read_bytes, read_file, read_study};

@@ -1,80 +1,18 @@
-//! Runs a study: prepares every case (so that what a method cannot take is found before anything is computed), lets the kind compute,
-//! and adds the record.
+//! Runs a study: checks every case (so that what a method cannot take is found before anything is computed), computes its units on all
+//! threads, joins their parts in order, lets the kind draw its figure, and adds the record.
 
-use crate::dataset::{Column, Dataset, Failure, Figure, Record, Table, Values as Cells};
+use crate::dataset::{Dataset, Figure, Record};
+use crate::drawing::Drawing;
 use crate::error::StudyError;
-use crate::study::{Case, Study};
+use crate::note::Note;
+use crate::study::Study;
+use crate::work::{Part, Units, Work, refused};
 use std::collections::BTreeMap;
-use std::sync::atomic::AtomicBool;
-use std::time::Instant;
-use stickslip::curve::sweep::Watch;
-use stickslip::method::{self, Method, MethodError, OrbitError};
-use stickslip::model::System;
-use stickslip::orbit::Orbit;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::{Arc, mpsc};
+use std::time::{Duration, Instant};
 
-/// How a study is run.
-#[derive(Clone, Copy)]
-pub struct Context<'a> {
-    /// Threads that the run may use, for the record; the caller sets up the pool.
-    pub threads: usize,
-    /// When true the run ends early with the points that are finished.
-    pub stop: &'a AtomicBool,
-    /// Called once per finished point, from any thread.
-    pub finished: &'a (dyn Fn() + Sync),
-}
-
-impl<'a> Context<'a> {
-    /// What a sweep needs to know.
-    pub(crate) fn watch(&self) -> Watch<'a> {
-        Watch { finished: self.finished, stop: self.stop }
-    }
-
-    /// Whether the run is to end early.
-    pub(crate) fn stopped(&self) -> bool {
-        self.stop.load(std::sync::atomic::Ordering::Relaxed)
-    }
-}
-
-/// A case that is ready to be computed.
-#[derive(Debug)]
-pub struct Prepared {
-    /// What the file says.
-    pub case: Case,
-    /// The assembled model.
-    pub system: System,
-    /// The method with its options.
-    pub method: Box<dyn Method>,
-}
-
-/// What a kind yields.
-#[derive(Debug, Default)]
-pub struct Outcome {
-    /// Tables, the most important first.
-    pub tables: Vec<Table>,
-    /// Panels of the figure.
-    pub figure: Vec<crate::dataset::Panel>,
-    /// Sentences for the reader.
-    pub notes: Vec<String>,
-    /// Points without a result.
-    pub failures: Vec<Failure>,
-    /// Points by status.
-    pub points: BTreeMap<String, u64>,
-}
-
-impl Outcome {
-    /// Counts a point and keeps its failure.
-    pub(crate) fn count(&mut self, at: impl FnOnce() -> String, status: &str, failure: Option<String>) {
-        *self.points.entry(status.to_owned()).or_default() += 1;
-        if let Some(reason) = failure {
-            self.failures.push(Failure { at: at(), reason });
-        }
-    }
-}
-
-/// The status of a point that converged, [`Accuracy::Converged`](stickslip::orbit::Accuracy::Converged).
-pub const CONVERGED: &str = "converged";
-/// The status of a point that an interrupted run did not reach.
-pub const NOT_REACHED: &str = "not-reached";
+pub use crate::work::{CONVERGED, Context, NOT_REACHED, Prepared};
 
 /// Runs a study.
 ///
@@ -84,43 +22,41 @@ pub const NOT_REACHED: &str = "not-reached";
 ///
 /// # Example
 /// ```
-/// use std::sync::atomic::AtomicBool;
 /// use stickslip_study::{read_study, run::{Context, run}};
 /// let text = stickslip::model::templates::find("element").unwrap().study;
 /// let study = read_study("element.toml", text, &[]).unwrap();
-/// let context = Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| () };
-/// let dataset = run(&study, &context).unwrap();
+/// let dataset = run(&study, &Context::unwatched(1)).unwrap();
 /// let loss = dataset.tables[1].numbers("dissipation_J").unwrap();
 /// assert!((loss[1] - 4e-6).abs() < 1e-15);   // 4 Ft (a - Ft/kt), a = 2 mm
 /// ```
-pub fn run(study: &Study, context: &Context<'_>) -> Result<Dataset, StudyError> {
+pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
     let start = Instant::now();
-    let mut cases = Vec::with_capacity(study.cases());
-    for index in 0..study.cases() {
-        cases.push(prepare(study, study.case(index)?)?);
-    }
-    let mut outcome = (study.kind().run)(study, &cases, context)
-        .map_err(|(index, error)| refused(study, &cases[index].case, &error))?;
-    let interrupted = outcome.points.contains_key(NOT_REACHED);
+    check(study)?;
+    let part = parts(study, context)?;
+    let kind = study.kind();
+    let interrupted = part.points.contains_key(NOT_REACHED);
+    let mut notes: Vec<String> = part.notes.iter().filter_map(Note::text).collect();
     if interrupted {
-        outcome.notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
+        notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
     }
+    let tables: Vec<_> = kind.tables.iter().zip(part.tables).map(|(name, rows)| rows.table(name)).collect();
+    let figure = Figure { title: study.title().to_owned(), ..(kind.draw)(&Drawing { study, tables: &tables }) };
     Ok(Dataset {
         name: study.name().to_owned(),
         title: study.title().to_owned(),
         source: study.source().map(str::to_owned),
-        kind: study.kind().name.to_owned(),
-        tables: outcome.tables,
-        figure: Figure { title: study.title().to_owned(), panels: outcome.figure, ..Figure::default() },
-        notes: outcome.notes,
-        failures: outcome.failures,
+        kind: kind.name.to_owned(),
+        tables,
+        figure,
+        notes,
+        failures: part.failures,
         record: Record {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             study: study.resolved(),
             seed: None,
             threads: context.threads,
             wall_time_s: start.elapsed().as_secs_f64(),
-            points: outcome.points,
+            points: part.points,
             interrupted,
         },
     })
@@ -131,193 +67,90 @@ pub fn run(study: &Study, context: &Context<'_>) -> Result<Dataset, StudyError> 
 /// # Errors
 /// [`StudyError`]: the method cannot take the model of a case.
 pub fn check(study: &Study) -> Result<(), StudyError> {
-    (0..study.cases()).try_for_each(|index| prepare(study, study.case(index)?).map(drop))
+    (0..study.cases()).try_for_each(|index| Prepared::new(study, index).map(drop))
 }
 
-fn prepare(study: &Study, case: Case) -> Result<Prepared, StudyError> {
-    let row = method::find(&case.method.name).ok_or_else(|| {
-        study.error_at("method", 0, "kind", format!("there is no method `{}`", case.method.name), None)
-    })?;
-    let method = (row.build)(&case.method.options).map_err(|error| refused(study, &case, &error))?;
-    let system =
-        case.model.assemble().map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
-    if study.kind().uses_method {
-        method.solver(&system).map_err(|error| refused(study, &case, &error))?;
-    }
-    Ok(Prepared { case, system, method })
-}
+/// Units that may be under way or waiting for their turn, per thread: enough that none waits for a long one, few enough to keep little.
+const AHEAD: usize = 8;
+/// How often a run looks whether it is to stop.
+const LOOK: Duration = Duration::from_millis(20);
+/// How long an interrupted run waits for what is under way, which ends with the orbit that it is at: less than the second that a user
+/// waits gladly.
+const GRACE: Duration = Duration::from_millis(700);
 
-/// A method's refusal, at the place in the file that it is about.
-fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyError {
-    let model = &case.model;
-    match error {
-        MethodError::Law { joint, instead, .. } => {
-            let index = model.joints.iter().position(|j| j.name == *joint).unwrap_or(0);
-            study.error_at("joint", index, "law", error.to_string(), Some(format!("use {instead}")))
+/// Computes all units and joins their parts in order.
+///
+/// Units run as tasks of the pool that own what they need, so that an interrupted run can leave behind one that does not end.
+fn parts(study: &Study, context: &Context) -> Result<Part, StudyError> {
+    let units = Units::of(study);
+    let shared = Arc::new(study.clone());
+    let (send, receive) = mpsc::channel();
+    let mut whole = Part::default();
+    let mut waiting: BTreeMap<usize, Part> = BTreeMap::new();
+    let (mut begun, mut joined) = (0, 0);
+    let mut deadline: Option<Instant> = None;
+    while joined < units.len() {
+        if deadline.is_none() && context.stopped() {
+            deadline = Some(Instant::now() + GRACE);
         }
-        MethodError::NeedsMass { place, .. } => {
-            let index = model.masses.iter().position(|m| m.name == *place).unwrap_or(0);
-            study.error_at("mass", index, "mass", error.to_string(), None)
+        while begun < units.len() && begun < joined + AHEAD * context.threads.max(1) && deadline.is_none() {
+            let (study, context, send, index) = (shared.clone(), context.clone(), send.clone(), begun);
+            rayon::spawn_fifo(move || {
+                // nobody listens any more if the run was left
+                let part = catch_unwind(AssertUnwindSafe(|| compute(&study, index, &context)));
+                let _ = send.send((index, part));
+            });
+            begun += 1;
         }
-        // a kind that needs no method has the method's options among its own keys
-        MethodError::Option { key, .. } => {
-            let table = if study.kind().uses_method { "method" } else { "study" };
-            study.error_at(table, 0, key, error.to_string(), None)
-        }
-        _ => study.error_at("method", 0, "kind", error.to_string(), None),
-    }
-}
-
-/// Columns that grow row by row, in a fixed order.
-#[derive(Debug, Default)]
-pub(crate) struct Rows {
-    columns: Vec<Column>,
-    next: usize,
-}
-
-impl Rows {
-    fn cells(&mut self, name: &str, empty: Cells) -> &mut Cells {
-        if self.next == self.columns.len() {
-            self.columns.push(Column { name: name.to_owned(), values: empty });
-        }
-        let column = &mut self.columns[self.next];
-        assert_eq!(column.name, name, "rows of one table have the same columns");
-        self.next += 1;
-        &mut column.values
-    }
-
-    pub fn number(&mut self, name: &str, value: f64) {
-        if let Cells::Number(v) = self.cells(name, Cells::Number(Vec::new())) {
-            v.push(value);
-        }
-    }
-
-    pub fn integer(&mut self, name: &str, value: u64) {
-        if let Cells::Integer(v) = self.cells(name, Cells::Integer(Vec::new())) {
-            v.push(value);
-        }
-    }
-
-    pub fn text(&mut self, name: &str, value: &str) {
-        if let Cells::Text(v) = self.cells(name, Cells::Text(Vec::new())) {
-            v.push(value.to_owned());
-        }
-    }
-
-    pub fn flag(&mut self, name: &str, value: Option<bool>) {
-        if let Cells::Flag(v) = self.cells(name, Cells::Flag(Vec::new())) {
-            v.push(value);
-        }
-    }
-
-    /// The varied parameters of a case, SI.
-    pub fn varied(&mut self, case: &Case) {
-        for varied in &case.varied {
-            self.number(&varied.name, varied.si);
-        }
-    }
-
-    /// Ends a row.
-    pub fn end(&mut self) {
-        self.next = 0;
-    }
-
-    pub fn table(self, name: &str) -> Table {
-        Table { name: name.to_owned(), columns: self.columns }
-    }
-}
-
-/// The place of a point in words: the varied parameters and the frequency.
-pub(crate) fn place_of(case: &Case, omega: f64) -> String {
-    let frequency = format!("frequency = {:.6} Hz", omega / std::f64::consts::TAU);
-    if case.varied.is_empty() { frequency } else { format!("{}, {frequency}", case.label()) }
-}
-
-/// What a table keeps of one orbit, or of its failure: one number per place and joint, and the evidence.
-#[derive(Debug, Clone)]
-pub(crate) struct Summary {
-    /// Amplitude, mean, phase per mass.
-    pub places: Vec<[f64; 3]>,
-    /// Dissipation, slip fraction per joint.
-    pub joints: Vec<[f64; 2]>,
-    pub stable: Option<bool>,
-    pub residual: f64,
-    pub energy_gap: f64,
-    pub truncation: f64,
-    pub iterations: u64,
-    pub status: String,
-    pub failure: Option<String>,
-    pub stuck: bool,
-}
-
-impl Summary {
-    pub fn new(system: &System, outcome: Result<&Orbit, &OrbitError>) -> Self {
-        match outcome {
-            Ok(orbit) => Summary {
-                places: orbit.places.iter().map(|p| [p.amplitude(), p.mean, p.phase_deg()]).collect(),
-                joints: orbit.joints.iter().map(|j| [j.dissipation, j.slip_fraction]).collect(),
-                stable: orbit.is_stable(),
-                residual: orbit.evidence.residual,
-                energy_gap: orbit.evidence.energy_gap,
-                truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),
-                iterations: orbit.evidence.iterations as u64,
-                status: orbit.evidence.accuracy.status().to_owned(),
-                failure: None,
-                stuck: orbit.is_one_of_many(),
-            },
-            Err(error) => {
-                let mut row = Summary::missing(system, error.status());
-                row.failure = Some(error.to_string());
-                row
+        match next(&receive) {
+            Some((index, part)) => {
+                // a bug in a unit is one of the run
+                waiting.insert(index, part.unwrap_or_else(|panic| resume_unwind(panic))?);
             }
+            None if deadline.is_some_and(|deadline| Instant::now() >= deadline) => break,
+            None => {}
+        }
+        while let Some(part) = waiting.remove(&joined) {
+            whole.append(part);
+            joined += 1;
+        }
+        // what has not begun does not begin any more
+        if deadline.is_some() && joined == begun {
+            break;
         }
     }
-
-    /// A point without a result.
-    pub fn missing(system: &System, status: &str) -> Self {
-        Summary {
-            places: vec![[f64::NAN; 3]; system.dofs()],
-            joints: vec![[f64::NAN; 2]; system.joints.len()],
-            stable: None,
-            residual: f64::NAN,
-            energy_gap: f64::NAN,
-            truncation: f64::NAN,
-            iterations: 0,
-            status: status.to_owned(),
-            failure: None,
-            stuck: false,
-        }
+    for index in joined..units.len() {
+        whole.append(waiting.remove(&index).unwrap_or_else(|| Part::not_reached(units.get(index).len())));
     }
-
-    /// The cells of the row, after the varied parameters and the frequency; `truncated` says whether any row of the table has an
-    /// estimate of its truncation.
-    pub fn write(&self, system: &System, truncated: bool, rows: &mut Rows) {
-        for (place, [amplitude, mean, phase]) in system.places.iter().zip(&self.places) {
-            rows.number(&format!("{place}_amplitude_m"), *amplitude);
-            rows.number(&format!("{place}_mean_m"), *mean);
-            rows.number(&format!("{place}_phase_deg"), *phase);
-        }
-        for (joint, [dissipation, slip]) in system.joints.iter().zip(&self.joints) {
-            rows.number(&format!("{}_dissipation_J", joint.name), *dissipation);
-            rows.number(&format!("{}_slip_fraction", joint.name), *slip);
-        }
-        rows.flag("stable", self.stable);
-        rows.number("residual", self.residual);
-        rows.number("energy_gap", self.energy_gap);
-        if truncated {
-            rows.number("truncation", self.truncation);
-        }
-        rows.integer("iterations", self.iterations);
-        rows.text("status", &self.status);
-    }
+    Ok(whole)
 }
 
-/// The unit in which `largest` (SI) lies between 0.5 and 500: its name and the factor from SI.
-pub(crate) fn display_unit(largest: f64, si: &str) -> (String, f64) {
-    for (prefix, factor) in [("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)] {
-        if largest * factor >= 0.5 {
-            return (format!("{prefix}{si}"), factor);
-        }
+type Finished = (usize, std::thread::Result<Result<Part, StudyError>>);
+
+/// The next finished unit, or `None` after a while. A thread of the pool works meanwhile instead of waiting for itself.
+fn next(receive: &mpsc::Receiver<Finished>) -> Option<Finished> {
+    if rayon::current_thread_index().is_none() {
+        return receive.recv_timeout(LOOK).ok();
     }
-    (si.to_owned(), 1.0)
+    if let Ok(finished) = receive.try_recv() {
+        return Some(finished);
+    }
+    if rayon::yield_now() != Some(rayon::Yield::Executed) {
+        std::thread::sleep(LOOK / 20);
+    }
+    None
+}
+
+fn compute(study: &Study, index: usize, context: &Context) -> Result<Part, StudyError> {
+    let unit = Units::of(study).get(index);
+    if context.stopped() {
+        return Ok(Part::not_reached(unit.len()));
+    }
+    let cases = unit.cases.clone().map(|index| Prepared::new(study, index)).collect::<Result<Vec<_>, _>>()?;
+    let work = Work { study, cases, points: unit.points, context };
+    let part = (study.kind().compute)(&work);
+    part.map_err(|(index, error)| match work.cases.iter().find(|prepared| prepared.case.index == index) {
+        Some(prepared) => refused(study, &prepared.case, &error),
+        None => study.error_at("study", 0, "kind", error.to_string(), None),
+    })
 }

@@ -214,6 +214,18 @@ impl Study {
         self.cases() * frequencies
     }
 
+    /// Number of values of the last varied parameter, the one that changes fastest; 1 if nothing is varied.
+    pub(crate) fn last_varied(&self) -> usize {
+        self.varied.last().map_or(1, |varied| varied.points.len())
+    }
+
+    /// The varied parameters of the case with this number, without its model; `None` if there is no such case.
+    pub(crate) fn varied_values(&self, index: usize) -> Option<Vec<VariedValue>> {
+        let choice = self.choice(index);
+        let environment = evaluate(&self.names, &self.parameters, &self.order, &choice, None).ok()?;
+        Some(self.varied_of(&environment, &choice.into_values().map(|(varied, point)| (varied.index, point)).collect()))
+    }
+
     /// The case with this number.
     ///
     /// # Errors
@@ -351,13 +363,19 @@ impl Study {
         parts
     }
 
-    fn resolve(&self, index: usize, fixed: Option<(usize, f64)>, problems: &mut Vec<Problem>) -> Option<Parts> {
+    /// Which point of each varied parameter a case has.
+    fn choice(&self, index: usize) -> HashMap<usize, (&Varied, usize)> {
         let mut remainder = index;
         let mut choice = HashMap::new();
         for varied in self.varied.iter().rev() {
             choice.insert(varied.index, (varied, remainder % varied.points.len()));
             remainder /= varied.points.len();
         }
+        choice
+    }
+
+    fn resolve(&self, index: usize, fixed: Option<(usize, f64)>, problems: &mut Vec<Problem>) -> Option<Parts> {
+        let choice = self.choice(index);
         let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed) {
             Ok(values) => values,
             Err(problem) => {
@@ -409,25 +427,31 @@ impl Study {
         model
     }
 
+    fn varied_of(&self, environment: &[Value], choice: &HashMap<usize, usize>) -> Vec<VariedValue> {
+        self.varied
+            .iter()
+            .map(|varied| {
+                let name = self.names[varied.index].clone();
+                let value = environment[varied.index];
+                let literal = match &varied.points {
+                    VariedPoints::List(list) => choice.get(&varied.index).and_then(|&point| list.get(point)),
+                    VariedPoints::Range { .. } => None,
+                };
+                // as the user wrote it, if that is a number with its unit
+                let text = match literal.filter(|q| q.inner.is_some() && q.expression.is_literal()) {
+                    Some(quantity) if quantity.text.contains(|c: char| c.is_alphabetic() && c != 'e' && c != 'E') => {
+                        quantity.text.trim().to_owned()
+                    }
+                    _ => displayed(value.si, value.dimension),
+                };
+                VariedValue { text: format!("{name} = {text}"), name, si: value.si, dimension: value.dimension }
+            })
+            .collect()
+    }
+
     fn finished(&self, index: usize, parts: Parts) -> Case {
         let Parts { environment, model, values, method, choice } = parts;
-        let varied = self.varied.iter().map(|varied| {
-            let name = self.names[varied.index].clone();
-            let value = environment[varied.index];
-            let literal = match &varied.points {
-                VariedPoints::List(list) => choice.get(&varied.index).and_then(|&point| list.get(point)),
-                VariedPoints::Range { .. } => None,
-            };
-            // as the user wrote it, if that is a number with its unit
-            let text = match literal.filter(|q| q.inner.is_some() && q.expression.is_literal()) {
-                Some(quantity) if quantity.text.contains(|c: char| c.is_alphabetic() && c != 'e' && c != 'E') => {
-                    quantity.text.trim().to_owned()
-                }
-                _ => displayed(value.si, value.dimension),
-            };
-            VariedValue { text: format!("{name} = {text}"), name, si: value.si, dimension: value.dimension }
-        });
-        let varied = varied.collect();
+        let varied = self.varied_of(&environment, &choice);
         let parameters = self
             .names
             .iter()

@@ -1,6 +1,5 @@
 //! Kinds that follow something: performance curves, nonlinear modes, branches, as a study file asks for them.
 
-use std::sync::atomic::AtomicBool;
 use stickslip_study::dataset::{Dataset, Style, Table};
 use stickslip_study::{
     read_study,
@@ -9,7 +8,7 @@ use stickslip_study::{
 
 fn dataset(text: &str) -> Dataset {
     let study = read_study("study.toml", text, &[]).unwrap();
-    run(&study, &Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| () }).unwrap()
+    run(&study, &Context::unwatched(1)).unwrap()
 }
 
 fn table<'a>(dataset: &'a Dataset, name: &str) -> &'a Table {
@@ -157,7 +156,7 @@ frequency = { from = "1 rad/s", to = "2 rad/s", points = 2 }
 harmonics = 3
 "#;
     let study = read_study("study.toml", text, &[]).unwrap();
-    let error = run(&study, &Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| () }).unwrap_err();
+    let error = run(&study, &Context::unwatched(1)).unwrap_err();
     assert_eq!(error.key(), Some("harmonics"));
     assert_eq!(error.line(), Some(17), "{error}");
 }

@@ -62,7 +62,8 @@ pub fn curves(dataset: &Dataset) -> Option<Vec<Curve>> {
         .map(|rows| {
             let limit = limit[rows.start];
             let peak_of = |place: &str| {
-                let row = (0..peaks.rows()).find(|&i| peak_limit[i] == limit && masses[i] == place)?;
+                let rows = (0..peaks.rows()).filter(|&i| peak_limit[i] == limit && masses[i] == place);
+                let row = rows.max_by(|&a, &b| peak_amplitude[a].total_cmp(&peak_amplitude[b]))?;
                 Some((peak_frequency[row], peak_amplitude[row]))
             };
             Some(Curve {

@@ -14,7 +14,6 @@ use optimum::Optimum;
 use std::error::Error;
 use std::fmt::Write;
 use std::path::Path;
-use std::sync::atomic::Ordering;
 use stickslip_report::{Claim, Outputs, Page, Section, Verdict, write_dataset};
 use stickslip_study::run::{Context, run};
 use studies::{FILES, Results, read};
@@ -62,14 +61,14 @@ struct Extent {
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn paper(out: &Path, context: &Context<'_>, say: &dyn Fn(&str)) -> Result<Outcome, Failure> {
+pub fn paper(out: &Path, context: &Context, say: &dyn Fn(&str)) -> Result<Outcome, Failure> {
     produce(out, context, say, &Extent { points: None, outputs: Outputs::all() })
 }
 
-fn produce(out: &Path, context: &Context<'_>, say: &dyn Fn(&str), extent: &Extent) -> Result<Outcome, Failure> {
+fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -> Result<Outcome, Failure> {
     let mut results = Results::default();
     for (name, _) in FILES {
-        if context.stop.load(Ordering::Relaxed) {
+        if context.stopped() {
             break;
         }
         let dataset = run(&read(name, extent.points, &[])?, context)?;
@@ -126,11 +125,11 @@ const OMEGAS: [(f64, &str); 4] =
     [(0.5, "0.5 rad/s"), (1.0, "1 rad/s"), (2.0, "2 rad/s"), (std::f64::consts::TAU, "6.283185307179586 rad/s")];
 
 impl Further {
-    fn new(context: &Context<'_>, extent: &Extent) -> Further {
+    fn new(context: &Context, extent: &Extent) -> Further {
         // an interrupted or failed extra case only leaves its claim unmeasured
         let with =
             |name: &str, key: &str, value: &str| run(&read(name, extent.points, &[(key, value)]).ok()?, context).ok();
-        let stopped = || context.stop.load(Ordering::Relaxed);
+        let stopped = || context.stopped();
         if stopped() {
             return Further::default();
         }
@@ -238,11 +237,11 @@ fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::AtomicBool;
+    use std::sync::{Arc, atomic::AtomicBool};
 
     fn reduced(stop: bool) -> (tempfile::TempDir, Outcome) {
         let out = tempfile::tempdir().unwrap();
-        let context = Context { threads: 1, stop: &AtomicBool::new(stop), finished: &|| () };
+        let context = Context { stop: Arc::new(AtomicBool::new(stop)), ..Context::unwatched(1) };
         let extent = Extent { points: Some(25), outputs: Outputs::only(&["csv", "json", "svg"]).unwrap() };
         let outcome = produce(out.path(), &context, &|_| (), &extent).unwrap();
         (out, outcome)

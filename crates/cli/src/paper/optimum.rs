@@ -1,6 +1,5 @@
 //! The highest resonance peak over the slip limit: the curve on which the paper's four values lie, and its lowest point.
 
-use std::sync::atomic::Ordering;
 use stickslip::curve::performance::Performance;
 use stickslip::law::{Coulomb, Law};
 use stickslip::method::find;
@@ -27,9 +26,9 @@ pub struct Optimum {
 
 impl Optimum {
     /// Computes the curve for the model of a response study with Coulomb friction; `None` if the run is stopped or a case fails.
-    pub fn new(study: &Study, context: &Context<'_>) -> Option<Optimum> {
+    pub fn new(study: &Study, context: &Context) -> Option<Optimum> {
         let case = study.case(0).ok()?;
-        if context.stop.load(Ordering::Relaxed) {
+        if context.stopped() {
             return None;
         }
         let frequencies = case.frequencies.as_ref()?;

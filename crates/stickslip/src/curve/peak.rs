@@ -336,7 +336,8 @@ mod tests {
 
     #[test]
     fn a_kink_is_found_as_well() {
-        let curve = |w: f64| if w < 1.05 { 1.0 + 3.0 * (w - 1.05) } else { 1.0 - 0.2 * (w - 1.05) + (w - 1.05).powi(2) };
+        let curve =
+            |w: f64| if w < 1.05 { 1.0 + 3.0 * (w - 1.05) } else { 1.0 - 0.2 * (w - 1.05) + (w - 1.05).powi(2) };
         let (omega, value, count) = check(&curve, [0.9, 1.1, 1.2]);
         assert!((value - 1.0).abs() < 1e-7 && (omega - 1.05).abs() < 1e-7, "{omega} {value} {count}");
         assert!(count <= 24, "{count}");

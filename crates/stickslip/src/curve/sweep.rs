@@ -50,20 +50,11 @@ pub fn sweep<R: Send>(
         .into_par_iter()
         .map(|block| {
             let range = block * BLOCK..((block + 1) * BLOCK).min(count);
-            let mut solver = method.solver(system)?;
-            let mut start: Option<Vec<f64>> = None;
             let mut rows = Vec::with_capacity(range.len());
-            for index in range {
-                if watch.stop.load(Ordering::Relaxed) {
-                    rows.push(None);
-                    continue;
-                }
-                let outcome = solver.orbit(omega(index), start.as_deref());
-                rows.push(Some(row(index, outcome.as_ref())));
-                // after a failure the next point starts cold: the last good orbit may be far away
-                start = outcome.ok().map(|orbit| orbit.start);
-                (watch.finished)();
-            }
+            stretch(method, system, &mut range.clone().map(omega), watch, &mut |_, outcome| {
+                let index = range.start + rows.len();
+                rows.push(outcome.map(|outcome| row(index, outcome)));
+            })?;
             Ok(rows)
         })
         .collect();
@@ -72,4 +63,35 @@ pub fn sweep<R: Send>(
         all.extend(block?);
     }
     Ok(all)
+}
+
+/// Looks at an outcome at a frequency (rad/s); `None` if the sweep was stopped before.
+pub type See<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
+
+/// Runs `system` over some frequencies (rad/s), one after the other, each started from the one before; `see` looks at each outcome as soon
+/// as it is there.
+///
+/// # Errors
+/// The method cannot take the system.
+pub fn stretch(
+    method: &dyn Method,
+    system: &System,
+    omegas: &mut dyn Iterator<Item = f64>,
+    watch: Watch<'_>,
+    see: &mut See<'_>,
+) -> Result<(), MethodError> {
+    let mut solver = method.solver(system)?;
+    let mut start: Option<Vec<f64>> = None;
+    for omega in omegas {
+        if watch.stop.load(Ordering::Relaxed) {
+            see(omega, None);
+            continue;
+        }
+        let outcome = solver.orbit(omega, start.as_deref());
+        see(omega, Some(outcome.as_ref()));
+        // after a failure the next point starts cold: the last good orbit may be far away
+        start = outcome.ok().map(|orbit| orbit.start);
+        (watch.finished)();
+    }
+    Ok(())
 }

@@ -1,16 +1,17 @@
 //! Branches of orbits by arc length, along the drive frequency or along a design parameter, around turning points.
 
-use super::orbits::Inaccurate;
 use super::peak_of::{check_peak_of, peak_place};
-use super::{Complaint, Computed, FREQUENCY, HARMONICS, Kind, SERIES_SAMPLES, check_samples};
-use crate::dataset::{Axis, Panel, Series, Style};
-use crate::run::{Context, NOT_REACHED, Outcome, Prepared, Rows, Summary, display_unit};
+use super::{Complaint, FREQUENCY, HARMONICS, Kind, SERIES_SAMPLES, check_samples, orbits};
+use crate::dataset::{Axis, Figure, Panel, Series, Style, Table, Values as Cells};
+use crate::drawing::{Drawing, display_unit, largest, numbers};
+use crate::point::Summary;
+use crate::rows::Rows;
 use crate::schema::{Takes, Within, default, optional};
 use crate::study::{Study, VariedValue, varied_text};
 use crate::values::Values;
-use rayon::prelude::*;
+use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
-use stickslip::curve::trace::{Branch, End, Trace, TraceError, TracePoint};
+use stickslip::curve::trace::{Branch, End, Trace, TraceError};
 use stickslip::dimension::Dimension;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::model::{Model, System};
@@ -47,7 +48,11 @@ pub(super) const KIND: Kind = Kind {
     check,
     // harmonic balance is what branches are made of
     uses_method: false,
-    run,
+    tables: &["branch", "peaks", "turns"],
+    // along a parameter the cases of one branch differ in the last one only
+    grain: |study| if along_parameter(study) { Grain::Curve } else { Grain::Case },
+    compute,
+    draw,
 };
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
@@ -62,99 +67,21 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     check_samples(values)
 }
 
-/// A branch that was asked for.
-struct Followed<'a> {
-    /// The first of its cases.
-    prepared: &'a Prepared,
-    /// The parameter that it runs along; the drive frequency if absent.
-    along: Option<&'a VariedValue>,
-    found: Result<Branch, Missing>,
-}
-
 /// Why there is no branch.
 enum Missing {
-    Interrupted,
     NoRange,
     Trace(TraceError),
 }
 
-fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
-    let outer = |prepared: &Prepared| -> Vec<u64> {
-        // along a parameter the cases of one branch differ in the last one only
-        let (outer, _) = split(prepared);
-        outer.iter().map(|v| v.si.to_bits()).collect()
-    };
-    let groups: Vec<&[Prepared]> = cases.chunk_by(|a, b| split(a).1.is_some() && outer(a) == outer(b)).collect();
-    let followed: Vec<Followed<'_>> = groups.par_iter().map(|group| follow(study, group, context)).collect();
-    let mut outcome = Outcome::default();
-    let (mut rows, mut peaks, mut turns) = (Rows::default(), Rows::default(), Rows::default());
-    let mut inaccurate = Inaccurate::default();
-    let mut branches = Vec::new();
-    for Followed { prepared, along, found } in followed {
-        let label = || varied_text(split(prepared).0);
-        let branch = match found {
-            Ok(branch) => branch,
-            Err(Missing::Trace(TraceError::Method(error))) => return Err((prepared.case.index, error)),
-            Err(Missing::Trace(TraceError::Start(error))) => {
-                outcome.count(label, error.status(), Some(error.to_string()));
-                continue;
-            }
-            Err(Missing::Interrupted) => {
-                outcome.count(label, NOT_REACHED, None);
-                continue;
-            }
-            Err(Missing::NoRange) => {
-                let reason = "a branch needs a range: frequency = { from = …, to = …, points = 2 }, or vary = { Ft = [ … ] } with two values";
-                outcome.count(label, "no-range", Some(reason.to_owned()));
-                continue;
-            }
-        };
-        let place = peak_place(prepared);
-        let (name, factor) = axis(along);
-        let begin = |rows: &mut Rows, value: f64| {
-            split(prepared).0.iter().for_each(|v| rows.number(&v.name, v.si));
-            rows.number(&name, value * factor);
-        };
-        for point in &branch.points {
-            outcome.count(String::new, point.orbit.evidence.accuracy.status(), None);
-            inaccurate.add(&point.orbit);
-            begin(&mut rows, point.value);
-            Summary::new(&prepared.system, Ok(&point.orbit)).write(&prepared.system, true, &mut rows);
-            rows.end();
-        }
-        for (value, height) in &branch.peaks {
-            begin(&mut peaks, *value);
-            peaks.number("amplitude_m", *height);
-            peaks.end();
-        }
-        for point in branch.turns.iter().map(|turn| &branch.points[*turn]) {
-            begin(&mut turns, point.value);
-            turns.number("amplitude_m", point.orbit.places[place].amplitude());
-            turns.end();
-        }
-        let reason = match branch.end {
-            End::Border => None,
-            End::Stalled { at } => Some(format!("no shorter step converges beyond {name} = {:.9}", at * factor)),
-            End::Points | End::Stopped => Some("the branch does not reach the end of its range".to_owned()),
-        };
-        if let Some(reason) = reason {
-            let kept = format!("{reason}; its {} points so far are kept", branch.points.len());
-            outcome.count(label, "stalled", Some(kept));
-        }
-        branches.push((prepared, along, branch));
-    }
-    outcome.notes.extend(inaccurate.notes());
-    outcome.tables = vec![rows.table("branch"), peaks.table("peaks"), turns.table("turns")];
-    outcome.figure = panel(&branches).into_iter().collect();
-    Ok(outcome)
+/// Whether branches run along the last varied parameter, at one frequency, rather than along the frequency.
+fn along_parameter(study: &Study) -> bool {
+    !study.varied().is_empty() && study.points() == study.cases()
 }
 
-/// The varied parameters that tell branches apart, and the one that a branch runs along: the last one, if there is one frequency.
-fn split(prepared: &Prepared) -> (&[VariedValue], Option<&VariedValue>) {
-    let varied = &prepared.case.varied[..];
-    let one = prepared.case.frequencies.as_ref().is_some_and(|f| f.len() == 1);
+/// The varied parameters that tell branches apart, and the one that a branch runs along.
+fn split<'v>(study: &Study, varied: &'v [VariedValue]) -> (&'v [VariedValue], Option<&'v VariedValue>) {
     match varied.split_last() {
-        Some((last, outer)) if one => (outer, Some(last)),
+        Some((last, outer)) if along_parameter(study) => (outer, Some(last)),
         _ => (varied, None),
     }
 }
@@ -164,92 +91,144 @@ fn axis(along: Option<&VariedValue>) -> (String, f64) {
     along.map_or_else(|| ("frequency_Hz".to_owned(), 1.0 / TAU), |parameter| (parameter.name.clone(), 1.0))
 }
 
-fn follow<'a>(study: &Study, group: &'a [Prepared], context: &Context<'_>) -> Followed<'a> {
-    let (prepared, last) = (&group[0], &group[group.len() - 1]);
-    let along = split(prepared).1;
-    let frequencies: Vec<f64> = prepared.case.frequencies.iter().flat_map(|f| f.iter()).collect();
-    let range = match (along, split(last).1) {
-        (Some(first), Some(last)) => (first.si, last.si),
-        _ => (frequencies.first().copied().unwrap_or(0.0), frequencies.last().copied().unwrap_or(0.0)),
+fn compute(work: &Work<'_>) -> Computed {
+    let prepared = work.case();
+    let (outer, along) = split(work.study, &prepared.case.varied);
+    let label = || varied_text(outer);
+    let mut part = Part::default();
+    let found = follow(work, along);
+    (0..work.cases.len() * work.points.len()).for_each(|_| (work.context.finished)());
+    let branch = match found {
+        Ok(branch) => branch,
+        Err(Missing::Trace(TraceError::Method(error))) => return Err((prepared.case.index, error)),
+        Err(Missing::Trace(TraceError::Start(error))) => {
+            part.count(label, error.status(), Some(error.to_string()));
+            return Ok(part);
+        }
+        Err(Missing::NoRange) => {
+            let reason = "a branch needs a range: frequency = { from = …, to = …, points = 2 }, or vary = { Ft = [ … ] } with two values";
+            part.count(label, "no-range", Some(reason.to_owned()));
+            return Ok(part);
+        }
     };
-    let found = if context.stopped() {
-        Err(Missing::Interrupted)
-    } else if range.0 == range.1 {
-        Err(Missing::NoRange)
-    } else {
-        let values = &prepared.case.values;
-        let count = |key: &str, default: u64| values.count(key).unwrap_or(default) as usize;
-        let omega = frequencies[0];
-        let system = |value: f64| -> Option<System> {
-            let case = study.case_with(prepared.case.index, &along?.name, value).ok()?;
-            case.model.assemble().ok()
-        };
-        // a value that the model cannot have has no drive, and the branch ends before it
-        let at = |value: f64| match along {
-            None => (prepared.system.clone(), value),
-            Some(_) => system(value).map_or((prepared.system.clone(), 0.0), |system| (system, omega)),
-        };
-        let place = peak_place(prepared);
-        let trace = Trace {
-            at: &at,
-            method: HarmonicBalance {
-                harmonics: Some(count("harmonics", HARMONICS)),
-                samples: Some(count("samples", SERIES_SAMPLES)),
-                tolerance: values.quantity("tolerance"),
-            },
-            range,
-            step: (range.1 - range.0).abs() / count("steps", 100) as f64,
-            quantity: &|orbit| orbit.places[place].amplitude(),
-        };
-        trace.branch().map_err(Missing::Trace)
+    let place = peak_place(prepared);
+    let (name, factor) = axis(along);
+    let begin = |rows: &mut Rows, value: f64| {
+        outer.iter().for_each(|v| rows.number(&v.name, v.si));
+        rows.number(&name, value * factor);
     };
-    (0..group.len() * frequencies.len()).for_each(|_| (context.finished)());
-    Followed { prepared, along, found }
+    let (mut rows, mut peaks, mut turns) = (Rows::default(), Rows::default(), Rows::default());
+    for point in &branch.points {
+        orbits::count(&mut part, &prepared.case, &point.orbit);
+        begin(&mut rows, point.value);
+        Summary::new(&prepared.system, Ok(&point.orbit)).write(&prepared.system, &mut rows);
+        rows.end();
+    }
+    for (value, height) in &branch.peaks {
+        begin(&mut peaks, *value);
+        peaks.number("amplitude_m", *height);
+        peaks.end();
+    }
+    for point in branch.turns.iter().map(|turn| &branch.points[*turn]) {
+        begin(&mut turns, point.value);
+        turns.number("amplitude_m", point.orbit.places[place].amplitude());
+        turns.end();
+    }
+    let reason = match branch.end {
+        End::Border => None,
+        End::Stalled { at } => Some(format!("no shorter step converges beyond {name} = {:.9}", at * factor)),
+        End::Points | End::Stopped => Some("the branch does not reach the end of its range".to_owned()),
+    };
+    if let Some(reason) = reason {
+        let kept = format!("{reason}; its {} points so far are kept", branch.points.len());
+        part.count(label, "stalled", Some(kept));
+    }
+    part.tables = vec![rows, peaks, turns];
+    Ok(part)
 }
 
-fn panel(branches: &[(&Prepared, Option<&VariedValue>, Branch)]) -> Option<Panel> {
-    let (_, along, _) = branches.first()?;
-    let points = branches.iter().flat_map(|(_, _, branch)| &branch.points);
-    let largest = points.flat_map(|point| point.orbit.places.iter().map(|p| p.amplitude())).fold(0.0, f64::max);
-    let (unit, factor) = display_unit(largest, "m");
-    let (name, along_factor) = axis(*along);
+fn follow(work: &Work<'_>, along: Option<&VariedValue>) -> Result<Branch, Missing> {
+    let (prepared, last) = (work.case(), &work.cases[work.cases.len() - 1]);
+    let range = match (along, split(work.study, &last.case.varied).1) {
+        (Some(first), Some(last)) => (first.si, last.si),
+        _ => (work.omega(work.points.start), work.omega(work.points.end - 1)),
+    };
+    if range.0 == range.1 {
+        return Err(Missing::NoRange);
+    }
+    let values = &prepared.case.values;
+    let count = |key: &str, default: u64| values.count(key).unwrap_or(default) as usize;
+    let system = |value: f64| -> Option<System> {
+        let case = work.study.case_with(prepared.case.index, &along?.name, value).ok()?;
+        case.model.assemble().ok()
+    };
+    // a value that the model cannot have has no drive, and the branch ends before it
+    let at = |value: f64| match along {
+        None => (prepared.system.clone(), value),
+        Some(_) => system(value).map_or((prepared.system.clone(), 0.0), |system| (system, work.omega(0))),
+    };
+    let place = peak_place(prepared);
+    let trace = Trace {
+        at: &at,
+        method: HarmonicBalance {
+            harmonics: Some(count("harmonics", HARMONICS)),
+            samples: Some(count("samples", SERIES_SAMPLES)),
+            tolerance: values.quantity("tolerance"),
+        },
+        range,
+        step: (range.1 - range.0).abs() / count("steps", 100) as f64,
+        quantity: &|orbit| orbit.places[place].amplitude(),
+    };
+    trace.branch().map_err(Missing::Trace)
+}
+
+/// Of several branches only the place whose peaks count is shown.
+fn draw(drawing: &Drawing<'_>) -> Figure {
+    let (Some(table), Ok(prepared)) = (drawing.table("branch"), Prepared::new(drawing.study, 0)) else {
+        return Figure::default();
+    };
+    let (system, place) = (&prepared.system, peak_place(&prepared));
+    let (outer, along) = split(drawing.study, &prepared.case.varied);
+    let column = |place: usize| format!("{}_amplitude_m", system.places[place]);
+    let (unit, factor) = display_unit(largest(table, (0..system.dofs()).map(column)), "m");
+    let (name, _) = axis(along);
     let si = along.map_or("Hz", |v| v.dimension.and_then(|d| d.name_and_unit()).map_or("", |(_, unit)| unit));
-    let quantity = if along.is_some() { name } else { "frequency".to_owned() };
-    // of several branches only the place whose peaks count is shown
-    let place = &branches[0].0.system.places[peak_place(branches[0].0)];
-    let height = if branches.len() == 1 { "amplitude".to_owned() } else { format!("amplitude of {place}") };
+    let stretches = drawing.stretches_of(table, outer.len());
+    let one = stretches.len() == 1;
+    let height = if one { "amplitude".to_owned() } else { format!("amplitude of {}", system.places[place]) };
+    let unstable = unstable(table);
     let mut series = Vec::new();
     let mut colour = 0;
-    for (prepared, _, branch) in branches {
-        let outer = varied_text(split(prepared).0);
-        let places = if branches.len() == 1 {
-            0..prepared.system.dofs()
-        } else {
-            peak_place(prepared)..peak_place(prepared) + 1
-        };
-        for place in places {
-            let label = if branches.len() == 1 { prepared.system.places[place].clone() } else { outer.clone() };
-            let mut from = 0;
+    for stretch in &stretches {
+        for place in if one { 0..system.dofs() } else { place..place + 1 } {
+            let label = if one { system.places[place].clone() } else { varied_text(&stretch.varied[..outer.len()]) };
+            let mut from = stretch.rows.start;
             // unstable stretches are dashed; each begins at the last point of the one before
-            for run in branch.points.chunk_by(|a, b| unstable(a) == unstable(b)) {
-                let shown = &branch.points[from.max(1) - 1..from + run.len()];
+            for run in unstable[stretch.rows.clone()].chunk_by(|a, b| a == b) {
+                let shown = from.max(stretch.rows.start + 1) - 1..from + run.len();
                 from += run.len();
-                let dashed = unstable(&run[0]);
-                series.push(Series {
-                    label: if dashed { format!("{label}, unstable") } else { label.clone() },
-                    x: shown.iter().map(|point| point.value * along_factor).collect(),
-                    y: shown.iter().map(|point| point.orbit.places[place].amplitude() * factor).collect(),
-                    style: if dashed { Style::Dashed } else { Style::Solid },
-                    colour,
-                    ..Series::default()
-                });
+                let y = numbers(table, &column(place), shown.clone()).iter().map(|y| y * factor).collect();
+                let label = if run[0] { format!("{label}, unstable") } else { label.clone() };
+                let line = Series::line(label, numbers(table, &name_of_axis(table, outer.len()), shown), y, colour);
+                series.push(if run[0] { Series { style: Style::Dashed, ..line } } else { line });
             }
             colour += 1;
         }
     }
-    Some(Panel { title: String::new(), x: Axis::new(quantity, si), y: Axis::new(height, unit), series })
+    let quantity = if along.is_some() { name } else { "frequency".to_owned() };
+    let panel = Panel { title: String::new(), x: Axis::new(quantity, si), y: Axis::new(height, unit), series };
+    Figure { panels: vec![panel], ..Figure::default() }
 }
 
-fn unstable(point: &TracePoint) -> bool {
-    point.orbit.is_stable() == Some(false)
+/// The column of what a branch runs along stands behind the outer varied parameters.
+fn name_of_axis(table: &Table, outer: usize) -> String {
+    table.columns[outer].name.clone()
+}
+
+/// Which rows are known to be unstable.
+fn unstable(table: &Table) -> Vec<bool> {
+    match table.columns.iter().find(|column| column.name == "stable").map(|column| &column.values) {
+        Some(Cells::Flag(flags)) => flags.iter().map(|stable| *stable == Some(false)).collect(),
+        _ => vec![false; table.rows()],
+    }
 }

@@ -1,11 +1,12 @@
 //! Hysteresis loops: force over displacement of joints and moved places, over one period of the steady motion.
 
-use super::{Complaint, Computed, FREQUENCY, Kind, SAMPLES, orbits};
-use crate::dataset::{Axis, Panel, Series, Style};
-use crate::run::{Context, Outcome, Prepared, Rows, display_unit, place_of};
+use super::{Complaint, FREQUENCY, Kind, SAMPLES, orbits};
+use crate::dataset::{Axis, Figure, Panel, Series};
+use crate::drawing::{Drawing, display_unit, largest, numbers, words};
+use crate::rows::Rows;
 use crate::schema::{Takes, optional};
-use crate::study::Study;
 use crate::values::Values;
+use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::model::Model;
 use stickslip::orbit::{Orbit, Sample};
@@ -25,7 +26,10 @@ pub(super) const KIND: Kind = Kind {
     ],
     check,
     uses_method: true,
-    run,
+    tables: &["loops", "loops_summary"],
+    grain: |_| Grain::Frequencies,
+    compute,
+    draw,
 };
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
@@ -41,15 +45,6 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
         return Err(Complaint::new("kind", "the model has no joint and no moved place, so it has no loop", help));
     }
     Ok(())
-}
-
-/// One loop to be drawn.
-struct Loop {
-    case: usize,
-    omega: f64,
-    name: String,
-    displacement: Vec<f64>,
-    force: Vec<f64>,
 }
 
 /// Where the force and displacement of a loop stand in a sample.
@@ -69,63 +64,53 @@ impl Source {
     }
 }
 
-fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
-    let mut outcome = Outcome::default();
+fn compute(work: &Work<'_>) -> Computed {
+    let mut part = Part::default();
     let (mut table, mut summary) = (Rows::default(), Rows::default());
-    let mut loops = Vec::new();
-    let mut inaccurate = orbits::Inaccurate::default();
-    let several = cases.iter().any(|prepared| prepared.case.frequencies.as_ref().is_some_and(|f| f.len() > 1));
-    for (index, (prepared, points)) in cases.iter().zip(orbits::all(cases, context)).enumerate() {
-        let sources = sources(prepared);
-        for (omega, point) in points {
-            let orbit = match point {
-                Some(Ok(orbit)) => orbit,
-                other => {
-                    orbits::count_missing(&mut outcome, &prepared.case, omega, other.as_ref());
-                    continue;
-                }
-            };
-            outcome.count(|| place_of(&prepared.case, omega), orbit.evidence.accuracy.status(), None);
-            inaccurate.add(&orbit);
-            let times = orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
-            let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();
-            for (name, source) in &sources {
-                let mut one = Loop { case: index, omega, name: name.clone(), displacement: vec![], force: vec![] };
-                for (time, sample) in times.iter().zip(&samples) {
-                    let (displacement, force) = source.read(sample);
-                    table.varied(&prepared.case);
-                    if several {
-                        table.number("frequency_Hz", omega / TAU);
-                    }
-                    table.text("joint", name);
-                    table.number("time_s", *time);
-                    table.number("displacement_m", displacement);
-                    table.number("force_N", force);
-                    table.end();
-                    one.displacement.push(displacement);
-                    one.force.push(force);
-                }
-                loops.push(one);
-                let first = First::new(&orbit, *source);
-                summary.varied(&prepared.case);
-                if several {
-                    summary.number("frequency_Hz", omega / TAU);
-                }
-                summary.text("joint", name);
-                summary.number("dissipation_J", exact_loss(prepared, &orbit, *source).unwrap_or(first.loss));
-                summary.number("equivalent_stiffness_N_per_m", first.stiffness);
-                summary.number("equivalent_damping_kg_per_s", first.damping);
-                summary.number("residual", orbit.evidence.residual);
-                summary.number("energy_gap", orbit.evidence.energy_gap);
-                summary.text("status", orbit.evidence.accuracy.status());
-                summary.end();
+    let prepared = work.case();
+    let several = work.several_frequencies();
+    let sources = sources(prepared);
+    for (omega, point) in orbits::all(work)? {
+        let orbit = match point {
+            Some(Ok(orbit)) => orbit,
+            other => {
+                orbits::count_missing(&mut part, &prepared.case, omega, other.as_ref());
+                continue;
             }
+        };
+        orbits::count(&mut part, &prepared.case, &orbit);
+        let times = orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
+        let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();
+        for (name, source) in &sources {
+            for (time, sample) in times.iter().zip(&samples) {
+                let (displacement, force) = source.read(sample);
+                table.varied(&prepared.case);
+                if several {
+                    table.number("frequency_Hz", omega / TAU);
+                }
+                table.text("joint", name);
+                table.number("time_s", *time);
+                table.number("displacement_m", displacement);
+                table.number("force_N", force);
+                table.end();
+            }
+            let first = First::new(&orbit, *source);
+            summary.varied(&prepared.case);
+            if several {
+                summary.number("frequency_Hz", omega / TAU);
+            }
+            summary.text("joint", name);
+            summary.number("dissipation_J", exact_loss(prepared, &orbit, *source).unwrap_or(first.loss));
+            summary.number("equivalent_stiffness_N_per_m", first.stiffness);
+            summary.number("equivalent_damping_kg_per_s", first.damping);
+            summary.number("residual", orbit.evidence.residual);
+            summary.number("energy_gap", orbit.evidence.energy_gap);
+            summary.text("status", orbit.evidence.accuracy.status());
+            summary.end();
         }
     }
-    outcome.notes.extend(inaccurate.notes());
-    outcome.tables = vec![table.table("loops"), summary.table("loops_summary")];
-    outcome.figure = panels(cases, &loops, several);
-    Ok(outcome)
+    part.tables = vec![table, summary];
+    Ok(part)
 }
 
 /// The loops that the study asks for.
@@ -205,43 +190,46 @@ impl First {
     }
 }
 
-fn panels(cases: &[Prepared], loops: &[Loop], several: bool) -> Vec<Panel> {
-    let largest = |values: fn(&Loop) -> &[f64]| loops.iter().flat_map(values).fold(0.0f64, |a, v| a.max(v.abs()));
-    let (x_unit, x_factor) = display_unit(largest(|l| &l.displacement), "m");
-    let (y_unit, y_factor) = display_unit(largest(|l| &l.force), "N");
+/// The fastest varied parameter and the frequency tell the loops of one panel apart, the others the panels.
+fn draw(drawing: &Drawing<'_>) -> Figure {
+    let Some(table) = drawing.table("loops") else { return Figure::default() };
+    let (x_unit, x_factor) = display_unit(largest(table, ["displacement_m".to_owned()]), "m");
+    let (y_unit, y_factor) = display_unit(largest(table, ["force_N".to_owned()]), "N");
+    let joints = words(table, "joint");
+    let frequencies = table.numbers("frequency_Hz");
+    let several = joints.iter().any(|joint| *joint != joints[0]);
+    let same = |a: usize, b: usize| joints[a] == joints[b] && frequencies.is_none_or(|f| f[a] == f[b]);
     let mut panels: Vec<Panel> = Vec::new();
-    let names: std::collections::BTreeSet<&str> = loops.iter().map(|l| l.name.as_str()).collect();
-    for one in loops {
-        let varied = &cases[one.case].case.varied;
-        // the fastest varied parameter tells the loops of one panel apart, the others the panels
-        let (outer, inner) = varied.split_at(varied.len().saturating_sub(1));
-        let mut title: Vec<String> = outer.iter().map(|v| v.text.clone()).collect();
-        if names.len() > 1 {
-            title.push(one.name.clone());
-        }
-        let title = title.join(", ");
-        let mut label: Vec<String> = inner.iter().map(|v| v.text.clone()).collect();
-        if several {
-            label.push(format!("{:.4} Hz", one.omega / TAU));
-        }
-        let at = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
-            panels.push(Panel {
-                title: title.clone(),
-                x: Axis::new("displacement", x_unit.clone()),
-                y: Axis::new("force", y_unit.clone()),
-                series: Vec::new(),
+    for stretch in drawing.stretches(table) {
+        let (outer, inner) = stretch.varied.split_at(stretch.varied.len().saturating_sub(1));
+        let mut from = stretch.rows.start;
+        while from < stretch.rows.end {
+            let to = (from + 1..stretch.rows.end).find(|row| !same(from, *row)).unwrap_or(stretch.rows.end);
+            let mut title: Vec<String> = outer.iter().map(|v| v.text.clone()).collect();
+            if several {
+                title.push(joints[from].clone());
+            }
+            let title = title.join(", ");
+            let mut label: Vec<String> = inner.iter().map(|v| v.text.clone()).collect();
+            if let Some(frequencies) = frequencies {
+                label.push(format!("{:.4} Hz", frequencies[from]));
+            }
+            let label = if label.is_empty() { joints[from].clone() } else { label.join(", ") };
+            let at = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
+                panels.push(Panel {
+                    title,
+                    x: Axis::new("displacement", x_unit.clone()),
+                    y: Axis::new("force", y_unit.clone()),
+                    series: Vec::new(),
+                });
+                panels.len() - 1
             });
-            panels.len() - 1
-        });
-        let colour = panels[at].series.len();
-        panels[at].series.push(Series {
-            label: if label.is_empty() { one.name.clone() } else { label.join(", ") },
-            x: one.displacement.iter().map(|u| u * x_factor).collect(),
-            y: one.force.iter().map(|f| f * y_factor).collect(),
-            style: Style::Solid,
-            colour,
-            ..Series::default()
-        });
+            let x = numbers(table, "displacement_m", from..to).iter().map(|u| u * x_factor).collect();
+            let y = numbers(table, "force_N", from..to).iter().map(|f| f * y_factor).collect();
+            let colour = panels[at].series.len();
+            panels[at].series.push(Series::line(label, x, y, colour));
+            from = to;
+        }
     }
-    panels
+    Figure { panels, ..Figure::default() }
 }

@@ -12,11 +12,12 @@ mod performance;
 mod response;
 mod transient;
 
-use crate::run::{Context, Outcome, Prepared};
+use crate::dataset::Figure;
+use crate::drawing::Drawing;
 use crate::schema::{Key, Takes, default, required};
 use crate::study::Study;
 use crate::values::Values;
-use stickslip::method::MethodError;
+use crate::work::{Computed, Grain, Work};
 use stickslip::model::Model;
 
 /// A row of the table of study kinds.
@@ -32,12 +33,15 @@ pub struct Kind {
     pub check: fn(&Values, &Model) -> Result<(), Complaint>,
     /// Whether it finds its orbits with the method of `[method]`, which must then be able to take the model.
     pub uses_method: bool,
-    /// Computes the cases.
-    pub run: fn(&Study, &[Prepared], &Context<'_>) -> Computed,
+    /// Its tables, the most important first.
+    pub tables: &'static [&'static str],
+    /// How its studies are cut into units of work.
+    pub grain: fn(&Study) -> Grain,
+    /// Computes one unit: rows of its tables.
+    pub compute: fn(&Work<'_>) -> Computed,
+    /// Draws the figure of finished tables; the title is the study's.
+    pub draw: fn(&Drawing<'_>) -> Figure,
 }
-
-/// What a kind computed, or the index of a case and why its model cannot be taken.
-pub type Computed = Result<Outcome, (usize, MethodError)>;
 
 /// Every study kind there is, in the order in which lists show them.
 pub const TABLE: &[Kind] =

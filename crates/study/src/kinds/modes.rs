@@ -1,12 +1,12 @@
 //! Nonlinear modes: frequency and equivalent damping over amplitude.
 
-use super::{Complaint, Computed, HARMONICS, Kind, SERIES_SAMPLES, check_samples};
-use crate::dataset::{Axis, Panel, Series, Style};
-use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit};
+use super::{Complaint, HARMONICS, Kind, SERIES_SAMPLES, check_samples};
+use crate::dataset::{Axis, Figure, Panel, Series};
+use crate::drawing::{Drawing, display_unit, largest, numbers};
+use crate::rows::Rows;
 use crate::schema::{Key, Takes, Within, default, required};
-use crate::study::Study;
 use crate::values::Values;
-use rayon::prelude::*;
+use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::curve::modes::{Mode, ModeRequest, mode};
 use stickslip::dimension::Dimension;
@@ -41,7 +41,10 @@ pub(super) const KIND: Kind = Kind {
     check,
     // free vibration has no drive frequency: harmonic balance with an unknown frequency and damping is solved
     uses_method: false,
-    run,
+    tables: &["modes"],
+    grain: |_| Grain::Case,
+    compute,
+    draw,
 };
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
@@ -60,41 +63,26 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     Ok(())
 }
 
-fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
-    let found: Vec<Result<Option<Mode>, MethodError>> = cases
-        .par_iter()
-        .map(|prepared| {
-            let found = if context.stopped() { Ok(None) } else { follow(prepared).map(Some) };
-            (context.finished)();
-            found
-        })
-        .collect();
-    let mut outcome = Outcome::default();
+fn compute(work: &Work<'_>) -> Computed {
+    let prepared = work.case();
+    let mode = follow(prepared).map_err(|error| (prepared.case.index, error))?;
+    (work.context.finished)();
+    let mut part = Part::default();
+    let lost = mode.lost.map(|a| format!("the mode was lost at the modal amplitude {a:.3e} m √kg; try more harmonics"));
+    part.count(|| prepared.case.label(), if lost.is_some() { "lost" } else { CONVERGED }, lost);
     let mut rows = Rows::default();
-    let mut modes = Vec::new();
-    for (prepared, found) in cases.iter().zip(found) {
-        let Some(mode) = found.map_err(|error| (prepared.case.index, error))? else {
-            outcome.count(|| prepared.case.label(), NOT_REACHED, None);
-            continue;
-        };
-        let lost =
-            mode.lost.map(|a| format!("the mode was lost at the modal amplitude {a:.3e} m √kg; try more harmonics"));
-        outcome.count(|| prepared.case.label(), if lost.is_some() { "lost" } else { CONVERGED }, lost);
-        for point in &mode.points {
-            rows.varied(&prepared.case);
-            rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
-            rows.number("frequency_Hz", point.omega / TAU);
-            rows.number("damping_ratio", point.damping);
-            for (place, amplitude) in prepared.system.places.iter().zip(&point.places) {
-                rows.number(&format!("{place}_amplitude_m"), *amplitude);
-            }
-            rows.end();
+    for point in &mode.points {
+        rows.varied(&prepared.case);
+        rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
+        rows.number("frequency_Hz", point.omega / TAU);
+        rows.number("damping_ratio", point.damping);
+        for (place, amplitude) in prepared.system.places.iter().zip(&point.places) {
+            rows.number(&format!("{place}_amplitude_m"), *amplitude);
         }
-        modes.push((prepared, mode));
+        rows.end();
     }
-    outcome.tables = vec![rows.table("modes")];
-    outcome.figure = panels(&modes);
-    Ok(outcome)
+    part.tables = vec![rows];
+    Ok(part)
 }
 
 fn follow(prepared: &Prepared) -> Result<Mode, MethodError> {
@@ -116,43 +104,35 @@ fn follow(prepared: &Prepared) -> Result<Mode, MethodError> {
     )
 }
 
-fn panels(modes: &[(&Prepared, Mode)]) -> Vec<Panel> {
-    let widest = |mode: &Mode| {
-        let last = mode.points.last()?;
-        (0..last.places.len()).max_by(|&a, &b| last.places[a].total_cmp(&last.places[b]))
-    };
-    let largest = modes
-        .iter()
-        .flat_map(|(_, mode)| mode.points.iter().flat_map(|p| p.places.iter()))
-        .fold(0.0f64, |a, x| a.max(*x));
-    let (unit, factor) = display_unit(largest, "m");
-    let x = Axis::new("log₁₀ amplitude", unit);
-    let panel = |quantity: &str, unit: &str, read: fn(&stickslip::curve::modes::ModePoint) -> f64| Panel {
+/// Of every case the place that moves most at the largest amplitude.
+fn draw(drawing: &Drawing<'_>) -> Figure {
+    let (Some(table), Some(system)) = (drawing.table("modes"), drawing.system(0)) else { return Figure::default() };
+    let column = |place: &String| format!("{place}_amplitude_m");
+    let (unit, factor) = display_unit(largest(table, system.places.iter().map(column)), "m");
+    let stretches = drawing.stretches(table);
+    let panel = |quantity: &str, unit_of: &str, read: &str, scale: f64| Panel {
         title: String::new(),
-        x: x.clone(),
-        y: Axis::new(quantity, unit),
-        series: modes
+        x: Axis::new("amplitude", unit.clone()).log(),
+        y: Axis::new(quantity, unit_of),
+        series: stretches
             .iter()
             .enumerate()
-            .filter_map(|(colour, (prepared, mode))| {
-                let place = widest(mode)?;
-                let label = match prepared.case.label() {
-                    label if label.is_empty() => prepared.system.places[place].clone(),
-                    label => label,
-                };
-                Some(Series {
-                    label,
-                    x: mode.points.iter().map(|p| (p.places[place] * factor).log10()).collect(),
-                    y: mode.points.iter().map(read).collect(),
-                    style: Style::Solid,
-                    colour,
-                    ..Series::default()
-                })
+            .filter_map(|(colour, stretch)| {
+                let at_last = |place: &&String| numbers(table, &column(place), stretch.rows.clone()).last().copied();
+                let widest = system
+                    .places
+                    .iter()
+                    .max_by(|a, b| at_last(a).unwrap_or(0.0).total_cmp(&at_last(b).unwrap_or(0.0)))?;
+                let label = if stretch.varied.is_empty() { widest.clone() } else { stretch.label() };
+                let x = numbers(table, &column(widest), stretch.rows.clone()).iter().map(|x| x * factor).collect();
+                let y = numbers(table, read, stretch.rows.clone()).iter().map(|y| y * scale).collect();
+                Some(Series::line(label, x, y, colour))
             })
             .collect(),
     };
-    vec![
-        panel("frequency", "Hz", |point| point.omega / TAU),
-        panel("equivalent damping ratio", "%", |point| 100.0 * point.damping),
-    ]
+    let panels = vec![
+        panel("frequency", "Hz", "frequency_Hz", 1.0),
+        panel("equivalent damping ratio", "%", "damping_ratio", 100.0),
+    ];
+    Figure { panels, ..Figure::default() }
 }

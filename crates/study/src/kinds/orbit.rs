@@ -1,9 +1,12 @@
 //! Orbits: the steady motion over one period, in time.
 
-use super::{Computed, FREQUENCY, Kind, SAMPLES, orbits};
-use crate::dataset::{Axis, Panel, Series, Style};
-use crate::run::{Context, Outcome, Prepared, Rows, Summary, display_unit, place_of};
-use crate::study::Study;
+use super::{FREQUENCY, Kind, SAMPLES, orbits};
+use crate::dataset::{Axis, Figure, Panel, Series};
+use crate::drawing::{Drawing, display_unit, largest, numbers};
+use crate::note::Note;
+use crate::point::{Summary, place_of};
+use crate::rows::Rows;
+use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
@@ -13,71 +16,68 @@ pub(super) const KIND: Kind = Kind {
     keys: &[FREQUENCY, SAMPLES],
     check: |_, _| Ok(()),
     uses_method: true,
-    run,
+    tables: &["orbit", "orbits", "multipliers"],
+    grain: |_| Grain::Frequencies,
+    compute,
+    draw,
 };
 
-fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
-    let mut outcome = Outcome::default();
+fn compute(work: &Work<'_>) -> Computed {
+    let mut part = Part::default();
     let (mut motion, mut summary, mut multipliers) = (Rows::default(), Rows::default(), Rows::default());
-    let all = orbits::all(cases, context);
-    let estimated = |point: &orbits::Point| matches!(&point.1, Some(Ok(orbit)) if orbit.evidence.truncation.is_some());
-    let truncated = all.iter().flatten().any(estimated);
-    let mut inaccurate = orbits::Inaccurate::default();
-    for (prepared, points) in cases.iter().zip(all) {
-        for (omega, point) in points {
-            let orbit = match point {
-                Some(Ok(orbit)) => orbit,
-                other => {
-                    orbits::count_missing(&mut outcome, &prepared.case, omega, other.as_ref());
-                    continue;
-                }
-            };
-            outcome.count(|| place_of(&prepared.case, omega), orbit.evidence.accuracy.status(), None);
-            inaccurate.add(&orbit);
-            if orbit.is_one_of_many() {
-                let which = match orbit.symmetry {
-                    Symmetry::HalfPeriod => "the symmetric one is shown",
-                    Symmetry::FullPeriod => "the one nearest to the first guess is shown",
-                };
-                outcome.notes.push(format!(
-                    "{}: {} sticks for the whole period; the orbit is one of a continuum, {which}.",
-                    place_of(&prepared.case, omega),
-                    orbit.evidence.stuck.join(", ")
-                ));
+    let prepared = work.case();
+    for (omega, point) in orbits::all(work)? {
+        let orbit = match point {
+            Some(Ok(orbit)) => orbit,
+            other => {
+                orbits::count_missing(&mut part, &prepared.case, omega, other.as_ref());
+                continue;
             }
-            summary.varied(&prepared.case);
-            summary.number("frequency_Hz", omega / TAU);
-            Summary::new(&prepared.system, Ok(&orbit)).write(&prepared.system, truncated, &mut summary);
-            summary.number("work_in_J", orbit.energy.work_in);
-            summary.number("viscous_J", orbit.energy.viscous);
-            summary.number("friction_J", orbit.energy.friction);
-            summary.integer("switches", orbit.evidence.switches as u64);
-            summary.end();
-            for (index, multiplier) in orbit.multipliers().iter().enumerate() {
-                multipliers.varied(&prepared.case);
-                multipliers.number("frequency_Hz", omega / TAU);
-                multipliers.integer("index", index as u64 + 1);
-                multipliers.number("real", multiplier.re);
-                multipliers.number("imaginary", multiplier.im);
-                multipliers.number("modulus", multiplier.norm());
-                multipliers.end();
-            }
-            let times = orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
-            let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();
-            for (time, sample) in times.iter().zip(&samples) {
-                motion.varied(&prepared.case);
-                motion.number("frequency_Hz", omega / TAU);
-                motion.number("time_s", *time);
-                write_sample(prepared, sample, &mut motion);
-                motion.end();
-            }
-            outcome.figure.extend(panels(prepared, &orbit, &times, &samples));
+        };
+        orbits::count(&mut part, &prepared.case, &orbit);
+        part.notes.extend(one_of_many(prepared, &orbit));
+        summary.varied(&prepared.case);
+        summary.number("frequency_Hz", omega / TAU);
+        Summary::new(&prepared.system, Ok(&orbit)).write(&prepared.system, &mut summary);
+        summary.number("work_in_J", orbit.energy.work_in);
+        summary.number("viscous_J", orbit.energy.viscous);
+        summary.number("friction_J", orbit.energy.friction);
+        summary.integer("switches", orbit.evidence.switches as u64);
+        summary.end();
+        for (index, multiplier) in orbit.multipliers().iter().enumerate() {
+            multipliers.varied(&prepared.case);
+            multipliers.number("frequency_Hz", omega / TAU);
+            multipliers.integer("index", index as u64 + 1);
+            multipliers.number("real", multiplier.re);
+            multipliers.number("imaginary", multiplier.im);
+            multipliers.number("modulus", multiplier.norm());
+            multipliers.end();
+        }
+        for time in orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize) {
+            motion.varied(&prepared.case);
+            motion.number("frequency_Hz", omega / TAU);
+            motion.number("time_s", time);
+            write_sample(prepared, &orbit.sample(time), &mut motion);
+            motion.end();
         }
     }
-    outcome.notes.extend(inaccurate.notes());
-    outcome.figure.truncate(MOST_PANELS);
-    outcome.tables = vec![motion.table("orbit"), summary.table("orbits"), multipliers.table("multipliers")];
-    Ok(outcome)
+    part.tables = vec![motion, summary, multipliers];
+    Ok(part)
+}
+
+/// Which orbit of a continuum is shown.
+fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
+    let which = match orbit.symmetry {
+        Symmetry::HalfPeriod => "the symmetric one is shown",
+        Symmetry::FullPeriod => "the one nearest to the first guess is shown",
+    };
+    orbit.is_one_of_many().then(|| {
+        Note::Said(format!(
+            "{}: {} sticks for the whole period; the orbit is one of a continuum, {which}.",
+            place_of(&prepared.case, orbit.omega),
+            orbit.evidence.stuck.join(", ")
+        ))
+    })
 }
 
 /// More panels than this say nothing; the tables have all.
@@ -105,41 +105,45 @@ fn word(contact: Contact) -> &'static str {
     }
 }
 
-/// Displacements of the masses, and forces of the joints, over time.
-fn panels(prepared: &Prepared, orbit: &Orbit, times: &[f64], samples: &[Sample]) -> Vec<Panel> {
-    let title = place_of(&prepared.case, orbit.omega);
-    let (time_unit, time_factor) = display_unit(orbit.period(), "s");
-    let x: Vec<f64> = times.iter().map(|t| t * time_factor).collect();
-    let panel = |what: &str, si: &str, names: Vec<&str>, read: &dyn Fn(&Sample, usize) -> f64| {
-        let largest = samples.iter().flat_map(|s| (0..names.len()).map(|i| read(s, i).abs())).fold(0.0, f64::max);
-        let (unit, factor) = display_unit(largest, si);
-        Panel {
-            title: title.clone(),
-            x: Axis::new("time", time_unit.clone()),
-            y: Axis::new(what.to_owned(), unit),
-            series: names
-                .iter()
-                .enumerate()
-                .map(|(i, name)| Series {
-                    label: (*name).to_owned(),
-                    x: x.clone(),
-                    y: samples.iter().map(|s| read(s, i) * factor).collect(),
-                    style: Style::Solid,
-                    colour: i,
-                    ..Series::default()
-                })
-                .collect(),
-        }
-    };
-    let system = &prepared.system;
+/// Displacements of the masses, and forces of the joints, over time: two panels for every orbit.
+fn draw(drawing: &Drawing<'_>) -> Figure {
+    let (Some(motion), Some(system)) = (drawing.table("orbit"), drawing.system(0)) else { return Figure::default() };
     let mut panels = Vec::new();
-    if system.dofs() > 0 {
-        let names = system.places.iter().map(String::as_str).collect();
-        panels.push(panel("displacement", "m", names, &|s, i| s.displacement[i]));
+    let frequencies = motion.numbers("frequency_Hz").unwrap_or_default();
+    for stretch in drawing.stretches(motion) {
+        let mut from = stretch.rows.start;
+        for run in frequencies[stretch.rows.clone()].chunk_by(|a, b| a == b) {
+            let rows = from..from + run.len();
+            from = rows.end;
+            let frequency = format!("{:.6} Hz", run[0]);
+            let title = if stretch.varied.is_empty() { frequency } else { format!("{}, {frequency}", stretch.label()) };
+            let times = numbers(motion, "time_s", rows.clone());
+            let (time_unit, time_factor) = display_unit(times.last().copied().unwrap_or(0.0), "s");
+            let x: Vec<f64> = times.iter().map(|time| time * time_factor).collect();
+            let panel = |what: &str, si: &str, names: Vec<&str>, column: &str, colour: usize| {
+                let columns: Vec<String> = names.iter().map(|name| format!("{name}_{column}")).collect();
+                let (unit, factor) = display_unit(largest(motion, columns.clone()), si);
+                let line = |(i, column): (usize, &String)| {
+                    let y = numbers(motion, column, rows.clone()).iter().map(|value| value * factor).collect();
+                    Series::line(names[i], x.clone(), y, colour + i)
+                };
+                Panel {
+                    title: format!("{what}, {title}"),
+                    x: Axis::new("time", time_unit.clone()),
+                    y: Axis::new(what, unit),
+                    series: columns.iter().enumerate().map(line).collect(),
+                }
+            };
+            if system.dofs() > 0 {
+                let names = system.places.iter().map(String::as_str).collect();
+                panels.push(panel("displacement", "m", names, "displacement_m", 0));
+            }
+            if !system.joints.is_empty() {
+                let names = system.joints.iter().map(|joint| joint.name.as_str()).collect();
+                panels.push(panel("joint force", "N", names, "force_N", system.dofs()));
+            }
+        }
     }
-    if !system.joints.is_empty() {
-        let names = system.joints.iter().map(|joint| joint.name.as_str()).collect();
-        panels.push(panel("joint force", "N", names, &|s, j| s.joints[j].force));
-    }
-    panels
+    panels.truncate(MOST_PANELS);
+    Figure { panels, ..Figure::default() }
 }

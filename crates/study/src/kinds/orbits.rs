@@ -1,80 +1,47 @@
-//! What the kinds share that look at whole orbits: all orbits of a study, their instants, their failures.
+//! What the kinds share that look at whole orbits: the orbits of a unit, their instants, their failures.
 
-use crate::run::{Context, NOT_REACHED, Outcome, Prepared, place_of};
+use crate::note::Note;
+use crate::point::place_of;
 use crate::study::Case;
-use rayon::prelude::*;
-use stickslip::curve::sweep::sweep;
-use stickslip::method::OrbitError;
-use stickslip::orbit::{Accuracy, Orbit};
+use crate::work::{NOT_REACHED, Part, Work};
+use stickslip::curve::sweep::{See, Watch, stretch};
+use stickslip::method::{MethodError, OrbitError};
+use stickslip::orbit::Orbit;
 
 /// A frequency (rad/s) and what was found there; `None` if the run was stopped before.
 pub(super) type Point = (f64, Option<Result<Orbit, OrbitError>>);
 
-/// The orbits of every case at every frequency.
-pub(super) fn all(cases: &[Prepared], context: &Context<'_>) -> Vec<Vec<Point>> {
-    cases
-        .par_iter()
-        .map(|prepared| {
-            let omegas: Vec<f64> = prepared.case.frequencies.iter().flat_map(|f| f.iter()).collect();
-            let keep = |_: usize, outcome: Result<&Orbit, &OrbitError>| outcome.cloned().map_err(Clone::clone);
-            let omega = |i: usize| omegas[i];
-            // the method took this system when the case was prepared
-            let points = sweep(&*prepared.method, &prepared.system, omegas.len(), &omega, context.watch(), &keep);
-            omegas.iter().copied().zip(points.unwrap_or_default()).collect()
-        })
-        .collect()
+/// The outcomes at the frequencies of a unit of one case, each started from its neighbour; `see` looks at each as soon as it is there.
+pub(super) fn sweep(work: &Work<'_>, see: &mut See<'_>) -> Result<(), MethodError> {
+    let prepared = work.case();
+    let watch = Watch { finished: &*work.context.finished, stop: &work.context.stop };
+    let mut omegas = work.points.clone().map(|index| work.omega(index));
+    stretch(&*prepared.method, &prepared.system, &mut omegas, watch, see)
 }
 
-/// Points whose series is too short, or was not compared with a longer one.
-#[derive(Default)]
-pub(super) struct Inaccurate {
-    truncated: usize,
-    largest: f64,
-    unchecked: usize,
+/// The orbits of a unit of one case.
+pub(super) fn all(work: &Work<'_>) -> Result<Vec<Point>, (usize, MethodError)> {
+    let mut points = Vec::with_capacity(work.points.len());
+    sweep(work, &mut |omega, outcome| {
+        points.push((omega, outcome.map(|outcome| outcome.cloned().map_err(Clone::clone))));
+    })
+    .map_err(|error| (work.case().case.index, error))?;
+    Ok(points)
 }
 
-impl Inaccurate {
-    pub fn add(&mut self, orbit: &Orbit) {
-        self.count(orbit.evidence.accuracy.status(), orbit.evidence.truncation.unwrap_or(0.0));
-    }
-
-    /// A point with this status and estimated error.
-    pub fn count(&mut self, status: &str, estimate: f64) {
-        if status == Accuracy::Truncated.status() {
-            self.truncated += 1;
-            self.largest = self.largest.max(estimate);
-        }
-        self.unchecked += usize::from(status == Accuracy::Unchecked.status());
-    }
-
-    /// What the reader has to know about them.
-    pub fn notes(&self) -> Vec<String> {
-        let points = |count: usize| format!("{count} point{}", if count == 1 { "" } else { "s" });
-        let truncated = (self.truncated > 0).then(|| {
-            format!(
-                "At {} the series is too short: its estimated error is beyond the `tolerance` of the method, and up to {:.1e}. \
-                 Leave `harmonics` out or raise it, raise `tolerance` if that is good enough, or use `event-driven` where the laws \
-                 are exact.",
-                points(self.truncated),
-                self.largest
-            )
-        });
-        let unchecked = (self.unchecked > 0).then(|| {
-            format!(
-                "At {} nothing is known of the error of the series: the longer one that tells it has too many unknowns or was not found. \
-                 Try fewer `harmonics`.",
-                points(self.unchecked)
-            )
-        });
-        truncated.into_iter().chain(unchecked).collect()
+/// Counts an orbit and notes what its accuracy asks for.
+pub(super) fn count(part: &mut Part, case: &Case, orbit: &Orbit) {
+    part.count(|| place_of(case, orbit.omega), orbit.evidence.accuracy.status(), None);
+    if let Some(note) = Note::of_accuracy(orbit) {
+        note.join(&mut part.notes);
     }
 }
 
 /// Counts a point that has no orbit.
-pub(super) fn count_missing(outcome: &mut Outcome, case: &Case, omega: f64, point: Option<&Result<Orbit, OrbitError>>) {
+pub(super) fn count_missing(part: &mut Part, case: &Case, omega: f64, point: Option<&Result<Orbit, OrbitError>>) {
     match point {
-        Some(Err(error)) => outcome.count(|| place_of(case, omega), error.status(), Some(error.to_string())),
-        _ => outcome.count(|| place_of(case, omega), NOT_REACHED, None),
+        Some(Err(error)) => part.count(|| place_of(case, omega), error.status(), Some(error.to_string())),
+        _ => part.count(|| place_of(case, omega), NOT_REACHED, None),
     }
 }
 

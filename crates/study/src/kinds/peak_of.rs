@@ -1,8 +1,8 @@
 //! The key `peak_of` of the kinds that look for a resonance: which mass counts.
 
 use super::Complaint;
-use crate::run::Prepared;
 use crate::values::Values;
+use crate::work::Prepared;
 use stickslip::model::Model;
 
 /// Whether it names one mass of the model; `help` says what for.

@@ -1,12 +1,15 @@
 //! Performance curves: the resonance peak as a function of a design parameter, and its best value.
 
 use super::peak_of::{check_peak_of, peak_place};
-use super::{Complaint, Computed, FREQUENCY, Kind};
-use crate::dataset::{Axis, Panel, Series, Style};
-use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit};
+use super::{Complaint, FREQUENCY, Kind};
+use crate::dataset::{Axis, Figure, Panel, Series};
+use crate::drawing::{Drawing, display_unit, largest, numbers};
+use crate::note::Note;
+use crate::rows::Rows;
 use crate::schema::{Takes, optional};
-use crate::study::{Study, VariedValue, varied_text};
+use crate::study::{VariedValue, varied_text};
 use crate::values::Values;
+use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
 use stickslip::method::MethodError;
@@ -27,7 +30,10 @@ pub(super) const KIND: Kind = Kind {
     ],
     check,
     uses_method: true,
-    run,
+    tables: &["performance", "optimum"],
+    grain: |_| Grain::Curve,
+    compute,
+    draw,
 };
 
 /// Values of the parameter that make a curve.
@@ -42,75 +48,53 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// One curve: the cases that differ in the last varied parameter only.
-struct Group<'a> {
-    cases: &'a [Prepared],
-    curve: PerformanceCurve,
-}
-
-fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
-    let mut outcome = Outcome::default();
-    let outer = |prepared: &Prepared| -> Vec<u64> {
-        let varied = &prepared.case.varied;
-        varied[..varied.len().saturating_sub(1)].iter().map(|v| v.si.to_bits()).collect()
-    };
-    let mut groups = Vec::new();
-    for group in cases.chunk_by(|a, b| outer(a) == outer(b)) {
-        let first = group[0].case.index;
-        if group[0].case.varied.is_empty() || group.len() < FEWEST_VALUES {
-            outcome.notes.push(format!(
-                "A performance curve needs at least {FEWEST_VALUES} values of one parameter: add vary = {{ Ft = [ … ] }} to [study]."
-            ));
-        }
-        if context.stopped() {
-            outcome.count(|| group[0].case.label(), NOT_REACHED, None);
-            continue;
-        }
-        let curve = curve(study, group, context).map_err(|error| (first, error))?;
-        groups.push(Group { cases: group, curve });
+fn compute(work: &Work<'_>) -> Computed {
+    let mut part = Part::default();
+    if work.case().case.varied.is_empty() || work.cases.len() < FEWEST_VALUES {
+        part.notes.push(Note::Said(format!(
+            "A performance curve needs at least {FEWEST_VALUES} values of one parameter: add vary = {{ Ft = [ … ] }} to [study]."
+        )));
     }
+    let curve = curve(work).map_err(|error| (work.case().case.index, error))?;
     let (mut rows, mut optima) = (Rows::default(), Rows::default());
-    for group in &groups {
-        for (prepared, row) in group.cases.iter().zip(&group.curve.rows) {
-            let (failed, status) = (row.failed > 0 || row.peak.is_none(), status(row));
-            let reason = || format!("{} of the orbits on the frequency grid did not converge", row.failed);
-            outcome.count(|| prepared.case.label(), status, failed.then(reason));
-            if row.inaccurate > 0 {
-                outcome.notes.push(format!(
-                    "{}: at {} frequencies of the grid the series is too short for the `tolerance` of the method; look at one with \
-                     kind = \"response\".",
-                    prepared.case.label(),
-                    row.inaccurate
-                ));
-            }
-            rows.varied(&prepared.case);
-            rows.number("frequency_Hz", row.peak.map_or(f64::NAN, |peak| peak.omega / TAU));
-            rows.number("amplitude_m", row.peak.map_or(f64::NAN, |peak| peak.value));
-            rows.flag("at_range_end", row.peak.map(|peak| peak.at_end));
-            rows.integer("failed_orbits", row.failed as u64);
-            rows.text("status", status);
-            rows.end();
+    for (prepared, row) in work.cases.iter().zip(&curve.rows) {
+        let (failed, status) = (row.failed > 0 || row.peak.is_none(), status(row));
+        let reason = || format!("{} of the orbits on the frequency grid did not converge", row.failed);
+        part.count(|| prepared.case.label(), status, failed.then(reason));
+        if row.inaccurate > 0 {
+            part.notes.push(Note::Said(format!(
+                "{}: at {} frequencies of the grid the series is too short for the `tolerance` of the method; look at one with                  kind = \"response\".",
+                prepared.case.label(),
+                row.inaccurate
+            )));
         }
-        let Some((varied, inner)) = split(&group.cases[0]) else { continue };
-        for v in varied {
-            optima.number(&v.name, v.si);
-        }
-        let best = group.curve.optimum;
+        rows.varied(&prepared.case);
+        rows.number("frequency_Hz", row.peak.map_or(f64::NAN, |peak| peak.omega / TAU));
+        rows.number("amplitude_m", row.peak.map_or(f64::NAN, |peak| peak.value));
+        rows.flag("at_range_end", row.peak.map(|peak| peak.at_end));
+        rows.integer("failed_orbits", row.failed as u64);
+        rows.text("status", status);
+        rows.end();
+    }
+    if let Some((outer, inner)) = split(work.case()) {
+        let best = curve.optimum;
+        let peak = best.and_then(|row| row.peak);
+        outer.iter().for_each(|varied| optima.number(&varied.name, varied.si));
         optima.number(&inner.name, best.map_or(f64::NAN, |row| row.value));
-        optima.number("frequency_Hz", best.and_then(|row| row.peak).map_or(f64::NAN, |peak| peak.omega / TAU));
-        optima.number("amplitude_m", best.and_then(|row| row.peak).map_or(f64::NAN, |peak| peak.value));
+        optima.number("frequency_Hz", peak.map_or(f64::NAN, |peak| peak.omega / TAU));
+        optima.number("amplitude_m", peak.map_or(f64::NAN, |peak| peak.value));
         optima.text("status", best.as_ref().map_or("none", status));
         optima.end();
         if best.is_none() {
-            let at = if varied.is_empty() { String::new() } else { format!(" at {}", varied_text(varied)) };
-            outcome
-                .notes
-                .push(format!("The lowest peak stands at an end of the values of {}{at}: widen them.", inner.name));
+            let at = if outer.is_empty() { String::new() } else { format!(" at {}", varied_text(outer)) };
+            part.notes.push(Note::Said(format!(
+                "The lowest peak stands at an end of the values of {}{at}: widen them.",
+                inner.name
+            )));
         }
     }
-    outcome.tables = vec![rows.table("performance"), optima.table("optimum")];
-    outcome.figure = panel(&groups).into_iter().collect();
-    Ok(outcome)
+    part.tables = vec![rows, optima];
+    Ok(part)
 }
 
 /// How far the orbits behind a peak may be trusted.
@@ -127,16 +111,15 @@ fn split(prepared: &Prepared) -> Option<(&[VariedValue], &VariedValue)> {
     prepared.case.varied.split_last().map(|(last, outer)| (outer, last))
 }
 
-fn curve(study: &Study, group: &[Prepared], context: &Context<'_>) -> Result<PerformanceCurve, MethodError> {
-    let first = &group[0];
-    let system = &first.system;
+fn curve(work: &Work<'_>) -> Result<PerformanceCurve, MethodError> {
+    let first = work.case();
     let place = peak_place(first);
-    let frequencies: Vec<f64> = first.case.frequencies.iter().flat_map(|f| f.iter()).collect();
+    let frequencies: Vec<f64> = work.points.clone().map(|index| work.omega(index)).collect();
     let range = frequencies.iter().fold((f64::INFINITY, 0.0f64), |(a, b), w| (a.min(*w), b.max(*w)));
     let parameter = split(first).map(|(_, inner)| inner.name.clone());
     let build = |value: f64| {
-        let Some(name) = &parameter else { return Ok(system.clone()) };
-        let case = study.case_with(first.case.index, name, value).map_err(|error| error.to_string())?;
+        let Some(name) = &parameter else { return Ok(first.system.clone()) };
+        let case = work.study.case_with(first.case.index, name, value).map_err(|error| error.to_string())?;
         case.model.assemble().map_err(|error| error.to_string())
     };
     let performance = Performance {
@@ -146,9 +129,9 @@ fn curve(study: &Study, group: &[Prepared], context: &Context<'_>) -> Result<Per
         points: frequencies.len(),
         quantity: &|orbit| orbit.places[place].amplitude(),
     };
-    let values: Vec<f64> = group.iter().map(|p| split(p).map_or(0.0, |(_, inner)| inner.si)).collect();
+    let values: Vec<f64> = work.cases.iter().map(|p| split(p).map_or(0.0, |(_, inner)| inner.si)).collect();
     let result = performance.curve(&values);
-    (0..group.len() * frequencies.len()).for_each(|_| (context.finished)());
+    (0..work.cases.len() * frequencies.len()).for_each(|_| (work.context.finished)());
     match result {
         Ok(curve) => Ok(curve),
         Err(PerformanceError::Method(error)) => Err(error),
@@ -157,33 +140,33 @@ fn curve(study: &Study, group: &[Prepared], context: &Context<'_>) -> Result<Per
     }
 }
 
-fn panel(groups: &[Group<'_>]) -> Option<Panel> {
-    let (_, inner) = split(groups.first()?.cases.first()?)?;
-    let peaks = groups.iter().flat_map(|group| group.curve.rows.iter().filter_map(|row| row.peak));
-    let (unit, factor) = display_unit(peaks.map(|peak| peak.value).fold(0.0, f64::max), "m");
+fn draw(drawing: &Drawing<'_>) -> Figure {
+    let (Some(table), outer) = (drawing.table("performance"), drawing.study.varied().len().saturating_sub(1)) else {
+        return Figure::default();
+    };
+    let stretches = drawing.stretches_of(table, outer);
+    let Some(inner) = stretches.first().and_then(|stretch| stretch.varied.last()) else { return Figure::default() };
+    let (unit, factor) = display_unit(largest(table, ["amplitude_m".to_owned()]), "m");
     let si = inner.dimension.and_then(|d| d.name_and_unit()).map_or("", |(_, unit)| unit);
+    let parameter = |table: &crate::dataset::Table, rows| numbers(table, &table.columns[outer].name, rows);
+    let height = |table, rows| numbers(table, "amplitude_m", rows).iter().map(|y| y * factor).collect::<Vec<f64>>();
     let mut series = Vec::new();
-    for (colour, group) in groups.iter().enumerate() {
-        let rows = || group.curve.rows.iter().filter_map(|row| Some((row.value, row.peak?.value * factor)));
-        let label = split(&group.cases[0]).map(|(outer, _)| varied_text(outer)).filter(|t| !t.is_empty());
-        let (x, y) = rows().unzip();
-        series.push(Series {
-            label: label.unwrap_or_else(|| "peak".to_owned()),
-            x,
-            y,
-            style: Style::Solid,
-            colour,
-            ..Series::default()
-        });
-        if let Some((value, peak)) = group.curve.optimum.and_then(|row| Some((row.value, row.peak?))) {
-            let (x, y) = (vec![value], vec![peak.value * factor]);
-            series.push(Series { label: "optimum".to_owned(), x, y, style: Style::Marks, colour, ..Series::default() });
+    for (colour, stretch) in stretches.iter().enumerate() {
+        let label = varied_text(&stretch.varied[..outer]);
+        let label = if label.is_empty() { "peak".to_owned() } else { label };
+        let (x, y) = (parameter(table, stretch.rows.clone()), height(table, stretch.rows.clone()));
+        series.push(Series::line(label, x, y, colour));
+    }
+    if let Some(optima) = drawing.table("optimum") {
+        // one row for every curve
+        for row in 0..optima.rows() {
+            let (x, y) = (parameter(optima, row..row + 1), height(optima, row..row + 1));
+            if x[0].is_finite() {
+                series.push(Series::marks("optimum", x, y, row));
+            }
         }
     }
-    Some(Panel {
-        title: String::new(),
-        x: Axis::new(inner.name.clone(), si),
-        y: Axis::new("resonance peak", unit),
-        series,
-    })
+    let panel =
+        Panel { title: String::new(), x: Axis::new(&inner.name, si), y: Axis::new("resonance peak", unit), series };
+    Figure { panels: vec![panel], ..Figure::default() }
 }

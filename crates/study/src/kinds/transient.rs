@@ -1,18 +1,18 @@
 //! Transients: the motion in time from rest or from given displacements; free decay, switched-on drive, or run-up.
 
 use super::orbit::write_sample;
-use super::{Complaint, Computed, Kind, MOST_SAMPLES};
-use crate::dataset::{Axis, Panel, Series, Style};
-use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit, place_of};
+use super::{Complaint, Kind, MOST_SAMPLES};
+use crate::dataset::{Axis, Figure, Panel, Series};
+use crate::drawing::{Drawing, display_unit, numbers};
+use crate::point::place_of;
+use crate::rows::Rows;
 use crate::schema::{Key, Takes, Within, default, optional, required};
-use crate::study::Study;
 use crate::values::Values;
-use rayon::prelude::*;
+use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Work};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
-use stickslip::method::transient::{Excitation, Transient, TransientError};
+use stickslip::method::transient::{Excitation, Transient};
 use stickslip::model::Model;
-use stickslip::orbit::Sample;
 
 const FREQUENCY: Takes = Takes::Quantity(Dimension::FREQUENCY, Within::Positive);
 const DURATION: Takes = Takes::Quantity(Dimension::TIME, Within::Positive);
@@ -68,7 +68,10 @@ pub(super) const KIND: Kind = Kind {
     check,
     // exact and smooth laws alike are followed in time; there is no orbit to be found
     uses_method: false,
-    run,
+    tables: &["motion"],
+    grain: |_| Grain::Case,
+    compute,
+    draw,
 };
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
@@ -129,59 +132,16 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// One computed motion.
-struct Motion {
-    drive: Option<f64>,
-    samples: Vec<(f64, f64, Sample)>,
-    end: Result<(), TransientError>,
-    stopped: bool,
-}
-
-fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
-    let mut outcome = Outcome::default();
-    let mut rows = Rows::default();
-    let all: Vec<Vec<Motion>> = cases.par_iter().map(|prepared| motions(prepared, context)).collect();
-    let several = cases.iter().any(|prepared| prepared.case.frequencies.as_ref().is_some_and(|f| f.len() > 1));
-    for (prepared, motions) in cases.iter().zip(all) {
-        for motion in motions {
-            let at = || match motion.drive {
-                Some(omega) => place_of(&prepared.case, omega),
-                None => prepared.case.label(),
-            };
-            match &motion.end {
-                Ok(()) if motion.stopped => outcome.count(at, NOT_REACHED, None),
-                Ok(()) => outcome.count(at, CONVERGED, None),
-                Err(error) => outcome.count(at, "breakdown", Some(error.to_string())),
-            }
-            for (time, omega, sample) in &motion.samples {
-                rows.varied(&prepared.case);
-                if several {
-                    rows.number("drive_frequency_Hz", motion.drive.unwrap_or(0.0) / TAU);
-                }
-                rows.number("time_s", *time);
-                rows.number("frequency_Hz", omega / TAU);
-                write_sample(prepared, sample, &mut rows);
-                rows.end();
-            }
-            outcome.figure.push(panel(prepared, at(), &motion));
-        }
-    }
-    outcome.figure.truncate(MOST_PANELS);
-    outcome.tables = vec![rows.table("motion")];
-    Ok(outcome)
-}
-
-/// More panels than this say nothing; the table has all.
-const MOST_PANELS: usize = 12;
-
-fn motions(prepared: &Prepared, context: &Context<'_>) -> Vec<Motion> {
-    let values = &prepared.case.values;
+fn compute(work: &Work<'_>) -> Computed {
+    let prepared = work.case();
+    let case = &prepared.case;
+    let values = &case.values;
     let run_up = values.table("run_up").map(|table| Excitation::RunUp {
         from: table.quantity("from").unwrap_or(0.0),
         to: table.quantity("to").unwrap_or(0.0),
         duration: table.quantity("duration").unwrap_or(0.0),
     });
-    let drives: Vec<Option<f64>> = match &prepared.case.frequencies {
+    let drives: Vec<Option<f64>> = match &case.frequencies {
         Some(frequencies) => frequencies.iter().map(Some).collect(),
         None => vec![None],
     };
@@ -189,60 +149,86 @@ fn motions(prepared: &Prepared, context: &Context<'_>) -> Vec<Motion> {
         let given = values.by_name(key);
         prepared.system.places.iter().map(|p| given.and_then(|g| g.get(p)).copied().unwrap_or(0.0)).collect()
     };
-    drives
-        .into_iter()
-        .map(|drive| {
-            let excitation = drive.map(Excitation::Steady).or(run_up).unwrap_or(Excitation::Free);
-            let fastest = match excitation {
-                Excitation::Free => None,
-                Excitation::Steady(omega) => Some(omega),
-                Excitation::RunUp { from, to, .. } => Some(from.max(to)),
-            };
-            let cycles = values.count("cycles").zip(drive).map(|(cycles, omega)| cycles as f64 * TAU / omega);
-            let run_up_time = values.table("run_up").and_then(|table| table.quantity("duration"));
-            // `check` has made sure that one of each is there
-            let duration = values.quantity("duration").or(cycles).or(run_up_time).unwrap_or(0.0);
-            let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
-            let step = values.quantity("time_step").or(fastest.map(|w| TAU / w / per_cycle)).unwrap_or(duration);
-            let transient = Transient {
-                displacement: initial("start"),
-                velocity: initial("start_velocity"),
-                excitation,
-                duration,
-                step,
-                width: prepared.case.method.options.get("width").copied(),
-            };
-            let (mut samples, mut stopped) = (Vec::new(), false);
-            let end = transient.run(&prepared.system, &mut |time, omega, sample| {
-                samples.push((time, omega, sample.clone()));
-                stopped = context.stopped();
-                !stopped
-            });
-            (context.finished)();
-            Motion { drive, samples, end, stopped }
-        })
-        .collect()
+    let mut part = Part::default();
+    let mut rows = Rows::default();
+    for drive in drives {
+        let excitation = drive.map(Excitation::Steady).or(run_up).unwrap_or(Excitation::Free);
+        let fastest = match excitation {
+            Excitation::Free => None,
+            Excitation::Steady(omega) => Some(omega),
+            Excitation::RunUp { from, to, .. } => Some(from.max(to)),
+        };
+        let cycles = values.count("cycles").zip(drive).map(|(cycles, omega)| cycles as f64 * TAU / omega);
+        let run_up_time = values.table("run_up").and_then(|table| table.quantity("duration"));
+        // `check` has made sure that one of each is there
+        let duration = values.quantity("duration").or(cycles).or(run_up_time).unwrap_or(0.0);
+        let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
+        let step = values.quantity("time_step").or(fastest.map(|w| TAU / w / per_cycle)).unwrap_or(duration);
+        let transient = Transient {
+            displacement: initial("start"),
+            velocity: initial("start_velocity"),
+            excitation,
+            duration,
+            step,
+            width: case.method.options.get("width").copied(),
+        };
+        let mut stopped = false;
+        let end = transient.run(&prepared.system, &mut |time, omega, sample| {
+            rows.varied(case);
+            if work.several_frequencies() {
+                rows.number("drive_frequency_Hz", drive.unwrap_or(0.0) / TAU);
+            }
+            rows.number("time_s", time);
+            rows.number("frequency_Hz", omega / TAU);
+            write_sample(prepared, sample, &mut rows);
+            rows.end();
+            stopped = work.context.stopped();
+            !stopped
+        });
+        (work.context.finished)();
+        let at = || drive.map_or_else(|| case.label(), |omega| place_of(case, omega));
+        match end {
+            Ok(()) if stopped => part.count(at, NOT_REACHED, None),
+            Ok(()) => part.count(at, CONVERGED, None),
+            Err(error) => part.count(at, "breakdown", Some(error.to_string())),
+        }
+    }
+    part.tables = vec![rows];
+    Ok(part)
 }
 
-fn panel(prepared: &Prepared, title: String, motion: &Motion) -> Panel {
-    let names = &prepared.system.places;
-    let largest = motion.samples.iter().flat_map(|(_, _, s)| s.displacement.iter()).fold(0.0f64, |a, x| a.max(x.abs()));
-    let (unit, factor) = display_unit(largest, "m");
-    Panel {
-        title,
-        x: Axis::new("time", "s"),
-        y: Axis::new("displacement", unit),
-        series: names
-            .iter()
-            .enumerate()
-            .map(|(i, name)| Series {
-                label: name.clone(),
-                x: motion.samples.iter().map(|(time, _, _)| *time).collect(),
-                y: motion.samples.iter().map(|(_, _, s)| s.displacement[i] * factor).collect(),
-                style: Style::Solid,
-                colour: i,
-                ..Series::default()
-            })
-            .collect(),
+/// More panels than this say nothing; the table has all.
+const MOST_PANELS: usize = 12;
+
+fn draw(drawing: &Drawing<'_>) -> Figure {
+    let (Some(motion), Some(system)) = (drawing.table("motion"), drawing.system(0)) else { return Figure::default() };
+    let drives = motion.numbers("drive_frequency_Hz");
+    let mut panels = Vec::new();
+    for stretch in drawing.stretches(motion) {
+        let mut from = stretch.rows.start;
+        while from < stretch.rows.end && panels.len() < MOST_PANELS {
+            let same = |row: usize| drives.is_none_or(|drives| drives[row] == drives[from]);
+            let to = (from + 1..stretch.rows.end).find(|row| !same(*row)).unwrap_or(stretch.rows.end);
+            let mut title = stretch.label();
+            if let Some(drives) = drives {
+                let frequency = format!("frequency = {:.6} Hz", drives[from]);
+                title = if title.is_empty() { frequency } else { format!("{title}, {frequency}") };
+            }
+            let displacement = |place: &String| numbers(motion, &format!("{place}_displacement_m"), from..to);
+            let all = system.places.iter().flat_map(displacement);
+            let (unit, factor) = display_unit(all.map(f64::abs).filter(|x| x.is_finite()).fold(0.0, f64::max), "m");
+            let x = numbers(motion, "time_s", from..to);
+            let line = |(i, place): (usize, &String)| {
+                Series::line(place, x.clone(), displacement(place).iter().map(|y| y * factor).collect(), i)
+            };
+            panels.push(Panel {
+                title,
+                x: Axis::new("time", "s"),
+                y: Axis::new("displacement", unit),
+                series: system.places.iter().enumerate().map(line).collect(),
+            });
+            from = to;
+        }
     }
+    Figure { panels, ..Figure::default() }
 }

@@ -1,0 +1,114 @@
+//! What a reader of the results must know, in sentences. Notes of one sort from several units become one sentence.
+
+use stickslip::orbit::{Accuracy, Orbit};
+
+/// A note.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Note {
+    /// A sentence.
+    Said(String),
+    /// Points whose series is too short, and the largest estimated error.
+    Truncated(usize, f64),
+    /// Points whose series was not compared with a longer one.
+    Unchecked(usize),
+    /// Of one case (its varied parameters in words): points at which a joint sticks for the whole period, of so many.
+    Stuck {
+        /// The case.
+        case: String,
+        /// Points that stick.
+        points: usize,
+        /// All points.
+        of: usize,
+    },
+}
+
+impl Note {
+    /// What the accuracy of an orbit's series asks for.
+    pub(crate) fn of_accuracy(orbit: &Orbit) -> Option<Note> {
+        match orbit.evidence.accuracy {
+            Accuracy::Truncated => Some(Note::Truncated(1, orbit.evidence.truncation.unwrap_or(0.0))),
+            Accuracy::Unchecked => Some(Note::Unchecked(1)),
+            Accuracy::Converged => None,
+        }
+    }
+
+    /// Adds it to `notes`, to one of its sort if there is one.
+    pub(crate) fn join(self, notes: &mut Vec<Note>) {
+        for known in notes.iter_mut() {
+            match (known, &self) {
+                (Note::Truncated(points, largest), Note::Truncated(more, other)) => {
+                    *points += more;
+                    *largest = largest.max(*other);
+                    return;
+                }
+                (Note::Unchecked(points), Note::Unchecked(more)) => {
+                    *points += more;
+                    return;
+                }
+                (Note::Stuck { case, points, of }, Note::Stuck { case: same, points: more_points, of: more })
+                    if case == same =>
+                {
+                    *points += more_points;
+                    *of += more;
+                    return;
+                }
+                _ => {}
+            }
+        }
+        notes.push(self);
+    }
+
+    /// The sentence; none if there is nothing to be said.
+    pub(crate) fn text(&self) -> Option<String> {
+        let points = |count: usize| format!("{count} point{}", if count == 1 { "" } else { "s" });
+        match self {
+            Note::Said(text) => Some(text.clone()),
+            Note::Truncated(count, largest) => Some(format!(
+                "At {} the series is too short: its estimated error is beyond the `tolerance` of the method, and up to {largest:.1e}. \
+                 Leave `harmonics` out or raise it, raise `tolerance` if that is good enough, or use `event-driven` where the laws \
+                 are exact.",
+                points(*count)
+            )),
+            Note::Unchecked(count) => Some(format!(
+                "At {} nothing is known of the error of the series: the longer one that tells it has too many unknowns or was not found. \
+                 Try fewer `harmonics`.",
+                points(*count)
+            )),
+            Note::Stuck { points: 0, .. } => None,
+            Note::Stuck { case, points: count, of } => {
+                let label = if case.is_empty() { String::new() } else { format!("{case}: ") };
+                Some(format!(
+                    "{label}at {count} of {} a joint sticks for the whole period; its offset is not unique there, and the \
+                     symmetric motion is shown.",
+                    points(*of)
+                ))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_of_one_sort_become_one() {
+        let stuck = |case: &str, points| Note::Stuck { case: case.to_owned(), points, of: 10 };
+        let mut notes = Vec::new();
+        for note in [
+            stuck("Ft = 1 N", 0),
+            Note::Truncated(1, 1e-2),
+            stuck("Ft = 1 N", 3),
+            Note::Truncated(2, 5e-2),
+            stuck("Ft = 2 N", 0),
+            Note::Said("It is so.".to_owned()),
+        ] {
+            note.join(&mut notes);
+        }
+        let texts: Vec<String> = notes.iter().filter_map(Note::text).collect();
+        assert_eq!(texts.len(), 3, "{texts:?}");
+        assert!(texts[0].starts_with("Ft = 1 N: at 3 of 20 points a joint sticks"), "{}", texts[0]);
+        assert!(texts[1].starts_with("At 3 points") && texts[1].contains("5.0e-2"), "{}", texts[1]);
+        assert_eq!(texts[2], "It is so.");
+    }
+}

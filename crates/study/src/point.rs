@@ -1,0 +1,89 @@
+//! What a table keeps of one orbit, or of its failure.
+
+use crate::rows::Rows;
+use crate::study::Case;
+use stickslip::method::OrbitError;
+use stickslip::model::System;
+use stickslip::orbit::Orbit;
+
+/// The place of a point in words: the varied parameters and the frequency.
+pub(crate) fn place_of(case: &Case, omega: f64) -> String {
+    let frequency = format!("frequency = {:.6} Hz", omega / std::f64::consts::TAU);
+    if case.varied.is_empty() { frequency } else { format!("{}, {frequency}", case.label()) }
+}
+
+/// One number per place and joint, and the evidence.
+#[derive(Debug, Clone)]
+pub(crate) struct Summary {
+    /// Amplitude, mean, phase per mass.
+    pub places: Vec<[f64; 3]>,
+    /// Dissipation, slip fraction per joint.
+    pub joints: Vec<[f64; 2]>,
+    pub stable: Option<bool>,
+    pub residual: f64,
+    pub energy_gap: f64,
+    pub truncation: f64,
+    pub iterations: u64,
+    pub status: String,
+    pub failure: Option<String>,
+    pub stuck: bool,
+}
+
+impl Summary {
+    pub fn new(system: &System, outcome: Result<&Orbit, &OrbitError>) -> Self {
+        match outcome {
+            Ok(orbit) => Summary {
+                places: orbit.places.iter().map(|p| [p.amplitude(), p.mean, p.phase_deg()]).collect(),
+                joints: orbit.joints.iter().map(|j| [j.dissipation, j.slip_fraction]).collect(),
+                stable: orbit.is_stable(),
+                residual: orbit.evidence.residual,
+                energy_gap: orbit.evidence.energy_gap,
+                truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),
+                iterations: orbit.evidence.iterations as u64,
+                status: orbit.evidence.accuracy.status().to_owned(),
+                failure: None,
+                stuck: orbit.is_one_of_many(),
+            },
+            Err(error) => {
+                let mut row = Summary::missing(system, error.status());
+                row.failure = Some(error.to_string());
+                row
+            }
+        }
+    }
+
+    /// A point without a result.
+    pub fn missing(system: &System, status: &str) -> Self {
+        Summary {
+            places: vec![[f64::NAN; 3]; system.dofs()],
+            joints: vec![[f64::NAN; 2]; system.joints.len()],
+            stable: None,
+            residual: f64::NAN,
+            energy_gap: f64::NAN,
+            truncation: f64::NAN,
+            iterations: 0,
+            status: status.to_owned(),
+            failure: None,
+            stuck: false,
+        }
+    }
+
+    /// The cells of the row, after the varied parameters and the frequency.
+    pub fn write(&self, system: &System, rows: &mut Rows) {
+        for (place, [amplitude, mean, phase]) in system.places.iter().zip(&self.places) {
+            rows.number(&format!("{place}_amplitude_m"), *amplitude);
+            rows.number(&format!("{place}_mean_m"), *mean);
+            rows.number(&format!("{place}_phase_deg"), *phase);
+        }
+        for (joint, [dissipation, slip]) in system.joints.iter().zip(&self.joints) {
+            rows.number(&format!("{}_dissipation_J", joint.name), *dissipation);
+            rows.number(&format!("{}_slip_fraction", joint.name), *slip);
+        }
+        rows.flag("stable", self.stable);
+        rows.number("residual", self.residual);
+        rows.number("energy_gap", self.energy_gap);
+        rows.number("truncation", self.truncation);
+        rows.integer("iterations", self.iterations);
+        rows.text("status", &self.status);
+    }
+}

@@ -1,0 +1,89 @@
+//! Tables that grow row by row.
+
+use crate::dataset::{Column, Table, Values as Cells};
+use crate::study::Case;
+
+/// Columns that grow row by row, in a fixed order.
+#[derive(Debug, Default)]
+pub struct Rows {
+    columns: Vec<Column>,
+    next: usize,
+}
+
+impl Rows {
+    fn cells(&mut self, name: &str, empty: Cells) -> &mut Cells {
+        if self.next == self.columns.len() {
+            self.columns.push(Column { name: name.to_owned(), values: empty });
+        }
+        let column = &mut self.columns[self.next];
+        assert_eq!(column.name, name, "rows of one table have the same columns");
+        self.next += 1;
+        &mut column.values
+    }
+
+    /// A real number.
+    pub fn number(&mut self, name: &str, value: f64) {
+        if let Cells::Number(v) = self.cells(name, Cells::Number(Vec::new())) {
+            v.push(value);
+        }
+    }
+
+    /// A count.
+    pub fn integer(&mut self, name: &str, value: u64) {
+        if let Cells::Integer(v) = self.cells(name, Cells::Integer(Vec::new())) {
+            v.push(value);
+        }
+    }
+
+    /// A word.
+    pub fn text(&mut self, name: &str, value: &str) {
+        if let Cells::Text(v) = self.cells(name, Cells::Text(Vec::new())) {
+            v.push(value.to_owned());
+        }
+    }
+
+    /// True, false, or unknown.
+    pub fn flag(&mut self, name: &str, value: Option<bool>) {
+        if let Cells::Flag(v) = self.cells(name, Cells::Flag(Vec::new())) {
+            v.push(value);
+        }
+    }
+
+    /// The varied parameters of a case, SI.
+    pub fn varied(&mut self, case: &Case) {
+        for varied in &case.varied {
+            self.number(&varied.name, varied.si);
+        }
+    }
+
+    /// Ends a row.
+    pub fn end(&mut self) {
+        self.next = 0;
+    }
+
+    /// The rows of `more`, which has the same columns, after these.
+    ///
+    /// # Panics
+    /// If the columns differ.
+    pub fn append(&mut self, more: Rows) {
+        if self.columns.is_empty() {
+            self.columns = more.columns;
+            return;
+        }
+        for (column, other) in self.columns.iter_mut().zip(more.columns) {
+            assert_eq!(column.name, other.name, "rows of one table have the same columns");
+            match (&mut column.values, other.values) {
+                (Cells::Number(a), Cells::Number(b)) => a.extend(b),
+                (Cells::Integer(a), Cells::Integer(b)) => a.extend(b),
+                (Cells::Text(a), Cells::Text(b)) => a.extend(b),
+                (Cells::Flag(a), Cells::Flag(b)) => a.extend(b),
+                (a, b) => panic!("column {} has two sorts of values: {a:?}, {b:?}", column.name),
+            }
+        }
+    }
+
+    /// The table.
+    pub fn table(self, name: &str) -> Table {
+        Table { name: name.to_owned(), columns: self.columns }
+    }
+}
