@@ -67,6 +67,7 @@ pub fn check(request: &Request<'_>) -> Ending {
                     if cases == 1 { "" } else { "s" },
                     if points == 1 { "" } else { "s" }
                 );
+                text.extend(study.notes().iter().map(|note| format!("  note: {note}\n")));
             }
             print(&text)
         }
