@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use stickslip::orbit::Accuracy;
-use stickslip_report::{Outputs, terminal::Terminal, write_dataset};
+use stickslip_report::{Outputs, check_writable, terminal::Terminal, write_dataset};
 use stickslip_study::dataset::Dataset;
 use stickslip_study::run::{CONVERGED, Context, check as check_study, run as run_study};
 use stickslip_study::{Study, StudyError, read_file};
@@ -68,6 +68,7 @@ pub fn check(request: &Request<'_>) -> Ending {
                     if cases == 1 { "" } else { "s" },
                     if points == 1 { "" } else { "s" }
                 );
+                text.extend(study.notes().iter().map(|note| format!("  note: {note}\n")));
             }
             print(&text)
         }
@@ -92,6 +93,9 @@ pub fn run(request: &Request<'_>, place: &Place, only: &[String], json: bool) ->
         eprintln!("error: two files are called `{}`, their results would be in one folder; rename one", twice.name());
         return Ending::WrongInput;
     }
+    if let Some(error) = studies.iter().find_map(|study| check_writable(&place.out.join(study.name())).err()) {
+        return Ending::Failed(error.to_string());
+    }
     let threads = match pool(place) {
         Ok(threads) => threads,
         Err(ending) => return ending,
@@ -112,11 +116,21 @@ pub fn run(request: &Request<'_>, place: &Place, only: &[String], json: bool) ->
             }
         };
         failed |= dataset.record.points.keys().any(|status| status != CONVERGED);
-        if let Err(ending) = write(&dataset, &place.out, &outputs, json) {
-            return ending;
-        }
+        let folder = match write(&dataset, &place.out, &outputs, json) {
+            Ok(folder) => folder,
+            Err(ending) => return ending,
+        };
         if stop.load(Ordering::Relaxed) {
-            return Ending::Failed("interrupted; the finished points are written".to_owned());
+            let whole = place.out.join(study.name());
+            let beside = if folder == whole || !dataset.record.interrupted {
+                String::new()
+            } else {
+                format!("; the whole run in {} stays", whole.join("").display())
+            };
+            return Ending::Failed(format!(
+                "interrupted; the finished points are in {}{beside}",
+                folder.join("").display()
+            ));
         }
     }
     if failed { Ending::SomeFailed } else { Ending::Done }
@@ -125,7 +139,8 @@ pub fn run(request: &Request<'_>, place: &Place, only: &[String], json: bool) ->
 /// Failed points that are named on standard error; the record has all.
 const NAMED_FAILURES: usize = 10;
 
-fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result<(), Ending> {
+/// Writes the results and says what there is to say; returns their folder.
+fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result<PathBuf, Ending> {
     let files = write_dataset(dataset, out, outputs).map_err(|error| Ending::Failed(error.to_string()))?;
     for failure in dataset.failures.iter().take(NAMED_FAILURES) {
         eprintln!("{}: failed at {}: {}", dataset.name, failure.at, failure.reason);
@@ -155,11 +170,15 @@ fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result
     } else {
         Ending::Done
     };
-    if let Ending::Failed(_) = ending { Err(ending) } else { Ok(()) }
+    let folder = files.first().and_then(|file| file.parent()).unwrap_or(out);
+    if let Ending::Failed(_) = ending { Err(ending) } else { Ok(folder.to_owned()) }
 }
 
 /// `stickslip paper`.
 pub fn paper(place: &Place) -> Ending {
+    if let Err(error) = check_writable(&place.out) {
+        return Ending::Failed(error.to_string());
+    }
     let threads = match pool(place) {
         Ok(threads) => threads,
         Err(ending) => return ending,

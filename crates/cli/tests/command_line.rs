@@ -59,6 +59,7 @@ fn a_study_runs_and_every_output_is_there() {
         "stable",
         "residual",
         "energy_gap",
+        "truncation",
         "iterations",
         "status",
     ];
@@ -229,10 +230,27 @@ fn every_method_fills_the_table() {
             assert!([0, 3].contains(&code(&output)), "{method} {kind}: {}", stderr(&output));
             let table = if kind == "response" { "curve.csv" } else { "orbits.csv" };
             let text = fs::read_to_string(folder.path().join(method).join(kind).join(table)).unwrap();
+            let mut lines = text.lines();
+            let column = lines.next().unwrap().split(',').position(|name| name == "truncation").unwrap();
             let estimates = ["transient", "harmonic-balance"].contains(&method);
-            assert_eq!(text.lines().next().unwrap().contains("truncation"), estimates, "{method} {kind}");
+            assert_eq!(lines.next().unwrap().split(',').nth(column).unwrap() != "", estimates, "{method} {kind}");
         }
     }
+}
+
+/// What a long run of `study.toml` says after this signal.
+#[cfg(unix)]
+fn interrupted(folder: &Path, signal: &str) -> Output {
+    let child = std::process::Command::new(assert_cmd::cargo::cargo_bin("stickslip"))
+        .current_dir(folder)
+        .args(["run", "study.toml", "--only", "csv,json"])
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    let kill = std::process::Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    child.wait_with_output().unwrap()
 }
 
 /// Ctrl-C during a long sweep leaves the finished points readable.
@@ -240,16 +258,7 @@ fn every_method_fills_the_table() {
 #[test]
 fn an_interrupt_keeps_the_finished_points() {
     let (folder, _) = folder("blade-couple", &[("points = 241", "points = 200000")]);
-    let child = std::process::Command::new(assert_cmd::cargo::cargo_bin("stickslip"))
-        .current_dir(folder.path())
-        .args(["run", "study.toml", "--only", "csv,json"])
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(1500));
-    let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(kill.success());
-    let output = child.wait_with_output().unwrap();
+    let output = interrupted(folder.path(), "-INT");
     assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
     let curve = fs::read_to_string(folder.path().join("stickslip-out/study/curve.csv")).unwrap();
     let rows = curve.lines().count() - 1;
@@ -257,6 +266,51 @@ fn an_interrupt_keeps_the_finished_points() {
     assert!(curve.lines().skip(1).all(|line| line.ends_with("converged")));
     let record = fs::read_to_string(folder.path().join("stickslip-out/study/record.json")).unwrap();
     assert!(record.contains("\"interrupted\": true"));
+}
+
+/// Tables, figures and record of a folder belong to one run, and an interrupted run does not destroy a whole one.
+#[cfg(unix)]
+#[test]
+fn results_belong_to_one_run() {
+    let (folder, path) = folder("blade-couple", &[("points = 241", "points = 5")]);
+    assert_eq!(code(&stickslip(folder.path(), &["run", "study.toml"])), 0);
+    let out = folder.path().join("stickslip-out/study");
+    fs::write(out.join("mine.txt"), "mine").unwrap();
+    let output = stickslip(folder.path(), &["run", "study.toml", "--set", "Ft=3N", "--only", "csv"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let names = |folder: &Path| {
+        let mut names: Vec<String> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names(&out), ["curve.csv", "mine.txt", "peaks.csv", "record.json"]);
+    let record = fs::read_to_string(out.join("record.json")).unwrap();
+    assert!(record.contains("Ft = 3N from `--set` replaces the 4 values of `vary`."), "{record}");
+
+    let text = fs::read_to_string(&path).unwrap().replace("points = 5", "points = 200000");
+    fs::write(&path, text).unwrap();
+    let output = interrupted(folder.path(), "-INT");
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert!(stderr(&output).contains("the whole run in stickslip-out/study/ stays"), "{}", stderr(&output));
+    assert_eq!(fs::read_to_string(out.join("record.json")).unwrap(), record);
+    let cut_short = folder.path().join("stickslip-out/study.interrupted");
+    assert_eq!(names(&cut_short), ["curve.csv", "peaks.csv", "record.json"]);
+}
+
+/// What is in the way of the results is found before anything is computed.
+#[test]
+fn an_unwritable_folder_is_found_first() {
+    let (folder, _) = folder("blade-couple", &[("points = 241", "points = 200000")]);
+    fs::write(folder.path().join("taken"), "").unwrap();
+    for arguments in [&["run", "study.toml", "--out", "taken"][..], &["paper", "--out", "taken/deeper"][..]] {
+        let start = std::time::Instant::now();
+        let output = stickslip(folder.path(), arguments);
+        assert_eq!(code(&output), 1);
+        assert!(stderr(&output).contains("cannot write taken"), "{}", stderr(&output));
+        // the study takes minutes
+        assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+    }
 }
 
 #[test]

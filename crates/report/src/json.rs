@@ -10,13 +10,14 @@ pub const OUTPUT: Output =
     Output { name: "json", summary: "record.json: versions, resolved study, seed, points by status", make: files };
 
 fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
-    Ok(vec![File::new("record.json", to_json(dataset)?)])
+    Ok(vec![File::new("record.json", to_json(dataset, &[])?)])
 }
 
-/// The record of a run and what a reader of the results must know, as indented JSON with a final line feed.
+/// The record of a run and what a reader of the results must know, as indented JSON with a final line feed; `files` are the names of the
+/// files that belong to the run.
 /// # Errors
 /// [`ReportError::Encode`] if a value cannot be written as JSON.
-pub fn to_json(dataset: &Dataset) -> Result<String, ReportError> {
+pub fn to_json(dataset: &Dataset, files: &[String]) -> Result<String, ReportError> {
     let record = &dataset.record;
     let value = serde_json::json!({
         "name": dataset.name,
@@ -31,6 +32,7 @@ pub fn to_json(dataset: &Dataset) -> Result<String, ReportError> {
         "points": record.points,
         "notes": dataset.notes,
         "failures": dataset.failures,
+        "files": files,
         "tables": dataset.tables.iter().map(|t| serde_json::json!({
             "file": format!("{}.csv", t.name),
             "rows": t.rows(),
@@ -50,10 +52,12 @@ mod tests {
     #[test]
     fn the_record_holds_what_a_repetition_needs() {
         let dataset = samples::hostile();
-        let value: serde_json::Value = serde_json::from_str(&to_json(&dataset).unwrap()).unwrap();
+        let value: serde_json::Value =
+            serde_json::from_str(&to_json(&dataset, &["record.json".to_owned()]).unwrap()).unwrap();
         assert_eq!(value["title"], dataset.title.as_str());
         assert_eq!(value["study"], dataset.record.study);
         assert_eq!(value["seed"], 7);
+        assert_eq!(value["files"][0], "record.json");
         assert_eq!(value["failures"].as_array().unwrap().len(), dataset.failures.len());
         assert_eq!(value["failures"][0]["reason"], dataset.failures[0].reason.as_str());
         assert_eq!(value["points"]["converged"], 240);

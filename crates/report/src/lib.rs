@@ -17,6 +17,7 @@
 //! ```
 
 pub mod csv;
+pub mod folder;
 mod font;
 mod frame;
 pub mod html;
@@ -30,6 +31,7 @@ pub mod terminal;
 #[cfg(test)]
 mod samples;
 
+pub use folder::check_writable;
 pub use output::{Output, Outputs, ReportError, write_dataset, write_file};
 pub use page::{Claim, Page, PageTable, Section, Verdict};
 pub use stickslip_study::dataset::{Dataset, Figure};

@@ -1,5 +1,6 @@
 //! The table of outputs, and how their files reach the disk: whole or not at all.
 
+use crate::folder;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::Dataset;
@@ -133,16 +134,24 @@ impl ReportError {
 
 /// Writes the chosen outputs of a dataset into `out/NAME/` and returns the paths of the files, in that order.
 ///
-/// All files are made before the first is written, and each appears under its name only when it is complete.
+/// The files replace those of an earlier run there, all or none; files that no run wrote stay. The record is always among them: it lists what
+/// belongs to the run. The results of an interrupted run go to `out/NAME.interrupted/` where `out/NAME/` holds a whole one.
 /// # Errors
-/// [`ReportError`] says which file and why; files that were written before stay.
+/// [`ReportError`] says which file and why; what was there before stays.
 pub fn write_dataset(dataset: &Dataset, out: &Path, outputs: &Outputs) -> Result<Vec<PathBuf>, ReportError> {
-    let folder = out.join(file_name(&dataset.name, "study")?);
+    let name = file_name(&dataset.name, "study")?;
     let mut files = Vec::new();
     for output in outputs.iter() {
         files.extend((output.make)(dataset)?);
     }
-    files.iter().map(|file| write_file(&folder.join(file_name(&file.name, "result")?), &file.content)).collect()
+    if files.iter().all(|file| file.name != folder::RECORD) {
+        files.push(File::new(folder::RECORD, Vec::new()));
+    }
+    let names: Vec<String> = files.iter().map(|file| file.name.clone()).collect();
+    for file in files.iter_mut().filter(|file| file.name == folder::RECORD) {
+        file.content = crate::json::to_json(dataset, &names)?.into_bytes();
+    }
+    folder::replace(&folder::of_run(out, name, dataset.record.interrupted), &files)
 }
 
 /// Writes one file, whole or not at all: a temporary file in the same folder, renamed when complete. Makes the folder

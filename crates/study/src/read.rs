@@ -7,7 +7,7 @@ use crate::kinds;
 use crate::near::{nearest, one_of, shown};
 use crate::schema::{self, FILE, Key, MOST_BYTES, MOST_ELEMENTS, MOST_POINTS, Presence, STUDY, Takes, Within};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable};
-use crate::study::{Lists, Parameter, Structure, Study, Varied, VariedPoints};
+use crate::study::{Lists, Parameter, Replaced, Structure, Study, Varied, VariedPoints};
 use crate::values::Given;
 use std::collections::HashMap;
 use std::io::Read;
@@ -95,9 +95,11 @@ fn too_big(name: &str, bytes: usize) -> Result<(), StudyError> {
 /// use stickslip::model::templates;
 /// use stickslip_study::read_study;
 /// let text = templates::find("blade-couple").unwrap().study;
-/// let study = read_study("couple.toml", text, &[("Ft".into(), "3 N".into())]).unwrap();
+/// let study = read_study("couple.toml", text, &[]).unwrap();
 /// assert_eq!((study.name(), study.cases()), ("couple", 4));
 /// assert_eq!(study.case(0).unwrap().varied[0].text, "Ft = 2 N");
+/// let study = read_study("couple.toml", text, &[("Ft".into(), "3 N".into())]).unwrap();
+/// assert_eq!((study.cases(), study.case(0).unwrap().varied[0].text.as_str()), (1, "Ft = 3 N"));
 /// let error = read_study("couple.toml", &text.replace("stiffness", "stifness"), &[]).unwrap_err();
 /// assert_eq!(error.help_text(), Some("did you mean `stiffness`?"));
 /// ```
@@ -169,10 +171,11 @@ impl Reader {
         let (kind, study, vary) = self.request(&root)?;
         let method = self.method(&root);
         let mut parameters = parameters?;
-        let varied = vary.and_then(|entry| self.vary(entry, &mut parameters)).unwrap_or_default();
+        let mut varied = vary.and_then(|entry| self.vary(entry, &mut parameters)).unwrap_or_default();
         if !self.problems.is_empty() {
             return None;
         }
+        let replaced = self.replace(&mut varied, &parameters, overrides);
         let order = self.order(&parameters, &varied)?;
         self.limit_points(&study, &varied)?;
         let stem = Path::new(file).file_stem().and_then(|stem| stem.to_str()).unwrap_or("study").to_owned();
@@ -188,6 +191,7 @@ impl Reader {
             parameters,
             order,
             varied,
+            replaced,
             structure: structure?,
             study,
             method: method?,
@@ -456,7 +460,7 @@ impl Reader {
         let mut keys = vec![schema::required("kind", Takes::Text, "law", "\"coulomb\"")];
         keys.extend(row.parameters.iter().map(|p| Key {
             name: p.key,
-            takes: Takes::Quantity(p.dimension, Within::Positive),
+            takes: Takes::Quantity(p.dimension, if p.may_be_zero { Within::AtLeastZero } else { Within::Positive }),
             presence: Presence::Required,
             doc: p.doc,
             example: example_of(p.dimension),
@@ -736,6 +740,25 @@ impl Reader {
             self.settle_dimensions(parameters, &which)?;
         }
         Some(varied)
+    }
+
+    /// A value from outside the file stands for all values that `vary` gives its parameter: one case has it.
+    fn replace(
+        &self,
+        varied: &mut [Varied],
+        parameters: &[Parameter],
+        overrides: &[(String, String)],
+    ) -> Vec<Replaced> {
+        let mut replaced = Vec::new();
+        for varied in varied {
+            let name = &self.names[varied.index];
+            let Some((_, text)) = overrides.iter().rfind(|(set, _)| set == name) else { continue };
+            replaced.push(Replaced { name: name.clone(), text: text.trim().to_owned(), values: varied.points.len() });
+            let quantity = parameters[varied.index].quantity.clone();
+            varied.place = quantity.place.clone();
+            varied.points = VariedPoints::List(vec![quantity]);
+        }
+        replaced
     }
 
     /// The order in which parameters can be evaluated; a circle is an error.

@@ -35,7 +35,8 @@ pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
     let part = parts(study, context)?;
     let kind = study.kind();
     let interrupted = part.points.contains_key(NOT_REACHED);
-    let mut notes: Vec<String> = part.notes.iter().filter_map(Note::text).collect();
+    let mut notes = study.notes();
+    notes.extend(part.notes.iter().filter_map(Note::text));
     if interrupted {
         notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
     }

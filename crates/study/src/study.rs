@@ -29,6 +29,7 @@ pub struct Study {
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) order: Vec<usize>,
     pub(crate) varied: Vec<Varied>,
+    pub(crate) replaced: Vec<Replaced>,
     pub(crate) structure: Structure,
     pub(crate) study: StatedTable,
     pub(crate) method: StatedTable,
@@ -47,6 +48,16 @@ pub(crate) struct Varied {
     pub index: usize,
     pub place: Place,
     pub points: VariedPoints,
+}
+
+/// Values of `vary` that a value from outside the file has replaced.
+#[derive(Debug, Clone)]
+pub(crate) struct Replaced {
+    pub name: String,
+    /// The value as it was typed.
+    pub text: String,
+    /// How many values stand in the file.
+    pub values: usize,
 }
 
 #[derive(Debug, Clone)]
@@ -199,6 +210,15 @@ impl Study {
         self.varied.iter().map(|varied| self.names[varied.index].as_str()).collect()
     }
 
+    /// What differs from the file, in sentences for the reader of the results.
+    pub fn notes(&self) -> Vec<String> {
+        let note = |Replaced { name, text, values }: &Replaced| {
+            let values = if *values == 1 { "the value".to_owned() } else { format!("the {values} values") };
+            format!("{name} = {text} from `--set` replaces {values} of `vary`.")
+        };
+        self.replaced.iter().map(note).collect()
+    }
+
     /// Number of cases: the product of the numbers of values in `vary`; 1 if nothing is varied.
     pub fn cases(&self) -> usize {
         self.varied.iter().map(|varied| varied.points.len()).product()
@@ -223,7 +243,7 @@ impl Study {
     pub(crate) fn varied_values(&self, index: usize) -> Option<Vec<VariedValue>> {
         let choice = self.choice(index);
         let environment = evaluate(&self.names, &self.parameters, &self.order, &choice, None).ok()?;
-        Some(self.varied_of(&environment, &choice.into_values().map(|(varied, point)| (varied.index, point)).collect()))
+        Some(self.varied_in(&environment, &choice))
     }
 
     /// The case with this number.
@@ -333,6 +353,8 @@ impl Study {
             "kind": self.kind.name,
             "file": self.text,
             "set": self.overrides.iter().map(|(name, text)| json!([name, text])).collect::<Vec<_>>(),
+            "replaced": self.replaced.iter().map(|r| json!({ "parameter": r.name, "value": r.text, "values_in_file": r.values }))
+                .collect::<Vec<_>>(),
             "number_of_cases": self.cases(),
             "cases": cases,
         })
@@ -354,16 +376,40 @@ impl Study {
 
     fn parts(&self, index: usize, fixed: Option<(usize, f64)>, problems: &mut Vec<Problem>) -> Option<Parts> {
         let parts = self.resolve(index, fixed, problems);
-        // one case of many: say which
-        if self.cases() > 1 && index > 0 {
-            for problem in problems.iter_mut() {
-                problem.message = format!("{} (in case {} of {})", problem.message, index + 1, self.cases());
+        if !problems.is_empty() && self.cases() > 1 {
+            // what is wrong in the first case and in the last is no matter of one case
+            let mut others = Vec::new();
+            if index == 0 {
+                self.resolve(self.cases() - 1, fixed, &mut others);
+            }
+            for problem in problems.iter_mut().filter(|problem| !others.contains(problem)) {
+                problem.message = format!("{} ({})", problem.message, self.case_words(index));
             }
         }
         parts
     }
 
-    /// Which point of each varied parameter a case has.
+    /// A case in words, with its number among all: `N = 0 N, case 1 of 8`.
+    pub(crate) fn case_words(&self, index: usize) -> String {
+        let choice = self.choice(index);
+        let words = match evaluate(&self.names, &self.parameters, &self.order, &choice, None) {
+            Ok(environment) => varied_text(&self.varied_in(&environment, &choice)),
+            // without values: as they stand in the file
+            Err(_) => {
+                let words = self.varied.iter().filter_map(|varied| match (&varied.points, choice.get(&varied.index)) {
+                    (VariedPoints::List(list), Some((_, point))) => {
+                        Some(format!("{} = {}", self.names[varied.index], shown(list[*point].text.trim())))
+                    }
+                    _ => None,
+                });
+                words.collect::<Vec<_>>().join(", ")
+            }
+        };
+        let number = format!("case {} of {}", index + 1, self.cases());
+        if words.is_empty() { number } else { format!("{words}, {number}") }
+    }
+
+    /// Which point every varied parameter has in a case.
     fn choice(&self, index: usize) -> HashMap<usize, (&Varied, usize)> {
         let mut remainder = index;
         let mut choice = HashMap::new();
@@ -372,6 +418,26 @@ impl Study {
             remainder /= varied.points.len();
         }
         choice
+    }
+
+    fn varied_in(&self, environment: &[Value], choice: &HashMap<usize, (&Varied, usize)>) -> Vec<VariedValue> {
+        let values = self.varied.iter().map(|varied| {
+            let name = self.names[varied.index].clone();
+            let value = environment[varied.index];
+            let literal = match &varied.points {
+                VariedPoints::List(list) => choice.get(&varied.index).and_then(|(_, point)| list.get(*point)),
+                VariedPoints::Range { .. } => None,
+            };
+            // as the user wrote it, if that is a number with its unit
+            let text = match literal.filter(|q| q.inner.is_some() && q.expression.is_literal()) {
+                Some(quantity) if quantity.text.contains(|c: char| c.is_alphabetic() && c != 'e' && c != 'E') => {
+                    quantity.text.trim().to_owned()
+                }
+                _ => displayed(value.si, value.dimension),
+            };
+            VariedValue { text: format!("{name} = {text}"), name, si: value.si, dimension: value.dimension }
+        });
+        values.collect()
     }
 
     fn resolve(&self, index: usize, fixed: Option<(usize, f64)>, problems: &mut Vec<Problem>) -> Option<Parts> {
@@ -403,8 +469,7 @@ impl Study {
             problems.push(self.complaint(complaint));
             return None;
         }
-        let choice = choice.into_values().map(|(varied, point)| (varied.index, point)).collect();
-        Some(Parts { environment: environment.values, model, values, method, choice })
+        Some(Parts { environment: environment.values, model, values, method })
     }
 
     fn template_model(
@@ -427,31 +492,9 @@ impl Study {
         model
     }
 
-    fn varied_of(&self, environment: &[Value], choice: &HashMap<usize, usize>) -> Vec<VariedValue> {
-        self.varied
-            .iter()
-            .map(|varied| {
-                let name = self.names[varied.index].clone();
-                let value = environment[varied.index];
-                let literal = match &varied.points {
-                    VariedPoints::List(list) => choice.get(&varied.index).and_then(|&point| list.get(point)),
-                    VariedPoints::Range { .. } => None,
-                };
-                // as the user wrote it, if that is a number with its unit
-                let text = match literal.filter(|q| q.inner.is_some() && q.expression.is_literal()) {
-                    Some(quantity) if quantity.text.contains(|c: char| c.is_alphabetic() && c != 'e' && c != 'E') => {
-                        quantity.text.trim().to_owned()
-                    }
-                    _ => displayed(value.si, value.dimension),
-                };
-                VariedValue { text: format!("{name} = {text}"), name, si: value.si, dimension: value.dimension }
-            })
-            .collect()
-    }
-
     fn finished(&self, index: usize, parts: Parts) -> Case {
-        let Parts { environment, model, values, method, choice } = parts;
-        let varied = self.varied_of(&environment, &choice);
+        let Parts { environment, model, values, method } = parts;
+        let varied = self.varied_in(&environment, &self.choice(index));
         let parameters = self
             .names
             .iter()
@@ -518,8 +561,6 @@ struct Parts {
     model: Model,
     values: Values,
     method: Values,
-    /// Which point of each varied parameter.
-    choice: HashMap<usize, usize>,
 }
 
 /// The values of all parameters, with the choices made for the varied ones.

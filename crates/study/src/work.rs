@@ -80,21 +80,26 @@ impl Prepared {
 /// A method's refusal, at the place in the file that it is about.
 pub(crate) fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyError {
     let model = &case.model;
+    // a method looks at the first case first: what it refuses later is a matter of that case
+    let message = match case.index {
+        0 => error.to_string(),
+        index => format!("{error} ({})", study.case_words(index)),
+    };
     match error {
         MethodError::Law { joint, instead, .. } => {
             let index = model.joints.iter().position(|j| j.name == *joint).unwrap_or(0);
-            study.error_at("joint", index, "law", error.to_string(), Some(format!("use {instead}")))
+            study.error_at("joint", index, "law", message, Some(format!("use {instead}")))
         }
         MethodError::NeedsMass { place, .. } => {
             let index = model.masses.iter().position(|m| m.name == *place).unwrap_or(0);
-            study.error_at("mass", index, "mass", error.to_string(), None)
+            study.error_at("mass", index, "mass", message, None)
         }
         // a kind that needs no method has the method's options among its own keys
         MethodError::Option { key, .. } => {
             let table = if study.kind().uses_method { "method" } else { "study" };
-            study.error_at(table, 0, key, error.to_string(), None)
+            study.error_at(table, 0, key, message, None)
         }
-        _ => study.error_at("method", 0, "kind", error.to_string(), None),
+        _ => study.error_at("method", 0, "kind", message, None),
     }
 }
 

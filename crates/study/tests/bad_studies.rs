@@ -82,7 +82,7 @@ fn quantities() {
     check("Ft = \"2 N\"", "Ft = \"1e999 N\"", (11, 7), "Ft", &["too large"]);
     check("mass = \"m1\"", "mass = \"-1 g\"", (18, 9), "mass", &["must be zero or more", "-0.001 kg"]);
     check("mass = \"m1\"", "mass = \"m1 - m\"", (18, 9), "mass", &["must be zero or more"]);
-    check("limit = \"Ft\"", "limit = \"0 N\"", (38, 36), "limit", &["must be more than zero, found 0 N"]);
+    check("limit = \"Ft\"", "limit = \"-1 N\"", (38, 36), "limit", &["must be zero or more, found -1 N"]);
     check("mass = \"m - m1/2\"", "mass = \"m - (m1\"", (15, 13), "mass", &["not closed"]);
     check("mass = \"m - m1/2\"", "mass = \"m - k/2\"", (15, 9), "mass", &["mass (kg) and stiffness (N/m)"]);
     check("mass = \"m - m1/2\"", "mass = \"m - m2/2\"", (15, 13), "mass", &["no parameter `m2`", "did you mean"]);
@@ -99,10 +99,11 @@ fn parameters() {
     check("b = \"0.2 kg/s\"", "b-b = 1", (9, 1), "b-b", &["a letter first"]);
     check("b = \"0.2 kg/s\"", "b = [1]", (9, 5), "b", &["expected a quantity, found a list"]);
     check("vary = { Ft", "vary = { FT", (47, 10), "FT", &["did you mean `Ft`?"]);
-    check("\"4 N\"", "\"4 kg\"", (47, 24), "Ft", &["expected force (N), found mass (kg)", "case 2 of 4"]);
+    check("\"4 N\"", "\"4 kg\"", (47, 24), "Ft", &["expected force (N), found mass (kg)", "(Ft = 4 kg, case 2 of 4)"]);
     check("[\"2 N\", \"4 N\", \"6 N\", \"8 N\"]", "[]", (47, 15), "Ft", &["empty"]);
     check("\"4 N\"", "\"2*Ft\"", (47, 15), "Ft", &["Ft -> Ft"]);
-    check("\"4 N\"", "\"-4 N\"", (38, 36), "limit", &["must be more than zero", "case 2 of 4"]);
+    check("\"4 N\"", "\"-4 N\"", (38, 36), "limit", &["must be zero or more", "(Ft = -4 N, case 2 of 4)"]);
+    check("\"2 N\", \"4 N\"", "\"-2 N\", \"4 N\"", (38, 36), "limit", &["found -2 N (Ft = -2 N, case 1 of 4)"]);
 }
 
 #[test]
@@ -187,6 +188,16 @@ fn templates_and_lists_exclude_each_other() {
     let error = read_study("bad.toml", &bad, &[]).unwrap_err();
     assert_eq!((error.line(), error.underlined()), (Some(6), Some("\"blade-couple\"")), "{error}");
     assert!(error.message().contains("mass 1"), "{error}");
+}
+
+/// An error that every case has is no matter of the first.
+#[test]
+fn an_error_of_all_cases_names_none() {
+    let error = read_study("bad.toml", &EXAMPLE.replace("stiffness = \"k\"", "stiffness = \"2 s\""), &[]).unwrap_err();
+    assert!(!error.message().contains("case"), "{error}");
+    let text = EXAMPLE.replace("[\"2 N\", \"4 N\", \"6 N\", \"8 N\"]", "{ from = \"-2 N\", to = \"2 N\", points = 5 }");
+    let error = read_study("bad.toml", &text, &[]).unwrap_err();
+    assert!(error.message().ends_with("found -2 N (Ft = -2 N, case 1 of 5)"), "{error}");
 }
 
 #[test]

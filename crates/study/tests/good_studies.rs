@@ -254,3 +254,20 @@ fn the_example_of_every_key_is_toml() {
         }
     }
 }
+
+/// `--set` of a parameter that `vary` has too: one case with that value, and every reader of the results is told.
+#[test]
+fn set_replaces_the_values_of_vary_and_says_so() {
+    let study = read_study("fig06.toml", EXAMPLE, &set("Ft", "3N")).unwrap();
+    assert_eq!((study.cases(), study.points()), (1, 241));
+    let case = study.case(0).unwrap();
+    assert_eq!((case.varied[0].si, case.model.joints[0].law.values()), (3.0, vec![3.0]));
+    assert_eq!(study.notes(), ["Ft = 3N from `--set` replaces the 4 values of `vary`."]);
+    assert_eq!(study.resolved()["replaced"][0]["values_in_file"], 4);
+    // the last of several; another parameter of `vary` keeps its values
+    let text = EXAMPLE.replace("vary = { Ft = [", "vary = { kt = { from = 1, to = 9, points = 5 }, Ft = [");
+    let study = read_study("fig06.toml", &text, &[set("Ft", "3 N"), set("Ft", "m * 10 m/s^2")].concat()).unwrap();
+    assert_eq!((study.cases(), study.case(4).unwrap().label().as_str()), (5, "kt = 9 N/m, Ft = 1.82 N"));
+    assert!(read(EXAMPLE).notes().is_empty());
+    assert!(read_study("fig06.toml", EXAMPLE, &set("kt", "1 N/m")).unwrap().notes().is_empty());
+}

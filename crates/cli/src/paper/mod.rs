@@ -98,8 +98,12 @@ fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -
     .into_iter()
     .flatten()
     .collect();
-    let summary = summary(out, &parts, &results);
-    page(parts).write(&out.join("report.html"))?;
+    // what an interrupted run has does not replace a whole report
+    let whole = out.join("report.html");
+    let cut_short = context.stopped() && whole.exists();
+    let report = if cut_short { out.join("report.interrupted.html") } else { whole };
+    let summary = summary(&report, &parts, &results);
+    page(parts).write(&report)?;
     Ok(Outcome { summary, failed: results.failed() })
 }
 
@@ -187,7 +191,7 @@ fn page(parts: Vec<Part>) -> Page {
 }
 
 /// The claims for the terminal.
-fn summary(out: &Path, parts: &[Part], results: &Results) -> String {
+fn summary(report: &Path, parts: &[Part], results: &Results) -> String {
     let mut text = String::new();
     for part in parts.iter().filter(|part| !part.findings.is_empty()) {
         let _ = writeln!(text, "{}", part.section.heading);
@@ -208,7 +212,7 @@ fn summary(out: &Path, parts: &[Part], results: &Results) -> String {
     for dataset in results.all().filter(|dataset| !dataset.failures.is_empty()) {
         let _ = writeln!(text, "{}: {} points failed, see record.json", dataset.name, dataset.failures.len());
     }
-    let _ = writeln!(text, "{}", out.join("report.html").display());
+    let _ = writeln!(text, "{}", report.display());
     text
 }
 

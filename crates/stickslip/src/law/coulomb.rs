@@ -4,7 +4,6 @@
 //! Source: the "2V" law of Pust, Pesek, Radolfova (2015), Sec. 1; as a set-valued law Moreau (1988).
 
 use super::{Branch, CoulombArctan, FrictionLaw, Law, Parameter};
-use crate::dimension::Dimension;
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -25,8 +24,7 @@ pub struct Coulomb {
 impl FrictionLaw for Coulomb {
     const NAME: &'static str = "coulomb";
     const SUMMARY: &'static str = "rigid dry friction, f = limit Sgn(u'), exact";
-    const PARAMETERS: &'static [Parameter] =
-        &[Parameter { key: "limit", dimension: Dimension::FORCE, doc: "slip limit: friction force while slipping" }];
+    const PARAMETERS: &'static [Parameter] = &[Parameter::limit("slip limit: friction force while slipping")];
 
     fn from_values(values: &[f64]) -> Self {
         Coulomb { limit: values[0] }
@@ -41,6 +39,9 @@ impl FrictionLaw for Coulomb {
         Some(Law::CoulombArctan(CoulombArctan { limit: self.limit, alpha: 1.0 / width }))
     }
     fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
+        if self.limit == 0.0 {
+            return Complex64::new(0.0, 0.0); // also without motion
+        }
         Complex64::new(0.0, 4.0 * self.limit / (PI * amplitude))
     }
 }

@@ -32,8 +32,8 @@ impl FrictionLaw for CoulombArctan {
     const NAME: &'static str = "coulomb-arctan";
     const SUMMARY: &'static str = "smoothed dry friction, f = limit (2/pi) arctan(alpha u'), paper Eq. (2)";
     const PARAMETERS: &'static [Parameter] = &[
-        Parameter { key: "limit", dimension: Dimension::FORCE, doc: "friction force at high sliding velocity" },
-        Parameter { key: "alpha", dimension: Dimension::INVERSE_VELOCITY, doc: "steepness of the arctangent at rest" },
+        Parameter::limit("friction force at high sliding velocity"),
+        Parameter::positive("alpha", Dimension::INVERSE_VELOCITY, "steepness of the arctangent at rest"),
     ];
 
     fn from_values(values: &[f64]) -> Self {
@@ -46,6 +46,9 @@ impl FrictionLaw for CoulombArctan {
         Some(Rate::CoulombArctan(*self))
     }
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+        if self.limit == 0.0 {
+            return Complex64::new(0.0, 0.0); // also without motion
+        }
         // first harmonic of arctan(z cos θ), z the scaled velocity; written without cancellation for small z
         let z = self.alpha * amplitude * omega;
         let first = self.limit * 4.0 / PI * z / ((1.0 + z * z).sqrt() + 1.0);

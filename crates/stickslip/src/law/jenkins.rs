@@ -30,8 +30,8 @@ impl FrictionLaw for Jenkins {
     const NAME: &'static str = "jenkins";
     const SUMMARY: &'static str = "spring and slider in series, f = kt (u - s), |f| <= limit, exact, paper Eq. (1)";
     const PARAMETERS: &'static [Parameter] = &[
-        Parameter { key: "stiffness", dimension: Dimension::STIFFNESS, doc: "tangential contact stiffness" },
-        Parameter { key: "limit", dimension: Dimension::FORCE, doc: "slip limit: force while the slider moves" },
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "tangential contact stiffness"),
+        Parameter::limit("slip limit: force while the slider moves"),
     ];
 
     fn from_values(values: &[f64]) -> Self {
@@ -48,6 +48,9 @@ impl FrictionLaw for Jenkins {
         Some(Law::JenkinsArctan(JenkinsArctan { stiffness: self.stiffness, limit: self.limit, alpha: 1.0 / width }))
     }
     fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
+        if self.limit == 0.0 {
+            return Complex64::new(0.0, 0.0); // also without motion
+        }
         let hold = self.limit / self.stiffness;
         if amplitude <= hold {
             return Complex64::new(self.stiffness, 0.0);

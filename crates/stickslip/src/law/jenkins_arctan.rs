@@ -41,9 +41,9 @@ impl FrictionLaw for JenkinsArctan {
     const NAME: &'static str = "jenkins-arctan";
     const SUMMARY: &'static str = "spring and smoothed slider in series, f' = kt (u' - tan(pi f/(2 limit))/alpha)";
     const PARAMETERS: &'static [Parameter] = &[
-        Parameter { key: "stiffness", dimension: Dimension::STIFFNESS, doc: "tangential contact stiffness" },
-        Parameter { key: "limit", dimension: Dimension::FORCE, doc: "friction force at high sliding velocity" },
-        Parameter { key: "alpha", dimension: Dimension::INVERSE_VELOCITY, doc: "steepness of the arctangent at rest" },
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "tangential contact stiffness"),
+        Parameter::limit("friction force at high sliding velocity"),
+        Parameter::positive("alpha", Dimension::INVERSE_VELOCITY, "steepness of the arctangent at rest"),
     ];
 
     fn from_values(values: &[f64]) -> Self {
@@ -75,11 +75,14 @@ const BELOW: f64 = 1.0 - 1e-12;
 impl RateLaw for JenkinsArctan {
     #[inline]
     fn states(&self) -> usize {
-        1
+        usize::from(self.limit > 0.0) // a slider that holds nothing leaves its spring without force
     }
     #[inline]
     fn evaluate<S: Real>(&self, contact: &Relative<S>, z: &[S], z_rate: &mut [S]) -> [S; 3] {
         let zero = S::from_f64(0.0);
+        if z.is_empty() {
+            return [zero, zero, zero];
+        }
         let (sinh, cosh) = (z[0].sinh(), z[0].cosh());
         let creep = contact.velocity[0] - sinh * S::from_f64(1.0 / self.alpha);
         z_rate[0] = cosh * creep * S::from_f64(self.stiffness * FRAC_PI_2 / self.limit);

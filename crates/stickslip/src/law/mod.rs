@@ -33,8 +33,27 @@ pub struct Parameter {
     pub key: &'static str,
     /// Physical dimension, for units and for error messages.
     pub dimension: Dimension,
+    /// Whether it may be zero; otherwise it is more than zero.
+    pub may_be_zero: bool,
     /// One line for the documentation and for editors.
     pub doc: &'static str,
+}
+
+impl Parameter {
+    /// A parameter that is more than zero.
+    pub const fn positive(key: &'static str, dimension: Dimension, doc: &'static str) -> Self {
+        Parameter { key, dimension, may_be_zero: false, doc }
+    }
+
+    /// The slip limit, N; zero is a joint that carries no force: the free reference of a damper.
+    pub const fn limit(doc: &'static str) -> Self {
+        Parameter { key: "limit", dimension: Dimension::FORCE, may_be_zero: true, doc }
+    }
+
+    /// Whether the law can have this value, SI.
+    fn takes(&self, value: f64) -> bool {
+        value.is_finite() && (value > 0.0 || self.may_be_zero && value == 0.0)
+    }
 }
 
 /// The relative motion at a contact, up to three components (the first `d` count), and the normal force.
@@ -108,7 +127,7 @@ pub trait FrictionLaw {
 
 /// Why a law's parameters are refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{law}: `{key}` must be a positive finite {dimension}, found {value}")]
+#[error("{law}: `{key}` must be a finite {dimension}, {}, found {value}", if *may_be_zero { "zero or more" } else { "more than zero" })]
 pub struct LawError {
     /// Name of the law.
     pub law: &'static str,
@@ -116,6 +135,8 @@ pub struct LawError {
     pub key: &'static str,
     /// What is measured by it.
     pub dimension: Dimension,
+    /// Whether zero is allowed.
+    pub may_be_zero: bool,
     /// The value that was given, SI.
     pub value: f64,
 }
@@ -169,9 +190,11 @@ macro_rules! friction_laws {
             pub fn directions(&self) -> usize {
                 match self { $(Law::$variant(law) => law.directions(),)* }
             }
-            /// Exact view, see [`FrictionLaw::network`].
+            /// Exact view, see [`FrictionLaw::network`]; a slider that holds nothing is left out.
             pub fn network(&self) -> Option<Vec<Branch>> {
-                match self { $(Law::$variant(law) => law.network(),)* }
+                let mut branches = match self { $(Law::$variant(law) => law.network(),)* }?;
+                branches.retain(|branch| branch.limit > 0.0);
+                Some(branches)
             }
             /// Smooth view, see [`FrictionLaw::rate`].
             pub fn rate(&self) -> Option<Rate> {
@@ -228,15 +251,21 @@ impl Law {
         TABLE.iter().find(|row| row.name == self.name()).expect("every law has its row")
     }
 
-    /// Checks that every parameter is a positive finite number.
+    /// Whether the law can never carry a force: its slip limit is zero.
+    pub fn is_free(&self) -> bool {
+        self.limit() == 0.0
+    }
+
+    /// Checks that every parameter is finite and in its range: more than zero, or zero for a slip limit.
     ///
     /// # Errors
     /// [`LawError`] names the first parameter that is not.
     pub fn check(&self) -> Result<(), LawError> {
         let info = self.info();
         for (parameter, value) in info.parameters.iter().zip(self.values()) {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(LawError { law: info.name, key: parameter.key, dimension: parameter.dimension, value });
+            if !parameter.takes(value) {
+                let Parameter { key, dimension, may_be_zero, .. } = *parameter;
+                return Err(LawError { law: info.name, key, dimension, may_be_zero, value });
             }
         }
         Ok(())
@@ -247,7 +276,7 @@ impl LawInfo {
     /// Builds the law from values by key (SI).
     ///
     /// # Errors
-    /// The keys that are missing, or a value that is not positive and finite.
+    /// The keys that are missing, or a value that is not finite or out of its range.
     ///
     /// # Example
     /// ```

@@ -200,7 +200,8 @@ impl ExactPath {
                 JointMotion {
                     name: joint.name.clone(),
                     dissipation: self.times() * dissipation,
-                    slip_fraction: self.times() * slipping / self.period,
+                    // a joint that holds nothing slips all the time
+                    slip_fraction: if sliders.is_empty() { 1.0 } else { self.times() * slipping / self.period },
                     displacement: (low, high),
                     switches: self.times() as usize * switches,
                 }
@@ -431,11 +432,16 @@ impl Path for ExactPath {
                 let mine = || owners.iter().enumerate().filter(|(_, owner)| **owner == j).map(|(s, _)| s);
                 let contact =
                     mine().map(|s| piece.contacts[s]).find(|c| *c != Contact::Stick).unwrap_or(Contact::Stick);
+                let joint_velocity = along(&velocity) + sign * real_dot(&speed, &values);
                 JointSample {
                     displacement: along(&displacement) + sign * real_dot(&imposed, &values),
-                    velocity: along(&velocity) + sign * real_dot(&speed, &values),
+                    velocity: joint_velocity,
                     force: mine().map(|s| row(&piece.segment.force, s)).sum(),
-                    contact: if contact == Contact::Stick { contact } else { Contact::slip(sign * contact.sign()) },
+                    contact: match contact {
+                        Contact::Stick if mine().next().is_none() => Contact::slip(joint_velocity),
+                        Contact::Stick => contact,
+                        _ => Contact::slip(sign * contact.sign()),
+                    },
                 }
             })
             .collect();

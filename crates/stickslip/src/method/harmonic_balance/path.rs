@@ -140,6 +140,12 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
                 (h, imposed + (0..n).map(|i| x[i] * joint.direction[(i, 0)]).sum::<Complex64>())
             })
             .collect();
+        if joint.law.is_free() {
+            // what holds nothing slips all the time
+            let velocity: Vec<_> = u.iter().map(|(h, c)| (*h, Complex64::new(0.0, *h as f64 * omega) * c)).collect();
+            level.alternation.fourier.synthesise(&velocity, &mut level.alternation.signal);
+            contact[j] = level.alternation.signal.iter().map(|v| Contact::slip(*v)).collect();
+        }
         let (low, high) = extremes(&u, level);
         let slipping = contact[j].iter().filter(|c| **c != Contact::Stick).count();
         let switches = (0..samples).filter(|&i| contact[j][i] != contact[j][(i + 1) % samples]).count();

@@ -302,11 +302,12 @@ impl Path for SteppedPath {
                     _ => self.force_between(step, q, s),
                 };
                 let slips = force.abs() >= SLIPS_ABOVE * joint.limit;
+                let along_force = if joint.limit > 0.0 { force } else { velocity };
                 JointSample {
                     displacement: sign * u,
                     velocity: sign * velocity,
                     force: sign * force,
-                    contact: if slips { Contact::slip(sign * force) } else { Contact::Stick },
+                    contact: if slips { Contact::slip(sign * along_force) } else { Contact::Stick },
                 }
             })
             .collect();

@@ -1,0 +1,231 @@
+//! A folder of results: what stands in it belongs to one run.
+//!
+//! The files of a run are written aside, inside the folder, and moved in when all are complete; what an earlier run wrote is moved out
+//! before, and is put back if anything fails. Files that no run wrote stay as they are. `record.json` goes first and comes last: while it is
+//! there, the files that it lists are those of one run. A run that was interrupted does not replace one that was not: its
+//! results go beside, to `NAME.interrupted`.
+
+use crate::output::{File, ReportError, file_name};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The record of a run.
+pub(crate) const RECORD: &str = "record.json";
+
+/// Files that every run may write beside its tables, whatever the record of an earlier one lists.
+const KNOWN: [&str; 4] = [RECORD, "figure.svg", "figure.png", "figure.html"];
+
+/// What is added to the name of a folder whose results are complete, for those of an interrupted run.
+const ASIDE: &str = "interrupted";
+
+/// The folder for the results of a run: `out/NAME`, or another one beside it if this run was interrupted and that one holds a whole one.
+pub(crate) fn of_run(out: &Path, name: &str, interrupted: bool) -> PathBuf {
+    let folder = out.join(name);
+    if interrupted && holds_whole_run(&folder) { out.join(format!("{name}.{ASIDE}")) } else { folder }
+}
+
+/// Whether a run that came to its end wrote here.
+fn holds_whole_run(folder: &Path) -> bool {
+    match record(folder) {
+        Some(record) => record["interrupted"] != Value::Bool(true),
+        None => KNOWN.iter().any(|name| folder.join(name).is_file()),
+    }
+}
+
+fn record(folder: &Path) -> Option<Value> {
+    serde_json::from_slice(&fs::read(folder.join(RECORD)).ok()?).ok()
+}
+
+/// The names of the files here that an earlier run wrote.
+fn written_before(folder: &Path) -> BTreeSet<String> {
+    let record = record(folder).unwrap_or_default();
+    let files = record["files"].as_array().into_iter().flatten().filter_map(Value::as_str);
+    let tables = record["tables"].as_array().into_iter().flatten().filter_map(|table| table["file"].as_str());
+    let names = files.chain(tables).chain(KNOWN).filter(|name| file_name(name, "result").is_ok());
+    names.filter(|name| folder.join(name).is_file()).map(str::to_owned).collect()
+}
+
+/// Writes the files of a run into `folder` in place of those of an earlier one, all or none. Returns their paths.
+///
+/// # Errors
+/// [`ReportError`] says which file and why; what was in the folder is there as before.
+pub(crate) fn replace(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
+    let mut names = BTreeSet::new();
+    for file in files {
+        if !names.insert(file_name(&file.name, "result")?) {
+            return Err(ReportError::SameName(file.name.clone()));
+        }
+        let path = folder.join(&file.name);
+        if path.is_dir() {
+            return Err(ReportError::Write { path, cause: std::io::ErrorKind::IsADirectory.into() });
+        }
+    }
+    let fresh = !folder.exists();
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |cause| ReportError::Write { path, cause }
+    };
+    fs::create_dir_all(folder).map_err(failed(folder))?;
+    // the process id keeps two runs into the same folder apart
+    let aside = folder.join(format!(".{}.part", std::process::id()));
+    let (new, old) = (aside.join("new"), aside.join("old"));
+    let done = [&new, &old]
+        .into_iter()
+        .try_for_each(|part| fs::create_dir_all(part).map_err(failed(folder)))
+        .and_then(|()| files.iter().try_for_each(|file| write(&new.join(&file.name), file).map_err(failed(folder))))
+        .and_then(|()| swap(folder, &new, &old, files));
+    // only what this run has put there; what cannot be removed is no reason to fail
+    let _ = fs::remove_dir_all(&aside);
+    if done.is_err() && fresh {
+        let _ = fs::remove_dir(folder);
+    }
+    done
+}
+
+fn write(path: &Path, file: &File) -> std::io::Result<()> {
+    let mut handle = fs::File::create(path)?;
+    handle.write_all(&file.content)?;
+    handle.sync_all()
+}
+
+/// Moves the old files out and the new ones in; on a failure everything back.
+fn swap(folder: &Path, new: &Path, old: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
+    let record_last = |name: &&str| *name == RECORD;
+    let mut out = written_before(folder);
+    out.extend(files.iter().map(|file| file.name.clone()).filter(|name| folder.join(name).is_file()));
+    let mut out: Vec<String> = out.into_iter().collect();
+    out.sort_by_key(|name| !record_last(&name.as_str()));
+    let mut names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+    names.sort_by_key(record_last);
+
+    let mut moves: Vec<(PathBuf, PathBuf)> = Vec::new();
+    let outward = out.iter().map(|name| (folder.join(name), old.join(name)));
+    let inward = names.iter().map(|name| (new.join(name), folder.join(name)));
+    for (from, to) in outward.chain(inward) {
+        if let Err(cause) = fs::rename(&from, &to) {
+            for (from, to) in moves.iter().rev() {
+                let _ = fs::rename(to, from); // the first cause is the one to tell
+            }
+            let path = if to.starts_with(old) { from } else { to };
+            return Err(ReportError::Write { path, cause });
+        }
+        moves.push((from, to));
+    }
+    Ok(files.iter().map(|file| folder.join(&file.name)).collect())
+}
+
+/// Whether results could be written into `folder` (which need not exist yet); leaves nothing behind.
+///
+/// # Errors
+/// [`ReportError::Write`] with the path that is in the way and the cause.
+pub fn check_writable(folder: &Path) -> Result<(), ReportError> {
+    let mut there = folder;
+    while !there.exists() {
+        there = match there.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+    }
+    let refuse = |path: &Path, cause| Err(ReportError::Write { path: path.to_owned(), cause });
+    if !there.is_dir() {
+        return refuse(there, std::io::ErrorKind::NotADirectory.into());
+    }
+    let probe = there.join(format!(".{}.probe", std::process::id()));
+    match fs::File::create(&probe).and_then(|_| fs::remove_file(&probe)) {
+        Ok(()) => Ok(()),
+        Err(cause) => refuse(folder, cause),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::{Outputs, write_dataset};
+    use crate::samples;
+    use stickslip_study::dataset::Dataset;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    fn only(names: &[&str]) -> Outputs {
+        Outputs::only(names).unwrap()
+    }
+
+    #[test]
+    fn a_run_replaces_the_results_of_another_and_nothing_else() {
+        let out = tempfile::tempdir().unwrap();
+        write_dataset(&samples::response(), out.path(), &Outputs::all()).unwrap();
+        let folder = out.path().join("fig06");
+        fs::write(folder.join("notes.txt"), "mine").unwrap();
+        // another kind of study of the same name, only tables: neither figures nor tables of the first stay
+        let other = Dataset { name: "fig06".into(), ..samples::hysteresis() };
+        write_dataset(&other, out.path(), &only(&["csv"])).unwrap();
+        assert_eq!(names(&folder), ["loops_summary.csv", "notes.txt", "record.json"]);
+        assert_eq!(fs::read_to_string(folder.join("notes.txt")).unwrap(), "mine");
+        let files = &record(&folder).unwrap()["files"];
+        assert_eq!(*files, serde_json::json!(["loops_summary.csv", "record.json"]));
+        // a record that names files elsewhere reaches none
+        fs::write(folder.join(RECORD), r#"{"files": ["../fig06/notes.txt", "..", "/etc/passwd", ""]}"#).unwrap();
+        assert!(written_before(&folder).iter().all(|name| name == RECORD));
+    }
+
+    #[test]
+    fn an_interrupted_run_does_not_replace_a_whole_one() {
+        let out = tempfile::tempdir().unwrap();
+        let whole = samples::response();
+        let mut cut = samples::response();
+        cut.record.interrupted = true;
+        let folder_of = |dataset: &Dataset| {
+            let files = write_dataset(dataset, out.path(), &only(&["csv"])).unwrap();
+            files[0].parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned()
+        };
+        assert_eq!(folder_of(&cut), "fig06", "nothing to destroy");
+        assert_eq!(folder_of(&cut), "fig06", "nor here");
+        assert_eq!(folder_of(&whole), "fig06");
+        let before = fs::read(out.path().join("fig06").join(RECORD)).unwrap();
+        assert_eq!(folder_of(&cut), "fig06.interrupted");
+        assert_eq!(fs::read(out.path().join("fig06").join(RECORD)).unwrap(), before);
+    }
+
+    #[test]
+    fn a_failure_leaves_everything_as_it_was() {
+        let out = tempfile::tempdir().unwrap();
+        let folder = out.path().join("run");
+        let file = |name: &str, text: &str| File::new(name, text);
+        replace(&folder, &[file(RECORD, r#"{"files": ["a.csv"]}"#), file("a.csv", "old")]).unwrap();
+        fs::create_dir(folder.join("b.csv")).unwrap();
+        let error = replace(&folder, &[file("a.csv", "new"), file("b.csv", "new")]).unwrap_err().to_string();
+        assert!(error.contains("b.csv"), "{error}");
+        assert_eq!(names(&folder), ["a.csv", "b.csv", RECORD]);
+        assert_eq!(fs::read_to_string(folder.join("a.csv")).unwrap(), "old");
+        // in the middle of the moves, too: the third name is in the way only then
+        let new = out.path().join("new");
+        let old = out.path().join("old");
+        fs::create_dir_all(&new).unwrap();
+        fs::create_dir_all(&old).unwrap();
+        fs::write(new.join("a.csv"), "new").unwrap();
+        let files = [file("a.csv", "new"), file("c.csv", "not written")];
+        assert!(swap(&folder, &new, &old, &files).is_err());
+        assert_eq!(names(&folder), ["a.csv", "b.csv", RECORD]);
+        assert_eq!(fs::read_to_string(folder.join("a.csv")).unwrap(), "old");
+        assert!(replace(&folder, &[file("x.csv", ""), file("x.csv", "")]).is_err());
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_is_found_without_writing() {
+        let out = tempfile::tempdir().unwrap();
+        check_writable(&out.path().join("a/b/c")).unwrap();
+        assert!(names(out.path()).is_empty());
+        let file = out.path().join("file");
+        fs::write(&file, "").unwrap();
+        let error = check_writable(&file.join("deeper")).unwrap_err().to_string();
+        assert!(error.contains(file.to_str().unwrap()), "{error}");
+    }
+}

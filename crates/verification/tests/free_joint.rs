@@ -1,0 +1,116 @@
+//! A joint whose slip limit is zero carries no force: the free reference of every damper. Each method that takes a law must take it with
+//! this limit too, and give the motion that the structure has without the joint.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use stickslip::law::{self, Law, LawInfo};
+use stickslip::method::{self, Method, Options};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
+use stickslip::orbit::{Contact, Orbit};
+
+/// Tolerance of the methods in time, relative; harmonic balance and event-driven are far below.
+const NEAR: f64 = 1e-6;
+
+/// The law of this row with the slip limit zero.
+fn free(row: &LawInfo) -> Law {
+    let sample = (row.sample)();
+    let mut values: BTreeMap<&str, f64> = row.parameters.iter().map(|p| p.key).zip(sample.values()).collect();
+    values.insert("limit", 0.0);
+    row.build(&values).unwrap()
+}
+
+/// A mass of 1 kg on 1e4 N/m and 20 kg/s with these joints to the ground, driven by 3 N.
+fn oscillator(laws: &[Law]) -> Model {
+    let between = || ["m".to_owned(), GROUND.to_owned()];
+    Model {
+        masses: vec![Mass { name: "m".into(), mass: 1.0 }],
+        springs: vec![Spring { between: between(), stiffness: 1e4, damping: 20.0 }],
+        joints: laws
+            .iter()
+            .enumerate()
+            .map(|(i, law)| Joint { name: format!("joint{i}"), between: between(), law: *law })
+            .collect(),
+        forces: vec![Force { on: "m".into(), amplitude: 3.0, phase: 0.0, harmonic: 1 }],
+        ..Model::default()
+    }
+}
+
+/// The methods that take this law, with a width where one is needed.
+fn methods(law: Law) -> Vec<(&'static str, Box<dyn Method>)> {
+    let system = oscillator(&[law]).assemble().unwrap();
+    let mut all = Vec::new();
+    for row in method::TABLE {
+        let widths = [Options::new(), Options::from([("width".to_owned(), 1e-5)])];
+        let mut tried = widths.iter().filter_map(|options| (row.build)(options).ok());
+        if let Some(method) = tried.find(|method| method.solver(&system).is_ok()) {
+            all.push((row.name, method));
+        }
+    }
+    all
+}
+
+fn orbit(method: &dyn Method, model: &Model, omega: f64) -> Orbit {
+    let system = model.assemble().unwrap();
+    method.solver(&system).unwrap().orbit(omega, None).unwrap()
+}
+
+#[test]
+fn every_method_gives_the_linear_motion() {
+    let mut combinations = 0;
+    for row in law::TABLE {
+        for (name, method) in methods(free(row)) {
+            for omega in [30.0, 99.0, 250.0] {
+                let orbit = orbit(&*method, &oscillator(&[free(row)]), omega);
+                let expected = 3.0 / ((1e4 - omega * omega).powi(2) + (20.0 * omega).powi(2)).sqrt();
+                let found = orbit.places[0].amplitude();
+                assert!((found / expected - 1.0).abs() < NEAR, "{}, {name}, {omega}: {found} {expected}", row.name);
+                let joint = &orbit.joints[0];
+                assert_eq!(joint.dissipation, 0.0, "{}, {name}", row.name);
+                // methods in steps add up their lengths
+                assert!((joint.slip_fraction - 1.0).abs() < 1e-12, "{}, {name}: {}", row.name, joint.slip_fraction);
+                assert!(!orbit.is_one_of_many(), "{}, {name}", row.name);
+                let sample = orbit.sample(0.3 * orbit.period());
+                assert_eq!(sample.joints[0].force, 0.0, "{}, {name}", row.name);
+                let forward = sample.joints[0].velocity > 0.0;
+                let contact = if forward { Contact::SlipForward } else { Contact::SlipBackward };
+                assert_eq!(sample.joints[0].contact, contact, "{}, {name}", row.name);
+            }
+            combinations += 1;
+        }
+    }
+    // every law is taken by `auto` and by another method at least
+    assert!(combinations >= 2 * law::TABLE.len(), "{combinations}");
+}
+
+/// Beside a joint that holds, one that does not changes nothing.
+#[test]
+fn beside_another_joint_it_is_not_there() {
+    for row in law::TABLE {
+        let other = (row.sample)();
+        for (name, method) in methods(other) {
+            let with = orbit(&*method, &oscillator(&[free(row), other, free(row)]), 95.0);
+            let without = orbit(&*method, &oscillator(&[other]), 95.0);
+            let (a, b) = (with.places[0].amplitude(), without.places[0].amplitude());
+            assert!((a / b - 1.0).abs() < NEAR, "{}, {name}: {a} {b}", row.name);
+            let (a, b) = (with.joints[1].dissipation, without.joints[0].dissipation);
+            assert!((a - b).abs() <= 1e2 * NEAR * b, "{}, {name}: {a} {b}", row.name);
+        }
+    }
+}
+
+/// A place that is moved against such a joint: a loop without area.
+#[test]
+fn its_loop_has_no_area() {
+    for row in law::TABLE {
+        let model = Model {
+            joints: vec![Joint { name: "j".into(), between: ["mover".into(), GROUND.into()], law: free(row) }],
+            motions: vec![Motion { on: "mover".into(), amplitude: 1e-3, phase: 0.0, harmonic: 1 }],
+            ..Model::default()
+        };
+        let method = (method::find("auto").unwrap().build)(&Options::new()).unwrap();
+        let orbit = orbit(&*method, &model, TAU);
+        assert_eq!((orbit.energy.friction, orbit.joints[0].slip_fraction), (0.0, 1.0), "{}", row.name);
+        let (low, high) = orbit.joints[0].displacement;
+        assert!((low + 1e-3).abs() < 1e-9 && (high - 1e-3).abs() < 1e-9, "{}: {low} {high}", row.name);
+    }
+}
