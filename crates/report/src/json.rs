@@ -25,6 +25,7 @@ pub fn to_json(dataset: &Dataset, files: &[String]) -> Result<String, ReportErro
         "source": dataset.source,
         "kind": dataset.kind,
         "version": record.version,
+        "methods": record.methods,
         "seed": record.seed,
         "threads": record.threads,
         "wall_time_s": record.wall_time_s,

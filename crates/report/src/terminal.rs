@@ -41,9 +41,13 @@ impl Terminal {
         let time = duration(dataset.record.wall_time_s);
         let _ = writeln!(
             out,
-            "{}: {} in {time}",
+            "{}: {} in {time}{}",
             clean(&dataset.name),
-            if points.is_empty() { "no points" } else { &points }
+            if points.is_empty() { "no points" } else { &points },
+            match &dataset.record.methods[..] {
+                [] => String::new(),
+                methods => format!(" by {}", clean(&methods.join("; "))),
+            }
         );
         for note in &dataset.notes {
             let _ = writeln!(out, "note: {}", clean(note));

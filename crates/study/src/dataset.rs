@@ -276,6 +276,8 @@ pub struct Record {
     pub version: String,
     /// The study as it was understood: all values resolved to SI.
     pub study: serde_json::Value,
+    /// The methods that found the orbits, with the reason where one was chosen; none for kinds that need no method.
+    pub methods: Vec<String>,
     /// Seed of the random numbers, if any were used.
     pub seed: Option<u64>,
     /// Threads used.

@@ -7,10 +7,11 @@ use crate::error::StudyError;
 use crate::note::Note;
 use crate::study::Study;
 use crate::work::{Part, Units, Work, refused};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
+use stickslip::method::Choice;
 
 pub use crate::work::{CONVERGED, Context, NOT_REACHED, Prepared};
 
@@ -31,7 +32,7 @@ pub use crate::work::{CONVERGED, Context, NOT_REACHED, Prepared};
 /// ```
 pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
     let start = Instant::now();
-    check(study)?;
+    let methods = methods(study)?;
     let part = parts(study, context)?;
     let kind = study.kind();
     let interrupted = part.points.contains_key(NOT_REACHED);
@@ -54,6 +55,7 @@ pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
         record: Record {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             study: study.resolved(),
+            methods,
             seed: None,
             threads: context.threads,
             wall_time_s: start.elapsed().as_secs_f64(),
@@ -68,7 +70,19 @@ pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
 /// # Errors
 /// [`StudyError`]: the method cannot take the model of a case.
 pub fn check(study: &Study) -> Result<(), StudyError> {
-    (0..study.cases()).try_for_each(|index| Prepared::new(study, index).map(drop))
+    methods(study).map(drop)
+}
+
+/// What finds the orbits of the cases, in words, each once.
+fn methods(study: &Study) -> Result<Vec<String>, StudyError> {
+    let mut choices = BTreeSet::new();
+    for index in 0..study.cases() {
+        let prepared = Prepared::new(study, index)?;
+        if study.kind().uses_method {
+            choices.insert(prepared.method.choice(&prepared.system));
+        }
+    }
+    Ok(choices.iter().map(Choice::to_string).collect())
 }
 
 /// Units that may be under way or waiting for their turn, per thread: enough that none waits for a long one, few enough to keep little.

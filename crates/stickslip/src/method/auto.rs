@@ -1,26 +1,57 @@
-//! Picks a method: event-driven for exact laws, shooting for smooth ones.
+//! Picks a method: event-driven for exact laws, shooting for smooth ones, harmonic balance for many joints.
 
-use super::{Method, MethodError, MethodInfo, Solver, event_driven::EventDriven, shooting::Shooting};
+use super::harmonic_balance::HarmonicBalance;
+use super::{Choice, Method, MethodError, MethodInfo, Solver, event_driven::EventDriven, shooting::Shooting};
 use crate::model::System;
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: "auto",
-    summary: "event-driven for exact laws, shooting for smooth laws",
+    summary: "event-driven for exact laws, shooting for smooth laws, harmonic balance for more than a dozen joints",
     options: &[],
     build: |_| Ok(Box::new(Auto)),
 };
 
-/// The choice by the laws of a system's joints.
+/// Joints up to which the motion is followed in time. Event-driven meets new patterns of stick and slip at nearly every switch of many
+/// joints, and shooting carries a sensitivity as wide as the state: both cost the cube of the size, harmonic balance the first power.
+const FOLLOWED: usize = 12;
+
+/// The choice by the laws of a system's joints and their number.
+///
+/// # Example
+/// ```
+/// use stickslip::method::{Method, auto::Auto};
+/// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+/// assert_eq!(Auto.choice(&system).to_string(), "event-driven (chosen by auto: every law is exact)");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Auto;
+
+impl Auto {
+    fn chosen(system: &System) -> (Box<dyn Method>, String) {
+        let joints = system.joints.len();
+        let exact = system.joints.iter().all(|joint| joint.law.network().is_some());
+        if joints > FOLLOWED {
+            let because = format!("{joints} joints are more than {FOLLOWED}");
+            (Box::new(HarmonicBalance::default()), because)
+        } else if exact {
+            let because = if joints == 0 { "there are no joints" } else { "every law is exact" };
+            (Box::new(EventDriven), because.to_owned())
+        } else {
+            (Box::new(Shooting::default()), "a law is smooth".to_owned())
+        }
+    }
+}
 
 impl Method for Auto {
     fn name(&self) -> &'static str {
         INFO.name
     }
+    fn choice(&self, system: &System) -> Choice {
+        let (method, because) = Auto::chosen(system);
+        Choice { method: method.name(), because: Some(format!("chosen by auto: {because}")) }
+    }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        let exact = system.joints.iter().all(|joint| joint.law.network().is_some());
-        if exact { EventDriven.solver(system) } else { Shooting::default().solver(system) }
+        Auto::chosen(system).0.solver(system)
     }
 }

@@ -25,11 +25,33 @@ use std::collections::BTreeMap;
 pub trait Method: Send + Sync + std::fmt::Debug {
     /// Name in study files.
     fn name(&self) -> &'static str;
+    /// What finds the orbits of this system: the method itself, unless it picks another one.
+    fn choice(&self, _system: &System) -> Choice {
+        Choice { method: self.name(), because: None }
+    }
     /// Prepares for one system.
     ///
     /// # Errors
     /// The system is none that this method can take: [`MethodError`] names the joint or place and what to use instead.
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError>;
+}
+
+/// The method that finds the orbits of a system.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Choice {
+    /// Its name.
+    pub method: &'static str,
+    /// Why it was picked, if it was.
+    pub because: Option<String>,
+}
+
+impl std::fmt::Display for Choice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.because {
+            Some(because) => write!(f, "{} ({because})", self.method),
+            None => write!(f, "{}", self.method),
+        }
+    }
 }
 
 /// Finds orbits of one system.
