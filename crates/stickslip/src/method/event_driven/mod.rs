@@ -2,6 +2,7 @@
 //!
 //! - `mechanics`: the system as masses, springs and ideal sliders;
 //! - `pattern`: the linear motion while a pattern of stick and slip lasts;
+//! - `memory`: the patterns that were met, up to a number of bytes;
 //! - `decide`: which pattern begins at an instant;
 //! - `flow`: segments joined at the switches, with the exact derivative of the motion;
 //! - `path`: the orbit's numbers from its segments.
@@ -12,6 +13,7 @@
 mod decide;
 mod flow;
 mod mechanics;
+mod memory;
 mod path;
 mod pattern;
 

@@ -79,7 +79,9 @@ impl ExactPath {
         let n = system.dofs();
         let pieces = flow
             .segments()
-            .map(|(segment, basis, pattern)| {
+            .iter()
+            .map(|segment| {
+                let basis = segment.basis();
                 let nb = basis.len();
                 let derivative = |of: &[Complex64]| {
                     let mut out = vec![ZERO; n * nb];
@@ -94,8 +96,8 @@ impl ExactPath {
                     velocity,
                     segment: segment.clone(),
                     basis: basis.clone(),
-                    modes: pattern.lambda.len(),
-                    contacts: pattern.contacts.clone(),
+                    modes: segment.driven.modes,
+                    contacts: segment.contacts.clone(),
                 }
             })
             .collect();
