@@ -45,6 +45,9 @@ impl FrictionLaw for CoulombArctan {
     fn rate(&self) -> Option<Rate> {
         Some(Rate::CoulombArctan(*self))
     }
+    fn is_incrementally_passive(&self) -> bool {
+        true // the force grows with velocity
+    }
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
         // first harmonic of arctan(z cos θ), z the scaled velocity; written without cancellation for small z
         let z = self.alpha * amplitude * omega;

@@ -3,6 +3,7 @@
 use super::{Computed, FREQUENCY, Kind, SAMPLES, orbits};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{Context, Outcome, Prepared, Rows, Summary, display_unit, place_of};
+use crate::schema::{Takes, default};
 use crate::study::Study;
 use std::f64::consts::TAU;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
@@ -10,7 +11,17 @@ use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 pub(super) const KIND: Kind = Kind {
     name: "orbit",
     summary: "the steady motion over one period: displacements, velocities, joint forces",
-    keys: &[FREQUENCY, SAMPLES],
+    keys: &[
+        FREQUENCY,
+        SAMPLES,
+        default(
+            "multipliers",
+            Takes::Flag,
+            "false",
+            "whether all Floquet multipliers are computed, into `multipliers.csv`; `stable` needs no more than the largest, if any",
+            "true",
+        ),
+    ],
     check: |_, _| Ok(()),
     uses_method: true,
     run,
@@ -23,6 +34,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     let estimated = |point: &orbits::Point| matches!(&point.1, Some(Ok(orbit)) if orbit.evidence.truncation.is_some());
     let truncated = all.iter().flatten().any(estimated);
     let mut inaccurate = orbits::Inaccurate::default();
+    let mut asked = false;
     for (prepared, points) in cases.iter().zip(all) {
         for (omega, point) in points {
             let orbit = match point {
@@ -53,7 +65,14 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             summary.number("friction_J", orbit.energy.friction);
             summary.integer("switches", orbit.evidence.switches as u64);
             summary.end();
-            for (index, multiplier) in orbit.multipliers().iter().enumerate() {
+            let wanted = prepared.case.values.flag("multipliers") == Some(true);
+            let all = if wanted { orbit.multipliers() } else { Some(Vec::new()) };
+            if all.is_none() {
+                let place = place_of(&prepared.case, omega);
+                outcome.notes.push(format!("{place}: the multipliers are not known, as the orbit has no return map."));
+            }
+            asked |= wanted;
+            for (index, multiplier) in all.iter().flatten().enumerate() {
                 multipliers.varied(&prepared.case);
                 multipliers.number("frequency_Hz", omega / TAU);
                 multipliers.integer("index", index as u64 + 1);
@@ -76,7 +95,10 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
     }
     outcome.notes.extend(inaccurate.notes());
     outcome.figure.truncate(MOST_PANELS);
-    outcome.tables = vec![motion.table("orbit"), summary.table("orbits"), multipliers.table("multipliers")];
+    outcome.tables = vec![motion.table("orbit"), summary.table("orbits")];
+    if asked {
+        outcome.tables.push(multipliers.table("multipliers"));
+    }
     Ok(outcome)
 }
 
