@@ -3,8 +3,10 @@
 pub mod banded;
 pub mod complementarity;
 pub mod continuation;
+pub mod definite;
 pub mod dense;
 pub mod dual;
+pub mod eigen;
 pub mod fourier;
 pub mod modes;
 pub mod radau;

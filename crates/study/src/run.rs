@@ -41,7 +41,9 @@ pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
     if interrupted {
         notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
     }
-    let tables: Vec<_> = kind.tables.iter().zip(part.tables).map(|(name, rows)| rows.table(name)).collect();
+    let tables = kind.tables.iter().zip(part.tables).map(|(name, rows)| rows.table(name));
+    // a table that nothing was ever written to has no columns either
+    let tables: Vec<_> = tables.filter(|table| !table.columns.is_empty()).collect();
     let figure = Figure { title: study.title().to_owned(), ..(kind.draw)(&Drawing { study, tables: &tables }) };
     Ok(Dataset {
         name: study.name().to_owned(),

@@ -159,7 +159,7 @@ fn theory_7_5_determinant_of_the_return_map() {
         let determinant = map[(0, 0)] * map[(1, 1)] - map[(0, 1)] * map[(1, 0)];
         close("determinant", determinant, (x0 * r * r - beta) / (x0 * r * r + beta), 1e-8);
         // both multipliers of the full period have the modulus |det| (a pair of equal modulus over half a period, squared)
-        let multipliers = orbit.multipliers();
+        let multipliers = orbit.multipliers().unwrap();
         close("product", (multipliers[0] * multipliers[1]).re, determinant * determinant, 1e-8);
         if multipliers[0].im != 0.0 {
             close("modulus", multipliers[0].norm(), determinant, 1e-8);

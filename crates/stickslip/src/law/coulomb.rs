@@ -38,6 +38,9 @@ impl FrictionLaw for Coulomb {
     fn regularised(&self, width: f64) -> Option<Law> {
         Some(Law::CoulombArctan(CoulombArctan { limit: self.limit, alpha: 1.0 / width }))
     }
+    fn is_incrementally_passive(&self) -> bool {
+        true // the force is a monotone function of velocity, if a set-valued one
+    }
     fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
         if self.limit == 0.0 {
             return Complex64::new(0.0, 0.0); // also without motion

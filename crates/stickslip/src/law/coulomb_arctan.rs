@@ -45,6 +45,9 @@ impl FrictionLaw for CoulombArctan {
     fn rate(&self) -> Option<Rate> {
         Some(Rate::CoulombArctan(*self))
     }
+    fn is_incrementally_passive(&self) -> bool {
+        true // the force grows with velocity
+    }
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
         if self.limit == 0.0 {
             return Complex64::new(0.0, 0.0); // also without motion

@@ -47,6 +47,9 @@ impl FrictionLaw for Jenkins {
     fn regularised(&self, width: f64) -> Option<Law> {
         Some(Law::JenkinsArctan(JenkinsArctan { stiffness: self.stiffness, limit: self.limit, alpha: 1.0 / width }))
     }
+    fn is_incrementally_passive(&self) -> bool {
+        true // the spring keeps δf²/(2 kt), and the slider is Coulomb's
+    }
     fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
         if self.limit == 0.0 {
             return Complex64::new(0.0, 0.0); // also without motion

@@ -55,6 +55,9 @@ impl FrictionLaw for JenkinsArctan {
     fn rate(&self) -> Option<Rate> {
         Some(Rate::JenkinsArctan(*self))
     }
+    fn is_incrementally_passive(&self) -> bool {
+        true // the spring keeps δf²/(2 kt), and the slider's velocity grows with the force
+    }
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
         // a search begins at the exact law; the smooth one is near it wherever it is used
         Jenkins { stiffness: self.stiffness, limit: self.limit }.linearised(amplitude, omega)

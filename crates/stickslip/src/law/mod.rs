@@ -119,6 +119,17 @@ pub trait FrictionLaw {
     }
     /// Complex stiffness of the first harmonic under `u = amplitude cos Ωt` (N/m): where methods begin to search.
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64;
+    /// Whether two contacts with this law that move differently never give energy to their difference: `∫ δf δu' dt` from equal states on is
+    /// never negative. Then what both keep of it elastically cannot exceed what went in, and motions do not separate
+    /// ([`crate::model::System::contracts`]). Friction that grows with velocity or does not depend on it is of this kind at constant slip limits;
+    /// friction that falls with velocity is not.
+    fn is_incrementally_passive(&self) -> bool {
+        false
+    }
+    /// Whether the force changes its sign with the motion: `f(-u) = -f(u)` for whole histories.
+    fn is_odd(&self) -> bool {
+        true
+    }
     /// The smooth law that tends to this one as `width` (m/s, the velocity over which friction changes its sign) goes to zero.
     fn regularised(&self, _width: f64) -> Option<Law> {
         None
@@ -203,6 +214,14 @@ macro_rules! friction_laws {
             /// First-harmonic stiffness, see [`FrictionLaw::linearised`].
             pub fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
                 match self { $(Law::$variant(law) => law.linearised(amplitude, omega),)* }
+            }
+            /// Whether the difference of two motions gains nothing, see [`FrictionLaw::is_incrementally_passive`].
+            pub fn is_incrementally_passive(&self) -> bool {
+                match self { $(Law::$variant(law) => law.is_incrementally_passive(),)* }
+            }
+            /// Whether the force changes its sign with the motion, see [`FrictionLaw::is_odd`].
+            pub fn is_odd(&self) -> bool {
+                match self { $(Law::$variant(law) => law.is_odd(),)* }
             }
             /// Smooth neighbour, see [`FrictionLaw::regularised`].
             pub fn regularised(&self, width: f64) -> Option<Law> {

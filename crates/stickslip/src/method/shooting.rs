@@ -107,6 +107,7 @@ pub(super) struct Smooth<'a> {
     owners: Vec<usize>,
     weights: Vec<f64>,
     duration: f64,
+    contracts: bool,
 }
 
 impl ReturnMap for Smooth<'_> {
@@ -126,7 +127,9 @@ impl<'a> Smooth<'a> {
         let weights = vec![1.0; structure.states()];
         let owners = (0..system.joints.len()).collect();
         let flow = SmoothFlow::new(structure, options.tolerance);
-        Ok(Smooth { system, name, search, flow, owners, weights, duration: 0.0 })
+        // smooth neighbours are passive where the exact laws are
+        let contracts = system.contracts();
+        Ok(Smooth { system, name, search, flow, owners, weights, duration: 0.0, contracts })
     }
 
     /// Weights of the energy norm; internal states count with the scale of the motion.
@@ -187,7 +190,7 @@ impl Solver for Smooth<'_> {
         self.flow.record = true;
         let mut end = closed.state.clone();
         self.flow.run(&mut end, 0.0, self.duration, None).map_err(broke)?;
-        let orbit = path::orbit(self.system, &self.flow, name, omega, symmetry, closed);
+        let orbit = path::orbit((self.system, self.contracts), &self.flow, name, omega, symmetry, closed);
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
             return Err(OrbitError::Evidence { method: name, omega, energy_gap: orbit.evidence.energy_gap });

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::collections::BTreeMap;
 use std::fmt;
+use stickslip_numerics::eigen;
 
 /// A checked, assembled model.
 ///
@@ -93,17 +94,18 @@ impl System {
         let Some(factor) = self.mass.clone().cholesky() else { return 0.0 };
         let n = self.dofs();
         let Some(inverse) = factor.l().solve_lower_triangular(&DMatrix::identity(n, n)) else { return 0.0 };
-        let eigen = nalgebra::SymmetricEigen::new(&inverse * &self.stiffness * inverse.transpose());
+        let Some(eigen) = eigen::symmetric(&inverse * &self.stiffness * inverse.transpose()) else { return 0.0 };
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
         // an M-normalised shape has φᵀMφ = 1
         order.get(index).map_or(0.0, |&k| 1.0 / (inverse.transpose() * eigen.eigenvectors.column(k)).amax())
     }
 
-    /// Whether the excitation changes its sign after half a period, as do all friction laws: then an orbit with
+    /// Whether the excitation changes its sign after half a period, and all friction laws with it: then an orbit with
     /// `x(t + T/2) = -x(t)` exists.
     pub fn is_odd(&self) -> bool {
-        self.harmonics_of_excitation(|z| z != Complex64::new(0.0, 0.0)).iter().all(|h| !h.is_multiple_of(2))
+        let laws = self.joints.iter().all(|joint| joint.law.is_odd());
+        laws && self.harmonics_of_excitation(|z| z != Complex64::new(0.0, 0.0)).iter().all(|h| !h.is_multiple_of(2))
     }
 
     /// The harmonics of loads and imposed motions whose amplitudes `counts` accepts; some may stand more than once.

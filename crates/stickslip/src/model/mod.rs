@@ -3,6 +3,7 @@
 //! A [`Model`] is plain data in SI units. [`Model::assemble`] checks it and turns it into a [`System`] of matrices.
 
 mod assemble;
+mod contraction;
 pub mod templates;
 
 pub use assemble::{Element, Load, ModelError, MovedPlace, System, SystemJoint, is_identifier};

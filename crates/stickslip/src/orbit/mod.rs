@@ -8,6 +8,7 @@ mod stability;
 pub use crate::method::Contact;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
+pub use stability::Stability;
 use std::fmt;
 use std::sync::Arc;
 
@@ -30,8 +31,11 @@ pub struct Orbit {
     pub energy: Energy,
     /// Why the orbit may be trusted.
     pub evidence: Evidence,
-    /// Derivative of the state after one return (half or full period by `symmetry`) with respect to the state at t = 0.
+    /// Derivative of the state after one return (half or full period by `symmetry`) with respect to the state at t = 0; 0 × 0 if the method
+    /// had no need of it ([`Orbit::multipliers`] makes it then).
     pub return_map: DMatrix<f64>,
+    /// No two motions of the system separate: [`crate::model::System::contracts`].
+    pub(crate) contracts: bool,
     pub(crate) path: Arc<dyn Path>,
 }
 
@@ -172,6 +176,10 @@ pub(crate) trait Path: Send + Sync {
     fn sample(&self, time: f64) -> Sample;
     /// The instants at which something switches, in `[0, T)`, rising.
     fn switch_times(&self) -> Vec<f64>;
+    /// The derivative of the return from `start`, of a method that makes none by itself; `None` if there is none.
+    fn return_map(&self, _start: &[f64], _symmetry: Symmetry) -> Option<DMatrix<f64>> {
+        None
+    }
 }
 
 impl Orbit {

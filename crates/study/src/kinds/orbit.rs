@@ -6,6 +6,7 @@ use crate::drawing::{Drawing, display_unit, largest, numbers};
 use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
+use crate::schema::{Takes, default};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
@@ -13,7 +14,17 @@ use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 pub(super) const KIND: Kind = Kind {
     name: "orbit",
     summary: "the steady motion over one period: displacements, velocities, joint forces",
-    keys: &[FREQUENCY, SAMPLES],
+    keys: &[
+        FREQUENCY,
+        SAMPLES,
+        default(
+            "multipliers",
+            Takes::Flag,
+            "false",
+            "whether all Floquet multipliers are computed, into `multipliers.csv`; `stable` needs no more than the largest, if any",
+            "true",
+        ),
+    ],
     check: |_, _| Ok(()),
     uses_method: true,
     tables: &["orbit", "orbits", "multipliers"],
@@ -44,7 +55,13 @@ fn compute(work: &Work<'_>) -> Computed {
         summary.number("friction_J", orbit.energy.friction);
         summary.integer("switches", orbit.evidence.switches as u64);
         summary.end();
-        for (index, multiplier) in orbit.multipliers().iter().enumerate() {
+        let wanted = prepared.case.values.flag("multipliers") == Some(true);
+        let all = if wanted { orbit.multipliers() } else { Some(Vec::new()) };
+        if all.is_none() {
+            let place = place_of(&prepared.case, omega);
+            part.notes.push(Note::Said(format!("{place}: the multipliers are not known, as the orbit has no return map.")));
+        }
+        for (index, multiplier) in all.unwrap_or_default().iter().enumerate() {
             multipliers.varied(&prepared.case);
             multipliers.number("frequency_Hz", omega / TAU);
             multipliers.integer("index", index as u64 + 1);

@@ -2,12 +2,13 @@
 
 use super::decide::{AT_LIMIT, Decision, REST};
 use super::mechanics::{Contact, Mechanics};
+use super::memory::Memory;
 use super::pattern::{Beginning, Driven, Pattern, Work};
 use crate::method::Breakdown;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use std::collections::BTreeMap;
+use std::sync::Arc;
 use stickslip_numerics::signal::{Basis, Begin, FirstZero, Scratch, real_dot};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -15,6 +16,9 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Switches in one stretch beyond which the motion counts as chatter. Den Hartog's oscillator at a fiftieth of its natural
 /// frequency has some 200.
 pub(crate) const SWITCH_LIMIT: usize = 20_000;
+/// Bytes of segments in one stretch beyond which it counts as chatter too: a return of a ring of 48 blades has a few hundred switches, and a
+/// segment a tenth of a megabyte.
+const SEGMENT_LIMIT: usize = 256 << 20;
 /// Switches at one and the same instant beyond which the decision is going round in circles: every slider may change once
 /// per derivative that decides.
 const AT_ONCE_LIMIT: usize = 8;
@@ -26,23 +30,25 @@ pub(crate) struct Segment {
     pub start: f64,
     /// Length, s.
     pub length: f64,
-    /// Index of the pattern.
-    pub pattern: usize,
+    /// What sticks, and which way the others slip.
+    pub contacts: Vec<Contact>,
+    /// The response to the drive of its pattern, with the basis of its signals.
+    pub driven: Arc<Driven>,
     /// Coefficients of the displacements, n × basis, row after row.
     pub displacement: Vec<Complex64>,
     /// Forces of the sliders, sliders × basis, row after row.
     pub force: Vec<Complex64>,
 }
 
-struct Slot {
-    pattern: Pattern,
-    /// Made for the present drive when the pattern first occurs under it.
-    driven: Option<Driven>,
-}
+impl Segment {
+    /// Memory that its signals take, bytes.
+    fn bytes(&self) -> usize {
+        16 * (self.displacement.len() + self.force.len())
+    }
 
-impl Slot {
-    fn driven(&self) -> &Driven {
-        self.driven.as_ref().expect("a pattern is driven before it is used")
+    /// The basis of its signals.
+    pub fn basis(&self) -> &Basis {
+        &self.driven.basis
     }
 }
 
@@ -54,8 +60,7 @@ pub(crate) struct Flow {
     pub energy_scale: f64,
     /// A velocity well below those of the moving structure, m/s: the scale of velocities near rest.
     moving: f64,
-    slots: Vec<Slot>,
-    index: BTreeMap<Vec<Contact>, usize>,
+    memory: Memory,
     segments: Vec<Segment>,
     /// Number of segments of the last run.
     used: usize,
@@ -85,8 +90,7 @@ impl Flow {
             drive,
             energy_scale: 0.0,
             moving: 0.0,
-            slots: Vec::new(),
-            index: BTreeMap::new(),
+            memory: Memory::default(),
             segments: Vec::new(),
             used: 0,
             switches: 0,
@@ -106,12 +110,9 @@ impl Flow {
         }
     }
 
-    /// The segments of the last run, with the basis of each.
-    pub fn segments(&self) -> impl Iterator<Item = (&Segment, &Basis, &Pattern)> {
-        self.segments[..self.used].iter().map(|s| {
-            let slot = &self.slots[s.pattern];
-            (s, &slot.driven().basis, &slot.pattern)
-        })
+    /// The segments of the last run.
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments[..self.used]
     }
 
     /// Runs from `state` (changed to the end state) over `[start, start + duration]`. `sensitivity`, if given, is multiplied
@@ -134,35 +135,40 @@ impl Flow {
         let velocity_scale = self.velocity_scale(state);
         let end = start + duration;
         let mut time = start;
-        let mut at_once = 0;
+        let (mut at_once, mut bytes) = (0, 0);
         if !self.decision.decide(&self.mechanics, &self.drive, time, state, velocity_scale) {
             return Err(Breakdown::Undecidable { time });
         }
         loop {
-            let pattern = self.pattern(time)?;
-            self.start_segment(time, pattern, state);
-            self.watch(velocity_scale);
+            let (pattern, driven) = self
+                .memory
+                .pattern(&self.mechanics, &self.drive, &self.decision.contacts)
+                .map_err(|defective| Breakdown::Defective { time, lambda: defective.lambda.norm() })?;
+            self.start_segment(time, &pattern, driven, state);
+            self.watch(&pattern, velocity_scale);
             let rest = end - time;
-            let basis = &self.slots[pattern].driven().basis;
+            let basis = self.segments[self.used].basis();
             let zero = basis.first_zero(&self.signals, &self.begins, rest, &mut self.scratch);
             let (length, event) = match zero {
                 FirstZero::None => (rest, None),
                 FirstZero::At { index, time } => (time, Some(self.watched[index])),
                 FirstZero::TooManySteps => return Err(Breakdown::TooFast { time }),
             };
-            self.finish_segment(length, state, sensitivity.as_deref_mut());
+            self.finish_segment(&pattern, length, state, sensitivity.as_deref_mut());
             let Some(slider) = event else { return Ok(()) };
             time += length;
             self.switches += 1;
             at_once = if length <= f64::EPSILON * end.abs() { at_once + 1 } else { 0 };
-            if self.switches > SWITCH_LIMIT || at_once > AT_ONCE_LIMIT * (1 + self.mechanics.sliders.len()) {
+            bytes += self.segments[self.used - 1].bytes();
+            let many = self.switches > SWITCH_LIMIT || bytes > SEGMENT_LIMIT;
+            if many || at_once > AT_ONCE_LIMIT * (1 + self.mechanics.sliders.len()) {
                 let joint = self.mechanics.sliders[slider].joint;
-                if self.slots[pattern].pattern.redundant {
+                if pattern.redundant {
                     return Err(Breakdown::Redundant { time, joint });
                 }
                 return Err(Breakdown::Chatter { time, switches: self.switches, joint });
             }
-            let old = self.slots[pattern].pattern.contacts[slider];
+            let old = self.segments[self.used - 1].contacts[slider];
             if old != Contact::Stick || self.mechanics.sliders[slider].state.is_some() {
                 self.snap(slider, old, state);
             }
@@ -170,7 +176,7 @@ impl Flow {
                 return Err(Breakdown::Undecidable { time });
             }
             if let Some(sensitivity) = sensitivity.as_deref_mut() {
-                self.jump(slider, pattern, time, state, sensitivity);
+                self.jump(slider, time, state, sensitivity);
             }
         }
     }
@@ -185,28 +191,6 @@ impl Flow {
         fastest.max(widest).max(self.moving).max(f64::MIN_POSITIVE)
     }
 
-    /// The pattern that was decided, with its response to the drive.
-    fn pattern(&mut self, time: f64) -> Result<usize, Breakdown> {
-        // slip direction does not change the linear motion but the constants; patterns are kept per direction for simplicity
-        let found = self.index.get(&self.decision.contacts).copied();
-        let index = match found {
-            Some(index) => index,
-            None => {
-                let contacts = self.decision.contacts.clone();
-                let pattern = Pattern::new(&self.mechanics, &contacts)
-                    .map_err(|defective| Breakdown::Defective { time, lambda: defective.lambda.norm() })?;
-                self.slots.push(Slot { pattern, driven: None });
-                self.index.insert(contacts, self.slots.len() - 1);
-                self.slots.len() - 1
-            }
-        };
-        let slot = &mut self.slots[index];
-        if slot.driven.is_none() {
-            slot.driven = Some(slot.pattern.drive(&self.mechanics, &self.drive));
-        }
-        Ok(index)
-    }
-
     /// Changes the drive; patterns stay.
     pub fn set_drive(&mut self, drive: Drive) {
         self.work = Work::new(&self.mechanics, drive.rates.len());
@@ -216,20 +200,21 @@ impl Flow {
         let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax().sqrt() };
         self.moving = drive.imposed_velocity().max(super::NEAR_REST * self.energy_scale * mobility);
         self.drive = drive;
-        self.slots.iter_mut().for_each(|slot| slot.driven = None);
+        self.memory.change_drive();
     }
 
-    fn start_segment(&mut self, time: f64, pattern: usize, state: &[f64]) {
+    fn start_segment(&mut self, time: f64, shape: &Pattern, driven: Arc<Driven>, state: &[f64]) {
         if self.segments.len() == self.used {
             self.segments.push(Segment::default());
         }
         let segment = &mut self.segments[self.used];
-        let (shape, driven) = (&self.slots[pattern].pattern, self.slots[pattern].driven());
         let (n, nb, sliders) = (self.mechanics.n, driven.basis.len(), self.mechanics.sliders.len());
-        (segment.start, segment.pattern) = (time, pattern);
+        (segment.start, segment.driven) = (time, driven);
+        segment.contacts.clone_from(&self.decision.contacts);
+        let driven = &segment.driven;
         segment.displacement.resize(n * nb, ZERO);
         segment.force.resize(sliders * nb, ZERO);
-        let beginning = Beginning { driven, time, state };
+        let beginning = Beginning { driven, contacts: &segment.contacts, time, state };
         shape.displacement(&self.mechanics, &self.drive, beginning, &mut self.work, &mut segment.displacement);
         self.velocity.resize(n * nb, ZERO);
         self.acceleration.resize(n * nb, ZERO);
@@ -238,19 +223,18 @@ impl Flow {
             driven.basis.differentiate(&segment.displacement[range.clone()], &mut self.velocity[range.clone()]);
             driven.basis.differentiate(&self.velocity[range.clone()], &mut self.acceleration[range]);
         }
-        self.forces(time, pattern, state);
+        self.forces(time, shape, state);
     }
 
     /// Forces of all sliders as signals.
-    fn forces(&mut self, time: f64, pattern: usize, state: &[f64]) {
+    fn forces(&mut self, time: f64, shape: &Pattern, state: &[f64]) {
         let segment = &mut self.segments[self.used];
-        let (shape, driven) = (&self.slots[pattern].pattern, self.slots[pattern].driven());
-        let (n, basis) = (self.mechanics.n, &driven.basis);
+        let (n, basis) = (self.mechanics.n, &segment.driven.basis);
         let (nb, constant, modes) = (basis.len(), basis.constant(), shape.lambda.len());
         segment.force.fill(ZERO);
         for (i, slider) in self.mechanics.sliders.iter().enumerate() {
             let row = &mut segment.force[i * nb..(i + 1) * nb];
-            match (shape.contacts[i], slider.stiffness) {
+            match (segment.contacts[i], slider.stiffness) {
                 (Contact::Stick, None) => {}
                 (Contact::Stick, Some(kt)) => {
                     let state_index = 2 * n + slider.state.expect("a slider behind a spring has a state");
@@ -318,9 +302,9 @@ impl Flow {
     }
 
     /// The signals whose zeros are switches: `limit ∓ f` in stick, the velocity in slip direction in slip.
-    fn watch(&mut self, velocity_scale: f64) {
+    fn watch(&mut self, shape: &Pattern, velocity_scale: f64) {
         let segment = &self.segments[self.used];
-        let (shape, driven) = (&self.slots[segment.pattern].pattern, self.slots[segment.pattern].driven());
+        let driven = &segment.driven;
         let (n, nb) = (self.mechanics.n, driven.basis.len());
         let (constant, modes) = (driven.basis.constant(), shape.lambda.len());
         self.values.resize(n.max(nb), ZERO);
@@ -329,7 +313,7 @@ impl Flow {
         self.begins.clear();
         self.watched.clear();
         for (i, slider) in self.mechanics.sliders.iter().enumerate() {
-            if shape.contacts[i] == Contact::Stick {
+            if segment.contacts[i] == Contact::Stick {
                 if shape.frozen[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
                     continue; // its force is constant, whatever rounding says
                 }
@@ -343,7 +327,7 @@ impl Flow {
                     self.watched.push(i);
                 }
             } else {
-                let (at, sign) = (self.signals.len(), shape.contacts[i].sign());
+                let (at, sign) = (self.signals.len(), segment.contacts[i].sign());
                 self.signals.resize(at + nb, ZERO);
                 let signal = &mut self.signals[at..];
                 for k in 0..n {
@@ -367,14 +351,20 @@ impl Flow {
     }
 
     /// Ends the current segment: end state, sensitivity.
-    fn finish_segment(&mut self, length: f64, state: &mut [f64], sensitivity: Option<&mut DMatrix<f64>>) {
+    fn finish_segment(
+        &mut self,
+        shape: &Pattern,
+        length: f64,
+        state: &mut [f64],
+        sensitivity: Option<&mut DMatrix<f64>>,
+    ) {
         let segment = &mut self.segments[self.used];
         segment.length = length;
         self.used += 1;
-        let (shape, driven) = (&self.slots[segment.pattern].pattern, self.slots[segment.pattern].driven());
-        let (n, nb) = (self.mechanics.n, driven.basis.len());
+        let basis = &segment.driven.basis;
+        let (n, nb) = (self.mechanics.n, basis.len());
         self.values.resize(n.max(nb), ZERO);
-        driven.basis.evaluate(length, &mut self.values[..nb]);
+        basis.evaluate(length, &mut self.values[..nb]);
         let values = &self.values[..nb];
         for row in 0..n {
             let range = row * nb..(row + 1) * nb;
@@ -403,9 +393,9 @@ impl Flow {
 
     /// The jump of the sensitivity at a switch of `slider` (saltation): `S = I + (F⁺ - F⁻) ∇g / g'`.
     /// Source: Leine and Nijmeijer (2004), Sec. 7.
-    fn jump(&mut self, slider: usize, pattern: usize, time: f64, state: &[f64], sensitivity: &mut DMatrix<f64>) {
+    fn jump(&mut self, slider: usize, time: f64, state: &[f64], sensitivity: &mut DMatrix<f64>) {
         let n = self.mechanics.n;
-        let contacts = &self.slots[pattern].pattern.contacts;
+        let contacts = &self.segments[self.used - 1].contacts;
         let body = &self.mechanics.sliders[slider];
         // rates of the state before and after: displacements go on smoothly
         for row in 0..n {

@@ -2,6 +2,7 @@
 //!
 //! - `mechanics`: the system as masses, springs and ideal sliders;
 //! - `pattern`: the linear motion while a pattern of stick and slip lasts;
+//! - `memory`: the patterns that were met, up to a number of bytes;
 //! - `decide`: which pattern begins at an instant;
 //! - `flow`: segments joined at the switches, with the exact derivative of the motion;
 //! - `path`: the orbit's numbers from its segments.
@@ -12,6 +13,7 @@
 mod decide;
 mod flow;
 mod mechanics;
+mod memory;
 mod path;
 mod pattern;
 
@@ -79,6 +81,7 @@ pub(crate) struct Exact<'a> {
     flow: Flow,
     weights: Vec<f64>,
     duration: f64,
+    contracts: bool,
 }
 
 impl ReturnMap for Exact<'_> {
@@ -96,7 +99,8 @@ impl<'a> Exact<'a> {
     pub fn new(system: &'a System, name: &'static str, search: Search) -> Result<Self, MethodError> {
         let mechanics = Mechanics::new(system)?;
         let weights = vec![1.0; mechanics.states()];
-        Ok(Exact { system, name, search, flow: Flow::new(mechanics, Drive::default()), weights, duration: 0.0 })
+        let flow = Flow::new(mechanics, Drive::default());
+        Ok(Exact { system, name, search, flow, weights, duration: 0.0, contracts: system.contracts() })
     }
 
     /// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia.
@@ -139,7 +143,7 @@ impl Solver for Exact<'_> {
         let aim = Aim { method: name, omega, residual: CLOSED, sign, rest: NEAR_REST * self.flow.energy_scale };
         let closed = search.find(self, start, |exact| exact.first_state(omega), aim)?;
         // the last run of the iteration was that of the closed state: its segments are the orbit
-        let mut orbit = path::orbit(self.system, &self.flow, omega, symmetry, closed);
+        let mut orbit = path::orbit(self.system, self.contracts, &self.flow, omega, symmetry, closed);
         orbit.method = name;
         // a motion that has settled but for an estimated rest is out of balance by that rest
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);

@@ -38,7 +38,14 @@ struct Piece {
 }
 
 /// Makes the orbit of the flow's last run.
-pub(super) fn orbit(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
+pub(super) fn orbit(
+    system: &System,
+    contracts: bool,
+    flow: &Flow,
+    omega: f64,
+    symmetry: Symmetry,
+    closed: Closed,
+) -> Orbit {
     let path = ExactPath::new(system, flow, symmetry, std::f64::consts::TAU / omega);
     let places = path.places(omega);
     let joints = path.joints(flow);
@@ -69,6 +76,7 @@ pub(super) fn orbit(system: &System, flow: &Flow, omega: f64, symmetry: Symmetry
         joints,
         energy,
         return_map: closed.derivative,
+        contracts,
         path: Arc::new(path),
     }
 }
@@ -79,7 +87,9 @@ impl ExactPath {
         let n = system.dofs();
         let pieces = flow
             .segments()
-            .map(|(segment, basis, pattern)| {
+            .iter()
+            .map(|segment| {
+                let basis = segment.basis();
                 let nb = basis.len();
                 let derivative = |of: &[Complex64]| {
                     let mut out = vec![ZERO; n * nb];
@@ -94,8 +104,8 @@ impl ExactPath {
                     velocity,
                     segment: segment.clone(),
                     basis: basis.clone(),
-                    modes: pattern.lambda.len(),
-                    contacts: pattern.contacts.clone(),
+                    modes: segment.driven.modes,
+                    contacts: segment.contacts.clone(),
                 }
             })
             .collect();

@@ -3,7 +3,8 @@
 //! In a pattern the rigid sliders that stick hold `Wₛᵀx + g(t) = c`; those that slip, and the springs in front of sliders, are
 //! forces that are constant or linear in `x`. With `N` an M-orthonormal basis of the directions that are left free and
 //! `S = M⁻¹Wₛ(WₛᵀM⁻¹Wₛ)⁺`, the motion is `x = N q + S (c - g)` and `q'' + NᵀCN q' + NᵀKₚN q = Nᵀ(forces)`, which the modes of
-//! [`stickslip_numerics::modes`] solve in closed form. Nothing here depends on time, drive frequency or slip direction.
+//! [`stickslip_numerics::modes`] solve in closed form. Nothing here depends on time, drive frequency or slip direction:
+//! a pattern is known by what sticks.
 
 use super::mechanics::{Contact, Mechanics};
 use crate::method::drive::Drive;
@@ -25,7 +26,8 @@ const RESONANT: f64 = 1e-5;
 /// The closed-form motion of one pattern.
 #[derive(Debug, Clone)]
 pub(crate) struct Pattern {
-    pub contacts: Vec<Contact>,
+    /// Which sliders stick.
+    pub stuck: Vec<bool>,
     /// Rigid sliders that stick.
     pub held: Vec<usize>,
     /// Whether fewer of them would hold the same motion, so that their forces are not unique.
@@ -36,12 +38,9 @@ pub(crate) struct Pattern {
     pub lambda: Vec<Complex64>,
     /// x = Re(shape η), n × modes, column-major.
     pub shape: DMatrix<Complex64>,
-    /// Modal coordinates from the state (x, v, f): the constant part and the decaying part, modes × states.
-    constant_from_state: DMatrix<Complex64>,
-    decaying_from_state: DMatrix<Complex64>,
-    /// Constant modal coordinate of a unit constant force, modes × n (zero rows for modes at λ = 0).
-    constant_from_force: DMatrix<Complex64>,
-    /// Modal force of a unit force, modes × n.
+    /// Modal coordinates of displacements and velocities, modes × 2n.
+    coordinate: DMatrix<Complex64>,
+    /// Modal force of a unit force, modes × n; a constant one moves the coordinate by `-1/λ` of it.
     input: DMatrix<Complex64>,
     /// Modes exactly at λ = 0: they drift under a constant force.
     drifting: Vec<usize>,
@@ -66,16 +65,20 @@ pub(crate) struct Pattern {
 pub(crate) struct Beginning<'a> {
     /// The pattern's response to the drive.
     pub driven: &'a Driven,
+    /// What sticks, and which way the others slip.
+    pub contacts: &'a [Contact],
     /// Time, s.
     pub time: f64,
     /// State (x, v, f).
     pub state: &'a [f64],
 }
 
-/// What a pattern adds at one drive frequency.
+/// What a pattern adds at one drive frequency; the motion's segments share it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Driven {
     pub basis: Basis,
+    /// Exponents of the basis that are modes; those of the drive follow.
+    pub modes: usize,
     /// Steady complex displacement per harmonic, n each.
     steady: Vec<DVector<Complex64>>,
     /// Resonant pairs: mode, harmonic, modal force amplitude.
@@ -84,12 +87,19 @@ pub(crate) struct Driven {
     free_steady: Vec<DVector<Complex64>>,
 }
 
+impl Driven {
+    /// Memory that it takes, bytes.
+    pub fn bytes(&self) -> usize {
+        let steady = self.steady.iter().chain(&self.free_steady).map(|x| x.len()).sum::<usize>();
+        size_of::<Self>() + 16 * (steady + 3 * self.basis.len()) + 32 * self.resonant.len()
+    }
+}
+
 impl Pattern {
-    pub fn new(mechanics: &Mechanics, contacts: &[Contact]) -> Result<Self, Defective> {
+    pub fn new(mechanics: &Mechanics, stuck: &[bool]) -> Result<Self, Defective> {
         let n = mechanics.n;
-        let held: Vec<usize> = (0..contacts.len())
-            .filter(|&s| contacts[s] == Contact::Stick && mechanics.sliders[s].stiffness.is_none())
-            .collect();
+        let held: Vec<usize> =
+            (0..stuck.len()).filter(|&s| stuck[s] && mechanics.sliders[s].stiffness.is_none()).collect();
         let w = DMatrix::from_fn(n, held.len(), |i, s| mechanics.sliders[held[s]].direction[i]);
         let inverse_delassus = weighted_inverse(
             &(w.transpose() * &mechanics.inverse_mass * &w),
@@ -103,8 +113,8 @@ impl Pattern {
         let mut stiffness = mechanics.stiffness.clone();
         // constant force: -Σ w (f0 - kt wᵀx0) of stuck springs, and -Kₚ S Wₛᵀ x0
         let mut force_from_state = DMatrix::zeros(n, states);
-        for (slider, contact) in mechanics.sliders.iter().zip(contacts) {
-            if let (Some(kt), Some(state), Contact::Stick) = (slider.stiffness, slider.state, contact) {
+        for (slider, stuck) in mechanics.sliders.iter().zip(stuck) {
+            if let (Some(kt), Some(state), true) = (slider.stiffness, slider.state, stuck) {
                 let outer = &slider.direction * slider.direction.transpose() * kt;
                 stiffness += &outer;
                 let mut block = force_from_state.columns_mut(0, n);
@@ -142,28 +152,17 @@ impl Pattern {
             lambda[k] = ZERO;
         }
         let input = &modes.from_velocity * complex(&project);
-        let constant_from_force =
-            DMatrix::from_fn(count, n, |k, i| if lambda[k] == ZERO { ZERO } else { -input[(k, i)] / lambda[k] });
-        let constant_from_state = &constant_from_force * complex(&force_from_state);
-        let mut decaying_from_state = -&constant_from_state;
-        {
-            let mut x = decaying_from_state.columns_mut(0, n);
-            x += &modes.from_displacement * complex(&coordinates);
-        }
-        {
-            let mut v = decaying_from_state.columns_mut(n, n);
-            v += &modes.from_velocity * complex(&coordinates);
-        }
+        let mut coordinate = DMatrix::from_element(count, 2 * n, ZERO);
+        coordinate.columns_mut(0, n).copy_from(&(&modes.from_displacement * complex(&coordinates)));
+        coordinate.columns_mut(n, n).copy_from(&(&modes.from_velocity * complex(&coordinates)));
         Ok(Pattern {
-            contacts: contacts.to_vec(),
+            stuck: stuck.to_vec(),
             held,
             redundant,
             frozen,
             lambda,
             shape: complex(&basis) * &modes.shape,
-            constant_from_state,
-            decaying_from_state,
-            constant_from_force,
+            coordinate,
             input,
             drifting,
             free: &basis * &modes.free,
@@ -178,10 +177,40 @@ impl Pattern {
         })
     }
 
+    /// Modal force of a force, length n.
+    fn push(&self, k: usize, force: &[f64]) -> Complex64 {
+        force.iter().enumerate().map(|(i, f)| self.input[(k, i)] * f).sum()
+    }
+
+    /// Where a constant force moves modal coordinate `k`; a mode at λ = 0 drifts instead.
+    fn fixed(&self, k: usize, force: &[f64]) -> Complex64 {
+        if self.lambda[k] == ZERO { ZERO } else { -self.push(k, force) / self.lambda[k] }
+    }
+
+    /// Modal coordinate `k` of displacements and velocities, length 2n.
+    fn coordinate(&self, k: usize, state: &[f64]) -> Complex64 {
+        state.iter().enumerate().map(|(i, z)| self.coordinate[(k, i)] * z).sum()
+    }
+
+    /// Memory that it takes, bytes: matrices of some multiples of n² numbers.
+    pub fn bytes(&self) -> usize {
+        let complex = self.lambda.len() + self.shape.len() + self.coordinate.len() + self.input.len();
+        let real = self.free.len()
+            + self.free_coordinate.len()
+            + self.free_input.len()
+            + self.force_from_state.len()
+            + self.hold.len()
+            + self.hold_projection.len()
+            + self.stiffness.len()
+            + self.multiplier.len()
+            + self.inverse_delassus.len();
+        size_of::<Self>() + 16 * complex + 8 * real + 16 * self.stuck.len()
+    }
+
     /// Steady response and basis at one drive frequency.
     pub fn drive(&self, mechanics: &Mechanics, drive: &Drive) -> Driven {
         let n = mechanics.n;
-        let mut driven = Driven::default();
+        let mut driven = Driven { modes: self.lambda.len(), ..Driven::default() };
         driven.basis.exponents = self.lambda.clone();
         driven.basis.exponents.extend(drive.rates.iter().map(|&rate| Complex64::new(0.0, rate)));
         let complex = |m: &DMatrix<f64>| m.map(|x| Complex64::new(x, 0.0));
@@ -192,7 +221,7 @@ impl Pattern {
             let mut force =
                 drive.forces[h].clone() + (complex(&self.stiffness) + complex(&mechanics.damping) * s) * &moved;
             for (i, slider) in mechanics.sliders.iter().enumerate() {
-                if let (Some(kt), Contact::Stick) = (slider.stiffness, self.contacts[i]) {
+                if let (Some(kt), true) = (slider.stiffness, self.stuck[i]) {
                     force -= complex_vector(&slider.direction) * (drive.imposed[h][i] * kt);
                 }
             }
@@ -225,7 +254,7 @@ impl Pattern {
         &self,
         mechanics: &Mechanics,
         drive: &Drive,
-        Beginning { driven, time, state }: Beginning<'_>,
+        Beginning { driven, contacts, time, state }: Beginning<'_>,
         work: &mut Work,
         out: &mut [Complex64],
     ) {
@@ -238,7 +267,7 @@ impl Pattern {
         work.held.clear();
         work.held.extend(self.held.iter().map(|&s| drive.imposed_at(s, time, 0)));
         for (i, slider) in mechanics.sliders.iter().enumerate() {
-            let value = match (self.contacts[i], slider.stiffness) {
+            let value = match (contacts[i], slider.stiffness) {
                 (Contact::Stick, None) => continue,
                 (Contact::Stick, Some(kt)) => kt * drive.imposed_at(i, time, 0),
                 (slip, _) => -slip.sign() * slider.limit,
@@ -268,23 +297,14 @@ impl Pattern {
                 out[row * nb + count + h] = driven.steady[h][row] * work.turn[h];
             }
         }
-        // state without the steady part
+        for (i, &z) in state.iter().enumerate() {
+            for row in 0..n {
+                work.force[row] += self.force_from_state[(row, i)] * z;
+            }
+        }
         for k in 0..count {
-            let mut fixed = ZERO;
-            let mut decaying = ZERO;
-            for i in 0..n {
-                fixed += self.constant_from_force[(k, i)] * work.force[i];
-            }
-            for (i, &z) in state.iter().enumerate() {
-                decaying += self.decaying_from_state[(k, i)] * z;
-                fixed += self.constant_from_state[(k, i)] * z;
-            }
-            // decaying_from_state already subtracts the constant that the state causes
-            for i in 0..n {
-                decaying -= self.constant_from_force[(k, i)] * work.force[i];
-            }
-            work.eta[k] = decaying;
-            work.fixed[k] = fixed;
+            work.fixed[k] = self.fixed(k, &work.force);
+            work.eta[k] = self.coordinate(k, &state[..2 * n]) - work.fixed[k];
         }
         self.subtract_steady(mechanics, drive, driven, work);
         for row in 0..n {
@@ -310,13 +330,7 @@ impl Pattern {
                 work.steady[n + i] = (z * rate).re;
             }
             for k in 0..self.lambda.len() {
-                let mut eta = ZERO;
-                for i in 0..2 * n {
-                    // the state's own constants must not count here: they belong to forces, not to the coordinates
-                    let from = self.decaying_from_state[(k, i)] + self.constant_from_state[(k, i)];
-                    eta += from * work.steady[i];
-                }
-                work.eta[k] -= eta;
+                work.eta[k] -= self.coordinate(k, &work.steady[..2 * n]);
             }
         }
     }
@@ -335,13 +349,8 @@ impl Pattern {
             return;
         }
         let (n, nb, constant) = (mechanics.n, driven.basis.len(), driven.basis.constant());
-        for row in 0..n {
-            for (i, &z) in state.iter().enumerate() {
-                work.force[row] += self.force_from_state[(row, i)] * z;
-            }
-        }
         for &k in &self.drifting {
-            let drift: Complex64 = (0..n).map(|i| self.input[(k, i)] * work.force[i]).sum();
+            let drift = self.push(k, &work.force);
             for row in 0..n {
                 out[row * nb + constant + 1].re += (self.shape[(row, k)] * drift).re;
             }
@@ -372,7 +381,7 @@ impl Pattern {
         sensitivity: &mut DMatrix<f64>,
         work: &mut Work,
     ) {
-        let (n, states, count) = (mechanics.n, mechanics.states(), self.lambda.len());
+        let (n, count) = (mechanics.n, self.lambda.len());
         for mut column in sensitivity.column_iter_mut() {
             work.column.copy_from_slice(column.as_slice());
             let z = &work.column;
@@ -380,12 +389,15 @@ impl Pattern {
                 work.shift[row] = (0..n).map(|i| self.hold_projection[(row, i)] * z[i]).sum();
                 work.steady[row] = 0.0;
             }
-            for k in 0..count {
-                let (mut fixed, mut decaying) = (ZERO, ZERO);
-                for i in 0..states {
-                    fixed += self.constant_from_state[(k, i)] * z[i];
-                    decaying += self.decaying_from_state[(k, i)] * z[i];
+            work.force.fill(0.0);
+            for (i, &z) in z.iter().enumerate().filter(|(_, z)| **z != 0.0) {
+                for row in 0..n {
+                    work.force[row] += self.force_from_state[(row, i)] * z;
                 }
+            }
+            for k in 0..count {
+                let fixed = self.fixed(k, &work.force);
+                let decaying = self.coordinate(k, &z[..2 * n]) - fixed;
                 let (now, rate) = (decaying * values[k], decaying * values[k] * self.lambda[k]);
                 for row in 0..n {
                     let shape = self.shape[(row, k)];
@@ -394,11 +406,8 @@ impl Pattern {
                 }
             }
             if !self.drifting.is_empty() || self.free.ncols() > 0 {
-                for row in 0..n {
-                    work.force[row] = (0..states).map(|i| self.force_from_state[(row, i)] * z[i]).sum();
-                }
                 for &k in &self.drifting {
-                    let drift: Complex64 = (0..n).map(|i| self.input[(k, i)] * work.force[i]).sum();
+                    let drift = self.push(k, &work.force);
                     for row in 0..n {
                         let speed = (self.shape[(row, k)] * drift).re;
                         work.shift[row] += speed * length;
@@ -416,9 +425,9 @@ impl Pattern {
                     }
                 }
             }
-            for (slider, contact) in mechanics.sliders.iter().zip(&self.contacts) {
+            for (slider, stuck) in mechanics.sliders.iter().zip(&self.stuck) {
                 if let (Some(kt), Some(state)) = (slider.stiffness, slider.state) {
-                    column[2 * n + state] = if *contact == Contact::Stick {
+                    column[2 * n + state] = if *stuck {
                         let stretch: f64 = (0..n).map(|i| slider.direction[i] * (work.shift[i] - z[i])).sum();
                         z[2 * n + state] + kt * stretch
                     } else {

@@ -1,5 +1,6 @@
-//! Stability of a harmonic-balance orbit, by the judge of the other methods: the derivative of the return map along the motion that
-//! starts at the orbit's state, exact for laws that are exact and by implicit integration for smooth ones.
+//! Stability of a harmonic-balance orbit. Where no two motions of the system separate there is nothing to compute; elsewhere it is by the
+//! judge of the other methods: the derivative of the return map along the motion that starts at the orbit's state, exact for laws that
+//! are exact and by implicit integration for smooth ones.
 
 use crate::method::drive::Drive;
 use crate::method::event_driven::{Flow, Mechanics};
@@ -8,13 +9,15 @@ use crate::method::smooth::step::Structure;
 use crate::model::System;
 use nalgebra::DMatrix;
 
-/// Degrees of freedom up to which orbits are judged: the return map is dense, and its cost grows with the cube.
+/// Degrees of freedom up to which orbits are judged without being asked: the return map is dense, and its cost grows with the cube.
 const LARGEST: usize = 24;
 /// Relative error per step of the integration of smooth laws.
 const TOLERANCE: f64 = 1e-8;
 
 /// The flow of a system between two returns.
 pub(super) enum Judge {
+    /// No two motions separate.
+    Proven,
     Exact(Box<Flow>),
     Smooth(Box<SmoothFlow>),
     /// The system is too large, or its laws are mixed.
@@ -23,7 +26,15 @@ pub(super) enum Judge {
 
 impl Judge {
     pub fn new(system: &System) -> Self {
-        if system.dofs() == 0 || system.dofs() > LARGEST {
+        if system.contracts() {
+            return Judge::Proven;
+        }
+        if system.dofs() > LARGEST { Judge::None } else { Judge::of_any_size(system) }
+    }
+
+    /// A flow, also where it is not needed or long.
+    pub fn of_any_size(system: &System) -> Self {
+        if system.dofs() == 0 {
             return Judge::None;
         }
         if let Ok(mechanics) = Mechanics::new(system) {
@@ -35,11 +46,9 @@ impl Judge {
         }
     }
 
-    /// Derivative of the return, over the half period if `odd`, with respect to the state at t = 0, which begins with `start`. A 0 × 0
-    /// matrix if there is none.
-    pub fn derivative(&mut self, system: &System, omega: f64, odd: bool, start: &[f64]) -> DMatrix<f64> {
+    /// Derivative of the return, over the half period if `odd`, with respect to the state at t = 0, which begins with `start`.
+    pub fn derivative(&mut self, system: &System, omega: f64, odd: bool, start: &[f64]) -> Option<DMatrix<f64>> {
         let duration = if odd { 0.5 } else { 1.0 } * std::f64::consts::TAU / omega;
-        let none = DMatrix::zeros(0, 0);
         match self {
             Judge::Exact(flow) => {
                 let states = flow.mechanics.states();
@@ -48,8 +57,8 @@ impl Judge {
                 let owners = flow.mechanics.owners();
                 flow.set_drive(Drive::new(system, &owners, omega));
                 let mut derivative = DMatrix::identity(states, states);
-                let run = flow.run(&mut state, 0.0, duration, Some(&mut derivative));
-                run.map_or(none, |()| derivative)
+                flow.run(&mut state, 0.0, duration, Some(&mut derivative)).ok()?;
+                Some(derivative)
             }
             Judge::Smooth(flow) => {
                 let owners: Vec<usize> = (0..system.joints.len()).collect();
@@ -58,10 +67,10 @@ impl Judge {
                 let mut state = start.to_vec();
                 state.resize(states, 0.0);
                 let mut derivative = DMatrix::identity(states, states);
-                let run = flow.run(&mut state, 0.0, duration, Some(&mut derivative));
-                run.map_or(none, |()| derivative)
+                flow.run(&mut state, 0.0, duration, Some(&mut derivative)).ok()?;
+                Some(derivative)
             }
-            Judge::None => none,
+            Judge::Proven | Judge::None => None,
         }
     }
 }

@@ -201,7 +201,7 @@ impl Method for HarmonicBalance {
 }
 
 /// Which harmonics the motion has: the multiples of `unit`, the greatest common divisor of the excitation's, and of these the odd ones if
-/// the excitation has no others. Any other would be found zero.
+/// the excitation has no others and all laws are odd. Any other would be found zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Kept {
     unit: usize,
@@ -216,7 +216,8 @@ impl Kept {
         let present: Vec<usize> = system.harmonics_of_excitation(counts).into_iter().map(|h| h as usize).collect();
         let unit = present.iter().fold(0, |a, &b| common_divisor(a, b)).max(1);
         let highest = present.iter().copied().max().unwrap_or(0);
-        Kept { unit, odd: present.iter().all(|h| (h / unit) % 2 == 1), highest }
+        let laws = system.joints.iter().all(|joint| joint.law.is_odd());
+        Kept { unit, odd: laws && present.iter().all(|h| (h / unit) % 2 == 1), highest }
     }
 
     /// The harmonics up to `top`.

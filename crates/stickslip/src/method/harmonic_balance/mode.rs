@@ -56,10 +56,15 @@ const TRACE: f64 = 1e-9;
 
 impl<'a> ModeEquations<'a> {
     /// # Errors
-    /// A law with several directions, a place without mass.
+    /// A law with several directions, a place without mass, a mass matrix that is not diagonal.
     pub fn new(system: &'a System, harmonics: usize, samples: usize) -> Result<Self, MethodError> {
         if let Some(massless) = (0..system.dofs()).find(|&i| system.mass[(i, i)] == 0.0) {
             return Err(MethodError::NeedsMass { method: super::NAME, place: system.places[massless].clone() });
+        }
+        let n = system.dofs();
+        if (0..n).any(|i| (0..n).any(|k| i != k && system.mass[(i, k)] != 0.0)) {
+            // the modal amplitude and the first shape are made for single masses
+            return Err(MethodError::NotPositive { method: super::NAME, matrix: "diagonal mass" });
         }
         let (mut elastic, mut contacts) = (Vec::new(), Vec::new());
         for coordinate in coordinates(system)? {

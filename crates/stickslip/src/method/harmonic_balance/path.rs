@@ -175,7 +175,9 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
     start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
     start.extend(elastic_states);
-    let return_map = judge.map_or_else(|| DMatrix::zeros(0, 0), |judge| judge.derivative(system, omega, odd, &start));
+    let contracts = judge.as_ref().is_some_and(|judge| matches!(judge, Judge::Proven));
+    let return_map =
+        judge.and_then(|judge| judge.derivative(system, omega, odd, &start)).unwrap_or_else(|| DMatrix::zeros(0, 0));
     Some(Orbit {
         method: super::NAME,
         omega,
@@ -198,6 +200,7 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
         joints,
         energy,
         return_map,
+        contracts,
         path: Arc::new(Series { system: system.clone(), omega, harmonics, x, force, contact }),
     })
 }
@@ -401,5 +404,10 @@ impl Path for Series {
         times.sort_by(f64::total_cmp);
         times.dedup();
         times
+    }
+
+    fn return_map(&self, start: &[f64], symmetry: Symmetry) -> Option<DMatrix<f64>> {
+        let odd = symmetry == Symmetry::HalfPeriod;
+        Judge::of_any_size(&self.system).derivative(&self.system, self.omega, odd, start)
     }
 }

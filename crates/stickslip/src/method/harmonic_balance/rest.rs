@@ -169,23 +169,23 @@ fn free_fraction(s: Complex64, omega: f64) -> Complex64 {
     if s == ZERO { Complex64::new((HOLD * omega).powi(-2), 0.0) } else { 1.0 / (s * s) }
 }
 
-/// Modes in the structure's coordinates; `None` if a place has no mass or modes fall together: then frequencies are factored one
-/// by one.
+/// Modes in the structure's coordinates; `None` if the mass matrix is not positive definite or modes fall together: then frequencies are
+/// factored one by one.
 fn modal(system: &System, direction: &DMatrix<f64>) -> Option<Modal> {
     let n = system.dofs();
-    if (0..n).any(|i| system.mass[(i, i)] <= 0.0) {
-        return None;
-    }
-    let scale: Vec<f64> = (0..n).map(|i| 1.0 / system.mass[(i, i)].sqrt()).collect();
-    let normalised = |matrix: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, k| scale[i] * matrix[(i, k)] * scale[k]);
-    let modes = Modes::new(&normalised(&system.damping), &normalised(&system.stiffness)).ok()?;
-    let shape = DMatrix::from_fn(n, modes.lambda.len(), |i, m| modes.shape[(i, m)] * scale[i]);
-    let left = DMatrix::from_fn(modes.lambda.len(), n, |m, i| modes.from_velocity[(m, i)] * scale[i]);
-    let free = DMatrix::from_fn(n, modes.free.ncols(), |i, r| modes.free[(i, r)] * scale[i]);
-    let complex = direction.map(|w| Complex64::new(w, 0.0));
+    // M = L Lᵀ; with q = Lᵀ x the masses are ones
+    let factor = system.mass.clone().cholesky()?;
+    let to = factor.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
+    let back = to.transpose();
+    let modes = Modes::new(&(&to * &system.damping * &back), &(&to * &system.stiffness * &back)).ok()?;
+    let complex = |matrix: &DMatrix<f64>| matrix.map(|w| Complex64::new(w, 0.0));
+    let shape = complex(&back) * modes.shape;
+    let left = modes.from_velocity * complex(&to);
+    let free = back * modes.free;
+    let along = complex(direction);
     Some(Modal {
-        shape_at: complex.transpose() * &shape,
-        left_at: &left * complex,
+        shape_at: along.transpose() * &shape,
+        left_at: &left * along,
         free_at: free.transpose() * direction,
         lambda: modes.lambda,
         shape,

@@ -28,7 +28,7 @@ pub(crate) struct SteppedPath {
 
 /// Makes the orbit of the flow's last, recorded run.
 pub(crate) fn orbit(
-    system: &System,
+    (system, contracts): (&System, bool),
     flow: &SmoothFlow,
     method: &'static str,
     omega: f64,
@@ -60,6 +60,7 @@ pub(crate) fn orbit(
         joints,
         energy,
         return_map: closed.derivative,
+        contracts,
         path: Arc::new(path),
     }
 }

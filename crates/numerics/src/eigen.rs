@@ -1,0 +1,387 @@
+//! Eigenvalues by iterations that always end.
+//!
+//! - [`symmetric`] and [`singular`]: nalgebra's decompositions with a bound on their iterations;
+//! - [`eigenvalues`]: all of a general matrix: exact zeros deflated, balanced, and the QR iteration of its Hessenberg form with Wilkinson's
+//!   shift. An entry below the diagonal counts as zero relative to the *whole* matrix. Relative to its neighbours on the diagonal, as it is
+//!   often done, the test never passes where these vanish: return maps in which contacts stick have large nilpotent parts;
+//! - [`largest_modulus`]: of a large matrix the largest only, from an Arnoldi process that grows until they have settled.
+//!
+//! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 7.4, 7.5 and 10.5; Parlett and Reinsch (1969) for the balance.
+
+use nalgebra::{ComplexField, DMatrix, DVector, Dyn, SVD, SymmetricEigen};
+use num_complex::Complex64;
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// QR steps per eigenvalue at most; 2 to 4 are usual.
+const STEPS: usize = 40;
+/// Every so many steps without an eigenvalue an exceptional shift breaks a cycle.
+const EXCEPTIONAL: usize = 10;
+/// Sweeps of the balance; 3 or 4 are usual.
+const SWEEPS: usize = 20;
+/// Size from which the largest eigenvalues are cheaper than all.
+const LARGE: usize = 64;
+/// First dimension of the Arnoldi process; it doubles from there.
+const FIRST: usize = 24;
+/// Residual, relative to the eigenvalue, at which one of the Arnoldi process has settled: its error is then far below what decides about
+/// stability (1e-6), also where eigenvectors are a hundred times worse conditioned than orthogonal ones.
+const SETTLED: f64 = 1e-9;
+/// Eigenvalues of the Arnoldi process whose modulus is above this share of the largest have to settle too: one of them may pass it yet.
+const RIVAL: f64 = 0.9;
+
+/// Eigenvalues and eigenvectors of a symmetric matrix; `None` if an entry is not finite or the iteration does not end in time.
+pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
+    let steps = STEPS * (matrix.nrows() + 1);
+    finite(&matrix).then(|| SymmetricEigen::try_new(matrix, f64::EPSILON, steps))?
+}
+
+/// Singular values and vectors; `None` if an entry is not finite or the iteration does not end in time.
+pub fn singular<T: ComplexField<RealField = f64>>(matrix: DMatrix<T>) -> Option<SVD<T, Dyn, Dyn>> {
+    let steps = STEPS * (matrix.nrows().max(matrix.ncols()) + 1);
+    let finite = matrix.iter().all(|z| z.clone().modulus().is_finite());
+    finite.then(|| SVD::try_new(matrix, true, true, 5.0 * f64::EPSILON, steps))?
+}
+
+/// All eigenvalues of a square matrix, in no particular order; `None` if an entry is not finite or the iteration does not end in time.
+///
+/// # Example
+/// ```
+/// use nalgebra::dmatrix;
+/// let turn = stickslip_numerics::eigen::eigenvalues(&dmatrix![0.0, -2.0; 2.0, 0.0]).unwrap();
+/// assert!((turn[0].im.abs() - 2.0).abs() < 1e-14 && turn[0].re.abs() < 1e-14);
+/// ```
+pub fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex64>> {
+    if !finite(matrix) {
+        return None;
+    }
+    let (core, zeros) = deflated(matrix);
+    let mut found = match core.nrows() {
+        0 => Vec::new(),
+        1 => vec![Complex64::new(core[0], 0.0)],
+        _ => of_hessenberg(balanced(core).hessenberg().unpack_h().map(|x| Complex64::new(x, 0.0)))?,
+    };
+    found.resize(found.len() + zeros, ZERO);
+    Some(found)
+}
+
+/// The largest modulus of an eigenvalue, zero for an empty matrix; `None` if an entry is not finite or the iteration does not end in time.
+///
+/// # Example
+/// ```
+/// use nalgebra::dmatrix;
+/// let largest = stickslip_numerics::eigen::largest_modulus(&dmatrix![0.5, 1e3; 0.0, -0.9]).unwrap();
+/// assert!((largest - 0.9).abs() < 1e-13);
+/// ```
+pub fn largest_modulus(matrix: &DMatrix<f64>) -> Option<f64> {
+    if !finite(matrix) {
+        return None;
+    }
+    let (core, _) = deflated(matrix);
+    if core.nrows() > LARGE
+        && let Some(largest) = arnoldi(&balanced(core.clone()))
+    {
+        return Some(largest);
+    }
+    Some(eigenvalues(&core)?.iter().map(|z| z.norm()).fold(0.0, f64::max))
+}
+
+fn finite(matrix: &DMatrix<f64>) -> bool {
+    matrix.iter().all(|x| x.is_finite())
+}
+
+/// The matrix without the rows and columns that are zero, again and again until none is, and how many eigenvalues zero went with them.
+fn deflated(matrix: &DMatrix<f64>) -> (DMatrix<f64>, usize) {
+    let mut kept: Vec<usize> = (0..matrix.nrows()).collect();
+    loop {
+        let empty =
+            |i: usize| kept.iter().all(|&k| matrix[(i, k)] == 0.0) || kept.iter().all(|&k| matrix[(k, i)] == 0.0);
+        let left: Vec<usize> = kept.iter().copied().filter(|&i| !empty(i)).collect();
+        if left.len() == kept.len() {
+            let core = DMatrix::from_fn(kept.len(), kept.len(), |i, k| matrix[(kept[i], kept[k])]);
+            return (core, matrix.nrows() - kept.len());
+        }
+        kept = left;
+    }
+}
+
+/// A similar matrix whose rows are as long as its columns, to a factor of two: states of different units then count alike. Powers of two
+/// only, so that nothing is rounded.
+fn balanced(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let n = matrix.nrows();
+    for _ in 0..SWEEPS {
+        let mut changed = false;
+        for i in 0..n {
+            let off = |k: usize| k != i;
+            let row = (0..n).filter(|&k| off(k)).map(|k| matrix[(i, k)].abs()).fold(0.0, f64::max);
+            let column = (0..n).filter(|&k| off(k)).map(|k| matrix[(k, i)].abs()).fold(0.0, f64::max);
+            // the square root of either may be out of range, but not that of the exponent's difference
+            let power = if row > 0.0 && column > 0.0 { (0.5 * (row.log2() - column.log2())).round() } else { 0.0 };
+            if power != 0.0 && power.abs() < 500.0 {
+                let factor = power.exp2();
+                matrix.column_mut(i).scale_mut(factor);
+                matrix.row_mut(i).scale_mut(1.0 / factor);
+                changed = true;
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+    matrix
+}
+
+/// Eigenvalues of an upper Hessenberg matrix.
+fn of_hessenberg(mut h: DMatrix<Complex64>) -> Option<Vec<Complex64>> {
+    let n = h.nrows();
+    let small = f64::EPSILON * h.norm();
+    if !small.is_finite() {
+        return None;
+    }
+    let mut found = Vec::with_capacity(n);
+    let (mut end, mut steps) = (n, 0);
+    while end > 0 {
+        // the part that hangs together, from below
+        let mut start = end - 1;
+        while start > 0 && h[(start, start - 1)].norm() > small {
+            start -= 1;
+        }
+        if start + 1 == end {
+            found.push(h[(end - 1, end - 1)]);
+            (end, steps) = (end - 1, 0);
+            continue;
+        }
+        if steps == STEPS {
+            return None;
+        }
+        steps += 1;
+        let shift = if steps % EXCEPTIONAL == 0 {
+            h[(end - 1, end - 1)] + h[(end - 1, end - 2)].norm()
+        } else {
+            wilkinson(&h, end)
+        };
+        qr_step(&mut h, start, end, shift);
+    }
+    Some(found)
+}
+
+/// The eigenvalue of the last two by two block that is nearer to its corner.
+fn wilkinson(h: &DMatrix<Complex64>, end: usize) -> Complex64 {
+    let (a, b) = (h[(end - 2, end - 2)], h[(end - 2, end - 1)]);
+    let (c, d) = (h[(end - 1, end - 2)], h[(end - 1, end - 1)]);
+    let half = (a - d) * 0.5;
+    let root = (half * half + b * c).sqrt();
+    // d - bc / (half ± root), with the sign that does not cancel
+    let sum = if (half + root).norm() >= (half - root).norm() { half + root } else { half - root };
+    if sum == ZERO { d } else { d - b * c / sum }
+}
+
+/// `H - μ = Q R`, `H := R Q + μ` within rows and columns `start..end`, by plane rotations.
+fn qr_step(h: &mut DMatrix<Complex64>, start: usize, end: usize, shift: Complex64) {
+    for i in start..end {
+        h[(i, i)] -= shift;
+    }
+    let mut rotations = Vec::with_capacity(end - start);
+    for k in start..end - 1 {
+        let (x, y) = (h[(k, k)], h[(k + 1, k)]);
+        let length = x.norm().hypot(y.norm());
+        let (c, s) = if length == 0.0 { (Complex64::new(1.0, 0.0), ZERO) } else { (x / length, y / length) };
+        for j in k..end {
+            let (above, below) = (h[(k, j)], h[(k + 1, j)]);
+            h[(k, j)] = c.conj() * above + s.conj() * below;
+            h[(k + 1, j)] = c * below - s * above;
+        }
+        rotations.push((c, s));
+    }
+    for (k, (c, s)) in (start..).zip(rotations) {
+        for i in start..(k + 2).min(end) {
+            let (left, right) = (h[(i, k)], h[(i, k + 1)]);
+            h[(i, k)] = c * left + s * right;
+            h[(i, k + 1)] = c.conj() * right - s.conj() * left;
+        }
+    }
+    for i in start..end {
+        h[(i, i)] += shift;
+    }
+}
+
+/// The largest modulus by an Arnoldi process whose dimension doubles until the eigenvalues that compete have settled; `None` if they have
+/// not when half of all dimensions are used: then all of them cost no more.
+fn arnoldi(matrix: &DMatrix<f64>) -> Option<f64> {
+    let n = matrix.nrows();
+    let most = n / 2;
+    let mut basis = DMatrix::zeros(n, most + 1);
+    let mut h = DMatrix::zeros(most + 1, most);
+    // any direction will do that has a part along every eigenvector; golden-ratio steps repeat nowhere
+    let first = DVector::from_fn(n, |i, _| 0.5 + (i as f64 * 0.618_033_988_749_894_9).fract());
+    basis.set_column(0, &first.normalize());
+    let mut check = FIRST.min(most);
+    for k in 0..most {
+        let mut next = matrix * basis.column(k);
+        let before = next.norm();
+        // twice, for the digits that the first time cancels
+        for _ in 0..2 {
+            let part = basis.columns(0, k + 1).tr_mul(&next);
+            next -= basis.columns(0, k + 1) * &part;
+            let mut column = h.view_mut((0, k), (k + 1, 1));
+            column += part;
+        }
+        let length = next.norm();
+        if length <= f64::EPSILON * before {
+            return None; // a closed subspace tells nothing of the rest
+        }
+        h[(k + 1, k)] = length;
+        basis.set_column(k + 1, &(next / length));
+        if k + 1 == check {
+            let square = h.view((0, 0), (check, check)).into_owned();
+            let found = of_hessenberg(square.map(|x| Complex64::new(x, 0.0)))?;
+            let largest = found.iter().map(|z| z.norm()).fold(0.0, f64::max);
+            let settled = |value: Complex64| residual(&square, value, length) <= SETTLED * largest;
+            if found.iter().filter(|z| z.norm() >= RIVAL * largest).all(|z| settled(*z)) {
+                return Some(largest);
+            }
+            check = (2 * check).min(most);
+        }
+    }
+    None
+}
+
+/// Residual of an eigenvalue of the Arnoldi process: its eigenvector's last entry times the next length.
+fn residual(square: &DMatrix<f64>, value: Complex64, next: f64) -> f64 {
+    let n = square.nrows();
+    // inverse iteration; the value is off by a rounding so that there is a solution
+    let offset = f64::EPSILON * square.norm();
+    let shifted = square.map(|x| Complex64::new(x, 0.0)) - DMatrix::from_diagonal_element(n, n, value + offset);
+    let factor = shifted.lu();
+    let mut vector = DVector::from_element(n, Complex64::new(1.0, 0.0));
+    for _ in 0..2 {
+        let Some(solved) = factor.solve(&vector) else { return f64::INFINITY };
+        let size = solved.norm();
+        if !(size.is_finite() && size > 0.0) {
+            return f64::INFINITY;
+        }
+        vector = solved / Complex64::new(size, 0.0);
+    }
+    vector[n - 1].norm() * next
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::dmatrix;
+    use proptest::prelude::*;
+
+    fn noise(i: usize) -> f64 {
+        (i as f64 * 0.618_033_988_749_894_9 + 0.37).fract() - 0.5
+    }
+
+    /// `S D S⁻¹` with a lower triangular `S` of ones on the diagonal.
+    fn with_eigenvalues(block: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = block.nrows();
+        let s = DMatrix::from_fn(n, n, |i, k| {
+            if i == k {
+                1.0
+            } else if i > k {
+                0.3 * noise(i * n + k)
+            } else {
+                0.0
+            }
+        });
+        &s * block * s.clone().try_inverse().unwrap()
+    }
+
+    /// Pairs `r e^{±jφ}` and real ones, mixed by a similarity.
+    fn planted(n: usize, top: f64) -> (DMatrix<f64>, Vec<f64>) {
+        let mut block = DMatrix::zeros(n, n);
+        let mut moduli = Vec::new();
+        for i in (0..n).step_by(2) {
+            let r = top * 0.98f64.powi(i as i32 / 2);
+            let (sin, cos) = (1.0 + i as f64).sin_cos();
+            if i + 1 == n {
+                block[(i, i)] = r;
+                moduli.push(r);
+            } else {
+                block.view_mut((i, i), (2, 2)).copy_from(&dmatrix![r * cos, -r * sin; r * sin, r * cos]);
+                moduli.extend([r, r]);
+            }
+        }
+        (with_eigenvalues(&block), moduli)
+    }
+
+    #[test]
+    fn all_eigenvalues_of_planted_matrices() {
+        for n in [1, 2, 3, 7, 24, 61] {
+            let (matrix, mut moduli) = planted(n, 1.1);
+            let mut found: Vec<f64> = eigenvalues(&matrix).unwrap().iter().map(|z| z.norm()).collect();
+            moduli.sort_by(f64::total_cmp);
+            found.sort_by(f64::total_cmp);
+            assert_eq!(found.len(), n);
+            for (a, b) in found.iter().zip(&moduli) {
+                assert!((a - b).abs() < 1e-10, "{n}: {a} {b}");
+            }
+        }
+    }
+
+    /// What hung: shifts of many states into one another (a Jordan block of zeros), in and out of a similarity.
+    #[test]
+    fn nilpotent_parts_end() {
+        for n in [2, 10, 40, 150] {
+            let mut shift = DMatrix::zeros(n, n);
+            for i in 1..n {
+                shift[(i, i - 1)] = 1.0;
+            }
+            assert!(eigenvalues(&shift).unwrap().iter().all(|z| *z == ZERO));
+            shift[(0, 0)] = 0.5;
+            let largest = largest_modulus(&with_eigenvalues(&shift)).unwrap();
+            // the rounding of n zeros in a chain is the n-th root of that of the matrix: at most one, for a long chain
+            assert!(n > 10 || (largest - 0.5).abs() < 0.1, "{n}: {largest}");
+            // rank one, as contacts that swallow what they get
+            let rank_one = DMatrix::from_fn(n, n, |i, k| noise(i) * (1.0 + noise(k + 7)));
+            let trace = rank_one.trace().abs();
+            assert!((largest_modulus(&rank_one).unwrap() - trace).abs() < 1e-9 * n as f64, "{n}");
+        }
+    }
+
+    /// The Arnoldi process finds what was planted, in far fewer dimensions than there are.
+    #[test]
+    fn the_largest_of_many() {
+        for (n, top) in [(80, 1.0 + 1e-5), (200, 0.7), (300, 1.3)] {
+            let (matrix, _) = planted(n, top);
+            assert!((largest_modulus(&matrix).unwrap() - top).abs() < 1e-9, "{n}");
+        }
+        // one that is far away from the others, at any place
+        let mut single = DMatrix::from_diagonal_element(150, 150, 0.2);
+        single[(97, 97)] = -1.01;
+        assert!((largest_modulus(&single).unwrap() - 1.01).abs() < 1e-12);
+    }
+
+    /// Units change nothing: a similarity by a diagonal of thirty decades.
+    #[test]
+    fn units_do_not_matter() {
+        let (matrix, _) = planted(30, 1.05);
+        let unit = |i: usize| 10f64.powi((i as i32 % 7 - 3) * 5);
+        let scaled = DMatrix::from_fn(30, 30, |i, k| unit(i) * matrix[(i, k)] / unit(k));
+        assert!((largest_modulus(&scaled).unwrap() - 1.05).abs() < 1e-9);
+    }
+
+    #[test]
+    fn nothing_finite_is_asked() {
+        assert_eq!(eigenvalues(&dmatrix![f64::NAN, 0.0; 1.0, 2.0]), None);
+        assert_eq!(largest_modulus(&dmatrix![f64::INFINITY]), None);
+        assert!(symmetric(dmatrix![1.0, f64::NAN; f64::NAN, 1.0]).is_none());
+        assert!(singular(dmatrix![f64::INFINITY, 1.0; 0.0, 1.0]).is_none());
+        assert_eq!(eigenvalues(&DMatrix::zeros(0, 0)), Some(vec![]));
+        assert_eq!(largest_modulus(&DMatrix::zeros(0, 0)), Some(0.0));
+    }
+
+    proptest! {
+        /// Trace and determinant are sum and product.
+        #[test]
+        fn trace_and_determinant(entries in proptest::collection::vec(-1.0f64..1.0, 25)) {
+            let matrix = DMatrix::from_vec(5, 5, entries);
+            let found = eigenvalues(&matrix).unwrap();
+            let (sum, product) = (found.iter().sum::<Complex64>(), found.iter().product::<Complex64>());
+            prop_assert!((sum - matrix.trace()).norm() < 1e-12);
+            prop_assert!((product - matrix.determinant()).norm() < 1e-11);
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! The patterns that a motion has met, kept up to a number of bytes.
+//!
+//! A structure with `s` sliders has `2^s` patterns, and each takes some multiples of n² numbers. A return meets few of them, and the next one
+//! mostly the same: those that were not used for longest go first. A pattern that is made again has the same bits, so that nothing
+//! but time depends on what was kept.
+
+use super::mechanics::{Contact, Mechanics};
+use super::pattern::{Driven, Pattern};
+use crate::method::drive::Drive;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use stickslip_numerics::modes::Defective;
+
+/// Bytes up to which patterns are kept, for each of the flows that run side by side. A return of a ring of 48 blades meets one to two hundred
+/// patterns of a quarter of a megabyte.
+const LIMIT: usize = 64 << 20;
+
+struct Slot {
+    pattern: Arc<Pattern>,
+    /// Made for the present drive when the pattern first occurs under it.
+    driven: Option<Arc<Driven>>,
+    /// When it was last used, counted in uses of all.
+    used: u64,
+    bytes: usize,
+}
+
+/// Patterns by what sticks.
+pub(super) struct Memory {
+    slots: BTreeMap<Vec<bool>, Slot>,
+    bytes: usize,
+    limit: usize,
+    uses: u64,
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Memory { slots: BTreeMap::new(), bytes: 0, limit: LIMIT, uses: 0 }
+    }
+}
+
+impl Memory {
+    /// The pattern of these contacts, with its response to the drive.
+    pub fn pattern(
+        &mut self,
+        mechanics: &Mechanics,
+        drive: &Drive,
+        contacts: &[Contact],
+    ) -> Result<(Arc<Pattern>, Arc<Driven>), Defective> {
+        let stuck: Vec<bool> = contacts.iter().map(|contact| *contact == Contact::Stick).collect();
+        self.uses += 1;
+        if let Some(Slot { pattern, driven: Some(driven), used, .. }) = self.slots.get_mut(&stuck) {
+            *used = self.uses;
+            return Ok((pattern.clone(), driven.clone()));
+        }
+        let pattern = match self.slots.remove(&stuck) {
+            Some(slot) => {
+                self.bytes -= slot.bytes;
+                slot.pattern
+            }
+            None => Arc::new(Pattern::new(mechanics, &stuck)?),
+        };
+        let driven = Arc::new(pattern.drive(mechanics, drive));
+        let bytes = pattern.bytes() + driven.bytes();
+        if self.bytes + bytes > self.limit {
+            self.forget(self.limit / 2);
+        }
+        self.bytes += bytes;
+        let slot = Slot { pattern: pattern.clone(), driven: Some(driven.clone()), used: self.uses, bytes };
+        self.slots.insert(stuck, slot);
+        Ok((pattern, driven))
+    }
+
+    /// Forgets what belongs to one drive only.
+    pub fn change_drive(&mut self) {
+        self.slots.values_mut().for_each(|slot| slot.driven = None);
+    }
+
+    /// Lets those go that were not used for longest, until the others take no more than `bytes`.
+    fn forget(&mut self, bytes: usize) {
+        let mut uses: Vec<(u64, usize)> = self.slots.values().map(|slot| (slot.used, slot.bytes)).collect();
+        uses.sort_unstable();
+        let mut oldest = 0;
+        for (used, size) in uses {
+            if self.bytes <= bytes {
+                break;
+            }
+            self.bytes -= size;
+            oldest = used;
+        }
+        self.slots.retain(|_, slot| slot.used > oldest);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Jenkins, Law};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
+
+    /// A chain of masses, each with its slider.
+    fn chain(n: usize) -> (Mechanics, Drive) {
+        let name = |i: usize| format!("m{i}");
+        let before = |i: usize| if i == 0 { GROUND.to_owned() } else { name(i - 1) };
+        let model = Model {
+            masses: (0..n).map(|i| Mass { name: name(i), mass: 1.0 + 0.1 * i as f64 }).collect(),
+            springs: (0..n)
+                .map(|i| Spring { between: [before(i), name(i)], stiffness: 100.0 + i as f64, damping: 0.1 })
+                .collect(),
+            joints: (0..n)
+                .map(|i| Joint {
+                    name: format!("j{i}"),
+                    between: [name(i), GROUND.to_owned()],
+                    law: Law::Jenkins(Jenkins { stiffness: 50.0, limit: 1.0 }),
+                })
+                .collect(),
+            forces: vec![Force { on: name(0), amplitude: 1.0, phase: 0.0, harmonic: 1 }],
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let mechanics = Mechanics::new(&system).unwrap();
+        let drive = Drive::new(&system, &mechanics.owners(), 3.0);
+        (mechanics, drive)
+    }
+
+    fn contacts(n: usize, number: usize) -> Vec<Contact> {
+        (0..n).map(|i| if number >> i & 1 == 1 { Contact::SlipForward } else { Contact::Stick }).collect()
+    }
+
+    /// More patterns than there is room for: the bytes stay below the limit and are those of what is kept, the last ones are at hand, and one
+    /// that was forgotten comes back with the same numbers.
+    #[test]
+    fn memory_stays_below_its_limit() {
+        let n = 8;
+        let (mechanics, drive) = chain(n);
+        let mut memory = Memory::default();
+        let (first, _) = memory.pattern(&mechanics, &drive, &contacts(n, 0)).unwrap();
+        let one = memory.bytes;
+        assert!(one > 16 * n * n && one < 16 * 40 * n * n, "{one} bytes for a pattern of {n} places");
+        memory.limit = 20 * one;
+        for number in 0..1 << n {
+            memory.pattern(&mechanics, &drive, &contacts(n, number)).unwrap();
+            assert!(memory.bytes <= memory.limit, "{} bytes", memory.bytes);
+            assert_eq!(memory.bytes, memory.slots.values().map(|slot| slot.bytes).sum::<usize>());
+        }
+        let kept = memory.slots.len();
+        assert!((10..=21).contains(&kept), "{kept}");
+        let stuck = |number: usize| contacts(n, number).iter().map(|c| *c == Contact::Stick).collect::<Vec<_>>();
+        assert!((246..256).all(|number| memory.slots.contains_key(&stuck(number))), "the last ten are there");
+        assert!(!memory.slots.contains_key(&stuck(0)));
+        let (again, _) = memory.pattern(&mechanics, &drive, &contacts(n, 0)).unwrap();
+        assert_eq!(again.lambda, first.lambda);
+        assert_eq!(again.shape, first.shape);
+    }
+
+    /// Slip directions share a pattern; another drive makes only the response anew.
+    #[test]
+    fn directions_share_a_pattern() {
+        let (mechanics, drive) = chain(3);
+        let mut memory = Memory::default();
+        let (forward, driven) = memory.pattern(&mechanics, &drive, &[Contact::SlipForward; 3]).unwrap();
+        let (backward, _) = memory.pattern(&mechanics, &drive, &[Contact::SlipBackward; 3]).unwrap();
+        assert!(Arc::ptr_eq(&forward, &backward));
+        memory.change_drive();
+        let (again, other) = memory.pattern(&mechanics, &drive, &[Contact::SlipForward; 3]).unwrap();
+        assert!(Arc::ptr_eq(&forward, &again) && !Arc::ptr_eq(&driven, &other));
+        assert_eq!(memory.bytes, memory.slots.values().map(|slot| slot.bytes).sum::<usize>());
+    }
+}

@@ -1,0 +1,94 @@
+//! Whether two motions of a system can separate.
+//!
+//! Let `δ` be the difference of two motions under the same drive, and `Eⱼ` the elastic energy that joint `j` keeps of the difference of its
+//! states. Joints that are incrementally passive give no energy to the difference, `δfⱼ δuⱼ' ≥ dEⱼ/dt`, hence
+//!
+//! `E = ½ δx'ᵀ M δx' + ½ δxᵀ K δx + Σ Eⱼ`,   `dE/dt ≤ -δx'ᵀ C δx' ≤ 0`.
+//!
+//! That needs `M` and `K` symmetric and positive *semi*definite, and the symmetric part of `C` positive *semi*definite; zero damping will do.
+//! As `E` is a quadratic form of small disturbances that no return increases, no Floquet multiplier lies outside the unit circle: where
+//! `E > 0` because of that, and where `E = 0` because the difference then rests. (It rests if no direction is without mass, spring and
+//! damper at once: `M + C + K` is positive definite, as it is where every place has a mass.) What `E` does not see is a displacement that no spring
+//! holds: it stays, with a multiplier of one, or drifts at the constant velocity that a disturbance gave to it. Multipliers inside the circle, so
+//! that disturbances die, need more: damping, of every motion that the joints do not damp.
+//!
+//! Source: Leine and van de Wouw, "Stability and Convergence of Mechanical Systems with Unilateral Constraints" (2008), Ch. 8.
+
+use super::System;
+use stickslip_numerics::definite::semidefinite;
+
+impl System {
+    /// Whether no two motions under the same drive ever separate: masses and springs are symmetric and positive semidefinite, dampers take no
+    /// less than nothing, and every law is incrementally passive ([`crate::law::FrictionLaw::is_incrementally_passive`]). Every orbit is
+    /// then stable, whatever it is and however large the system.
+    ///
+    /// # Example
+    /// ```
+    /// let mut system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+    /// assert!(system.contracts());
+    /// system.damping[(0, 0)] = -0.1;
+    /// assert!(!system.contracts());
+    /// ```
+    pub fn contracts(&self) -> bool {
+        if !self.joints.iter().all(|joint| joint.law.is_incrementally_passive()) {
+            return false;
+        }
+        // a part of the damping that only turns velocities takes no power
+        let damping = (&self.damping + self.damping.transpose()) * 0.5;
+        let (Some(rank), Some(_), Some(_)) =
+            (semidefinite(&self.mass), semidefinite(&damping), semidefinite(&self.stiffness))
+        else {
+            return false;
+        };
+        let n = self.dofs();
+        rank == n || {
+            // each with its own unit: what one of them holds is held
+            let share = |matrix: &nalgebra::DMatrix<f64>| matrix / matrix.amax().max(f64::MIN_POSITIVE);
+            semidefinite(&(share(&self.mass) + share(&damping) + share(&self.stiffness))) == Some(n)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::model::{GROUND, Mass, Model, Spring, System};
+
+    /// Two masses, each on the ground, and a spring between them, each spring with its damper.
+    fn system(masses: [f64; 2], springs: [f64; 3], dampers: [f64; 3]) -> System {
+        let between = [["a", GROUND], ["b", GROUND], ["a", "b"]];
+        let springs = between.iter().zip(springs).zip(dampers).map(|((between, stiffness), damping)| Spring {
+            between: between.map(str::to_owned),
+            stiffness,
+            damping,
+        });
+        let mass = |name: &str, mass: f64| Mass { name: name.into(), mass };
+        Model {
+            masses: vec![mass("a", masses[0]), mass("b", masses[1])],
+            springs: springs.collect(),
+            ..Model::default()
+        }
+        .assemble()
+        .unwrap()
+    }
+
+    #[test]
+    fn what_contracts() {
+        let (one, two, zero) = ([1.0; 2], [1.0; 3], [0.0; 3]);
+        assert!(system(one, two, two).contracts());
+        assert!(system(one, two, zero).contracts(), "undamped");
+        assert!(system(one, zero, zero).contracts(), "two free masses");
+        assert!(system([1.0, 0.0], two, zero).contracts(), "a massless place that springs hold");
+        assert!(!system([1.0, 0.0], [1.0, 0.0, 0.0], zero).contracts(), "a massless place that nothing holds");
+        assert!(!system(one, two, [-0.1, 1.0, 0.05]).contracts(), "a damper that gives energy");
+        assert!(system(one, two, [-0.1, 1.0, 1.0]).contracts(), "others take more: 0.9 · 2 > 1");
+        let mut circulatory = system(one, two, two);
+        circulatory.stiffness[(0, 1)] = 1.0;
+        assert!(!circulatory.contracts(), "springs that follow");
+        let mut gyroscopic = system(one, two, zero);
+        (gyroscopic.damping[(0, 1)], gyroscopic.damping[(1, 0)]) = (3.0, -3.0);
+        assert!(gyroscopic.contracts(), "turning takes no power");
+        let mut buckled = system(one, two, two);
+        buckled.stiffness[(0, 0)] = -1.0;
+        assert!(!buckled.contracts(), "negative stiffness");
+    }
+}

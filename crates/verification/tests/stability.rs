@@ -1,0 +1,218 @@
+//! Stability: the theorem against multipliers that are computed, what is not covered by it, and the models whose eigenvalues hung.
+
+#![allow(clippy::print_stdout)] // tests say what they measured
+
+use std::f64::consts::TAU;
+use std::time::Instant;
+use stickslip::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, Law};
+use stickslip::method::event_driven::EventDriven;
+use stickslip::method::harmonic_balance::HarmonicBalance;
+use stickslip::method::shooting::Shooting;
+use stickslip::method::{Method, OrbitError};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
+use stickslip::orbit::{Orbit, Stability};
+use stickslip_verification::Random;
+
+fn mass(name: &str, mass: f64) -> Mass {
+    Mass { name: name.into(), mass }
+}
+
+fn spring(a: &str, b: &str, stiffness: f64, damping: f64) -> Spring {
+    Spring { between: [a.into(), b.into()], stiffness, damping }
+}
+
+fn joint(name: &str, a: &str, b: &str, law: Law) -> Joint {
+    Joint { name: name.into(), between: [a.into(), b.into()], law }
+}
+
+fn force(on: &str, amplitude: f64, phase: f64) -> Force {
+    Force { on: on.into(), amplitude, phase, harmonic: 1 }
+}
+
+fn find(method: &dyn Method, system: &System, omega: f64) -> Result<Orbit, OrbitError> {
+    method.solver(system).unwrap().orbit(omega, None)
+}
+
+fn series(harmonics: usize) -> HarmonicBalance {
+    HarmonicBalance { harmonics: Some(harmonics), ..HarmonicBalance::default() }
+}
+
+/// One mass on ten parallel sliders that let go one after the other.
+fn ten_sliders() -> System {
+    Model {
+        masses: vec![mass("m", 1.0)],
+        springs: vec![spring("m", GROUND, 1e4, 2.0)],
+        joints: (1..=10)
+            .map(|i| {
+                let law = Law::Jenkins(Jenkins { stiffness: 200.0, limit: 0.04 * f64::from(i) });
+                joint(&format!("j{i}"), "m", GROUND, law)
+            })
+            .collect(),
+        forces: vec![force("m", 2.0, 0.0)],
+        ..Model::default()
+    }
+    .assemble()
+    .unwrap()
+}
+
+/// A ring of blades with joints from each to the next; `mistuning` is relative, `damping` in N s/m.
+fn ring(count: usize, drive: f64, mistuning: f64, damping: f64) -> System {
+    let mut random = Random::new(5);
+    let name = |i: usize| format!("b{}", i % count);
+    Model {
+        masses: (0..count).map(|i| mass(&name(i), 0.2)).collect(),
+        springs: (0..count)
+            .map(|i| spring(&name(i), GROUND, 105e3 * (1.0 + random.between(-mistuning, mistuning)), damping))
+            .collect(),
+        joints: (0..count)
+            .map(|i| {
+                let law = Law::Jenkins(Jenkins { stiffness: 1e4, limit: 2.0 });
+                joint(&format!("j{i}"), &name(i), &name(i + 1), law)
+            })
+            .collect(),
+        forces: (0..count).map(|i| force(&name(i), drive, -3.0 * TAU * i as f64 / count as f64)).collect(),
+        ..Model::default()
+    }
+    .assemble()
+    .unwrap()
+}
+
+/// They hung: the return map of many sliders that stick or swallow is nilpotent in large parts.
+#[test]
+fn models_that_hung_end() {
+    for (what, system, hertz) in
+        [("ten sliders", ten_sliders(), 14.35), ("ring that sticks", ring(12, 0.01, 0.0, 0.5), 116.0)]
+    {
+        for method in [&EventDriven as &dyn Method, &series(15)] {
+            let clock = Instant::now();
+            let orbit = find(method, &system, TAU * hertz).unwrap();
+            let found = orbit.multipliers().unwrap();
+            println!("{what}, {}: {:.3} s", orbit.method, clock.elapsed().as_secs_f64());
+            assert_eq!(orbit.stability(), Stability::Proven);
+            assert_eq!(found.len(), 2 * system.dofs() + system.joints.len());
+            assert!(found[0].norm() <= 1.0 + 1e-6, "{what}: {}", found[0]);
+        }
+    }
+}
+
+/// The theorem holds for a series that nobody could judge by its return map.
+#[test]
+fn large_systems_are_stable_by_theorem() {
+    let orbit = find(&series(3), &ring(36, 1.0, 0.01, 0.5), TAU * 115.0).unwrap();
+    assert_eq!((orbit.stability(), orbit.is_stable()), (Stability::Proven, Some(true)));
+    let orbit = find(&series(3), &ring(36, 1.0, 0.01, -1e-3), TAU * 100.0).unwrap();
+    assert_eq!((orbit.stability(), orbit.is_stable()), (Stability::Unknown, None));
+}
+
+fn random_law(random: &mut Random, smooth: bool) -> Law {
+    let (limit, stiffness, alpha) = (random.between(0.1, 2.0), random.between(0.5, 5.0), random.between(2.0, 50.0));
+    match (smooth, random.unit() < 0.5) {
+        (false, false) => Law::Coulomb(Coulomb { limit }),
+        (false, true) => Law::Jenkins(Jenkins { stiffness, limit }),
+        (true, false) => Law::CoulombArctan(CoulombArctan { limit, alpha }),
+        (true, true) => Law::JenkinsArctan(JenkinsArctan { stiffness, limit, alpha }),
+    }
+}
+
+/// Up to four masses, joints anywhere. Dampers are positive, or absent.
+fn random_system(seed: u64, smooth: bool) -> System {
+    let mut random = Random::new(seed);
+    let count = 1 + (random.unit() * 4.0) as usize;
+    let name = |i: usize| format!("m{i}");
+    let damper = |random: &mut Random| if random.unit() < 0.3 { 0.0 } else { random.between(0.01, 0.3) };
+    let mut model = Model::default();
+    for i in 0..count {
+        model.masses.push(mass(&name(i), random.between(0.3, 2.0)));
+        let (k, c) = (random.between(0.5, 3.0), damper(&mut random));
+        model.springs.push(spring(&name(i), GROUND, k, c));
+        let other = if i == 0 { GROUND.to_owned() } else { name(i - 1) };
+        if i > 0 {
+            let (k, c) = (random.between(0.1, 3.0), damper(&mut random));
+            model.springs.push(spring(&name(i), &other, k, c));
+        }
+        if i == 0 || random.unit() < 0.6 {
+            model.joints.push(joint(&format!("j{i}"), &name(i), &other, random_law(&mut random, smooth)));
+        }
+        model.forces.push(force(&name(i), random.between(0.2, 3.0), random.between(0.0, TAU)));
+    }
+    model.assemble().unwrap()
+}
+
+/// Where the theorem says that no disturbance grows, no multiplier of the orbit is outside the unit circle.
+#[test]
+fn theorem_against_multipliers() {
+    let (mut compared, mut largest) = (0, 0.0f64);
+    for seed in 0..60 {
+        let smooth = seed % 4 == 3;
+        let system = random_system(seed, smooth);
+        assert!(system.contracts());
+        let omega = Random::new(seed + 1000).between(0.3, 2.5);
+        let exact: &dyn Method = if smooth { &Shooting { tolerance: 1e-8, width: None } } else { &EventDriven };
+        let Ok(orbit) = find(exact, &system, omega) else { continue };
+        assert_eq!(orbit.is_stable(), Some(true));
+        let computed = orbit.multipliers().unwrap()[0].norm();
+        assert!(computed <= 1.0 + 1e-6, "seed {seed}: {computed}");
+        (compared, largest) = (compared + 1, largest.max(computed));
+    }
+    println!("{compared} orbits, largest multiplier {largest:.9}");
+    assert!(compared >= 50, "{compared}");
+}
+
+/// A damper that gives energy is not covered by the theorem: the largest multiplier is that of the linear oscillator that no friction
+/// damps, of modulus `e^{-cT/2m}`.
+#[test]
+fn negative_damping_is_computed() {
+    for (c, stable) in [(-0.02, false), (0.02, true)] {
+        // the joint moves with the mass that nothing drives, and takes no part
+        let system = Model {
+            masses: vec![mass("driven", 1.0), mass("idle", 1.0)],
+            springs: vec![spring("driven", GROUND, 1.0, c), spring("idle", GROUND, 1.0, 0.5)],
+            joints: vec![joint("j", "idle", GROUND, Law::Jenkins(Jenkins { stiffness: 1.0, limit: 1.0 }))],
+            forces: vec![force("driven", 1.0, 0.0)],
+            ..Model::default()
+        }
+        .assemble()
+        .unwrap();
+        let omega = 1.7;
+        let expected = (-0.5 * c * TAU / omega).exp();
+        for method in [&EventDriven as &dyn Method, &series(5)] {
+            let orbit = find(method, &system, omega).unwrap();
+            assert_eq!(orbit.is_stable(), Some(stable), "{}", orbit.method);
+            match orbit.stability() {
+                Stability::Proven => assert!(stable),
+                Stability::Computed { largest } => assert!((largest - expected).abs() < 1e-9, "{largest} {expected}"),
+                Stability::Unknown => panic!("{} knows nothing", orbit.method),
+            }
+            assert_eq!(matches!(orbit.stability(), Stability::Proven), stable);
+        }
+    }
+}
+
+/// Two masses that a third, common one couples: `M x'' + K x = F cos Ωt` in closed form, by every method.
+#[test]
+fn masses_that_couple_places() {
+    let mut system = Model {
+        masses: vec![mass("a", 1.0), mass("b", 1.5)],
+        springs: vec![spring("a", GROUND, 1.0, 0.0), spring("b", GROUND, 2.0, 0.0)],
+        // far below its limit: a spring
+        joints: vec![joint("j", "a", "b", Law::Jenkins(Jenkins { stiffness: 0.3, limit: 1e3 }))],
+        forces: vec![force("a", 1.0, 0.0)],
+        ..Model::default()
+    }
+    .assemble()
+    .unwrap();
+    (system.mass[(0, 1)], system.mass[(1, 0)]) = (0.4, 0.4);
+    assert!(system.contracts());
+    let omega: f64 = 0.9;
+    let square = omega * omega;
+    let (aa, ab, bb) = (1.3 - square, -0.3 - 0.4 * square, 2.3 - 1.5 * square);
+    let determinant = aa * bb - ab * ab;
+    let expected = [bb / determinant, -ab / determinant];
+    for method in [&EventDriven as &dyn Method, &series(5), &series(1)] {
+        let orbit = find(method, &system, omega).unwrap();
+        for (place, expected) in orbit.places.iter().zip(expected) {
+            let found = place.first_harmonic;
+            assert!((found - expected).norm() < 1e-9 * expected.abs(), "{}: {found} {expected}", orbit.method);
+        }
+    }
+}
