@@ -257,7 +257,8 @@ fn extent(panel: &Panel) -> Option<(Range, Range)> {
     };
     let mut x = Range::around(panel.series.iter().flat_map(|s| drawn(panel, s).map(|p| p.0)), panel.x.scale)?;
     if x.scale == Scale::Linear && panel.series.iter().any(|s| s.style == Style::Bars) {
-        let half = 0.5 * bar_slot(panel, x);
+        // the outer bars stand clear of the frame as they do of each other
+        let half = 0.5 * bar_slot(panel, x) / BAR;
         x = Range { from: x.from - half, to: x.to + half, ..x };
     }
     let results = Range::around(values(false), panel.y.scale);

@@ -92,7 +92,7 @@ function stickslip(id, figure) {
     for (const key of Object.keys(layout)) {
       if (/^[xy]axis/.test(key) && place.layout[key]) { layout[key].range = place.layout[key].range; }
     }
-    Object.assign(layout, {showlegend: true, title: {text: figure.title, y: 0.99, yanchor: 'top'}, autosize: false});
+    Object.assign(layout, {showlegend: true, title: {text: '<b>' + figure.title + '</b>', yref: 'container', y: 1, yanchor: 'top', pad: {t: 16}}, autosize: false});
     layout.margin.t += 40;
     layout.height += 40;
     const data = figure.data.filter((trace) => trace.visible !== false);
