@@ -166,7 +166,8 @@ fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result
             Err(error) => Ending::Failed(error.to_string()),
         }
     } else if std::io::stdout().is_terminal() {
-        print(&Terminal { colour: true }.text(dataset, &files))
+        let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
+        print(&Terminal { colour: true, width }.text(dataset, &files))
     } else {
         Ending::Done
     };

@@ -34,16 +34,28 @@ pub(crate) fn width(text: &str, size: f64, weight: Weight) -> f64 {
     size * text.chars().map(advance).sum::<f64>()
 }
 
-/// Breaks a text at its spaces into lines that fit `limit` px; a longer word stands alone.
+/// Breaks a text at its spaces into lines that fit `limit` px; a longer word is broken where it must be.
 pub(crate) fn wrap(text: &str, size: f64, weight: Weight, limit: f64) -> Vec<String> {
+    let fits = |line: &str| width(line, size, weight) <= limit;
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {
-            Some(line) if width(&format!("{line} {word}"), size, weight) <= limit => {
+            Some(line) if fits(&format!("{line} {word}")) => {
                 line.push(' ');
                 line.push_str(word);
             }
-            _ => lines.push(word.to_owned()),
+            _ if fits(word) => lines.push(word.to_owned()),
+            _ => {
+                let mut piece = String::new();
+                for c in word.chars() {
+                    piece.push(c);
+                    if !fits(&piece) && piece.chars().count() > 1 {
+                        piece.pop();
+                        lines.push(std::mem::replace(&mut piece, c.to_string()));
+                    }
+                }
+                lines.push(piece);
+            }
         }
     }
     lines
@@ -62,6 +74,9 @@ mod tests {
             assert!(font.charmap().map(c).is_some_and(|g| g.to_u32() > 0), "{c}");
         }
         assert_eq!(wrap("one two three", 12.0, Weight::Regular, 60.0), ["one two", "three"]);
+        let pieces = wrap("a wordthatistoolong", 12.0, Weight::Regular, 60.0);
+        assert!(pieces.len() > 2 && pieces.iter().all(|p| width(p, 12.0, Weight::Regular) <= 60.0), "{pieces:?}");
+        assert_eq!(pieces[1..].concat(), "wordthatistoolong");
         assert!(wrap(" ", 12.0, Weight::Regular, 60.0).is_empty());
     }
 }

@@ -1,17 +1,9 @@
-//! What the static and the interactive figure share: the grid of panels, ranges and ticks, the legend, the palette.
+//! What the static and the interactive figure share: the grid of panels, ranges, the order of drawing, the legend, the
+//! colours.
 
-use stickslip_study::dataset::{Axis, Figure, Panel, Series, Style};
-
-/// Colours that readers with any colour vision can tell apart (Okabe and Ito, 2008), without the yellow that vanishes
-/// on paper. `Series::colour` counts through them and starts again.
-pub(crate) const PALETTE: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222"];
-
-/// Legend colour of a label that is drawn in several colours.
-pub(crate) const MANY_COLOURS: &str = "#555555";
-
-pub(crate) fn colour(index: usize) -> &'static str {
-    PALETTE[index % PALETTE.len()]
-}
+use crate::axis::{MARGIN, Range};
+use crate::colour::Colour;
+use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Sharing, Style};
 
 /// Columns and rows of the grid for this many panels: one; two side by side; two by two; then rows of three.
 pub(crate) fn grid(panels: usize) -> (usize, usize) {
@@ -23,9 +15,12 @@ pub(crate) fn grid(panels: usize) -> (usize, usize) {
     (columns, panels.div_ceil(columns).max(1))
 }
 
-/// The points of a series: pairs, as many as both lists have.
-pub(crate) fn points(series: &Series) -> impl Iterator<Item = (f64, f64)> + '_ {
-    series.x.iter().copied().zip(series.y.iter().copied())
+/// The points of a series: pairs, as many as both lists have; one that its axes cannot show is not a number.
+pub(crate) fn points<'a>(panel: &Panel, series: &'a Series) -> impl Iterator<Item = (f64, f64)> + 'a {
+    let (x_scale, y_scale) = (panel.x.scale, panel.y.scale);
+    let nothing = (f64::NAN, f64::NAN);
+    let shown = move |(x, y): &(f64, f64)| Range::takes(x_scale, *x) && Range::takes(y_scale, *y);
+    series.x.iter().copied().zip(series.y.iter().copied()).map(move |p| if shown(&p) { p } else { nothing })
 }
 
 /// Whether a point can be drawn.
@@ -33,129 +28,281 @@ pub(crate) fn drawable((x, y): (f64, f64)) -> bool {
     x.is_finite() && y.is_finite()
 }
 
+/// The points that can be drawn.
+pub(crate) fn drawn<'a>(panel: &Panel, series: &'a Series) -> impl Iterator<Item = (f64, f64)> + 'a {
+    points(panel, series).filter(|p| drawable(*p))
+}
+
+/// Lower edge of a band or foot of a bar at a point; the lower end of a logarithmic axis has no number.
+pub(crate) fn base(panel: &Panel, series: &Series, index: usize) -> Option<f64> {
+    let base = series.base.get(index).copied().unwrap_or(0.0);
+    Range::takes(panel.y.scale, base).then_some(base)
+}
+
 /// Whether the panel has anything to draw.
 pub(crate) fn has_data(panel: &Panel) -> bool {
-    panel.series.iter().any(|series| points(series).any(drawable))
+    panel.series.iter().any(|series| drawn(panel, series).next().is_some())
+}
+
+/// The series of a panel, those behind first.
+pub(crate) fn layers(panel: &Panel) -> Vec<&Series> {
+    let mut series: Vec<&Series> = panel.series.iter().collect();
+    series.sort_by_key(|s| match (s.style, s.emphasis) {
+        (Style::Marks, _) => 5,
+        (_, Emphasis::Reference) => 0,
+        (Style::Band, _) => 1,
+        (Style::Bars, _) => 2,
+        (_, Emphasis::Pale) => 3,
+        _ => 4,
+    });
+    series
+}
+
+/// The line that is drawn: a reference is never a continuous one.
+pub(crate) fn line_style(series: &Series) -> Style {
+    match (series.emphasis, series.style) {
+        (Emphasis::Reference, Style::Solid) => Style::Dashed,
+        (_, style) => style,
+    }
+}
+
+/// The colours of a figure: by palette, or by value where there are many values.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Shades {
+    /// What the values mean and their range, if colours follow values.
+    pub bar: Option<(Axis, Range)>,
+}
+
+/// Up to this many values are told apart by name and by the palette.
+const NAMED: usize = 7;
+
+impl Shades {
+    pub(crate) fn of(figure: &Figure) -> Shades {
+        Shades { bar: Shades::bar(figure) }
+    }
+
+    fn bar(figure: &Figure) -> Option<(Axis, Range)> {
+        let axis = figure.varied.as_ref()?;
+        let mut values: Vec<f64> = figure
+            .panels
+            .iter()
+            .flat_map(|panel| panel.series.iter().filter(|s| drawn(panel, s).next().is_some()))
+            .filter_map(|series| series.value.filter(|v| v.is_finite()))
+            .collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        let positive = values.first().is_some_and(|v| *v > 0.0);
+        // one value that is zero makes a logarithmic scale impossible, not the figure
+        let axis = Axis { scale: if positive { axis.scale } else { Scale::Linear }, ..axis.clone() };
+        let range = Range::fixed(&axis).or_else(|| Range::around(values.iter().copied(), axis.scale))?.widened(0.0);
+        (values.len() > NAMED).then_some((axis, range))
+    }
+
+    /// The colour of a series.
+    pub(crate) fn colour(&self, series: &Series) -> Colour {
+        match (&self.bar, series.value) {
+            _ if series.emphasis == Emphasis::Reference => Colour::reference(),
+            (Some((_, range)), Some(value)) if value.is_finite() => Colour::sequential(range.part(value)),
+            _ => Colour::palette(series.colour),
+        }
+    }
 }
 
 /// An entry of the legend: what all series of one label look like.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry {
     pub label: String,
-    pub colour: &'static str,
+    pub colour: Colour,
     /// Line style, if a line carries the label.
     pub line: Option<Style>,
     /// Whether marks carry the label.
     pub marks: bool,
+    /// Whether an area carries the label: a band or bars.
+    pub area: Option<Style>,
+    /// Whether all that carries the label is pale.
+    pub pale: bool,
 }
 
-/// The legend of a figure: every label once, in order of appearance; a series without label or points has none.
-pub(crate) fn legend(figure: &Figure) -> Vec<Entry> {
-    let mut entries: Vec<Entry> = Vec::new();
-    for series in figure.panels.iter().flat_map(|panel| &panel.series) {
-        if series.label.trim().is_empty() || !points(series).any(drawable) {
+/// Longest legend; of what is beyond only the number is told.
+const MOST: usize = 24;
+
+/// The legend of a figure: every label once, in order of appearance; what has marks only and references last. A series without label or points
+/// has no entry, and one whose colour says its value has none unless its label stands for several values. Also returns
+/// how many labels are left out.
+pub(crate) fn legend(figure: &Figure) -> (Vec<Entry>, usize) {
+    let shades = Shades::of(figure);
+    let mut entries: Vec<(Entry, Option<f64>, bool)> = Vec::new();
+    let all = figure.panels.iter().flat_map(|panel| panel.series.iter().map(move |series| (panel, series)));
+    for (panel, series) in all {
+        if series.label.trim().is_empty() || drawn(panel, series).next().is_none() {
             continue;
         }
-        let (line, marks) = match series.style {
-            Style::Marks => (None, true),
-            style => (Some(style), false),
+        let colour = shades.colour(series);
+        let value = series.value.filter(|_| shades.bar.is_some() && series.emphasis != Emphasis::Reference);
+        let (line, marks, area) = match line_style(series) {
+            Style::Marks => (None, true, None),
+            style @ (Style::Band | Style::Bars) => (None, false, Some(style)),
+            style => (Some(style), false, None),
         };
-        match entries.iter_mut().find(|entry| entry.label == series.label) {
-            Some(entry) => {
-                if entry.colour != colour(series.colour) {
-                    entry.colour = MANY_COLOURS;
+        let pale = series.emphasis == Emphasis::Pale;
+        match entries.iter_mut().find(|(entry, _, _)| entry.label == series.label) {
+            Some((entry, known, named)) => {
+                if entry.colour != colour {
+                    entry.colour = Colour::many();
                 }
+                *named |= value.is_none() || *known != value;
                 entry.line = entry.line.or(line);
+                entry.area = entry.area.or(area);
                 entry.marks |= marks;
+                entry.pale &= pale;
             }
-            None => entries.push(Entry { label: series.label.clone(), colour: colour(series.colour), line, marks }),
+            None => {
+                let label = series.label.clone();
+                entries.push((Entry { label, colour, line, marks, area, pale }, value, value.is_none()));
+            }
         }
     }
-    entries
+    let mut entries: Vec<Entry> = entries.into_iter().filter(|(_, _, named)| *named).map(|(entry, ..)| entry).collect();
+    let reference = Colour::reference();
+    entries.sort_by_key(|entry| match entry {
+        entry if entry.colour == reference => 2,
+        entry => u8::from(entry.line.is_none() && entry.area.is_none()),
+    });
+    let more = entries.len().saturating_sub(MOST);
+    entries.truncate(MOST);
+    (entries, more)
 }
 
-/// Interval of an axis, finite and not empty.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Range {
-    pub from: f64,
-    pub to: f64,
-}
-
-/// Values beyond this are drawn at the edge, so that differences of two of them stay finite.
-const LARGEST: f64 = 1e307;
-/// A range narrower than this part of its values is drawn as a constant: ticks could not tell its ends apart.
-const NARROWEST: f64 = 1e-12;
-/// Free space beyond the data, part of the range.
-const MARGIN: f64 = 0.05;
 /// Panels of one quantity share their range if none would use less than this part of it.
 const SHARE: f64 = 0.2;
+/// References count for the vertical range up to this multiple of the results: a resonance without friction would
+/// flatten the curves that matter.
+const REFERENCE_REACH: f64 = 2.0;
 
-impl Range {
-    fn around(values: impl Iterator<Item = f64>) -> Option<Range> {
-        values.filter(|v| v.is_finite()).map(|v| v.clamp(-LARGEST, LARGEST)).fold(None, |range: Option<Range>, v| {
-            Some(range.map_or(Range { from: v, to: v }, |r| Range { from: r.from.min(v), to: r.to.max(v) }))
-        })
-    }
-
-    fn union(self, other: Range) -> Range {
-        Range { from: self.from.min(other.from), to: self.to.max(other.to) }
-    }
-
-    pub(crate) fn span(self) -> f64 {
-        self.to - self.from
-    }
-
-    fn size(self) -> f64 {
-        self.from.abs().max(self.to.abs())
-    }
-
-    /// Widens by `margin` of the span on both ends; a constant gets a range around it.
-    fn widened(self, margin: f64) -> Range {
-        let pad = match self.size() {
-            size if size < 1.0 / LARGEST => 1.0,
-            size if self.span() <= NARROWEST * size => 0.1 * size,
-            _ => margin * self.span(),
-        };
-        Range { from: self.from - pad, to: self.to + pad }
-    }
+/// Whether so many results are in a panel that they need thin lines and small marks.
+pub(crate) fn crowded(panel: &Panel) -> bool {
+    panel.series.iter().filter(|s| s.emphasis == Emphasis::Normal).count() > CROWD
 }
 
-/// Ranges of the axes of every panel, x and y.
-pub(crate) fn ranges(figure: &Figure) -> Vec<(Range, Range)> {
-    let raw: Vec<Option<(Range, Range)>> = figure
-        .panels
-        .iter()
-        .map(|panel| {
-            let all = || panel.series.iter().flat_map(|series| points(series).filter(|p| drawable(*p)));
-            Some((Range::around(all().map(|p| p.0))?, Range::around(all().map(|p| p.1))?))
-        })
-        .collect();
+/// A panel with more results than this is crowded.
+const CROWD: usize = 40;
+
+/// How much of its colour a pale curve and an area keep.
+pub(crate) const PALE: f64 = 0.4;
+pub(crate) const AREA: f64 = 0.25;
+
+/// The axes of a panel: their ranges, and whether a panel of the same quantity has another range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Axes {
+    pub x: Range,
+    pub y: Range,
+    pub own_x: bool,
+    pub own_y: bool,
+}
+
+/// The axes of every panel.
+pub(crate) fn axes(figure: &Figure) -> Vec<Axes> {
+    let raw: Vec<Option<(Range, Range)>> = figure.panels.iter().map(extent).collect();
     let x = shared(figure, &raw, |panel| &panel.x, |pair| pair.0);
     let y = shared(figure, &raw, |panel| &panel.y, |pair| pair.1);
-    let curves = figure.panels.iter().map(|panel| panel.series.iter().all(is_curve));
-    curves
+    let ranges: Vec<(Range, Range)> = figure
+        .panels
+        .iter()
         .zip(x.into_iter().zip(y))
-        .map(|(curve, (x, y))| {
+        .map(|(panel, (x, y))| {
             // a curve over a parameter fills its axis from end to end; a loop wants air around it
+            let curve = panel.series.iter().all(|series| is_curve(panel, series));
+            let floor = y.scale == Scale::Linear && y.from >= 0.0 && y.from <= 0.4 * y.to && y.to > 0.0;
+            let wide = y.widened(MARGIN);
+            let y = if floor { Range { from: 0.0, ..wide } } else { wide };
             let x = x.widened(if curve { 0.0 } else { MARGIN });
-            let floor = y.from >= 0.0 && y.from <= 0.4 * y.to && y.to > 0.0;
-            let y = y.widened(MARGIN);
-            (x, if floor { Range { from: 0.0, ..y } } else { y })
+            (Range::fixed(&panel.x).unwrap_or(x), Range::fixed(&panel.y).unwrap_or(y))
+        })
+        .collect();
+    let differs = |i: usize, axis: fn(&Panel) -> &Axis, range: fn(&(Range, Range)) -> Range| {
+        let panels = &figure.panels;
+        raw[i].is_some()
+            && (0..panels.len()).any(|j| {
+                raw[j].is_some() && alike(axis(&panels[i]), axis(&panels[j])) && range(&ranges[i]) != range(&ranges[j])
+            })
+    };
+    (0..ranges.len())
+        .map(|i| Axes {
+            x: ranges[i].0,
+            y: ranges[i].1,
+            own_x: differs(i, |p| &p.x, |r| r.0),
+            own_y: differs(i, |p| &p.y, |r| r.1),
         })
         .collect()
 }
 
+/// Whether two axes show the same quantity in the same unit and scale, so that a reader compares them.
+pub(crate) fn alike(a: &Axis, b: &Axis) -> bool {
+    (&a.quantity, &a.unit, a.scale) == (&b.quantity, &b.unit, b.scale)
+}
+
+/// The ranges that the data of a panel take up.
+fn extent(panel: &Panel) -> Option<(Range, Range)> {
+    let fixed = Range::fixed(&panel.x);
+    let inside = |p: &(f64, f64)| fixed.is_none_or(|range| range.contains(p.0));
+    let values = |reference: bool| {
+        panel.series.iter().filter(move |s| (s.emphasis == Emphasis::Reference) == reference).flat_map(move |series| {
+            let area = matches!(series.style, Style::Band | Style::Bars);
+            points(panel, series)
+                .enumerate()
+                .filter(|(_, p)| drawable(*p))
+                .filter(move |(_, p)| inside(p))
+                .flat_map(move |(i, (_, y))| [Some(y), base(panel, series, i).filter(|_| area)].into_iter().flatten())
+        })
+    };
+    let mut x = Range::around(panel.series.iter().flat_map(|s| drawn(panel, s).map(|p| p.0)), panel.x.scale)?;
+    if x.scale == Scale::Linear && panel.series.iter().any(|s| s.style == Style::Bars) {
+        // the outer bars stand clear of the frame as they do of each other
+        let half = 0.5 * bar_slot(panel, x) / BAR;
+        x = Range { from: x.from - half, to: x.to + half, ..x };
+    }
+    let results = Range::around(values(false), panel.y.scale);
+    let references = Range::around(values(true), panel.y.scale);
+    let y = match (results, references) {
+        (Some(results), Some(references)) if results.scale == Scale::Linear => {
+            let reach = REFERENCE_REACH * results.from.abs().max(results.to.abs());
+            let cut = |v: f64| if reach > 0.0 { v.clamp(-reach, reach) } else { v };
+            results.union(Range { from: cut(references.from), to: cut(references.to), ..references })
+        }
+        (Some(results), Some(references)) => results.union(references),
+        // only outside of the fixed range is anything
+        (results, references) => results.or(references).unwrap_or(Range::unit(panel.y.scale)),
+    };
+    Some((x, y))
+}
+
+/// Bars take this part of the smallest distance between two of them.
+const BAR: f64 = 0.8;
+
+/// Width of all bars at one abscissa, in the measure of the axis.
+pub(crate) fn bar_slot(panel: &Panel, x: Range) -> f64 {
+    let bars = panel.series.iter().filter(|s| s.style == Style::Bars);
+    let mut at: Vec<f64> = bars.flat_map(|s| drawn(panel, s).map(|p| x.measure(p.0))).collect();
+    at.sort_by(f64::total_cmp);
+    let gap = at.windows(2).map(|w| w[1] - w[0]).filter(|gap| *gap > 1e-9).fold(f64::INFINITY, f64::min);
+    BAR * match x.scale {
+        _ if gap.is_finite() => gap,
+        Scale::Linear => 1.0,
+        Scale::Log => 0.3,
+    }
+}
+
 /// Whether x never goes back (marks do not count).
-fn is_curve(series: &Series) -> bool {
+fn is_curve(panel: &Panel, series: &Series) -> bool {
     if series.style == Style::Marks {
         return true;
     }
     let mut last = f64::NEG_INFINITY;
-    points(series).filter(|p| drawable(*p)).all(|(x, _)| std::mem::replace(&mut last, x) <= x)
+    drawn(panel, series).all(|(x, _)| std::mem::replace(&mut last, x) <= x)
 }
 
-/// One range per panel; panels of the same quantity and unit share it where that leaves each of them legible, so that
-/// they can be compared by eye.
+/// One range per panel; panels of the same quantity and unit share it as the figure says, so that they can be compared
+/// by eye.
 fn shared(
     figure: &Figure,
     raw: &[Option<(Range, Range)>],
@@ -164,92 +311,20 @@ fn shared(
 ) -> Vec<Range> {
     (0..raw.len())
         .map(|i| {
-            let alike: Vec<Range> = (0..raw.len())
-                .filter(|&j| axis(&figure.panels[j]) == axis(&figure.panels[i]))
+            let own = axis(&figure.panels[i]);
+            let members: Vec<Range> = (0..raw.len())
+                .filter(|&j| alike(axis(&figure.panels[j]), own))
                 .filter_map(|j| raw[j].as_ref().map(pick))
                 .collect();
-            let Some(union) = alike.iter().copied().reduce(Range::union) else { return Range { from: 0.0, to: 1.0 } };
-            match &raw[i] {
-                None => union,
-                Some(_) if alike.iter().all(|r| r.span() >= SHARE * union.span()) => union,
-                Some(pair) => pick(pair),
+            let Some(union) = members.iter().copied().reduce(Range::union) else { return Range::unit(own.scale) };
+            let legible = || members.iter().all(|r| r.span() >= SHARE * union.span());
+            match (&raw[i], figure.sharing) {
+                (None, _) | (_, Sharing::Always) => union,
+                (Some(_), Sharing::WhereLegible) if legible() => union,
+                (Some(pair), _) => pick(pair),
             }
         })
         .collect()
-}
-
-/// Ticks of an axis: where they are, what stands there, and the power of ten taken out of them.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Ticks {
-    pub at: Vec<f64>,
-    pub labels: Vec<String>,
-    pub power: i32,
-}
-
-/// About `count` ticks at round values inside the range.
-pub(crate) fn ticks(range: Range, count: f64) -> Ticks {
-    let rough = range.span() / count.max(1.0);
-    let magnitude = 10f64.powf(rough.log10().floor());
-    let step =
-        [1.0, 2.0, 2.5, 5.0, 10.0].map(|s| s * magnitude).into_iter().find(|s| *s >= 0.999 * rough).unwrap_or(rough);
-    let (first, last) = ((range.from / step - 1e-6).ceil(), (range.to / step + 1e-6).floor());
-    let number = ((last - first).max(0.0) as usize).min(100);
-    let at: Vec<f64> = (0..=number).map(|i| (first + i as f64) * step + 0.0).collect();
-    // five figures before the point or three zeros after it are hard to read: take a power of a thousand out
-    let size = range.size();
-    let exponent = size.log10().floor() as i32;
-    // (unless the ticks differ in their last figures only)
-    let usual = if range.span() < 1e-3 * size { -4..=9 } else { -2..=4 };
-    let power = if usual.contains(&exponent) { 0 } else { 3 * exponent.div_euclid(3) };
-    let scaled = |v: f64| scaled(v, power);
-    let whole = |d: &i32| {
-        let digits = scaled(step) * 10f64.powi(*d);
-        digits > 0.5 && (digits - digits.round()).abs() < 1e-6 * digits
-    };
-    let decimals = (0..15).find(whole).unwrap_or(15) as usize;
-    let labels = at.iter().map(|v| signed(format!("{:.decimals$}", scaled(*v)))).collect();
-    Ticks { at, labels, power }
-}
-
-/// A value in units of a power of ten.
-pub(crate) fn scaled(value: f64, power: i32) -> f64 {
-    value / 10f64.powi(power / 2) / 10f64.powi(power - power / 2) // two factors: 1e-320 has no inverse
-}
-
-/// A number with a true minus sign, and without the sign of a zero.
-fn signed(text: String) -> String {
-    match text.strip_prefix('-') {
-        Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_owned(),
-        Some(digits) => format!("−{digits}"),
-        None => text,
-    }
-}
-
-/// The unit of an axis, with the power of ten taken out of its numbers: `Hz`, `10⁻⁶ J`.
-pub(crate) fn unit(axis: &Axis, power: i32) -> String {
-    let factor = if power == 0 { String::new() } else { format!("10{}", superscript(power)) };
-    [factor.as_str(), axis.unit.trim()].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
-}
-
-/// What an axis shows: `frequency (Hz)`; with a power of ten taken out, `energy (10⁻⁶ J)`.
-pub(crate) fn axis_title(axis: &Axis, power: i32) -> String {
-    let unit = unit(axis, power);
-    match (axis.quantity.trim(), unit.as_str()) {
-        (quantity, "") => quantity.to_owned(),
-        ("", unit) => unit.to_owned(),
-        (quantity, unit) => format!("{quantity} ({unit})"),
-    }
-}
-
-pub(crate) fn superscript(power: i32) -> String {
-    let digit = |c: char| match c {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        c => c.to_digit(10).and_then(|d| char::from_u32(0x2070 + d)).unwrap_or(c),
-    };
-    power.to_string().chars().map(digit).collect()
 }
 
 #[cfg(test)]
@@ -257,59 +332,92 @@ mod tests {
     use super::*;
     use crate::samples;
 
-    fn labels(from: f64, to: f64) -> (Vec<String>, i32) {
-        let t = ticks(Range { from, to }, 6.0);
-        (t.labels, t.power)
-    }
-
-    #[test]
-    fn ticks_are_round_and_short() {
-        assert_eq!(labels(119.5, 122.5).0, ["119.5", "120.0", "120.5", "121.0", "121.5", "122.0", "122.5"]);
-        assert_eq!(labels(-0.3, 0.3).0, ["−0.3", "−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3"]);
-        assert_eq!(labels(0.0, 6e-7), (["0", "100", "200", "300", "400", "500", "600"].map(String::from).to_vec(), -9));
-        assert_eq!(labels(0.0, 3e300).1, 300);
-        for (from, to) in [(0.0, 1e-299), (-1e300, 1e300), (1e9, 1e9 + 1.0), (1.0, 1.0 + 1e-9), (0.0, 0.7)] {
-            let t = ticks(Range { from, to }, 6.0);
-            assert!((3..=13).contains(&t.at.len()), "{from} {to}: {t:?}");
-            let mut distinct = t.labels.clone();
-            distinct.dedup();
-            assert_eq!(distinct, t.labels);
-        }
-    }
-
     #[test]
     fn a_label_stands_once_in_the_legend() {
-        let entries = legend(&samples::response().figure);
+        let (entries, more) = legend(&samples::response().figure);
         assert_eq!(entries.iter().map(|e| e.label.as_str()).collect::<Vec<_>>(), ["a₁", "a₂", "a₃", "peak"]);
-        assert_eq!(entries[3], Entry { label: "peak".into(), colour: MANY_COLOURS, line: None, marks: true });
+        let peak =
+            Entry { label: "peak".into(), colour: Colour::many(), line: None, marks: true, area: None, pale: false };
+        assert_eq!((&entries[3], more), (&peak, 0));
+    }
+
+    #[test]
+    fn many_values_are_told_by_colours_and_few_by_names() {
+        let figure = samples::cases(400).figure;
+        let (entries, more) = legend(&figure);
+        // the label that stands for many values stays
+        assert_eq!(
+            (entries.iter().map(|e| e.label.as_str()).collect::<Vec<_>>(), more),
+            (vec!["peak", "free", "stuck"], 0)
+        );
+        let (axis, range) = Shades::of(&figure).bar.unwrap();
+        assert_eq!((axis.quantity.as_str(), range.from, range.to), ("Ft", 1.0, 400.0));
+        let shades = Shades::of(&figure);
+        let colours: Vec<Colour> =
+            figure.panels[0].series.iter().filter(|s| s.label.starts_with("Ft")).map(|s| shades.colour(s)).collect();
+        assert_eq!((colours.first(), colours.last()), (Some(&Colour::sequential(0.0)), Some(&Colour::sequential(1.0))));
+        let few = samples::cases(7).figure;
+        assert_eq!((legend(&few).0.len(), Shades::of(&few).bar), (7 + 3, None));
+        // names that are no values: the first of them, and the number of the others
+        let unnamed = Figure { varied: None, ..figure };
+        let (entries, more) = legend(&unnamed);
+        assert_eq!((entries.len(), more), (MOST, 400 + 3 - MOST));
     }
 
     #[test]
     fn every_range_is_finite_and_holds_its_data() {
         for dataset in samples::all() {
-            for ((x, y), panel) in ranges(&dataset.figure).iter().zip(&dataset.figure.panels) {
+            for (axes, panel) in axes(&dataset.figure).iter().zip(&dataset.figure.panels) {
+                let (x, y) = (axes.x, axes.y);
                 assert!(
                     x.span() > 0.0 && y.span() > 0.0 && x.span().is_finite() && y.span().is_finite(),
                     "{}",
                     panel.title
                 );
-                for point in panel.series.iter().flat_map(points).filter(|p| drawable(*p)) {
-                    assert!(
-                        point.0 >= x.from && point.0 <= x.to && point.1 >= y.from && point.1 <= y.to,
-                        "{}",
-                        panel.title
-                    );
+                let results = panel.series.iter().filter(|s| s.emphasis != Emphasis::Reference);
+                for point in results.flat_map(|s| drawn(panel, s)) {
+                    let free = panel.x.range.is_none() && panel.y.range.is_none();
+                    assert!(!free || x.contains(point.0) && y.contains(point.1), "{}: {point:?}", panel.title);
                 }
             }
         }
     }
 
     #[test]
-    fn units_and_powers_stand_in_brackets() {
-        let axis = |quantity: &str, unit: &str| Axis::new(quantity, unit);
-        assert_eq!(axis_title(&axis("frequency", "Hz"), 0), "frequency (Hz)");
-        assert_eq!(axis_title(&axis("energy", "J"), -6), "energy (10⁻⁶ J)");
-        assert_eq!(axis_title(&axis("slip fraction", ""), 0), "slip fraction");
-        assert_eq!(axis_title(&axis("ratio", ""), 12), "ratio (10¹²)");
+    fn panels_that_are_compared_share_their_axes_or_say_that_they_do_not() {
+        let panel = |height: f64| Panel {
+            x: Axis::new("frequency", "Hz"),
+            y: Axis::new("amplitude", "mm"),
+            series: vec![Series::line("a", vec![1.0, 2.0], vec![0.0, height], 0)],
+            ..Panel::default()
+        };
+        let figure =
+            |sharing, heights: [f64; 2]| Figure { sharing, panels: heights.map(panel).to_vec(), ..Figure::default() };
+        let tops =
+            |figure: &Figure| axes(figure).iter().map(|a| ((a.y.to * 1e9).round() / 1e9, a.own_y)).collect::<Vec<_>>();
+        assert_eq!(tops(&figure(Sharing::WhereLegible, [2.0, 4.0])), [(4.2, false); 2]);
+        assert_eq!(tops(&figure(Sharing::WhereLegible, [0.2, 4.0])), [(0.21, true), (4.2, true)]);
+        assert_eq!(tops(&figure(Sharing::Always, [0.2, 4.0])), [(4.2, false); 2]);
+        assert_eq!(tops(&figure(Sharing::Never, [2.0, 4.0])), [(2.1, true), (4.2, true)]);
+        // a range given for one panel is no longer that of the other
+        let mut fixed = figure(Sharing::Always, [2.0, 4.0]);
+        fixed.panels[0].y = fixed.panels[0].y.clone().between(0.0, 1.0);
+        assert_eq!(tops(&fixed), [(1.0, true), (4.2, true)]);
+    }
+
+    #[test]
+    fn a_reference_does_not_flatten_the_results() {
+        let figure = |top: f64| Figure {
+            panels: vec![Panel {
+                series: vec![
+                    Series::line("a", vec![0.0, 1.0], vec![0.0, 1.0], 0),
+                    Series::line("free", vec![0.0, 1.0], vec![0.0, top], 1).reference(),
+                ],
+                ..Panel::default()
+            }],
+            ..Figure::default()
+        };
+        assert!((axes(&figure(50.0))[0].y.to - 2.1).abs() < 1e-12);
+        assert!((axes(&figure(1.5))[0].y.to - 1.575).abs() < 1e-12);
     }
 }

@@ -16,6 +16,9 @@
 //! # }
 //! ```
 
+mod axis;
+mod clip;
+mod colour;
 pub mod csv;
 pub mod folder;
 mod font;

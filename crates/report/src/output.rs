@@ -19,16 +19,22 @@ pub struct Output {
 /// A file before it is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct File {
-    /// Name inside the study's folder.
+    /// Name inside its folder.
     pub name: String,
     /// The bytes.
     pub content: Vec<u8>,
+    /// Whether its folder is the one that holds the studies' folders: the same file serves them all.
+    pub shared: bool,
 }
 
 impl File {
-    /// A file of this name and content.
+    /// A file of this name and content in the study's folder.
     pub fn new(name: impl Into<String>, content: impl Into<Vec<u8>>) -> File {
-        File { name: name.into(), content: content.into() }
+        File { name: name.into(), content: content.into(), shared: false }
+    }
+    /// A file that all studies share, in the folder that holds theirs.
+    pub fn shared(name: impl Into<String>, content: impl Into<Vec<u8>>) -> File {
+        File { shared: true, ..File::new(name, content) }
     }
 }
 
@@ -132,7 +138,8 @@ impl ReportError {
     }
 }
 
-/// Writes the chosen outputs of a dataset into `out/NAME/` and returns the paths of the files, in that order.
+/// Writes the chosen outputs of a dataset into `out/NAME/` and returns the paths of the files, in that order. Files that
+/// studies share go into `out`, unless they are there already, and are not among the paths: they are no results.
 ///
 /// The files replace those of an earlier run there, all or none; files that no run wrote stay. The record is always among them: it lists what
 /// belongs to the run. The results of an interrupted run go to `out/NAME.interrupted/` where `out/NAME/` holds a whole one.
@@ -144,6 +151,7 @@ pub fn write_dataset(dataset: &Dataset, out: &Path, outputs: &Outputs) -> Result
     for output in outputs.iter() {
         files.extend((output.make)(dataset)?);
     }
+    let (shared, mut files): (Vec<File>, Vec<File>) = files.into_iter().partition(|file| file.shared);
     if files.iter().all(|file| file.name != folder::RECORD) {
         files.push(File::new(folder::RECORD, Vec::new()));
     }
@@ -151,7 +159,19 @@ pub fn write_dataset(dataset: &Dataset, out: &Path, outputs: &Outputs) -> Result
     for file in files.iter_mut().filter(|file| file.name == folder::RECORD) {
         file.content = crate::json::to_json(dataset, &names)?.into_bytes();
     }
+    // shared files first: a page must not appear before what it needs
+    for file in &shared {
+        write_once(&out.join(file_name(&file.name, "result")?), &file.content)?;
+    }
     folder::replace(&folder::of_run(out, name, dataset.record.interrupted), &files)
+}
+
+/// Writes a file unless it is there with this content.
+pub(crate) fn write_once(path: &Path, content: &[u8]) -> Result<(), ReportError> {
+    if std::fs::read(path).is_ok_and(|found| found == content) {
+        return Ok(());
+    }
+    write_file(path, content).map(|_| ())
 }
 
 /// Writes one file, whole or not at all: a temporary file in the same folder, renamed when complete. Makes the folder
@@ -207,6 +227,16 @@ mod tests {
         names.sort();
         found.sort();
         assert_eq!(found, names);
+        // the script of the interactive figure stands beside the folder, once
+        let script = out.path().join(crate::html::script_name());
+        let written = std::fs::metadata(&script).unwrap().modified().unwrap();
+        write_dataset(&samples::hysteresis(), out.path(), &Outputs::all()).unwrap();
+        assert_eq!(std::fs::metadata(&script).unwrap().modified().unwrap(), written);
+        assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 3);
+        // one that is broken is written anew
+        std::fs::write(&script, "half a scr").unwrap();
+        write_dataset(&samples::response(), out.path(), &Outputs::only(&["html"]).unwrap()).unwrap();
+        assert_eq!(std::fs::read_to_string(&script).unwrap(), crate::html::script());
         // a second run replaces the files
         write_dataset(&samples::response(), out.path(), &Outputs::only(&["csv"]).unwrap()).unwrap();
     }
@@ -229,7 +259,8 @@ mod tests {
         assert!(error.to_string().contains(taken.to_str().unwrap()), "{error}");
         std::fs::create_dir(out.path().join("target")).unwrap();
         assert!(write_file(&out.path().join("target"), b"x").is_err()); // a folder has the name
-        assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 2);
+        // and the script, which is written first
+        assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 3);
     }
 
     #[test]

@@ -43,12 +43,12 @@ fn draw(figure: &Figure) -> Result<tiny_skia::Pixmap, ReportError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{frame, samples};
+    use crate::samples;
 
     #[test]
     fn every_colour_of_the_palette_is_on_the_image() {
         let pixmap = draw(&samples::many().figure).unwrap();
-        for colour in frame::PALETTE {
+        for colour in crate::colour::PALETTE.map(|pair| pair[0]) {
             let rgb = u32::from_str_radix(&colour[1..], 16).unwrap();
             let close = |p: &tiny_skia::PremultipliedColorU8| {
                 let near = |value: u8, shift: u32| i64::from(value).abs_diff(i64::from((rgb >> shift) & 255)) < 12;

@@ -34,7 +34,7 @@ fn record(points: &[(&str, u64)]) -> Record {
 }
 
 pub(crate) fn all() -> Vec<Dataset> {
-    vec![response(), hysteresis(), hostile(), many()]
+    vec![response(), hysteresis(), hostile(), many(), cases(5), cases(400), envelope(), spectrum(), modes()]
 }
 
 /// Response curves of two weakly coupled blades and their contact: four limits of friction.
@@ -255,4 +255,101 @@ pub(crate) fn many() -> Dataset {
         kind: "transient".into(),
         ..hysteresis()
     }
+}
+
+/// Amplitude of one mass under a unit force, relative to its static displacement.
+fn resonance(f: f64, f0: f64, zeta: f64) -> f64 {
+    1.0 / ((1.0 - (f / f0).powi(2)).powi(2) + (2.0 * zeta * f / f0).powi(2)).sqrt()
+}
+
+fn bare(name: &str, title: &str, panels: Vec<Panel>) -> Dataset {
+    Dataset {
+        name: name.into(),
+        title: title.into(),
+        tables: vec![],
+        figure: Figure { title: title.into(), panels, ..Figure::default() },
+        ..hysteresis()
+    }
+}
+
+/// Overlaid response curves of this many slip limits with their peaks, between the free and the stuck one.
+pub(crate) fn cases(count: usize) -> Dataset {
+    let f: Vec<f64> = (0..300).map(|i| 100.0 + 0.2 * f64::from(i)).collect();
+    let curve = |f0: f64, zeta: f64| f.iter().map(|f| 0.1 * resonance(*f, f0, zeta)).collect::<Vec<f64>>();
+    let mut list = Vec::new();
+    for k in 0..count {
+        let part = k as f64 / count as f64;
+        let limit = (k + 1) as f64;
+        let y = curve(120.0 + 20.0 * part, 0.012 + 0.12 * part * (1.0 - part));
+        let top = (0..y.len()).max_by(|i, j| y[*i].total_cmp(&y[*j])).unwrap();
+        list.push(Series::marks("peak", vec![f[top]], vec![y[top]], k).of(limit));
+        list.push(Series::line(format!("Ft = {limit} N"), f.clone(), y, k).of(limit));
+    }
+    list.push(Series::line("free", f.clone(), curve(120.0, 0.001), 0).reference());
+    list.push(Series { style: Style::Dotted, ..Series::line("stuck", f.clone(), curve(140.0, 0.004), 0).reference() });
+    let panel = Panel { title: "blade".into(), x: axis("frequency", "Hz"), y: axis("amplitude", "mm"), series: list };
+    let mut dataset =
+        bare(&format!("cases{count}"), "Response of a blade under a damper, slip limits compared", vec![panel]);
+    dataset.figure.varied = Some(axis("Ft", "N"));
+    dataset
+}
+
+/// The largest of many blades and the single ones behind it on a logarithmic axis of a fixed range; percentiles of a
+/// random sample beside it.
+pub(crate) fn envelope() -> Dataset {
+    let f: Vec<f64> = (0..300).map(|i| 100.0 + 0.2 * f64::from(i)).collect();
+    let blades: Vec<Vec<f64>> = (0..48)
+        .map(|k| f.iter().map(|f| 0.1 * resonance(*f, 125.0 + 8.0 * (f64::from(k) * 2.4).sin(), 0.004)).collect())
+        .collect();
+    let largest: Vec<f64> = (0..f.len()).map(|i| blades.iter().map(|b| b[i]).fold(0.0, f64::max)).collect();
+    let mut list: Vec<Series> =
+        blades.iter().map(|b| Series::line("single blades", f.clone(), b.clone(), 0).pale()).collect();
+    list.push(Series::line("largest (blade 17)", f.clone(), largest.clone(), 1));
+    let first = Panel {
+        title: "48 blades".into(),
+        x: axis("frequency", "Hz").between(110.0, 140.0),
+        y: axis("amplitude", "mm").log().between(0.1, 10.0),
+        series: list,
+    };
+    let scaled = |by: f64| largest.iter().map(|v| by * v).collect::<Vec<f64>>();
+    let second = Panel {
+        title: "random stiffness".into(),
+        x: axis("frequency", "Hz"),
+        y: axis("amplitude", "mm"),
+        series: vec![
+            Series::line("median", f.clone(), scaled(0.5), 2),
+            Series::band("5 % to 95 %", f.clone(), scaled(0.3), scaled(0.9), 2),
+        ],
+    };
+    bare("envelope", "Mistuned ring of 48 blades", vec![first, second])
+}
+
+/// Harmonics of three masses as bars.
+pub(crate) fn spectrum() -> Dataset {
+    let order: Vec<f64> = (1..=9).map(f64::from).collect();
+    let list = ["blade 1", "blade 2", "contact"].iter().enumerate().map(|(k, name)| {
+        let y = order.iter().map(|n| (3.0 + k as f64) / n.powi(2)).collect();
+        Series::bars(*name, order.clone(), y, k)
+    });
+    let panel =
+        Panel { title: String::new(), x: axis("harmonic", ""), y: axis("amplitude", "µm"), series: list.collect() };
+    bare("spectrum", "Harmonics of the motion", vec![panel])
+}
+
+/// Frequency, damping and stiffness of nonlinear modes over four decades of amplitude.
+pub(crate) fn modes() -> Dataset {
+    let a: Vec<f64> = (0..=80).map(|i| 10f64.powf(-2.0 + f64::from(i) / 20.0)).collect();
+    let panel = |quantity: &str, unit: &str, y: &dyn Fn(f64) -> f64| Panel {
+        title: quantity.into(),
+        x: axis("amplitude", "µm").log(),
+        y: axis(quantity, unit),
+        series: vec![Series::line("mode 1", a.clone(), a.iter().map(|a| y(*a)).collect(), 0)],
+    };
+    let mut panels = vec![
+        panel("frequency", "Hz", &|a| 120.0 + 20.0 / (1.0 + a)),
+        panel("damping ratio", "%", &|a| 5.0 * a / (1.0 + a * a)),
+        panel("dissipation", "J", &|a| 1e-9 * a * a / (1.0 + a)),
+    ];
+    panels[2].y = axis("dissipation per cycle, all joints of the ring together with the tip shroud", "J").log();
+    bare("modes", "Nonlinear modes", panels)
 }

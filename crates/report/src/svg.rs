@@ -4,11 +4,14 @@
 //! drawn (kuva 0.6 counts its clip paths per process), ranges below 2e-16 must not collapse, `$` in a title must stay,
 //! and the legend must stand in rows beside no curve. Every text is measured in the embedded font before it is placed.
 
+use crate::axis::{self, Range, Ticks};
+use crate::clip::{self, Point, Window};
+use crate::colour::Colour;
 use crate::font::{self, Weight};
-use crate::frame::{self, Entry, Range, Ticks};
+use crate::frame::{self, AREA, Axes, Entry, PALE, Shades};
 use crate::output::{File, Output, ReportError};
 use std::fmt::Write;
-use stickslip_study::dataset::{Dataset, Figure, Panel, Series, Style};
+use stickslip_study::dataset::{Axis, Dataset, Emphasis, Figure, Panel, Series, Style};
 
 /// The output `svg`.
 pub const OUTPUT: Output = Output { name: "svg", summary: "figure.svg, for papers and slides", make: files };
@@ -24,13 +27,18 @@ const LEADING: f64 = 1.3;
 const MARGIN: f64 = 16.0;
 const GAP: f64 = 26.0;
 const TICK_LENGTH: f64 = 5.0;
+const MINOR_LENGTH: f64 = 3.0;
 const LINE: f64 = 1.8;
+const THIN: f64 = 1.0;
 const MARK: f64 = 3.8;
+const SMALL_MARK: f64 = 2.0;
+/// The colour bar: its width, and the number of steps that look continuous.
+const BAR: f64 = 16.0;
+const BAR_STEPS: usize = 96;
 const TEXT: &str = "#1a1a1a";
 const AXIS: &str = "#444444";
 const GRID: &str = "#e3e3e3";
-/// A polyline with more points than this is thinned to what the eye can see.
-const DENSE: usize = 4000;
+const FINE_GRID: &str = "#f2f2f2";
 
 fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
     Ok(vec![File::new("figure.svg", to_svg(&dataset.figure))])
@@ -48,7 +56,10 @@ pub fn to_svg(figure: &Figure) -> String {
         draw_entry(&mut svg, placed);
     }
     for (panel, place) in figure.panels.iter().zip(&layout.panels) {
-        draw_panel(&mut svg, panel, place);
+        draw_panel(&mut svg, panel, place, &layout.shades);
+    }
+    if let Some(bar) = &layout.bar {
+        draw_bar(&mut svg, bar);
     }
     svg.finish()
 }
@@ -69,13 +80,28 @@ struct Layout {
     title: Vec<String>,
     legend: Vec<Placed>,
     panels: Vec<Place>,
+    shades: Shades,
+    bar: Option<Bar>,
 }
 
-/// A legend entry and the left end of its middle line.
+/// A legend entry and the left end of its first line.
 struct Placed {
     entry: Entry,
+    lines: Vec<String>,
     x: f64,
     y: f64,
+}
+
+/// The colour bar.
+struct Bar {
+    left: f64,
+    top: f64,
+    height: f64,
+    range: Range,
+    ticks: Ticks,
+    title: Vec<String>,
+    /// Distance from the bar to the near edge of its title.
+    title_offset: f64,
 }
 
 /// The plot area of a panel with its axes and texts.
@@ -86,6 +112,8 @@ struct Place {
     height: f64,
     x: Range,
     y: Range,
+    own_x: bool,
+    own_y: bool,
     x_ticks: Ticks,
     y_ticks: Ticks,
     title: Vec<String>,
@@ -106,17 +134,17 @@ impl Layout {
         let mut panels: Vec<Place> = figure
             .panels
             .iter()
-            .zip(frame::ranges(figure))
-            .map(|(panel, (x, y))| Place::new(panel, x, y, plot_width, plot_height))
+            .zip(frame::axes(figure))
+            .map(|(panel, axes)| Place::new(panel, &axes, plot_width, plot_height))
             .collect();
         // where neighbours have the same axis, its title stands once, at the outside
         for i in 0..panels.len() {
-            if i + columns < panels.len() && panels[i].x_title == panels[i + columns].x_title {
+            if i + columns < panels.len() && !panels[i].own_x && panels[i].x_title == panels[i + columns].x_title {
                 panels[i].x_title.clear();
             }
         }
         for i in (0..panels.len()).rev() {
-            if i % columns > 0 && panels[i].y_title == panels[i - 1].y_title {
+            if i % columns > 0 && !panels[i].own_y && panels[i].y_title == panels[i - 1].y_title {
                 panels[i].y_title.clear();
             }
         }
@@ -131,7 +159,10 @@ impl Layout {
             let overhang = members.iter().map(|&i| panels[i].overhang()).fold(0.0, f64::max);
             right += left + plot_width + if column + 1 < columns { overhang.max(GAP) } else { overhang };
         }
-        let width = right + MARGIN;
+        let shades = Shades::of(figure);
+        let full_height = rows as f64 * plot_height;
+        let mut bar = shades.bar.as_ref().map(|(axis, range)| Bar::new(axis, *range, right + GAP, full_height));
+        let width = bar.as_ref().map_or(right, Bar::right) + MARGIN;
 
         let title = font::wrap(&figure.title, TITLE, Weight::Bold, width - 2.0 * MARGIN);
         let mut y = MARGIN + TITLE * LEADING * title.len() as f64;
@@ -147,19 +178,46 @@ impl Layout {
             }
             y = top + plot_height + below + if row + 1 < rows { 10.0 } else { 0.0 };
         }
-        Layout { width, height: y + MARGIN, title, legend, panels }
+        if let (Some(bar), Some(first), Some(last)) = (&mut bar, panels.first(), panels.last()) {
+            bar.top = first.top;
+            bar.height = last.top + plot_height - first.top;
+        }
+        Layout { width, height: y + MARGIN, title, legend, panels, shades, bar }
+    }
+}
+
+fn widest(ticks: &Ticks) -> f64 {
+    ticks.labels.iter().map(|l| font::width(l, TICK, Weight::Regular)).fold(0.0, f64::max)
+}
+
+/// The title of an axis; a panel that does not share the axis of its like says so.
+fn title(axis: &Axis, ticks: &Ticks, own: bool, limit: f64) -> Vec<String> {
+    let own = if own { ", own range" } else { "" };
+    font::wrap(&format!("{}{own}", axis::axis_title(axis, ticks.power)), LABEL, Weight::Regular, limit)
+}
+
+impl Bar {
+    fn new(axis: &Axis, range: Range, left: f64, height: f64) -> Bar {
+        let ticks = axis::ticks(range, height / 46.0);
+        let title_offset = BAR + TICK_LENGTH + 5.0 + widest(&ticks) + 9.0;
+        let title = title(axis, &ticks, false, height);
+        Bar { left, top: 0.0, height, range, ticks, title, title_offset }
+    }
+
+    fn right(&self) -> f64 {
+        self.left + self.title_offset + LABEL * LEADING * self.title.len() as f64
     }
 }
 
 impl Place {
-    fn new(panel: &Panel, x: Range, y: Range, width: f64, height: f64) -> Place {
-        let y_ticks = frame::ticks(y, height / 46.0);
-        let widest =
-            |ticks: &Ticks| ticks.labels.iter().map(|l| font::width(l, TICK, Weight::Regular)).fold(0.0, f64::max);
+    fn new(panel: &Panel, axes: &Axes, width: f64, height: f64) -> Place {
+        let Axes { x, y, own_x, own_y } = *axes;
+        let y_ticks = axis::ticks(y, height / 46.0);
         // as many ticks as their labels leave room for
-        let fits = |ticks: &Ticks| (widest(ticks) + 16.0) * ticks.labels.len() as f64 <= width;
+        let fits =
+            |ticks: &Ticks| (widest(ticks) + 16.0) * ticks.labels.len() as f64 <= width && apart(ticks, x, width);
         let x_ticks =
-            (3..=8).rev().map(|n| frame::ticks(x, f64::from(n))).find(fits).unwrap_or_else(|| frame::ticks(x, 2.0));
+            (3..=8).rev().map(|n| axis::ticks(x, f64::from(n))).find(fits).unwrap_or_else(|| axis::ticks(x, 2.0));
         let y_title_offset = TICK_LENGTH + 5.0 + widest(&y_ticks) + 9.0;
         Place {
             left: 0.0,
@@ -167,10 +225,12 @@ impl Place {
             width,
             height,
             title: font::wrap(&panel.title, PANEL_TITLE, Weight::Bold, width),
-            x_title: font::wrap(&frame::axis_title(&panel.x, x_ticks.power), LABEL, Weight::Regular, width),
-            y_title: font::wrap(&frame::axis_title(&panel.y, y_ticks.power), LABEL, Weight::Regular, height),
+            x_title: title(&panel.x, &x_ticks, own_x, width),
+            y_title: title(&panel.y, &y_ticks, own_y, height),
             x,
             y,
+            own_x,
+            own_y,
             x_ticks,
             y_ticks,
             y_title_offset,
@@ -195,70 +255,146 @@ impl Place {
             .max(0.0)
     }
 
-    /// The place of a point.
-    fn map(&self, (x, y): (f64, f64)) -> (f64, f64) {
-        let part = |v: f64, r: Range| ((v - r.from) / r.span()).clamp(0.0, 1.0);
+    /// The place of a point; far outside it is near enough to infinity for a straight line.
+    fn map(&self, (x, y): Point) -> Point {
+        let part = |v: f64, r: Range| r.part(v).clamp(-FAR, FAR);
         (self.left + self.width * part(x, self.x), self.top + self.height * (1.0 - part(y, self.y)))
     }
+
+    fn window(&self) -> Window {
+        Window { left: self.left, top: self.top, right: self.left + self.width, bottom: self.top + self.height }
+    }
+}
+
+/// Lengths of an axis beyond which all points are equally far.
+const FAR: f64 = 1e6;
+
+/// Whether the labels of an uneven axis stand clear of each other.
+fn apart(ticks: &Ticks, range: Range, width: f64) -> bool {
+    let edges: Vec<(f64, f64)> = (ticks.at.iter().zip(&ticks.labels))
+        .map(|(at, label)| (width * range.part(*at), 0.5 * font::width(label, TICK, Weight::Regular)))
+        .collect();
+    edges.windows(2).all(|w| w[1].0 - w[1].1 - (w[0].0 + w[0].1) >= 8.0)
 }
 
 /// Length of the line before a label, space after it and between entries, px.
 const SAMPLE: (f64, f64, f64) = (30.0, 7.0, 24.0);
 
 /// Entries in centred rows below `top`; returns them and the lower edge.
-fn place_legend(entries: Vec<Entry>, width: f64, top: f64) -> (Vec<Placed>, f64) {
+fn place_legend((entries, more): (Vec<Entry>, usize), width: f64, top: f64) -> (Vec<Placed>, f64) {
     let limit = width - 2.0 * MARGIN;
-    let length = |entry: &Entry| SAMPLE.0 + SAMPLE.1 + font::width(&entry.label, LABEL, Weight::Regular);
-    let mut rows: Vec<(f64, Vec<Entry>)> = Vec::new();
-    for entry in entries {
-        let more = length(&entry);
+    let before = SAMPLE.0 + SAMPLE.1;
+    struct Item {
+        length: f64,
+        lines: Vec<String>,
+        entry: Entry,
+    }
+    let broken = |entry: Entry| {
+        let lines = font::wrap(&entry.label, LABEL, Weight::Regular, limit - before);
+        let text = lines.iter().map(|l| font::width(l, LABEL, Weight::Regular)).fold(0.0, f64::max);
+        Item { length: before + text, lines, entry }
+    };
+    let rest = (more > 0).then(|| Entry {
+        label: format!("… and {more} more"),
+        colour: Colour::many(),
+        line: None,
+        marks: false,
+        area: None,
+        pale: false,
+    });
+    let mut rows: Vec<(f64, Vec<Item>)> = Vec::new();
+    for item in entries.into_iter().chain(rest).map(broken) {
         match rows.last_mut() {
-            Some((used, row)) if *used + SAMPLE.2 + more <= limit => {
-                *used += SAMPLE.2 + more;
-                row.push(entry);
+            Some((used, row)) if *used + SAMPLE.2 + item.length <= limit => {
+                *used += SAMPLE.2 + item.length;
+                row.push(item);
             }
-            _ => rows.push((more, vec![entry])),
+            _ => rows.push((item.length, vec![item])),
         }
     }
     let mut placed = Vec::new();
     let mut y = top;
     for (used, row) in rows {
         let mut x = ((width - used) / 2.0).max(MARGIN);
-        y += LABEL * 1.5;
-        for entry in row {
-            let step = length(&entry) + SAMPLE.2;
-            placed.push(Placed { entry, x, y: y - 0.5 * LABEL });
-            x += step;
+        let lines = row.iter().map(|item| item.lines.len()).max().unwrap_or(1).max(1);
+        for Item { length, lines, entry } in row {
+            placed.push(Placed { entry, lines, x, y: y + LABEL });
+            x += length + SAMPLE.2;
         }
+        y += LABEL * (1.5 + LEADING * (lines - 1) as f64);
     }
     (placed, y)
 }
 
-fn draw_entry(svg: &mut Svg, Placed { entry, x, y }: &Placed) {
+fn draw_entry(svg: &mut Svg, Placed { entry, lines, x, y }: &Placed) {
+    let colour = &entry.colour.light;
+    let opacity = if entry.pale { PALE } else { 1.0 };
+    match entry.area {
+        Some(Style::Band) => svg.area(&box_around(*x, y - 5.0, SAMPLE.0, 10.0), colour, AREA),
+        Some(_) => svg.area(&box_around(x + 8.0, y - 6.0, 14.0, 12.0), colour, opacity),
+        None => {}
+    }
     if let Some(style) = entry.line {
-        svg.polyline(&[(*x, *y), (x + SAMPLE.0, *y)], entry.colour, dashes(style));
+        let pen = Pen { colour, width: LINE, dashes: dashes(style), opacity };
+        svg.polyline(&[(*x, *y), (x + SAMPLE.0, *y)], &pen);
     }
     if entry.marks {
-        svg.mark((x + SAMPLE.0 / 2.0, *y), entry.colour);
+        svg.mark((x + SAMPLE.0 / 2.0, *y), colour, MARK);
     }
-    let at = Text::at(x + SAMPLE.0 + SAMPLE.1, y + 0.36 * LABEL);
-    svg.text(&entry.label, Text { anchor: "start", ..at });
+    for (i, line) in lines.iter().enumerate() {
+        let at = Text::at(x + SAMPLE.0 + SAMPLE.1, y + (0.36 + LEADING * i as f64) * LABEL);
+        svg.text(line, Text { anchor: "start", ..at });
+    }
 }
 
-fn draw_panel(svg: &mut Svg, panel: &Panel, place: &Place) {
+fn box_around(x: f64, y: f64, width: f64, height: f64) -> [Point; 4] {
+    [(x, y), (x + width, y), (x + width, y + height), (x, y + height)]
+}
+
+fn draw_bar(svg: &mut Svg, bar: &Bar) {
+    svg.open("colours");
+    // from the lower end up, every step to the upper end: no seams
+    for i in 0..BAR_STEPS {
+        let part = |i: usize| i as f64 / BAR_STEPS as f64;
+        let colour = Colour::sequential((i as f64 + 0.5) / BAR_STEPS as f64).light;
+        svg.area(&box_around(bar.left, bar.top, BAR, bar.height * (1.0 - part(i))), &colour, 1.0);
+    }
+    svg.frame(bar.left, bar.top, BAR, bar.height);
+    let at = |value: f64| bar.top + bar.height * (1.0 - bar.range.part(value));
+    for minor in &bar.ticks.minor {
+        svg.line((bar.left + BAR, at(*minor)), (bar.left + BAR + MINOR_LENGTH, at(*minor)), AXIS);
+    }
+    for (value, label) in bar.ticks.at.iter().zip(&bar.ticks.labels) {
+        let y = at(*value);
+        svg.line((bar.left + BAR, y), (bar.left + BAR + TICK_LENGTH, y), AXIS);
+        let place = Text::at(bar.left + BAR + TICK_LENGTH + 5.0, y + 0.36 * TICK);
+        svg.text(label, Text { size: TICK, anchor: "start", ..place });
+    }
+    for (i, line) in bar.title.iter().enumerate() {
+        let x = bar.left + bar.title_offset + LABEL * (0.8 + LEADING * i as f64);
+        svg.text(line, Text { upright: true, ..Text::at(x, bar.top + bar.height / 2.0) });
+    }
+    svg.close();
+}
+
+fn draw_panel(svg: &mut Svg, panel: &Panel, place: &Place, shades: &Shades) {
     let (right, bottom, middle) = (place.left + place.width, place.top + place.height, place.left + place.width / 2.0);
     svg.open(&panel.title);
     for (i, line) in place.title.iter().enumerate() {
         let y = place.top - 8.0 - PANEL_TITLE * LEADING * (place.title.len() - 1 - i) as f64;
         svg.text(line, Text { size: PANEL_TITLE, weight: Weight::Bold, ..Text::at(middle, y) });
     }
-    let x_at: Vec<f64> = place.x_ticks.at.iter().map(|x| place.map((*x, place.y.from)).0).collect();
-    let y_at: Vec<f64> = place.y_ticks.at.iter().map(|y| place.map((place.x.from, *y)).1).collect();
-    for x in &x_at {
-        svg.line((*x, place.top), (*x, bottom), GRID);
+    let x_of = |x: &f64| place.map((*x, place.y.from)).0;
+    let y_of = |y: &f64| place.map((place.x.from, *y)).1;
+    for (values, colour) in [(&place.x_ticks.minor, FINE_GRID), (&place.x_ticks.at, GRID)] {
+        for x in values.iter().map(x_of) {
+            svg.line((x, place.top), (x, bottom), colour);
+        }
     }
-    for y in &y_at {
-        svg.line((place.left, *y), (right, *y), GRID);
+    for (values, colour) in [(&place.y_ticks.minor, FINE_GRID), (&place.y_ticks.at, GRID)] {
+        for y in values.iter().map(y_of) {
+            svg.line((place.left, y), (right, y), colour);
+        }
     }
     // the axes through zero of a loop
     for (inside, from, to) in [
@@ -269,13 +405,19 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, place: &Place) {
             svg.line(from, to, "#b0b0b0");
         }
     }
-    svg.frame(place);
-    for (x, label) in x_at.iter().zip(&place.x_ticks.labels) {
-        svg.line((*x, bottom), (*x, bottom + TICK_LENGTH), AXIS);
-        svg.text(label, Text { size: TICK, ..Text::at(*x, bottom + TICK_LENGTH + 3.0 + TICK * 0.95) });
+    svg.frame(place.left, place.top, place.width, place.height);
+    for x in place.x_ticks.minor.iter().map(x_of) {
+        svg.line((x, bottom), (x, bottom + MINOR_LENGTH), AXIS);
     }
-    for (y, label) in y_at.iter().zip(&place.y_ticks.labels) {
-        svg.line((place.left - TICK_LENGTH, *y), (place.left, *y), AXIS);
+    for (x, label) in place.x_ticks.at.iter().map(x_of).zip(&place.x_ticks.labels) {
+        svg.line((x, bottom), (x, bottom + TICK_LENGTH), AXIS);
+        svg.text(label, Text { size: TICK, ..Text::at(x, bottom + TICK_LENGTH + 3.0 + TICK * 0.95) });
+    }
+    for y in place.y_ticks.minor.iter().map(y_of) {
+        svg.line((place.left - MINOR_LENGTH, y), (place.left, y), AXIS);
+    }
+    for (y, label) in place.y_ticks.at.iter().map(y_of).zip(&place.y_ticks.labels) {
+        svg.line((place.left - TICK_LENGTH, y), (place.left, y), AXIS);
         let at = Text::at(place.left - TICK_LENGTH - 5.0, y + 0.36 * TICK);
         svg.text(label, Text { size: TICK, anchor: "end", ..at });
     }
@@ -290,46 +432,97 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, place: &Place) {
     if !frame::has_data(panel) {
         svg.text("no data", Text { colour: "#777777", ..Text::at(middle, place.top + place.height / 2.0) });
     }
-    // marks stand above all lines
-    for series in panel.series.iter().filter(|s| s.style != Style::Marks) {
-        draw_line(svg, series, place);
-    }
-    for series in panel.series.iter().filter(|s| s.style == Style::Marks) {
-        for point in frame::points(series).filter(|p| frame::drawable(*p)) {
-            svg.mark(place.map(point), frame::colour(series.colour));
+    let crowd = frame::crowded(panel);
+    let bars: Vec<&Series> = panel.series.iter().filter(|s| s.style == Style::Bars).collect();
+    for series in frame::layers(panel) {
+        let colour = &shades.colour(series).light;
+        match series.style {
+            Style::Marks => {
+                let size = if crowd { SMALL_MARK } else { MARK };
+                let at = frame::drawn(panel, series).map(|p| place.map(p));
+                for point in at.filter(|p| place.window().contains(*p)) {
+                    svg.mark(point, colour, size);
+                }
+            }
+            Style::Band => draw_band(svg, panel, series, place, colour),
+            Style::Bars => {
+                let slot = frame::bar_slot(panel, place.x);
+                let which = bars.iter().position(|s| std::ptr::eq(*s, series)).unwrap_or(0);
+                let slot =
+                    Slot { width: slot / bars.len() as f64, shift: slot * (which as f64 / bars.len() as f64 - 0.5) };
+                draw_bars(svg, panel, series, place, &slot, colour);
+            }
+            Style::Solid | Style::Dashed | Style::Dotted => {
+                let pale = series.emphasis == Emphasis::Pale;
+                let width = if pale || crowd { THIN } else { LINE };
+                let opacity = if pale { PALE } else { 1.0 };
+                let pen = Pen { colour, width, dashes: dashes(frame::line_style(series)), opacity };
+                draw_line(svg, panel, series, place, &pen);
+            }
         }
     }
     svg.close();
 }
 
 /// The pieces between the gaps of a curve; a piece of one point is a dot.
-fn draw_line(svg: &mut Svg, series: &Series, place: &Place) {
-    let points: Vec<(f64, f64)> = frame::points(series).collect();
-    let colour = frame::colour(series.colour);
+fn draw_line(svg: &mut Svg, panel: &Panel, series: &Series, place: &Place, pen: &Pen<'_>) {
+    let points: Vec<Point> = frame::points(panel, series).collect();
     for piece in points.split(|p| !frame::drawable(*p)) {
-        match piece {
+        let piece: Vec<Point> = piece.iter().map(|p| place.map(*p)).collect();
+        match piece.as_slice() {
             [] => {}
-            [point] => svg.dot(place.map(*point), colour),
-            _ => svg.polyline(&thin(piece.iter().map(|p| place.map(*p)).collect()), colour, dashes(series.style)),
+            [point] if place.window().contains(*point) => svg.dot(*point, pen.colour),
+            [_] => {}
+            line => {
+                for part in place.window().line(line) {
+                    svg.polyline(&clip::visible(part), pen);
+                }
+            }
         }
     }
 }
 
-/// Keeps of a dense line, in every quarter of a pixel, the first and last and the extreme points.
-fn thin(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
-    if points.len() <= DENSE {
-        return points;
+/// The pieces between the gaps of a band, each as an area.
+fn draw_band(svg: &mut Svg, panel: &Panel, series: &Series, place: &Place, colour: &str) {
+    let floor = place.top + place.height;
+    let points: Vec<(Point, f64)> = frame::points(panel, series)
+        .enumerate()
+        .map(|(i, p)| {
+            let upper = place.map(p);
+            (upper, frame::base(panel, series, i).map_or(floor, |base| place.map((p.0, base)).1))
+        })
+        .collect();
+    for piece in points.split(|((x, y), _)| !(x.is_finite() && y.is_finite())) {
+        let upper = clip::visible(piece.iter().map(|(p, _)| *p).collect());
+        let lower = clip::visible(piece.iter().map(|((x, _), base)| (*x, *base)).collect());
+        let outline: Vec<Point> = upper.into_iter().chain(lower.into_iter().rev()).collect();
+        svg.area(&place.window().polygon(&outline), colour, AREA);
     }
-    let column = |p: &(f64, f64)| (p.0 * 4.0).floor();
-    let mut kept = Vec::new();
-    for run in points.chunk_by(|a, b| column(a) == column(b)) {
-        let by =
-            |sign: f64| (0..run.len()).max_by(|i, j| (sign * run[*i].1).total_cmp(&(sign * run[*j].1))).unwrap_or(0);
-        let mut indices = [0, by(1.0), by(-1.0), run.len() - 1];
-        indices.sort_unstable();
-        kept.extend(indices.iter().enumerate().filter(|(i, k)| *i == 0 || indices[i - 1] != **k).map(|(_, k)| run[*k]));
+}
+
+/// A bar's width, and its left edge from its abscissa, in the measure of the axis.
+struct Slot {
+    width: f64,
+    shift: f64,
+}
+
+fn draw_bars(svg: &mut Svg, panel: &Panel, series: &Series, place: &Place, slot: &Slot, colour: &str) {
+    let opacity = if series.emphasis == Emphasis::Pale { PALE } else { 1.0 };
+    let scale = place.width / place.x.span();
+    for (i, point) in frame::points(panel, series).enumerate().filter(|(_, p)| frame::drawable(*p)) {
+        let (x, y) = place.map(point);
+        let base = frame::base(panel, series, i).map_or(place.top + place.height, |base| place.map((point.0, base)).1);
+        let corners = box_around(x + slot.shift * scale, y, slot.width * scale, base - y);
+        svg.area(&place.window().polygon(&corners), colour, opacity);
     }
-    kept
+}
+
+/// How a line is drawn.
+struct Pen<'a> {
+    colour: &'a str,
+    width: f64,
+    dashes: Option<&'static str>,
+    opacity: f64,
 }
 
 /// A line of text: where and how.
@@ -387,16 +580,43 @@ impl Svg {
         let _ = writeln!(self.0, "<path d=\"M{x1} {y1}L{x2} {y2}\" stroke=\"{colour}\"/>");
     }
 
-    fn frame(&mut self, place: &Place) {
-        let [x, y, w, h] = [place.left, place.top, place.width, place.height].map(short);
+    fn frame(&mut self, left: f64, top: f64, width: f64, height: f64) {
+        let [x, y, w, h] = [left, top, width, height].map(short);
         let _ = writeln!(
             self.0,
             "<rect x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" fill=\"none\" stroke=\"{AXIS}\"/>"
         );
     }
 
-    fn polyline(&mut self, points: &[(f64, f64)], colour: &str, dashes: Option<&str>) {
-        let dashes = dashes.map_or(String::new(), |d| format!(" stroke-dasharray=\"{d}\""));
+    fn polyline(&mut self, points: &[Point], pen: &Pen<'_>) {
+        self.path(points);
+        let Pen { colour, width, .. } = pen;
+        let _ =
+            write!(self.0, "\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"");
+        if let Some(dashes) = pen.dashes {
+            let _ = write!(self.0, " stroke-dasharray=\"{dashes}\"");
+        }
+        if pen.opacity < 1.0 {
+            let _ = write!(self.0, " stroke-opacity=\"{}\"", pen.opacity);
+        }
+        self.0.push_str("/>\n");
+    }
+
+    /// A filled polygon.
+    fn area(&mut self, points: &[Point], colour: &str, opacity: f64) {
+        if points.len() < 3 {
+            return;
+        }
+        self.path(points);
+        let _ = write!(self.0, "Z\" fill=\"{colour}\"");
+        if opacity < 1.0 {
+            let _ = write!(self.0, " fill-opacity=\"{opacity}\"");
+        }
+        self.0.push_str("/>\n");
+    }
+
+    /// The beginning of a path, up to its last point.
+    fn path(&mut self, points: &[Point]) {
         self.0.push_str("<path d=\"");
         let mut last = None;
         for (i, point) in points.iter().enumerate() {
@@ -407,17 +627,14 @@ impl Svg {
             let _ = write!(self.0, "{}{} {}", if i == 0 { 'M' } else { 'L' }, now.0, now.1);
             last = Some(now);
         }
-        let _ = writeln!(
-            self.0,
-            "\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{LINE}\" stroke-linejoin=\"round\"{dashes}/>"
-        );
     }
 
-    fn mark(&mut self, (x, y): (f64, f64), colour: &str) {
+    fn mark(&mut self, (x, y): Point, colour: &str, radius: f64) {
         let (x, y) = (short(x), short(y));
+        let (fill, stroke) = if radius < MARK { (colour, 0.6) } else { ("#ffffff", 1.6) };
         let _ = writeln!(
             self.0,
-            "<circle cx=\"{x}\" cy=\"{y}\" r=\"{MARK}\" fill=\"#ffffff\" stroke=\"{colour}\" stroke-width=\"1.6\"/>"
+            "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" fill=\"{fill}\" stroke=\"{colour}\" stroke-width=\"{stroke}\"/>"
         );
     }
 
@@ -483,7 +700,7 @@ mod tests {
                     all.contains(&panel.title) && all.contains(&panel.x.quantity) && all.contains(&panel.y.quantity)
                 );
             }
-            for entry in frame::legend(&dataset.figure) {
+            for entry in frame::legend(&dataset.figure).0 {
                 let titles = dataset.figure.panels.iter().filter(|p| p.title == entry.label).count();
                 assert_eq!(texts.iter().filter(|t| **t == entry.label).count(), 1 + titles, "{}", entry.label);
             }
@@ -493,6 +710,100 @@ mod tests {
 
     fn figure_title(figure: &Figure) -> String {
         figure.title.split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
+    /// The figure's texts, without its tags.
+    fn texts(figure: &Figure) -> Vec<String> {
+        let svg = to_svg(figure);
+        let document = roxmltree::Document::parse(&svg).unwrap();
+        let texts = document.descendants().filter(|n| n.has_tag_name("text"));
+        texts.map(|n| n.text().unwrap_or("").to_owned()).collect()
+    }
+
+    #[test]
+    fn many_values_have_a_colour_bar_with_unit_and_round_ticks() {
+        let all = texts(&samples::cases(400).figure);
+        assert!(all.contains(&"Ft (N)".to_owned()), "{all:?}");
+        for tick in ["50", "100", "200", "400"] {
+            assert!(all.contains(&tick.to_owned()), "{tick}");
+        }
+        assert!(!all.iter().any(|t| t.starts_with("Ft =")));
+        let few = texts(&samples::cases(5).figure);
+        assert!(!few.contains(&"Ft (N)".to_owned()) && few.contains(&"Ft = 3 N".to_owned()), "{few:?}");
+        // 400 curves of 300 points each, twice: the page stays small because what nobody sees is left out
+        let size = to_svg(&samples::cases(400).figure).len();
+        assert!(size < 1_500_000, "{size}");
+    }
+
+    #[test]
+    fn a_logarithmic_axis_has_powers_of_ten_and_short_ticks_between() {
+        let figure = samples::modes().figure;
+        let all = texts(&figure);
+        for tick in ["0.01", "0.1", "1", "10", "10⁻¹⁰"] {
+            assert!(all.contains(&tick.to_owned()), "{tick}: {all:?}");
+        }
+        // three panels over four decades: 37 lines each, less the nine at labels
+        let fine = to_svg(&figure).matches(FINE_GRID).count();
+        assert!(fine >= 3 * 28, "{fine}");
+    }
+
+    #[test]
+    fn a_fixed_range_cuts_the_curves_at_its_edges() {
+        let mut figure = samples::envelope().figure;
+        figure.panels.truncate(1);
+        let layout = Layout::new(&figure);
+        let window = layout.panels[0].window();
+        let svg = to_svg(&figure);
+        let document = roxmltree::Document::parse(&svg).unwrap();
+        let mut points = 0;
+        for path in document.descendants().filter(|n| n.attribute("stroke-linejoin").is_some()) {
+            let numbers: Vec<f64> =
+                path.attribute("d").unwrap().split(['M', 'L', ' ']).filter_map(|t| t.parse().ok()).collect();
+            for p in numbers.chunks(2).map(|c| (c[0], c[1])).filter(|p| p.1 > window.top - 5.0) {
+                assert!(window.contains(p), "{p:?} {window:?}");
+                points += 1;
+            }
+        }
+        assert!(points > 500, "{points}");
+    }
+
+    #[test]
+    fn references_are_grey_dashes_behind_the_results() {
+        let svg = to_svg(&samples::cases(3).figure);
+        let grey = Colour::reference().light;
+        let last_reference = svg.rfind(&format!("stroke=\"{grey}\"")).unwrap();
+        let panel = svg.find("<g aria-label").unwrap();
+        let first_result = panel + svg[panel..].find("stroke=\"#0072b2\"").unwrap();
+        assert!(last_reference > panel && last_reference < first_result);
+        for line in svg.lines().filter(|l| l.contains(&grey) && l.contains("linejoin")) {
+            assert!(line.contains("stroke-dasharray"), "{line}");
+        }
+    }
+
+    #[test]
+    fn bars_stand_side_by_side_on_zero() {
+        let svg = to_svg(&samples::spectrum().figure);
+        let document = roxmltree::Document::parse(&svg).unwrap();
+        let mut boxes: Vec<[f64; 4]> = Vec::new();
+        for path in document.descendants().filter(|n| n.has_tag_name("path") && n.attribute("fill-opacity").is_none()) {
+            if !path.attribute("d").unwrap().ends_with('Z')
+                || path.parent().is_some_and(|p| p.is_root() || !p.has_tag_name("g"))
+            {
+                continue; // the samples of the legend
+            }
+            let n: Vec<f64> =
+                path.attribute("d").unwrap().split(['M', 'L', 'Z', ' ']).filter_map(|t| t.parse().ok()).collect();
+            let (x, y): (Vec<f64>, Vec<f64>) = n.chunks(2).map(|c| (c[0], c[1])).unzip();
+            let ends =
+                |v: &[f64]| (v.iter().copied().fold(f64::INFINITY, f64::min), v.iter().copied().fold(0.0, f64::max));
+            let ((left, right), (top, bottom)) = (ends(&x), ends(&y));
+            boxes.push([left, right, top, bottom]);
+        }
+        assert_eq!(boxes.len(), 3 * 9);
+        let foot = boxes[0][3];
+        boxes.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        assert!(boxes.windows(2).all(|w| w[0][1] <= w[1][0] + 0.02), "bars overlap");
+        assert!(boxes.iter().all(|b| (b[3] - foot).abs() < 0.02 && b[2] < foot), "bars start at zero");
     }
 
     #[test]
@@ -548,14 +859,6 @@ mod tests {
                 boxes.push((edges, text));
             }
         }
-    }
-
-    #[test]
-    fn a_dense_line_is_thinned_without_losing_its_extremes() {
-        let points: Vec<(f64, f64)> = (0..100_000).map(|i| (f64::from(i) * 0.005, f64::from(i % 97))).collect();
-        let kept = thin(points.clone());
-        assert!(kept.len() < 10_000 && kept.first() == points.first() && kept.last() == points.last());
-        assert!(kept.iter().any(|p| p.1 == 96.0) && kept.iter().any(|p| p.1 == 0.0));
     }
 
     #[test]

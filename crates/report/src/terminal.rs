@@ -9,12 +9,20 @@ use stickslip_study::dataset::{Dataset, Table, Values};
 pub struct Terminal {
     /// Whether to use colours (ANSI escape sequences).
     pub colour: bool,
+    /// Characters in a line, if sentences are to be broken between words and tables to be made narrower.
+    pub width: Option<usize>,
 }
 
-/// Tables longer than this are left to their files.
+/// Tables longer than this are left to their files, or cut if they hold the main numbers of a study.
 const ROWS: usize = 24;
-/// Tables wider than this, in characters, too.
+/// Tables with the main numbers: these, and all whose names end in `_summary`.
+const MAIN: [&str; 5] = ["summary", "peaks", "optimum", "turns", "orbits"];
+/// Widest table, in characters, where the width of a line is unknown or larger.
 const WIDTH: usize = 120;
+/// Narrowest line that is taken seriously.
+const NARROWEST: usize = 40;
+/// Columns that a table loses first where it is too wide: evidence, which `record.json` and the file keep.
+const EVIDENCE: [&str; 4] = ["residual", "energy_gap", "iterations", "truncation"];
 /// Failures named one by one; of more than these only the number is told.
 const FAILURES: usize = 5;
 
@@ -22,17 +30,20 @@ impl Terminal {
     /// The text, with a final line feed. `files` are the paths that were written; none if nothing was.
     pub fn text(self, dataset: &Dataset, files: &[PathBuf]) -> String {
         let mut out = String::new();
-        let _ = writeln!(out, "{}", self.paint("1", &clean(&dataset.title)));
-        if let Some(source) = &dataset.source {
-            let _ = writeln!(out, "{}", self.paint("2", &clean(source)));
+        for line in self.wrapped(&clean(&dataset.title), "") {
+            let _ = writeln!(out, "{}", self.paint("1", &line));
+        }
+        for line in dataset.source.iter().flat_map(|source| self.wrapped(&clean(source), "")) {
+            let _ = writeln!(out, "{}", self.paint("2", &line));
         }
         if dataset.record.interrupted {
             let _ = writeln!(out, "{}", self.paint("33", "interrupted: these are the points finished until then"));
         }
-        for table in dataset.tables.iter().filter(|t| (1..=ROWS).contains(&t.rows())) {
-            let text = aligned(table);
-            if text.lines().all(|line| line.chars().count() <= WIDTH) {
-                let _ = write!(out, "\n{}\n{text}", clean(&table.name));
+        let width = self.width.map_or(WIDTH, |width| width.clamp(NARROWEST, WIDTH));
+        for table in &dataset.tables {
+            let main = MAIN.contains(&table.name.as_str()) || table.name.ends_with("_summary");
+            if (1..=ROWS).contains(&table.rows()) || main && table.rows() > 0 {
+                let _ = write!(out, "\n{}\n{}", clean(&table.name), shown(table, width));
             }
         }
         out.push('\n');
@@ -50,11 +61,19 @@ impl Terminal {
             }
         );
         for note in &dataset.notes {
-            let _ = writeln!(out, "note: {}", clean(note));
+            for line in self.wrapped(&format!("note: {}", clean(note)), "      ") {
+                let _ = writeln!(out, "{line}");
+            }
         }
         for failure in dataset.failures.iter().take(FAILURES) {
-            let _ =
-                writeln!(out, "{} at {}: {}", self.paint("31", "failed"), clean(&failure.at), clean(&failure.reason));
+            let text = format!("failed at {}: {}", clean(&failure.at), clean(&failure.reason));
+            for (i, line) in self.wrapped(&text, "  ").iter().enumerate() {
+                match line.strip_prefix("failed").filter(|_| i == 0) {
+                    Some(rest) => writeln!(out, "{}{rest}", self.paint("31", "failed")),
+                    None => writeln!(out, "{line}"),
+                }
+                .unwrap_or(()); // writing into a string cannot fail
+            }
         }
         if let Some(more @ 1..) = dataset.failures.len().checked_sub(FAILURES) {
             let _ = writeln!(
@@ -66,6 +85,24 @@ impl Terminal {
         }
         out.push_str(&places(files));
         out
+    }
+
+    /// A text in lines no longer than the width, broken between words; all but the first begin with `indent`. A longer
+    /// word stands alone.
+    fn wrapped(self, text: &str, indent: &str) -> Vec<String> {
+        let Some(width) = self.width.map(|width| width.max(NARROWEST)) else { return vec![text.to_owned()] };
+        let mut lines: Vec<String> = Vec::new();
+        for word in text.split_whitespace() {
+            match lines.last_mut() {
+                Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
+                    line.push(' ');
+                    line.push_str(word);
+                }
+                Some(_) => lines.push(format!("{indent}{word}")),
+                None => lines.push(word.to_owned()),
+            }
+        }
+        lines
     }
 
     fn paint(self, code: &str, text: &str) -> String {
@@ -165,34 +202,71 @@ fn engineering(values: &[f64], significant: i32) -> Vec<String> {
     write(&|v| format!("{v:.decimals$}"))
 }
 
-/// A table with aligned columns: numbers at the right, words at the left.
-fn aligned(table: &Table) -> String {
-    let columns: Vec<(String, Vec<String>, bool)> = table
+/// A column ready to be written: its head and its cells, all of one width.
+struct Shown<'a> {
+    name: &'a str,
+    heading: String,
+    cells: Vec<String>,
+    /// Numbers stand at the right, words at the left.
+    right: bool,
+    width: usize,
+}
+
+/// The first rows of a table with aligned columns, no wider than `limit`, and what is left out.
+fn shown(table: &Table, limit: usize) -> String {
+    let rows = table.rows().min(ROWS);
+    let mut columns: Vec<Shown<'_>> = table
         .columns
         .iter()
         .map(|c| {
-            let (heading, cells) = column(&c.name, &c.values);
-            (clean(&heading), cells, matches!(c.values, Values::Number(_) | Values::Integer(_)))
+            let (heading, cells) = column(&c.name, &head(&c.values, rows));
+            let heading = clean(&heading);
+            let width = cells.iter().chain([&heading]).map(|text| text.chars().count()).max().unwrap_or(0);
+            let right = matches!(c.values, Values::Number(_) | Values::Integer(_));
+            Shown { name: &c.name, heading, cells, right, width }
         })
         .collect();
+    let all = columns.len();
+    // a line begins with two spaces, and two stand between columns
+    let too_wide = |columns: &[Shown<'_>]| columns.iter().map(|c| c.width + 2).sum::<usize>() > limit;
+    while columns.len() > 1 && too_wide(&columns) {
+        let evidence = EVIDENCE.iter().find_map(|name| columns.iter().position(|c| c.name == *name));
+        columns.remove(evidence.unwrap_or(columns.len() - 1));
+    }
     let mut out = String::new();
-    for row in 0..=table.rows() {
+    for row in 0..=rows {
         let mut line = String::from(" ");
-        for (heading, cells, right) in &columns {
-            let width = cells.iter().map(|c| c.chars().count()).max().unwrap_or(0).max(heading.chars().count());
+        for Shown { heading, cells, right, width, .. } in &columns {
             let empty = String::new();
             let cell = if row == 0 { heading } else { cells.get(row - 1).unwrap_or(&empty) };
             let _ = if *right { write!(line, " {cell:>width$} ") } else { write!(line, " {cell:<width$} ") };
         }
         let _ = writeln!(out, "{}", line.trim_end());
     }
+    let more = [(table.rows() - rows, "row"), (all - columns.len(), "column")];
+    let more: Vec<String> =
+        more.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} more {what}{}", plural(*n))).collect();
+    if !more.is_empty() {
+        let _ = writeln!(out, "  … and {} in {}.csv", more.join(", "), clean(&table.name));
+    }
     out
+}
+
+/// The first values of a column.
+fn head(values: &Values, rows: usize) -> Values {
+    match values {
+        Values::Number(v) => Values::Number(v.iter().take(rows).copied().collect()),
+        Values::Integer(v) => Values::Integer(v.iter().take(rows).copied().collect()),
+        Values::Text(v) => Values::Text(v.iter().take(rows).cloned().collect()),
+        Values::Flag(v) => Values::Flag(v.iter().take(rows).copied().collect()),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::samples;
+    use stickslip_study::dataset::Column;
 
     #[test]
     fn tables_have_engineering_units_and_sensible_digits() {
@@ -223,13 +297,62 @@ results/fig02/: loops_summary.csv, figure.svg
         assert_eq!(text.matches("failed at Ft").count(), FAILURES);
         assert!(text.contains("failed at 4 more points") && text.contains("240 converged, 9 not converged"), "{text}");
         assert!(!text.contains('\x1b'));
-        assert!(Terminal { colour: true }.text(&samples::hostile(), &[]).contains("\x1b[31mfailed\x1b[0m"));
+        assert!(
+            Terminal { colour: true, ..Terminal::default() }
+                .text(&samples::hostile(), &[])
+                .contains("\x1b[31mfailed\x1b[0m")
+        );
     }
 
     #[test]
     fn long_tables_stay_in_their_files() {
         let text = Terminal::default().text(&samples::response(), &[]);
         assert!(!text.contains("iterations") && text.contains("peaks\n"), "{text}");
+    }
+
+    fn long(name: &str, rows: usize) -> Dataset {
+        let column = |name: &str, unit: f64| Column {
+            name: name.into(),
+            values: Values::Number((0..rows).map(|i| unit * (1.0 + i as f64)).collect()),
+        };
+        let mut columns = vec![column("frequency_Hz", 1.0), column("amplitude_m", 1e-3)];
+        columns.extend(EVIDENCE.map(|name| column(name, 1e-9)));
+        columns.extend((0..6).map(|i| column(&format!("a_rather_long_name_{i}_N"), 1.0)));
+        let table = Table { name: name.into(), columns };
+        Dataset { tables: vec![table], ..samples::response() }
+    }
+
+    #[test]
+    fn the_main_table_is_cut_and_says_where_the_rest_is() {
+        let text = Terminal::default().text(&long("peaks", 30), &[]);
+        let table: Vec<&str> =
+            text.lines().skip_while(|l| *l != "peaks").skip(1).take_while(|l| !l.is_empty()).collect();
+        assert_eq!(table.len(), 1 + ROWS + 1, "{text}");
+        // evidence goes first, then what stands last: 16 + 16 for the first two leave room for three of 26
+        assert!(table[0].contains("amplitude (mm)") && table[0].contains("name 2") && !table[0].contains("name 3"));
+        assert!(!table[0].contains("residual") && !table[0].contains("iterations"), "{}", table[0]);
+        assert_eq!(*table.last().unwrap(), "  … and 6 more rows, 7 more columns in peaks.csv");
+        assert!(table.iter().all(|l| l.chars().count() <= WIDTH));
+        assert!(table[24].contains("24"), "{}", table[24]);
+        let narrow = Terminal { width: Some(60), ..Terminal::default() }.text(&long("loops_summary", 2), &[]);
+        assert!(narrow.contains("in loops_summary.csv") && narrow.lines().all(|l| l.chars().count() <= 60), "{narrow}");
+        // other long tables stay in their files
+        assert!(!Terminal::default().text(&long("curve", 30), &[]).contains("amplitude (mm)"));
+    }
+
+    #[test]
+    fn sentences_break_between_words() {
+        let note =
+            "The series of 41 of 964 points is shorter than asked for; more harmonics would change them by up to 3 %.";
+        let dataset = Dataset { notes: vec![note.into()], tables: vec![], ..samples::hostile() };
+        let text = Terminal { width: Some(50), ..Terminal::default() }.text(&dataset, &[]);
+        let lines: Vec<&str> = text.lines().collect();
+        let at = lines.iter().position(|l| l.starts_with("note: ")).unwrap();
+        assert_eq!(lines[at], "note: The series of 41 of 964 points is shorter");
+        assert_eq!(lines[at + 1], "      than asked for; more harmonics would change");
+        assert_eq!(lines[at + 2], "      them by up to 3 %.");
+        assert!(lines.iter().all(|l| l.chars().count() <= 50), "{text}");
+        assert!(Terminal::default().text(&dataset, &[]).contains(&format!("note: {note}\n")));
     }
 
     #[test]
