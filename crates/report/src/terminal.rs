@@ -9,12 +9,16 @@ use stickslip_study::dataset::{Dataset, Table, Values};
 pub struct Terminal {
     /// Whether to use colours (ANSI escape sequences).
     pub colour: bool,
+    /// Characters in a line, where sentences are broken between words; `None` leaves that to the terminal.
+    pub width: Option<usize>,
 }
 
 /// Tables longer than this are left to their files.
 const ROWS: usize = 24;
 /// Tables wider than this, in characters, too.
 const WIDTH: usize = 120;
+/// Narrower terminals break lines themselves.
+const NARROWEST: usize = 20;
 /// Failures named one by one; of more than these only the number is told.
 const FAILURES: usize = 5;
 
@@ -46,21 +50,35 @@ impl Terminal {
             if points.is_empty() { "no points" } else { &points }
         );
         for note in &dataset.notes {
-            let _ = writeln!(out, "note: {}", clean(note));
+            let _ = writeln!(out, "{}", self.wrapped("note:", &clean(note)));
         }
         for failure in dataset.failures.iter().take(FAILURES) {
-            let _ =
-                writeln!(out, "{} at {}: {}", self.paint("31", "failed"), clean(&failure.at), clean(&failure.reason));
+            let text = self.wrapped("failed", &format!("at {}: {}", clean(&failure.at), clean(&failure.reason)));
+            let _ = writeln!(out, "{}", text.replacen("failed", &self.paint("31", "failed"), 1));
         }
         if let Some(more @ 1..) = dataset.failures.len().checked_sub(FAILURES) {
-            let _ = writeln!(
-                out,
-                "{} at {more} more point{}; all are in record.json",
-                self.paint("31", "failed"),
-                plural(more)
-            );
+            let text = self.wrapped("failed", &format!("at {more} more point{}; all are in record.json", plural(more)));
+            let _ = writeln!(out, "{}", text.replacen("failed", &self.paint("31", "failed"), 1));
         }
         out.push_str(&places(files));
+        out
+    }
+
+    /// A word and a text after it, broken between words where a line is full; further lines are indented.
+    fn wrapped(self, word: &str, text: &str) -> String {
+        let width = self.width.unwrap_or(usize::MAX).max(NARROWEST);
+        let (mut out, mut line) = (word.to_owned(), word.chars().count());
+        for word in text.split_whitespace() {
+            let length = word.chars().count();
+            if line.saturating_add(1 + length) > width {
+                out.push_str("\n    ");
+                line = 4 + length;
+            } else {
+                out.push(' ');
+                line += 1 + length;
+            }
+            out.push_str(word);
+        }
         out
     }
 
@@ -219,7 +237,24 @@ results/fig02/: loops_summary.csv, figure.svg
         assert_eq!(text.matches("failed at Ft").count(), FAILURES);
         assert!(text.contains("failed at 4 more points") && text.contains("240 converged, 9 not converged"), "{text}");
         assert!(!text.contains('\x1b'));
-        assert!(Terminal { colour: true }.text(&samples::hostile(), &[]).contains("\x1b[31mfailed\x1b[0m"));
+        assert!(
+            Terminal { colour: true, width: None }.text(&samples::hostile(), &[]).contains("\x1b[31mfailed\x1b[0m")
+        );
+    }
+
+    #[test]
+    fn sentences_are_broken_between_words() {
+        let mut dataset = samples::hostile();
+        dataset.notes = vec!["Many words that do not fit into one line of a narrow terminal.".into()];
+        for width in [30, 40, 80] {
+            let text = Terminal { colour: false, width: Some(width) }.text(&dataset, &[]);
+            let from = text.find("note:").unwrap();
+            let sentences = &text[from..];
+            assert!(sentences.lines().all(|line| line.chars().count() <= width), "{sentences}");
+            let words: Vec<&str> = sentences.split_whitespace().collect();
+            assert!(words.join(" ").starts_with(&format!("note: {}", dataset.notes[0])), "{sentences}");
+            assert!(words.join(" ").contains(&dataset.failures[0].reason), "{sentences}");
+        }
     }
 
     #[test]
