@@ -7,7 +7,7 @@ use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{Context, NOT_REACHED, Outcome, Prepared, Rows, Summary, display_unit};
 use crate::schema::{Takes, Within, default, optional};
 use crate::study::{Study, VariedValue, varied_text};
-use crate::values::Values;
+use crate::values::{Values, hertz};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use stickslip::curve::trace::{Branch, End, Trace, TraceError, TracePoint};
@@ -110,10 +110,14 @@ fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             }
         };
         let place = peak_place(prepared);
-        let (name, factor) = axis(along);
+        let (axis_name, factor) = axis(along);
         let begin = |rows: &mut Rows, value: f64| {
-            split(prepared).0.iter().for_each(|v| rows.number(&v.name, v.si));
-            rows.number(&name, value * factor);
+            split(prepared).0.iter().map(VariedValue::column).for_each(|(name, value)| rows.number(&name, value));
+            let (name, value) = match along {
+                None => ("frequency_Hz".to_owned(), hertz(value)),
+                Some(parameter) => VariedValue { si: value, ..parameter.clone() }.column(),
+            };
+            rows.number(&name, value);
         };
         for point in &branch.points {
             outcome.count(String::new, point.orbit.evidence.accuracy.status(), None);
@@ -134,7 +138,7 @@ fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
         }
         let reason = match branch.end {
             End::Border => None,
-            End::Stalled { at } => Some(format!("no shorter step converges beyond {name} = {:.9}", at * factor)),
+            End::Stalled { at } => Some(format!("no shorter step converges beyond {axis_name} = {:.9}", at * factor)),
             End::Points | End::Stopped => Some("the branch does not reach the end of its range".to_owned()),
         };
         if let Some(reason) = reason {

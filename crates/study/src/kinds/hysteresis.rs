@@ -5,7 +5,7 @@ use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{Context, Outcome, Prepared, Rows, display_unit, place_of};
 use crate::schema::{Takes, optional};
 use crate::study::Study;
-use crate::values::Values;
+use crate::values::{Values, hertz};
 use std::f64::consts::TAU;
 use stickslip::model::Model;
 use stickslip::orbit::{Orbit, Sample};
@@ -95,7 +95,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
                     let (displacement, force) = source.read(sample);
                     table.varied(&prepared.case);
                     if several {
-                        table.number("frequency_Hz", omega / TAU);
+                        table.number("frequency_Hz", hertz(omega));
                     }
                     table.text("joint", name);
                     table.number("time_s", *time);
@@ -109,7 +109,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
                 let first = First::new(&orbit, *source);
                 summary.varied(&prepared.case);
                 if several {
-                    summary.number("frequency_Hz", omega / TAU);
+                    summary.number("frequency_Hz", hertz(omega));
                 }
                 summary.text("joint", name);
                 summary.number("dissipation_J", exact_loss(prepared, &orbit, *source).unwrap_or(first.loss));

@@ -4,7 +4,7 @@ use super::{Computed, FREQUENCY, Kind, SAMPLES, orbits};
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{Context, Outcome, Prepared, Rows, Summary, display_unit, place_of};
 use crate::study::Study;
-use std::f64::consts::TAU;
+use crate::values::hertz;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
 pub(super) const KIND: Kind = Kind {
@@ -46,7 +46,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
                 ));
             }
             summary.varied(&prepared.case);
-            summary.number("frequency_Hz", omega / TAU);
+            summary.number("frequency_Hz", hertz(omega));
             Summary::new(&prepared.system, Ok(&orbit)).write(&prepared.system, truncated, &mut summary);
             summary.number("work_in_J", orbit.energy.work_in);
             summary.number("viscous_J", orbit.energy.viscous);
@@ -55,7 +55,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             summary.end();
             for (index, multiplier) in orbit.multipliers().iter().enumerate() {
                 multipliers.varied(&prepared.case);
-                multipliers.number("frequency_Hz", omega / TAU);
+                multipliers.number("frequency_Hz", hertz(omega));
                 multipliers.integer("index", index as u64 + 1);
                 multipliers.number("real", multiplier.re);
                 multipliers.number("imaginary", multiplier.im);
@@ -66,7 +66,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();
             for (time, sample) in times.iter().zip(&samples) {
                 motion.varied(&prepared.case);
-                motion.number("frequency_Hz", omega / TAU);
+                motion.number("frequency_Hz", hertz(omega));
                 motion.number("time_s", *time);
                 write_sample(prepared, sample, &mut motion);
                 motion.end();

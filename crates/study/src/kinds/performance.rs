@@ -93,10 +93,12 @@ fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
         }
         let Some((varied, inner)) = split(&group.cases[0]) else { continue };
         for v in varied {
-            optima.number(&v.name, v.si);
+            let (name, value) = v.column();
+            optima.number(&name, value);
         }
         let best = group.curve.optimum;
-        optima.number(&inner.name, best.map_or(f64::NAN, |row| row.value));
+        let at_best = best.map(|row| VariedValue { si: row.value, ..inner.clone() });
+        optima.number(&inner.column().0, at_best.map_or(f64::NAN, |v| v.column().1));
         optima.number("frequency_Hz", best.and_then(|row| row.peak).map_or(f64::NAN, |peak| peak.omega / TAU));
         optima.number("amplitude_m", best.and_then(|row| row.peak).map_or(f64::NAN, |peak| peak.value));
         optima.text("status", best.as_ref().map_or("none", status));

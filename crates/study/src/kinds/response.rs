@@ -6,7 +6,7 @@ use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{Context, NOT_REACHED, Outcome, Prepared, Rows, Summary, display_unit, place_of};
 use crate::schema::{Takes, default};
 use crate::study::Study;
-use crate::values::Frequencies;
+use crate::values::{Frequencies, hertz};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use stickslip::curve::peak::{Peak, highest};
@@ -57,7 +57,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             stuck += usize::from(row.stuck);
             inaccurate.count(&row.status, row.truncation);
             rows.varied(&prepared.case);
-            rows.number("frequency_Hz", omega / TAU);
+            rows.number("frequency_Hz", hertz(*omega));
             row.write(&prepared.system, truncated, &mut rows);
             rows.end();
         }

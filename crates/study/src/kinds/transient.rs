@@ -6,7 +6,7 @@ use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit, place_of};
 use crate::schema::{Key, Takes, Within, default, optional, required};
 use crate::study::Study;
-use crate::values::Values;
+use crate::values::{Values, hertz};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
@@ -159,7 +159,7 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
                     rows.number("drive_frequency_Hz", motion.drive.unwrap_or(0.0) / TAU);
                 }
                 rows.number("time_s", *time);
-                rows.number("frequency_Hz", omega / TAU);
+                rows.number("frequency_Hz", hertz(*omega));
                 write_sample(prepared, sample, &mut rows);
                 rows.end();
             }
