@@ -65,8 +65,8 @@ pub enum Command {
     },
     /// List what there is
     List {
-        /// What to list
-        what: What,
+        /// What to list; everything when absent
+        what: Option<What>,
     },
     /// Print the JSON Schema of study files, for editors
     Schema,

@@ -1,11 +1,18 @@
 //! `stickslip list`: the tables of laws, methods, templates and study kinds.
 
 use crate::args::What;
+use clap::ValueEnum;
 use stickslip::{law, method, model::templates};
 use stickslip_study::kinds;
 
-/// The list as text.
-pub fn text(what: What) -> String {
+/// The list as text; without a choice all of them, each under its heading.
+pub fn text(what: Option<What>) -> String {
+    let all =
+        What::value_variants().iter().map(|what| format!("{}\n\n{}", format!("{what:?}").to_uppercase(), one(*what)));
+    what.map_or_else(|| all.collect::<Vec<_>>().join("\n"), one)
+}
+
+fn one(what: What) -> String {
     let mut out = String::new();
     let mut entry = |name: &str, summary: &str, keys: &[(String, String)]| {
         out += &format!("{name}\n    {summary}\n");

@@ -3,12 +3,12 @@
 use crate::args::Place;
 use crate::{Ending, paper, print, progress};
 use std::collections::BTreeSet;
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use stickslip::orbit::Accuracy;
-use stickslip_report::{Outputs, check_writable, terminal::Terminal, write_dataset};
+use stickslip_report::{Outputs, check_writable, json::write_dataset_json, terminal::Terminal, write_dataset};
 use stickslip_study::dataset::Dataset;
 use stickslip_study::run::{CONVERGED, Context, check as check_study, run as run_study};
 use stickslip_study::{Study, StudyError, read_file};
@@ -139,9 +139,17 @@ pub fn run(request: &Request<'_>, place: &Place, only: &[String], json: bool) ->
 /// Failed points that are named on standard error; the record has all.
 const NAMED_FAILURES: usize = 10;
 
-/// Writes the results and says what there is to say; returns their folder.
-fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result<PathBuf, Ending> {
-    let files = write_dataset(dataset, out, outputs).map_err(|error| Ending::Failed(error.to_string()))?;
+/// One line of JSON on standard output; a reader that has gone away (`| head`) is no error.
+fn print_json(dataset: &Dataset) -> Ending {
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    match write_dataset_json(dataset, &mut out).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Ending::Failed(error.to_string()),
+        _ => Ending::Done,
+    }
+}
+
+/// Points that failed or are not what was asked for, on standard error.
+fn complain(dataset: &Dataset) {
     for failure in dataset.failures.iter().take(NAMED_FAILURES) {
         eprintln!("{}: failed at {}: {}", dataset.name, failure.at, failure.reason);
     }
@@ -160,12 +168,19 @@ fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result
             dataset.failures.len() - NAMED_FAILURES
         );
     }
+}
+
+/// Writes the results and says what there is to say; returns their folder.
+fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result<PathBuf, Ending> {
+    let files = write_dataset(dataset, out, outputs).map_err(|error| Ending::Failed(error.to_string()))?;
+    // the summary on a terminal says it too
+    let summary = !json && std::io::stdout().is_terminal();
+    if !(summary && std::io::stderr().is_terminal()) {
+        complain(dataset);
+    }
     let ending = if json {
-        match serde_json::to_string(dataset) {
-            Ok(text) => print(&(text + "\n")),
-            Err(error) => Ending::Failed(error.to_string()),
-        }
-    } else if std::io::stdout().is_terminal() {
+        print_json(dataset)
+    } else if summary {
         let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
         print(&Terminal { colour: true, width }.text(dataset, &files))
     } else {

@@ -43,7 +43,7 @@ fn a_study_runs_and_every_output_is_there() {
     let curve = fs::read_to_string(out.join("curve.csv")).unwrap();
     let header: Vec<&str> = curve.lines().next().unwrap().split(',').collect();
     let expected = [
-        "Ft",
+        "Ft_N",
         "frequency_Hz",
         "blade1_amplitude_m",
         "blade1_mean_m",
@@ -65,6 +65,9 @@ fn a_study_runs_and_every_output_is_there() {
     ];
     assert_eq!(header, expected);
     assert_eq!(curve.lines().count(), 1 + 4 * 13);
+    // 119.5 Hz to 122.5 Hz in 13 points, as a user would type them
+    let typed: Vec<String> = (0..13).map(|i| format!("2.0,{:?},", 119.5 + 0.25 * f64::from(i))).collect();
+    assert!(curve.lines().skip(1).zip(&typed).all(|(line, typed)| line.starts_with(typed)), "{curve}");
     assert!(curve.lines().skip(1).all(|line| line.ends_with(",converged")));
 }
 
@@ -74,10 +77,10 @@ fn parameters_and_methods_change_from_outside() {
     let output = stickslip(folder.path(), &["run", "study.toml", "--set", "Ft=2mN", "--only", "csv", "--json"]);
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     let dataset: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let summary = &dataset["tables"][1];
-    let loss = summary["columns"].as_array().unwrap().iter().find(|c| c["name"] == "dissipation_J").unwrap();
     // 4 Ft (a - Ft/kt) at a = 2.75 mm, Ft = 2 mN, kt = 1 N/m
-    let last = loss["values"]["Number"][2].as_f64().unwrap();
+    let summary = &dataset["tables"]["loops_summary"][2];
+    assert_eq!(summary["a_m"], 0.00275);
+    let last = summary["dissipation_J"].as_f64().unwrap();
     assert!((last - 6e-6).abs() < 1e-15, "{last}");
     assert!(!folder.path().join("stickslip-out/study/figure.png").exists());
     let output = stickslip(folder.path(), &["run", "study.toml", "--method", "shooting"]);
@@ -319,6 +322,10 @@ fn lists_templates_schema_and_completions() {
     for what in ["laws", "methods", "templates", "studies"] {
         let output = stickslip(folder.path(), &["list", what]);
         assert!(code(&output) == 0 && output.stdout.len() > 100, "{what}");
+    }
+    let all = String::from_utf8(stickslip(folder.path(), &["list"]).stdout).unwrap();
+    for word in ["LAWS", "coulomb", "METHODS", "event-driven", "TEMPLATES", "blade-couple", "STUDIES", "response"] {
+        assert!(all.contains(word), "{word}");
     }
     let output = stickslip(folder.path(), &["schema"]);
     let schema: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

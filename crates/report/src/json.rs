@@ -3,7 +3,8 @@
 //! The wall time is the only entry that differs between two runs of the same study.
 
 use crate::output::{File, Output, ReportError};
-use stickslip_study::dataset::Dataset;
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use stickslip_study::dataset::{Dataset, Table, Values};
 
 /// The output `json`.
 pub const OUTPUT: Output =
@@ -45,10 +46,93 @@ pub fn to_json(dataset: &Dataset, files: &[String]) -> Result<String, ReportErro
     Ok(text + "\n")
 }
 
+/// The dataset as one line of JSON for other programs: what was run and how it went, and every table as a list of rows, each an object from
+/// column to value. A number or flag that does not exist is `null`.
+/// # Errors
+/// `writer` fails.
+pub fn write_dataset_json(dataset: &Dataset, writer: impl std::io::Write) -> Result<(), std::io::Error> {
+    serde_json::to_writer(writer, &Whole(dataset)).map_err(std::io::Error::from)
+}
+
+struct Whole<'a>(&'a Dataset);
+struct Tables<'a>(&'a [Table]);
+struct Rows<'a>(&'a Table);
+struct Row<'a>(&'a Table, usize);
+
+impl Serialize for Whole<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Whole(dataset) = self;
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("name", &dataset.name)?;
+        map.serialize_entry("title", &dataset.title)?;
+        map.serialize_entry("source", &dataset.source)?;
+        map.serialize_entry("kind", &dataset.kind)?;
+        map.serialize_entry("notes", &dataset.notes)?;
+        map.serialize_entry("failures", &dataset.failures)?;
+        map.serialize_entry("record", &dataset.record)?;
+        map.serialize_entry("tables", &Tables(&dataset.tables))?;
+        map.end()
+    }
+}
+
+impl Serialize for Tables<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|table| (&table.name, Rows(table))))
+    }
+}
+
+impl Serialize for Rows<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq((0..self.0.rows()).map(|row| Row(self.0, row)))
+    }
+}
+
+impl Serialize for Row<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Row(table, row) = self;
+        let mut map = serializer.serialize_map(Some(table.columns.len()))?;
+        for column in &table.columns {
+            match &column.values {
+                // NaN and infinity are no JSON
+                Values::Number(v) => {
+                    map.serialize_entry(&column.name, &v.get(*row).copied().filter(|value| value.is_finite()))?;
+                }
+                Values::Integer(v) => map.serialize_entry(&column.name, &v.get(*row))?,
+                Values::Text(v) => map.serialize_entry(&column.name, &v.get(*row))?,
+                Values::Flag(v) => map.serialize_entry(&column.name, &v.get(*row).copied().flatten())?,
+            }
+        }
+        map.end()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::samples;
+
+    #[test]
+    fn rows_are_objects_and_what_does_not_exist_is_null() {
+        for dataset in samples::all() {
+            let mut bytes = Vec::new();
+            write_dataset_json(&dataset, &mut bytes).unwrap();
+            let value: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+            assert_eq!(value["tables"].as_object().unwrap().len(), dataset.tables.len());
+            for table in &dataset.tables {
+                assert_eq!(value["tables"][&table.name].as_array().unwrap().len(), table.rows(), "{}", table.name);
+            }
+        }
+        let mut bytes = Vec::new();
+        write_dataset_json(&samples::hostile(), &mut bytes).unwrap();
+        let value: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+        let expected = serde_json::json!([
+            { "frequency_Hz": null, "mass": "<b>", "amplitude_m": 1e300 },
+            { "frequency_Hz": 1e-300, "mass": "a,b", "amplitude_m": -0.0 },
+            { "frequency_Hz": 121.25, "mass": "位移", "amplitude_m": 0.0487321 },
+        ]);
+        assert_eq!(value["tables"]["peaks"], expected);
+        assert_eq!(value["record"]["points"]["converged"], 240);
+    }
 
     #[test]
     fn the_record_holds_what_a_repetition_needs() {

@@ -71,7 +71,11 @@ impl<'a> Drawing<'a> {
             // rows stand in the order of the cases; a case may have none
             while case < self.study.cases() {
                 let varied = self.study.varied_values(case).unwrap_or_default();
-                if varied.iter().zip(&columns).all(|(value, column)| value.si.to_bits() == column[from].to_bits()) {
+                if varied
+                    .iter()
+                    .zip(&columns)
+                    .all(|(value, column)| value.column().1.to_bits() == column[from].to_bits())
+                {
                     stretches.push(Stretch { case, varied, rows: from..to });
                     break;
                 }

@@ -25,4 +25,4 @@ pub mod work;
 pub use error::StudyError;
 pub use read::{read_bytes, read_file, read_study};
 pub use study::{Case, MethodChoice, Study, VariedValue};
-pub use values::{Frequencies, Values};
+pub use values::{Frequencies, Values, hertz};

@@ -363,6 +363,33 @@ impl Reader {
     }
 
     fn quantity(&mut self, key: &str, node: &Node) -> Option<Quantity> {
+        let before = self.problems.len();
+        let quantity = self.any_quantity(key, node);
+        if let (None, Content::Text { text, .. }) = (&quantity, &node.value)
+            && let Some((from, to)) = self.two_quantities(text)
+        {
+            self.problems.truncate(before);
+            let message = "a text holds one quantity, this reads like a range";
+            let help = format!(
+                "where a range can stand, write it as {{ from = \"{}\", to = \"{}\", points = 101 }}",
+                shown(from),
+                shown(to)
+            );
+            self.problems.push(Problem::new(&node.place, key, message).help(help));
+        }
+        quantity
+    }
+
+    /// The two quantities of `14 Hz to 19 Hz`, and of what else people write for it.
+    fn two_quantities<'a>(&self, text: &'a str) -> Option<(&'a str, &'a str)> {
+        [" to ", "...", "..", "…", "–", " - ", "; "].iter().find_map(|word| {
+            let (from, to) = text.split_once(word)?;
+            let (from, to) = (from.trim(), to.trim());
+            (self.compile(from).is_ok() && self.compile(to).is_ok()).then_some((from, to))
+        })
+    }
+
+    fn any_quantity(&mut self, key: &str, node: &Node) -> Option<Quantity> {
         let place = &node.place;
         let problem = match &node.value {
             Content::Text { text, inner } => match self.compile(text) {

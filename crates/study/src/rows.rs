@@ -49,10 +49,11 @@ impl Rows {
         }
     }
 
-    /// The varied parameters of a case, SI.
+    /// The varied parameters of a case.
     pub fn varied(&mut self, case: &Case) {
         for varied in &case.varied {
-            self.number(&varied.name, varied.si);
+            let (name, value) = varied.column();
+            self.number(&name, value);
         }
     }
 

@@ -223,7 +223,7 @@ pub const STUDY: &[Key] = &[
     optional(
         "vary",
         Takes::Vary,
-        "runs the study for every combination of these values of parameters: a list, or `{ from, to, points }`",
+        "runs the study for every combination of these values of parameters: one, a list, or `{ from, to, points }`",
         "{ Ft = [\"2 N\", \"4 N\"] }",
     ),
 ];
@@ -274,7 +274,7 @@ pub fn described(takes: &Takes) -> String {
         Takes::Law => "a law: { kind = \"…\", … }".to_owned(),
         Takes::Choice(words) => format!("one of {}", crate::near::one_of(words().iter().map(|word| word.0))),
         Takes::Parameters => "a table of quantities by name".to_owned(),
-        Takes::Vary => "a table from parameters to lists of values or { from, to, points }".to_owned(),
+        Takes::Vary => "a table from parameters to a value, a list of values, or { from, to, points }".to_owned(),
         Takes::Method => "a table with `kind` and the options of that method".to_owned(),
         Takes::Study => "a table with `kind` and the keys of that kind".to_owned(),
     }
@@ -356,7 +356,7 @@ fn takes_schema(takes: &Takes) -> Value {
         Takes::Vary => json!({
             "type": "object",
             "additionalProperties": {
-                "anyOf": [{ "type": "array", "items": quantity(), "minItems": 1 }, object(RANGE)],
+                "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(RANGE)],
             },
         }),
         Takes::Method => {

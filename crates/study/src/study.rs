@@ -6,7 +6,7 @@ use crate::kinds::{Complaint, Kind};
 use crate::near::{nearest, one_of, shown};
 use crate::read::{in_dimension, settled};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
-use crate::values::{Frequencies, Given, Values, between, quantity_json};
+use crate::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
 use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -145,6 +145,43 @@ pub struct VariedValue {
     pub text: String,
 }
 
+/// Names of columns, without their units, that a parameter could have too.
+const OF_TABLES: [&str; 12] = [
+    "amplitude",
+    "frequency",
+    "drive_frequency",
+    "time",
+    "displacement",
+    "force",
+    "dissipation",
+    "damping_ratio",
+    "status",
+    "mass",
+    "joint",
+    "loop",
+];
+
+impl VariedValue {
+    /// Its column in a table: the name with the unit at its end, `Ft_N`, and the value in that unit. SI, but hertz and degrees, which
+    /// come back as they were typed; a parameter of unknown dimension, or without one, has its bare name.
+    pub fn column(&self) -> (String, f64) {
+        // tables have columns of these names themselves
+        let prefix = if OF_TABLES.contains(&self.name.as_str()) { "parameter_" } else { "" };
+        match self.dimension.and_then(|dimension| Some((table_unit(dimension)?, dimension))) {
+            Some(((unit, _), dimension)) => {
+                (format!("{prefix}{}_{unit}", self.name), in_table_unit(self.si, dimension))
+            }
+            None => (format!("{prefix}{}", self.name), self.si),
+        }
+    }
+
+    /// The value and its unit for the axis of a figure, as in [`VariedValue::column`].
+    pub fn on_axis(&self) -> (f64, String) {
+        let unit = self.dimension.and_then(table_unit).map_or(String::new(), |(_, unit)| unit);
+        (self.column().1, unit)
+    }
+}
+
 /// One case of a study: one combination of the varied parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Case {
@@ -243,7 +280,7 @@ impl Study {
     pub(crate) fn varied_values(&self, index: usize) -> Option<Vec<VariedValue>> {
         let choice = self.choice(index);
         let environment = evaluate(&self.names, &self.parameters, &self.order, &choice, None).ok()?;
-        Some(self.varied_in(&environment, &choice))
+        Some(self.varied_of(&environment, &choice))
     }
 
     /// The case with this number.
@@ -393,7 +430,7 @@ impl Study {
     pub(crate) fn case_words(&self, index: usize) -> String {
         let choice = self.choice(index);
         let words = match evaluate(&self.names, &self.parameters, &self.order, &choice, None) {
-            Ok(environment) => varied_text(&self.varied_in(&environment, &choice)),
+            Ok(environment) => varied_text(&self.varied_of(&environment, &choice)),
             // without values: as they stand in the file
             Err(_) => {
                 let words = self.varied.iter().filter_map(|varied| match (&varied.points, choice.get(&varied.index)) {
@@ -420,7 +457,7 @@ impl Study {
         choice
     }
 
-    fn varied_in(&self, environment: &[Value], choice: &HashMap<usize, (&Varied, usize)>) -> Vec<VariedValue> {
+    fn varied_of(&self, environment: &[Value], choice: &HashMap<usize, (&Varied, usize)>) -> Vec<VariedValue> {
         let values = self.varied.iter().map(|varied| {
             let name = self.names[varied.index].clone();
             let value = environment[varied.index];
@@ -494,7 +531,7 @@ impl Study {
 
     fn finished(&self, index: usize, parts: Parts) -> Case {
         let Parts { environment, model, values, method } = parts;
-        let varied = self.varied_in(&environment, &self.choice(index));
+        let varied = self.varied_of(&environment, &self.choice(index));
         let parameters = self
             .names
             .iter()
@@ -585,7 +622,7 @@ pub(crate) fn evaluate(
                 let start = in_dimension(from, start, name, dimension, &environment)?;
                 let end = in_dimension(to, end, name, dimension, &environment)?;
                 not_empty(start.si, end.si, to, dimension)?;
-                Value { si: between(start.si, end.si, point, *points), ..start }
+                Value { si: between(start.si, end.si, dimension, point, *points), ..start }
             }
         };
         environment.values[index] = match fixed {

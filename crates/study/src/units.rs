@@ -87,6 +87,30 @@ const UNITS: &[Named] = &[
     named("%", false, (1, 1, -2, 0), (0, 0, 0, 0)),
 ];
 
+/// What people write for a unit that has another name here, in small letters, and what to write instead.
+const SPELT_OTHERWISE: &[(&[&str], &str)] = &[
+    (&["lbs", "pound", "pounds", "lbm"], "write `lb` for a mass, `lbf` for a force"),
+    (&["kgf", "kp"], "a kilogram-force is 9.80665 N"),
+    (&["kip", "kips"], "write 1000 lbf"),
+    (&["oz"], "an ounce is 0.0625 lb, as a force 0.0625 lbf"),
+    (&["psi"], "write `lbf/in^2`"),
+    (&["mil", "mils", "thou"], "write 0.001 in"),
+    (&["inch", "inches"], "write `in`"),
+    (&["foot", "feet"], "write `ft`"),
+    (&["micron", "microns"], "write `um`"),
+    (&["sec", "secs", "second", "seconds"], "write `s`"),
+    (&["mins", "minute", "minutes"], "write `min`"),
+    (&["hour", "hours", "hr", "hrs"], "write `h`"),
+    (&["degree", "degrees", "degs"], "write `deg`"),
+    (&["radian", "radians", "rads"], "write `rad`"),
+    (&["kgs", "kilo", "kilos"], "write `kg`"),
+    (&["newton", "newtons"], "write `N`"),
+    (&["hertz", "cps"], "write `Hz`"),
+    (&["gram", "grams", "gr"], "write `g`"),
+    (&["meter", "meters", "metre", "metres"], "write `m`"),
+    (&["tonne", "tonnes", "ton", "tons"], "write `t`, which is 1000 kg"),
+];
+
 const PREFIXES: &[(&str, i32)] = &[
     ("p", -12),
     ("n", -9),
@@ -172,6 +196,16 @@ impl Unit {
         };
         let scaled = if self.denominator == 1 { scaled } else { scaled / self.denominator as f64 };
         if self.pi == 0 { scaled } else { scaled * std::f64::consts::PI.powi(self.pi) }
+    }
+}
+
+impl Unit {
+    /// [`Unit::scale`] of a number that may have a sign.
+    pub(crate) fn scale_signed(&self, literal: &str) -> f64 {
+        match literal.strip_prefix('-') {
+            Some(positive) => -self.scale(positive),
+            None => self.scale(literal),
+        }
     }
 }
 
@@ -419,6 +453,11 @@ impl Reader<'_> {
         if (self.names.parameter)(word) {
             return fault.help(format!("a number is followed by its unit; for the parameter write \"* {word}\""));
         }
+        if let Some((_, advice)) =
+            SPELT_OTHERWISE.iter().find(|(words, _)| words.contains(&word.to_lowercase().as_str()))
+        {
+            return fault.help(*advice);
+        }
         match nearest_unit(word) {
             Some(unit) => fault.help(format!("did you mean `{unit}`?")),
             None => fault.help("units are m, kg, s, N, J, Pa, W, Hz, rad, deg, rpm, with prefixes such as m and k"),
@@ -490,12 +529,40 @@ mod tests {
         assert!(all.contains(words), "{text}: {all}");
     }
 
+    /// No word that is explained is a unit, and units that are proposed are units.
+    #[test]
+    fn other_spellings_lead_to_units() {
+        for (words, advice) in SPELT_OTHERWISE {
+            assert!(words.iter().all(|word| find(word).is_none()), "{words:?}");
+            let proposed = advice.split('`').skip(1).step_by(2);
+            for unit in proposed {
+                check(&format!("1 {unit}"), quantity_of(unit), read_dimension(unit));
+            }
+        }
+    }
+
+    fn read_unit(unit: &str) -> Unit {
+        let names = Names { parameter: &|_| false, function: &|_| false };
+        read(unit, 0, &names).unwrap().0
+    }
+
+    fn quantity_of(unit: &str) -> f64 {
+        read_unit(unit).scale("1")
+    }
+
+    fn read_dimension(unit: &str) -> Dimension {
+        read_unit(unit).dimension
+    }
+
     #[test]
     fn faults_say_what_is_missing() {
         refuse("10 N/", "after `/` a unit is missing");
         refuse("10 N*", "after `*` a unit is missing");
         refuse("10 Nm", "did you mean `N m`?");
         refuse("10 hz", "did you mean `Hz`?");
+        refuse("2 lbs", "write `lb` for a mass, `lbf` for a force");
+        refuse("2 Pounds", "write `lb` for a mass, `lbf` for a force");
+        refuse("0.1 sec", "write `s`");
         refuse("10 N/m s", "whether `s` is below");
         refuse("10 N / m", "the parameter `m`");
         refuse("10 m^", "whole number");

@@ -1,12 +1,61 @@
 //! The values of a table of the file, resolved for one case: SI, checked.
 
 use crate::expression::displayed;
+use crate::units;
 use serde_json::{Map, Value as Json, json};
 use std::collections::BTreeMap;
 use stickslip::dimension::Dimension;
 use stickslip::law::Law;
 
+/// The unit in which tables give quantities of this dimension: its name, as the end of a column's name, and the unit as it is written in a study
+/// file. SI, but hertz and degrees, which people type; `None` for a pure number.
+pub(crate) fn table_unit(dimension: Dimension) -> Option<(String, String)> {
+    let unit = match dimension {
+        Dimension::NONE => return None,
+        Dimension::FREQUENCY => "Hz".to_owned(),
+        Dimension::SWEEP_RATE => "Hz/s".to_owned(),
+        Dimension::ANGLE => "deg".to_owned(),
+        other => match other.name_and_unit() {
+            Some((_, unit)) => unit.to_owned(),
+            None => other.to_string(),
+        },
+    };
+    let name = unit.replace("^-", "_to_minus_").replace('^', "").replace('/', "_per_").replace(' ', "_");
+    Some((name, unit))
+}
+
+/// The number in the unit of [`table_unit`] whose value in SI is `si`: the shortest that a user could have typed for it, where there
+/// is one, so that 119.5 Hz stays 119.5 and does not become 119.49999999999999 by way of rad/s.
+pub(crate) fn in_table_unit(si: f64, dimension: Dimension) -> f64 {
+    let unit = match dimension {
+        Dimension::FREQUENCY | Dimension::SWEEP_RATE => "Hz",
+        Dimension::ANGLE => "deg",
+        _ => return si,
+    };
+    let Some(unit) = units::find(unit).filter(|_| si.is_finite()) else { return si };
+    let near = si / unit.scale("1");
+    // 17 digits tell any two numbers apart; 15 are what a double keeps of any decimal number
+    let typed = (15..=17).map(|digits| format!("{near:.*e}", digits - 1)).find(|text| unit.scale_signed(text) == si);
+    typed.and_then(|text| text.parse().ok()).unwrap_or(near)
+}
+
+/// A frequency in rad/s as the hertz that a user would have typed for it, see the tables' column `frequency_Hz`.
+///
+/// # Example
+/// ```
+/// use std::f64::consts::TAU;
+/// use stickslip_study::hertz;
+/// let typed = || (0..2000).map(|i| f64::from(i) / 10.0);
+/// assert!(typed().any(|f| f * TAU / TAU != f));
+/// assert!(typed().all(|f| hertz(f * TAU) == f));
+/// ```
+pub fn hertz(omega: f64) -> f64 {
+    in_table_unit(omega, Dimension::FREQUENCY)
+}
+
 /// Drive frequencies, rad/s. A range is computed on demand, so that its number of points costs no memory.
+///
+/// The points of a range are equally spaced in hertz, as decimal numbers: 119 Hz to 123 Hz in 41 points has 119.3 Hz.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Frequencies {
     /// As listed in the file.
@@ -40,8 +89,15 @@ impl Frequencies {
     pub fn get(&self, index: usize) -> Option<f64> {
         match self {
             Frequencies::List(list) => list.get(index).copied(),
-            Frequencies::Range { from, to, points } => (index < *points).then(|| between(*from, *to, index, *points)),
+            Frequencies::Range { from, to, points } => {
+                (index < *points).then(|| between(*from, *to, Some(Dimension::FREQUENCY), index, *points))
+            }
         }
+    }
+
+    /// The frequency at `index`, Hz, as a user would have typed it.
+    pub fn hertz(&self, index: usize) -> Option<f64> {
+        self.get(index).map(hertz)
     }
 
     /// All of them, rad/s.
@@ -50,10 +106,34 @@ impl Frequencies {
     }
 }
 
-/// Point `index` of `points` from `from` to `to`; both ends are exact.
-pub(crate) fn between(from: f64, to: f64, index: usize, points: usize) -> f64 {
-    if index + 1 == points { to } else { from + (to - from) * (index as f64 / (points - 1) as f64) }
+/// Point `index` of `points` from `from` to `to` (SI of this dimension); both ends are exact, and the points between are the decimal
+/// numbers that were meant, in the unit of the tables: 0.1 to 0.7 in seven points has 0.3, not 0.30000000000000004.
+pub(crate) fn between(from: f64, to: f64, dimension: Option<Dimension>, index: usize, points: usize) -> f64 {
+    if index == 0 || index + 1 >= points {
+        return if index == 0 { from } else { to };
+    }
+    let dimension = dimension.unwrap_or(Dimension::NONE);
+    let (start, end) = (in_table_unit(from, dimension), in_table_unit(to, dimension));
+    let value = start + (end - start) * (index as f64 / (points - 1) as f64);
+    // 15 digits of the larger end: below the rounding of the sum, and beyond what anybody types
+    let digits = 14 - start.abs().max(end.abs()).log10().floor() as i32;
+    let decimal = match usize::try_from(digits) {
+        Ok(digits @ ..=MOST_DECIMALS) => format!("{value:.digits$}"),
+        _ => format!("{value:e}"),
+    };
+    let unit = match dimension {
+        Dimension::FREQUENCY | Dimension::SWEEP_RATE => units::find("Hz"),
+        Dimension::ANGLE => units::find("deg"),
+        _ => None,
+    };
+    match unit {
+        Some(unit) => unit.scale_signed(&decimal),
+        None => decimal.parse().unwrap_or(value),
+    }
 }
+
+/// Decimals beyond which a value is left as it is computed: it is far below 1 in its unit.
+const MOST_DECIMALS: usize = 300;
 
 /// One resolved value.
 #[derive(Debug, Clone, PartialEq)]
@@ -153,12 +233,63 @@ pub(crate) fn quantity_json(si: f64, dimension: Option<Dimension>) -> Json {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     #[test]
     fn a_range_has_exact_ends_and_costs_no_memory() {
         let range = Frequencies::Range { from: 0.1, to: 0.7, points: 10_000_000 };
         assert_eq!((range.len(), range.get(0), range.get(9_999_999)), (10_000_000, Some(0.1), Some(0.7)));
         assert_eq!(range.get(10_000_000), None);
-        assert_eq!(Frequencies::Range { from: 1.0, to: 3.0, points: 3 }.iter().collect::<Vec<_>>(), [1.0, 2.0, 3.0]);
+        let range = Frequencies::Range { from: TAU, to: 3.0 * TAU, points: 3 };
+        assert_eq!(range.iter().collect::<Vec<_>>(), [TAU, 2.0 * TAU, 3.0 * TAU]);
+    }
+
+    #[test]
+    fn values_come_back_as_typed() {
+        let omega = |text: &str| units::find("Hz").unwrap().scale(text);
+        // numbers of up to eight digits
+        for i in 1..20_000u32 {
+            for text in [format!("{}", f64::from(i) / 40.0), format!("{:.5}", f64::from(i) * 1.7e-4)] {
+                assert_eq!(hertz(omega(&text)), text.parse::<f64>().unwrap(), "{text}");
+            }
+        }
+        let lost = (1..2000).filter(|&i| f64::from(i) / 10.0 * TAU / TAU != f64::from(i) / 10.0).count();
+        assert!(lost > 100, "the division alone loses {lost} of 2000");
+        for (i, text) in ["30", "0.1", "-45", "12.345678", "0"].iter().enumerate() {
+            let si = units::find("deg").unwrap().scale_signed(text);
+            assert_eq!(in_table_unit(si, Dimension::ANGLE), text.parse::<f64>().unwrap(), "{i}");
+        }
+        // what nobody typed in hertz is the quotient
+        assert_eq!(hertz(760.0), 760.0 / TAU);
+        assert!(hertz(f64::NAN).is_nan() && hertz(0.0) == 0.0);
+    }
+
+    #[test]
+    fn points_of_a_range_are_decimal_numbers() {
+        let at = |i| between(0.1, 0.7, None, i, 7);
+        assert_eq!((0..7).map(at).collect::<Vec<_>>(), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]);
+        let range = Frequencies::Range { from: 119.0 * TAU, to: 123.0 * TAU, points: 41 };
+        for i in 0..41 {
+            let typed: f64 = format!("{:.1}", 119.0 + 0.1 * f64::from(i)).parse().unwrap();
+            assert_eq!(range.hertz(i as usize), Some(typed));
+            assert_eq!(range.get(i as usize), Some(typed * TAU), "typed alone it is the same frequency");
+        }
+        // far from 1, through zero, and where the ends are no decimal numbers
+        assert_eq!(between(1e-320, 3e-320, None, 1, 3), 2e-320);
+        assert_eq!(between(1e300, 3e300, None, 1, 3), 2e300);
+        assert_eq!(between(-0.3, 0.3, None, 3, 7), 0.0);
+        let third = between(1.0 / 3.0, 2.0 / 3.0, None, 1, 3);
+        assert!((third - 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn columns_end_with_their_unit() {
+        let name = |dimension| table_unit(dimension).map(|(name, _)| name);
+        assert_eq!(name(Dimension::STIFFNESS).as_deref(), Some("N_per_m"));
+        assert_eq!(name(Dimension::FREQUENCY).as_deref(), Some("Hz"));
+        assert_eq!(name(Dimension::ANGLE).as_deref(), Some("deg"));
+        assert_eq!(name(Dimension::INVERSE_VELOCITY).as_deref(), Some("s_per_m"));
+        assert_eq!(name(Dimension { kg: 0, m: 2, s: -1, rad: 0 }).as_deref(), Some("m2_s_to_minus_1"));
+        assert_eq!(name(Dimension::NONE), None);
     }
 }

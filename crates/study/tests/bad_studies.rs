@@ -138,6 +138,15 @@ fn frequencies() {
     check("points = 241", "points = 1", (46, 60), "points", &["from 2 to 1000000"]);
     check("points = 241", "points = 10_000_000", (46, 60), "points", &["limit", "1000000 points"]);
     check("points = 241", "points = 500_000", (46, 13), "frequency", &["4 cases times 500000", "limit is 1000000"]);
+    let as_a_text = "\"119.5 Hz to 122.5 Hz\"";
+    check(
+        range,
+        as_a_text,
+        (46, 13),
+        "frequency",
+        &["one quantity", "{ from = \"119.5 Hz\", to = \"122.5 Hz\", points"],
+    );
+    check(range, "\"119..122 Hz\"", (46, 13), "frequency", &["reads like a range", "from = \"119\", to = \"122 Hz\""]);
     check(range, "\"-1 Hz\"", (46, 14), "frequency", &["more than zero, found -1 Hz"]);
     check(range, "0", (46, 13), "frequency", &["more than zero"]);
     check(range, "[]", (46, 13), "frequency", &["empty"]);

@@ -59,7 +59,7 @@ vary = { Ft = ["5.5 N", "6.5 N", "7.5 N"] }
     let found = dataset(text);
     assert!(found.failures.is_empty());
     let best = table(&found, "optimum");
-    assert!((best.numbers("Ft").unwrap()[0] - 6.684).abs() < 0.01);
+    assert!((best.numbers("Ft_N").unwrap()[0] - 6.684).abs() < 0.01);
     assert!((best.numbers("amplitude_m").unwrap()[0] - 0.019_747).abs() < 1e-6);
     // the same with a series that is too short does not look converged
     let short = dataset(&(text.to_owned() + "[method]\nkind = \"harmonic-balance\"\nharmonics = 3\n"));
@@ -92,10 +92,10 @@ harmonics = 31
 tolerance = 0.3"#;
     let found = oscillator("-0.03 kg/s", r#"{ kind = "coulomb", limit = "1 N" }"#, study);
     assert!(found.failures.is_empty(), "{:?}", found.failures);
-    let turns = table(&found, "turns").numbers("F0").unwrap();
+    let turns = table(&found, "turns").numbers("F0_N").unwrap();
     // the first where (0.1 a)² + (4/π - 0.03 ω a)² is least, up to the higher harmonics; the second above the force of stick
     assert!(turns.len() == 2 && (turns[0] - 1.21).abs() < 0.05 && turns[1] > turns[0], "{turns:?}");
-    let values = table(&found, "branch").numbers("F0").unwrap();
+    let values = table(&found, "branch").numbers("F0_N").unwrap();
     assert_eq!((values[0], *values.last().unwrap()), (2.0, 0.5));
     let styles: Vec<Style> = found.figure.panels[0].series.iter().map(|series| series.style).collect();
     assert_eq!(styles, [Style::Solid, Style::Dashed, Style::Solid]);

@@ -234,6 +234,19 @@ fn the_json_schema_accepts_good_files_and_refuses_unknown_keys() {
     }
 }
 
+/// A value alone stands for a list of one, for the program and for the schema.
+#[test]
+fn vary_takes_a_single_value() {
+    let text = EXAMPLE.replace("[\"2 N\", \"4 N\", \"6 N\", \"8 N\"]", "\"5 N\"");
+    let study = read(&text);
+    assert_eq!((study.cases(), study.case(0).unwrap().label().as_str()), (1, "Ft = 5 N"));
+    let root = schema::json_schema();
+    let value: Json = serde_json::to_value(toml::from_str::<toml::Value>(&text).unwrap()).unwrap();
+    accepts(&root, &root, &value).unwrap();
+    let wrong = toml::from_str::<toml::Value>(&text.replace("\"5 N\"", "[]").replace("Ft = []", "Ft = true")).unwrap();
+    assert!(accepts(&root, &root, &serde_json::to_value(wrong).unwrap()).is_err());
+}
+
 #[test]
 fn the_reference_names_every_key_law_method_kind_and_template() {
     let book = schema::markdown();
@@ -270,4 +283,30 @@ fn set_replaces_the_values_of_vary_and_says_so() {
     assert_eq!((study.cases(), study.case(4).unwrap().label().as_str()), (5, "kt = 9 N/m, Ft = 1.82 N"));
     assert!(read(EXAMPLE).notes().is_empty());
     assert!(read_study("fig06.toml", EXAMPLE, &set("kt", "1 N/m")).unwrap().notes().is_empty());
+}
+
+/// A varied parameter stands in tables with its unit, in the number that was typed; without a unit under its bare name.
+#[test]
+fn columns_of_parameters_have_their_unit() {
+    let text = EXAMPLE
+        .replace("b = \"0.2 kg/s\"", "b = \"0.2 kg/s\"\nshift = \"0 deg\"\nf = \"1 Hz\"\namplitude = \"10 N\"\nn = 3")
+        .replace(
+            "vary = {",
+            "vary = { shift = [\"47.3 deg\"], f = [\"119.3 Hz\"], amplitude = [\"0.3 N\"], n = [7], kt = [\"1 N/mm\"],",
+        )
+        .replace(
+            "amplitude = \"10 N\"\n\n[study]",
+            "amplitude = \"amplitude * n * f / (1 Hz)\"\nphase = \"shift\"\n\n[study]",
+        );
+    let case = read(&text).case(0).unwrap();
+    let columns: Vec<(String, f64)> = case.varied.iter().map(|value| value.column()).collect();
+    let expected = [
+        ("shift_deg", 47.3),
+        ("f_Hz", 119.3),
+        ("parameter_amplitude_N", 0.3),
+        ("n", 7.0),
+        ("kt_N_per_m", 1000.0),
+        ("Ft_N", 2.0),
+    ];
+    assert_eq!(columns, expected.map(|(name, value)| (name.to_owned(), value)));
 }

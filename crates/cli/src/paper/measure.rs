@@ -51,10 +51,10 @@ fn runs(keys: &[(f64, f64)]) -> Vec<std::ops::Range<usize>> {
 pub fn curves(dataset: &Dataset) -> Option<Vec<Curve>> {
     let (curve, peaks) = (table(dataset, "curve")?, table(dataset, "peaks")?);
     let places: Vec<&str> = curve.columns.iter().filter_map(|c| c.name.strip_suffix("_amplitude_m")).collect();
-    let limit = curve.numbers("Ft")?;
+    let limit = curve.numbers("Ft_N")?;
     let frequency = curve.numbers("frequency_Hz")?;
     let (peak_limit, peak_frequency, peak_amplitude) =
-        (peaks.numbers("Ft")?, peaks.numbers("frequency_Hz")?, peaks.numbers("amplitude_m")?);
+        (peaks.numbers("Ft_N")?, peaks.numbers("frequency_Hz")?, peaks.numbers("amplitude_m")?);
     let Values::Text(masses) = &peaks.columns.iter().find(|column| column.name == "mass")?.values else { return None };
     let keys: Vec<(f64, f64)> = limit.iter().map(|limit| (*limit, 0.0)).collect();
     runs(&keys)
@@ -84,7 +84,7 @@ pub fn loops(dataset: &Dataset) -> Option<Vec<Loop>> {
     let (points, summary) = (table(dataset, "loops")?, table(dataset, "loops_summary")?);
     let column = |name: &str| points.numbers(name);
     let (kt, a, time, u, force) =
-        (column("kt")?, column("a")?, column("time_s")?, column("displacement_m")?, column("force_N")?);
+        (column("kt_N_per_m")?, column("a_m")?, column("time_s")?, column("displacement_m")?, column("force_N")?);
     let keys: Vec<(f64, f64)> = kt.iter().copied().zip(a.iter().copied()).collect();
     let areas = summary.numbers("dissipation_J")?;
     let runs = runs(&keys);

@@ -8,7 +8,7 @@ use crate::point::Summary;
 use crate::rows::Rows;
 use crate::schema::{Takes, Within, default, optional};
 use crate::study::{Study, VariedValue, varied_text};
-use crate::values::Values;
+use crate::values::{Values, hertz};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::curve::trace::{Branch, End, Trace, TraceError};
@@ -114,8 +114,12 @@ fn compute(work: &Work<'_>) -> Computed {
     let place = peak_place(prepared);
     let (name, factor) = axis(along);
     let begin = |rows: &mut Rows, value: f64| {
-        outer.iter().for_each(|v| rows.number(&v.name, v.si));
-        rows.number(&name, value * factor);
+        outer.iter().map(VariedValue::column).for_each(|(name, value)| rows.number(&name, value));
+        let (column, value) = match along {
+            None => ("frequency_Hz".to_owned(), hertz(value)),
+            Some(parameter) => VariedValue { si: value, ..parameter.clone() }.column(),
+        };
+        rows.number(&column, value);
     };
     let (mut rows, mut peaks, mut turns) = (Rows::default(), Rows::default(), Rows::default());
     for point in &branch.points {
@@ -192,7 +196,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let column = |place: usize| format!("{}_amplitude_m", system.places[place]);
     let (unit, factor) = display_unit(largest(table, (0..system.dofs()).map(column)), "m");
     let (name, _) = axis(along);
-    let si = along.map_or("Hz", |v| v.dimension.and_then(|d| d.name_and_unit()).map_or("", |(_, unit)| unit));
+    let along_unit = along.map_or("Hz".to_owned(), |parameter| parameter.on_axis().1);
     let stretches = drawing.stretches_of(table, outer.len());
     let one = stretches.len() == 1;
     let height = if one { "amplitude".to_owned() } else { format!("amplitude of {}", system.places[place]) };
@@ -216,7 +220,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         }
     }
     let quantity = if along.is_some() { name } else { "frequency".to_owned() };
-    let panel = Panel { title: String::new(), x: Axis::new(quantity, si), y: Axis::new(height, unit), series };
+    let panel = Panel { title: String::new(), x: Axis::new(quantity, along_unit), y: Axis::new(height, unit), series };
     Figure { panels: vec![panel], ..Figure::default() }
 }
 

@@ -5,9 +5,8 @@ use crate::dataset::{Axis, Figure, Panel, Series};
 use crate::drawing::{Drawing, display_unit, largest, numbers, words};
 use crate::rows::Rows;
 use crate::schema::{Takes, optional};
-use crate::values::Values;
+use crate::values::{Values, hertz};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
-use std::f64::consts::TAU;
 use stickslip::model::Model;
 use stickslip::orbit::{Orbit, Sample};
 
@@ -86,7 +85,7 @@ fn compute(work: &Work<'_>) -> Computed {
                 let (displacement, force) = source.read(sample);
                 table.varied(&prepared.case);
                 if several {
-                    table.number("frequency_Hz", omega / TAU);
+                    table.number("frequency_Hz", hertz(omega));
                 }
                 table.text("joint", name);
                 table.number("time_s", *time);
@@ -97,7 +96,7 @@ fn compute(work: &Work<'_>) -> Computed {
             let first = First::new(&orbit, *source);
             summary.varied(&prepared.case);
             if several {
-                summary.number("frequency_Hz", omega / TAU);
+                summary.number("frequency_Hz", hertz(omega));
             }
             summary.text("joint", name);
             summary.number("dissipation_J", exact_loss(prepared, &orbit, *source).unwrap_or(first.loss));

@@ -7,8 +7,8 @@ use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
 use crate::schema::{Takes, default};
+use crate::values::hertz;
 use crate::work::{Computed, Grain, Part, Prepared, Work};
-use std::f64::consts::TAU;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
 pub(super) const KIND: Kind = Kind {
@@ -48,7 +48,7 @@ fn compute(work: &Work<'_>) -> Computed {
         orbits::count(&mut part, &prepared.case, &orbit);
         part.notes.extend(one_of_many(prepared, &orbit));
         summary.varied(&prepared.case);
-        summary.number("frequency_Hz", omega / TAU);
+        summary.number("frequency_Hz", hertz(omega));
         Summary::new(&prepared.system, Ok(&orbit)).write(&prepared.system, &mut summary);
         summary.number("work_in_J", orbit.energy.work_in);
         summary.number("viscous_J", orbit.energy.viscous);
@@ -59,11 +59,12 @@ fn compute(work: &Work<'_>) -> Computed {
         let all = if wanted { orbit.multipliers() } else { Some(Vec::new()) };
         if all.is_none() {
             let place = place_of(&prepared.case, omega);
-            part.notes.push(Note::Said(format!("{place}: the multipliers are not known, as the orbit has no return map.")));
+            part.notes
+                .push(Note::Said(format!("{place}: the multipliers are not known, as the orbit has no return map.")));
         }
         for (index, multiplier) in all.unwrap_or_default().iter().enumerate() {
             multipliers.varied(&prepared.case);
-            multipliers.number("frequency_Hz", omega / TAU);
+            multipliers.number("frequency_Hz", hertz(omega));
             multipliers.integer("index", index as u64 + 1);
             multipliers.number("real", multiplier.re);
             multipliers.number("imaginary", multiplier.im);
@@ -72,7 +73,7 @@ fn compute(work: &Work<'_>) -> Computed {
         }
         for time in orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize) {
             motion.varied(&prepared.case);
-            motion.number("frequency_Hz", omega / TAU);
+            motion.number("frequency_Hz", hertz(omega));
             motion.number("time_s", time);
             write_sample(prepared, &orbit.sample(time), &mut motion);
             motion.end();

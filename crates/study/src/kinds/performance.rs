@@ -8,9 +8,8 @@ use crate::note::Note;
 use crate::rows::Rows;
 use crate::schema::{Takes, optional};
 use crate::study::{VariedValue, varied_text};
-use crate::values::Values;
+use crate::values::{Values, hertz};
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
-use std::f64::consts::TAU;
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
 use stickslip::method::MethodError;
 use stickslip::model::Model;
@@ -69,7 +68,7 @@ fn compute(work: &Work<'_>) -> Computed {
             )));
         }
         rows.varied(&prepared.case);
-        rows.number("frequency_Hz", row.peak.map_or(f64::NAN, |peak| peak.omega / TAU));
+        rows.number("frequency_Hz", row.peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
         rows.number("amplitude_m", row.peak.map_or(f64::NAN, |peak| peak.value));
         rows.flag("at_range_end", row.peak.map(|peak| peak.at_end));
         rows.integer("failed_orbits", row.failed as u64);
@@ -79,9 +78,10 @@ fn compute(work: &Work<'_>) -> Computed {
     if let Some((outer, inner)) = split(work.case()) {
         let best = curve.optimum;
         let peak = best.and_then(|row| row.peak);
-        outer.iter().for_each(|varied| optima.number(&varied.name, varied.si));
-        optima.number(&inner.name, best.map_or(f64::NAN, |row| row.value));
-        optima.number("frequency_Hz", peak.map_or(f64::NAN, |peak| peak.omega / TAU));
+        outer.iter().map(VariedValue::column).for_each(|(name, value)| optima.number(&name, value));
+        let at_best = best.map(|row| VariedValue { si: row.value, ..inner.clone() });
+        optima.number(&inner.column().0, at_best.map_or(f64::NAN, |value| value.column().1));
+        optima.number("frequency_Hz", peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
         optima.number("amplitude_m", peak.map_or(f64::NAN, |peak| peak.value));
         optima.text("status", best.as_ref().map_or("none", status));
         optima.end();
@@ -147,7 +147,6 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let stretches = drawing.stretches_of(table, outer);
     let Some(inner) = stretches.first().and_then(|stretch| stretch.varied.last()) else { return Figure::default() };
     let (unit, factor) = display_unit(largest(table, ["amplitude_m".to_owned()]), "m");
-    let si = inner.dimension.and_then(|d| d.name_and_unit()).map_or("", |(_, unit)| unit);
     let parameter = |table: &crate::dataset::Table, rows| numbers(table, &table.columns[outer].name, rows);
     let height = |table, rows| numbers(table, "amplitude_m", rows).iter().map(|y| y * factor).collect::<Vec<f64>>();
     let mut series = Vec::new();
@@ -166,7 +165,11 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             }
         }
     }
-    let panel =
-        Panel { title: String::new(), x: Axis::new(&inner.name, si), y: Axis::new("resonance peak", unit), series };
+    let panel = Panel {
+        title: String::new(),
+        x: Axis::new(&inner.name, inner.on_axis().1),
+        y: Axis::new("resonance peak", unit),
+        series,
+    };
     Figure { panels: vec![panel], ..Figure::default() }
 }

@@ -7,8 +7,8 @@ use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
 use crate::schema::{Takes, default};
+use crate::values::hertz;
 use crate::work::{Computed, Grain, NOT_REACHED, Part, Work};
-use std::f64::consts::TAU;
 use stickslip::curve::peak::{self, Peak, Point};
 use stickslip::method::MethodError;
 use stickslip::orbit::Orbit;
@@ -57,7 +57,7 @@ fn compute(work: &Work<'_>) -> Computed {
             note.join(&mut part.notes);
         }
         rows.varied(case);
-        rows.number("frequency_Hz", omega / TAU);
+        rows.number("frequency_Hz", hertz(omega));
         summary.write(system, &mut rows);
         rows.end();
         if wanted {
@@ -73,7 +73,7 @@ fn compute(work: &Work<'_>) -> Computed {
         for (place, peak) in found {
             peaks.varied(case);
             peaks.text("mass", &system.places[place]);
-            peaks.number("frequency_Hz", peak.omega / TAU);
+            peaks.number("frequency_Hz", hertz(peak.omega));
             peaks.number("amplitude_m", peak.value);
             peaks.flag("at_range_end", Some(peak.at_end));
             peaks.end();

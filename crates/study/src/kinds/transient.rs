@@ -7,7 +7,7 @@ use crate::drawing::{Drawing, display_unit, numbers};
 use crate::point::place_of;
 use crate::rows::Rows;
 use crate::schema::{Key, Takes, Within, default, optional, required};
-use crate::values::Values;
+use crate::values::{Values, hertz};
 use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Work};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
@@ -176,10 +176,10 @@ fn compute(work: &Work<'_>) -> Computed {
         let end = transient.run(&prepared.system, &mut |time, omega, sample| {
             rows.varied(case);
             if work.several_frequencies() {
-                rows.number("drive_frequency_Hz", drive.unwrap_or(0.0) / TAU);
+                rows.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
             }
             rows.number("time_s", time);
-            rows.number("frequency_Hz", omega / TAU);
+            rows.number("frequency_Hz", hertz(omega));
             write_sample(prepared, sample, &mut rows);
             rows.end();
             stopped = work.context.stopped();
