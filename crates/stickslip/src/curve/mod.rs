@@ -1,5 +1,6 @@
 //! Families of orbits along a parameter.
 
+pub mod adaptive;
 pub mod modes;
 pub mod peak;
 pub mod performance;
