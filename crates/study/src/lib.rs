@@ -10,6 +10,7 @@ pub mod expression;
 pub mod kinds;
 mod near;
 mod read;
+mod repeat;
 pub mod run;
 pub mod schema;
 mod statement;
