@@ -102,6 +102,8 @@ impl StudyError {
     /// The first of several errors, in the order of the file, with the rest behind it.
     pub(crate) fn all(sources: &[Arc<Source>], mut problems: Vec<Problem>) -> Option<Self> {
         problems.sort_by_key(|p| (p.place.source, p.place.span.start));
+        // one mistake in an entry that is repeated is one error
+        problems.dedup_by(|later, first| later.place == first.place && later.key == first.key);
         let mut errors = problems.into_iter().map(|problem| StudyError::at(sources, problem));
         let mut first = errors.next()?;
         first.0.others = errors.collect();

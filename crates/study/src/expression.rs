@@ -164,15 +164,17 @@ impl Expression {
     pub fn compile<S: AsRef<str>>(text: &str, parameters: &[S]) -> Result<Self, Fault> {
         let index = |name: &str| parameters.iter().position(|p| p.as_ref() == name);
         let names: Vec<&str> = parameters.iter().map(AsRef::as_ref).collect();
-        Expression::compile_with(text, &index, &names)
+        Expression::compile_with(text, &index, &|_| None, &names)
     }
 
+    /// With bare numbers that have names; `names` are those that can have been meant by a wrong one.
     pub(crate) fn compile_with(
         text: &str,
         index: &dyn Fn(&str) -> Option<usize>,
+        constant: &dyn Fn(&str) -> Option<f64>,
         names: &[&str],
     ) -> Result<Self, Fault> {
-        let mut parser = Parser { text, at: 0, index, names, depth: 0, steps: Vec::new() };
+        let mut parser = Parser { text, at: 0, index, constant, names, depth: 0, steps: Vec::new() };
         parser.space();
         if parser.peek().is_none() {
             return Err(Fault::new(0..text.len(), "the text is empty, a number or an expression is missing"));
@@ -332,6 +334,7 @@ struct Parser<'a> {
     text: &'a str,
     at: usize,
     index: &'a dyn Fn(&str) -> Option<usize>,
+    constant: &'a dyn Fn(&str) -> Option<f64>,
     names: &'a [&'a str],
     depth: usize,
     steps: Vec<(Operation, Range<usize>)>,
@@ -484,7 +487,7 @@ impl Parser<'_> {
         self.space();
         let value = match self.peek() {
             Some(c) if units::starts_unit(c) => {
-                let parameter = |name: &str| (self.index)(name).is_some();
+                let parameter = |name: &str| (self.index)(name).is_some() || (self.constant)(name).is_some();
                 let function = |name: &str| FUNCTIONS.contains(&name);
                 let names = Names { parameter: &parameter, function: &function };
                 let (unit, end) = units::read(self.text, self.at, &names)?;
@@ -514,6 +517,10 @@ impl Parser<'_> {
         self.space();
         if self.peek() == Some('(') {
             return self.call(name, start..end);
+        }
+        if let Some(value) = (self.constant)(name) {
+            self.push(Operation::Push(Value::bare(value)), start);
+            return Ok(());
         }
         if let Some(index) = (self.index)(name) {
             self.push(Operation::Parameter(index), start);

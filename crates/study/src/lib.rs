@@ -13,6 +13,7 @@ mod near;
 mod note;
 mod point;
 mod read;
+mod repeat;
 mod rows;
 pub mod run;
 pub mod schema;

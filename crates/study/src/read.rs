@@ -5,7 +5,10 @@ use crate::error::{Place, Problem, Source, StudyError};
 use crate::expression::{Expression, Value, described, is_reserved};
 use crate::kinds;
 use crate::near::{nearest, one_of, shown};
-use crate::schema::{self, FILE, Key, MOST_BYTES, MOST_ELEMENTS, MOST_POINTS, Presence, STUDY, Takes, Within};
+use crate::repeat::{Index, Repetition, Turn};
+use crate::schema::{
+    self, FILE, Key, MOST_BYTES, MOST_ELEMENTS, MOST_MASSES, MOST_POINTS, Presence, STUDY, Takes, Within,
+};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable};
 use crate::study::{Lists, Parameter, Replaced, Structure, Study, Varied, VariedPoints};
 use crate::values::Given;
@@ -20,6 +23,9 @@ use stickslip::{law, method};
 
 /// Most errors that are reported at once.
 const MOST_ERRORS: usize = 20;
+
+/// Largest value of an index: names stay short, and sums of indices exact.
+const LARGEST_INDEX: u64 = 1_000_000;
 
 /// Reads the study at `path`; `overrides` are parameters and their new values, as in `--set Ft=3N`.
 ///
@@ -110,6 +116,8 @@ pub fn read_study(name: &str, text: &str, overrides: &[(String, String)]) -> Res
         problems: Vec::new(),
         names: Vec::new(),
         index: HashMap::new(),
+        repetition: Repetition::default(),
+        number: 0,
     };
     let study = reader.study(name, text, overrides);
     match study {
@@ -131,6 +139,9 @@ struct Reader {
     /// Parameters, in order, and their index by name.
     names: Vec<String>,
     index: HashMap<String, usize>,
+    /// The repetition of the entry that is being read, and which of its turns.
+    repetition: Repetition,
+    number: usize,
 }
 
 impl Reader {
@@ -242,7 +253,7 @@ impl Reader {
             };
             entries.extend(value.map(|value| StatedEntry { key: key.name, place, value }));
         }
-        StatedTable { place: table.place.clone(), entries }
+        StatedTable { place: table.place.clone(), turn: String::new(), entries }
     }
 
     /// The value that stands for an absent key.
@@ -270,14 +281,13 @@ impl Reader {
     fn value(&mut self, key: &Key, node: &Node) -> Option<Stated> {
         match (&key.takes, &node.value) {
             (Takes::Text, Content::Text { text, .. }) => Some(Stated::Fixed(Given::Text(text.clone()))),
-            (Takes::Name, Content::Text { text, .. }) => {
-                self.name(key.name, text, &node.place)?;
-                Some(Stated::Fixed(Given::Text(text.clone())))
+            (Takes::Name, Content::Text { text, inner }) => {
+                Some(Stated::Fixed(Given::Text(self.name(key.name, text, *inner, &node.place)?)))
             }
-            (Takes::Names, Content::Text { text, .. }) => {
-                self.name(key.name, text, &node.place)?;
-                Some(Stated::Names(vec![(text.clone(), node.place.clone())]))
+            (Takes::Names, Content::Text { text, inner }) => {
+                Some(Stated::Names(vec![(self.name(key.name, text, *inner, &node.place)?, node.place.clone())]))
             }
+            (Takes::Repeat, _) => None, // read before the other keys, whose values depend on it
             (Takes::Names, Content::List(list)) if !list.is_empty() => self.names(key, list),
             (Takes::Pair, Content::List(list)) if list.len() == 2 => self.names(key, list),
             (Takes::Pair, Content::List(list)) => {
@@ -343,21 +353,33 @@ impl Reader {
         self.problems.push(Problem::new(place, key, message).maybe_help(help));
     }
 
-    fn name(&mut self, key: &str, text: &str, place: &Place) -> Option<()> {
-        if is_identifier(text) {
-            return Some(());
-        }
-        let message = format!("`{}` is no name: a letter first, then letters, digits and `_`", shown(text));
-        self.problems.push(Problem::new(place, key, message));
+    /// A name, with the indices of a repetition filled in.
+    fn name(&mut self, key: &str, text: &str, inner: Option<usize>, place: &Place) -> Option<String> {
+        let problem = match self.turn().name(text) {
+            Ok(name) if is_identifier(&name) => return Some(name),
+            Ok(name) => {
+                let message = format!("`{}` is no name: a letter first, then letters, digits and `_`", shown(&name));
+                Problem::new(place, key, message)
+            }
+            Err(fault) if self.repetition.indices.is_empty() => {
+                let help = "braces need an index in the same entry: repeat = { i = 12 }";
+                Problem::fault(place, inner, key, fault).help(help)
+            }
+            Err(fault) => Problem::fault(place, inner, key, fault),
+        };
+        self.problems.push(problem);
         None
+    }
+
+    fn turn(&self) -> Turn<'_> {
+        self.repetition.turn(self.number)
     }
 
     fn names(&mut self, key: &Key, list: &[Node]) -> Option<Stated> {
         let mut names = Vec::with_capacity(list.len());
         for node in list {
-            let Content::Text { text, .. } = &node.value else { return self.wrong_type(key, node) };
-            self.name(key.name, text, &node.place)?;
-            names.push((text.clone(), node.place.clone()));
+            let Content::Text { text, inner } = &node.value else { return self.wrong_type(key, node) };
+            names.push((self.name(key.name, text, *inner, &node.place)?, node.place.clone()));
         }
         Some(Stated::Names(names))
     }
@@ -418,8 +440,9 @@ impl Reader {
     }
 
     fn compile(&self, text: &str) -> Result<Expression, crate::units::Fault> {
-        let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
-        Expression::compile_with(text, &|name| self.index.get(name).copied(), &names)
+        let turn = self.turn();
+        let names: Vec<&str> = self.names.iter().map(String::as_str).chain(turn.names()).collect();
+        Expression::compile_with(text, &|name| self.index.get(name).copied(), &|name| turn.value(name), &names)
     }
 
     fn quantities(&mut self, key: &str, list: &[Node], place: &Place) -> Option<Vec<Quantity>> {
@@ -588,16 +611,21 @@ impl Reader {
                     self.wrong_type(key, node);
                 }
                 (Takes::List(keys), Content::List(list)) => {
-                    if list.len() > MOST_ELEMENTS {
-                        let message = format!("{} elements; the limit is {MOST_ELEMENTS}", list.len());
-                        self.problems.push(Problem::new(&node.place, name, message));
-                        continue;
-                    }
+                    let most = if name == "mass" { MOST_MASSES } else { MOST_ELEMENTS };
+                    let mut elements = 0;
                     for (i, node) in list.iter().enumerate() {
                         match &node.value {
                             Content::Table(table) => {
-                                let stated = self.table(table, keys, &format!("{name} {}", i + 1));
-                                lists.get_mut(name)?.push(stated);
+                                let owner = format!("{name} {}", i + 1);
+                                let Some(repetition) = self.repetition(table, &owner) else { continue };
+                                elements = repetition.count().saturating_add(elements);
+                                if elements > most {
+                                    let message = format!("{elements} elements; the limit is {most}");
+                                    self.problems.push(Problem::new(&node.place, name, message));
+                                    break;
+                                }
+                                let stated = self.repeated(table, keys, &owner, repetition);
+                                lists.get_mut(name)?.extend(stated);
                             }
                             other => {
                                 let message = format!("expected a table, found {}", other.described());
@@ -623,6 +651,112 @@ impl Reader {
             }
         }
         Some(Structure::Lists(lists))
+    }
+
+    /// The entries that one entry states, up to the first that is wrong.
+    fn repeated(&mut self, table: &Table, keys: &[Key], owner: &str, repetition: Repetition) -> Vec<StatedTable> {
+        self.repetition = repetition;
+        let mut all = Vec::with_capacity(self.repetition.count());
+        for number in 0..self.repetition.count() {
+            self.number = number;
+            let before = self.problems.len();
+            let mut stated = self.table(table, keys, owner);
+            let turn = self.turn().words();
+            if !turn.is_empty() {
+                for problem in &mut self.problems[before..] {
+                    problem.message = format!("{} ({turn})", problem.message);
+                }
+                stated.turn = format!("{owner}, {turn}");
+            }
+            all.push(stated);
+            if self.problems.len() > before {
+                break;
+            }
+        }
+        (self.repetition, self.number) = (Repetition::default(), 0);
+        all
+    }
+
+    /// The indices of `repeat`; none if it is absent.
+    fn repetition(&mut self, table: &Table, owner: &str) -> Option<Repetition> {
+        let Some(entry) = table.get("repeat") else { return Some(Repetition::default()) };
+        let before = self.problems.len();
+        let mut refuse = |place: &Place, message: String, help: Option<&str>| {
+            let problem = Problem::new(place, "repeat", message);
+            self.problems.push(problem.maybe_help(help.map(str::to_owned)));
+        };
+        let example = Some("write it as in repeat = { i = 12 } or repeat = { i = [2, 11] }");
+        let Content::Table(repeat) = &entry.node.value else {
+            let message = format!("expected a table of indices in {owner}, found {}", entry.node.value.described());
+            refuse(&entry.node.place, message, example);
+            return None;
+        };
+        let mut indices = Vec::new();
+        for Entry { key, key_place, node } in repeat.entries.iter().filter(|entry| entry.key != "wrap") {
+            let whole = |node: &Node| match node.value {
+                Content::Number { whole, .. } => whole.filter(|whole| whole.unsigned_abs() <= LARGEST_INDEX),
+                _ => None,
+            };
+            let range = match &node.value {
+                Content::List(list) if list.len() == 2 => whole(&list[0]).zip(whole(&list[1])),
+                _ => whole(node).map(|times| (1, times)),
+            };
+            if !is_identifier(key) {
+                let message = format!("`{}` is no index: a letter first, then letters, digits and `_`", shown(key));
+                refuse(key_place, message, None);
+            } else if is_reserved(key) {
+                refuse(key_place, format!("`{key}` has a meaning of its own in expressions"), None);
+            } else if self.index.contains_key(key) {
+                let help = Some("give the index another name");
+                refuse(key_place, format!("`{key}` is a parameter already"), help);
+            } else {
+                match range.filter(|(from, to)| from <= to) {
+                    Some((from, to)) => indices.push(Index { name: key.clone(), from, to, wraps: false }),
+                    None => {
+                        let message = format!(
+                            "expected a whole number of times, or [first, last], found {}",
+                            match &node.value {
+                                Content::List(_) => "another list".to_owned(),
+                                other => other.described(),
+                            }
+                        );
+                        refuse(&node.place, message, example);
+                    }
+                }
+            }
+        }
+        if indices.is_empty() && self.problems.len() == before {
+            let problem = Problem::new(&entry.node.place, "repeat", format!("an index is missing in {owner}"));
+            self.problems.push(problem.maybe_help(example.map(str::to_owned)));
+        }
+        if let Some(wrap) = repeat.get("wrap") {
+            self.wrap(wrap, &mut indices);
+        }
+        (self.problems.len() == before).then_some(Repetition { indices })
+    }
+
+    /// Which indices wrap around: all, none, or those named.
+    fn wrap(&mut self, entry: &Entry, indices: &mut [Index]) {
+        let node = &entry.node;
+        let named: Vec<&Node> = match &node.value {
+            Content::Flag(flag) => return indices.iter_mut().for_each(|index| index.wraps = *flag),
+            Content::List(list) => list.iter().collect(),
+            _ => vec![node],
+        };
+        for node in named {
+            let Content::Text { text, .. } = &node.value else {
+                let message = format!("expected true, or the name of an index, found {}", node.value.described());
+                self.problems.push(Problem::new(&node.place, "wrap", message));
+                return;
+            };
+            match indices.iter_mut().find(|index| index.name == *text) {
+                Some(index) => index.wraps = true,
+                None => {
+                    let message = format!("there is no index `{}` in this entry", shown(text));
+                    self.problems.push(Problem::new(&node.place, "wrap", message));
+                }
+            }
+        }
     }
 
     // ------------------------------------------------------------------------------------------ parameters

@@ -14,8 +14,11 @@ pub const VERSION: i64 = 1;
 /// Most points of a study: cases times frequencies.
 pub const MOST_POINTS: usize = 1_000_000;
 
-/// Most elements in one list (`[[mass]]`, …): the matrices are dense.
-pub const MOST_ELEMENTS: usize = 1_000;
+/// Most elements in one list (`[[spring]]`, …), repetitions counted.
+pub const MOST_ELEMENTS: usize = 10_000;
+
+/// Most masses, repetitions counted: the matrices are dense.
+pub const MOST_MASSES: usize = 2_000;
 
 /// Most bytes of a study file.
 pub const MOST_BYTES: u64 = 4 * 1024 * 1024;
@@ -81,6 +84,8 @@ pub enum Takes {
     Method,
     /// `[study]`: `kind`, `vary` and the keys of that kind.
     Study,
+    /// `repeat`: indices, each with how often, or from where to where.
+    Repeat,
     /// A list of tables with these keys: `[[mass]]`.
     List(&'static [Key]),
 }
@@ -169,9 +174,18 @@ const MODEL: &[Key] = &[
     optional("law", Takes::Law, "replaces the law of every joint", "{ kind = \"coulomb\", limit = \"2 N\" }"),
 ];
 
+/// The key that every entry of a list has.
+const REPEAT: Key = optional(
+    "repeat",
+    Takes::Repeat,
+    "states the entry for i = 1 to 12: `{i}` in its names, `i` in its expressions; `wrap = true` lets `{i+1}` begin anew after the last",
+    "{ i = 12, wrap = true }",
+);
+
 const MASS: &[Key] = &[
     required("name", Takes::Name, "name of the place, for springs, joints and forces", "\"blade1\""),
     required("mass", Takes::Quantity(Dimension::MASS, Within::AtLeastZero), "mass", "\"182 g\""),
+    REPEAT,
 ];
 
 const SPRING: &[Key] = &[
@@ -193,12 +207,14 @@ const SPRING: &[Key] = &[
         "viscous damping in parallel",
         "\"0.2 kg/s\"",
     ),
+    REPEAT,
 ];
 
 const JOINT: &[Key] = &[
     required("name", Takes::Name, "name, for results", "\"shroud\""),
     required("between", Takes::Pair, "the two places that rub", "[\"blade1\", \"contact\"]"),
     required("law", Takes::Law, "friction law", "{ kind = \"coulomb\", limit = \"2 N\" }"),
+    REPEAT,
 ];
 
 const MOST_HARMONIC: i64 = 1_000;
@@ -208,6 +224,7 @@ const FORCE: &[Key] = &[
     required("amplitude", Takes::Quantity(Dimension::FORCE, Within::Finite), "amplitude", "\"10 N\""),
     default("phase", Takes::Quantity(Dimension::ANGLE, Within::Finite), "0 deg", "phase lead", "\"90 deg\""),
     default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
+    REPEAT,
 ];
 
 const MOTION: &[Key] = &[
@@ -215,6 +232,7 @@ const MOTION: &[Key] = &[
     required("amplitude", Takes::Quantity(Dimension::LENGTH, Within::Finite), "amplitude", "\"2 mm\""),
     default("phase", Takes::Quantity(Dimension::ANGLE, Within::Finite), "0 deg", "phase lead", "\"90 deg\""),
     default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
+    REPEAT,
 ];
 
 /// The keys of `[study]` that every kind has.
@@ -271,6 +289,7 @@ pub fn described(takes: &Takes) -> String {
             let many = matches!(takes, Takes::List(_));
             format!("{} with the keys {names}", if many { "a list of tables" } else { "a table" })
         }
+        Takes::Repeat => "a table from indices to a number of times or [first, last], and `wrap`".to_owned(),
         Takes::Law => "a law: { kind = \"…\", … }".to_owned(),
         Takes::Choice(words) => format!("one of {}", crate::near::one_of(words().iter().map(|word| word.0))),
         Takes::Parameters => "a table of quantities by name".to_owned(),
@@ -284,6 +303,8 @@ pub fn described(takes: &Takes) -> String {
 
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 const NAME_PATTERN: &str = "^[A-Za-z][A-Za-z0-9_]*$";
+/// Names in entries that may be repeated, with indices in braces.
+const REPEATED_PATTERN: &str = "^[A-Za-z]([A-Za-z0-9_]|\\{[^{}]+\\})*$";
 
 /// The JSON Schema (draft 2020-12) of study files, for editors that complete and check TOML.
 pub fn json_schema() -> Value {
@@ -323,13 +344,13 @@ fn takes_schema(takes: &Takes) -> Value {
     let quantity = || json!({ "$ref": "#/$defs/quantity" });
     match takes {
         Takes::Text => json!({ "type": "string" }),
-        Takes::Name => json!({ "type": "string", "pattern": NAME_PATTERN }),
+        Takes::Name => json!({ "type": "string", "pattern": REPEATED_PATTERN }),
         Takes::Names => {
             let name = json!({ "type": "string", "pattern": NAME_PATTERN });
             json!({ "anyOf": [name, { "type": "array", "items": name, "minItems": 1 }] })
         }
         Takes::Pair => json!({
-            "type": "array", "minItems": 2, "maxItems": 2, "items": { "type": "string", "pattern": NAME_PATTERN },
+            "type": "array", "minItems": 2, "maxItems": 2, "items": { "type": "string", "pattern": REPEATED_PATTERN },
         }),
         Takes::Quantity(..) => quantity(),
         Takes::Count(from, to) => json!({ "type": "integer", "minimum": from, "maximum": to }),
@@ -342,6 +363,17 @@ fn takes_schema(takes: &Takes) -> Value {
         }),
         Takes::Table(keys) => object(keys),
         Takes::List(keys) => json!({ "type": "array", "items": object(keys), "maxItems": MOST_ELEMENTS }),
+        Takes::Repeat => json!({
+            "type": "object",
+            "properties": { "wrap": {
+                "description": "values beyond the last begin anew in names: of every index, or of those named",
+                "anyOf": [{ "type": "boolean" }, { "type": "string" }, { "type": "array", "items": { "type": "string" } }],
+            } },
+            "additionalProperties": { "anyOf": [
+                { "type": "integer", "minimum": 1, "maximum": MOST_ELEMENTS },
+                { "type": "array", "items": { "type": "integer" }, "minItems": 2, "maxItems": 2 },
+            ] },
+        }),
         Takes::Law => {
             let one = |row: &law::LawInfo| {
                 let parameters = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc));

@@ -21,6 +21,8 @@ pub(crate) struct Quantity {
 #[derive(Debug, Clone)]
 pub(crate) struct StatedTable {
     pub place: Place,
+    /// The indices of the repetition that states it, in words; empty for most.
+    pub turn: String,
     pub entries: Vec<StatedEntry>,
 }
 
@@ -47,6 +49,11 @@ pub(crate) enum Stated {
 impl StatedTable {
     pub fn entry(&self, key: &str) -> Option<&StatedEntry> {
         self.entries.iter().find(|entry| entry.key == key)
+    }
+
+    /// A message with the indices of the repetition.
+    pub fn with_turn(&self, message: &str) -> String {
+        if self.turn.is_empty() { message.to_owned() } else { format!("{message} ({})", self.turn) }
     }
 
     /// The place of a key's value, or of a name in it; the table's own if there is no such key.
@@ -131,11 +138,17 @@ impl Quantity {
 impl StatedTable {
     /// The values of all keys. What is wrong goes to `problems`, and its key is left out.
     pub fn values(&self, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Values {
+        let before = problems.len();
         let mut entries = Vec::with_capacity(self.entries.len());
         for entry in &self.entries {
             match entry.value.given(entry.key, environment, problems) {
                 Ok(given) => entries.push((entry.key, given)),
                 Err(problem) => problems.push(problem),
+            }
+        }
+        if !self.turn.is_empty() {
+            for problem in &mut problems[before..] {
+                problem.message = self.with_turn(&problem.message);
             }
         }
         Values { entries }

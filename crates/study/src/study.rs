@@ -563,7 +563,7 @@ impl Study {
             Structure::Lists(lists) => {
                 let table = lists.get(list).get(index);
                 let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
-                (place, error.message.clone())
+                (place, table.map_or_else(|| error.message.clone(), |table| table.with_turn(&error.message)))
             }
             Structure::Template(_, table) => {
                 let place = table.place_of(if error.key == "law" { "law" } else { "template" }, None);

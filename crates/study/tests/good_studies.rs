@@ -222,6 +222,7 @@ fn the_json_schema_accepts_good_files_and_refuses_unknown_keys() {
     let root = schema::json_schema();
     let mut texts: Vec<String> = templates::TABLE.iter().map(|template| template.study.to_owned()).collect();
     texts.push(EXAMPLE.to_owned());
+    texts.push(EXAMPLE.replacen("[[force]]", "[[force]]\nrepeat = { i = 3, j = [2, 4], wrap = [\"i\"] }", 1));
     for text in texts {
         let value: Json = serde_json::to_value(toml::from_str::<toml::Value>(&text).unwrap()).unwrap();
         accepts(&root, &root, &value).unwrap();
