@@ -102,6 +102,8 @@ pub enum What {
     Templates,
     /// Study kinds
     Studies,
+    /// What `output` of a study can ask for
+    Outputs,
 }
 
 fn assignment(text: &str) -> Result<(String, String), String> {

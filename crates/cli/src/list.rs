@@ -48,6 +48,7 @@ fn one(what: What) -> String {
                 entry(row.name, row.summary, &keys);
             }
         }
+        What::Outputs => kinds::outputs().iter().for_each(|(name, doc)| entry(name, doc, &[])),
     }
     out
 }

@@ -1,9 +1,12 @@
 //! Figures from finished tables: what the kinds need to draw, whether the tables were computed just now or read from a disk.
 
-use crate::dataset::{Table, Values as Cells};
+use crate::dataset::{Axis, Table, Values as Cells};
+use crate::kinds::{Complaint, Kind};
 use crate::study::{Study, VariedValue};
+use crate::units;
+use crate::values::Values;
 use std::ops::Range;
-use stickslip::model::System;
+use stickslip::model::{Model, System};
 
 /// A study and its finished tables.
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +35,94 @@ impl Stretch {
     }
 }
 
+/// What is wrong in `[figure]`.
+pub(crate) fn check(figure: &Values, kind: &Kind, model: &Model) -> Result<(), Complaint> {
+    let masses = model.masses.iter().map(|mass| mass.name.as_str());
+    let known: Vec<&str> = masses.chain(model.joints.iter().map(|joint| joint.name.as_str())).collect();
+    if let Some(name) = figure.names("only").unwrap_or_default().iter().find(|name| !known.contains(&name.as_str())) {
+        return Err(Complaint::unknown("only", "mass or joint", name, &known));
+    }
+    for (key, axis) in [("x_unit", kind.axes[0]), ("y_unit", kind.axes[1])] {
+        let Some(text) = figure.text(key) else { continue };
+        let Some(expected) = axis else {
+            let message = format!("the figure of the kind `{}` has no single unit on this axis", kind.name);
+            return Err(Complaint::new(key, message, "leave it out"));
+        };
+        let example = expected.name_and_unit().map_or("", |(_, unit)| unit);
+        match units::find(text) {
+            Some(unit) if unit.dimension == expected => {}
+            found => {
+                let what = if found.is_some() { "a unit of another quantity" } else { "no unit that is known" };
+                let help = format!("write a unit such as {example}");
+                return Err(Complaint::new(key, format!("`{}` is {what}", crate::near::shown(text)), help));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// More curves than this in a panel say nothing; they are thinned out evenly, and the panel says so.
+pub(crate) const MOST_CURVES: usize = 400;
+
+/// What the curves of a figure belong to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Layout {
+    /// A panel for every case, with a curve for every mass.
+    Cases,
+    /// A panel for every mass, with a curve for every case.
+    Masses,
+}
+
 impl<'a> Drawing<'a> {
+    /// The values of `[figure]`.
+    pub(crate) fn options(&self) -> Values {
+        self.study.figure_values()
+    }
+
+    /// Whether the figure shows a mass or joint of this name.
+    pub(crate) fn shows(&self, name: &str) -> bool {
+        self.options().names("only").is_none_or(|names| names.iter().any(|shown| shown == name))
+    }
+
+    /// How curves of so many masses and cases are laid out.
+    pub(crate) fn layout(&self, masses: usize, cases: usize) -> Layout {
+        match self.options().flag("overlay") {
+            Some(true) => Layout::Masses,
+            Some(false) => Layout::Cases,
+            None if masses > 1 && cases <= MOST_CASES => Layout::Cases,
+            None => Layout::Masses,
+        }
+    }
+
+    /// An axis of the figure (0 or 1) in the unit that is asked for, else in one that suits `largest`, and the factor from the values of
+    /// tables, which are in `si`.
+    pub(crate) fn axis(&self, which: usize, quantity: &str, largest: f64, si: &str) -> (Axis, f64) {
+        let options = self.options();
+        let (unit_key, scale_key) = [("x_unit", "x"), ("y_unit", "y")][which];
+        let asked = options.text(unit_key).and_then(|text| Some((text.to_owned(), units::find(text)?)));
+        let (unit, factor) = match asked {
+            Some((text, unit)) => (text, units::find(si).map_or(1.0, |si| si.scale("1")) / unit.scale("1")),
+            None if si == "Hz" => (si.to_owned(), 1.0),
+            None => display_unit(largest, si),
+        };
+        let axis = Axis::new(quantity, unit);
+        (if options.text(scale_key) == Some("log") { axis.log() } else { axis }, factor)
+    }
+
+    /// What the colours of curves mean whose last varied parameter differs; none if there is none, or it has no numbers to tell.
+    pub(crate) fn varied_axis(&self, stretches: &[Stretch]) -> Option<Axis> {
+        let last = stretches.first()?.varied.last()?;
+        let values: Vec<f64> =
+            stretches.iter().filter_map(|stretch| Some(stretch.varied.last()?.on_axis().0)).collect();
+        let axis = Axis::new(&last.name, last.on_axis().1);
+        // values that are spaced by ratios belong on a logarithmic scale
+        let positive = values.iter().all(|value| *value > 0.0);
+        let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(*v), high.max(*v)));
+        let middle = values.get(values.len() / 2).copied().unwrap_or(0.0);
+        let by_ratio = positive && high > DECADES * low && (middle / (low * high).sqrt()).ln().abs() < 0.7;
+        Some(if by_ratio { axis.log() } else { axis })
+    }
+
     /// A table by name; one that nothing was written to is absent.
     pub(crate) fn table(&self, name: &str) -> Option<&'a Table> {
         self.tables.iter().find(|table| table.name == name && table.rows() > 0)
@@ -86,6 +176,19 @@ impl<'a> Drawing<'a> {
         }
         stretches
     }
+}
+
+/// Up to this many cases each has a panel with all masses; beyond, each mass has a panel with all cases.
+const MOST_CASES: usize = 6;
+/// Ratio of the ends of a parameter's values from which on they may be spaced by ratios.
+const DECADES: f64 = 10.0;
+
+/// At most `most` of `all`, evenly chosen, both ends included.
+pub(crate) fn thinned<T>(all: &[T], most: usize) -> Vec<&T> {
+    if all.len() <= most {
+        return all.iter().collect();
+    }
+    (0..most).map(|i| &all[i * (all.len() - 1) / (most - 1)]).collect()
 }
 
 /// The numbers of a column in some rows; NaN where there are none.

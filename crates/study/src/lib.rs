@@ -8,6 +8,7 @@ mod document;
 mod drawing;
 mod error;
 pub mod expression;
+mod extra;
 pub mod kinds;
 mod near;
 mod note;

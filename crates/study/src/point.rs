@@ -1,9 +1,10 @@
 //! What a table keeps of one orbit, or of its failure.
 
+use crate::extra;
 use crate::rows::Rows;
 use crate::study::Case;
+use crate::work::Prepared;
 use stickslip::method::OrbitError;
-use stickslip::model::System;
 use stickslip::orbit::Orbit;
 
 /// The place of a point in words: the varied parameters and the frequency.
@@ -27,10 +28,12 @@ pub(crate) struct Summary {
     pub status: String,
     pub failure: Option<String>,
     pub stuck: bool,
+    /// What `output` asks for.
+    pub extra: Vec<f64>,
 }
 
 impl Summary {
-    pub fn new(system: &System, outcome: Result<&Orbit, &OrbitError>) -> Self {
+    pub fn new(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> Self {
         match outcome {
             Ok(orbit) => Summary {
                 places: orbit.places.iter().map(|p| [p.amplitude(), p.mean, p.phase_deg()]).collect(),
@@ -43,9 +46,10 @@ impl Summary {
                 status: orbit.evidence.accuracy.status().to_owned(),
                 failure: None,
                 stuck: orbit.is_one_of_many(),
+                extra: extra::values(prepared, orbit),
             },
             Err(error) => {
-                let mut row = Summary::missing(system, error.status());
+                let mut row = Summary::missing(prepared, error.status());
                 row.failure = Some(error.to_string());
                 row
             }
@@ -53,7 +57,8 @@ impl Summary {
     }
 
     /// A point without a result.
-    pub fn missing(system: &System, status: &str) -> Self {
+    pub fn missing(prepared: &Prepared, status: &str) -> Self {
+        let system = &prepared.system;
         Summary {
             places: vec![[f64::NAN; 3]; system.dofs()],
             joints: vec![[f64::NAN; 2]; system.joints.len()],
@@ -65,11 +70,13 @@ impl Summary {
             status: status.to_owned(),
             failure: None,
             stuck: false,
+            extra: vec![f64::NAN; extra::columns(prepared).len()],
         }
     }
 
     /// The cells of the row, after the varied parameters and the frequency.
-    pub fn write(&self, system: &System, rows: &mut Rows) {
+    pub fn write(&self, prepared: &Prepared, rows: &mut Rows) {
+        let system = &prepared.system;
         for (place, [amplitude, mean, phase]) in system.places.iter().zip(&self.places) {
             rows.number(&format!("{place}_amplitude_m"), *amplitude);
             rows.number(&format!("{place}_mean_m"), *mean);
@@ -79,6 +86,7 @@ impl Summary {
             rows.number(&format!("{}_dissipation_J", joint.name), *dissipation);
             rows.number(&format!("{}_slip_fraction", joint.name), *slip);
         }
+        extra::columns(prepared).iter().zip(&self.extra).for_each(|(column, value)| rows.number(column, *value));
         rows.flag("stable", self.stable);
         rows.number("residual", self.residual);
         rows.number("energy_gap", self.energy_gap);

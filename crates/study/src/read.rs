@@ -181,6 +181,7 @@ impl Reader {
         };
         let (kind, study, vary) = self.request(&root)?;
         let method = self.method(&root);
+        let figure = self.figure(&root);
         let mut parameters = parameters?;
         let mut varied = vary.and_then(|entry| self.vary(entry, &mut parameters)).unwrap_or_default();
         if !self.problems.is_empty() {
@@ -206,7 +207,18 @@ impl Reader {
             structure: structure?,
             study,
             method: method?,
+            figure,
         })
+    }
+
+    /// `[figure]`, empty if it is absent.
+    fn figure(&mut self, root: &Table) -> StatedTable {
+        let key = FILE.iter().find(|key| key.name == "figure");
+        let stated = root.get("figure").zip(key).and_then(|(entry, key)| self.value(key, &entry.node));
+        match stated {
+            Some(Stated::Table(table)) => table,
+            _ => StatedTable { place: Place::default(), entries: Vec::new(), turn: Default::default() },
+        }
     }
 
     // ------------------------------------------------------------------------------------------ tables and keys
@@ -318,6 +330,22 @@ impl Reader {
             }
             (Takes::Frequencies, Content::List(list)) => {
                 Some(Stated::List(self.quantities(key.name, list, &node.place)?))
+            }
+            (Takes::Frequencies, Content::Table(table)) if table.get("tolerance").is_some() => {
+                let before = self.problems.len();
+                let mut stated = self.table(table, schema::ADAPTIVE, &format!("the range of `{}`", shown(key.name)));
+                let mut take = |key: &str| {
+                    let at = stated.entries.iter().position(|entry| entry.key == key)?;
+                    match stated.entries.swap_remove(at).value {
+                        Stated::Quantity { quantity, .. } => Some(quantity),
+                        _ => None,
+                    }
+                };
+                let (from, to, tolerance) = (take("from"), take("to"), take("tolerance"));
+                if self.problems.len() > before {
+                    return None;
+                }
+                Some(Stated::Adaptive { from: from?, to: to?, tolerance: tolerance? })
             }
             (Takes::Frequencies, Content::Table(table)) => {
                 let (from, to, points) = self.range(table, key.name)?;

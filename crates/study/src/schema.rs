@@ -167,7 +167,35 @@ pub const FILE: &[Key] = &[
     optional("motion", Takes::List(MOTION), "imposed motions of a place; they add up", "[]"),
     required("study", Takes::Study, "what is asked for", "{ kind = \"response\" }"),
     optional("method", Takes::Method, "how the orbits are found", "{ kind = \"event-driven\" }"),
+    optional("figure", Takes::Table(FIGURE), "how the figure is drawn", "{ overlay = true }"),
 ];
+
+/// The keys of `[figure]`.
+pub const FIGURE: &[Key] = &[
+    optional(
+        "overlay",
+        Takes::Flag,
+        "all values of the last varied parameter in one panel, a panel for every mass (true), or a panel for every case with all \
+         masses (false); absent: overlaid for one mass or more than six cases",
+        "true",
+    ),
+    optional("only", Takes::Names, "the masses, or joints, that are shown; all when absent", "[\"blade1\"]"),
+    default(
+        "references",
+        Takes::Flag,
+        "false",
+        "adds the linear responses with all joints free and all joints stuck, of the first case, to a response",
+        "true",
+    ),
+    optional("x", Takes::Choice(scale_names), "scale of the horizontal axis", "\"log\""),
+    optional("y", Takes::Choice(scale_names), "scale of the vertical axis", "\"log\""),
+    optional("x_unit", Takes::Text, "unit of the horizontal axis", "\"kHz\""),
+    optional("y_unit", Takes::Text, "unit of the vertical axis", "\"mm\""),
+];
+
+fn scale_names() -> Vec<(&'static str, &'static str)> {
+    vec![("linear", "equal differences are equal lengths"), ("log", "equal ratios are equal lengths")]
+}
 
 const MODEL: &[Key] = &[
     required("template", Takes::Choice(template_names), "name of the ready model", "\"blade-couple\""),
@@ -253,6 +281,18 @@ pub const RANGE: &[Key] = &[
     required("points", Takes::Count(2, MOST_POINTS as i64), "number of values, both ends included", "241"),
 ];
 
+/// Keys of a range of frequencies whose points lie where the curve bends.
+pub const ADAPTIVE: &[Key] = &[
+    required("from", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "first value", "\"119 Hz\""),
+    required("to", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "last value", "\"123 Hz\""),
+    required(
+        "tolerance",
+        Takes::Quantity(Dimension::NONE, Within::Positive),
+        "distance of the curve from the straight lines between its points, relative to its largest amplitude",
+        "\"1 %\"",
+    ),
+];
+
 /// The choice of `kind` in `[method]`.
 pub const METHOD: &[Key] = &[default("kind", Takes::Choice(method_names), "auto", "the method", "\"event-driven\"")];
 
@@ -282,7 +322,7 @@ pub fn described(takes: &Takes) -> String {
         Takes::Count(from, to) if from == to => format!("the number {from}"),
         Takes::Count(from, to) => format!("a whole number from {from} to {to}"),
         Takes::Flag => "true or false".to_owned(),
-        Takes::Frequencies => "a frequency (Hz or rad/s), a list of them, or { from, to, points }".to_owned(),
+        Takes::Frequencies => "a frequency (Hz or rad/s), a list of them, or { from, to, points }; in a response also { from, to, tolerance }".to_owned(),
         Takes::ByName(dimension) => format!("a table from names to {}", crate::expression::described(*dimension)),
         Takes::Table(keys) | Takes::List(keys) => {
             let names = crate::near::one_of(keys.iter().map(|key| key.name)).replace(" or ", ", ");
@@ -356,7 +396,7 @@ fn takes_schema(takes: &Takes) -> Value {
         Takes::Count(from, to) => json!({ "type": "integer", "minimum": from, "maximum": to }),
         Takes::Flag => json!({ "type": "boolean" }),
         Takes::Frequencies => {
-            json!({ "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(RANGE)] })
+            json!({ "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(RANGE), object(ADAPTIVE)] })
         }
         Takes::ByName(_) | Takes::Parameters => json!({
             "type": "object", "additionalProperties": quantity(), "propertyNames": { "pattern": NAME_PATTERN },

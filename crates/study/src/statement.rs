@@ -41,6 +41,7 @@ pub(crate) enum Stated {
     Quantity { quantity: Quantity, dimension: Dimension, within: Within, example: &'static str },
     List(Vec<Quantity>),
     Range { from: Quantity, to: Quantity, points: usize },
+    Adaptive { from: Quantity, to: Quantity, tolerance: Quantity },
     ByName(Vec<(String, Place, Quantity)>, Dimension),
     Law(&'static LawInfo, StatedTable),
     Table(StatedTable),
@@ -179,6 +180,18 @@ impl Stated {
                 not_empty(start, end, to, Some(Dimension::FREQUENCY))?;
                 Given::Frequencies(Frequencies::Range { from: start, to: end, points: *points })
             }
+            Stated::Adaptive { from, to, tolerance } => {
+                let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
+                let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
+                not_empty(start, end, to, Some(Dimension::FREQUENCY))?;
+                let share =
+                    tolerance.number("tolerance", (Dimension::NONE, Within::Positive), "\"1 %\"", environment)?;
+                if !(FINEST..=COARSEST).contains(&share) {
+                    let message = format!("must lie between {FINEST} and {COARSEST}, found {share}");
+                    return Err(tolerance.problem("tolerance", message).help("1 % makes a smooth figure"));
+                }
+                Given::Frequencies(Frequencies::Adaptive { from: start, to: end, tolerance: share })
+            }
             Stated::ByName(names, dimension) => {
                 let mut table = BTreeMap::new();
                 for (name, _, quantity) in names {
@@ -202,6 +215,10 @@ impl Stated {
         })
     }
 }
+
+/// Tolerances of adaptive frequencies: finer ones take more points than they are worth, coarser ones show nothing.
+const FINEST: f64 = 1e-5;
+const COARSEST: f64 = 0.5;
 
 /// Refuses a range whose end is not above its start.
 pub(crate) fn not_empty(from: f64, to: f64, end: &Quantity, dimension: Option<Dimension>) -> Result<(), Problem> {

@@ -33,6 +33,7 @@ pub struct Study {
     pub(crate) structure: Structure,
     pub(crate) study: StatedTable,
     pub(crate) method: StatedTable,
+    pub(crate) figure: StatedTable,
 }
 
 /// A parameter: its value as stated, the dimension that it must have (if that is known).
@@ -266,6 +267,7 @@ impl Study {
         let frequencies = match self.study.entry("frequency").map(|entry| &entry.value) {
             Some(Stated::List(list)) => list.len(),
             Some(Stated::Range { points, .. }) => *points,
+            Some(Stated::Adaptive { .. }) => stickslip::curve::adaptive::FIRST + 1,
             _ => 1,
         };
         self.cases() * frequencies
@@ -281,6 +283,18 @@ impl Study {
         let choice = self.choice(index);
         let environment = evaluate(&self.names, &self.parameters, &self.order, &choice, None).ok()?;
         Some(self.varied_of(&environment, &choice))
+    }
+
+    /// Whether the frequencies lie where the curve bends, so that their number is not known before.
+    pub fn is_adaptive(&self) -> bool {
+        matches!(self.study.entry("frequency").map(|entry| &entry.value), Some(Stated::Adaptive { .. }))
+    }
+
+    /// The values of `[figure]`.
+    pub(crate) fn figure_values(&self) -> Values {
+        // none of its keys takes a quantity
+        let environment = Environment { names: &self.names, values: Vec::new() };
+        self.figure.values(&environment, &mut Vec::new())
     }
 
     /// The case with this number.
@@ -355,6 +369,7 @@ impl Study {
         let stated = match (table, &self.structure) {
             ("study", _) => Some(&self.study),
             ("method", _) => Some(&self.method),
+            ("figure", _) => Some(&self.figure),
             (_, Structure::Lists(lists)) => lists.get(table).get(index),
             (_, Structure::Template(_, table)) => Some(table),
         };
@@ -401,6 +416,11 @@ impl Study {
 
     /// Checks all cases; the first is assembled, the others differ from it in numbers only.
     pub(crate) fn check(&self) -> Result<(), StudyError> {
+        if self.is_adaptive() && !self.kind.adapts {
+            let message = format!("the kind `{}` needs to know its frequencies", self.kind.name);
+            let help = "write { from = …, to = …, points = … }; only a response takes a tolerance".to_owned();
+            return Err(self.error_at("study", 0, "frequency", message, Some(help)));
+        }
         for index in 0..self.cases() {
             let mut problems = Vec::new();
             self.parts(index, None, &mut problems);
@@ -504,6 +524,13 @@ impl Study {
         }
         if let Err(complaint) = (self.kind.check)(&values, &model) {
             problems.push(self.complaint(complaint));
+            return None;
+        }
+        if index == 0
+            && let Err(complaint) = crate::drawing::check(&self.figure_values(), self.kind, &model)
+        {
+            let place = self.figure.place_of(complaint.key, complaint.name.as_deref());
+            problems.push(Problem::new(place, complaint.key, complaint.message).maybe_help(complaint.help));
             return None;
         }
         Some(Parts { environment: environment.values, model, values, method })

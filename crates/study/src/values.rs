@@ -4,6 +4,7 @@ use crate::expression::displayed;
 use crate::units;
 use serde_json::{Map, Value as Json, json};
 use std::collections::BTreeMap;
+use stickslip::curve::adaptive;
 use stickslip::dimension::Dimension;
 use stickslip::law::Law;
 
@@ -69,12 +70,22 @@ pub enum Frequencies {
         /// How many, two or more.
         points: usize,
     },
+    /// Where the curve bends; how many is not known before.
+    Adaptive {
+        /// First, rad/s.
+        from: f64,
+        /// Last, rad/s.
+        to: f64,
+        /// Distance of the curve from the straight lines between its points, relative to its largest amplitude.
+        tolerance: f64,
+    },
 }
 
 impl Frequencies {
-    /// How many.
+    /// How many; of adaptive ones those to begin with, which are equally spaced.
     pub fn len(&self) -> usize {
         match self {
+            Frequencies::Adaptive { .. } => adaptive::FIRST + 1,
             Frequencies::List(list) => list.len(),
             Frequencies::Range { points, .. } => *points,
         }
@@ -91,6 +102,10 @@ impl Frequencies {
             Frequencies::List(list) => list.get(index).copied(),
             Frequencies::Range { from, to, points } => {
                 (index < *points).then(|| between(*from, *to, Some(Dimension::FREQUENCY), index, *points))
+            }
+            Frequencies::Adaptive { from, to, .. } => {
+                let points = self.len();
+                (index < points).then(|| between(*from, *to, Some(Dimension::FREQUENCY), index, points))
             }
         }
     }
@@ -211,6 +226,9 @@ impl Given {
             Given::Frequencies(Frequencies::List(list)) => json!({ "rad_per_s": list }),
             Given::Frequencies(Frequencies::Range { from, to, points }) => {
                 json!({ "from_rad_per_s": from, "to_rad_per_s": to, "points": points })
+            }
+            Given::Frequencies(Frequencies::Adaptive { from, to, tolerance }) => {
+                json!({ "from_rad_per_s": from, "to_rad_per_s": to, "tolerance": tolerance })
             }
             Given::ByName(table, dimension) => {
                 let entry = |(name, value): (&String, &f64)| (name.clone(), quantity_json(*value, Some(*dimension)));

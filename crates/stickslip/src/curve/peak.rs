@@ -98,7 +98,7 @@ pub fn highest(
     let mut peak = Peak { omega: omegas[best], value: values[best], at_end };
     for i in (1..points.len().saturating_sub(1)).filter(|&i| values[i] >= CANDIDATE * values[best]) {
         if is_maximum(&points[i - 1..=i + 1], 0) {
-            let refined = refine(solver, &points[i - 1..=i + 1], &[0], &|orbit| vec![quantity(orbit)])[0];
+            let refined = refine(solver, &points[i - 1..=i + 1], &[0], &|orbit| vec![quantity(orbit)])[0].peak;
             if refined.value > peak.value || (refined.value == peak.value && peak.at_end) {
                 peak = refined;
             }
@@ -107,8 +107,18 @@ pub fn highest(
     Some(peak)
 }
 
-/// Every local maximum of every quantity among the inner points of `points` (rising), refined, by frequency: the number of the quantity,
-/// and the peak.
+/// A peak of one of several quantities.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PeakOf {
+    /// The number of the quantity.
+    pub quantity: usize,
+    /// The peak.
+    pub peak: Peak,
+    /// All quantities there.
+    pub values: Vec<f64>,
+}
+
+/// Every local maximum of the first `wanted` quantities among the inner points of `points` (rising), refined, by frequency.
 ///
 /// # Errors
 /// The method cannot take the system.
@@ -125,28 +135,27 @@ pub fn highest(
 ///     .map(|i| solver.orbit(std::f64::consts::TAU * (120.5 + 0.2 * f64::from(i)), None).unwrap())
 ///     .map(|orbit| Point::new(&orbit, &amplitudes))
 ///     .collect();
-/// let peaks = all(&EventDriven, &system, &points, &amplitudes).unwrap();
-/// assert_eq!(peaks.iter().filter(|(mass, _)| *mass == 0).count(), 1);
+/// let peaks = all(&EventDriven, &system, &points, 3, &amplitudes).unwrap();
+/// assert_eq!(peaks.iter().filter(|peak| peak.quantity == 0).count(), 1);
 /// ```
 pub fn all(
     method: &dyn Method,
     system: &System,
     points: &[Point],
+    wanted: usize,
     quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
-) -> Result<Vec<(usize, Peak)>, MethodError> {
-    let count = points.iter().map(|point| point.values.len()).max().unwrap_or(0);
-    let found: Vec<Result<Vec<(usize, Peak)>, MethodError>> = (1..points.len().saturating_sub(1))
+) -> Result<Vec<PeakOf>, MethodError> {
+    let found: Vec<Result<Vec<PeakOf>, MethodError>> = (1..points.len().saturating_sub(1))
         .into_par_iter()
         .map(|i| {
             let near = &points[i - 1..=i + 1];
-            let wanted: Vec<usize> = (0..count).filter(|&quantity| is_maximum(near, quantity)).collect();
+            let wanted: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
             if wanted.is_empty() {
                 return Ok(Vec::new());
             }
             let mut solver = method.solver(system)?;
-            let mut peaks: Vec<(usize, Peak)> =
-                wanted.iter().copied().zip(refine(&mut *solver, near, &wanted, quantities)).collect();
-            peaks.sort_by(|a, b| a.1.omega.total_cmp(&b.1.omega));
+            let mut peaks = refine(&mut *solver, near, &wanted, quantities);
+            peaks.sort_by(|a, b| a.peak.omega.total_cmp(&b.peak.omega));
             Ok(peaks)
         })
         .collect();
@@ -170,7 +179,7 @@ fn refine(
     near: &[Point],
     wanted: &[usize],
     quantities: &dyn Fn(&Orbit) -> Vec<f64>,
-) -> Vec<Peak> {
+) -> Vec<PeakOf> {
     let mut points = near.to_vec();
     let closest = CLOSEST * (near[2].omega - near[0].omega);
     for &quantity in wanted {
@@ -192,7 +201,8 @@ fn refine(
         .iter()
         .map(|&quantity| {
             let point = &points[best(&points, quantity)];
-            Peak { omega: point.omega, value: point.value(quantity), at_end: false }
+            let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false };
+            PeakOf { quantity, peak, values: point.values.clone() }
         })
         .collect()
 }
@@ -370,7 +380,7 @@ mod tests {
         let curve = |w: f64| 2.0 - (w - 1.0).powi(2);
         let mut formula = Formula { curve: &curve };
         let near = [0.9, 1.01, 1.1].map(|omega| Point { omega, values: vec![curve(omega)], start: None });
-        let peak = refine(&mut formula, &near, &[0], &|_| Vec::new())[0];
+        let peak = refine(&mut formula, &near, &[0], &|_| Vec::new())[0].peak;
         assert_eq!((peak.omega, peak.value), (1.01, curve(1.01)));
     }
 }

@@ -257,6 +257,9 @@ friction_laws! {
     jenkins_arctan::JenkinsArctan "jenkins-arctan" [10_000.0, 2.0, 25_000.0] rate JenkinsArctan;
 }
 
+/// A slip limit that nothing reaches, N; the weight of a mountain.
+const STUCK: f64 = 1e15;
+
 impl Law {
     /// Slip limit, N: the largest force of the law.
     pub fn limit(&self) -> f64 {
@@ -268,6 +271,25 @@ impl Law {
     pub fn info(&self) -> &'static LawInfo {
         // every variant has its row, by the macro
         TABLE.iter().find(|row| row.name == self.name()).expect("every law has its row")
+    }
+
+    /// The same law with another slip limit, N.
+    fn limited(&self, limit: f64) -> Law {
+        let (info, mut values) = (self.info(), self.values());
+        if let Some(at) = info.parameters.iter().position(|p| p.key == "limit") {
+            values[at] = limit;
+        }
+        (info.build)(&values)
+    }
+
+    /// The same joint free of friction, a linear reference: its slip limit is zero.
+    pub fn free(&self) -> Law {
+        self.limited(0.0)
+    }
+
+    /// The same joint stuck, a linear reference: no force reaches its slip limit.
+    pub fn stuck(&self) -> Law {
+        self.limited(STUCK)
     }
 
     /// Whether the law can never carry a force: its slip limit is zero.

@@ -1,12 +1,12 @@
 //! Branches of orbits by arc length, along the drive frequency or along a design parameter, around turning points.
 
-use super::peak_of::{check_peak_of, peak_place};
-use super::{Complaint, FREQUENCY, HARMONICS, Kind, SERIES_SAMPLES, check_samples, orbits};
+use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
+use super::{Complaint, FREQUENCY, HARMONICS, Kind, OUTPUT, SERIES_SAMPLES, check_output, check_samples, orbits};
 use crate::dataset::{Axis, Figure, Panel, Series, Style, Table, Values as Cells};
-use crate::drawing::{Drawing, display_unit, largest, numbers};
+use crate::drawing::{Drawing, largest, numbers};
 use crate::point::Summary;
 use crate::rows::Rows;
-use crate::schema::{Takes, Within, default, optional};
+use crate::schema::{Takes, Within, default};
 use crate::study::{Study, VariedValue, varied_text};
 use crate::values::{Values, hertz};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
@@ -29,12 +29,8 @@ pub(super) const KIND: Kind = Kind {
             "steps over the range at least; they shorten where it bends",
             "100",
         ),
-        optional(
-            "peak_of",
-            Takes::Names,
-            "the mass whose peaks along the branch are refined; the first one that a force acts on when absent",
-            "\"blade1\"",
-        ),
+        PEAK_OF,
+        OUTPUT,
         default("harmonics", Takes::Count(1, 255), "15", "highest harmonic", "15"),
         default("samples", Takes::Count(8, 1 << 16), "1024", "samples per period", "1024"),
         default(
@@ -46,8 +42,10 @@ pub(super) const KIND: Kind = Kind {
         ),
     ],
     check,
+    axes: [None, Some(Dimension::LENGTH)],
     // harmonic balance is what branches are made of
     uses_method: false,
+    adapts: false,
     tables: &["branch", "peaks", "turns"],
     // along a parameter the cases of one branch differ in the last one only
     grain: |study| if along_parameter(study) { Grain::Curve } else { Grain::Case },
@@ -56,7 +54,8 @@ pub(super) const KIND: Kind = Kind {
 };
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
-    check_peak_of(values, model, "name the mass whose peaks are to be refined")?;
+    check_peak_of(values, model)?;
+    check_output(values)?;
     if values.quantity("tolerance").is_some_and(|tolerance| tolerance >= 1.0) {
         return Err(Complaint::new(
             "tolerance",
@@ -111,7 +110,7 @@ fn compute(work: &Work<'_>) -> Computed {
             return Ok(part);
         }
     };
-    let place = peak_place(prepared);
+    let places = peak_places(prepared);
     let (name, factor) = axis(along);
     let begin = |rows: &mut Rows, value: f64| {
         outer.iter().map(VariedValue::column).for_each(|(name, value)| rows.number(&name, value));
@@ -125,7 +124,7 @@ fn compute(work: &Work<'_>) -> Computed {
     for point in &branch.points {
         orbits::count(&mut part, &prepared.case, &point.orbit);
         begin(&mut rows, point.value);
-        Summary::new(&prepared.system, Ok(&point.orbit)).write(&prepared.system, &mut rows);
+        Summary::new(prepared, Ok(&point.orbit)).write(prepared, &mut rows);
         rows.end();
     }
     for (value, height) in &branch.peaks {
@@ -135,7 +134,7 @@ fn compute(work: &Work<'_>) -> Computed {
     }
     for point in branch.turns.iter().map(|turn| &branch.points[*turn]) {
         begin(&mut turns, point.value);
-        turns.number("amplitude_m", point.orbit.places[place].amplitude());
+        turns.number("amplitude_m", worst(&point.orbit, &places));
         turns.end();
     }
     let reason = match branch.end {
@@ -171,7 +170,7 @@ fn follow(work: &Work<'_>, along: Option<&VariedValue>) -> Result<Branch, Missin
         None => (prepared.system.clone(), value),
         Some(_) => system(value).map_or((prepared.system.clone(), 0.0), |system| (system, work.omega(0))),
     };
-    let place = peak_place(prepared);
+    let places = peak_places(prepared);
     let trace = Trace {
         at: &at,
         method: HarmonicBalance {
@@ -181,7 +180,7 @@ fn follow(work: &Work<'_>, along: Option<&VariedValue>) -> Result<Branch, Missin
         },
         range,
         step: (range.1 - range.0).abs() / count("steps", 100) as f64,
-        quantity: &|orbit| orbit.places[place].amplitude(),
+        quantity: &|orbit| worst(orbit, &places),
     };
     trace.branch().map_err(Missing::Trace)
 }
@@ -191,27 +190,38 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(table), Ok(prepared)) = (drawing.table("branch"), Prepared::new(drawing.study, 0)) else {
         return Figure::default();
     };
-    let (system, place) = (&prepared.system, peak_place(&prepared));
+    let (system, places) = (&prepared.system, peak_places(&prepared));
     let (outer, along) = split(drawing.study, &prepared.case.varied);
     let column = |place: usize| format!("{}_amplitude_m", system.places[place]);
-    let (unit, factor) = display_unit(largest(table, (0..system.dofs()).map(column)), "m");
+    let (y, factor) = drawing.axis(1, "amplitude", largest(table, (0..system.dofs()).map(column)), "m");
     let (name, _) = axis(along);
     let along_unit = along.map_or("Hz".to_owned(), |parameter| parameter.on_axis().1);
     let stretches = drawing.stretches_of(table, outer.len());
     let one = stretches.len() == 1;
-    let height = if one { "amplitude".to_owned() } else { format!("amplitude of {}", system.places[place]) };
+    let names: Vec<&str> = places.iter().map(|place| system.places[*place].as_str()).collect();
+    let y = if one { y } else { Axis { quantity: format!("amplitude of {}", names.join(", ")), ..y } };
+    // of several branches the masses whose peaks count are shown, the largest amplitude of them
+    let shown: Vec<Vec<usize>> = match one {
+        true => {
+            (0..system.dofs()).filter(|place| drawing.shows(&system.places[*place])).map(|place| vec![place]).collect()
+        }
+        false => vec![places],
+    };
     let unstable = unstable(table);
     let mut series = Vec::new();
     let mut colour = 0;
     for stretch in &stretches {
-        for place in if one { 0..system.dofs() } else { place..place + 1 } {
-            let label = if one { system.places[place].clone() } else { varied_text(&stretch.varied[..outer.len()]) };
+        for places in &shown {
+            let label =
+                if one { system.places[places[0]].clone() } else { varied_text(&stretch.varied[..outer.len()]) };
             let mut from = stretch.rows.start;
             // unstable stretches are dashed; each begins at the last point of the one before
             for run in unstable[stretch.rows.clone()].chunk_by(|a, b| a == b) {
                 let shown = from.max(stretch.rows.start + 1) - 1..from + run.len();
                 from += run.len();
-                let y = numbers(table, &column(place), shown.clone()).iter().map(|y| y * factor).collect();
+                let all: Vec<Vec<f64>> = places.iter().map(|p| numbers(table, &column(*p), shown.clone())).collect();
+                let largest = |i: usize| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max);
+                let y = (0..shown.len()).map(|i| largest(i) * factor).collect();
                 let label = if run[0] { format!("{label}, unstable") } else { label.clone() };
                 let line = Series::line(label, numbers(table, &name_of_axis(table, outer.len()), shown), y, colour);
                 series.push(if run[0] { Series { style: Style::Dashed, ..line } } else { line });
@@ -220,7 +230,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         }
     }
     let quantity = if along.is_some() { name } else { "frequency".to_owned() };
-    let panel = Panel { title: String::new(), x: Axis::new(quantity, along_unit), y: Axis::new(height, unit), series };
+    let panel = Panel { title: String::new(), x: Axis::new(quantity, along_unit), y, series };
     Figure { panels: vec![panel], ..Figure::default() }
 }
 

@@ -1,12 +1,13 @@
 //! Hysteresis loops: force over displacement of joints and moved places, over one period of the steady motion.
 
 use super::{Complaint, FREQUENCY, Kind, SAMPLES, orbits};
-use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, display_unit, largest, numbers, words};
+use crate::dataset::{Figure, Panel, Series};
+use crate::drawing::{Drawing, largest, numbers, words};
 use crate::rows::Rows;
-use crate::schema::{Takes, optional};
+use crate::schema::{Takes, default, optional};
 use crate::values::{Values, hertz};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
+use stickslip::dimension::Dimension;
 use stickslip::model::Model;
 use stickslip::orbit::{Orbit, Sample};
 
@@ -21,10 +22,19 @@ pub(super) const KIND: Kind = Kind {
             "joints, or moved places (the force that moves them), whose loops are wanted; every joint when absent",
             "\"shroud\"",
         ),
+        optional(
+            "against",
+            Takes::Name,
+            "the mass whose displacement is the abscissa of the loops; absent: the relative displacement of the joint",
+            "\"blade1\"",
+        ),
+        default("sum", Takes::Flag, "false", "adds the forces of the joints up to one loop", "true"),
         SAMPLES,
     ],
     check,
+    axes: [Some(Dimension::LENGTH), Some(Dimension::FORCE)],
     uses_method: true,
+    adapts: false,
     tables: &["loops", "loops_summary"],
     grain: |_| Grain::Frequencies,
     compute,
@@ -39,6 +49,20 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
             return Err(Complaint::unknown("loop", "joint or moved place", name, &known));
         }
     }
+    let masses: Vec<&str> = model.masses.iter().map(|mass| mass.name.as_str()).collect();
+    if let Some(name) = values.text("against").filter(|name| !masses.contains(name)) {
+        return Err(Complaint::unknown("against", "mass", name, &masses));
+    }
+    if values.flag("sum") == Some(true) && values.text("against").is_none() {
+        let summed = |name: &str| values.names("loop").is_none_or(|names| names.iter().any(|n| n == name));
+        let mut ends = model.joints.iter().filter(|joint| summed(&joint.name)).map(|joint| &joint.between);
+        let first = ends.next();
+        if ends.any(|between| Some(between) != first) {
+            let message =
+                "the joints to be summed lie between different places, so they share no relative displacement";
+            return Err(Complaint::new("sum", message, "say whose displacement counts: against = \"NAME\""));
+        }
+    }
     if known.is_empty() {
         let help = "add a [[joint]] or a [[motion]], or ask for kind = \"orbit\"";
         return Err(Complaint::new("kind", "the model has no joint and no moved place, so it has no loop", help));
@@ -47,19 +71,31 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
 }
 
 /// Where the force and displacement of a loop stand in a sample.
-#[derive(Clone, Copy)]
-enum Source {
-    Joint(usize),
+#[derive(Debug, Clone, PartialEq)]
+struct Source {
+    force: Of,
+    /// The mass whose displacement counts, instead of that of the joint or moved place.
+    against: Option<usize>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Of {
+    /// The sum over these joints.
+    Joints(Vec<usize>),
     Moved(usize),
 }
 
 impl Source {
     /// Displacement (m) and force (N).
-    fn read(self, sample: &Sample) -> (f64, f64) {
-        match self {
-            Source::Joint(j) => (sample.joints[j].displacement, sample.joints[j].force),
-            Source::Moved(m) => sample.moved[m],
-        }
+    fn read(&self, sample: &Sample) -> (f64, f64) {
+        let (displacement, force) = match &self.force {
+            Of::Joints(joints) => {
+                let force = joints.iter().map(|j| sample.joints[*j].force).sum();
+                (sample.joints[joints[0]].displacement, force)
+            }
+            Of::Moved(m) => sample.moved[*m],
+        };
+        (self.against.map_or(displacement, |place| sample.displacement[place]), force)
     }
 }
 
@@ -93,13 +129,13 @@ fn compute(work: &Work<'_>) -> Computed {
                 table.number("force_N", force);
                 table.end();
             }
-            let first = First::new(&orbit, *source);
+            let first = First::new(&orbit, source);
             summary.varied(&prepared.case);
             if several {
                 summary.number("frequency_Hz", hertz(omega));
             }
             summary.text("joint", name);
-            summary.number("dissipation_J", exact_loss(prepared, &orbit, *source).unwrap_or(first.loss));
+            summary.number("dissipation_J", exact_loss(prepared, &orbit, source).unwrap_or(first.loss));
             summary.number("equivalent_stiffness_N_per_m", first.stiffness);
             summary.number("equivalent_damping_kg_per_s", first.damping);
             summary.number("residual", orbit.evidence.residual);
@@ -114,27 +150,36 @@ fn compute(work: &Work<'_>) -> Computed {
 
 /// The loops that the study asks for.
 fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
-    let system = &prepared.system;
+    let (system, values) = (&prepared.system, &prepared.case.values);
+    let against = values.text("against").and_then(|name| system.places.iter().position(|place| place == name));
     let all = || system.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
-    let mut names = prepared.case.values.names("loop").map_or_else(all, <[String]>::to_vec);
+    let mut names = values.names("loop").map_or_else(all, <[String]>::to_vec);
     if names.is_empty() {
         names = system.moved.iter().map(|place| place.name.clone()).collect();
     }
+    let joint = |name: &String| system.joints.iter().position(|joint| joint.name == *name);
+    if values.flag("sum") == Some(true) {
+        let joints: Vec<usize> = names.iter().filter_map(joint).collect();
+        let name = joints.iter().map(|j| system.joints[*j].name.as_str()).collect::<Vec<_>>().join(" + ");
+        let sum = (name, Source { force: Of::Joints(joints.clone()), against });
+        return if joints.is_empty() { Vec::new() } else { vec![sum] };
+    }
     let find = |name: &String| {
-        let joint = system.joints.iter().position(|joint| joint.name == *name).map(Source::Joint);
-        joint.or_else(|| system.moved.iter().position(|place| place.name == *name).map(Source::Moved))
+        let joint = joint(name).map(|joint| Of::Joints(vec![joint]));
+        joint.or_else(|| system.moved.iter().position(|place| place.name == *name).map(Of::Moved))
     };
-    names.iter().filter_map(|name| Some((name.clone(), find(name)?))).collect()
+    names.iter().filter_map(|name| Some((name.clone(), Source { force: find(name)?, against }))).collect()
 }
 
-/// Loss per period where the orbit knows it in closed form: of a joint, and of the only source of work.
-fn exact_loss(prepared: &Prepared, orbit: &Orbit, source: Source) -> Option<f64> {
-    match source {
-        Source::Joint(j) => Some(orbit.joints[j].dissipation),
-        Source::Moved(_) if prepared.system.moved.len() == 1 && prepared.case.model.forces.is_empty() => {
+/// Loss per period where the orbit knows it in closed form: of joints over their own displacement, and of the only source of work.
+fn exact_loss(prepared: &Prepared, orbit: &Orbit, source: &Source) -> Option<f64> {
+    match &source.force {
+        _ if source.against.is_some() => None,
+        Of::Joints(joints) => Some(joints.iter().map(|j| orbit.joints[*j].dissipation).sum()),
+        Of::Moved(_) if prepared.system.moved.len() == 1 && prepared.case.model.forces.is_empty() => {
             Some(orbit.energy.work_in)
         }
-        Source::Moved(_) => None,
+        Of::Moved(_) => None,
     }
 }
 
@@ -158,7 +203,7 @@ const GAUSS: [(f64, f64); 5] = [
 
 impl First {
     /// `F₁ = (keq + jω ceq) U₁` with the first harmonics of force and displacement; loss `∮ F du`.
-    fn new(orbit: &Orbit, source: Source) -> Self {
+    fn new(orbit: &Orbit, source: &Source) -> Self {
         let (omega, times) = (orbit.omega, orbits::times(orbit, QUADRATURE));
         // u cos, u sin, F cos, F sin
         let mut sums = [0.0; 4];
@@ -192,8 +237,8 @@ impl First {
 /// The fastest varied parameter and the frequency tell the loops of one panel apart, the others the panels.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let Some(table) = drawing.table("loops") else { return Figure::default() };
-    let (x_unit, x_factor) = display_unit(largest(table, ["displacement_m".to_owned()]), "m");
-    let (y_unit, y_factor) = display_unit(largest(table, ["force_N".to_owned()]), "N");
+    let (x_axis, x_factor) = drawing.axis(0, "displacement", largest(table, ["displacement_m".to_owned()]), "m");
+    let (y_axis, y_factor) = drawing.axis(1, "force", largest(table, ["force_N".to_owned()]), "N");
     let joints = words(table, "joint");
     let frequencies = table.numbers("frequency_Hz");
     let several = joints.iter().any(|joint| *joint != joints[0]);
@@ -215,12 +260,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             }
             let label = if label.is_empty() { joints[from].clone() } else { label.join(", ") };
             let at = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
-                panels.push(Panel {
-                    title,
-                    x: Axis::new("displacement", x_unit.clone()),
-                    y: Axis::new("force", y_unit.clone()),
-                    series: Vec::new(),
-                });
+                panels.push(Panel { title, x: x_axis.clone(), y: y_axis.clone(), series: Vec::new() });
                 panels.len() - 1
             });
             let x = numbers(table, "displacement_m", from..to).iter().map(|u| u * x_factor).collect();

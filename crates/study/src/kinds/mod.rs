@@ -14,10 +14,11 @@ mod transient;
 
 use crate::dataset::Figure;
 use crate::drawing::Drawing;
-use crate::schema::{Key, Takes, default, required};
+use crate::schema::{Key, Takes, default, optional, required};
 use crate::study::Study;
 use crate::values::Values;
 use crate::work::{Computed, Grain, Work};
+use stickslip::dimension::Dimension;
 use stickslip::model::Model;
 
 /// A row of the table of study kinds.
@@ -31,8 +32,12 @@ pub struct Kind {
     pub keys: &'static [Key],
     /// What one key alone cannot tell: conditions between keys, and names that must exist in the model.
     pub check: fn(&Values, &Model) -> Result<(), Complaint>,
+    /// Dimensions of the two axes of its figure, if they are the same in every panel.
+    pub axes: [Option<Dimension>; 2],
     /// Whether it finds its orbits with the method of `[method]`, which must then be able to take the model.
     pub uses_method: bool,
+    /// Whether it can place its frequencies where the curve bends.
+    pub adapts: bool,
     /// Its tables, the most important first.
     pub tables: &'static [&'static str],
     /// How its studies are cut into units of work.
@@ -66,12 +71,12 @@ pub struct Complaint {
 }
 
 impl Complaint {
-    fn new(key: &'static str, message: impl Into<String>, help: impl Into<String>) -> Self {
+    pub(crate) fn new(key: &'static str, message: impl Into<String>, help: impl Into<String>) -> Self {
         Complaint { key, name: None, message: message.into(), help: Some(help.into()) }
     }
 
     /// A name in the value of `key` that is none of `candidates`.
-    fn unknown(key: &'static str, what: &str, name: &str, candidates: &[&str]) -> Self {
+    pub(crate) fn unknown(key: &'static str, what: &str, name: &str, candidates: &[&str]) -> Self {
         let help = match crate::near::nearest(name, candidates.iter().copied()) {
             Some(near) => format!("did you mean `{near}`?"),
             None if candidates.is_empty() => format!("the model has no {what}"),
@@ -107,6 +112,28 @@ const FREQUENCY: Key = required(
     "drive frequency: one, a list, or a range with both ends",
     "{ from = \"119 Hz\", to = \"123 Hz\", points = 241 }",
 );
+
+/// What `output` can ask for: name, and one line of what it is.
+pub fn outputs() -> Vec<(&'static str, &'static str)> {
+    crate::extra::TABLE.iter().map(|extra| (extra.name, extra.doc)).collect()
+}
+
+/// The key `output` of the kinds that have one row per orbit.
+const OUTPUT: Key = optional(
+    "output",
+    Takes::Names,
+    "further columns: joint_force, joint_motion, velocity, acceleration, harmonics, receptance",
+    "[\"joint_force\", \"harmonics\"]",
+);
+
+/// Whether it names what there is.
+fn check_output(values: &Values) -> Result<(), Complaint> {
+    let known: Vec<&str> = crate::extra::TABLE.iter().map(|extra| extra.name).collect();
+    match values.names("output").unwrap_or_default().iter().find(|name| !known.contains(&name.as_str())) {
+        Some(name) => Err(Complaint::unknown("output", "output", name, &known)),
+        None => Ok(()),
+    }
+}
 
 /// The key `samples` of the kinds that show a motion over one period.
 const SAMPLES: Key = default("samples", Takes::Count(8, MOST_SAMPLES), "720", "points per period", "720");

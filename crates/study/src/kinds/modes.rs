@@ -2,7 +2,7 @@
 
 use super::{Complaint, HARMONICS, Kind, SERIES_SAMPLES, check_samples};
 use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, display_unit, largest, numbers};
+use crate::drawing::{Drawing, largest, numbers};
 use crate::rows::Rows;
 use crate::schema::{Key, Takes, Within, default, required};
 use crate::values::Values;
@@ -39,8 +39,10 @@ pub(super) const KIND: Kind = Kind {
         default("samples", Takes::Count(8, 1 << 16), "1024", "samples per period", "1024"),
     ],
     check,
+    axes: [Some(Dimension::LENGTH), None],
     // free vibration has no drive frequency: harmonic balance with an unknown frequency and damping is solved
     uses_method: false,
+    adapts: false,
     tables: &["modes"],
     grain: |_| Grain::Case,
     compute,
@@ -108,11 +110,11 @@ fn follow(prepared: &Prepared) -> Result<Mode, MethodError> {
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(table), Some(system)) = (drawing.table("modes"), drawing.system(0)) else { return Figure::default() };
     let column = |place: &String| format!("{place}_amplitude_m");
-    let (unit, factor) = display_unit(largest(table, system.places.iter().map(column)), "m");
+    let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, system.places.iter().map(column)), "m");
     let stretches = drawing.stretches(table);
     let panel = |quantity: &str, unit_of: &str, read: &str, scale: f64| Panel {
         title: String::new(),
-        x: Axis::new("amplitude", unit.clone()).log(),
+        x: x_axis.clone().log(),
         y: Axis::new(quantity, unit_of),
         series: stretches
             .iter()

@@ -1,6 +1,6 @@
 //! Orbits: the steady motion over one period, in time.
 
-use super::{FREQUENCY, Kind, SAMPLES, orbits};
+use super::{FREQUENCY, Kind, OUTPUT, SAMPLES, check_output, orbits};
 use crate::dataset::{Axis, Figure, Panel, Series};
 use crate::drawing::{Drawing, display_unit, largest, numbers};
 use crate::note::Note;
@@ -9,6 +9,7 @@ use crate::rows::Rows;
 use crate::schema::{Takes, default};
 use crate::values::hertz;
 use crate::work::{Computed, Grain, Part, Prepared, Work};
+use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
 pub(super) const KIND: Kind = Kind {
@@ -17,6 +18,7 @@ pub(super) const KIND: Kind = Kind {
     keys: &[
         FREQUENCY,
         SAMPLES,
+        OUTPUT,
         default(
             "multipliers",
             Takes::Flag,
@@ -25,8 +27,10 @@ pub(super) const KIND: Kind = Kind {
             "true",
         ),
     ],
-    check: |_, _| Ok(()),
+    check: |values, _| check_output(values),
+    axes: [Some(Dimension::TIME), None],
     uses_method: true,
+    adapts: false,
     tables: &["orbit", "orbits", "multipliers"],
     grain: |_| Grain::Frequencies,
     compute,
@@ -49,7 +53,7 @@ fn compute(work: &Work<'_>) -> Computed {
         part.notes.extend(one_of_many(prepared, &orbit));
         summary.varied(&prepared.case);
         summary.number("frequency_Hz", hertz(omega));
-        Summary::new(&prepared.system, Ok(&orbit)).write(&prepared.system, &mut summary);
+        Summary::new(prepared, Ok(&orbit)).write(prepared, &mut summary);
         summary.number("work_in_J", orbit.energy.work_in);
         summary.number("viscous_J", orbit.energy.viscous);
         summary.number("friction_J", orbit.energy.friction);
@@ -153,15 +157,16 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 }
             };
             if system.dofs() > 0 {
-                let names = system.places.iter().map(String::as_str).collect();
+                let names = system.places.iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
                 panels.push(panel("displacement", "m", names, "displacement_m", 0));
             }
             if !system.joints.is_empty() {
-                let names = system.joints.iter().map(|joint| joint.name.as_str()).collect();
+                let names = system.joints.iter().map(|j| j.name.as_str()).filter(|name| drawing.shows(name)).collect();
                 panels.push(panel("joint force", "N", names, "force_N", system.dofs()));
             }
         }
     }
+    panels.retain(|panel| !panel.series.is_empty());
     panels.truncate(MOST_PANELS);
     Figure { panels, ..Figure::default() }
 }

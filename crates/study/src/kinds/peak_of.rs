@@ -1,28 +1,56 @@
-//! The key `peak_of` of the kinds that look for a resonance: which mass counts.
+//! The key `peak_of` of the kinds that look for a resonance: which masses count. Of several the worst does, at every frequency anew.
 
 use super::Complaint;
+use crate::schema::{Key, Takes, optional};
 use crate::values::Values;
 use crate::work::Prepared;
 use stickslip::model::Model;
+use stickslip::orbit::Orbit;
 
-/// Whether it names one mass of the model; `help` says what for.
-pub(super) fn check_peak_of(values: &Values, model: &Model, help: &str) -> Result<(), Complaint> {
+/// Stands for every mass, unless one has this name.
+const ALL: &str = "all";
+
+/// The key.
+pub(super) const PEAK_OF: Key = optional(
+    "peak_of",
+    Takes::Names,
+    "the masses whose peak counts, or \"all\"; of several the largest amplitude does; absent: the first mass that a force acts on",
+    "[\"blade1\", \"blade3\"]",
+);
+
+/// Whether it names masses of the model.
+pub(super) fn check_peak_of(values: &Values, model: &Model) -> Result<(), Complaint> {
     let masses: Vec<&str> = model.masses.iter().map(|mass| mass.name.as_str()).collect();
     for name in values.names("peak_of").unwrap_or_default() {
-        if !masses.contains(&name.as_str()) {
+        if name != ALL && !masses.contains(&name.as_str()) {
             return Err(Complaint::unknown("peak_of", "mass", name, &masses));
         }
-    }
-    if values.names("peak_of").is_some_and(|names| names.len() != 1) {
-        return Err(Complaint::new("peak_of", "one mass is needed", help));
     }
     Ok(())
 }
 
-/// The place whose peak counts: the named one, or the first that a force acts on.
-pub(super) fn peak_place(prepared: &Prepared) -> usize {
-    let named = prepared.case.values.names("peak_of").and_then(|names| names.first().cloned());
-    let driven = prepared.case.model.forces.first().map(|force| force.on.clone());
-    let name = named.or(driven);
-    name.and_then(|name| prepared.system.places.iter().position(|place| *place == name)).unwrap_or(0)
+/// The places that the key names; none if it is absent.
+pub(super) fn named_places(prepared: &Prepared) -> Vec<usize> {
+    let names = prepared.case.values.names("peak_of").unwrap_or_default();
+    let places = &prepared.system.places;
+    if names.iter().any(|name| name == ALL) && !places.iter().any(|place| place == ALL) {
+        return (0..places.len()).collect();
+    }
+    names.iter().filter_map(|name| places.iter().position(|place| place == name)).collect()
+}
+
+/// The places whose peak counts: the named ones, or the first that a force acts on.
+pub(super) fn peak_places(prepared: &Prepared) -> Vec<usize> {
+    let named = named_places(prepared);
+    if !named.is_empty() {
+        return named;
+    }
+    let driven = prepared.case.model.forces.first().map(|force| &force.on);
+    let driven = driven.and_then(|name| prepared.system.places.iter().position(|place| place == name));
+    vec![driven.unwrap_or(0)]
+}
+
+/// The largest amplitude among some places, m.
+pub(super) fn worst(orbit: &Orbit, places: &[usize]) -> f64 {
+    places.iter().map(|place| orbit.places[*place].amplitude()).fold(0.0, f64::max)
 }

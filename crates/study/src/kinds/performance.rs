@@ -1,16 +1,16 @@
 //! Performance curves: the resonance peak as a function of a design parameter, and its best value.
 
-use super::peak_of::{check_peak_of, peak_place};
+use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
 use super::{Complaint, FREQUENCY, Kind};
 use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, display_unit, largest, numbers};
+use crate::drawing::{Drawing, largest, numbers};
 use crate::note::Note;
 use crate::rows::Rows;
-use crate::schema::{Takes, optional};
 use crate::study::{VariedValue, varied_text};
 use crate::values::{Values, hertz};
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
+use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
 use stickslip::model::Model;
 use stickslip::orbit::Accuracy;
@@ -18,17 +18,11 @@ use stickslip::orbit::Accuracy;
 pub(super) const KIND: Kind = Kind {
     name: "performance",
     summary: "the resonance peak over a design parameter (the last one of `vary`), with the optimum refined",
-    keys: &[
-        FREQUENCY,
-        optional(
-            "peak_of",
-            Takes::Names,
-            "the mass whose peak counts; the first one that a force acts on when absent",
-            "\"blade1\"",
-        ),
-    ],
+    keys: &[FREQUENCY, PEAK_OF],
     check,
+    axes: [None, Some(Dimension::LENGTH)],
     uses_method: true,
+    adapts: false,
     tables: &["performance", "optimum"],
     grain: |_| Grain::Curve,
     compute,
@@ -39,7 +33,7 @@ pub(super) const KIND: Kind = Kind {
 const FEWEST_VALUES: usize = 3;
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
-    check_peak_of(values, model, "name the mass whose peak is to be low")?;
+    check_peak_of(values, model)?;
     if values.frequencies("frequency").is_some_and(|f| f.len() < FEWEST_VALUES) {
         let help = "write frequency = { from = …, to = …, points = … } around the resonance";
         return Err(Complaint::new("frequency", "a peak needs a range of frequencies", help));
@@ -113,7 +107,7 @@ fn split(prepared: &Prepared) -> Option<(&[VariedValue], &VariedValue)> {
 
 fn curve(work: &Work<'_>) -> Result<PerformanceCurve, MethodError> {
     let first = work.case();
-    let place = peak_place(first);
+    let places = peak_places(first);
     let frequencies: Vec<f64> = work.points.clone().map(|index| work.omega(index)).collect();
     let range = frequencies.iter().fold((f64::INFINITY, 0.0f64), |(a, b), w| (a.min(*w), b.max(*w)));
     let parameter = split(first).map(|(_, inner)| inner.name.clone());
@@ -127,7 +121,7 @@ fn curve(work: &Work<'_>) -> Result<PerformanceCurve, MethodError> {
         method: &*first.method,
         range,
         points: frequencies.len(),
-        quantity: &|orbit| orbit.places[place].amplitude(),
+        quantity: &|orbit| worst(orbit, &places),
     };
     let values: Vec<f64> = work.cases.iter().map(|p| split(p).map_or(0.0, |(_, inner)| inner.si)).collect();
     let result = performance.curve(&values);
@@ -146,7 +140,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     };
     let stretches = drawing.stretches_of(table, outer);
     let Some(inner) = stretches.first().and_then(|stretch| stretch.varied.last()) else { return Figure::default() };
-    let (unit, factor) = display_unit(largest(table, ["amplitude_m".to_owned()]), "m");
+    let (y_axis, factor) = drawing.axis(1, "resonance peak", largest(table, ["amplitude_m".to_owned()]), "m");
     let parameter = |table: &crate::dataset::Table, rows| numbers(table, &table.columns[outer].name, rows);
     let height = |table, rows| numbers(table, "amplitude_m", rows).iter().map(|y| y * factor).collect::<Vec<f64>>();
     let mut series = Vec::new();
@@ -165,11 +159,6 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             }
         }
     }
-    let panel = Panel {
-        title: String::new(),
-        x: Axis::new(&inner.name, inner.on_axis().1),
-        y: Axis::new("resonance peak", unit),
-        series,
-    };
+    let panel = Panel { title: String::new(), x: Axis::new(&inner.name, inner.on_axis().1), y: y_axis, series };
     Figure { panels: vec![panel], ..Figure::default() }
 }

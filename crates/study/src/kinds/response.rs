@@ -1,16 +1,21 @@
 //! Response curves: amplitude over drive frequency.
 
-use super::{FREQUENCY, Kind, orbits};
-use crate::dataset::{Axis, Figure, Panel, Series, Style};
-use crate::drawing::{Drawing, Stretch, display_unit, largest, numbers, words};
+use super::peak_of::{PEAK_OF, check_peak_of, named_places, worst};
+use super::{FREQUENCY, Kind, OUTPUT, check_output, orbits};
+use crate::dataset::{Figure, Panel, Series, Sharing, Style, Table};
+use crate::drawing::{Drawing, Layout, MOST_CURVES, Stretch, largest, numbers, thinned, words};
 use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
-use crate::schema::{Takes, default};
-use crate::values::hertz;
-use crate::work::{Computed, Grain, NOT_REACHED, Part, Work};
+use crate::schema::{Key, Takes, default};
+use crate::study::varied_text;
+use crate::values::{Frequencies, hertz};
+use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
+use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::peak::{self, Peak, Point};
-use stickslip::method::MethodError;
+use stickslip::dimension::Dimension;
+use stickslip::law::Law;
+use stickslip::method::{MethodError, OrbitError};
 use stickslip::orbit::Orbit;
 
 pub(super) const KIND: Kind = Kind {
@@ -22,157 +27,426 @@ pub(super) const KIND: Kind = Kind {
             "peaks",
             Takes::Flag,
             "true",
-            "refines every peak of every mass between the points of the curve",
+            "refines every peak of every mass between the points of the curve; with `peak_of` those of the worst mass",
             "false",
         ),
+        Key {
+            doc: "the masses of which the worst counts in peaks.csv, or \"all\"; absent: every mass for itself",
+            ..PEAK_OF
+        },
+        OUTPUT,
     ],
-    check: |_, _| Ok(()),
+    check: |values, model| {
+        check_peak_of(values, model)?;
+        check_output(values)
+    },
+    axes: [Some(Dimension::FREQUENCY), Some(Dimension::LENGTH)],
     uses_method: true,
-    tables: &["curve", "peaks"],
-    grain: |_| Grain::Frequencies,
+    adapts: true,
+    tables: &["curve", "peaks", "references"],
+    grain: |study| if study.is_adaptive() { Grain::Case } else { Grain::Frequencies },
     compute,
     draw,
 };
 
-/// Up to this many cases each has a panel with all masses; beyond, each mass has a panel with all cases.
-const PANELS: usize = 6;
 /// A mass below this share of the heaviest is drawn dashed, like the paper's contact masses.
 const LIGHT: f64 = 0.5;
+/// Masses that are drawn one by one; of more the largest amplitude is, with the single ones pale behind it.
+const SINGLE: usize = 7;
+/// Panels of a figure; the tables have all.
+const MOST_PANELS: usize = 12;
 
 fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
-    let (case, system) = (&prepared.case, &prepared.system);
-    let of_case = |error: MethodError| (case.index, error);
-    let wanted = wants_peaks(work);
-    let mut part = Part::default();
-    let mut rows = Rows::default();
-    let mut stuck = 0;
-    let mut points = Vec::new();
-    orbits::sweep(work, &mut |omega, outcome| {
-        let Some(outcome) = outcome else { return part.count(|| place_of(case, omega), NOT_REACHED, None) };
-        let summary = Summary::new(system, outcome);
-        part.count(|| place_of(case, omega), &summary.status, summary.failure.clone());
-        stuck += usize::from(summary.stuck);
-        if let Some(note) = outcome.ok().and_then(Note::of_accuracy) {
-            note.join(&mut part.notes);
+    let case = &prepared.case;
+    let mut stretch = Computing::new(prepared);
+    let found = match &case.frequencies {
+        Some(Frequencies::Adaptive { from, to, tolerance }) => {
+            let adaptive = Adaptive { range: (*from, *to), tolerance: *tolerance };
+            adaptively(work, adaptive, &mut stretch)
         }
-        rows.varied(case);
-        rows.number("frequency_Hz", hertz(omega));
-        summary.write(system, &mut rows);
-        rows.end();
-        if wanted {
-            points.push(outcome.map_or_else(|_| Point::failed(omega), |orbit| Point::new(orbit, &amplitudes)));
-        }
-    })
-    .map_err(of_case)?;
-    part.notes.push(Note::Stuck { case: case.label(), points: stuck, of: work.points.len() });
-    part.tables = vec![rows];
-    if wanted && !work.context.stopped() {
-        let found = peaks(work, points).map_err(of_case)?;
+        _ => evenly(work, &mut stretch),
+    };
+    let points = found.map_err(|error| (case.index, error))?;
+    let mut part = stretch.part;
+    let of = part.points.values().sum::<u64>() as usize;
+    part.notes.push(Note::Stuck { case: case.label(), points: stretch.stuck, of });
+    part.tables = vec![stretch.rows];
+    if !points.is_empty() && !work.context.stopped() {
         let mut peaks = Rows::default();
-        for (place, peak) in found {
+        for found in peaks_of(work, points).map_err(|error| (case.index, error))? {
             peaks.varied(case);
-            peaks.text("mass", &system.places[place]);
-            peaks.number("frequency_Hz", hertz(peak.omega));
-            peaks.number("amplitude_m", peak.value);
-            peaks.flag("at_range_end", Some(peak.at_end));
+            peaks.text("mass", &prepared.system.places[found.mass]);
+            peaks.number("frequency_Hz", hertz(found.peak.omega));
+            peaks.number("amplitude_m", found.peak.value);
+            peaks.flag("at_range_end", Some(found.peak.at_end));
             peaks.end();
         }
         part.tables.push(peaks);
+    } else {
+        part.tables.push(Rows::default());
+    }
+    if work.study.figure_values().flag("references") == Some(true) && case.index == 0 {
+        part.tables.push(references(work, &stretch.omegas).map_err(|error| (case.index, error))?);
     }
     Ok(part)
 }
 
-fn amplitudes(orbit: &Orbit) -> Vec<f64> {
-    orbit.places.iter().map(|place| place.amplitude()).collect()
+/// A stretch of a curve under way.
+struct Computing<'a> {
+    prepared: &'a Prepared,
+    part: Part,
+    rows: Rows,
+    omegas: Vec<f64>,
+    stuck: usize,
+}
+
+impl<'a> Computing<'a> {
+    fn new(prepared: &'a Prepared) -> Self {
+        Computing { prepared, part: Part::default(), rows: Rows::default(), omegas: Vec::new(), stuck: 0 }
+    }
+
+    /// Takes in a point; `None` if the run was stopped before.
+    fn add(&mut self, omega: f64, point: Option<(Summary, Option<Note>)>) {
+        let case = &self.prepared.case;
+        let Some((summary, note)) = point else {
+            return self.part.count(|| place_of(case, omega), NOT_REACHED, None);
+        };
+        self.part.count(|| place_of(case, omega), &summary.status, summary.failure.clone());
+        self.stuck += usize::from(summary.stuck);
+        if let Some(note) = note {
+            note.join(&mut self.part.notes);
+        }
+        self.omegas.push(omega);
+        self.rows.varied(case);
+        self.rows.number("frequency_Hz", hertz(omega));
+        summary.write(self.prepared, &mut self.rows);
+        self.rows.end();
+    }
+}
+
+/// What is kept of a point.
+fn kept(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> (Summary, Option<Note>) {
+    (Summary::new(prepared, outcome), outcome.ok().and_then(Note::of_accuracy))
+}
+
+/// The points of the unit's frequencies; those among which peaks are sought, if they are.
+fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Vec<Point>, MethodError> {
+    let prepared = work.case();
+    let wanted = wants_peaks(work);
+    let places = named_places(prepared);
+    let mut points = Vec::new();
+    orbits::sweep(work, &mut |omega, outcome| {
+        stretch.add(omega, outcome.map(|outcome| kept(prepared, outcome)));
+        if let Some(outcome) = outcome.filter(|_| wanted) {
+            points.push(outcome.map_or_else(|_| Point::failed(omega), |orbit| point(orbit, &places)));
+        }
+    })?;
+    if !wanted || points.is_empty() {
+        return Ok(Vec::new());
+    }
+    // its first and last points are looked at together with the neighbours that other units compute for themselves
+    let count = prepared.case.frequencies.as_ref().map_or(0, |f| f.len());
+    let mut solver = prepared.method.solver(&prepared.system)?;
+    let mut near = |index: usize, start: Option<&[f64]>| match solver.orbit(work.omega(index), start) {
+        Ok(orbit) => point(&orbit, &places),
+        Err(_) => Point::failed(work.omega(index)),
+    };
+    if work.points.start > 0 {
+        let before = near(work.points.start - 1, points[0].start.as_deref());
+        points.insert(0, before);
+    }
+    if work.points.end < count {
+        let after = near(work.points.end, points[points.len() - 1].start.as_deref());
+        points.push(after);
+    }
+    Ok(points)
+}
+
+/// The points that the curve needs.
+fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) -> Result<Vec<Point>, MethodError> {
+    let prepared = work.case();
+    let places = named_places(prepared);
+    let quantities = |orbit: &Orbit| amplitudes(orbit, &places);
+    let keep = |outcome: Result<&Orbit, &OrbitError>| {
+        (work.context.finished)();
+        kept(prepared, outcome)
+    };
+    let stop = || work.context.stopped();
+    let curve = adaptive.curve(&*prepared.method, &prepared.system, &quantities, &keep, &stop)?;
+    if work.context.stopped() {
+        stretch.add(adaptive.range.1, None);
+    }
+    let mut points = Vec::with_capacity(curve.len());
+    for (point, kept) in curve {
+        stretch.add(point.omega, Some(kept));
+        points.push(point);
+    }
+    Ok(if prepared.case.values.flag("peaks").unwrap_or(true) { points } else { Vec::new() })
+}
+
+/// The amplitudes whose peaks are sought: of every mass, or the largest of the named ones and then each of these.
+fn amplitudes(orbit: &Orbit, named: &[usize]) -> Vec<f64> {
+    if named.is_empty() {
+        return orbit.places.iter().map(|place| place.amplitude()).collect();
+    }
+    std::iter::once(worst(orbit, named)).chain(named.iter().map(|place| orbit.places[*place].amplitude())).collect()
+}
+
+fn point(orbit: &Orbit, named: &[usize]) -> Point {
+    Point::new(orbit, &|orbit| amplitudes(orbit, named))
 }
 
 /// Whether peaks are asked for, on a curve that can have any.
 fn wants_peaks(work: &Work<'_>) -> bool {
     let case = &work.case().case;
-    let rising = |f: &crate::values::Frequencies| f.len() > 2 && f.iter().is_sorted();
+    let rising = |f: &Frequencies| f.len() > 2 && f.iter().is_sorted();
     case.values.flag("peaks").unwrap_or(true) && case.frequencies.as_ref().is_some_and(rising)
 }
 
-/// The peaks of a stretch of a curve, by frequency. Its first and last points are looked at together with the neighbours that other
-/// units compute for themselves; those of the whole curve count as peaks at the end of the range if the curve falls away from them.
-fn peaks(work: &Work<'_>, mut points: Vec<Point>) -> Result<Vec<(usize, Peak)>, MethodError> {
+/// A peak and the mass that has it.
+struct Found {
+    mass: usize,
+    peak: Peak,
+}
+
+/// The peaks of a stretch of a curve, by frequency. The ends of the whole curve count as peaks at the end of the range if it falls away
+/// from them.
+fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodError> {
     let prepared = work.case();
-    let count = prepared.case.frequencies.as_ref().map_or(0, |f| f.len());
-    let mut solver = prepared.method.solver(&prepared.system)?;
-    let mut near = |index: usize, start: Option<&[f64]>| match solver.orbit(work.omega(index), start) {
-        Ok(orbit) => Point::new(&orbit, &amplitudes),
-        Err(_) => Point::failed(work.omega(index)),
+    let named = named_places(prepared);
+    let omegas = prepared
+        .case
+        .frequencies
+        .as_ref()
+        .map_or((0.0, 0.0), |f| (f.get(0).unwrap_or(0.0), f.get(f.len() - 1).unwrap_or(0.0)));
+    let wanted = if named.is_empty() { prepared.system.dofs() } else { 1 };
+    let found = |quantity: usize, peak: Peak, values: &[f64]| {
+        let worst = (1..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(1);
+        Found { mass: if named.is_empty() { quantity } else { named[worst - 1] }, peak }
     };
-    let at_end = |end: &Point, neighbour: &Point| -> Vec<(usize, Peak)> {
-        let falls = |place: &usize| neighbour.values.get(*place).is_some_and(|value| end.values[*place] > *value);
-        (0..end.values.len())
+    let at_end = |end: &Point, neighbour: &Point| -> Vec<Found> {
+        let falls = |q: &usize| neighbour.values.get(*q).is_some_and(|value| end.values[*q] > *value);
+        (0..wanted.min(end.values.len()))
             .filter(falls)
-            .map(|place| (place, Peak { omega: end.omega, value: end.values[place], at_end: true }))
+            .map(|q| found(q, Peak { omega: end.omega, value: end.values[q], at_end: true }, &end.values))
             .collect()
     };
     let (mut first, mut last) = (Vec::new(), Vec::new());
-    if work.points.start > 0 {
-        let start = points.first().and_then(|point| point.start.as_deref());
-        let before = near(work.points.start - 1, start);
-        points.insert(0, before);
-    } else if let [end, neighbour, ..] = &points[..] {
+    if let [end, neighbour, ..] = &points[..]
+        && end.omega == omegas.0
+    {
         first = at_end(end, neighbour);
     }
-    if work.points.end < count {
-        let start = points.last().and_then(|point| point.start.as_deref());
-        let after = near(work.points.end, start);
-        points.push(after);
-    } else if let [.., neighbour, end] = &points[..] {
+    if let [.., neighbour, end] = &points[..]
+        && end.omega == omegas.1
+    {
         last = at_end(end, neighbour);
     }
-    let inner = peak::all(&*prepared.method, &prepared.system, &points, &amplitudes)?;
+    let quantities = |orbit: &Orbit| amplitudes(orbit, &named);
+    let inner = peak::all(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
+    let inner = inner.into_iter().map(|peak| found(peak.quantity, peak.peak, &peak.values));
     Ok(first.into_iter().chain(inner).chain(last).collect())
+}
+
+/// The responses of the same structure with all joints free and with all joints stuck.
+fn references(work: &Work<'_>, omegas: &[f64]) -> Result<Rows, MethodError> {
+    let prepared = work.case();
+    let with = |change: &dyn Fn(Law) -> Law| {
+        let mut model = prepared.case.model.clone();
+        model.joints.iter_mut().for_each(|joint| joint.law = change(joint.law));
+        model.assemble().ok()
+    };
+    let mut systems = [with(&|law| law.free()), with(&|law| law.stuck())].map(|system| (system, Vec::new()));
+    for (system, curve) in &mut systems {
+        let Some(system) = system else { continue };
+        let mut solver = prepared.method.solver(system)?;
+        curve.extend(omegas.iter().map(|omega| solver.orbit(*omega, None).ok()));
+    }
+    let mut rows = Rows::default();
+    for (i, omega) in omegas.iter().enumerate() {
+        rows.number("frequency_Hz", hertz(*omega));
+        for (what, (_, curve)) in ["free", "stuck"].iter().zip(&systems) {
+            for (place, name) in prepared.system.places.iter().enumerate() {
+                let orbit = curve.get(i).and_then(|orbit| orbit.as_ref());
+                let amplitude = orbit.map_or(f64::NAN, |orbit| orbit.places[place].amplitude());
+                rows.number(&format!("{name}_{what}_amplitude_m"), amplitude);
+            }
+        }
+        rows.end();
+    }
+    Ok(rows)
+}
+
+/// What is drawn.
+struct Drawn<'a> {
+    drawing: &'a Drawing<'a>,
+    curve: &'a Table,
+    /// Names of the masses that are shown, and their numbers.
+    shown: Vec<(String, usize)>,
+    /// Case, and mass, frequency (Hz), amplitude (m) of the peaks inside the range.
+    peaks: Vec<(usize, (String, f64, f64))>,
+    factor: (f64, f64),
+}
+
+impl Drawn<'_> {
+    fn column(&self, name: &str) -> String {
+        format!("{name}_amplitude_m")
+    }
+
+    /// The curve of one mass in one case, with its peaks among its points.
+    fn line(&self, stretch: &Stretch, name: &str) -> (Vec<f64>, Vec<f64>) {
+        let x = numbers(self.curve, "frequency_Hz", stretch.rows.clone());
+        let y = numbers(self.curve, &self.column(name), stretch.rows.clone());
+        self.with_peaks(stretch, x.into_iter().zip(y).collect(), &|mass, _| mass == name)
+    }
+
+    /// The largest amplitude over the shown masses, and which mass has the largest of all.
+    fn envelope(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>, String) {
+        let x = numbers(self.curve, "frequency_Hz", stretch.rows.clone());
+        let all: Vec<Vec<f64>> =
+            self.shown.iter().map(|(name, _)| numbers(self.curve, &self.column(name), stretch.rows.clone())).collect();
+        let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let worst = (0..all.len()).max_by(|&a, &b| highest(&all[a]).total_cmp(&highest(&all[b]))).unwrap_or(0);
+        let y: Vec<f64> = (0..x.len()).map(|i| all.iter().map(|values| values[i]).fold(f64::NAN, f64::max)).collect();
+        let below = |omega: f64| {
+            let at = x.partition_point(|x| *x < omega).clamp(1, x.len().max(2) - 1);
+            let share = (omega - x[at - 1]) / (x[at] - x[at - 1]);
+            y[at - 1] + share * (y[at] - y[at - 1])
+        };
+        let points: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).collect();
+        // a peak of one mass below another one is none of the envelope
+        let (x, y) = self.with_peaks(stretch, points, &|_, peak| x.len() > 1 && peak.1 > below(peak.0));
+        (x, y, self.shown[worst].0.clone())
+    }
+
+    fn with_peaks(
+        &self,
+        stretch: &Stretch,
+        mut points: Vec<(f64, f64)>,
+        counts: &dyn Fn(&str, (f64, f64)) -> bool,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let of_case = self.peaks.iter().filter(|peak| peak.0 == stretch.case).map(|peak| &peak.1);
+        points.extend(of_case.filter(|(mass, x, y)| counts(mass, (*x, *y))).map(|(_, x, y)| (*x, *y)));
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        points.into_iter().map(|(x, y)| (x * self.factor.0, y * self.factor.1)).unzip()
+    }
+
+    /// Marks at the peaks of one mass.
+    fn marks(&self, stretch: &Stretch, name: &str, colour: usize) -> impl Iterator<Item = Series> {
+        let of_case = self.peaks.iter().filter(move |peak| peak.0 == stretch.case).map(|peak| &peak.1);
+        of_case
+            .filter(move |(mass, _, _)| mass == name)
+            .map(move |(_, x, y)| Series::marks("peak", vec![x * self.factor.0], vec![y * self.factor.1], colour))
+    }
+
+    /// Grey curves of the linear structures: of one mass, or the largest over the shown ones.
+    fn references(&self, names: &[&str]) -> Vec<Series> {
+        let Some(table) = self.drawing.table("references") else { return Vec::new() };
+        let x: Vec<f64> = numbers(table, "frequency_Hz", 0..table.rows()).iter().map(|x| x * self.factor.0).collect();
+        [("free", Style::Solid), ("stuck", Style::Dotted)]
+            .into_iter()
+            .map(|(what, style)| {
+                let all: Vec<Vec<f64>> = names
+                    .iter()
+                    .map(|name| numbers(table, &format!("{name}_{what}_amplitude_m"), 0..table.rows()))
+                    .collect();
+                let y = (0..x.len()).map(|i| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max) * self.factor.1);
+                let line = Series::line(format!("all joints {what}"), x.clone(), y.collect(), 0);
+                Series { style, ..line.reference() }
+            })
+            .collect()
+    }
 }
 
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(curve), Some(system)) = (drawing.table("curve"), drawing.system(0)) else { return Figure::default() };
+    let places = system.places.iter().cloned().zip(0..);
+    let shown: Vec<(String, usize)> = places.filter(|(name, _)| drawing.shows(name)).collect();
+    if shown.is_empty() {
+        return Figure::default();
+    }
+    let columns = || shown.iter().map(|(name, _)| format!("{name}_amplitude_m"));
+    let (x, x_factor) = drawing.axis(0, "frequency", largest(curve, ["frequency_Hz".to_owned()]), "Hz");
+    let (y, y_factor) = drawing.axis(1, "amplitude", largest(curve, columns()), "m");
     let stretches = drawing.stretches(curve);
-    let peaks = peaks_by_case(drawing);
-    let column = |place: &String| format!("{place}_amplitude_m");
-    let (unit, factor) = display_unit(largest(curve, system.places.iter().map(column)), "m");
-    let panel = |title: String| Panel {
-        title,
-        x: Axis::new("frequency", "Hz"),
-        y: Axis::new("amplitude", unit.clone()),
-        series: Vec::new(),
-    };
-    let line = |stretch: &Stretch, place: usize, label: String, colour: usize| {
-        let x = numbers(curve, "frequency_Hz", stretch.rows.clone());
-        let y = numbers(curve, &column(&system.places[place]), stretch.rows.clone());
-        Series::line(label, x, y.iter().map(|y| y * factor).collect(), colour)
-    };
+    let layout = drawing.layout(shown.len(), stretches.len());
+    let drawn = Drawn { drawing, curve, peaks: peaks_by_case(drawing), factor: (x_factor, y_factor), shown };
+    let panel = |title: String| Panel { title, x: x.clone(), y: y.clone(), series: Vec::new() };
     let heaviest = system.mass.diagonal().max();
-    let style =
-        |place: usize| if system.mass[(place, place)] < LIGHT * heaviest { Style::Dashed } else { Style::Solid };
+    let light = |place: usize| system.mass[(place, place)] < LIGHT * heaviest;
+    let single = drawn.shown.len() <= SINGLE;
     let mut panels = Vec::new();
-    if stretches.len() <= PANELS {
-        for stretch in &stretches {
+    if layout == Layout::Cases {
+        for stretch in stretches.iter().take(MOST_PANELS) {
             let mut panel = panel(stretch.label());
-            for (place, name) in system.places.iter().enumerate() {
-                panel.series.push(Series { style: style(place), ..line(stretch, place, name.clone(), place) });
-            }
-            for (name, x, y) in peaks.iter().filter(|peak| peak.0 == stretch.case).map(|peak| &peak.1) {
-                let colour = system.places.iter().position(|place| place == name).unwrap_or(0);
-                panel.series.push(Series::marks("peak", vec![*x], vec![y * factor], colour));
+            let names: Vec<&str> = drawn.shown.iter().map(|(name, _)| name.as_str()).collect();
+            panel.series.extend(drawn.references(&names));
+            if single {
+                for (name, place) in &drawn.shown {
+                    let (x, y) = drawn.line(stretch, name);
+                    let style = if light(*place) { Style::Dashed } else { Style::Solid };
+                    panel.series.push(Series { style, ..Series::line(name, x, y, *place) });
+                }
+                for (name, place) in &drawn.shown {
+                    panel.series.extend(drawn.marks(stretch, name, *place));
+                }
+            } else {
+                for (name, _) in &drawn.shown {
+                    let (x, y) = drawn.line(stretch, name);
+                    panel.series.push(Series::line(format!("each of {} masses", names.len()), x, y, 1).pale());
+                }
+                let (x, y, worst) = drawn.envelope(stretch);
+                panel.series.push(Series::line(format!("largest (of all {worst})"), x, y, 0));
             }
             panels.push(panel);
         }
-    } else {
-        for (place, name) in system.places.iter().enumerate() {
-            let mut panel = panel(name.clone());
-            for (number, stretch) in stretches.iter().enumerate() {
-                panel.series.push(line(stretch, place, stretch.label(), number));
+        return Figure { panels, ..Figure::default() };
+    }
+    // the last varied parameter tells the curves of one panel apart, the others the panels
+    let outer = |stretch: &Stretch| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
+    let masses: Vec<Option<&str>> =
+        if single { drawn.shown.iter().map(|(name, _)| Some(name.as_str())).collect() } else { vec![None] };
+    for group in stretches.chunk_by(|a, b| outer(a) == outer(b)) {
+        for mass in &masses {
+            let named = mass.filter(|_| masses.len() > 1).map(str::to_owned);
+            let mut title: Vec<String> =
+                named.into_iter().chain([outer(&group[0])]).filter(|t| !t.is_empty()).collect();
+            if group.len() > MOST_CURVES {
+                title.push(format!("{MOST_CURVES} of {} cases", group.len()));
+            }
+            let mut panel = panel(title.join(", "));
+            if mass.is_none() {
+                panel.y.quantity = format!("largest amplitude of {} masses", drawn.shown.len());
+            } else if masses.len() == 1 && system.dofs() > 1 {
+                panel.y.quantity = format!("amplitude of {}", drawn.shown[0].0);
+            }
+            let all: Vec<&str> = drawn.shown.iter().map(|(name, _)| name.as_str()).collect();
+            panel.series.extend(drawn.references(mass.as_ref().map_or(&all[..], std::slice::from_ref)));
+            for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
+                let (x, y) = match mass {
+                    Some(name) => drawn.line(stretch, name),
+                    None => {
+                        let (x, y, _) = drawn.envelope(stretch);
+                        (x, y)
+                    }
+                };
+                let label = stretch.varied.last().map_or_else(
+                    || mass.map_or_else(|| "largest".to_owned(), str::to_owned),
+                    |varied| varied.text.clone(),
+                );
+                let value = stretch.varied.last().map(|varied| varied.on_axis().0);
+                panel.series.push(Series { value, ..Series::line(label, x, y, colour) });
+                if let (Some(name), true) = (mass, group.len() <= SINGLE) {
+                    let marks = drawn.marks(stretch, name, colour);
+                    panel.series.extend(marks.map(|marks| Series { value, ..marks }));
+                }
             }
             panels.push(panel);
         }
     }
-    Figure { panels, ..Figure::default() }
+    panels.truncate(MOST_PANELS);
+    Figure { panels, sharing: Sharing::Always, varied: drawing.varied_axis(&stretches), ..Figure::default() }
 }
 
 /// The peaks inside the range: case, and mass, frequency (Hz), amplitude (m).

@@ -2,8 +2,8 @@
 
 use super::orbit::write_sample;
 use super::{Complaint, Kind, MOST_SAMPLES};
-use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, display_unit, numbers};
+use crate::dataset::{Figure, Panel, Series};
+use crate::drawing::{Drawing, numbers};
 use crate::point::place_of;
 use crate::rows::Rows;
 use crate::schema::{Key, Takes, Within, default, optional, required};
@@ -66,8 +66,10 @@ pub(super) const KIND: Kind = Kind {
         optional("time_step", DURATION, "distance of the points of the table; needed for a free decay", "\"0.1 ms\""),
     ],
     check,
+    axes: [Some(Dimension::TIME), Some(Dimension::LENGTH)],
     // exact and smooth laws alike are followed in time; there is no orbit to be found
     uses_method: false,
+    adapts: false,
     tables: &["motion"],
     grain: |_| Grain::Case,
     compute,
@@ -216,16 +218,19 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             }
             let displacement = |place: &String| numbers(motion, &format!("{place}_displacement_m"), from..to);
             let all = system.places.iter().flat_map(displacement);
-            let (unit, factor) = display_unit(all.map(f64::abs).filter(|x| x.is_finite()).fold(0.0, f64::max), "m");
-            let x = numbers(motion, "time_s", from..to);
+            let highest = all.map(f64::abs).filter(|x| x.is_finite()).fold(0.0, f64::max);
+            let (y_axis, factor) = drawing.axis(1, "displacement", highest, "m");
+            let times = numbers(motion, "time_s", from..to);
+            let (x_axis, x_factor) = drawing.axis(0, "time", times.last().copied().unwrap_or(0.0), "s");
+            let x: Vec<f64> = times.iter().map(|time| time * x_factor).collect();
             let line = |(i, place): (usize, &String)| {
                 Series::line(place, x.clone(), displacement(place).iter().map(|y| y * factor).collect(), i)
             };
             panels.push(Panel {
                 title,
-                x: Axis::new("time", "s"),
-                y: Axis::new("displacement", unit),
-                series: system.places.iter().enumerate().map(line).collect(),
+                x: x_axis,
+                y: y_axis,
+                series: system.places.iter().enumerate().filter(|(_, place)| drawing.shows(place)).map(line).collect(),
             });
             from = to;
         }
