@@ -119,7 +119,7 @@ vary = { Ft = ["2 N", "4 N"] }
     assert_eq!(branch.record.points.keys().collect::<Vec<_>>(), ["converged"]);
     let peaks = table(&branch, "peaks").numbers("amplitude_m").unwrap();
     let of_curve = table(&curve, "peaks");
-    let (limits, heights) = (of_curve.numbers("Ft").unwrap(), of_curve.numbers("amplitude_m").unwrap());
+    let (limits, heights) = (of_curve.numbers("Ft_N").unwrap(), of_curve.numbers("amplitude_m").unwrap());
     // the highest of the curve's peaks is that of blade 1; fifteen harmonics are within 3e-5 of the exact curve
     assert_eq!(peaks.len(), 2);
     for (peak, limit) in peaks.iter().zip([2.0, 4.0]) {
