@@ -98,6 +98,14 @@ impl Shades {
         (values.len() > NAMED).then_some((axis, range))
     }
 
+    /// The value of a series in words, if its colour shows it: `kt = 8 N/mm`.
+    pub(crate) fn value(&self, series: &Series) -> Option<String> {
+        let ((axis, _), value) = (self.bar.as_ref()?, series.value?);
+        let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+        let unit = if axis.unit.is_empty() { String::new() } else { format!(" {}", axis.unit) };
+        Some(format!("{} = {rounded}{unit}", axis.quantity))
+    }
+
     /// The colour of a series.
     pub(crate) fn colour(&self, series: &Series) -> Colour {
         match (&self.bar, series.value) {
@@ -127,7 +135,7 @@ pub(crate) struct Entry {
 const MOST: usize = 24;
 
 /// The legend of a figure: every label once, in order of appearance; what has marks only and references last. A series without label or points
-/// has no entry, and one whose colour says its value has none unless its label stands for several values. Also returns
+/// has no entry, and one whose colour says its value has none unless its label stands for several values and is no panel's title. Also returns
 /// how many labels are left out.
 pub(crate) fn legend(figure: &Figure) -> (Vec<Entry>, usize) {
     let shades = Shades::of(figure);
@@ -150,7 +158,7 @@ pub(crate) fn legend(figure: &Figure) -> (Vec<Entry>, usize) {
                 if entry.colour != colour {
                     entry.colour = Colour::many();
                 }
-                *named |= value.is_none() || *known != value;
+                *named |= value.is_none() || *known != value && panel.title != series.label;
                 entry.line = entry.line.or(line);
                 entry.area = entry.area.or(area);
                 entry.marks |= marks;
@@ -357,6 +365,13 @@ mod tests {
             figure.panels[0].series.iter().filter(|s| s.label.starts_with("Ft")).map(|s| shades.colour(s)).collect();
         assert_eq!((colours.first(), colours.last()), (Some(&Colour::sequential(0.0)), Some(&Colour::sequential(1.0))));
         let few = samples::cases(7).figure;
+        let masses = samples::masses().figure;
+        assert_eq!(legend(&masses), (vec![], 0)); // the panels are titled by the masses
+        let mut untitled = masses.clone();
+        untitled.panels.iter_mut().for_each(|panel| panel.title.clear());
+        let names: Vec<String> = legend(&untitled).0.into_iter().map(|e| e.label).collect();
+        assert_eq!(names, ["blade", "contact", "shroud"]);
+        assert_eq!(Shades::of(&masses).bar.unwrap().1.part(64.0), 6.0 / 11.0);
         assert_eq!((legend(&few).0.len(), Shades::of(&few).bar), (7 + 3, None));
         // names that are no values: the first of them, and the number of the others
         let unnamed = Figure { varied: None, ..figure };

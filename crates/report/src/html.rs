@@ -294,8 +294,10 @@ fn traces(figure: &Figure, ink: &mut Ink) -> Vec<Value> {
         let (x_form, y_form) = (Form::of(axes.x), Form::of(axes.y));
         for series in frame::layers(panel) {
             let named = listed.contains(series.label.as_str());
-            let place =
-                if several && !panel.title.is_empty() { format!("<br>{}", plain(&panel.title)) } else { String::new() };
+            let said = panel.title.is_empty() || panel.title == series.label;
+            let place = if several && !said { format!("<br>{}", plain(&panel.title)) } else { String::new() };
+            let value = ink.shades.value(series).filter(|text| !series.label.contains(text.as_str()));
+            let value = value.map_or(String::new(), |text| format!("<br>{}", plain(&text)));
             let (x, y) = (hover("x", &panel.x, x_form.power), hover("y", &panel.y, y_form.power));
             let mut trace = json!({
                 "type": if series.x.len() > 5000 { "scattergl" } else { "scatter" },
@@ -305,7 +307,7 @@ fn traces(figure: &Figure, ink: &mut Ink) -> Vec<Value> {
                 "name": plain(&series.label), "legendgroup": series.label,
                 "showlegend": named && frame::drawn(panel, series).next().is_some() && seen.insert(series.label.clone()),
                 "connectgaps": false,
-                "hovertemplate": format!("{x}<br>{y}<extra>{}{place}</extra>", plain(&series.label)),
+                "hovertemplate": format!("{x}<br>{y}<extra>{}{value}{place}</extra>", plain(&series.label)),
             });
             let shade = ink.shades.colour(series);
             let colour = ink.use_of(&shade);
@@ -759,6 +761,14 @@ pub(crate) mod tests {
         assert_eq!((&wide["coloraxis"]["cmin"], &wide["coloraxis"]["cmax"]), (&json!(1.0), &json!(400.0)));
         assert_eq!(narrow["coloraxis"]["colorbar"]["orientation"], "h");
         assert_eq!(traces.iter().filter(|t| t["marker"]["coloraxis"] == "coloraxis").count(), 1);
+        // where the labels name something else, the value stands under the pointer
+        let (traces, wide, _) = made(&samples::masses().figure);
+        let hover = |text: &str| {
+            traces.iter().filter(|t| t["hovertemplate"].as_str().is_some_and(|h| h.contains(text))).count()
+        };
+        assert_eq!(hover("<extra>blade<br>kt = 8 N/mm</extra>"), 1);
+        assert_eq!(wide["coloraxis"]["colorbar"]["ticktext"], json!(["1", "3", "10", "30", "100", "300", "1000"]));
+        assert_eq!(wide["yaxis3"]["matches"], "y");
         let (_, wide, _) = made(&samples::envelope().figure);
         assert_eq!((&wide["yaxis"]["type"], &wide["yaxis"]["range"]), (&json!("log"), &json!([-1.0, 1.0])));
         assert_eq!(wide["xaxis"]["range"], json!([110.0, 140.0]));

@@ -34,7 +34,7 @@ fn record(points: &[(&str, u64)]) -> Record {
 }
 
 pub(crate) fn all() -> Vec<Dataset> {
-    vec![response(), hysteresis(), hostile(), many(), cases(5), cases(400), envelope(), spectrum(), modes()]
+    vec![response(), hysteresis(), hostile(), many(), cases(5), cases(400), masses(), envelope(), spectrum(), modes()]
 }
 
 /// Response curves of two weakly coupled blades and their contact: four limits of friction.
@@ -291,6 +291,23 @@ pub(crate) fn cases(count: usize) -> Dataset {
     let mut dataset =
         bare(&format!("cases{count}"), "Response of a blade under a damper, slip limits compared", vec![panel]);
     dataset.figure.varied = Some(axis("Ft", "N"));
+    dataset
+}
+
+/// Two panels by mass on the same axes, coloured by twelve contact stiffnesses in equal ratios; the labels name the masses.
+pub(crate) fn masses() -> Dataset {
+    let f: Vec<f64> = (0..300).map(|i| 100.0 + 0.2 * f64::from(i)).collect();
+    let panel = |name: &str, height: f64| {
+        let list = (0..12).map(|k| {
+            let y = f.iter().map(|f| height * resonance(*f, 115.0 + 2.5 * f64::from(k), 0.02)).collect();
+            Series::line(name, f.clone(), y, k as usize).of(f64::from(1u32 << k))
+        });
+        Panel { title: name.into(), x: axis("frequency", "Hz"), y: axis("amplitude", "mm"), series: list.collect() }
+    };
+    let panels = vec![panel("blade", 1.0), panel("contact", 0.04), panel("shroud", 0.3)];
+    let mut dataset = bare("masses", "Influence of the contact stiffness on all masses", panels);
+    dataset.figure.varied = Some(axis("kt", "N/mm").log());
+    dataset.figure.sharing = Sharing::Always;
     dataset
 }
 
