@@ -253,12 +253,19 @@ fn interrupted(folder: &Path, signal: &str) -> Output {
     child.wait_with_output().unwrap()
 }
 
-/// Ctrl-C during a long sweep leaves the finished points readable.
+/// Ctrl-C during a long sweep leaves the finished points readable, and so does what a scheduler sends.
 #[cfg(unix)]
 #[test]
 fn an_interrupt_keeps_the_finished_points() {
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        an_interrupt_keeps(signal);
+    }
+}
+
+#[cfg(unix)]
+fn an_interrupt_keeps(signal: &str) {
     let (folder, _) = folder("blade-couple", &[("points = 241", "points = 200000")]);
-    let output = interrupted(folder.path(), "-INT");
+    let output = interrupted(folder.path(), signal);
     assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
     let curve = fs::read_to_string(folder.path().join("stickslip-out/study/curve.csv")).unwrap();
     let rows = curve.lines().count() - 1;
