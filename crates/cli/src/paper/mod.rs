@@ -13,7 +13,7 @@ mod verdict;
 use optimum::Optimum;
 use std::error::Error;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use stickslip_report::{Claim, Outputs, Page, Section, Verdict, write_dataset};
 use stickslip_study::run::{Context, run};
@@ -26,6 +26,8 @@ pub struct Outcome {
     pub summary: String,
     /// Points without a result.
     pub failed: u64,
+    /// The page of figures and claims.
+    pub report: PathBuf,
 }
 
 /// What can go wrong: a file cannot be written.
@@ -105,7 +107,7 @@ fn produce(out: &Path, context: &Context<'_>, say: &dyn Fn(&str), extent: &Exten
     let report = if cut_short { out.join("report.interrupted.html") } else { whole };
     let summary = summary(&report, &parts, &results);
     page(parts).write(&report)?;
-    Ok(Outcome { summary, failed: results.failed() })
+    Ok(Outcome { summary, failed: results.failed(), report })
 }
 
 /// Cases beyond the figures that the claims ask for; absent if the run was interrupted.
