@@ -23,7 +23,7 @@ pub fn stop_flag() -> &'static AtomicBool {
 /// A bar over `points`; it draws nothing unless standard error is a terminal.
 pub fn bar(points: u64, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(points);
-    if let Ok(style) = ProgressStyle::with_template("{msg:20} {bar:40} {pos}/{len} points, {left}") {
+    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:24} {pos}/{len} points, {left}") {
         bar.set_style(style.with_key("left", |state: &ProgressState, out: &mut dyn Write| {
             let _ = out.write_str(&left(state.pos(), state.len().unwrap_or(0), state.eta()));
         }));

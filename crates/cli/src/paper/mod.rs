@@ -279,6 +279,20 @@ mod tests {
         assert!(out.path().join("report.html").is_file());
     }
 
+    /// What an interrupted job has goes beside a report that is there.
+    #[test]
+    fn an_interrupted_job_does_not_replace_a_report() {
+        let out = tempfile::tempdir().unwrap();
+        let whole = out.path().join("report.html");
+        std::fs::write(&whole, "whole").unwrap();
+        let context = Context { threads: 1, stop: &AtomicBool::new(true), finished: &|| () };
+        let extent = Extent { points: Some(25), outputs: Outputs::only(&["json"]).unwrap() };
+        let outcome = produce(out.path(), &context, &|_| (), &extent).unwrap();
+        assert_eq!(std::fs::read_to_string(&whole).unwrap(), "whole");
+        assert!(outcome.report.ends_with("report.interrupted.html") && outcome.report.is_file());
+        assert!(outcome.summary.contains("report.interrupted.html"), "{}", outcome.summary);
+    }
+
     #[test]
     fn per_cent_keep_two_digits() {
         assert_eq!([0.65, 0.0123, 0.00046, 1e-9, 0.0].map(percent), ["65 %", "1.2 %", "0.05 %", "1.0e-7 %", "0 %"]);
