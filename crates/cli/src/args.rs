@@ -23,10 +23,13 @@ pub enum Command {
     Paper {
         #[command(flatten)]
         place: Place,
+        /// Show the report in the browser
+        #[arg(long)]
+        open: bool,
     },
     /// Run study files
     Run {
-        /// Study files (TOML)
+        /// Study files (TOML); `-` is standard input
         #[arg(required = true)]
         files: Vec<PathBuf>,
         #[command(flatten)]
@@ -40,13 +43,19 @@ pub enum Command {
         /// Write only these outputs: csv, json, svg, png, html (comma between them)
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
-        /// Print the whole dataset as JSON on standard output
+        /// Print the results as JSON on standard output, one line per study
         #[arg(long)]
         json: bool,
+        /// Show the figure in the browser
+        #[arg(long)]
+        open: bool,
+        /// Run again whenever a file changes, until Ctrl-C
+        #[arg(long)]
+        watch: bool,
     },
     /// Check study files without running them
     Check {
-        /// Study files (TOML)
+        /// Study files (TOML); `-` is standard input
         #[arg(required = true)]
         files: Vec<PathBuf>,
         /// Change a parameter, for example --set Ft=3N (may be given several times)

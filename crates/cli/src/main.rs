@@ -2,6 +2,7 @@
 
 mod args;
 mod list;
+mod open;
 mod paper;
 mod progress;
 mod run;
@@ -39,9 +40,10 @@ impl Ending {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let ending = match cli.command {
-        Command::Paper { place } => run::paper(&place),
-        Command::Run { files, place, set, method, only, json } => {
-            run::run(&run::Request { files: &files, set: &set, method: method.as_deref() }, &place, &only, json)
+        Command::Paper { place, open } => run::paper(&place, open),
+        Command::Run { files, place, set, method, only, json, open, watch } => {
+            let request = run::Request { files: &files, set: &set, method: method.as_deref() };
+            run::run(&request, &place, &run::Wanted { only: &only, json, open, watch })
         }
         Command::Check { files, set, method } => {
             run::check(&run::Request { files: &files, set: &set, method: method.as_deref() })

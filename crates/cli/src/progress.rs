@@ -1,8 +1,10 @@
-//! A progress bar on a terminal, silence in a pipe, and Ctrl-C that keeps what is finished.
+//! A progress bar on a terminal, silence in a pipe, and Ctrl-C that keeps what is finished; SIGTERM and SIGHUP are like Ctrl-C.
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
+use std::fmt::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 /// The flag that Ctrl-C sets; a second Ctrl-C ends the program at once.
 pub fn stop_flag() -> Arc<AtomicBool> {
@@ -13,7 +15,7 @@ pub fn stop_flag() -> Arc<AtomicBool> {
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(1);
         }
-        eprintln!("\nstopping: finished points are kept; press Ctrl-C again to stop at once");
+        eprintln!("\nstopping: finished points are kept; Ctrl-C again ends at once");
     });
     stop
 }
@@ -21,9 +23,41 @@ pub fn stop_flag() -> Arc<AtomicBool> {
 /// A bar over `points`; it draws nothing unless standard error is a terminal.
 pub fn bar(points: u64, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(points);
-    if let Ok(style) = ProgressStyle::with_template("{msg:20} {bar:40} {pos}/{len} points, {eta} left") {
-        bar.set_style(style);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:24} {pos}/{len} points, {left}") {
+        bar.set_style(style.with_key("left", |state: &ProgressState, out: &mut dyn Write| {
+            let _ = out.write_str(&left(state.pos(), state.len().unwrap_or(0), state.eta()));
+        }));
     }
     bar.set_message(what.to_owned());
+    // also while a point takes long: the estimate grows with the time that has gone by
+    bar.enable_steady_tick(TICK);
     bar
+}
+
+/// How often the bar is drawn anew.
+const TICK: Duration = Duration::from_millis(250);
+
+/// What the bar says of the time that is left; never that none is left while there is work.
+fn left(done: u64, all: u64, estimate: Duration) -> String {
+    match (done, estimate.as_secs()) {
+        (0, _) => "no estimate yet".to_owned(),
+        _ if done >= all => "finishing".to_owned(),
+        (_, 0) => "less than 1s left".to_owned(),
+        _ => format!("about {} left", HumanDuration(estimate)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_work_is_left_in_no_time() {
+        let at = |done, milliseconds| left(done, 10, Duration::from_millis(milliseconds));
+        assert_eq!(at(0, 0), "no estimate yet");
+        assert_eq!(at(5, 0), "less than 1s left");
+        assert_eq!(at(5, 999), "less than 1s left");
+        assert_eq!(at(9, 3_000), "about 3 seconds left");
+        assert_eq!(at(10, 0), "finishing"); // refined peaks, figures, files
+    }
 }

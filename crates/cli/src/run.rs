@@ -1,17 +1,19 @@
 //! `stickslip run`, `check` and `paper`.
 
 use crate::args::Place;
-use crate::{Ending, paper, print, progress};
+use crate::{Ending, open, paper, print, progress};
 use std::collections::BTreeSet;
-use std::io::{IsTerminal, Write};
+use std::io::{IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use stickslip::orbit::Accuracy;
 use stickslip_report::{Outputs, check_writable, json::write_dataset_json, terminal::Terminal, write_dataset};
 use stickslip_study::dataset::Dataset;
 use stickslip_study::run::{CONVERGED, Context, check as check_study, run as run_study};
-use stickslip_study::{Study, StudyError, read_file};
+use stickslip_study::schema::MOST_BYTES;
+use stickslip_study::{Study, StudyError, read_bytes, read_file};
 
 /// The studies that a command line names.
 pub struct Request<'a> {
@@ -29,7 +31,7 @@ impl Request<'_> {
         let mut studies = Vec::new();
         let mut wrong = false;
         for file in self.files {
-            let study = read_file(file, self.set)
+            let study = read(file, self.set)
                 .and_then(|study| match self.method {
                     Some(method) => study.with_method(method),
                     None => Ok(study),
@@ -44,6 +46,22 @@ impl Request<'_> {
             }
         }
         if wrong { Err(Ending::WrongInput) } else { Ok(studies) }
+    }
+}
+
+/// What stands for standard input among files.
+const STDIN: &str = "-";
+
+/// Reads a study from a file, or from standard input.
+fn read(file: &Path, set: &[(String, String)]) -> Result<Study, StudyError> {
+    if file != Path::new(STDIN) {
+        return read_file(file, set);
+    }
+    let mut bytes = Vec::new();
+    // what was read before an error is no whole study either
+    match std::io::stdin().lock().take(MOST_BYTES + 1).read_to_end(&mut bytes) {
+        Ok(_) => read_bytes("stdin", &bytes, set),
+        Err(_) => read_bytes("stdin", &[], set),
     }
 }
 
@@ -75,15 +93,74 @@ pub fn check(request: &Request<'_>) -> Ending {
     }
 }
 
+/// What a run is to yield.
+pub struct Wanted<'a> {
+    /// `--only`.
+    pub only: &'a [String],
+    /// `--json`.
+    pub json: bool,
+    /// `--open`.
+    pub open: bool,
+    /// `--watch`.
+    pub watch: bool,
+}
+
 /// `stickslip run`.
-pub fn run(request: &Request<'_>, place: &Place, only: &[String], json: bool) -> Ending {
-    let outputs = match if only.is_empty() { Ok(Outputs::all()) } else { Outputs::only(only) } {
+pub fn run(request: &Request<'_>, place: &Place, wanted: &Wanted<'_>) -> Ending {
+    let outputs = match if wanted.only.is_empty() { Ok(Outputs::all()) } else { Outputs::only(wanted.only) } {
         Ok(outputs) => outputs,
         Err(error) => {
             eprintln!("error: {error}");
             return Ending::WrongInput;
         }
     };
+    if wanted.watch && request.files.iter().any(|file| file == Path::new(STDIN)) {
+        eprintln!("error: standard input does not change, --watch needs files");
+        return Ending::WrongInput;
+    }
+    let threads = match pool(place) {
+        Ok(threads) => threads,
+        Err(ending) => return ending,
+    };
+    let stop = progress::stop_flag();
+    let mut open = wanted.open;
+    loop {
+        let before = contents(request.files);
+        let ending = once(request, place, (&outputs, wanted.json, open), threads, &stop);
+        if !wanted.watch || stop.load(Ordering::Relaxed) {
+            return ending;
+        }
+        // the browser shows it; a reload shows what follows
+        open &= matches!(ending, Ending::WrongInput);
+        if let Ending::Failed(message) = &ending {
+            eprintln!("error: {message}");
+        }
+        eprintln!("waiting for a change; Ctrl-C ends");
+        while contents(request.files) == before {
+            std::thread::sleep(LOOK);
+            if stop.load(Ordering::Relaxed) {
+                return Ending::Done;
+            }
+        }
+    }
+}
+
+/// How often files are looked at.
+const LOOK: Duration = Duration::from_millis(300);
+
+/// What stands in the files; editors write them in ways that no date tells.
+fn contents(files: &[PathBuf]) -> Vec<Option<Vec<u8>>> {
+    files.iter().map(|file| std::fs::read(file).ok()).collect()
+}
+
+/// One run of all files.
+fn once(
+    request: &Request<'_>,
+    place: &Place,
+    (outputs, json, open): (&Outputs, bool, bool),
+    threads: usize,
+    stop: &Arc<AtomicBool>,
+) -> Ending {
     let studies = match request.read() {
         Ok(studies) => studies,
         Err(ending) => return ending,
@@ -96,11 +173,6 @@ pub fn run(request: &Request<'_>, place: &Place, only: &[String], json: bool) ->
     if let Some(error) = studies.iter().find_map(|study| check_writable(&place.out.join(study.name())).err()) {
         return Ending::Failed(error.to_string());
     }
-    let threads = match pool(place) {
-        Ok(threads) => threads,
-        Err(ending) => return ending,
-    };
-    let stop = progress::stop_flag();
     let mut failed = false;
     for study in &studies {
         let bar = progress::bar(study.points() as u64, study.name());
@@ -116,10 +188,14 @@ pub fn run(request: &Request<'_>, place: &Place, only: &[String], json: bool) ->
             }
         };
         failed |= dataset.record.points.keys().any(|status| status != CONVERGED);
-        let folder = match write(&dataset, &place.out, &outputs, json) {
-            Ok(folder) => folder,
+        let files = match write(&dataset, &place.out, outputs, json) {
+            Ok(files) => files,
             Err(ending) => return ending,
         };
+        if open {
+            show_figure(&files);
+        }
+        let folder = files.first().and_then(|file| file.parent()).unwrap_or(&place.out);
         if stop.load(Ordering::Relaxed) {
             let whole = place.out.join(study.name());
             let beside = if folder == whole || !dataset.record.interrupted {
@@ -170,8 +246,17 @@ fn complain(dataset: &Dataset) {
     }
 }
 
-/// Writes the results and says what there is to say; returns their folder.
-fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result<PathBuf, Ending> {
+fn show_figure(files: &[PathBuf]) {
+    match open::figure(files).map(open::show) {
+        Some(Ok(())) => {}
+        // the results are there all the same
+        Some(Err(message)) => eprintln!("{message}"),
+        None => eprintln!("there is no figure to show: it is not among the outputs of --only"),
+    }
+}
+
+/// Writes the results and says what there is to say; returns the files.
+fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result<Vec<PathBuf>, Ending> {
     let files = write_dataset(dataset, out, outputs).map_err(|error| Ending::Failed(error.to_string()))?;
     // the summary on a terminal says it too
     let summary = !json && std::io::stdout().is_terminal();
@@ -186,12 +271,11 @@ fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result
     } else {
         Ending::Done
     };
-    let folder = files.first().and_then(|file| file.parent()).unwrap_or(out);
-    if let Ending::Failed(_) = ending { Err(ending) } else { Ok(folder.to_owned()) }
+    if let Ending::Failed(_) = ending { Err(ending) } else { Ok(files) }
 }
 
 /// `stickslip paper`.
-pub fn paper(place: &Place) -> Ending {
+pub fn paper(place: &Place, open: bool) -> Ending {
     if let Err(error) = check_writable(&place.out) {
         return Ending::Failed(error.to_string());
     }
@@ -210,6 +294,9 @@ pub fn paper(place: &Place) -> Ending {
         Ok(outcome) => {
             if let ending @ Ending::Failed(_) = print(&outcome.summary) {
                 return ending;
+            }
+            if open && let Err(message) = open::show(&outcome.report) {
+                eprintln!("{message}");
             }
             if context.stopped() {
                 Ending::Failed("interrupted; the finished figures are written".to_owned())

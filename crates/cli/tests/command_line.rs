@@ -256,12 +256,19 @@ fn interrupted(folder: &Path, signal: &str) -> Output {
     child.wait_with_output().unwrap()
 }
 
-/// Ctrl-C during a long sweep leaves the finished points readable.
+/// Ctrl-C during a long sweep leaves the finished points readable, and so does what a scheduler sends.
 #[cfg(unix)]
 #[test]
 fn an_interrupt_keeps_the_finished_points() {
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        an_interrupt_keeps(signal);
+    }
+}
+
+#[cfg(unix)]
+fn an_interrupt_keeps(signal: &str) {
     let (folder, _) = folder("blade-couple", &[("points = 241", "points = 200000")]);
-    let output = interrupted(folder.path(), "-INT");
+    let output = interrupted(folder.path(), signal);
     assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
     let curve = fs::read_to_string(folder.path().join("stickslip-out/study/curve.csv")).unwrap();
     let rows = curve.lines().count() - 1;
@@ -314,6 +321,88 @@ fn an_unwritable_folder_is_found_first() {
         // the study takes minutes
         assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
     }
+}
+
+#[test]
+fn a_study_comes_from_standard_input() {
+    let folder = TempDir::new().unwrap();
+    let text = stickslip::model::templates::find("element").unwrap().study;
+    let run = |text: &str, arguments: &[&str]| {
+        let mut command = Command::cargo_bin("stickslip").unwrap();
+        command.current_dir(folder.path()).args(arguments).write_stdin(text).output().unwrap()
+    };
+    let output = run(text, &["run", "-", "--only", "csv"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert!(folder.path().join("stickslip-out/stdin/loops.csv").is_file());
+    assert_eq!(code(&run(text, &["check", "-"])), 0);
+    let output = run(&text.replace("schema = 1", "schema = 2"), &["run", "-"]);
+    assert!(code(&output) == 2 && stderr(&output).contains("stdin:1:"), "{}", stderr(&output));
+    assert_eq!(code(&run("", &["run", "-"])), 2);
+    assert_eq!(code(&run(text, &["run", "-", "--watch"])), 2);
+}
+
+/// Waits until it is so, with an end.
+#[cfg(unix)]
+fn until(what: &str, so: &dyn Fn() -> bool) {
+    let start = std::time::Instant::now();
+    while !so() {
+        assert!(start.elapsed().as_secs() < 60, "waited in vain: {what}");
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+}
+
+/// A file that changes is run again; one that is wrong for a while says so and ends nothing.
+#[cfg(unix)]
+#[test]
+fn a_watched_file_runs_again() {
+    let (folder, path) = folder("element", &[]);
+    let log = folder.path().join("log");
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("stickslip"))
+        .current_dir(folder.path())
+        .args(["run", "study.toml", "--watch", "--only", "csv,json"])
+        .stderr(fs::File::create(&log).unwrap())
+        .spawn()
+        .unwrap();
+    let read = |file: &Path| fs::read_to_string(file).unwrap_or_default();
+    let record = folder.path().join("stickslip-out/study/record.json");
+    let text = read(&path);
+    let title = |title: &str| text.replacen("title = \"", &format!("title = \"{title} "), 1);
+    until("the first run", &|| read(&record).contains("\"title\""));
+    fs::write(&path, title("Second")).unwrap();
+    until("the second run", &|| read(&record).contains("\"title\": \"Second "));
+    fs::write(&path, "schema = 2").unwrap();
+    until("the error", &|| read(&log).contains("reads schema 1"));
+    fs::write(&path, title("Third")).unwrap();
+    until("the third run", &|| read(&record).contains("\"title\": \"Third "));
+    until("the end of the third run", &|| read(&log).matches("waiting for a change").count() == 4);
+    assert!(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(0), "{}", read(&log));
+}
+
+/// `--open` hands the figure to the desktop; without a desktop the results are there all the same.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_figure_is_shown() {
+    use std::os::unix::fs::PermissionsExt;
+    let (folder, _) = folder("element", &[]);
+    let desktop = folder.path().join("bin");
+    fs::create_dir(&desktop).unwrap();
+    let run = |only: &str| {
+        let mut command = Command::cargo_bin("stickslip").unwrap();
+        command.current_dir(folder.path()).env("PATH", &desktop);
+        command.args(["run", "study.toml", "--open", "--only", only]).output().unwrap()
+    };
+    let output = run("svg");
+    assert!(code(&output) == 0 && stderr(&output).contains("cannot be shown"), "{}", stderr(&output));
+    let shown = folder.path().join("shown");
+    let script = desktop.join("xdg-open");
+    fs::write(&script, format!("#!/bin/sh\necho \"$1\" > {}\n", shown.display())).unwrap();
+    fs::set_permissions(&script, fs::Permissions::from_mode(0o755)).unwrap();
+    let output = run("svg,html");
+    assert!(code(&output) == 0 && output.stderr.is_empty(), "{}", stderr(&output));
+    let path = fs::read_to_string(&shown).unwrap();
+    assert!(path.starts_with('/') && path.trim_end().ends_with("stickslip-out/study/figure.html"), "{path}");
+    assert!(stderr(&run("csv")).contains("no figure to show"));
 }
 
 #[test]

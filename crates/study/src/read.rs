@@ -390,7 +390,7 @@ impl Reader {
                 Problem::new(place, key, message)
             }
             Err(fault) if self.repetition.indices.is_empty() => {
-                let help = "braces need an index in the same entry: repeat = { i = 12 }";
+                let help = "braces are for entries of lists that have an index: repeat = { i = 12 }";
                 Problem::fault(place, inner, key, fault).help(help)
             }
             Err(fault) => Problem::fault(place, inner, key, fault),

@@ -199,6 +199,15 @@ fn templates_and_lists_exclude_each_other() {
     assert!(error.message().contains("mass 1"), "{error}");
 }
 
+/// What a method refuses in one case only names that case.
+#[test]
+fn a_refusal_of_one_case_names_it() {
+    let text = EXAMPLE.replace("vary = {", "vary = { m1 = [\"2 g\", \"0 g\"],");
+    let error = stickslip_study::run::check(&read_study("bad.toml", &text, &[]).unwrap()).unwrap_err();
+    assert!(error.message().ends_with("(m1 = 0 g, Ft = 2 N, case 5 of 8)"), "{error}");
+    assert_eq!(error.line(), Some(18), "{error}");
+}
+
 /// An error that every case has is no matter of the first.
 #[test]
 fn an_error_of_all_cases_names_none() {

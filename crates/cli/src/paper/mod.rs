@@ -13,7 +13,7 @@ mod verdict;
 use optimum::Optimum;
 use std::error::Error;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use stickslip_report::{Claim, Outputs, Page, Section, Verdict, write_dataset};
 use stickslip_study::run::{Context, run};
 use studies::{FILES, Results, read};
@@ -25,6 +25,8 @@ pub struct Outcome {
     pub summary: String,
     /// Points without a result.
     pub failed: u64,
+    /// The page of figures and claims.
+    pub report: PathBuf,
 }
 
 /// What can go wrong: a file cannot be written.
@@ -104,7 +106,7 @@ fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -
     let report = if cut_short { out.join("report.interrupted.html") } else { whole };
     let summary = summary(&report, &parts, &results);
     page(parts).write(&report)?;
-    Ok(Outcome { summary, failed: results.failed() })
+    Ok(Outcome { summary, failed: results.failed(), report })
 }
 
 /// Cases beyond the figures that the claims ask for; absent if the run was interrupted.
@@ -274,6 +276,20 @@ mod tests {
         let (out, outcome) = reduced(true);
         assert!(outcome.summary.contains("0 claims"), "{}", outcome.summary);
         assert!(out.path().join("report.html").is_file());
+    }
+
+    /// What an interrupted job has goes beside a report that is there.
+    #[test]
+    fn an_interrupted_job_does_not_replace_a_report() {
+        let out = tempfile::tempdir().unwrap();
+        let whole = out.path().join("report.html");
+        std::fs::write(&whole, "whole").unwrap();
+        let context = Context { stop: Arc::new(AtomicBool::new(true)), ..Context::unwatched(1) };
+        let extent = Extent { points: Some(25), outputs: Outputs::only(&["json"]).unwrap() };
+        let outcome = produce(out.path(), &context, &|_| (), &extent).unwrap();
+        assert_eq!(std::fs::read_to_string(&whole).unwrap(), "whole");
+        assert!(outcome.report.ends_with("report.interrupted.html") && outcome.report.is_file());
+        assert!(outcome.summary.contains("report.interrupted.html"), "{}", outcome.summary);
     }
 
     #[test]
