@@ -3,9 +3,11 @@
 //! A [`Model`] is plain data in SI units. [`Model::assemble`] checks it and turns it into a [`System`] of matrices.
 
 mod assemble;
+mod survey;
 pub mod templates;
 
 pub use assemble::{Element, Load, ModelError, MovedPlace, System, SystemJoint, is_identifier};
+pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey};
 
 use crate::law::Law;
 use serde::{Deserialize, Serialize};
