@@ -40,11 +40,11 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let ending = match cli.command {
         Command::Paper { place } => run::paper(&place),
-        Command::Run { files, place, set, method, only, json } => {
-            run::run(&run::Request { files: &files, set: &set, method: method.as_deref() }, &place, &only, json)
+        Command::Run { files, place, set, method, memory, only, json } => {
+            run::run(&run::Request { files: &files, set: &set, method: method.as_deref(), memory }, &place, &only, json)
         }
-        Command::Check { files, set, method } => {
-            run::check(&run::Request { files: &files, set: &set, method: method.as_deref() })
+        Command::Check { files, set, method, memory } => {
+            run::check(&run::Request { files: &files, set: &set, method: method.as_deref(), memory })
         }
         Command::New { template, file } => new(&template, file.as_deref()),
         Command::List { what } => print(&list::text(what)),

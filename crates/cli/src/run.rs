@@ -10,6 +10,7 @@ use stickslip::orbit::Accuracy;
 use stickslip_report::{Outputs, terminal::Terminal, write_dataset};
 use stickslip_study::dataset::Dataset;
 use stickslip_study::run::{CONVERGED, Context, check as check_study, run as run_study};
+use stickslip_study::summary::ModelSummary;
 use stickslip_study::{Study, StudyError, read_file};
 
 /// The studies that a command line names.
@@ -20,6 +21,8 @@ pub struct Request<'a> {
     pub set: &'a [(String, String)],
     /// `--method`.
     pub method: Option<&'a str>,
+    /// `--memory`, bytes.
+    pub memory: Option<u64>,
 }
 
 impl Request<'_> {
@@ -32,6 +35,10 @@ impl Request<'_> {
                 .and_then(|study| match self.method {
                     Some(method) => study.with_method(method),
                     None => Ok(study),
+                })
+                .map(|study| match self.memory {
+                    Some(bytes) => study.with_memory_limit(bytes),
+                    None => study,
                 })
                 .and_then(|study| check_study(&study).map(|()| study));
             match study {
@@ -60,17 +67,32 @@ pub fn check(request: &Request<'_>) -> Ending {
             let mut text = String::new();
             for (study, file) in studies.iter().zip(request.files) {
                 let (cases, points) = (study.cases(), study.points());
+                let plural = |count: usize| if count == 1 { "" } else { "s" };
+                let summary = summary(study);
+                let verdict = match summary.as_ref().map_or(0, |summary| summary.warnings.len()) {
+                    0 => "nothing wrong".to_owned(),
+                    warnings => format!("{warnings} warning{}", plural(warnings)),
+                };
                 text += &format!(
-                    "{}: {} study, {cases} case{}, {points} point{}, nothing wrong\n",
+                    "{}: {} study, {cases} case{}, {points} point{}, {verdict}\n",
                     file.display(),
                     study.kind().name,
-                    if cases == 1 { "" } else { "s" },
-                    if points == 1 { "" } else { "s" }
+                    plural(cases),
+                    plural(points)
                 );
+                text += &summary.map(|summary| summary.to_string()).unwrap_or_default();
             }
             print(&text)
         }
     }
+}
+
+/// What is known of a study before it is run, with its warnings on standard error.
+fn summary(study: &Study) -> Option<ModelSummary> {
+    // the study was checked, and its summary with it
+    let summary = ModelSummary::new(study).ok()?;
+    summary.warnings.iter().for_each(|warning| eprintln!("{warning}"));
+    Some(summary)
 }
 
 /// `stickslip run`.
@@ -98,6 +120,10 @@ pub fn run(request: &Request<'_>, place: &Place, only: &[String], json: bool) ->
     let stop = progress::stop_flag();
     let mut failed = false;
     for study in &studies {
+        let summary = summary(study);
+        if let Some(summary) = summary.as_ref().filter(|_| std::io::stderr().is_terminal()) {
+            eprint!("{}\n{summary}", study.title());
+        }
         let bar = progress::bar(study.points() as u64, study.name());
         let finished = || bar.inc(1);
         let result = run_study(study, &Context { threads, stop, finished: &finished });
@@ -109,6 +135,10 @@ pub fn run(request: &Request<'_>, place: &Place, only: &[String], json: bool) ->
                 return Ending::WrongInput;
             }
         };
+        // those of the summary stand there already
+        let known = |note: &&String| summary.as_ref().is_some_and(|summary| summary.warnings.contains(note));
+        let late = dataset.notes.iter().filter(|note| note.starts_with("warning") && !known(note));
+        late.for_each(|warning| eprintln!("{warning}"));
         failed |= dataset.record.points.keys().any(|status| status != CONVERGED);
         if let Err(ending) = write(&dataset, &place.out, &outputs, json) {
             return ending;

@@ -45,7 +45,8 @@ impl Terminal {
             clean(&dataset.name),
             if points.is_empty() { "no points" } else { &points }
         );
-        for note in &dataset.notes {
+        // warnings have been said on standard error
+        for note in dataset.notes.iter().filter(|note| !note.starts_with("warning")) {
             let _ = writeln!(out, "note: {}", clean(note));
         }
         for failure in dataset.failures.iter().take(FAILURES) {

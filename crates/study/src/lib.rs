@@ -14,6 +14,7 @@ pub mod run;
 pub mod schema;
 mod statement;
 mod study;
+pub mod summary;
 pub mod units;
 mod values;
 

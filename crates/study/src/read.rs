@@ -191,6 +191,7 @@ impl Reader {
             structure: structure?,
             study,
             method: method?,
+            memory: None,
         })
     }
 

@@ -4,6 +4,7 @@
 use crate::dataset::{Column, Dataset, Failure, Figure, Record, Table, Values as Cells};
 use crate::error::StudyError;
 use crate::study::{Case, Study};
+use crate::summary::ModelSummary;
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -79,7 +80,7 @@ pub const NOT_REACHED: &str = "not-reached";
 /// Runs a study.
 ///
 /// # Errors
-/// [`StudyError`]: the method cannot take the model; nothing was computed. Points that do not converge are no error: they are in the
+/// [`StudyError`]: the method cannot take the model, or too much memory would be needed; nothing was computed. Points that do not converge are no error: they are in the
 /// dataset, as failures.
 ///
 /// # Example
@@ -95,12 +96,14 @@ pub const NOT_REACHED: &str = "not-reached";
 /// ```
 pub fn run(study: &Study, context: &Context<'_>) -> Result<Dataset, StudyError> {
     let start = Instant::now();
+    let summary = summarised(study)?;
     let mut cases = Vec::with_capacity(study.cases());
     for index in 0..study.cases() {
         cases.push(prepare(study, study.case(index)?)?);
     }
     let mut outcome = (study.kind().run)(study, &cases, context)
         .map_err(|(index, error)| refused(study, &cases[index].case, &error))?;
+    outcome.notes.splice(0..0, summary.warnings.iter().cloned());
     let interrupted = outcome.points.contains_key(NOT_REACHED);
     if interrupted {
         outcome.notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
@@ -116,7 +119,7 @@ pub fn run(study: &Study, context: &Context<'_>) -> Result<Dataset, StudyError> 
         failures: outcome.failures,
         record: Record {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            study: study.resolved(),
+            study: recorded(study, &summary),
             seed: None,
             threads: context.threads,
             wall_time_s: start.elapsed().as_secs_f64(),
@@ -129,9 +132,26 @@ pub fn run(study: &Study, context: &Context<'_>) -> Result<Dataset, StudyError> 
 /// Prepares every case and computes nothing: whether [`run()`] would begin.
 ///
 /// # Errors
-/// [`StudyError`]: the method cannot take the model of a case.
+/// [`StudyError`]: the method cannot take the model of a case, or the study needs more memory than it may take.
 pub fn check(study: &Study) -> Result<(), StudyError> {
+    summarised(study)?;
     (0..study.cases()).try_for_each(|index| prepare(study, study.case(index)?).map(drop))
+}
+
+/// What is known of the study before it is run; a study that needs too much memory is refused.
+fn summarised(study: &Study) -> Result<ModelSummary, StudyError> {
+    let summary = ModelSummary::new(study)?;
+    match summary.size.refusal(study) {
+        Some(error) => Err(error),
+        None => Ok(summary),
+    }
+}
+
+/// The study as it was understood, and its summary.
+fn recorded(study: &Study, summary: &ModelSummary) -> serde_json::Value {
+    let mut record = study.resolved();
+    record["summary"] = summary.to_json();
+    record
 }
 
 fn prepare(study: &Study, case: Case) -> Result<Prepared, StudyError> {

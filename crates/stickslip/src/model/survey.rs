@@ -154,6 +154,9 @@ const STIFFEST: f64 = 1e-4;
 const LEVELS: usize = 4;
 /// A pivot below this share of what it came from is zero.
 const ZERO: f64 = 1e-12;
+/// Degrees of freedom beyond which modes are not computed: they would take longer than a second. Measured: 0.35 s at 500, with the third
+/// power.
+const LARGEST: usize = 700;
 /// Iterations of the eigenvalue search per degree of freedom; a few are needed.
 const ITERATIONS: usize = 100;
 
@@ -188,6 +191,11 @@ impl Model {
             .collect();
         let joints: Vec<Stuck> = system.joints.iter().map(Stuck::new).collect();
         let mass: Vec<f64> = system.mass.diagonal().iter().copied().collect();
+        let loose = self.loose(&joints);
+        if system.dofs() > LARGEST {
+            let unknown = || Linear { modes: Modes { lost: mass.len(), ..Modes::default() }, shapes: None };
+            return Ok(Survey { free: unknown(), stuck: unknown(), system, joints, loose });
+        }
         let free = Linear::new(&mass, &springs.iter().collect::<Vec<_>>(), &[]);
         let held: Vec<Link> = joints
             .iter()
@@ -203,7 +211,6 @@ impl Model {
             .map(|joint| joint.at.as_slice())
             .collect();
         let stuck = Linear::new(&mass, &springs.iter().chain(&held).collect::<Vec<_>>(), &rigid);
-        let loose = self.loose(&joints);
         Ok(Survey { system, joints, free, stuck, loose })
     }
 
@@ -391,16 +398,18 @@ fn reduced(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Reduced 
     let heavy = r - light;
     let part = |matrix: &DMatrix<f64>| matrix.view((light, light), (heavy, heavy)).into_owned();
     let (m, c, k) = (part(&m), part(&c), part(&k));
-    let empty = || Reduced { frequencies: Vec::new(), damping: Vec::new(), vectors: DMatrix::zeros(n, 0) };
+    // without an answer every mode is lost
+    let unknown =
+        || Reduced { frequencies: vec![0.0; heavy], damping: vec![0.0; heavy], vectors: DMatrix::zeros(n, heavy) };
     if heavy == 0 {
-        return empty();
+        return unknown();
     }
     // L with M = L Lᵀ; its inverse turns the modes into a standard problem
-    let Some(inverse) = inverse_root(&m) else { return empty() };
+    let Some(inverse) = inverse_root(&m) else { return unknown() };
     let standard = &inverse * k * inverse.transpose();
     let standard = (&standard + standard.transpose()) * 0.5;
     let Some(eigen) = SymmetricEigen::try_new(standard, f64::EPSILON, ITERATIONS * heavy) else {
-        return empty();
+        return unknown();
     };
     let mut rising: Vec<usize> = (0..heavy).collect();
     rising.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
@@ -571,6 +580,11 @@ impl Survey {
         &self.system
     }
 
+    /// Whether the model has too many degrees of freedom for its modes, which then count as lost.
+    pub fn is_too_large(&self) -> bool {
+        self.dofs() > LARGEST
+    }
+
     /// Modes with all joints free.
     pub fn free(&self) -> &Modes {
         &self.free.modes
@@ -609,6 +623,9 @@ impl Survey {
             return Some(Vec::new());
         }
         let shares: Vec<Vec<f64>> = omegas.iter().map(|omega| self.shares(*omega)).collect::<Option<_>>()?;
+        if shares.iter().flatten().any(|share| share.is_nan()) {
+            return None;
+        }
         (0..self.joints.len()).map(|joint| self.onset_of(joint, &omegas, &shares)).collect()
     }
 
@@ -686,8 +703,8 @@ impl Survey {
         Some(omegas)
     }
 
-    /// Harmonics of the excitation, each once, without the constant part.
-    fn harmonics(&self) -> Vec<u32> {
+    /// Harmonics of the excitation that are not zero, each once, rising, without the constant part.
+    pub fn harmonics(&self) -> Vec<u32> {
         let mut harmonics = self.system.harmonics_of_excitation(|z| z != Complex64::ZERO);
         harmonics.retain(|h| *h > 0);
         harmonics.sort_unstable();

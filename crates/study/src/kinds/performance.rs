@@ -6,6 +6,7 @@ use crate::dataset::{Axis, Panel, Series, Style};
 use crate::run::{CONVERGED, Context, NOT_REACHED, Outcome, Prepared, Rows, display_unit};
 use crate::schema::{Takes, optional};
 use crate::study::{Study, VariedValue, varied_text};
+use crate::summary::WARNING;
 use crate::values::Values;
 use std::f64::consts::TAU;
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
@@ -103,9 +104,10 @@ fn run(study: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
         optima.end();
         if best.is_none() {
             let at = if varied.is_empty() { String::new() } else { format!(" at {}", varied_text(varied)) };
-            outcome
-                .notes
-                .push(format!("The lowest peak stands at an end of the values of {}{at}: widen them.", inner.name));
+            outcome.notes.push(format!(
+                "{WARNING}the lowest peak stands at an end of the values of {}{at}: widen them",
+                inner.name
+            ));
         }
     }
     outcome.tables = vec![rows.table("performance"), optima.table("optimum")];
