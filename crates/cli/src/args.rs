@@ -40,6 +40,9 @@ pub enum Command {
         /// Use this method instead of the file's
         #[arg(long)]
         method: Option<String>,
+        /// Memory that a run may take, for example 4GB; a study that needs more is refused [default: 2GB, or what is free]
+        #[arg(long, value_name = "SIZE", value_parser = bytes)]
+        memory: Option<u64>,
         /// Write only these outputs: csv, json, svg, png, html (comma between them)
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
@@ -64,6 +67,9 @@ pub enum Command {
         /// Use this method instead of the file's
         #[arg(long)]
         method: Option<String>,
+        /// Memory that a run may take, for example 4GB; a study that needs more is refused [default: 2GB, or what is free]
+        #[arg(long, value_name = "SIZE", value_parser = bytes)]
+        memory: Option<u64>,
     },
     /// Start a study file from a template
     New {
@@ -119,5 +125,35 @@ fn assignment(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.trim().is_empty() => Ok((name.trim().to_owned(), value.trim().to_owned())),
         _ => Err(format!("expected NAME=VALUE, for example Ft=3N, found `{text}`")),
+    }
+}
+
+/// A number of bytes: `4GB`, `500 MB`.
+fn bytes(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let end = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
+    let (number, unit) = text.split_at(end);
+    let power = match unit.trim().to_ascii_lowercase().as_str() {
+        "b" | "" => 0,
+        "k" | "kb" => 3,
+        "m" | "mb" => 6,
+        "g" | "gb" => 9,
+        "t" | "tb" => 12,
+        _ => return Err(format!("expected a size such as 4GB or 500MB, found `{text}`")),
+    };
+    match number.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok((value * 10f64.powi(power)) as u64),
+        _ => Err(format!("expected a size such as 4GB or 500MB, found `{text}`")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!([bytes("4GB"), bytes("0.5 mb"), bytes("123")], [Ok(4_000_000_000), Ok(500_000), Ok(123)]);
+        assert!(["", "GB", "-1GB", "4 apples", "0", "1.2.3GB"].iter().all(|text| bytes(text).is_err()));
     }
 }

@@ -41,12 +41,12 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let ending = match cli.command {
         Command::Paper { place, open } => run::paper(&place, open),
-        Command::Run { files, place, set, method, only, json, open, watch } => {
-            let request = run::Request { files: &files, set: &set, method: method.as_deref() };
+        Command::Run { files, place, set, method, memory, only, json, open, watch } => {
+            let request = run::Request { files: &files, set: &set, method: method.as_deref(), memory };
             run::run(&request, &place, &run::Wanted { only: &only, json, open, watch })
         }
-        Command::Check { files, set, method } => {
-            run::check(&run::Request { files: &files, set: &set, method: method.as_deref() })
+        Command::Check { files, set, method, memory } => {
+            run::check(&run::Request { files: &files, set: &set, method: method.as_deref(), memory })
         }
         Command::New { template, file } => new(&template, file.as_deref()),
         Command::List { what } => print(&list::text(what)),

@@ -13,6 +13,7 @@ use stickslip_report::{Outputs, check_writable, json::write_dataset_json, termin
 use stickslip_study::dataset::Dataset;
 use stickslip_study::run::{CONVERGED, Context, check as check_study, run as run_study};
 use stickslip_study::schema::MOST_BYTES;
+use stickslip_study::summary::ModelSummary;
 use stickslip_study::{Study, StudyError, read_bytes, read_file};
 
 /// The studies that a command line names.
@@ -23,6 +24,8 @@ pub struct Request<'a> {
     pub set: &'a [(String, String)],
     /// `--method`.
     pub method: Option<&'a str>,
+    /// `--memory`, bytes.
+    pub memory: Option<u64>,
 }
 
 impl Request<'_> {
@@ -35,6 +38,10 @@ impl Request<'_> {
                 .and_then(|study| match self.method {
                     Some(method) => study.with_method(method),
                     None => Ok(study),
+                })
+                .map(|study| match self.memory {
+                    Some(bytes) => study.with_memory_limit(bytes),
+                    None => study,
                 })
                 .and_then(|study| check_study(&study).map(|()| study));
             match study {
@@ -79,14 +86,21 @@ pub fn check(request: &Request<'_>) -> Ending {
             let mut text = String::new();
             for (study, file) in studies.iter().zip(request.files) {
                 let (cases, points) = (study.cases(), study.points());
+                let plural = |count: usize| if count == 1 { "" } else { "s" };
+                let summary = summary(study);
+                let verdict = match summary.as_ref().map_or(0, |summary| summary.warnings.len()) {
+                    0 => "nothing wrong".to_owned(),
+                    warnings => format!("{warnings} warning{}", plural(warnings)),
+                };
                 text += &format!(
-                    "{}: {} study, {cases} case{}, {points} point{}, nothing wrong\n",
+                    "{}: {} study, {cases} case{}, {points} point{}, {verdict}\n",
                     file.display(),
                     study.kind().name,
-                    if cases == 1 { "" } else { "s" },
-                    if points == 1 { "" } else { "s" }
+                    plural(cases),
+                    plural(points)
                 );
                 text.extend(study.notes().iter().map(|note| format!("  note: {note}\n")));
+                text += &summary.map(|summary| summary.to_string()).unwrap_or_default();
             }
             print(&text)
         }
@@ -103,6 +117,14 @@ pub struct Wanted<'a> {
     pub open: bool,
     /// `--watch`.
     pub watch: bool,
+}
+
+/// What is known of a study before it is run, with its warnings on standard error.
+fn summary(study: &Study) -> Option<ModelSummary> {
+    // the study was checked, and its summary with it
+    let summary = ModelSummary::new(study).ok()?;
+    summary.warnings.iter().for_each(|warning| eprintln!("{warning}"));
+    Some(summary)
 }
 
 /// `stickslip run`.
@@ -175,6 +197,10 @@ fn once(
     }
     let mut failed = false;
     for study in &studies {
+        let summary = summary(study);
+        if let Some(summary) = summary.as_ref().filter(|_| std::io::stderr().is_terminal()) {
+            eprint!("{}\n{summary}", study.title());
+        }
         let bar = progress::bar(study.points() as u64, study.name());
         let counter = bar.clone();
         let context = Context { threads, stop: stop.clone(), finished: Arc::new(move || counter.inc(1)) };
@@ -187,6 +213,10 @@ fn once(
                 return Ending::WrongInput;
             }
         };
+        // those of the summary stand there already
+        let known = |note: &&String| summary.as_ref().is_some_and(|summary| summary.warnings.contains(note));
+        let late = dataset.notes.iter().filter(|note| note.starts_with("warning") && !known(note));
+        late.for_each(|warning| eprintln!("{warning}"));
         failed |= dataset.record.points.keys().any(|status| status != CONVERGED);
         let files = match write(&dataset, &place.out, outputs, json) {
             Ok(files) => files,

@@ -429,3 +429,73 @@ fn lists_templates_schema_and_completions() {
     let output = stickslip(folder.path(), &["new", "blade-cuple"]);
     assert!(code(&output) == 2 && stderr(&output).contains("blade-couple"));
 }
+
+#[test]
+fn check_says_what_is_known_before_a_run() {
+    let (folder, _) = folder("blade-couple", &[]);
+    let output = stickslip(folder.path(), &["check", "study.toml"]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert_eq!((code(&output), stderr(&output).as_str()), (0, ""));
+    // free 121.25 Hz, stuck 120.94 Hz, strongest stuck force 19.72 N at 120.9589 Hz against a limit of 2 N
+    for word in [
+        "nothing wrong",
+        "3 degrees of freedom",
+        "121.25",
+        "120.94",
+        "0.101 of the excitation is enough at 120.9589 Hz",
+        "below a second",
+    ] {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+}
+
+#[test]
+fn warnings_stand_on_standard_error_and_in_the_record() {
+    let edits = [("points = 241", "points = 5"), ("F0 = \"10 N\"", "F0 = \"10 N\"\nspare = \"1 N\"")];
+    let (folder, _) = folder("blade-couple", &edits);
+    let output = stickslip(folder.path(), &["check", "study.toml"]);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("1 warning\n"));
+    assert!(
+        stderr(&output).starts_with("warning: no value of the study uses the parameter `spare`"),
+        "{}",
+        stderr(&output)
+    );
+    let output = stickslip(folder.path(), &["run", "study.toml", "--only", "json"]);
+    assert_eq!((code(&output), output.stdout.len(), stderr(&output).matches("warning").count()), (0, 0, 1));
+    let record = fs::read_to_string(folder.path().join("stickslip-out/study/record.json")).unwrap();
+    let record: serde_json::Value = serde_json::from_str(&record).unwrap();
+    assert!(record["notes"][0].as_str().unwrap().starts_with("warning: no value"), "{record}");
+    assert_eq!(record["study"]["summary"]["degrees_of_freedom"], 3);
+}
+
+#[test]
+fn an_optimum_at_the_edge_is_warned_of_in_a_pipe() {
+    let edits = [("points = 241", "points = 9"), ("\"response\"", "\"performance\""), ("\"6 N\", \"8 N\"", "\"5 N\"")];
+    let (folder, _) = folder("blade-couple", &edits);
+    let output = stickslip(folder.path(), &["run", "study.toml", "--only", "csv"]);
+    assert!(
+        stderr(&output).contains("warning: the lowest peak stands at an end of the values of Ft"),
+        "{}",
+        stderr(&output)
+    );
+}
+
+#[test]
+fn a_run_that_needs_too_much_memory_is_refused_in_advance() {
+    let edits = [
+        ("frequency = \"1 rad/s\"", "frequency = \"1 rad/s\"\nsamples = 100000"),
+        ("[\"1.25 mm\", \"2 mm\", \"2.75 mm\"]", "{ from = \"1.25 mm\", to = \"2 mm\", points = 100 }"),
+    ];
+    let (folder, _) = folder("element", &edits);
+    for command in ["check", "run"] {
+        let output = stickslip(folder.path(), &[command, "study.toml", "--memory", "2GB"]);
+        assert_eq!(code(&output), 2, "{}", stderr(&output));
+        let text = stderr(&output).replace("\n  \u{2502} ", " ");
+        for word in ["GB of memory", "the limit is 2.0 GB", "--memory"] {
+            assert!(text.contains(word), "{command} {word}: {text}");
+        }
+    }
+    assert!(!folder.path().join("stickslip-out").exists());
+    assert_eq!(code(&stickslip(folder.path(), &["check", "study.toml", "--memory", "50 GB"])), 0);
+    assert_eq!(code(&stickslip(folder.path(), &["check", "study.toml", "--memory", "lots"])), 2);
+}

@@ -60,7 +60,8 @@ impl Terminal {
                 methods => format!(" by {}", clean(&methods.join("; "))),
             }
         );
-        for note in &dataset.notes {
+        // warnings have been said on standard error
+        for note in dataset.notes.iter().filter(|note| !note.starts_with("warning")) {
             for line in self.wrapped(&format!("note: {}", clean(note)), "      ") {
                 let _ = writeln!(out, "{line}");
             }

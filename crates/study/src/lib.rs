@@ -20,6 +20,7 @@ pub mod run;
 pub mod schema;
 mod statement;
 mod study;
+pub mod summary;
 pub mod units;
 mod values;
 pub mod work;

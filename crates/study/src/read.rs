@@ -208,6 +208,7 @@ impl Reader {
             study,
             method: method?,
             figure,
+            memory: None,
         })
     }
 

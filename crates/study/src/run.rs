@@ -6,6 +6,7 @@ use crate::drawing::Drawing;
 use crate::error::StudyError;
 use crate::note::Note;
 use crate::study::Study;
+use crate::summary::ModelSummary;
 use crate::work::{Part, Units, Work, refused};
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -18,7 +19,7 @@ pub use crate::work::{CONVERGED, Context, NOT_REACHED, Prepared};
 /// Runs a study.
 ///
 /// # Errors
-/// [`StudyError`]: the method cannot take the model; nothing was computed. Points that do not converge are no error: they are in the
+/// [`StudyError`]: the method cannot take the model, or too much memory would be needed; nothing was computed. Points that do not converge are no error: they are in the
 /// dataset, as failures.
 ///
 /// # Example
@@ -32,11 +33,13 @@ pub use crate::work::{CONVERGED, Context, NOT_REACHED, Prepared};
 /// ```
 pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
     let start = Instant::now();
+    let summary = summarised(study)?;
     let methods = methods(study)?;
     let part = parts(study, context)?;
     let kind = study.kind();
     let interrupted = part.points.contains_key(NOT_REACHED);
-    let mut notes = study.notes();
+    let mut notes = summary.warnings.clone();
+    notes.extend(study.notes());
     notes.extend(part.notes.iter().filter_map(Note::text));
     if interrupted {
         notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
@@ -56,7 +59,7 @@ pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
         failures: part.failures,
         record: Record {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            study: study.resolved(),
+            study: recorded(study, &summary),
             methods,
             seed: None,
             threads: context.threads,
@@ -70,9 +73,26 @@ pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
 /// Prepares every case and computes nothing: whether [`run()`] would begin.
 ///
 /// # Errors
-/// [`StudyError`]: the method cannot take the model of a case.
+/// [`StudyError`]: the method cannot take the model of a case, or the study needs more memory than it may take.
 pub fn check(study: &Study) -> Result<(), StudyError> {
+    summarised(study)?;
     methods(study).map(drop)
+}
+
+/// What is known of the study before it is run; a study that needs too much memory is refused.
+fn summarised(study: &Study) -> Result<ModelSummary, StudyError> {
+    let summary = ModelSummary::new(study)?;
+    match summary.size.refusal(study) {
+        Some(error) => Err(error),
+        None => Ok(summary),
+    }
+}
+
+/// The study as it was understood, and its summary.
+fn recorded(study: &Study, summary: &ModelSummary) -> serde_json::Value {
+    let mut record = study.resolved();
+    record["summary"] = summary.to_json();
+    record
 }
 
 /// What finds the orbits of the cases, in words, each once.

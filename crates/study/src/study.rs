@@ -34,6 +34,8 @@ pub struct Study {
     pub(crate) study: StatedTable,
     pub(crate) method: StatedTable,
     pub(crate) figure: StatedTable,
+    /// Memory that a run may take, bytes, if it was said.
+    pub(crate) memory: Option<u64>,
 }
 
 /// A parameter: its value as stated, the dimension that it must have (if that is known).
@@ -260,6 +262,23 @@ impl Study {
     /// Number of cases: the product of the numbers of values in `vary`; 1 if nothing is varied.
     pub fn cases(&self) -> usize {
         self.varied.iter().map(|varied| varied.points.len()).product()
+    }
+
+    /// Number of values of each varied parameter, in the order of the file.
+    pub(crate) fn varied_points(&self) -> Vec<usize> {
+        self.varied.iter().map(|varied| varied.points.len()).collect()
+    }
+
+    /// The same study, which may take so many bytes of memory.
+    pub fn with_memory_limit(mut self, bytes: u64) -> Study {
+        self.memory = Some(bytes);
+        self
+    }
+
+    /// Memory that a run may take, bytes: what was said, or [`MEMORY_LIMIT`](crate::summary::MEMORY_LIMIT), or what the machine has
+    /// free if that is less.
+    pub fn memory_limit(&self) -> u64 {
+        self.memory.unwrap_or_else(crate::summary::default_limit)
     }
 
     /// Number of points: cases times frequencies.

@@ -4,9 +4,11 @@
 
 mod assemble;
 mod contraction;
+mod survey;
 pub mod templates;
 
 pub use assemble::{Element, Load, ModelError, MovedPlace, System, SystemJoint, is_identifier};
+pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey};
 
 use crate::law::Law;
 use serde::{Deserialize, Serialize};

@@ -7,6 +7,7 @@ use crate::drawing::{Drawing, largest, numbers};
 use crate::note::Note;
 use crate::rows::Rows;
 use crate::study::{VariedValue, varied_text};
+use crate::summary::WARNING;
 use crate::values::{Values, hertz};
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
@@ -82,7 +83,7 @@ fn compute(work: &Work<'_>) -> Computed {
         if best.is_none() {
             let at = if outer.is_empty() { String::new() } else { format!(" at {}", varied_text(outer)) };
             part.notes.push(Note::Said(format!(
-                "The lowest peak stands at an end of the values of {}{at}: widen them.",
+                "{WARNING}the lowest peak stands at an end of the values of {}{at}: widen them",
                 inner.name
             )));
         }

@@ -1,0 +1,179 @@
+//! The summary in words, for a terminal.
+
+use super::{JointSummary, ModelSummary, bytes_text};
+use crate::drawing::display_unit;
+use std::f64::consts::TAU;
+use std::fmt;
+use stickslip::model::{LinearMode, Modes};
+
+/// Modes and joints that are listed.
+const LISTED: usize = 10;
+/// Stretches of slip that are listed for a joint.
+const STRETCHES: usize = 3;
+/// Width of the first column.
+const WIDTH: usize = 14;
+
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
+/// A number with so many significant digits, without zeros at its end.
+pub(super) fn significant(value: f64, digits: i32) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let decimals = (digits - 1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// A quantity with the prefix that suits its size.
+pub(super) fn quantity(value: f64, si: &str) -> String {
+    if value >= 1e4 {
+        return format!("{:.3e} {si}", value);
+    }
+    let (unit, factor) = display_unit(value.abs(), si);
+    format!("{} {unit}", significant(value * factor, 4))
+}
+
+/// A time for people, rounded as roughly as it is known.
+fn about(seconds: f64) -> String {
+    match seconds {
+        s if s < 1.0 => "below a second".to_owned(),
+        s if s < 100.0 => format!("about {} s", significant(s, 1)),
+        s if s < 2.0 * 3600.0 => format!("about {} minutes", significant(s / 60.0, 1)),
+        s if s < 48.0 * 3600.0 => format!("about {} hours", significant(s / 3600.0, 1)),
+        s => format!("about {} days", significant(s / 86_400.0, 1)),
+    }
+}
+
+impl ModelSummary {
+    fn modes(&self, modes: &Modes) -> String {
+        if self.too_large {
+            return format!("not computed for {} degrees of freedom", self.dofs);
+        }
+        let mut order: Vec<&LinearMode> = modes.elastic.iter().collect();
+        let count = order.len();
+        if let Some((from, to)) = self.range.filter(|_| count > LISTED) {
+            // the nearest to the range, in their order
+            let distance = |omega: f64| if omega < from { from / omega } else { (omega / to).max(1.0) };
+            order.sort_by(|a, b| distance(a.omega).total_cmp(&distance(b.omega)));
+        }
+        order.truncate(LISTED);
+        order.sort_by(|a, b| a.omega.total_cmp(&b.omega));
+        let list = |read: &dyn Fn(&LinearMode) -> String| order.iter().map(|m| read(m)).collect::<Vec<_>>().join(", ");
+        let mut parts = Vec::new();
+        if count > LISTED {
+            let which = if self.range.is_some() { "nearest the range" } else { "lowest" };
+            parts.push(format!("{count} modes, the {LISTED} {which}:"));
+        }
+        if count == 0 {
+            parts.push("no mode".to_owned());
+        } else {
+            let damping: Vec<String> = order.iter().map(|m| significant(100.0 * m.damping, 2)).collect();
+            let damping = match damping.iter().all(|d| *d == damping[0]) {
+                true => damping[0].clone(),
+                false => damping.join(", "),
+            };
+            parts.push(format!("{} Hz, damping {damping} %", list(&|m| significant(m.omega / TAU, 5))));
+        }
+        let mut text = parts.join(" ");
+        if modes.rigid > 0 {
+            text += &format!("; {} motion{} without stiffness", modes.rigid, plural(modes.rigid));
+        }
+        if modes.lost > 0 {
+            text += &format!("; {} lost in rounding beside much higher stiffnesses", modes.lost);
+        }
+        text
+    }
+
+    fn joint(&self, joint: &JointSummary) -> String {
+        if joint.limit == 0.0 {
+            return "limit 0: free".to_owned();
+        }
+        let mut text = match joint.displacement {
+            Some(displacement) => {
+                format!(
+                    "slips at {}, {} of relative displacement",
+                    quantity(joint.limit, "N"),
+                    quantity(displacement, "m")
+                )
+            }
+            None => format!("slips at {}, rigid until then", quantity(joint.limit, "N")),
+        };
+        let Some(onset) = &joint.onset else { return text };
+        let several = self.range.is_some_and(|(from, to)| from < to);
+        let hertz = |omega: f64| significant(omega / TAU, 7);
+        let at = if several { format!(" at {} Hz", hertz(onset.at)) } else { String::new() };
+        if !onset.largest.is_finite() {
+            return text + "; the motion forces it to slip";
+        }
+        let factor = significant(1.0 / onset.largest, 3);
+        if onset.largest == 0.0 {
+            text += "; the excitation does not reach it";
+        } else if onset.slips.is_empty() {
+            text += &format!("; sticks; {factor} times the excitation would make it slip{at}");
+        } else if several {
+            let mut stretches: Vec<String> =
+                onset.slips.iter().take(STRETCHES).map(|(a, b)| format!("{} to {} Hz", hertz(*a), hertz(*b))).collect();
+            if let Some(more @ 1..) = onset.slips.len().checked_sub(STRETCHES) {
+                stretches.push(format!("{more} more"));
+            }
+            text += &format!("; made to slip in {}; {factor} of the excitation is enough{at}", stretches.join(", "));
+        } else {
+            text += &format!("; made to slip, {factor} of the excitation is enough");
+        }
+        text
+    }
+}
+
+impl fmt::Display for ModelSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let joints = self.joints.len();
+        let dofs =
+            if self.dofs == 1 { "1 degree of freedom".to_owned() } else { format!("{} degrees of freedom", self.dofs) };
+        let shown = if self.case.is_empty() { String::new() } else { format!(", shown for {}", self.case) };
+        let mut line = |name: &str, text: &str| writeln!(f, "  {name:<WIDTH$} {text}");
+        line("model", &format!("{dofs}, {joints} joint{}{shown}", plural(joints)))?;
+        if self.dofs > 0 {
+            line(if joints > 0 { "joints free" } else { "modes" }, &self.modes(&self.free))?;
+            if joints > 0 {
+                line("joints stuck", &self.modes(&self.stuck))?;
+            }
+        }
+        // those that the excitation loads most come first where there are many
+        let mut order: Vec<&JointSummary> = self.joints.iter().collect();
+        if joints > LISTED {
+            let load = |joint: &JointSummary| joint.onset.as_ref().map_or(0.0, |onset| onset.largest);
+            order.sort_by(|a, b| load(b).total_cmp(&load(a)));
+        }
+        for joint in order.iter().take(LISTED) {
+            line(&joint.name, &self.joint(joint))?;
+        }
+        if let Some(more @ 1..) = joints.checked_sub(LISTED) {
+            line("", &format!("and {more} more joint{}", plural(more)))?;
+        }
+        let Self { size, cases, .. } = self;
+        let rows = format!("{} row{}", size.rows, if size.rows == 1 { "" } else { "s" });
+        let cases = format!("{cases} case{}", plural(*cases));
+        let results =
+            format!("{cases}, {rows}, {} of numbers, {} of memory", bytes_text(size.results), bytes_text(size.memory));
+        line("results", &format!("{results}; {} on one thread", about(self.seconds)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_as_many_digits_as_they_are_worth() {
+        assert_eq!([significant(121.2503, 5), significant(0.072_31, 2), significant(2.0, 4)], ["121.25", "0.072", "2"]);
+        assert_eq!([significant(12_345.6, 3), significant(1200.0, 3)], ["12346", "1200"]);
+        assert_eq!(
+            [about(0.3), about(34.0), about(600.0), about(1e5), about(1e6)],
+            ["below a second", "about 34 s", "about 10 minutes", "about 28 hours", "about 12 days",]
+        );
+        assert_eq!([quantity(2e-4, "m"), quantity(2.0, "N"), quantity(4e4, "N")], ["200 µm", "2 N", "4.000e4 N"]);
+    }
+}

@@ -1,0 +1,288 @@
+//! What a study says of itself before it is run.
+
+use std::sync::atomic::AtomicBool;
+use stickslip::model::templates;
+use stickslip_study::run::{Context, check, run};
+use stickslip_study::summary::ModelSummary;
+use stickslip_study::{Study, read_study};
+
+fn study(text: &str) -> Study {
+    read_study("study.toml", text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// The starting study of a template, edited.
+fn template(name: &str, edits: &[(&str, &str)]) -> String {
+    edits.iter().fold(templates::find(name).unwrap().study.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "{from} is not in the template");
+        text.replacen(from, to, 1)
+    })
+}
+
+fn summary(text: &str) -> ModelSummary {
+    ModelSummary::new(&study(text)).unwrap()
+}
+
+/// The only warning holds all these words.
+fn warns(text: &str, words: &[&str]) {
+    let warnings = summary(text).warnings;
+    assert_eq!(warnings.len(), 1, "{warnings:?}\n{text}");
+    assert!(warnings[0].starts_with("warning: "), "{warnings:?}");
+    for word in words {
+        assert!(warnings[0].contains(word), "`{word}` is not in {warnings:?}");
+    }
+}
+
+fn silent(text: &str) {
+    assert_eq!(summary(text).warnings, Vec::<String>::new(), "{text}");
+}
+
+#[test]
+fn starting_studies_have_nothing_to_warn_of() {
+    for row in templates::TABLE {
+        silent(row.study);
+    }
+}
+
+#[test]
+fn the_couple_says_its_modes_and_where_it_slips() {
+    let text = summary(templates::find("blade-couple").unwrap().study).to_string();
+    // free 121.25 Hz (theory 6.1), damping 7.23e-4; strongest stuck force 19.7237 N at 120.9589 Hz (6.8): 2 N are 10.1 % of it
+    for word in
+        ["3 degrees of freedom, 1 joint", "shown for Ft = 2 N", "121.25", "0.072", "rigid until then", "120.9589 Hz"]
+    {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    assert!(text.contains("119.5 to 120.2704 Hz, 120.6697 to 122.5 Hz; 0.101 of the excitation is enough"), "{text}");
+    assert!(text.contains("4 cases, 976 rows"), "4 (241 + 3 masses): {text}");
+    // a spring before the slider: 2 N / 10 kN/m
+    let text = summary(templates::find("blade-couple-massless").unwrap().study).to_string();
+    assert!(text.contains("slips at 2 N, 200 µm of relative displacement"), "{text}");
+    // without degrees of freedom there are no modes
+    assert!(!summary(templates::find("element").unwrap().study).to_string().contains("Hz"));
+}
+
+#[test]
+fn a_model_that_nothing_drives() {
+    warns(&template("blade-couple", &[("F0 = \"10 N\"", "F0 = \"0 N\"")]), &["no force and no motion"]);
+    warns(
+        &template("blade-couple", &[("amplitude = \"F0\"", "amplitude = \"F0\"\nharmonic = 0")]),
+        &["constant in time", "nothing vibrates"],
+    );
+    let drive = "kind = \"response\"\nfrequency = { from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }";
+    let decay = |start: &str| {
+        let kind = format!("kind = \"transient\"\nduration = \"0.1 s\"\ntime_step = \"1 ms\"\n{start}");
+        template("blade-couple", &[("F0 = \"10 N\"", "F0 = \"0 N\""), (drive, &kind)])
+    };
+    warns(&decay(""), &["nothing vibrates"]);
+    silent(&decay("start = { blade1 = \"1 mm\" }"));
+    // one value of several that is zero is a reference
+    silent(&template(
+        "blade-couple",
+        &[("vary = { Ft = [\"2 N\", \"4 N\", \"6 N\", \"8 N\"] }", "vary = { F0 = [\"0 N\", \"5 N\"] }")],
+    ));
+    // a mode is free vibration
+    let modes = "kind = \"modes\"\namplitude = { from = \"10 um\", to = \"10 cm\" }";
+    silent(&template("blade-couple", &[("F0 = \"10 N\"", "F0 = \"0 N\""), (drive, modes)]));
+}
+
+#[test]
+fn masses_that_nothing_holds() {
+    let edits = [("[[joint]]", "[[mass]]\nname = \"lost\"\nmass = \"1 g\"\n\n[[joint]]")];
+    warns(&template("blade-couple", &edits), &["nothing holds `lost`"]);
+    let ground = [
+        ("[[spring]]\nbetween = [\"contact\", \"blade3\"]\nstiffness = \"kt\"\n", ""),
+        ("kt = \"10000 N/m\"", "# none"),
+    ];
+    warns(&template("blade-couple", &ground), &["no spring holds `contact`", "friction alone"]);
+}
+
+#[test]
+fn parameters_that_nothing_uses() {
+    let edits = [("F0 = \"10 N\"", "F0 = \"10 N\"\nspare = \"1 N\"\nother = \"2 * spare\"")];
+    warns(&template("blade-couple", &edits), &["uses the parameter `spare`, `other`"]);
+    let varied = [("F0 = \"10 N\"", "F0 = \"10 N\"\nspare = \"1 N\""), ("vary = { Ft =", "vary = { spare =")];
+    warns(&template("blade-couple", &varied), &["`vary` changes `spare`", "the same"]);
+    // used by way of another parameter, in an expression of `vary`, in the study
+    let used = [
+        ("F0 = \"10 N\"", "F0 = \"10 N\"\nhalf = \"1 N\"\nlow = \"119.5 Hz\""),
+        ("\"2 N\", \"4 N\"", "\"2 * half\", \"4 N\""),
+        ("from = \"119.5 Hz\"", "from = \"low\""),
+    ];
+    silent(&template("blade-couple", &used));
+    // a template uses its parameters, unless its law is replaced
+    let short = |law: &str| {
+        format!(
+            "schema = 1\n[parameters]\nFt = \"3 N\"\n[model]\ntemplate = \"blade-couple\"\n{law}\n[study]\nkind = \"response\"\n\
+             frequency = {{ from = \"119 Hz\", to = \"123 Hz\", points = 9 }}\nvary = {{ Ft = [\"1 N\", \"2 N\"] }}\n"
+        )
+    };
+    silent(&short(""));
+    warns(&short("law = { kind = \"coulomb\", limit = \"5 N\" }"), &["`vary` changes `Ft`"]);
+}
+
+#[test]
+fn a_range_without_a_resonance() {
+    let range = |from: &str, to: &str| {
+        template(
+            "blade-couple",
+            &[("from = \"119.5 Hz\", to = \"122.5 Hz\"", &format!("from = \"{from}\", to = \"{to}\""))],
+        )
+    };
+    warns(&range("100 Hz", "110 Hz"), &["between 100 and 110 Hz", "the nearest is at 120.575 Hz with all joints free"]);
+    // between the free frequency of a mode and its stuck one there may be one
+    silent(&range("120.7 Hz", "120.9 Hz"));
+    silent(&range("100 Hz", "121 Hz"));
+    // the third harmonic of the drive meets it
+    let third = [
+        ("from = \"119.5 Hz\", to = \"122.5 Hz\"", "from = \"40 Hz\", to = \"41 Hz\""),
+        ("amplitude = \"F0\"", "amplitude = \"F0\"\nharmonic = 3"),
+    ];
+    silent(&template("blade-couple", &third));
+    // one frequency is a point, not a range
+    silent(&template("blade-couple", &[("{ from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }", "\"100 Hz\"")]));
+}
+
+#[test]
+fn bare_numbers_as_angles() {
+    let phase = |value: &str| {
+        template("blade-couple", &[("amplitude = \"F0\"", &format!("amplitude = \"F0\"\nphase = {value}"))])
+    };
+    // 90 rad are 5156.62 deg
+    warns(&phase("90"), &["`phase` of force 1", "radians", "(5157 deg)", "\"90 deg\""]);
+    warns(&phase("\"2 * 45\""), &["90"]);
+    for value in ["\"90 deg\"", "\"1.5 rad\"", "\"pi/2\"", "0", "\"pi/2 * 1 rad\""] {
+        silent(&phase(value));
+    }
+}
+
+#[test]
+fn a_mode_that_never_slips() {
+    let drive = "kind = \"response\"\nfrequency = { from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }";
+    let modes = |to: &str| {
+        let study = format!("kind = \"modes\"\nmode = 2\namplitude = {{ from = \"1 um\", to = \"{to}\" }}");
+        template("blade-couple-massless", &[(drive, &study)])
+    };
+    // stuck, both blades move against each other by 1/√2 of the modal amplitude: they slip at 2 N / 10 kN/m = 2 x / √2
+    warns(&modes("0.13 mm"), &["no joint slips", "end at 130 µm", "141.4 µm"]);
+    silent(&modes("0.15 mm"));
+}
+
+#[test]
+fn warnings_stand_in_the_record() {
+    let text = template(
+        "blade-couple",
+        &[("from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241", "from = \"100 Hz\", to = \"110 Hz\", points = 3")],
+    );
+    let context = Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| () };
+    let dataset = run(&study(&text), &context).unwrap();
+    assert!(dataset.notes[0].starts_with("warning: no resonance"), "{:?}", dataset.notes);
+    let record = &dataset.record.study["summary"];
+    assert_eq!(record["degrees_of_freedom"], 3);
+    let stuck = record["joints_stuck"]["frequencies_Hz"].as_array().unwrap();
+    assert!((stuck[0].as_f64().unwrap() - 120.94).abs() < 0.01);
+}
+
+#[test]
+fn an_optimum_at_the_edge_is_warned_of() {
+    let text = template(
+        "blade-couple",
+        &[
+            ("kind = \"response\"", "kind = \"performance\""),
+            ("points = 241", "points = 9"),
+            ("\"2 N\", \"4 N\", \"6 N\", \"8 N\"", "\"2 N\", \"3 N\", \"4 N\""),
+        ],
+    );
+    let context = Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| () };
+    let notes = run(&study(&text), &context).unwrap().notes;
+    assert!(
+        notes.iter().any(|note| note.starts_with("warning: the lowest peak stands at an end of the values of Ft")),
+        "{notes:?}"
+    );
+}
+
+/// A study that is too large, refused with its size; the same study may have more memory.
+fn refused(text: &str, key: &str) {
+    let study = study(text).with_memory_limit(2_000_000_000);
+    let error = check(&study).unwrap_err();
+    assert!(error.message().contains("GB of memory") && error.message().contains("the limit is 2.0 GB"), "{error}");
+    assert!(error.help_text().unwrap().contains(key) && error.line().is_some(), "{error:?}");
+    let context = Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| panic!("nothing is computed") };
+    assert_eq!(run(&study, &context).unwrap_err().message(), error.message());
+    check(&study.with_memory_limit(1_000_000_000_000)).unwrap();
+}
+
+#[test]
+fn studies_that_need_too_much_memory_are_refused_in_advance() {
+    // a hundred loops of 1e5 samples each: 1e7 rows of five columns
+    let loops = template(
+        "element",
+        &[
+            ("frequency = \"1 rad/s\"", "frequency = \"1 rad/s\"\nsamples = 100000"),
+            ("[\"1.25 mm\", \"2 mm\", \"2.75 mm\"]", "{ from = \"1.25 mm\", to = \"2 mm\", points = 100 }"),
+        ],
+    );
+    refused(&loops, "samples");
+    let summary = ModelSummary::new(&study(&loops)).unwrap();
+    assert!((10_000_000..10_010_000).contains(&summary.size.rows), "{:?}", summary.size);
+    // displacement, velocity of three masses, of the joint also force and contact: a thousand orbits of 20,000 samples
+    let orbits = template(
+        "blade-couple",
+        &[
+            ("kind = \"response\"", "kind = \"orbit\"\nsamples = 20000"),
+            ("points = 241", "points = 1000"),
+            ("vary = { Ft = [\"2 N\", \"4 N\", \"6 N\", \"8 N\"] }", ""),
+        ],
+    );
+    refused(&orbits, "frequencies");
+    // half a million cases of one frequency each
+    let cases = template(
+        "element",
+        &[("[\"1.25 mm\", \"2 mm\", \"2.75 mm\"]", "{ from = \"1.25 mm\", to = \"2 mm\", points = 500000 }")],
+    );
+    refused(&cases, "vary");
+}
+
+#[test]
+fn sizes_are_those_of_the_tables() {
+    let context = Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| () };
+    let small = ("points = 241", "points = 7");
+    let one = ("vary = { Ft = [\"2 N\", \"4 N\", \"6 N\", \"8 N\"] }", "");
+    let drive = "kind = \"response\"\nfrequency = { from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }";
+    let kinds = [
+        template("blade-couple", &[small]),
+        template("blade-couple", &[small, ("kind = \"response\"", "kind = \"orbit\""), one]),
+        template("blade-couple", &[small, ("kind = \"response\"", "kind = \"hysteresis\""), one]),
+        template("blade-couple", &[small, ("kind = \"response\"", "kind = \"performance\"")]),
+        template("blade-couple", &[(drive, "kind = \"transient\"\nfrequency = \"121 Hz\"\ncycles = 20")]),
+        template(
+            "blade-couple-massless",
+            &[(drive, "kind = \"modes\"\namplitude = { from = \"1 um\", to = \"1 mm\" }")],
+        ),
+        template("element", &[]),
+    ];
+    for text in kinds {
+        let study = study(&text);
+        let estimate = ModelSummary::new(&study).unwrap().size;
+        let dataset = run(&study, &context).unwrap();
+        let rows: usize = dataset.tables.iter().map(|table| table.rows()).sum();
+        let cells: usize = dataset.tables.iter().map(|table| table.rows() * table.columns.len()).sum();
+        // switches and multipliers that do not occur are counted
+        let kind = study.kind().name;
+        assert!(
+            rows as u64 <= estimate.rows + 4 && (rows as f64) > 0.9 * estimate.rows as f64,
+            "{kind}: {rows} {estimate:?}"
+        );
+        let share = cells as f64 * 8.0 / estimate.results as f64;
+        assert!((0.85..1.1).contains(&share), "{kind}: {share} {cells} {estimate:?}");
+    }
+}
+
+#[test]
+fn the_time_is_estimated_within_bounds() {
+    // a run of a second must not be called an hour, nor the other way round; a property test holds it to ten times
+    let small = summary(templates::find("element").unwrap().study).seconds;
+    assert!((0.05..2.0).contains(&small), "{small}");
+    let points = |count: &str| summary(&template("blade-couple", &[("points = 241", count)])).seconds;
+    let (few, many) = (points("points = 1000"), points("points = 100000"));
+    assert!(many > 50.0 * few && many < 100.0 * few, "{few} {many}");
+}
