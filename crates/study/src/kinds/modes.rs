@@ -8,7 +8,7 @@ use crate::study::Study;
 use crate::values::Values;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
-use stickslip::curve::modes::{Mode, ModeRequest, mode};
+use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
 use stickslip::model::Model;
@@ -70,16 +70,16 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
         })
         .collect();
     let mut outcome = Outcome::default();
-    let mut rows = Rows::default();
+    let (mut rows, mut summary) = (Rows::default(), Rows::default());
     let mut modes = Vec::new();
     for (prepared, found) in cases.iter().zip(found) {
         let Some(mode) = found.map_err(|error| (prepared.case.index, error))? else {
-            outcome.count(|| prepared.case.label(), NOT_REACHED, None);
+            outcome.count(|| place_of(prepared), NOT_REACHED, None);
             continue;
         };
-        let lost =
-            mode.lost.map(|a| format!("the mode was lost at the modal amplitude {a:.3e} m √kg; try more harmonics"));
-        outcome.count(|| prepared.case.label(), if lost.is_some() { "lost" } else { CONVERGED }, lost);
+        let (status, reason) = judged(prepared, &mode);
+        outcome.count(|| place_of(prepared), status, reason);
+        outcome.notes.extend(remarks(prepared, &mode));
         for point in &mode.points {
             rows.varied(&prepared.case);
             rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
@@ -90,30 +90,108 @@ fn run(_: &Study, cases: &[Prepared], context: &Context<'_>) -> Computed {
             }
             rows.end();
         }
+        summary.varied(&prepared.case);
+        let end = |point: Option<&ModePoint>| point.map_or(f64::NAN, |point| point.omega / TAU);
+        summary.number("small_end_frequency_Hz", end(mode.points.first().filter(|_| mode.lost.is_none())));
+        summary.number("large_end_frequency_Hz", end(mode.points.last()));
+        let largest = mode.largest.as_ref();
+        summary.number("largest_damping_ratio", largest.map_or(f64::NAN, |point| point.damping));
+        summary.number("amplitude_there_m", largest.map_or(f64::NAN, |point| point.amplitude / unit(prepared)));
+        summary.number("frequency_there_Hz", end(largest));
+        summary.end();
         modes.push((prepared, mode));
     }
-    outcome.tables = vec![rows.table("modes")];
+    outcome.tables = vec![rows.table("modes"), summary.table("modes_summary")];
     outcome.figure = panels(&modes);
     Ok(outcome)
+}
+
+/// Index of the mode, from 0.
+fn number(prepared: &Prepared) -> usize {
+    prepared.case.values.count("mode").unwrap_or(1) as usize - 1
+}
+
+/// Modal amplitude of a unit displacement of the place that moves most, m √kg per m.
+fn unit(prepared: &Prepared) -> f64 {
+    prepared.system.modal_unit(number(prepared))
 }
 
 fn follow(prepared: &Prepared) -> Result<Mode, MethodError> {
     let values = &prepared.case.values;
     let range = values.table("amplitude");
-    let end = |key: &str| range.and_then(|t| t.quantity(key)).unwrap_or(0.0);
-    let number = values.count("mode").unwrap_or(1) as usize - 1;
-    // modal amplitude of a unit displacement of the place that moves most
-    let unit = prepared.system.modal_unit(number);
+    let unit = unit(prepared);
+    let end = |key: &str| range.and_then(|t| t.quantity(key)).unwrap_or(0.0) * unit;
     mode(
         &prepared.system,
         ModeRequest {
-            mode: number,
-            range: (end("from") * unit, end("to") * unit),
+            mode: number(prepared),
+            range: (end("from"), end("to")),
             points: range.and_then(|t| t.count("points")).unwrap_or(61) as usize,
             harmonics: values.count("harmonics").unwrap_or(HARMONICS) as usize,
             samples: values.count("samples").unwrap_or(SERIES_SAMPLES) as usize,
         },
     )
+}
+
+/// The mode and its parameters in words.
+fn place_of(prepared: &Prepared) -> String {
+    let (mode, label) = (format!("mode {}", number(prepared) + 1), prepared.case.label());
+    if label.is_empty() { mode } else { format!("{label}, {mode}") }
+}
+
+/// A modal amplitude in words, as the study file gives it: the amplitude of the place that moves most.
+fn amplitude(prepared: &Prepared, modal: f64) -> String {
+    let si = modal / unit(prepared);
+    let (name, factor) = display_unit(si, "m");
+    format!("{:.3} {name}", si * factor)
+}
+
+/// The status of a mode, and what is missing or in doubt.
+fn judged(prepared: &Prepared, mode: &Mode) -> (&'static str, Option<String>) {
+    let words = |modal: f64| amplitude(prepared, modal);
+    if let Some(lost) = mode.lost {
+        let from = if lost.at.is_finite() { format!("lost at {}: ", words(lost.at)) } else { String::new() };
+        return ("lost", Some(format!("{from}{}", lost.reason)));
+    }
+    if let Some(at) = mode.missing.first() {
+        let more = mode.missing.len() - 1;
+        let others = if more == 0 { String::new() } else { format!(" and {more} more amplitudes") };
+        return ("incomplete", Some(format!("no motion found at {}{others}; try more harmonics", words(*at))));
+    }
+    if let Some(at) = mode.merges.first() {
+        let reason = format!(
+            "at {} it nearly becomes one with another mode: which of both goes on to which motion below is decided by \
+             little, by the number of harmonics for example; compare another number, and the other mode",
+            words(*at)
+        );
+        return ("merging", Some(reason));
+    }
+    (CONVERGED, None)
+}
+
+/// Damping ratio of the joints, absolute, up to which none of them slips: solutions are good to 1e-11.
+const SLIPS: f64 = 1e-9;
+
+/// What the reader must know of a mode that was followed.
+fn remarks(prepared: &Prepared, mode: &Mode) -> Vec<String> {
+    let place = place_of(prepared);
+    let mut remarks: Vec<String> = mode
+        .turns
+        .iter()
+        .map(|turn| {
+            format!(
+                "{place}: the curve turns at {} and goes back to {} before it falls for good; between them there are several \
+                 motions, and below the first the values jump.",
+                amplitude(prepared, turn.at),
+                amplitude(prepared, turn.up)
+            )
+        })
+        .collect();
+    let joints = mode.points.iter().chain(&mode.largest).map(|point| (point.damping - point.viscous).abs());
+    if !mode.points.is_empty() && joints.fold(0.0, f64::max) < SLIPS {
+        remarks.push(format!("{place}: no joint slips between these amplitudes; the joints add no damping."));
+    }
+    remarks
 }
 
 fn panels(modes: &[(&Prepared, Mode)]) -> Vec<Panel> {
@@ -127,7 +205,7 @@ fn panels(modes: &[(&Prepared, Mode)]) -> Vec<Panel> {
         .fold(0.0f64, |a, x| a.max(*x));
     let (unit, factor) = display_unit(largest, "m");
     let x = Axis { quantity: "log₁₀ amplitude".to_owned(), unit };
-    let panel = |quantity: &str, unit: &str, read: fn(&stickslip::curve::modes::ModePoint) -> f64| Panel {
+    let panel = |quantity: &str, unit: &str, read: fn(&ModePoint) -> f64| Panel {
         title: String::new(),
         x: x.clone(),
         y: Axis { quantity: quantity.to_owned(), unit: unit.to_owned() },
@@ -142,8 +220,8 @@ fn panels(modes: &[(&Prepared, Mode)]) -> Vec<Panel> {
                 };
                 Some(Series {
                     label,
-                    x: mode.points.iter().map(|p| (p.places[place] * factor).log10()).collect(),
-                    y: mode.points.iter().map(read).collect(),
+                    x: broken(mode, |point| (point.places[place] * factor).log10()),
+                    y: broken(mode, read),
                     style: Style::Solid,
                     colour,
                 })
@@ -154,4 +232,18 @@ fn panels(modes: &[(&Prepared, Mode)]) -> Vec<Panel> {
         panel("frequency", "Hz", |point| point.omega / TAU),
         panel("equivalent damping ratio", "%", |point| 100.0 * point.damping),
     ]
+}
+
+/// A value of all points, interrupted where the curve turns and the values jump.
+fn broken(mode: &Mode, read: impl Fn(&ModePoint) -> f64) -> Vec<f64> {
+    let mut values = Vec::with_capacity(mode.points.len());
+    let mut before = f64::INFINITY;
+    for point in &mode.points {
+        if mode.turns.iter().any(|turn| before < turn.at && turn.at <= point.amplitude) {
+            values.push(f64::NAN);
+        }
+        values.push(read(point));
+        before = point.amplitude;
+    }
+    values
 }
