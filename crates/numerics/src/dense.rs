@@ -19,12 +19,16 @@ const LARGE: usize = 96;
 /// assert_eq!(b, [2.0, 1.0]);
 /// ```
 pub fn solve(matrix: &mut [f64], n: usize, right: &mut [f64]) -> bool {
+    solve_signed(matrix, n, right).is_some()
+}
+
+/// As [`solve`], with the sign of the determinant of A, ±1; `None` where it returns false.
+pub fn solve_signed(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
+    let mut exchanges = 0;
     let block = if n < LARGE { n.max(1) } else { BLOCK };
     for start in (0..n).step_by(block) {
         let end = (start + block).min(n);
-        if !panel(matrix, n, (start, end), right) {
-            return false;
-        }
+        exchanges += panel(matrix, n, (start, end), right)?;
         if end < n {
             update(matrix, n, (start, end));
         }
@@ -34,11 +38,14 @@ pub fn solve(matrix: &mut [f64], n: usize, right: &mut [f64]) -> bool {
         let sum: f64 = row[k + 1..].iter().zip(&right[k + 1..n]).map(|(a, x)| a * x).sum();
         right[k] = (right[k] - sum) / row[k];
     }
-    right[..n].iter().all(|x| x.is_finite())
+    let negative = (0..n).filter(|k| matrix[k * n + k] < 0.0).count() + exchanges;
+    let sign = if negative.is_multiple_of(2) { 1.0 } else { -1.0 };
+    right[..n].iter().all(|x| x.is_finite()).then_some(sign)
 }
 
-/// Eliminates the columns `start..end`; below the diagonal they keep the factors. Rows are exchanged whole.
-fn panel(matrix: &mut [f64], n: usize, (start, end): (usize, usize), right: &mut [f64]) -> bool {
+/// Eliminates the columns `start..end`; below the diagonal they keep the factors. Rows are exchanged whole; returns how often.
+fn panel(matrix: &mut [f64], n: usize, (start, end): (usize, usize), right: &mut [f64]) -> Option<usize> {
+    let mut exchanges = 0;
     for k in start..end {
         let mut pivot = k;
         for i in k + 1..n {
@@ -48,9 +55,10 @@ fn panel(matrix: &mut [f64], n: usize, (start, end): (usize, usize), right: &mut
         }
         let largest = matrix[pivot * n + k];
         if largest == 0.0 || !largest.is_finite() {
-            return false;
+            return None;
         }
         if pivot != k {
+            exchanges += 1;
             let (top, bottom) = matrix.split_at_mut(pivot * n);
             top[k * n..(k + 1) * n].swap_with_slice(&mut bottom[..n]);
             right.swap(k, pivot);
@@ -69,7 +77,7 @@ fn panel(matrix: &mut [f64], n: usize, (start, end): (usize, usize), right: &mut
             }
         }
     }
-    true
+    Some(exchanges)
 }
 
 /// What the elimination of the columns `start..end` does to those after them.
@@ -113,6 +121,15 @@ mod tests {
             for (a, b) in right.iter().zip(&x) {
                 assert!((a - b).abs() < 1e-8 * n as f64, "{n}: {a} instead of {b}");
             }
+        }
+        // a cyclic exchange of n rows has the sign (-1)^(n - 1), and every other entry is negative
+        for n in [1, 2, 3, 4, 2 * LARGE + 5, 2 * LARGE + 6, 2 * LARGE + 7] {
+            let mut matrix = vec![0.0; n * n];
+            for i in 0..n {
+                matrix[i * n + (i + 1) % n] = if i % 2 == 1 { -2.0 } else { 3.0 };
+            }
+            let sign = if (n - 1 + n / 2).is_multiple_of(2) { 1.0 } else { -1.0 };
+            assert_eq!(solve_signed(&mut matrix, n, &mut vec![1.0; n]), Some(sign), "{n}");
         }
         let mut singular = vec![1.0; 4];
         assert!(!solve(&mut singular, 2, &mut [1.0, 2.0]));

@@ -81,6 +81,70 @@ fn modes_go_from_stuck_to_free() {
     assert!(damping[0].abs() < 1e-9 && damping[20] < 1e-3 && damping.iter().any(|zeta| *zeta > 0.025), "{damping:?}");
 }
 
+/// The main numbers of a mode, (10.3): both ends, and the largest damping `Im k/(2 (1 + Re k))` over amplitudes of the complex stiffness of
+/// the slider.
+#[test]
+fn modes_are_summarised() {
+    let law = r#"{ kind = "jenkins", stiffness = "0.2 N/m", limit = "1 N" }"#;
+    let study =
+        "kind = \"modes\"\nharmonics = 1\nsamples = 4096\namplitude = { from = \"1 m\", to = \"1000 m\", points = 5 }";
+    let found = oscillator("0 kg/s", law, study);
+    assert!(found.failures.is_empty() && found.notes.is_empty(), "{:?} {:?}", found.failures, found.notes);
+    let summary = table(&found, "modes_summary");
+    let value = |column: &str| summary.numbers(column).unwrap()[0];
+    let damping = |a: f64| {
+        let slip = (1.0 - 10.0 / a).acos();
+        let scale = 0.2 / std::f64::consts::PI;
+        let (re, im) = (scale * (slip - 0.5 * (2.0 * slip).sin()), scale * slip.sin().powi(2));
+        im / (2.0 * (1.0 + re))
+    };
+    let at =
+        (0..20_000).map(|i| 5.0 + 0.001 * f64::from(i)).max_by(|a, b| damping(*a).total_cmp(&damping(*b))).unwrap();
+    assert!((value("small_end_frequency_Hz") * std::f64::consts::TAU - 1.2f64.sqrt()).abs() < 1e-9);
+    assert!((value("large_end_frequency_Hz") * std::f64::consts::TAU - 1.0).abs() < 1e-3);
+    assert!((value("largest_damping_ratio") / damping(at) - 1.0).abs() < 1e-6, "{summary:?}");
+    assert!((value("amplitude_there_m") / at - 1.0).abs() < 2e-3, "{summary:?} {at}");
+}
+
+/// Where two modes nearly become one, the run says so at that amplitude and does not look like success.
+#[test]
+fn merging_modes_are_told() {
+    let study = |points: u32| {
+        dataset(&format!(
+            r#"
+schema = 1
+title = "Couple"
+[model]
+template = "blade-couple"
+[parameters]
+Ft = "8 N"
+[study]
+kind = "modes"
+mode = 2
+harmonics = 9
+amplitude = {{ from = "0.01 mm", to = "100 mm", points = {points} }}
+"#
+        ))
+    };
+    let (coarse, fine) = (study(3), study(50));
+    assert_eq!(fine.record.points.get("merging"), Some(&1), "{:?}", fine.record.points);
+    let reason = &fine.failures[0].reason;
+    assert!(fine.failures[0].at == "mode 2" && reason.contains("nearly becomes one with another mode"), "{reason}");
+    assert_eq!(coarse.failures, fine.failures);
+    let largest = |found: &Dataset| table(found, "modes_summary").numbers("largest_damping_ratio").unwrap()[0];
+    assert!((largest(&coarse) / largest(&fine) - 1.0).abs() < 1e-6 && largest(&fine) > 0.05);
+}
+
+/// A range in which nothing slips is a linear mode, and the reader is told.
+#[test]
+fn a_mode_that_never_slips_is_told() {
+    let law = r#"{ kind = "jenkins", stiffness = "0.2 N/m", limit = "1 N" }"#;
+    let study = |to: &str| format!("kind = \"modes\"\namplitude = {{ from = \"0.1 m\", to = \"{to} m\", points = 5 }}");
+    let told =
+        |to: &str| oscillator("0.1 kg/s", law, &study(to)).notes.iter().any(|note| note.contains("no joint slips"));
+    assert!(told("4.9") && !told("6"));
+}
+
 /// A branch along a force that turns twice: two turns in its table, and an unstable stretch in its figure.
 #[test]
 fn a_branch_turns() {

@@ -1,6 +1,6 @@
 //! What a study says of itself before it is run.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::Arc;
 use stickslip::model::templates;
 use stickslip_study::run::{Context, check, run};
 use stickslip_study::summary::ModelSummary;
@@ -173,7 +173,7 @@ fn warnings_stand_in_the_record() {
         "blade-couple",
         &[("from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241", "from = \"100 Hz\", to = \"110 Hz\", points = 3")],
     );
-    let context = Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| () };
+    let context = Context::unwatched(1);
     let dataset = run(&study(&text), &context).unwrap();
     assert!(dataset.notes[0].starts_with("warning: no resonance"), "{:?}", dataset.notes);
     let record = &dataset.record.study["summary"];
@@ -192,7 +192,7 @@ fn an_optimum_at_the_edge_is_warned_of() {
             ("\"2 N\", \"4 N\", \"6 N\", \"8 N\"", "\"2 N\", \"3 N\", \"4 N\""),
         ],
     );
-    let context = Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| () };
+    let context = Context::unwatched(1);
     let notes = run(&study(&text), &context).unwrap().notes;
     assert!(
         notes.iter().any(|note| note.starts_with("warning: the lowest peak stands at an end of the values of Ft")),
@@ -206,7 +206,7 @@ fn refused(text: &str, key: &str) {
     let error = check(&study).unwrap_err();
     assert!(error.message().contains("GB of memory") && error.message().contains("the limit is 2.0 GB"), "{error}");
     assert!(error.help_text().unwrap().contains(key) && error.line().is_some(), "{error:?}");
-    let context = Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| panic!("nothing is computed") };
+    let context = Context { finished: Arc::new(|| panic!("nothing is computed")), ..Context::unwatched(1) };
     assert_eq!(run(&study, &context).unwrap_err().message(), error.message());
     check(&study.with_memory_limit(1_000_000_000_000)).unwrap();
 }
@@ -244,7 +244,7 @@ fn studies_that_need_too_much_memory_are_refused_in_advance() {
 
 #[test]
 fn sizes_are_those_of_the_tables() {
-    let context = Context { threads: 1, stop: &AtomicBool::new(false), finished: &|| () };
+    let context = Context::unwatched(1);
     let small = ("points = 241", "points = 7");
     let one = ("vary = { Ft = [\"2 N\", \"4 N\", \"6 N\", \"8 N\"] }", "");
     let drive = "kind = \"response\"\nfrequency = { from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }";

@@ -166,3 +166,127 @@ fn blade_couple_from_free_to_stuck() {
 /// Modal amplitude, m √kg, above which both modes are two. With one harmonic they meet where friction makes up for half of the
 /// difference of the free frequencies, δ: at `a = (4 Ft/π)/(2 ω √m δ)` = 1.9e-3.
 const TWO: f64 = 4e-3;
+
+/// Relative agreement of frequencies and damping ratios that are solved for at the same amplitude, and of largest damping ratios. The
+/// followed curve is the same for all, so that only the rounding of the amplitudes is left; required is far less.
+const SAME: (f64, f64) = (1e-6, 1e-4);
+
+fn same(what: &str, one: &ModePoint, other: &ModePoint) {
+    assert!((one.omega / other.omega - 1.0).abs() < SAME.0, "{what}: {one:?} {other:?}");
+    assert!((one.damping - other.damping).abs() <= SAME.1 * other.damping.abs() + 1e-12, "{what}: {one:?} {other:?}");
+}
+
+/// The points of `some` that `all` has too agree with them; returns how many these are.
+fn compare(what: &str, some: &Mode, all: &Mode) -> usize {
+    let mut common = 0;
+    for one in &some.points {
+        if let Some(other) = all.points.iter().find(|p| (p.amplitude / one.amplitude - 1.0).abs() < 1e-9) {
+            same(what, one, other);
+            common += 1;
+        }
+    }
+    common
+}
+
+/// A mode does not depend on how many points are asked for, nor on where the range begins and ends: 30 random models with up to three
+/// joints. Each is followed to its end.
+#[test]
+fn a_mode_does_not_depend_on_its_points() {
+    let mut lost = Vec::new();
+    for seed in 0..30 {
+        let system = stickslip_verification::random_model(seed).0.assemble().unwrap();
+        let number = seed as usize % system.dofs();
+        let request = ModeRequest { mode: number, range: (1e-6, 1.0), points: 121, harmonics: 7, samples: 256 };
+        let fine = mode(&system, request).unwrap();
+        assert!(fine.missing.is_empty(), "seed {seed}: {:?}", fine.missing);
+        for points in [2, 13] {
+            let coarse = mode(&system, ModeRequest { points, ..request }).unwrap();
+            assert_eq!(
+                (&coarse.turns, &coarse.merges, coarse.lost),
+                (&fine.turns, &fine.merges, fine.lost),
+                "seed {seed}"
+            );
+            assert_eq!(compare(&format!("seed {seed}, {points} points"), &coarse, &fine), coarse.points.len());
+            same(&format!("seed {seed}, largest"), &coarse.largest.unwrap(), fine.largest.as_ref().unwrap());
+        }
+        // a part of the range, whose points are some of the whole
+        let part = mode(&system, ModeRequest { range: (1e-4, 1e-2), points: 41, ..request }).unwrap();
+        assert_eq!(compare(&format!("seed {seed}, part"), &part, &fine), part.points.len());
+        lost.extend(fine.lost.map(|lost| (seed, number, lost)));
+    }
+    assert!(lost.is_empty(), "{lost:?}");
+}
+
+/// The couple at 8 N: its largest damping ratio is the same for any number of points, and that of the motion that the mode goes on to.
+/// Both modes nearly become one, and both say so, at amplitudes where the other is near.
+#[test]
+fn blade_couple_has_one_largest_damping() {
+    let system = stickslip_verification::template("blade-couple", &[("Ft", 8.0)]);
+    let range = (4.255467e-6, 4.255467e-2);
+    let request = |mode, points| ModeRequest { mode, range, points, harmonics: 15, samples: 1024 };
+    let followed: Vec<Mode> = [2, 61, 200].map(|points| mode(&system, request(1, points)).unwrap()).into();
+    for one in &followed {
+        same("largest", one.largest.as_ref().unwrap(), followed[0].largest.as_ref().unwrap());
+        assert_eq!(one.points.len(), [2, 61, 200][followed.iter().position(|other| other == one).unwrap()]);
+    }
+    let other = mode(&system, request(0, 61)).unwrap();
+    for one in [&followed[1], &other] {
+        assert_eq!(one.lost, None);
+        assert!(one.merges.len() == 1 && (6e-3..8e-3).contains(&one.merges[0]), "{:?}", one.merges);
+    }
+    // one goes on to blades that move against each other, which friction damps, the other to blades that move together and stick
+    let largest = |mode: &Mode| mode.largest.as_ref().map_or(0.0, |point| point.damping);
+    let (against, together) = (largest(&followed[1]).max(largest(&other)), largest(&followed[1]).min(largest(&other)));
+    assert!((0.055..0.06).contains(&against) && (0.003..0.004).contains(&together), "{against} {together}");
+}
+
+/// Points of both modes of the couple at 8 N with five harmonics, from SciPy's root finder on the same equations written anew (rigid
+/// friction by its projection with ε = 62 N s/m, 512 samples, 600 random starts at each amplitude): modal amplitude, ω, ζ.
+/// With ε = 20 N s/m ω changes by 2e-3 rad/s and ζ by 2e-6, with which the program's own ε has to agree.
+#[test]
+fn blade_couple_agrees_with_a_search_from_random_starts() {
+    let system = stickslip_verification::template("blade-couple", &[("Ft", 8.0)]);
+    let expected = [
+        (0, 2e-2, 758.0188, 0.001_759),
+        (1, 2e-2, 761.9564, 0.001_764),
+        (0, 8.5e-3, 759.1943, 0.002_660),
+        (1, 8.5e-3, 761.5814, 0.003_102),
+        (1, 7e-3, 761.1656, 0.003_659),
+        (0, 1e-3, 759.8771, 0.000_723),
+        (1, 1e-3, 760.4674, 0.026_825),
+    ];
+    for (number, amplitude, omega, damping) in expected {
+        let request =
+            ModeRequest { mode: number, range: (amplitude, 2.0 * amplitude), points: 2, harmonics: 5, samples: 512 };
+        let found = mode(&system, request).unwrap().points.remove(0);
+        assert!((found.omega - omega).abs() < 0.06 && (found.damping - damping).abs() < 2e-3 * damping, "{found:?}");
+    }
+}
+
+/// What a mode is does not depend on the coordinates: with displacements as sums of others, all matrices full, the mass matrix too,
+/// frequencies and damping ratios are the same.
+#[test]
+fn full_mass_matrices_are_respected() {
+    for seed in [4, 8, 12, 20] {
+        let plain = stickslip_verification::random_model(seed).0.assemble().unwrap();
+        let n = plain.dofs();
+        let turn = |i: usize, k: usize| if i == k { 1.0 } else { 0.3 / (1.0 + (i + 2 * k) as f64) };
+        let mut full = plain.clone();
+        let mut basis = full.mass.clone();
+        for i in 0..n {
+            for k in 0..n {
+                basis[(i, k)] = turn(i, k);
+            }
+        }
+        full.mass = basis.transpose() * &plain.mass * &basis;
+        full.damping = basis.transpose() * &plain.damping * &basis;
+        full.stiffness = basis.transpose() * &plain.stiffness * &basis;
+        for joint in &mut full.joints {
+            joint.direction = basis.transpose() * &joint.direction;
+        }
+        assert!(n == 1 || full.mass[(0, 1)].abs() > 1e-2, "{}", full.mass);
+        let request = ModeRequest { mode: 0, range: (1e-3, 1.0), points: 13, harmonics: 5, samples: 256 };
+        let (one, other) = (mode(&plain, request).unwrap(), mode(&full, request).unwrap());
+        assert_eq!(compare(&format!("seed {seed}"), &one, &other), 13);
+    }
+}

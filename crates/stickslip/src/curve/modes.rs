@@ -1,12 +1,18 @@
 //! Nonlinear modes: frequency and equivalent damping of a free vibration over its amplitude, and self-excited orbits.
 //!
 //! At small amplitude joints stick and the mode is the linear one with their springs, or with rigid contacts closed; at large amplitude
-//! it is the linear one without joints; the damping vanishes at both ends and has a maximum between. Where friction pulls two
-//! frequencies together, both modes become one, and which of those below that amplitude is followed is not determined.
+//! it is the linear one without joints. A mode is *followed* from an amplitude at which friction hardly matters, by arc length, in steps
+//! that its own curve decides: neither the range that is asked for nor its points change them. The points are then solved for, each
+//! from the followed states beside it.
+//!
+//! Where friction pulls two frequencies together, two modes nearly become one: [`Mode::merges`]. Below there are two again, in other motions,
+//! and little decides which mode goes on to which, the number of harmonics for example. There the curve may also turn: its amplitude grows
+//! again before it falls for good, and the motion at the next smaller amplitude is another one ([`Mode::turns`]); or it does not come back at
+//! all, and the mode is [`Lost`].
 //! The equations are those of the extended periodic motion concept, Krack (2015).
 
 use crate::method::MethodError;
-use crate::method::harmonic_balance::{ModeEquations, ModeState};
+use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState};
 use crate::model::System;
 
 /// A point of a nonlinear mode.
@@ -19,6 +25,8 @@ pub struct ModePoint {
     /// Equivalent damping ratio ζ: that of the linear oscillator that loses the same share of energy per cycle. It contains the viscous
     /// dampers; it is negative where the structure takes up more energy than friction destroys.
     pub damping: f64,
+    /// The part of it that the viscous dampers have in this motion; the rest is the joints'.
+    pub viscous: f64,
     /// Amplitude of the first harmonic of every place, m.
     pub places: Vec<f64>,
 }
@@ -28,8 +36,56 @@ pub struct ModePoint {
 pub struct Mode {
     /// Points by rising amplitude.
     pub points: Vec<ModePoint>,
-    /// The amplitude at which it was lost, if it was.
-    pub lost: Option<f64>,
+    /// Where the damping ratio is largest within the range, between the points too.
+    pub largest: Option<ModePoint>,
+    /// Modal amplitudes within the range at which it nearly becomes one with another mode, by falling amplitude, m √kg.
+    pub merges: Vec<f64>,
+    /// Where its curve turns within the range, by falling amplitude.
+    pub turns: Vec<Turn>,
+    /// Amplitudes among those asked for at which no motion was found beside the followed ones.
+    pub missing: Vec<f64>,
+    /// Where and why it ended above the smallest amplitude, if it did.
+    pub lost: Option<Lost>,
+}
+
+/// A part of the curve that turns back: the values below `at` are not those that end at `at`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turn {
+    /// Modal amplitude below which the motion is another one, m √kg.
+    pub at: f64,
+    /// Modal amplitude to which the curve goes back before it falls for good; between both there are several motions.
+    pub up: f64,
+}
+
+/// A mode that ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lost {
+    /// Modal amplitude of the last motion, m √kg.
+    pub at: f64,
+    /// Why.
+    pub reason: Reason,
+}
+
+/// Why a mode ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Reason {
+    /// The structure without joints has no such mode, or its frequency is zero.
+    #[error("the structure without its joints has no such mode with a frequency above zero")]
+    NoBeginning,
+    /// The curve turned and went back to where friction hardly matters.
+    #[error(
+        "its curve turns there and goes back to large amplitudes: it becomes one with another mode, and does not exist below"
+    )]
+    Merged,
+    /// The curve turned and did not come back to smaller amplitudes.
+    #[error("its curve turns there and has not come back to smaller amplitudes after 1000 steps; try fewer harmonics")]
+    Turned,
+    /// No shorter step converged.
+    #[error("no neighbouring motion was found; try more harmonics")]
+    Stalled,
+    /// All steps are used up.
+    #[error("it was not followed to the end within 4000 steps; try fewer harmonics")]
+    Steps,
 }
 
 /// Which mode, and with how many harmonics.
@@ -47,15 +103,55 @@ pub struct ModeRequest {
     pub samples: usize,
 }
 
-/// Multiples of the largest amplitude at which a mode may begin.
-const STARTS: [f64; 4] = [1.0, 10.0, 100.0, 1e4];
-/// Steps between two points that may be halved.
-const HALVINGS: u32 = 12;
+/// Share of friction in the forces of the linear mode at which a mode begins: its frequency and damping are then right to this share.
+const FAINT: f64 = 1e-4;
+/// The same relative to what distinguishes it from the nearest mode: its shape is then the linear one to a percent.
+const APART: f64 = 1e-2;
+/// Factors by which a mode may begin higher, if Newton's method does not come from the linear mode to the nonlinear one.
+const HIGHER: [f64; 5] = [1.0, 10.0, 100.0, 1e4, 1e6];
+/// Steps, refused ones included. The couples take about 100, internal resonances some hundreds.
+const MOST_STEPS: usize = 4000;
+/// Steps without an amplitude below all before, after which the curve is left: it runs in a loop, or to another mode.
+const PATIENCE: usize = 1000;
+/// Arc lengths, see [`ModeEquations::step`]: the longest step changes the amplitude by up to a half, or a fifth of the shape.
+const LONGEST: f64 = 0.2;
+/// The first step, and that after a leap.
+const FIRST: f64 = 0.02;
+/// A step below this is rounding: the curve ends.
+const SHORTEST: f64 = 1e-7;
+/// Steps below this may take a corner: where a sampled joint begins to slip, the curve has kinks.
+const CORNER: f64 = 1e-3;
+/// Least cosine between the tangents at both ends of a step.
+const STRAIGHT: f64 = 0.9;
+/// Most distance of a solution from where the tangent pointed, relative to the step.
+const OFF: f64 = 0.5;
+/// Least modal assurance between neighbours.
+const SHAPE: f64 = 0.9;
+/// A step is lengthened after at most this many Newton iterations: at kinks it takes more than the usual three without being in danger.
+const FEW: usize = 8;
+/// Parts of a decade by which a mode is sought below where its curve cannot be followed.
+const LEAPS: [f64; 6] = [0.01, 0.03, 0.1, 0.2, 0.4, 0.7];
+/// Rigidity of the shape, see [`ModeEquations::rigidity`], below which two modes count as merging. In the blade couple it falls to 0.3 with one
+/// harmonic, to 0.03 with 15, to 0.1 with 31, and which mode goes on to which motion is not the same in the three.
+const MERGING: f64 = 1.0 / 3.0;
+/// Short steps from a followed state to an amplitude beside it, where one long step fails.
+const PARTS: u32 = 16;
+/// Relative amplitude up to which a turn is one of the sampled force and not of the mode, and is not told.
+const TREMOR: f64 = 1e-3;
+/// Relative amplitude to which the largest damping is located: its value is then right to the square of this.
+const LOCATED: f64 = 1e-3;
 
-/// Follows a mode from its large end, where joints hardly matter, to its small one.
+/// A mode's curve, followed from its large end.
+struct Path {
+    linear: Option<LinearMode>,
+    arcs: Vec<ModeArc>,
+    lost: Option<Lost>,
+}
+
+/// Follows a mode from an amplitude at which friction hardly matters downwards.
 ///
 /// # Errors
-/// A law with several directions, a place without mass.
+/// A law with several directions, a place without mass, a mass matrix that is not positive definite.
 ///
 /// # Example
 /// ```
@@ -71,55 +167,50 @@ const HALVINGS: u32 = 12;
 pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> {
     let mut equations = ModeEquations::new(system, request.harmonics, request.samples)?;
     let (low, high) = request.range;
+    let path = Path::follow(&mut equations, request.mode, low);
     let last = request.points.max(2) - 1;
-    let amplitude = |i: usize| low * (high / low).powf(i as f64 / last as f64);
-    let mut points = Vec::with_capacity(last + 1);
-    // joints matter the less the larger the motion: begin as far above the range as the linear mode is a good guess
-    let begin = STARTS.iter().find_map(|factor| {
-        let linear = equations.linear(request.mode, factor * high)?;
-        follow(&mut equations, &(factor * high, linear), high).map(|state| (high, state))
-    });
-    let Some(mut now) = begin else {
-        return Ok(Mode { points, lost: Some(high) });
+    let largest = path.largest(&mut equations, (low, high));
+    let mut mode = Mode {
+        points: Vec::new(),
+        largest: largest.map(|(a, state)| point(&equations, a, &state)),
+        merges: path.merges(&equations).into_iter().filter(|a| (low..high).contains(a)).collect(),
+        turns: path.turns().into_iter().filter(|turn| turn.at < high).collect(),
+        missing: Vec::new(),
+        lost: path.lost,
     };
-    let mut lost = None;
-    for i in (0..=last).rev() {
-        match follow(&mut equations, &now, amplitude(i)) {
-            Some(state) => now = (amplitude(i), state),
-            None => {
-                lost = Some(amplitude(i));
-                break;
-            }
+    for i in 0..=last {
+        let amplitude = if i == last { high } else { low * (high / low).powf(i as f64 / last as f64) };
+        match path.at(&mut equations, amplitude) {
+            Some(state) => mode.points.push(point(&equations, amplitude, &state)),
+            None if amplitude > path.end() => mode.missing.push(amplitude),
+            None => {}
         }
-        points.push(point(system, &now));
     }
-    points.reverse();
-    Ok(Mode { points, lost })
+    Ok(mode)
 }
 
 /// Self-excited orbits along a mode: the amplitudes at which its damping changes its sign. Stable ones have rising damping there.
 ///
 /// # Errors
-/// A law with several directions, a place without mass.
+/// As [`mode()`].
 pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoint>, MethodError> {
     let mut equations = ModeEquations::new(system, request.harmonics, request.samples)?;
-    let found = mode(system, request)?;
+    let path = Path::follow(&mut equations, request.mode, request.range.0);
     let mut orbits = Vec::new();
-    for pair in found.points.windows(2) {
-        if (pair[0].damping < 0.0) == (pair[1].damping < 0.0) {
+    for pair in path.within(&mut equations, request.range).windows(2) {
+        let [(i, above, upper), (k, below, lower)] = pair else { continue };
+        // between states that are not neighbours the curve turns: the damping jumps
+        if (upper.damping < 0.0) == (lower.damping < 0.0) || k - i > 1 {
             continue;
         }
-        let Some(linear) = equations.linear(request.mode, request.range.1) else { continue };
-        let Some(upper) = follow(&mut equations, &(request.range.1, linear), pair[1].amplitude) else { continue };
-        let mut at = (pair[1].amplitude, upper);
+        let mut found = None;
         // regula falsi on the logarithm of the amplitude, with the Illinois weight
-        let (mut a, mut fa) = (pair[0].amplitude.ln(), pair[0].damping);
-        let (mut b, mut fb) = (pair[1].amplitude.ln(), pair[1].damping);
+        let (mut a, mut fa, mut b, mut fb) = (below.ln(), lower.damping, above.ln(), upper.damping);
         for _ in 0..100 {
             let c = (a * fb - b * fa) / (fb - fa);
-            let Some(state) = follow(&mut equations, &at, c.exp()) else { break };
+            let Some(state) = path.at(&mut equations, c.exp()) else { break };
             let fc = state.damping;
-            at = (c.exp(), state);
+            found = Some((c.exp(), state));
             if fc == 0.0 || (b - a).abs() < 1e-14 || fc.abs() < 1e-15 {
                 break;
             }
@@ -130,41 +221,282 @@ pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoi
             }
             (b, fb) = (c, fc);
         }
-        orbits.push(point(system, &at));
+        orbits.extend(found.map(|(amplitude, state)| point(&equations, amplitude, &state)));
     }
+    orbits.reverse();
     Ok(orbits)
 }
 
-/// From one amplitude to another, in as many steps as it takes.
-fn follow(equations: &mut ModeEquations<'_>, from: &(f64, ModeState), to: f64) -> Option<ModeState> {
-    let (mut now, mut state) = (from.0, from.1.clone());
-    let mut factor = to / now;
-    let mut halvings = 0;
-    loop {
-        let next = if (factor < 1.0) == (now * factor < to) && factor != 1.0 { to } else { now * factor };
-        match equations.solve(&state, now, next) {
-            Some(found) => {
-                if next == to {
-                    return Some(found);
-                }
-                (now, state) = (next, found);
+impl Path {
+    /// Follows mode `index` until it is below the modal amplitude `low`.
+    fn follow(equations: &mut ModeEquations<'_>, index: usize, low: f64) -> Self {
+        let modes = equations.linear_modes();
+        let none = |linear| {
+            let lost = Lost { at: f64::INFINITY, reason: Reason::NoBeginning };
+            Path { linear, arcs: Vec::new(), lost: Some(lost) }
+        };
+        let Some(linear) = modes.get(index).cloned() else { return none(None) };
+        let faint = equations.faint(&modes, index, FAINT, APART).max(f64::MIN_POSITIVE);
+        let start = HIGHER.iter().find_map(|factor| {
+            let amplitude = factor * faint;
+            let guess = equations.linear(&linear, amplitude)?;
+            let state = equations.solve(&guess, amplitude, amplitude)?;
+            (equations.assurance(&guess, &state) >= SHAPE).then(|| equations.begin(&state, amplitude))?
+        });
+        let Some(start) = start else { return none(Some(linear)) };
+        let top = start.amplitude;
+        let mut path = Path { linear: Some(linear), arcs: vec![start], lost: None };
+        let mut length = FIRST;
+        let (mut lowest, mut since) = (0, 0);
+        for _ in 0..MOST_STEPS {
+            let now = &path.arcs[path.arcs.len() - 1];
+            let at = now.amplitude;
+            if at < low {
+                return path;
             }
-            None => {
-                halvings += 1;
-                if halvings > HALVINGS {
-                    return None;
+            let step = equations.step(now, length, length < CORNER).filter(|step| {
+                step.off <= OFF * length
+                    && (length < CORNER || (step.straight >= STRAIGHT && step.to.side == now.side))
+                    && equations.assurance(&now.state, &step.to.state) >= SHAPE
+            });
+            since += 1;
+            let reason = match step {
+                _ if at > top => Reason::Merged,
+                _ if since > PATIENCE => Reason::Turned,
+                Some(step) => {
+                    if step.iterations <= FEW {
+                        length = (1.5 * length).min(LONGEST);
+                    }
+                    path.arcs.push(step.to);
+                    if path.arcs[path.arcs.len() - 1].amplitude < path.arcs[lowest].amplitude {
+                        (lowest, since) = (path.arcs.len() - 1, 0);
+                    }
+                    continue;
                 }
-                factor = factor.sqrt();
+                None if length > SHORTEST => {
+                    length *= 0.5;
+                    continue;
+                }
+                None => Reason::Stalled,
+            };
+            // the mode goes on where its shape does
+            let Some(next) = leap(equations, &path.arcs[lowest]) else {
+                path.lost = Some(Lost { at: path.arcs[lowest].amplitude, reason });
+                return path;
+            };
+            path.arcs.push(next);
+            (length, lowest, since) = (FIRST, path.arcs.len() - 1, 0);
+        }
+        path.lost = Some(Lost { at: path.end(), reason: Reason::Steps });
+        path
+    }
+
+    /// The smallest amplitude that was reached.
+    fn end(&self) -> f64 {
+        self.arcs.iter().fold(f64::INFINITY, |least, arc| least.min(arc.amplitude))
+    }
+
+    /// The motion at modal amplitude `a`, where the curve passes it first.
+    fn at(&self, equations: &mut ModeEquations<'_>, a: f64) -> Option<ModeState> {
+        let first = self.arcs.first()?;
+        if a >= first.amplitude {
+            let guess = equations.linear(self.linear.as_ref()?, a)?;
+            let found = equations.solve(&guess, a, a).or_else(|| equations.solve(&first.state, first.amplitude, a))?;
+            return (equations.assurance(&guess, &found) >= SHAPE).then_some(found);
+        }
+        let pair = self.arcs.windows(2).find(|pair| pair[0].amplitude >= a && pair[1].amplitude < a)?;
+        let guess = pair[0].between(&pair[1], a);
+        let room = equations.distance(&pair[0], &pair[1].state, pair[1].amplitude);
+        let near = |equations: &mut ModeEquations<'_>, from: &ModeState, before: f64| {
+            let found = equations.solve(from, before, a)?;
+            let apart = pair.iter().map(|arc| equations.distance(arc, &found, a)).fold(f64::INFINITY, f64::min);
+            (apart <= room).then_some(found)
+        };
+        for (from, before) in [(&guess, a), (&pair[1].state, pair[1].amplitude)] {
+            if let Some(found) = near(equations, from, before) {
+                return Some(found);
             }
         }
+        // between kinks: in short steps from above
+        let (mut before, mut state) = (pair[0].amplitude, pair[0].state.clone());
+        for part in 1..=PARTS {
+            let next = pair[0].amplitude * (a / pair[0].amplitude).powf(f64::from(part) / f64::from(PARTS));
+            state = equations.solve(&state, before, next)?;
+            before = next;
+        }
+        near(equations, &state, before)
+    }
+
+    /// Followed states within a range, where the curve passes an amplitude first, and those at its ends, by falling amplitude; with the
+    /// number of the followed state before them.
+    fn within(&self, equations: &mut ModeEquations<'_>, (low, high): (f64, f64)) -> Vec<(usize, f64, ModeState)> {
+        let low = low.max(self.end());
+        let before = |a: f64| self.arcs.windows(2).position(|pair| pair[0].amplitude >= a && pair[1].amplitude < a);
+        let mut all = Vec::new();
+        if let Some(state) = self.at(equations, high) {
+            all.push((before(high).unwrap_or(0), high, state));
+        }
+        let mut least = f64::INFINITY;
+        for (i, arc) in self.arcs.iter().enumerate() {
+            if arc.amplitude < least {
+                least = arc.amplitude;
+                if low <= least && least < high {
+                    all.push((i, least, arc.state.clone()));
+                }
+            }
+        }
+        if let Some(state) = self.at(equations, low) {
+            all.push((before(low).unwrap_or(self.arcs.len()), low, state));
+        }
+        all
+    }
+
+    /// Amplitude and motion where damping is largest within a range: among the followed states, then by golden-section search between
+    /// the neighbours of the best.
+    fn largest(&self, equations: &mut ModeEquations<'_>, range: (f64, f64)) -> Option<(f64, ModeState)> {
+        let all = self.within(equations, range);
+        let best = (0..all.len()).max_by(|&i, &k| all[i].2.damping.total_cmp(&all[k].2.damping))?;
+        let (_, amplitude, state) = &all[best];
+        let mut top = (*amplitude, state.clone());
+        let golden = 0.5 * (5f64.sqrt() - 1.0);
+        let mut low = all[(best + 1).min(all.len() - 1)].1.ln();
+        let mut high = all[best.saturating_sub(1)].1.ln();
+        // damping ratios at the two inner amplitudes; where there is no motion it is not larger
+        let mut try_at = |at: f64| {
+            let Some(found) = self.at(equations, at.exp()) else { return f64::NEG_INFINITY };
+            let damping = found.damping;
+            if damping > top.1.damping {
+                top = (at.exp(), found);
+            }
+            damping
+        };
+        let (mut c, mut d) = (high - golden * (high - low), low + golden * (high - low));
+        let (mut fc, mut fd) = (try_at(c), try_at(d));
+        while high - low > LOCATED {
+            if fc > fd {
+                (high, d, fd) = (d, c, fc);
+                c = high - golden * (high - low);
+                fc = try_at(c);
+            } else {
+                (low, c, fc) = (c, d, fd);
+                d = low + golden * (high - low);
+                fd = try_at(d);
+            }
+        }
+        Some(top)
+    }
+
+    /// Amplitudes of the followed states at which the shape is least rigid, of every stretch of the curve where it is [`MERGING`].
+    fn merges(&self, equations: &ModeEquations<'_>) -> Vec<f64> {
+        let mut merges = Vec::new();
+        let mut least: Option<(f64, f64)> = None;
+        for arc in &self.arcs {
+            let rigidity = equations.rigidity(&arc.state);
+            if rigidity >= MERGING {
+                merges.extend(least.take().map(|(_, at)| at));
+            } else if least.is_none_or(|(before, _)| rigidity < before) {
+                least = Some((rigidity, arc.amplitude));
+            }
+        }
+        merges.extend(least.map(|(_, at)| at));
+        merges
+    }
+
+    /// Where the curve turns back and then passes on to amplitudes that it has not had.
+    fn turns(&self) -> Vec<Turn> {
+        let mut turns = Vec::new();
+        let (mut least, mut up): (f64, Option<f64>) = (f64::INFINITY, None);
+        for arc in &self.arcs {
+            let a = arc.amplitude;
+            if a > least {
+                up = Some(up.map_or(a, |up| up.max(a)));
+            } else {
+                let turn = up.take().map(|up| Turn { at: least, up });
+                turns.extend(turn.filter(|turn| turn.up > (1.0 + TREMOR) * turn.at));
+                least = a;
+            }
+        }
+        turns
     }
 }
 
-fn point(system: &System, (amplitude, state): &(f64, ModeState)) -> ModePoint {
+/// Over a kink that no step passes, or off a curve that does not come back, by solving at a smaller amplitude for the same shape.
+fn leap(equations: &mut ModeEquations<'_>, now: &ModeArc) -> Option<ModeArc> {
+    LEAPS.iter().find_map(|part| {
+        let amplitude = now.amplitude * 10f64.powf(-part);
+        let state = equations.solve(&now.state, now.amplitude, amplitude)?;
+        (equations.assurance(&now.state, &state) >= SHAPE).then(|| equations.begin(&state, amplitude))?
+    })
+}
+
+fn point(equations: &ModeEquations<'_>, amplitude: f64, state: &ModeState) -> ModePoint {
     ModePoint {
-        amplitude: *amplitude,
+        amplitude,
         omega: state.omega,
         damping: state.damping,
-        places: (0..system.dofs()).map(|i| state.x[i].norm()).collect(),
+        viscous: equations.viscous(state),
+        places: equations.amplitudes(state),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::{Method, event_driven::EventDriven};
+    use crate::model::{Force, templates};
+    use num_complex::Complex64;
+    use std::f64::consts::PI;
+
+    /// What the energy of an exact orbit and the amplitudes of its places may differ by from a mode with 31 harmonics: rigid friction makes
+    /// the error of a series fall as 1/H, and a motion close to where two modes become one magnifies it.
+    const SERIES: f64 = 0.02;
+
+    /// A mode is the forced vibration under the forces `2 ζ ω M x'`, all harmonics of them. The exact method, which knows nothing of modes,
+    /// finds the mode's amplitudes and its loss of energy `2 π ζ ω² Σ h² Xₕᴴ M Xₕ` under these forces. With positive damping its orbit is the
+    /// only one.
+    #[test]
+    fn the_exact_orbit_under_the_forces_of_a_mode_is_the_mode() {
+        let couple = templates::find("blade-couple").unwrap().model_with(&[("Ft", 8.0)]).unwrap();
+        let system = couple.assemble().unwrap();
+        let mut equations = ModeEquations::new(&system, 31, 1024).unwrap();
+        let mut slipping = 0;
+        for index in [0, 1] {
+            let path = Path::follow(&mut equations, index, 1e-4);
+            for amplitude in [2e-2, 8e-3, 1e-3, 3.5e-4] {
+                let state = path.at(&mut equations, amplitude).unwrap();
+                let n = system.dofs();
+                let mut model = couple.clone();
+                model.forces.clear();
+                let mut inertia = 0.0;
+                for (k, harmonic) in (1..=31u32).step_by(2).enumerate() {
+                    let x = &state.x[k * n..(k + 1) * n];
+                    let h = f64::from(harmonic);
+                    for (i, place) in system.places.iter().enumerate() {
+                        let moved = x[i] * system.mass[(i, i)];
+                        inertia += h * h * (x[i].conj() * moved).re;
+                        let force = moved * Complex64::new(0.0, 2.0 * state.damping * h * state.omega * state.omega);
+                        let (amplitude, phase) = force.to_polar();
+                        model.forces.push(Force { on: place.clone(), amplitude, phase, harmonic });
+                    }
+                }
+                let forced = model.assemble().unwrap();
+                let orbit = EventDriven.solver(&forced).unwrap().orbit(state.omega, None).unwrap();
+                let lost = 2.0 * PI * state.damping * state.omega * state.omega * inertia;
+                let found = orbit.energy.friction + orbit.energy.viscous;
+                assert!((found / lost - 1.0).abs() < SERIES, "{index} {amplitude}: {found} J, {lost} J");
+                let largest = state.x[..n].iter().fold(0.0, |m: f64, x| m.max(x.norm()));
+                for (i, place) in orbit.places.iter().enumerate() {
+                    let apart = (place.first_harmonic - state.x[i]).norm();
+                    assert!(
+                        apart < SERIES * largest,
+                        "{index} {amplitude} {i}: {:?} {:?}",
+                        place.first_harmonic,
+                        state.x[i]
+                    );
+                }
+                slipping += usize::from(orbit.energy.friction > 0.1 * orbit.energy.viscous);
+            }
+        }
+        assert!(slipping >= 5, "{slipping}");
     }
 }

@@ -1,14 +1,14 @@
 //! Nonlinear modes: frequency and equivalent damping over amplitude.
 
 use super::{Complaint, HARMONICS, Kind, SERIES_SAMPLES, check_samples};
-use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, largest, numbers};
+use crate::dataset::{Axis, Figure, Panel, Series, Values as Cells};
+use crate::drawing::{Drawing, display_unit, largest, numbers};
+use crate::note::Note;
 use crate::rows::Rows;
 use crate::schema::{Key, Takes, Within, default, required};
-use crate::values::Values;
+use crate::values::{Values, hertz};
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
-use std::f64::consts::TAU;
-use stickslip::curve::modes::{Mode, ModeRequest, mode};
+use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
 use stickslip::model::Model;
@@ -43,7 +43,7 @@ pub(super) const KIND: Kind = Kind {
     // free vibration has no drive frequency: harmonic balance with an unknown frequency and damping is solved
     uses_method: false,
     adapts: false,
-    tables: &["modes"],
+    tables: &["modes", "modes_summary"],
     grain: |_| Grain::Case,
     compute,
     draw,
@@ -70,40 +70,124 @@ fn compute(work: &Work<'_>) -> Computed {
     let mode = follow(prepared).map_err(|error| (prepared.case.index, error))?;
     (work.context.finished)();
     let mut part = Part::default();
-    let lost = mode.lost.map(|a| format!("the mode was lost at the modal amplitude {a:.3e} m √kg; try more harmonics"));
-    part.count(|| prepared.case.label(), if lost.is_some() { "lost" } else { CONVERGED }, lost);
-    let mut rows = Rows::default();
+    let (status, reason) = judged(prepared, &mode);
+    part.count(|| place_of(prepared), status, reason);
+    part.notes.extend(remarks(prepared, &mode).into_iter().map(Note::Said));
+    let (mut rows, mut summary) = (Rows::default(), Rows::default());
+    let (mut stretch, mut before) = (1, f64::INFINITY);
     for point in &mode.points {
+        // the values jump where the curve turns
+        stretch += u64::from(mode.turns.iter().any(|turn| before < turn.at && turn.at <= point.amplitude));
+        before = point.amplitude;
         rows.varied(&prepared.case);
         rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
-        rows.number("frequency_Hz", point.omega / TAU);
+        rows.number("frequency_Hz", hertz(point.omega));
         rows.number("damping_ratio", point.damping);
         for (place, amplitude) in prepared.system.places.iter().zip(&point.places) {
             rows.number(&format!("{place}_amplitude_m"), *amplitude);
         }
+        rows.integer("stretch", stretch);
         rows.end();
     }
-    part.tables = vec![rows];
+    summary.varied(&prepared.case);
+    let end = |point: Option<&ModePoint>| point.map_or(f64::NAN, |point| hertz(point.omega));
+    summary.number("small_end_frequency_Hz", end(mode.points.first().filter(|_| mode.lost.is_none())));
+    summary.number("large_end_frequency_Hz", end(mode.points.last()));
+    let largest = mode.largest.as_ref();
+    summary.number("largest_damping_ratio", largest.map_or(f64::NAN, |point| point.damping));
+    summary.number("amplitude_there_m", largest.map_or(f64::NAN, |point| point.amplitude / unit(prepared)));
+    summary.number("frequency_there_Hz", end(largest));
+    summary.end();
+    part.tables = vec![rows, summary];
     Ok(part)
+}
+
+/// Index of the mode, from 0.
+fn number(prepared: &Prepared) -> usize {
+    prepared.case.values.count("mode").unwrap_or(1) as usize - 1
+}
+
+/// Modal amplitude of a unit displacement of the place that moves most, m √kg per m.
+fn unit(prepared: &Prepared) -> f64 {
+    prepared.system.modal_unit(number(prepared))
 }
 
 fn follow(prepared: &Prepared) -> Result<Mode, MethodError> {
     let values = &prepared.case.values;
     let range = values.table("amplitude");
-    let end = |key: &str| range.and_then(|t| t.quantity(key)).unwrap_or(0.0);
-    let number = values.count("mode").unwrap_or(1) as usize - 1;
-    // modal amplitude of a unit displacement of the place that moves most
-    let unit = prepared.system.modal_unit(number);
+    let unit = unit(prepared);
+    let end = |key: &str| range.and_then(|t| t.quantity(key)).unwrap_or(0.0) * unit;
     mode(
         &prepared.system,
         ModeRequest {
-            mode: number,
-            range: (end("from") * unit, end("to") * unit),
+            mode: number(prepared),
+            range: (end("from"), end("to")),
             points: range.and_then(|t| t.count("points")).unwrap_or(61) as usize,
             harmonics: values.count("harmonics").unwrap_or(HARMONICS) as usize,
             samples: values.count("samples").unwrap_or(SERIES_SAMPLES) as usize,
         },
     )
+}
+
+/// The mode and its parameters in words.
+fn place_of(prepared: &Prepared) -> String {
+    let (mode, label) = (format!("mode {}", number(prepared) + 1), prepared.case.label());
+    if label.is_empty() { mode } else { format!("{label}, {mode}") }
+}
+
+/// A modal amplitude in words, as the study file gives it: the amplitude of the place that moves most.
+fn amplitude(prepared: &Prepared, modal: f64) -> String {
+    let si = modal / unit(prepared);
+    let (name, factor) = display_unit(si, "m");
+    format!("{:.3} {name}", si * factor)
+}
+
+/// The status of a mode, and what is missing or in doubt.
+fn judged(prepared: &Prepared, mode: &Mode) -> (&'static str, Option<String>) {
+    let words = |modal: f64| amplitude(prepared, modal);
+    if let Some(lost) = mode.lost {
+        let from = if lost.at.is_finite() { format!("lost at {}: ", words(lost.at)) } else { String::new() };
+        return ("lost", Some(format!("{from}{}", lost.reason)));
+    }
+    if let Some(at) = mode.missing.first() {
+        let more = mode.missing.len() - 1;
+        let others = if more == 0 { String::new() } else { format!(" and {more} more amplitudes") };
+        return ("incomplete", Some(format!("no motion found at {}{others}; try more harmonics", words(*at))));
+    }
+    if let Some(at) = mode.merges.first() {
+        let reason = format!(
+            "at {} it nearly becomes one with another mode: which of both goes on to which motion below is decided by \
+             little, by the number of harmonics for example; compare another number, and the other mode",
+            words(*at)
+        );
+        return ("merging", Some(reason));
+    }
+    (CONVERGED, None)
+}
+
+/// Damping ratio of the joints, absolute, up to which none of them slips: solutions are good to 1e-11.
+const SLIPS: f64 = 1e-9;
+
+/// What the reader must know of a mode that was followed.
+fn remarks(prepared: &Prepared, mode: &Mode) -> Vec<String> {
+    let place = place_of(prepared);
+    let mut remarks: Vec<String> = mode
+        .turns
+        .iter()
+        .map(|turn| {
+            format!(
+                "{place}: the curve turns at {} and goes back to {} before it falls for good; between them there are several \
+                 motions, and below the first the values jump.",
+                amplitude(prepared, turn.at),
+                amplitude(prepared, turn.up)
+            )
+        })
+        .collect();
+    let joints = mode.points.iter().chain(&mode.largest).map(|point| (point.damping - point.viscous).abs());
+    if !mode.points.is_empty() && joints.fold(0.0, f64::max) < SLIPS {
+        remarks.push(format!("{place}: no joint slips between these amplitudes; the joints add no damping."));
+    }
+    remarks
 }
 
 /// Of every case the place that moves most at the largest amplitude.
@@ -112,6 +196,10 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let column = |place: &String| format!("{place}_amplitude_m");
     let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, system.places.iter().map(column)), "m");
     let stretches = drawing.stretches(table);
+    let parts = match table.columns.iter().find(|column| column.name == "stretch").map(|column| &column.values) {
+        Some(Cells::Integer(parts)) => parts.clone(),
+        _ => vec![1; table.rows()],
+    };
     let panel = |quantity: &str, unit_of: &str, read: &str, scale: f64| Panel {
         title: String::new(),
         x: x_axis.clone().log(),
@@ -119,16 +207,23 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         series: stretches
             .iter()
             .enumerate()
-            .filter_map(|(colour, stretch)| {
+            .flat_map(|(colour, stretch)| {
                 let at_last = |place: &&String| numbers(table, &column(place), stretch.rows.clone()).last().copied();
-                let widest = system
-                    .places
-                    .iter()
-                    .max_by(|a, b| at_last(a).unwrap_or(0.0).total_cmp(&at_last(b).unwrap_or(0.0)))?;
+                let moves = |place: &&String| at_last(place).unwrap_or(0.0);
+                let Some(widest) = system.places.iter().max_by(|a, b| moves(a).total_cmp(&moves(b))) else {
+                    return Vec::new();
+                };
                 let label = if stretch.varied.is_empty() { widest.clone() } else { stretch.label() };
-                let x = numbers(table, &column(widest), stretch.rows.clone()).iter().map(|x| x * factor).collect();
-                let y = numbers(table, read, stretch.rows.clone()).iter().map(|y| y * scale).collect();
-                Some(Series::line(label, x, y, colour))
+                let mut from = stretch.rows.start;
+                // the line is interrupted where the curve turns
+                let lines = parts[stretch.rows.clone()].chunk_by(|a, b| a == b).map(|part| {
+                    let rows = from..from + part.len();
+                    from = rows.end;
+                    let x = numbers(table, &column(widest), rows.clone()).iter().map(|x| x * factor).collect();
+                    let y = numbers(table, read, rows).iter().map(|y| y * scale).collect();
+                    Series::line(label.clone(), x, y, colour)
+                });
+                lines.collect()
             })
             .collect(),
     };

@@ -11,6 +11,7 @@
 //! it has no others. The error of a solution is estimated from a second one with twice the harmonics.
 //! Source: Krack and Gross, "Harmonic Balance for Nonlinear Vibration Problems" (2019); Cameron and Griffin (1989).
 
+mod arc;
 mod branch;
 mod equations;
 mod joints;
@@ -26,11 +27,12 @@ use super::{Method, MethodError, MethodInfo, MethodOption, Options, OrbitError, 
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::Orbit;
+pub(crate) use arc::ModeArc;
 pub(crate) use branch::BranchEquations;
 use equations::{Level, Motion};
 use joints::{Coordinate, Element};
 use judge::Judge;
-pub(crate) use mode::{ModeEquations, ModeState};
+pub(crate) use mode::{LinearMode, ModeEquations, ModeState};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use rest::Rest;

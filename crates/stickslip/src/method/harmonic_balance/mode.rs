@@ -18,11 +18,11 @@ use stickslip_numerics::dense;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Newton iterations at one amplitude; 2 to 10 are usual.
-const ITERATIONS: usize = 60;
+pub(super) const ITERATIONS: usize = 60;
 /// Residual relative to the elastic forces, and to the slip limits, at which a motion counts as periodic.
-const SOLVED: f64 = 1e-11;
+pub(super) const SOLVED: f64 = 1e-11;
 /// The same where rounding lets Newton's method come no closer: a stiff joint between soft springs loses three digits.
-const ROUNDED: f64 = 1e-8;
+pub(super) const ROUNDED: f64 = 1e-8;
 
 /// A point of a nonlinear mode.
 #[derive(Debug, Clone)]
@@ -37,34 +37,45 @@ pub(crate) struct ModeState {
 
 /// The equations.
 pub(crate) struct ModeEquations<'a> {
-    system: &'a System,
+    pub(super) system: &'a System,
     /// Sliders behind springs.
-    elastic: Vec<Coordinate>,
-    contacts: Vec<Contact>,
-    alternation: Alternation,
+    pub(super) elastic: Vec<Coordinate>,
+    pub(super) contacts: Vec<Contact>,
+    pub(super) alternation: Alternation,
 }
 
 /// A law of velocity along the direction `w` of its joint, behind a spring of compliance `series` (m/N, zero without one).
-struct Contact {
-    law: Velocity,
+pub(super) struct Contact {
+    pub law: Velocity,
     w: DVector<f64>,
     series: f64,
 }
 
 /// Share of the joints' stiffness that tells the equal modes of a structure without joints apart.
 const TRACE: f64 = 1e-9;
+/// Distance of the squares of two frequencies, relative, up to which modes count as equal: well above [`TRACE`].
+const EQUAL: f64 = 1e-7;
+/// Steps of the eigenvalue iteration; two or three for each mode are usual.
+const EIGEN_STEPS: usize = 10_000;
+
+/// A linear mode of the structure without its joints.
+#[derive(Debug, Clone)]
+pub(crate) struct LinearMode {
+    /// Square of the frequency, (rad/s)².
+    pub square: f64,
+    /// Shape φ with φᵀ M φ = 1, 1/√kg.
+    pub shape: DVector<f64>,
+}
 
 impl<'a> ModeEquations<'a> {
     /// # Errors
-    /// A law with several directions, a place without mass, a mass matrix that is not diagonal.
+    /// A law with several directions, a place without mass, a mass matrix that is not positive definite.
     pub fn new(system: &'a System, harmonics: usize, samples: usize) -> Result<Self, MethodError> {
         if let Some(massless) = (0..system.dofs()).find(|&i| system.mass[(i, i)] == 0.0) {
             return Err(MethodError::NeedsMass { method: super::NAME, place: system.places[massless].clone() });
         }
-        let n = system.dofs();
-        if (0..n).any(|i| (0..n).any(|k| i != k && system.mass[(i, k)] != 0.0)) {
-            // the modal amplitude and the first shape are made for single masses
-            return Err(MethodError::NotPositive { method: super::NAME, matrix: "diagonal mass" });
+        if system.mass.clone().cholesky().is_none() {
+            return Err(MethodError::NotPositive { method: super::NAME, matrix: "mass" });
         }
         let (mut elastic, mut contacts) = (Vec::new(), Vec::new());
         for coordinate in coordinates(system)? {
@@ -81,9 +92,8 @@ impl<'a> ModeEquations<'a> {
         Ok(ModeEquations { system, elastic, contacts, alternation })
     }
 
-    /// The linear mode number `index` (by rising frequency) of the structure without its joints, at amplitude `a`; forces along laws of
-    /// velocity are zero. `None` if there is no such mode.
-    pub fn linear(&self, index: usize, a: f64) -> Option<ModeState> {
+    /// The linear modes of the structure without its joints, by rising frequency.
+    pub fn linear_modes(&self) -> Vec<LinearMode> {
         let n = self.system.dofs();
         let mut stiffness = self.system.stiffness.clone();
         // a trace of the joints stays, so that equal blades move with or against each other as the joints make them
@@ -98,31 +108,107 @@ impl<'a> ModeEquations<'a> {
             let kt = if *series > 0.0 { 1.0 / series } else { self.system.stiffness.amax() };
             stiffness += w * w.transpose() * (TRACE * kt);
         }
-        let scale: Vec<f64> = (0..n).map(|i| 1.0 / self.system.mass[(i, i)].sqrt()).collect();
-        let normal = DMatrix::from_fn(n, n, |i, k| scale[i] * stiffness[(i, k)] * scale[k]);
-        let eigen = normal.symmetric_eigen();
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|&i, &k| eigen.eigenvalues[i].total_cmp(&eigen.eigenvalues[k]));
-        let &column = order.get(index)?;
-        let omega = eigen.eigenvalues[column].max(0.0).sqrt();
-        let nh = self.alternation.harmonics.len();
+        let Some(factor) = self.system.mass.clone().cholesky() else { return Vec::new() };
+        let lower = factor.l();
+        let Some(inverse) = lower.solve_lower_triangular(&DMatrix::identity(n, n)) else { return Vec::new() };
+        let Some(eigen) = (&inverse * stiffness * inverse.transpose()).try_symmetric_eigen(f64::EPSILON, EIGEN_STEPS)
+        else {
+            return Vec::new();
+        };
+        let shapes = inverse.transpose() * eigen.eigenvectors;
+        let mut modes: Vec<LinearMode> = (0..n)
+            .map(|k| LinearMode { square: eigen.eigenvalues[k].max(0.0), shape: shapes.column(k).into_owned() })
+            .collect();
+        modes.sort_by(|a, b| a.square.total_cmp(&b.square));
+        modes
+    }
+
+    /// A linear mode at amplitude `a`; forces along laws of velocity are zero. `None` if it has no frequency.
+    pub fn linear(&self, mode: &LinearMode, a: f64) -> Option<ModeState> {
+        let (n, nh) = (self.system.dofs(), self.alternation.harmonics.len());
+        let omega = mode.square.sqrt();
         let mut x = vec![ZERO; nh * n];
         for i in 0..n {
-            x[i].re = a * scale[i] * eigen.eigenvectors[(i, column)];
+            x[i].re = a * mode.shape[i];
         }
-        let phi: Vec<f64> = (0..n).map(|i| x[i].re).collect();
-        let mut lost = 0.0;
+        let lost = mode.shape.dot(&(&self.system.damping * &mode.shape));
+        let force = vec![ZERO; nh * self.contacts.len()];
+        (omega > 0.0).then(|| ModeState { x, force, omega, damping: lost / (2.0 * omega) })
+    }
+
+    /// Modal assurance of two motions: how much of one first harmonic is in the other, in the mass inner product, from 0 to 1.
+    pub fn assurance(&self, one: &ModeState, other: &ModeState) -> f64 {
+        let (mut cross, mut squares) = (ZERO, [0.0; 2]);
+        let n = self.system.dofs();
         for i in 0..n {
-            for k in 0..n {
-                lost += phi[i] * self.system.damping[(i, k)] * phi[k];
+            for l in 0..n {
+                let m = self.system.mass[(i, l)];
+                cross += one.x[i].conj() * other.x[l] * m;
+                squares[0] += (one.x[i].conj() * one.x[l]).re * m;
+                squares[1] += (other.x[i].conj() * other.x[l]).re * m;
             }
         }
-        let force = vec![ZERO; nh * self.contacts.len()];
-        (omega > 0.0).then(|| ModeState { x, force, omega, damping: lost / (2.0 * omega * a * a) })
+        cross.norm_sqr() / (squares[0] * squares[1])
+    }
+
+    /// The share of the viscous dampers in the damping ratio: what they lose in a cycle, against what `2 ζ ω M` puts in for ζ = 1.
+    pub fn viscous(&self, state: &ModeState) -> f64 {
+        let (n, mut lost, mut whole) = (self.system.dofs(), 0.0, 0.0);
+        for (k, &h) in self.alternation.harmonics.iter().enumerate() {
+            for i in 0..n {
+                for l in 0..n {
+                    let pair = (state.x[k * n + i].conj() * state.x[k * n + l]).re * (h * h) as f64;
+                    lost += pair * self.system.damping[(i, l)];
+                    whole += pair * self.system.mass[(i, l)];
+                }
+            }
+        }
+        lost / (2.0 * state.omega * whole)
+    }
+
+    /// Amplitude of the first harmonic of every place, m.
+    pub fn amplitudes(&self, state: &ModeState) -> Vec<f64> {
+        (0..self.system.dofs()).map(|i| state.x[i].norm()).collect()
+    }
+
+    /// How real the shape is: `|X₁ᵀ M X₁| / X₁ᴴ M X₁`, one if all places move in phase or against each other. Where two modes of the symmetric
+    /// complex eigenvalue problem that the first harmonic solves become one, it is zero: their shape is orthogonal to itself.
+    /// Source: Heiss (2012), "The physics of exceptional points".
+    pub fn rigidity(&self, state: &ModeState) -> f64 {
+        let (mut transposed, mut adjoint) = (ZERO, 0.0);
+        for i in 0..self.system.dofs() {
+            for l in 0..self.system.dofs() {
+                let m = self.system.mass[(i, l)];
+                transposed += state.x[i] * state.x[l] * m;
+                adjoint += (state.x[i].conj() * state.x[l]).re * m;
+            }
+        }
+        transposed.norm() / adjoint
+    }
+
+    /// Modal amplitude, m √kg, from which on the first harmonic of friction is at most a share of the forces of inertia of the linear mode
+    /// `index`, and of what distinguishes it from every other mode.
+    pub fn faint(&self, modes: &[LinearMode], index: usize, share: f64, apart: f64) -> f64 {
+        let Some(mode) = modes.get(index) else { return 0.0 };
+        let mut forces: Vec<(DVector<f64>, f64)> = Vec::new();
+        for coordinate in &self.elastic {
+            if let Element::Springs(springs) = &coordinate.element {
+                let w = self.system.joints[coordinate.joint].direction.column(0).into_owned();
+                forces.push((w, springs.iter().map(|spring| spring.limit).sum()));
+            }
+        }
+        forces.extend(self.contacts.iter().map(|contact| (contact.w.clone(), contact.law.limit)));
+        let onto = |shape: &DVector<f64>| -> f64 { forces.iter().map(|(w, limit)| limit * w.dot(shape).abs()).sum() };
+        let own = onto(&mode.shape) / (share * mode.square);
+        let others = modes.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, other)| {
+            let gap = (other.square - mode.square).abs();
+            if gap <= EQUAL * mode.square { 0.0 } else { onto(&other.shape) / (apart * gap) }
+        });
+        4.0 / std::f64::consts::PI * others.fold(own, f64::max)
     }
 
     /// Unknowns: real and imaginary parts of motions and forces, ω and ζ.
-    fn size(&self) -> usize {
+    pub(super) fn size(&self) -> usize {
         2 * self.alternation.harmonics.len() * (self.system.dofs() + self.contacts.len()) + 2
     }
 
@@ -142,7 +228,7 @@ impl<'a> ModeEquations<'a> {
     }
 
     /// Residual at `state` for amplitude `a`, and its derivative. The phase of the motion is that of `start`.
-    fn evaluate(
+    pub(super) fn evaluate(
         &mut self,
         state: &ModeState,
         (start, a): (&ModeState, f64),
@@ -198,15 +284,19 @@ impl<'a> ModeEquations<'a> {
         // may stand still when they stick
         let (mut square, mut turned, last) = (0.0, 0.0, size - 2);
         for i in 0..n {
-            let m = self.system.mass[(i, i)] / (a * a);
-            let (x, before) = (state.x[i], start.x[i]);
-            square += m * x.norm_sqr();
-            turned += m * (before.conj() * x).im;
+            let (mut x, mut before) = (ZERO, ZERO);
+            for l in 0..n {
+                let m = self.system.mass[(i, l)] / (a * a);
+                x += state.x[l] * m;
+                before += start.x[l] * m;
+            }
+            square += (state.x[i].conj() * x).re;
+            turned += (before.conj() * state.x[i]).im;
             if let Some(jacobian) = jacobian.as_deref_mut() {
-                jacobian[last * size + 2 * i] = 2.0 * m * x.re;
-                jacobian[last * size + 2 * i + 1] = 2.0 * m * x.im;
-                jacobian[(last + 1) * size + 2 * i] = -m * before.im;
-                jacobian[(last + 1) * size + 2 * i + 1] = m * before.re;
+                jacobian[last * size + 2 * i] = 2.0 * x.re;
+                jacobian[last * size + 2 * i + 1] = 2.0 * x.im;
+                jacobian[(last + 1) * size + 2 * i] = -before.im;
+                jacobian[(last + 1) * size + 2 * i + 1] = before.re;
             }
         }
         residual[last] = square - 1.0;
@@ -300,22 +390,27 @@ impl<'a> ModeEquations<'a> {
         }
     }
 
+    /// Units of the residual: elastic forces, slip limits; amplitude and phase are relative.
+    pub(super) fn units(&self, start: &ModeState, a: f64) -> Vec<f64> {
+        let stiffness = self.system.stiffness.amax().max(start.omega * start.omega * self.system.mass.amax());
+        let mut scale = vec![(stiffness * a).max(f64::MIN_POSITIVE); 2 * start.x.len()];
+        let width = 2 * self.alternation.harmonics.len();
+        scale.extend(self.contacts.iter().flat_map(|contact| vec![contact.law.limit; width]));
+        scale.extend([1.0; 2]);
+        scale
+    }
+
     /// Solves at amplitude `a` from `start`, whose motion is scaled to it; forces along laws of velocity stay, as in slip.
     ///
     /// Newton's method as in forced vibration: the longest of the halved steps that comes closer, and where none does the whole one, which
     /// may lead out of a set of slipping samples that repeats, and over the amplitude at which two modes become one.
     pub fn solve(&mut self, start: &ModeState, before: f64, a: f64) -> Option<ModeState> {
         let size = self.size();
-        let (nh, motions) = (self.alternation.harmonics.len(), start.x.len());
         let mut start = start.clone();
         start.x.iter_mut().for_each(|x| *x *= a / before);
         let mut state = start.clone();
         let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * size]);
-        let stiffness = self.system.stiffness.amax().max(start.omega * start.omega * self.system.mass.amax());
-        // elastic forces, slip limits; amplitude and phase are relative
-        let mut scale = vec![(stiffness * a).max(f64::MIN_POSITIVE); 2 * motions];
-        scale.extend(self.contacts.iter().flat_map(|contact| vec![contact.law.limit; 2 * nh]));
-        scale.extend([1.0; 2]);
+        let scale = self.units(&start, a);
         let norm = |r: &[f64]| r.iter().zip(&scale).map(|(r, s)| (r / s) * (r / s)).sum::<f64>().sqrt();
         self.evaluate(&state, (&start, a), &mut residual, Some(&mut jacobian));
         let mut now = norm(&residual);
@@ -397,7 +492,7 @@ mod tests {
     fn the_derivative_agrees_with_differences() {
         let system = mixed();
         let mut equations = ModeEquations::new(&system, 5, 512).unwrap();
-        let start = equations.linear(1, 1.0).unwrap();
+        let start = equations.linear(&equations.linear_modes()[1], 1.0).unwrap();
         let mut state = start.clone();
         for (i, value) in state.x.iter_mut().chain(&mut state.force).enumerate() {
             *value += Complex64::from_polar(0.3 / (1.0 + (i / 5) as f64), 1.7 * i as f64);

@@ -12,7 +12,7 @@ const ITERATIONS: usize = 60;
 /// Halvings of a step.
 pub(super) const HALVINGS: usize = 7;
 /// Growth of the residual in a whole step beyond which the search is lost.
-const GROWS: f64 = 100.0;
+pub(super) const GROWS: f64 = 100.0;
 /// Share of its length by which a step has to shorten the residual.
 pub(super) const SHORTENS: f64 = 1e-3;
 /// Shares of the penalty that are tried first if Newton's method fails with the whole.
