@@ -7,6 +7,7 @@ pub mod dataset;
 mod document;
 mod error;
 pub mod expression;
+mod immovable;
 pub mod kinds;
 mod near;
 mod read;
