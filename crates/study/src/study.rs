@@ -491,7 +491,7 @@ impl Study {
             problems.push(self.model_problem(&error, &model));
             return None;
         }
-        let lowest = values.frequencies("frequency").and_then(|f| f.iter().reduce(f64::min));
+        let lowest = values.frequencies("frequency").and_then(Frequencies::lowest);
         if let Some(error) = lowest.and_then(|omega| immovable(&model, omega)) {
             problems.push(self.model_problem(&error, &model));
             return None;
