@@ -246,11 +246,12 @@ fn every_method_fills_the_table() {
 fn interrupted(folder: &Path, signal: &str) -> Output {
     let child = std::process::Command::new(assert_cmd::cargo::cargo_bin("stickslip"))
         .current_dir(folder)
-        .args(["run", "study.toml", "--only", "csv,json"])
+        .args(["run", "study.toml", "--only", "csv,json", "--threads", "1"])
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(1500));
+    // on one thread the run takes half a minute, and it has begun by now also where the machine is busy
+    std::thread::sleep(std::time::Duration::from_secs(3));
     let kill = std::process::Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
     assert!(kill.success());
     child.wait_with_output().unwrap()

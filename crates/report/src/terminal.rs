@@ -139,11 +139,13 @@ fn duration(seconds: f64) -> String {
 }
 
 /// Units at the end of a column's name, with the prefix chosen for the size of its values.
-const UNITS: [(&str, &str); 12] = [
+const UNITS: [(&str, &str); 14] = [
     ("_N_per_m", "N/m"),
     ("_kg_per_s", "kg/s"),
     ("_rad_per_s", "rad/s"),
     ("_m_per_s", "m/s"),
+    ("_s_per_m", "s/m"),
+    ("_Hz_per_s", "Hz/s"),
     ("_Hz", "Hz"),
     ("_deg", "°"),
     ("_kg", "kg"),
@@ -354,6 +356,15 @@ results/fig02/: loops_summary.csv, figure.svg
         assert_eq!(lines[at + 2], "      them by up to 3 %.");
         assert!(lines.iter().all(|l| l.chars().count() <= 50), "{text}");
         assert!(Terminal::default().text(&dataset, &[]).contains(&format!("note: {note}\n")));
+    }
+
+    #[test]
+    fn every_unit_of_a_parameter_is_read() {
+        for (name, heading) in
+            [("alpha_s_per_m", "alpha (s/m)"), ("v_m_per_s", "v (m/s)"), ("rate_Hz_per_s", "rate (Hz/s)"), ("n", "n")]
+        {
+            assert_eq!(column(name, &Values::Number(vec![2.0])).0, heading);
+        }
     }
 
     #[test]

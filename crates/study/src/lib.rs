@@ -9,6 +9,7 @@ mod drawing;
 mod error;
 pub mod expression;
 mod extra;
+mod immovable;
 pub mod kinds;
 mod near;
 mod note;

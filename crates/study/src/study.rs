@@ -2,6 +2,7 @@
 
 use crate::error::{Place, Problem, Source, StudyError};
 use crate::expression::{Value, displayed};
+use crate::immovable::immovable;
 use crate::kinds::{Complaint, Kind};
 use crate::near::{nearest, one_of, shown};
 use crate::read::{in_dimension, settled};
@@ -538,6 +539,11 @@ impl Study {
         if (index == 0 || !numbers_hold(&model))
             && let Err(error) = model.assemble()
         {
+            problems.push(self.model_problem(&error, &model));
+            return None;
+        }
+        let lowest = values.frequencies("frequency").and_then(Frequencies::lowest);
+        if let Some(error) = lowest.and_then(|omega| immovable(&model, omega)) {
             problems.push(self.model_problem(&error, &model));
             return None;
         }

@@ -4,6 +4,7 @@ use crate::expression::displayed;
 use crate::units;
 use serde_json::{Map, Value as Json, json};
 use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
 use stickslip::curve::adaptive;
 use stickslip::dimension::Dimension;
 use stickslip::law::Law;
@@ -33,11 +34,35 @@ pub(crate) fn in_table_unit(si: f64, dimension: Dimension) -> f64 {
         Dimension::ANGLE => "deg",
         _ => return si,
     };
+    if unit == "Hz" {
+        let near = decimal(si / TAU, decimals(si / TAU));
+        if let Some(near) = near.filter(|near| radians(*near) == si) {
+            return near;
+        }
+    }
     let Some(unit) = units::find(unit).filter(|_| si.is_finite()) else { return si };
     let near = si / unit.scale("1");
     // 17 digits tell any two numbers apart; 15 are what a double keeps of any decimal number
     let typed = (15..=17).map(|digits| format!("{near:.*e}", digits - 1)).find(|text| unit.scale_signed(text) == si);
     typed.and_then(|text| text.parse().ok()).unwrap_or(near)
+}
+
+/// Cycles as radians, with the rounding that a study file's `Hz` has.
+fn radians(cycles: f64) -> f64 {
+    2.0 * cycles * PI
+}
+
+/// Decimals after the point of a number of this size that has 15 digits, as many as a double keeps of any decimal number.
+fn decimals(size: f64) -> i32 {
+    14i32.saturating_sub(size.abs().log10().floor() as i32) // of zero the logarithm is infinite
+}
+
+/// The decimal number with so many decimals that is nearest to `value`; `None` where it takes more than one rounding.
+fn decimal(value: f64, decimals: i32) -> Option<f64> {
+    // these powers of ten, and whole numbers of 15 digits, are exact: the quotient is the double nearest to the decimal number
+    let power = (0..=22).contains(&decimals).then(|| 10f64.powi(decimals))?;
+    let whole = (value * power).round();
+    (whole.abs() <= 1e15).then(|| whole / power)
 }
 
 /// A frequency in rad/s as the hertz that a user would have typed for it, see the tables' column `frequency_Hz`.
@@ -115,6 +140,14 @@ impl Frequencies {
         self.get(index).map(hertz)
     }
 
+    /// The lowest, rad/s.
+    pub fn lowest(&self) -> Option<f64> {
+        match self {
+            Frequencies::List(list) => list.iter().copied().reduce(f64::min),
+            Frequencies::Range { from, to, .. } => Some(from.min(*to)),
+        }
+    }
+
     /// All of them, rad/s.
     pub fn iter(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.len()).filter_map(|index| self.get(index))
@@ -131,17 +164,17 @@ pub(crate) fn between(from: f64, to: f64, dimension: Option<Dimension>, index: u
     let (start, end) = (in_table_unit(from, dimension), in_table_unit(to, dimension));
     let value = start + (end - start) * (index as f64 / (points - 1) as f64);
     // 15 digits of the larger end: below the rounding of the sum, and beyond what anybody types
-    let digits = 14 - start.abs().max(end.abs()).log10().floor() as i32;
+    let digits = decimals(start.abs().max(end.abs()));
+    let cycles = matches!(dimension, Dimension::FREQUENCY | Dimension::SWEEP_RATE);
+    if let Some(value) = decimal(value, digits).filter(|_| dimension != Dimension::ANGLE) {
+        return if cycles { radians(value) } else { value };
+    }
     let decimal = match usize::try_from(digits) {
         Ok(digits @ ..=MOST_DECIMALS) => format!("{value:.digits$}"),
         _ => format!("{value:e}"),
     };
-    let unit = match dimension {
-        Dimension::FREQUENCY | Dimension::SWEEP_RATE => units::find("Hz"),
-        Dimension::ANGLE => units::find("deg"),
-        _ => None,
-    };
-    match unit {
+    let unit = if dimension == Dimension::ANGLE { "deg" } else { "Hz" };
+    match units::find(unit).filter(|_| cycles || dimension == Dimension::ANGLE) {
         Some(unit) => unit.scale_signed(&decimal),
         None => decimal.parse().unwrap_or(value),
     }
@@ -251,7 +284,6 @@ pub(crate) fn quantity_json(si: f64, dimension: Option<Dimension>) -> Json {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::TAU;
 
     #[test]
     fn a_range_has_exact_ends_and_costs_no_memory() {
@@ -277,6 +309,13 @@ mod tests {
             let si = units::find("deg").unwrap().scale_signed(text);
             assert_eq!(in_table_unit(si, Dimension::ANGLE), text.parse::<f64>().unwrap(), "{i}");
         }
+        // the short way and the unit agree bit by bit, also beyond the powers of ten that are exact
+        for i in 1..2_000 {
+            for text in [format!("{}", f64::from(i) / 40.0), format!("{i}e-20"), format!("{i}e30")] {
+                let typed: f64 = text.parse().unwrap();
+                assert_eq!((radians(typed), hertz(omega(&text))), (omega(&text), typed), "{text}");
+            }
+        }
         // what nobody typed in hertz is the quotient
         assert_eq!(hertz(760.0), 760.0 / TAU);
         assert!(hertz(f64::NAN).is_nan() && hertz(0.0) == 0.0);
@@ -292,6 +331,12 @@ mod tests {
             assert_eq!(range.hertz(i as usize), Some(typed));
             assert_eq!(range.get(i as usize), Some(typed * TAU), "typed alone it is the same frequency");
         }
+        // many of them take no time
+        let start = std::time::Instant::now();
+        let range = Frequencies::Range { from: 119.5 * TAU, to: 760.0, points: 100_000 };
+        let sum: f64 = range.iter().map(hertz).sum();
+        assert!((sum / 1e5 - 0.5 * (119.5 + 760.0 / TAU)).abs() < 1e-6, "{sum}");
+        assert!(start.elapsed().as_secs_f64() < 5.0, "{:?}", start.elapsed());
         // far from 1, through zero, and where the ends are no decimal numbers
         assert_eq!(between(1e-320, 3e-320, None, 1, 3), 2e-320);
         assert_eq!(between(1e300, 3e300, None, 1, 3), 2e300);

@@ -208,6 +208,31 @@ fn a_refusal_of_one_case_names_it() {
     assert_eq!(error.line(), Some(18), "{error}");
 }
 
+/// A stiffness beside which inertia is lost in double precision, `m Ω² < ε k`, stands for something rigid: it took seconds to minutes.
+#[test]
+fn masses_that_cannot_move_are_refused() {
+    let omega = 119.5 * std::f64::consts::TAU;
+    let most = 0.181_09 * omega * omega / f64::EPSILON;
+    let with = |stiffness: f64| read_study("a.toml", &EXAMPLE.replacen("\"k\"", &format!("{stiffness:e}"), 1), &[]);
+    assert!(with(0.99 * most).is_ok());
+    let error = with(1.01 * most).unwrap_err();
+    assert_eq!((error.line(), error.key()), (Some(25), Some("stiffness")), "{error}");
+    assert!(error.message().contains("`blade1` does not move at 119.5 Hz"), "{error}");
+    assert!(with(1e28).is_err());
+    // a joint, in one case of two
+    let law = "{ kind = \"jenkins\", limit = \"Ft\", stiffness = \"s\" }";
+    let text = EXAMPLE
+        .replace("{ kind = \"coulomb\", limit = \"Ft\" }", law)
+        .replace("b = \"0.2 kg/s\"", "b = \"0.2 kg/s\"\ns = \"1 N/mm\"")
+        .replace("vary = {", "vary = { s = [\"1e9 N/mm\", \"1e20 N/mm\"],");
+    let error = read_study("a.toml", &text, &[]).unwrap_err();
+    assert_eq!((error.line(), error.key()), (Some(39), Some("law")), "{error}");
+    assert!(error.message().contains("(s = 1e20 N/mm, Ft = 2 N, case 5 of 8)"), "{error}");
+    // one that carries nothing holds nothing
+    let text = text.replace("Ft = [\"2 N\", \"4 N\", \"6 N\", \"8 N\"]", "Ft = [\"0 N\"]");
+    assert!(read_study("a.toml", &text, &[]).is_ok());
+}
+
 /// An error that every case has is no matter of the first.
 #[test]
 fn an_error_of_all_cases_names_none() {
