@@ -5,7 +5,7 @@ use super::{Surveyed, range};
 use crate::error::{Problem, StudyError};
 use crate::study::{Case, Study};
 use std::f64::consts::TAU;
-use stickslip::law::RateLaw;
+use stickslip::law::{Law, RateLaw};
 use stickslip::model::System;
 
 /// Memory that a run may take unless it is told otherwise, bytes. What the machine has free may be less.
@@ -124,8 +124,12 @@ fn transient(case: &Case) -> (f64, f64) {
     (duration, step.filter(|step| *step > 0.0).map_or(0.0, |step| duration / step + 1.0))
 }
 
-/// Points of a branch for each of the steps that were asked for: it shortens them where it bends.
-const BRANCH_POINTS: f64 = 3.0;
+/// Points of a branch for each of the steps that were asked for: it shortens them where it bends. Measured: 3 to 15, and 109 for a ring of
+/// three whose branch turns at every border of stick.
+const BRANCH_POINTS: f64 = 5.0;
+/// Bytes of an orbit that is a series, per harmonic coefficient of a place or joint. Measured: 15 kB for the couple, 130 kB for 8 masses and
+/// joints, at 15 harmonics.
+const SERIES_ENTRY: f64 = 80.0;
 /// Panels of motions that are drawn.
 const PANELS: f64 = 12.0;
 
@@ -179,7 +183,7 @@ fn holds(study: &Study, surveyed: &Surveyed) -> Holds {
             let rows = branches(study, case) * steps(case) * BRANCH_POINTS;
             let table = Shape { rows, numbers: orbit_numbers, words: orbit_words };
             let harmonics = case.values.count("harmonics").unwrap_or(15) as f64;
-            let kept = rows * NUMBER * (2.0 * harmonics + 1.0) * (2.0 * n + 4.0 * counts.joints);
+            let kept = rows * SERIES_ENTRY * (2.0 * harmonics + 1.0) * (2.0 * n + 4.0 * counts.joints);
             Holds { tables: vec![table], drawn: rows * n, kept }
         }
         _ => {
@@ -299,8 +303,11 @@ const EVENT_DRIVEN: (f64, f64) = (2e-4, 3e-3);
 const EVENT_DRIVEN_SIZE: f64 = 16.0;
 /// Harmonic balance per mass and joint at 15 harmonics. Measured with springs before the sliders: 0.3 ms for the couple, 21 ms at 32 blades.
 const SERIES: f64 = 5e-4;
-/// Rigid sliders need more harmonics and more steps. Measured: 20 ms at 4 blades, 0.9 s at 32.
-const RIGID: f64 = 20.0;
+/// Rigid sliders and smooth laws need more harmonics and more steps: measured 20 ms at 4 blades, 0.9 s at 32. Where the harmonics are given
+/// they need more steps only.
+const HARD: f64 = 20.0;
+const HARD_RIGID: f64 = 3.0;
+const HARD_SMOOTH: f64 = 10.0;
 /// Harmonics of [`SERIES`].
 const SERIES_HARMONICS: f64 = 15.0;
 /// Shooting, times the square of masses and joints; more where the sliders have springs. Measured: 25 ms for two masses, 0.6 s for four.
@@ -316,8 +323,8 @@ const PERIOD: (f64, f64, f64) = (3e-4, 2.5e-4, 1.3e-3);
 const PEAK: f64 = 20.0;
 /// Steps of the search for an optimum.
 const OPTIMUM: f64 = 35.0;
-/// Solutions per point of a branch or of a mode: predictor, corrector, error estimate, stability.
-const FOLLOWED: f64 = 8.0;
+/// Solutions per point of a mode, and per step of a branch, which it shortens.
+const FOLLOWED: (f64, f64) = (8.0, 15.0);
 /// Joints up to which `auto` takes events.
 const AUTO: f64 = 12.0;
 
@@ -340,8 +347,8 @@ pub(super) fn seconds(study: &Study, surveyed: &Surveyed) -> f64 {
             let curves = study.cases() as f64 / study.varied_points().last().copied().unwrap_or(1).max(1) as f64;
             (counts.cases + curves * OPTIMUM) * (counts.frequencies + PEAK) * orbit
         }
-        "modes" => counts.cases * mode_points(case) * FOLLOWED * series,
-        "branch" => branches(study, case) * steps(case) * FOLLOWED * series,
+        "modes" => counts.cases * mode_points(case) * FOLLOWED.0 * series,
+        "branch" => branches(study, case) * steps(case) * FOLLOWED.1 * series,
         "response" if case.values.flag("peaks") != Some(false) && counts.frequencies > 2.0 => {
             (points + counts.cases * counts.n * PEAK) * orbit
         }
@@ -374,10 +381,14 @@ fn orbit(surveyed: &Surveyed, counts: &Counts) -> f64 {
 }
 
 fn series(system: &System, counts: &Counts, harmonics: Option<f64>) -> f64 {
-    let rigid = |law: &stickslip::law::Law| {
-        law.network().is_none_or(|branches| branches.iter().any(|branch| branch.stiffness.is_none()))
+    let rigid = |law: &Law| law.network().is_some_and(|all| all.iter().any(|branch| branch.stiffness.is_none()));
+    let any_rigid = system.joints.iter().any(|joint| rigid(&joint.law));
+    let factor = match (counts.smooth, any_rigid, harmonics) {
+        (false, false, _) => 1.0,
+        (_, _, None) => HARD,
+        (true, _, Some(_)) => HARD_SMOOTH,
+        (false, true, Some(_)) => HARD_RIGID,
     };
-    let factor = if system.joints.iter().any(|joint| rigid(&joint.law)) { RIGID } else { 1.0 };
     let length = (harmonics.unwrap_or(SERIES_HARMONICS) / SERIES_HARMONICS).max(1.0);
     SERIES * (counts.n + counts.joints).max(1.0) * factor * length * length
 }
