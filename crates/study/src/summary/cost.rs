@@ -1,5 +1,5 @@
-//! How much a study will hold and how long it will take, by counting: units of work, samples, columns; and by what each method was
-//! measured to need.
+//! How much a study will hold and how long it will take, by counting: units of work, samples, columns; and by what
+//! each method was measured to need.
 
 use super::{Surveyed, range};
 use crate::error::{Problem, StudyError};
@@ -33,8 +33,8 @@ const DRAWN: f64 = 240.0;
 /// Bytes of a case that waits to be computed, beside its matrices. Measured: 5.9 kB for seven elements.
 const CASE: f64 = 3_500.0;
 const CASE_ELEMENT: f64 = 250.0;
-/// Bytes of an orbit of an exact law, per entry of its state and per switch; and of a smooth law per entry. Measured: exact 8 kB for the
-/// couple and 170 kB for 8 masses and joints, smooth 80 kB and 600 kB.
+/// Bytes of an orbit of an exact law, per entry of its state and per switch; and of a smooth law per entry. Measured:
+/// exact 8 kB for the couple and 170 kB for 8 masses and joints, smooth 80 kB and 600 kB.
 const ORBIT_ENTRY: f64 = 500.0;
 const SMOOTH_ENTRY: f64 = 24_000.0;
 /// Samples of a motion are held whole until they are written, bytes per number and per sample.
@@ -95,7 +95,8 @@ impl Counts {
         (self.varied + 3.0 * self.n + 2.0 * self.joints + 6.0, 1.0)
     }
 
-    /// Columns of one instant: time and frequency, displacement and velocity of each mass, three of each joint and its contact.
+    /// Columns of one instant: time and frequency, displacement and velocity of each mass, three of each joint and its
+    /// contact.
     fn instant_columns(&self) -> (f64, f64) {
         (self.varied + 2.0 + 2.0 * self.n + 3.0 * self.joints, self.joints)
     }
@@ -124,11 +125,11 @@ fn transient(case: &Case) -> (f64, f64) {
     (duration, step.filter(|step| *step > 0.0).map_or(0.0, |step| duration / step + 1.0))
 }
 
-/// Points of a branch for each of the steps that were asked for: it shortens them where it bends. Measured: 3 to 15, and 109 for a ring of
-/// three whose branch turns at every border of stick.
+/// Points of a branch for each of the steps that were asked for: it shortens them where it bends. Measured: 3 to 15,
+/// and 109 for a ring of three whose branch turns at every border of stick.
 const BRANCH_POINTS: f64 = 5.0;
-/// Bytes of an orbit that is a series, per harmonic coefficient of a place or joint. Measured: 15 kB for the couple, 130 kB for 8 masses and
-/// joints, at 15 harmonics.
+/// Bytes of an orbit that is a series, per harmonic coefficient of a place or joint. Measured: 15 kB for the couple,
+/// 130 kB for 8 masses and joints, at 15 harmonics.
 const SERIES_ENTRY: f64 = 80.0;
 /// Panels of motions that are drawn.
 const PANELS: f64 = 12.0;
@@ -296,24 +297,27 @@ const OVERHEAD: f64 = 0.2;
 const CELL: f64 = 3e-7;
 /// Work on a point of a figure, s. Measured: 1 s for 800,000 in HTML, as much for SVG.
 const POINT: f64 = 3e-6;
-/// Event-driven: a closed form per segment, and a decomposition for each new pattern of stick and slip, whose number grows with the joints.
-/// Measured: 3 ms at 8 masses and joints, 40 ms at 16, 0.23 s at 24.
+/// Event-driven: a closed form per segment, and a decomposition for each new pattern of stick and slip, whose number
+/// grows with the joints. Measured: 3 ms at 8 masses and joints, 40 ms at 16, 0.23 s at 24.
 const EVENT_DRIVEN: (f64, f64) = (2e-4, 3e-3);
 /// Masses and joints of the second number.
 const EVENT_DRIVEN_SIZE: f64 = 16.0;
-/// Harmonic balance per mass and joint at 15 harmonics. Measured with springs before the sliders: 0.3 ms for the couple, 21 ms at 32 blades.
+/// Harmonic balance per mass and joint at 15 harmonics. Measured with springs before the sliders: 0.3 ms for the
+/// couple, 21 ms at 32 blades.
 const SERIES: f64 = 5e-4;
-/// Rigid sliders and smooth laws need more harmonics and more steps: measured 20 ms at 4 blades, 0.9 s at 32. Where the harmonics are given
-/// they need more steps only.
+/// Rigid sliders and smooth laws need more harmonics and more steps: measured 20 ms at 4 blades, 0.9 s at 32. Where
+/// the harmonics are given they need more steps only.
 const HARD: f64 = 20.0;
 const HARD_RIGID: f64 = 3.0;
 const HARD_SMOOTH: f64 = 10.0;
 /// Harmonics of [`SERIES`].
 const SERIES_HARMONICS: f64 = 15.0;
-/// Shooting, times the square of masses and joints; more where the sliders have springs. Measured: 25 ms for two masses, 0.6 s for four.
+/// Shooting, times the square of masses and joints; more where the sliders have springs. Measured: 25 ms for two
+/// masses, 0.6 s for four.
 const SHOOTING: (f64, f64) = (1e-3, 1.5e-2);
-/// Method `transient`: the periods in which a mode with the least damping loses a digit, times a share of these. Measured at a damping ratio of 7e-4:
-/// exact laws 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses; smooth laws 0.9 s and 8 s for 2 and 4.
+/// Method `transient`: the periods in which a mode with the least damping loses a digit, times a share of these.
+/// Measured at a damping ratio of 7e-4: exact laws 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses; smooth laws 0.9 s and 8 s
+/// for 2 and 4.
 const SETTLING: (f64, f64) = (0.1, 1.0);
 /// Fewest and most periods of it.
 const SETTLING_PERIODS: (f64, f64) = (20.0, 50_000.0);

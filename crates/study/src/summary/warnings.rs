@@ -115,7 +115,8 @@ fn used_parameters(study: &Study, first: &Surveyed) -> BTreeSet<usize> {
         }
         Structure::Template(row, table) => {
             from(table);
-            // a parameter of a template is used if the model changes with it; a law that is replaced takes its parameters away
+            // a parameter of a template is used if the model changes with it; a law that is replaced takes its
+            // parameters away
             let replaced = table.entry("law").and(first.case.model.joints.first()).map(|joint| joint.law);
             let values: Vec<(&str, f64)> =
                 row.parameters.iter().filter_map(|p| Some((p.key, first.case.parameters.get(p.key)?.0))).collect();
