@@ -1,5 +1,5 @@
-//! What a study says of itself before it is run: the linear modes of its model, when its joints first slip, what looks like a mistake,
-//! and how much memory and time it will take.
+//! What a study says of itself before it is run: the linear modes of its model, when its joints first slip, what looks
+//! like a mistake, and how much memory and time it will take.
 //!
 //! Everything here comes from the linear structure and from counting; no orbit is computed.
 
@@ -53,12 +53,13 @@ pub struct JointSummary {
     pub limit: f64,
     /// Relative displacement at which it gives way, m; `None` if it holds rigidly until then.
     pub displacement: Option<f64>,
-    /// What the excitation does to it while all joints stick; `None` where the study has no drive or the model is too large for a
-    /// quick answer.
+    /// What the excitation does to it while all joints stick; `None` where the study has no drive or the model is too
+    /// large for a quick answer.
     pub onset: Option<Onset>,
 }
 
-/// Cases that are looked at for warnings, evenly spread over all of them: a warning about the model holds for each of these.
+/// Cases that are looked at for warnings, evenly spread over all of them: a warning about the model holds for each of
+/// these.
 const LOOKED_AT: usize = 9;
 /// Degrees of freedom beyond which only the first case is looked at, so that a summary takes no longer than a second.
 const LARGE: usize = 60;

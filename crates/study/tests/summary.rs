@@ -46,7 +46,8 @@ fn starting_studies_have_nothing_to_warn_of() {
 #[test]
 fn the_couple_says_its_modes_and_where_it_slips() {
     let text = summary(templates::find("blade-couple").unwrap().study).to_string();
-    // free 121.25 Hz (theory 6.1), damping 7.23e-4; strongest stuck force 19.7237 N at 120.9589 Hz (6.8): 2 N are 10.1 % of it
+    // free 121.25 Hz (theory 6.1), damping 7.23e-4; strongest stuck force 19.7237 N at 120.9589 Hz (6.8): 2 N are 10.1
+    // % of it
     for word in
         ["3 degrees of freedom, 1 joint", "shown for Ft = 2 N", "121.25", "0.072", "rigid until then", "120.9589 Hz"]
     {

@@ -122,8 +122,8 @@ fn the_elements_of_the_paper() {
     close(&[slider.onset(1.0, 1.0).unwrap()[0].largest], &[2.0], 1e-9);
 }
 
-/// Four masses and a place without mass, a joint of each kind; expected values from SciPy 1.x (`eigh` of the structure condensed onto its
-/// masses, `numpy.linalg.solve` of the stuck structure, `brentq`).
+/// Four masses and a place without mass, a joint of each kind; expected values from SciPy 1.x (`eigh` of the structure
+/// condensed onto its masses, `numpy.linalg.solve` of the stuck structure, `brentq`).
 fn network() -> Model {
     Model {
         masses: vec![mass("a", 0.5), mass("b", 1.2), mass("c", 0.8), mass("d", 2.0), mass("p", 0.0)],
@@ -290,7 +290,8 @@ fn harmonics_add_up_over_the_period() {
     };
     let largest = |phase| model(phase).survey().unwrap().onset(5.0, 5.0).unwrap()[0].largest;
     close(&[largest(0.0)], &[2.0], ROUNDING);
-    // in antiphase cos τ - cos 3τ = 4 cos τ sin² τ, at most 8/(3√3) where cos² τ = 1/3; met to the distance of the instants
+    // in antiphase cos τ - cos 3τ = 4 cos τ sin² τ, at most 8/(3√3) where cos² τ = 1/3; met to the distance of the
+    // instants
     close(&[largest(PI)], &[8.0 / (3.0 * 3f64.sqrt())], 1.3e-3);
 }
 
@@ -315,4 +316,11 @@ fn a_mode_slips_first_at_the_amplitude_of_its_joint() {
     let force = (kt - omega * omega * m1) - kt * x3;
     let modal = ((star + m1) + star * x3 * x3).sqrt();
     close(&[survey.slip_amplitude(1).unwrap()], &[3.0 / force.abs() * modal], 1e-8);
+}
+
+#[test]
+fn models_that_are_too_large_say_so() {
+    let survey = chain(701, 1.0, 1.0).survey().unwrap();
+    assert!(survey.is_too_large() && survey.onset(1.0, 2.0).is_none());
+    assert_eq!((survey.free().elastic.len(), survey.free().lost), (0, 701));
 }

@@ -1,9 +1,9 @@
-//! What is known of a model before anything is computed: its linear modes with all joints free and with all joints stuck, the
-//! motion at which each joint begins to slip, the masses that nothing holds.
+//! What is known of a model before anything is computed: its linear modes with all joints free and with all joints
+//! stuck, the motion at which each joint begins to slip, the masses that nothing holds.
 //!
-//! Free: no joint carries a force. Stuck: every slider stands, so that a joint is its springs, or a constraint if it is rigid. Between
-//! the two lie the resonances of the model with friction: springs and constraints only raise the frequency of every mode
-//! (Courant, Fischer).
+//! Free: no joint carries a force. Stuck: every slider stands, so that a joint is its springs, or a constraint if it
+//! is rigid. Between the two lie the resonances of the model with friction: springs and constraints only raise the
+//! frequency of every mode (Courant, Fischer).
 
 use super::{GROUND, Model, ModelError, System, SystemJoint};
 use crate::law::Law;
@@ -17,7 +17,8 @@ use std::f64::consts::TAU;
 pub struct LinearMode {
     /// Undamped natural frequency, rad/s.
     pub omega: f64,
-    /// Damping ratio `φᵀCφ / (2ω φᵀMφ)`: exact where damping does not couple the modes, and to first order where it is light.
+    /// Damping ratio `φᵀCφ / (2ω φᵀMφ)`: exact where damping does not couple the modes, and to first order where it is
+    /// light.
     pub damping: f64,
 }
 
@@ -39,7 +40,8 @@ pub struct FirstSlip {
     pub joint: String,
     /// Limit of the slider that gives way first, N; zero if the joint carries nothing.
     pub limit: f64,
-    /// Relative displacement from the unloaded state at which it gives way, m; `None` if it holds rigidly until the limit.
+    /// Relative displacement from the unloaded state at which it gives way, m; `None` if it holds rigidly until the
+    /// limit.
     pub displacement: Option<f64>,
 }
 
@@ -51,8 +53,8 @@ pub struct Onset {
     pub largest: f64,
     /// Where that is, rad/s.
     pub at: f64,
-    /// The stretches of the range in which it is above 1, rad/s. They hold for a joint that slips first: what the others do
-    /// after it has slipped changes the structure.
+    /// The stretches of the range in which it is above 1, rad/s. They hold for a joint that slips first: what the
+    /// others do after it has slipped changes the structure.
     pub slips: Vec<(f64, f64)>,
 }
 
@@ -113,8 +115,8 @@ impl Hold {
         first.map_or(Hold::Nothing, |(k, limit)| Hold::Spring { stiffness, limit, displacement: limit / k })
     }
 
-    /// A smooth law: the spring that it is in small motion, or rigid where its resistance is viscous. The steeper its slope, the
-    /// nearer it is to that.
+    /// A smooth law: the spring that it is in small motion, or rigid where its resistance is viscous. The steeper its
+    /// slope, the nearer it is to that.
     fn smooth(law: &Law) -> Hold {
         let (limit, stiffness) = (law.limit(), law.linearised(SMALL, 1.0).re);
         match (limit > 0.0, stiffness > 0.0) {
@@ -143,8 +145,8 @@ struct Linear {
     shapes: Option<DMatrix<f64>>,
 }
 
-/// An eigenvalue below this share of the largest has fewer than six digits left; then the stiffest springs count as rigid for the
-/// modes below. Symmetric QR errs by some 1e-15 of the largest.
+/// An eigenvalue below this share of the largest has fewer than six digits left; then the stiffest springs count as
+/// rigid for the modes below. Symmetric QR errs by some 1e-15 of the largest.
 const FEW_DIGITS: f64 = 1e-9;
 /// An eigenvalue below this share of the largest is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -154,8 +156,8 @@ const STIFFEST: f64 = 1e-4;
 const LEVELS: usize = 4;
 /// A pivot below this share of what it came from is zero.
 const ZERO: f64 = 1e-12;
-/// Degrees of freedom beyond which modes are not computed: they would take longer than a second. Measured: 0.35 s at 500, with the third
-/// power.
+/// Degrees of freedom beyond which modes are not computed: they would take longer than a second. Measured: 0.35 s at
+/// 500, with the third power.
 const LARGEST: usize = 700;
 /// Iterations of the eigenvalue search per degree of freedom; a few are needed.
 const ITERATIONS: usize = 100;
@@ -441,8 +443,9 @@ fn add(matrix: &mut DMatrix<f64>, row: &[(usize, f64)], value: f64) {
     }
 }
 
-/// Removes the first `light` coordinates, which have no mass, from damping and stiffness: they move so that their springs balance.
-/// Returns their rows `x_p = -Σ follow[p, j] x_j`, j > p. A coordinate without a spring follows its dampers.
+/// Removes the first `light` coordinates, which have no mass, from damping and stiffness: they move so that their
+/// springs balance. Returns their rows `x_p = -Σ follow[p, j] x_j`, j > p. A coordinate without a spring follows its
+/// dampers.
 fn condense(light: usize, c: &mut DMatrix<f64>, k: &mut DMatrix<f64>) -> DMatrix<f64> {
     let r = k.nrows();
     let mut follow = DMatrix::zeros(light, r);
@@ -556,7 +559,8 @@ const FREQUENCIES: usize = 200;
 const FEWEST: usize = 24;
 /// Points around a mode, in half its width at half its power.
 const AROUND: [f64; 9] = [0.0, 0.3, 0.6, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
-/// Instants per period of the highest harmonic, where there are several: the largest value is met to (π/64)²/2, about 0.1 %.
+/// Instants per period of the highest harmonic, where there are several: the largest value is met to (π/64)²/2, about
+/// 0.1 %.
 const INSTANTS: usize = 64;
 /// Most instants; harmonics up to 64 have all of theirs.
 const MOST_INSTANTS: usize = 4096;
@@ -613,8 +617,9 @@ impl Survey {
         self.joints.iter().map(one).collect()
     }
 
-    /// The loads of the stuck joints under the model's excitation, as shares of their limits, over drive frequencies from `from` to
-    /// `to` (rad/s), which may be the same. Constant forces are left out: how joints share these depends on what was before.
+    /// The loads of the stuck joints under the model's excitation, as shares of their limits, over drive frequencies
+    /// from `from` to `to` (rad/s), which may be the same. Constant forces are left out: how joints share these
+    /// depends on what was before.
     ///
     /// `None`: the model is so large that this would take long, or it has no linear response there.
     pub fn onset(&self, from: f64, to: f64) -> Option<Vec<Onset>> {
@@ -629,8 +634,8 @@ impl Survey {
         (0..self.joints.len()).map(|joint| self.onset_of(joint, &omegas, &shares)).collect()
     }
 
-    /// The modal amplitude (m √kg) at which the first joint slips in mode `index` (from 0) of the stuck structure; `None` if it has no such
-    /// mode or no joint is loaded in it.
+    /// The modal amplitude (m √kg) at which the first joint slips in mode `index` (from 0) of the stuck structure;
+    /// `None` if it has no such mode or no joint is loaded in it.
     pub fn slip_amplitude(&self, index: usize) -> Option<f64> {
         let shapes = self.stuck.shapes.as_ref()?;
         let omega = self.stuck.modes.elastic.get(index)?.omega;
@@ -667,8 +672,8 @@ impl Survey {
         (0..self.joints.len()).filter(|j| rigid(&self.joints[*j])).collect()
     }
 
-    /// Drive frequencies that show the loads of stuck joints: evenly over the range, and around the modes that a harmonic of the
-    /// excitation meets in it.
+    /// Drive frequencies that show the loads of stuck joints: evenly over the range, and around the modes that a
+    /// harmonic of the excitation meets in it.
     fn frequencies(&self, from: f64, to: f64) -> Option<Vec<f64>> {
         // stiffnesses that had to count as rigid leave no digits for a response
         self.stuck.shapes.as_ref()?;

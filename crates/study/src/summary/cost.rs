@@ -1,11 +1,11 @@
-//! How much a study will hold and how long it will take, by counting: units of work, samples, columns; and by what each method was
-//! measured to need.
+//! How much a study will hold and how long it will take, by counting: units of work, samples, columns; and by what
+//! each method was measured to need.
 
 use super::{Surveyed, range};
 use crate::error::{Problem, StudyError};
 use crate::study::{Case, Study};
 use std::f64::consts::TAU;
-use stickslip::law::RateLaw;
+use stickslip::law::{Law, RateLaw};
 use stickslip::model::System;
 
 /// Memory that a run may take unless it is told otherwise, bytes. What the machine has free may be less.
@@ -33,8 +33,8 @@ const DRAWN: f64 = 240.0;
 /// Bytes of a case that waits to be computed, beside its matrices. Measured: 5.9 kB for seven elements.
 const CASE: f64 = 3_500.0;
 const CASE_ELEMENT: f64 = 250.0;
-/// Bytes of an orbit of an exact law, per entry of its state and per switch; and of a smooth law per entry. Measured: exact 8 kB for the
-/// couple and 170 kB for 8 masses and joints, smooth 80 kB and 600 kB.
+/// Bytes of an orbit of an exact law, per entry of its state and per switch; and of a smooth law per entry. Measured:
+/// exact 8 kB for the couple and 170 kB for 8 masses and joints, smooth 80 kB and 600 kB.
 const ORBIT_ENTRY: f64 = 500.0;
 const SMOOTH_ENTRY: f64 = 24_000.0;
 /// Samples of a motion are held whole until they are written, bytes per number and per sample.
@@ -95,7 +95,8 @@ impl Counts {
         (self.varied + 3.0 * self.n + 2.0 * self.joints + 6.0, 1.0)
     }
 
-    /// Columns of one instant: time and frequency, displacement and velocity of each mass, three of each joint and its contact.
+    /// Columns of one instant: time and frequency, displacement and velocity of each mass, three of each joint and its
+    /// contact.
     fn instant_columns(&self) -> (f64, f64) {
         (self.varied + 2.0 + 2.0 * self.n + 3.0 * self.joints, self.joints)
     }
@@ -124,8 +125,12 @@ fn transient(case: &Case) -> (f64, f64) {
     (duration, step.filter(|step| *step > 0.0).map_or(0.0, |step| duration / step + 1.0))
 }
 
-/// Points of a branch for each of the steps that were asked for: it shortens them where it bends.
-const BRANCH_POINTS: f64 = 3.0;
+/// Points of a branch for each of the steps that were asked for: it shortens them where it bends. Measured: 3 to 15,
+/// and 109 for a ring of three whose branch turns at every border of stick.
+const BRANCH_POINTS: f64 = 5.0;
+/// Bytes of an orbit that is a series, per harmonic coefficient of a place or joint. Measured: 15 kB for the couple,
+/// 130 kB for 8 masses and joints, at 15 harmonics.
+const SERIES_ENTRY: f64 = 80.0;
 /// Panels of motions that are drawn.
 const PANELS: f64 = 12.0;
 
@@ -179,7 +184,7 @@ fn holds(study: &Study, surveyed: &Surveyed) -> Holds {
             let rows = branches(study, case) * steps(case) * BRANCH_POINTS;
             let table = Shape { rows, numbers: orbit_numbers, words: orbit_words };
             let harmonics = case.values.count("harmonics").unwrap_or(15) as f64;
-            let kept = rows * NUMBER * (2.0 * harmonics + 1.0) * (2.0 * n + 4.0 * counts.joints);
+            let kept = rows * SERIES_ENTRY * (2.0 * harmonics + 1.0) * (2.0 * n + 4.0 * counts.joints);
             Holds { tables: vec![table], drawn: rows * n, kept }
         }
         _ => {
@@ -243,18 +248,12 @@ impl Size {
             self.rows,
             bytes_text(limit)
         );
-        let samples = ["samples", "samples_per_cycle", "steps", "amplitude"].iter();
-        let given = samples.filter(|key| study.study.entry(key).is_some()).copied();
-        let few = match study.study.entry("frequency") {
-            Some(_) if study.points() > study.cases() => "take fewer frequencies",
-            _ => "take fewer points",
-        };
-        let help = match given.last() {
-            Some(key) => {
-                format!("{few} or fewer `{key}`, split `vary` over several files, or allow more with --memory")
-            }
-            None => format!("{few}, split `vary` over several files, or allow more with --memory"),
-        };
+        let lengths = ["samples", "samples_per_cycle", "cycles", "duration", "steps"].into_iter();
+        let given: Vec<String> =
+            lengths.filter(|key| study.study.entry(key).is_some()).map(|key| format!("lower `{key}`, ")).collect();
+        let fewer = if study.points() > study.cases() { "take fewer frequencies, " } else { "" };
+        let split = if study.cases() > 1 { "split `vary` over several files, " } else { "" };
+        let help = format!("{}{fewer}{split}or allow more with --memory", given.concat());
         // at what makes most of it
         let place = match (study.varied.first(), study.points() / study.cases().max(1)) {
             (Some(varied), frequencies) if study.cases() >= frequencies => &varied.place,
@@ -298,29 +297,38 @@ const OVERHEAD: f64 = 0.2;
 const CELL: f64 = 3e-7;
 /// Work on a point of a figure, s. Measured: 1 s for 800,000 in HTML, as much for SVG.
 const POINT: f64 = 3e-6;
-/// Event-driven: a closed form per segment, and a decomposition for each new pattern of stick and slip, whose number grows with the joints.
-/// Measured: 3 ms at 8 masses and joints, 40 ms at 16, 0.23 s at 24.
+/// Event-driven: a closed form per segment, and a decomposition for each new pattern of stick and slip, whose number
+/// grows with the joints. Measured: 3 ms at 8 masses and joints, 40 ms at 16, 0.23 s at 24.
 const EVENT_DRIVEN: (f64, f64) = (2e-4, 3e-3);
 /// Masses and joints of the second number.
 const EVENT_DRIVEN_SIZE: f64 = 16.0;
-/// Harmonic balance per mass and joint at 15 harmonics. Measured with springs before the sliders: 0.3 ms for the couple, 21 ms at 32 blades.
+/// Harmonic balance per mass and joint at 15 harmonics. Measured with springs before the sliders: 0.3 ms for the
+/// couple, 21 ms at 32 blades.
 const SERIES: f64 = 5e-4;
-/// Rigid sliders need more harmonics and more steps. Measured: 20 ms at 4 blades, 0.9 s at 32.
-const RIGID: f64 = 20.0;
+/// Rigid sliders and smooth laws need more harmonics and more steps: measured 20 ms at 4 blades, 0.9 s at 32. Where
+/// the harmonics are given they need more steps only.
+const HARD: f64 = 20.0;
+const HARD_RIGID: f64 = 3.0;
+const HARD_SMOOTH: f64 = 10.0;
 /// Harmonics of [`SERIES`].
 const SERIES_HARMONICS: f64 = 15.0;
-/// Shooting, times the square of masses and joints; more where the sliders have springs. Measured: 25 ms for two masses, 0.6 s for four.
-const SHOOTING: (f64, f64) = (1e-3, 1e-2);
-/// Following a transient until it has died, times the square of masses and joints. Measured: 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses.
-const SETTLING: f64 = 2e-3;
+/// Shooting, times the square of masses and joints; more where the sliders have springs. Measured: 25 ms for two
+/// masses, 0.6 s for four.
+const SHOOTING: (f64, f64) = (1e-3, 1.5e-2);
+/// Method `transient`: the periods in which a mode with the least damping loses a digit, times a share of these.
+/// Measured at a damping ratio of 7e-4: exact laws 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses; smooth laws 0.9 s and 8 s
+/// for 2 and 4.
+const SETTLING: (f64, f64) = (0.1, 1.0);
+/// Fewest and most periods of it.
+const SETTLING_PERIODS: (f64, f64) = (20.0, 50_000.0);
 /// A period of a transient: events, per mass and joint; integration, times their square.
 const PERIOD: (f64, f64, f64) = (3e-4, 2.5e-4, 1.3e-3);
 /// Orbits that refine a peak of one mass.
 const PEAK: f64 = 20.0;
 /// Steps of the search for an optimum.
 const OPTIMUM: f64 = 35.0;
-/// Solutions per point of a branch or of a mode: predictor, corrector, error estimate, stability.
-const FOLLOWED: f64 = 8.0;
+/// Solutions per point of a mode, and per step of a branch, which it shortens.
+const FOLLOWED: (f64, f64) = (8.0, 15.0);
 /// Joints up to which `auto` takes events.
 const AUTO: f64 = 12.0;
 
@@ -330,7 +338,7 @@ pub(super) fn seconds(study: &Study, surveyed: &Surveyed) -> f64 {
     let counts = Counts::new(study, surveyed);
     let system = surveyed.survey.system();
     let points = counts.points();
-    let orbit = orbit(case, system, &counts);
+    let orbit = orbit(surveyed, &counts);
     let series = series(system, &counts, case.values.count("harmonics").map(|h| h as f64));
     let work = match study.kind().name {
         "transient" => {
@@ -343,8 +351,8 @@ pub(super) fn seconds(study: &Study, surveyed: &Surveyed) -> f64 {
             let curves = study.cases() as f64 / study.varied_points().last().copied().unwrap_or(1).max(1) as f64;
             (counts.cases + curves * OPTIMUM) * (counts.frequencies + PEAK) * orbit
         }
-        "modes" => counts.cases * mode_points(case) * FOLLOWED * series,
-        "branch" => branches(study, case) * steps(case) * FOLLOWED * series,
+        "modes" => counts.cases * mode_points(case) * FOLLOWED.0 * series,
+        "branch" => branches(study, case) * steps(case) * FOLLOWED.1 * series,
         "response" if case.values.flag("peaks") != Some(false) && counts.frequencies > 2.0 => {
             (points + counts.cases * counts.n * PEAK) * orbit
         }
@@ -356,14 +364,20 @@ pub(super) fn seconds(study: &Study, surveyed: &Surveyed) -> f64 {
 }
 
 /// One orbit by the method of a case.
-fn orbit(case: &Case, system: &System, counts: &Counts) -> f64 {
+fn orbit(surveyed: &Surveyed, counts: &Counts) -> f64 {
+    let (case, system, modes) = (&surveyed.case, surveyed.survey.system(), &surveyed.survey.free().elastic);
     let size = counts.n + counts.joints;
     let events = EVENT_DRIVEN.0 + EVENT_DRIVEN.1 * (size / EVENT_DRIVEN_SIZE).powi(4);
     let shooting = size * size * if has_states(system) { SHOOTING.1 } else { SHOOTING.0 };
     let series = series(system, counts, case.method.options.get("harmonics").copied());
     match case.method.name.as_str() {
         "harmonic-balance" => series,
-        "transient" => SETTLING * size * size,
+        "transient" => {
+            let damping = modes.iter().map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE);
+            let digit = std::f64::consts::LN_10 / (TAU * damping);
+            let share = if counts.smooth { SETTLING.1 } else { SETTLING.0 };
+            (share * digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1)) * period(system, counts)
+        }
         _ if counts.smooth => shooting,
         "auto" if counts.joints > AUTO => series,
         _ => events,
@@ -371,10 +385,14 @@ fn orbit(case: &Case, system: &System, counts: &Counts) -> f64 {
 }
 
 fn series(system: &System, counts: &Counts, harmonics: Option<f64>) -> f64 {
-    let rigid = |law: &stickslip::law::Law| {
-        law.network().is_none_or(|branches| branches.iter().any(|branch| branch.stiffness.is_none()))
+    let rigid = |law: &Law| law.network().is_some_and(|all| all.iter().any(|branch| branch.stiffness.is_none()));
+    let any_rigid = system.joints.iter().any(|joint| rigid(&joint.law));
+    let factor = match (counts.smooth, any_rigid, harmonics) {
+        (false, false, _) => 1.0,
+        (_, _, None) => HARD,
+        (true, _, Some(_)) => HARD_SMOOTH,
+        (false, true, Some(_)) => HARD_RIGID,
     };
-    let factor = if system.joints.iter().any(|joint| rigid(&joint.law)) { RIGID } else { 1.0 };
     let length = (harmonics.unwrap_or(SERIES_HARMONICS) / SERIES_HARMONICS).max(1.0);
     SERIES * (counts.n + counts.joints).max(1.0) * factor * length * length
 }

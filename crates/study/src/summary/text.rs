@@ -22,6 +22,9 @@ pub(super) fn significant(value: f64, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
+    if !(1e-9..1e7).contains(&value.abs()) {
+        return format!("{value:.*e}", (digits - 1).max(0) as usize);
+    }
     let decimals = (digits - 1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
     let text = format!("{value:.decimals$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
@@ -170,6 +173,7 @@ mod tests {
     fn numbers_have_as_many_digits_as_they_are_worth() {
         assert_eq!([significant(121.2503, 5), significant(0.072_31, 2), significant(2.0, 4)], ["121.25", "0.072", "2"]);
         assert_eq!([significant(12_345.6, 3), significant(1200.0, 3)], ["12346", "1200"]);
+        assert_eq!(significant(3.110_516e15, 3), "3.11e15");
         assert_eq!(
             [about(0.3), about(34.0), about(600.0), about(1e5), about(1e6)],
             ["below a second", "about 34 s", "about 10 minutes", "about 28 hours", "about 12 days",]

@@ -115,7 +115,8 @@ fn used_parameters(study: &Study, first: &Surveyed) -> BTreeSet<usize> {
         }
         Structure::Template(row, table) => {
             from(table);
-            // a parameter of a template is used if the model changes with it; a law that is replaced takes its parameters away
+            // a parameter of a template is used if the model changes with it; a law that is replaced takes its
+            // parameters away
             let replaced = table.entry("law").and(first.case.model.joints.first()).map(|joint| joint.law);
             let values: Vec<(&str, f64)> =
                 row.parameters.iter().filter_map(|p| Some((p.key, first.case.parameters.get(p.key)?.0))).collect();
@@ -207,11 +208,10 @@ fn no_resonance(study: &Study, cases: &[Surveyed]) -> Option<String> {
         }
     }
     let hertz = |omega: f64| significant(omega / TAU, 6);
-    let next = match nearest {
-        Some((_, omega, name)) => format!("the nearest is at {} Hz with all joints {name}", hertz(omega)),
-        None => "the model has none".to_owned(),
-    };
-    Some(format!("no resonance lies between {} and {} Hz: {next}", hertz(from), hertz(to)))
+    // a model without any is one that no spring holds, which is said elsewhere, or has no mass
+    let (_, omega, name) = nearest?;
+    let (from, to, omega) = (hertz(from), hertz(to), hertz(omega));
+    Some(format!("no resonance lies between {from} and {to} Hz: the nearest is at {omega} Hz with all joints {name}"))
 }
 
 /// Bare numbers as angles: they count as radians, as bare frequencies count as Hz.
