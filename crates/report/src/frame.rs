@@ -5,14 +5,24 @@ use crate::axis::{MARGIN, Range};
 use crate::colour::Colour;
 use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Sharing, Style};
 
-/// Columns and rows of the grid for this many panels: one; two side by side; two by two; then rows of three.
-pub(crate) fn grid(panels: usize) -> (usize, usize) {
-    let columns = match panels {
+/// Columns and rows of the grid of panels: one; two side by side; two by two; then rows of three. Panels that show two or
+/// three quantities in turn, case by case, have a column for each of these.
+pub(crate) fn grid(figure: &Figure) -> (usize, usize) {
+    let panels = &figure.panels;
+    let in_turn = |period: usize| {
+        let same = |i: usize, j: usize| panels[i].y.quantity == panels[j].y.quantity;
+        panels.len() > period
+            && panels.len().is_multiple_of(period)
+            && (period..panels.len()).all(|i| same(i, i - period))
+            && (1..period).all(|i| !same(i, 0))
+    };
+    let columns = match panels.len() {
         0 | 1 => 1,
         2..=4 => 2,
+        _ if in_turn(2) => 2,
         _ => 3,
     };
-    (columns, panels.div_ceil(columns).max(1))
+    (columns, panels.len().div_ceil(columns).max(1))
 }
 
 /// The points of a series: pairs, as many as both lists have; one that its axes cannot show is not a number.
@@ -339,6 +349,21 @@ fn shared(
 mod tests {
     use super::*;
     use crate::samples;
+
+    #[test]
+    fn quantities_shown_in_turn_have_a_column_each() {
+        let figure = |quantities: &[&str], cases: usize| {
+            let panel = |quantity: &&str| Panel { y: Axis::new(*quantity, "m"), ..Panel::default() };
+            Figure { panels: quantities.repeat(cases).iter().map(panel).collect(), ..Figure::default() }
+        };
+        assert_eq!(
+            [1, 2, 3, 4, 5, 8].map(|n| grid(&figure(&["a"], n))),
+            [(1, 1), (2, 1), (2, 2), (2, 2), (3, 2), (3, 3)]
+        );
+        assert_eq!(grid(&figure(&["displacement", "force"], 4)), (2, 4));
+        assert_eq!(grid(&figure(&["displacement", "velocity", "force"], 3)), (3, 3));
+        assert_eq!(grid(&Figure::default()), (1, 1));
+    }
 
     #[test]
     fn a_label_stands_once_in_the_legend() {

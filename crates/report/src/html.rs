@@ -159,7 +159,7 @@ const DARK: [[&str; 2]; 6] = [
 
 /// The figure inside a page: live on the screen, static on paper and where no script runs.
 pub(crate) fn fragment(figure: &Figure, id: &str) -> String {
-    let (columns, _) = frame::grid(figure.panels.len());
+    let (columns, _) = frame::grid(figure);
     let mut ink = Ink::new(figure);
     let data = traces(figure, &mut ink);
     let wide = layout(figure, Page::Wide, &mut ink);
@@ -506,7 +506,7 @@ enum Page {
 fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
     let count = figure.panels.len().max(1);
     let narrow = page == Page::Narrow;
-    let columns = if narrow { 1 } else { frame::grid(count).0 };
+    let columns = if narrow { 1 } else { frame::grid(figure).0 };
     let rows = count.div_ceil(columns);
     let plot_height = match (columns, rows) {
         (1, 1) => 460.0,

@@ -125,7 +125,7 @@ struct Place {
 
 impl Layout {
     fn new(figure: &Figure) -> Layout {
-        let (columns, rows) = frame::grid(figure.panels.len());
+        let (columns, rows) = frame::grid(figure);
         let (plot_width, plot_height) = match columns {
             1 => (620.0, 380.0),
             2 => (430.0, if rows == 1 { 330.0 } else { 270.0 }),

@@ -23,6 +23,8 @@ const WIDTH: usize = 120;
 const NARROWEST: usize = 40;
 /// Columns that a table loses first where it is too wide: evidence, which `record.json` and the file keep.
 const EVIDENCE: [&str; 4] = ["residual", "energy_gap", "iterations", "truncation"];
+/// Notes printed; of more than these only the number is told.
+const NOTES: usize = 8;
 /// Failures named one by one; of more than these only the number is told.
 const FAILURES: usize = 5;
 
@@ -61,10 +63,14 @@ impl Terminal {
             }
         );
         // warnings have been said on standard error
-        for note in dataset.notes.iter().filter(|note| !note.starts_with("warning")) {
+        let notes: Vec<&String> = dataset.notes.iter().filter(|note| !note.starts_with("warning")).collect();
+        for note in notes.iter().take(NOTES) {
             for line in self.wrapped(&format!("note: {}", clean(note)), "      ") {
                 let _ = writeln!(out, "{line}");
             }
+        }
+        if let Some(more @ 1..) = notes.len().checked_sub(NOTES) {
+            let _ = writeln!(out, "note: {more} more note{}; all are in record.json", plural(more));
         }
         for failure in dataset.failures.iter().take(FAILURES) {
             let text = format!("failed at {}: {}", clean(&failure.at), clean(&failure.reason));
@@ -341,6 +347,18 @@ results/fig02/: loops_summary.csv, figure.svg
         assert!(narrow.contains("in loops_summary.csv") && narrow.lines().all(|l| l.chars().count() <= 60), "{narrow}");
         // other long tables stay in their files
         assert!(!Terminal::default().text(&long("curve", 30), &[]).contains("amplitude (mm)"));
+    }
+
+    #[test]
+    fn many_notes_are_counted() {
+        let notes = |count: usize| {
+            let notes = (0..count).map(|i| format!("Case {i} sticks.")).collect();
+            Terminal::default().text(&Dataset { notes, ..samples::hysteresis() }, &[])
+        };
+        assert!(notes(8).contains("Case 7") && !notes(8).contains("more note"));
+        let text = notes(24);
+        assert!(text.contains("Case 7") && !text.contains("Case 8"), "{text}");
+        assert!(text.contains("note: 16 more notes; all are in record.json\n"), "{text}");
     }
 
     #[test]
