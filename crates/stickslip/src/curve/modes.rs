@@ -70,7 +70,7 @@ pub struct Lost {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Reason {
     /// The structure without joints has no such mode, or its frequency is zero.
-    #[error("the structure without its joints has no such mode with a frequency above zero")]
+    #[error("no motion near the mode of the structure without its joints was found, or that mode has no frequency")]
     NoBeginning,
     /// The curve turned and went back to where friction hardly matters.
     #[error(
@@ -107,8 +107,9 @@ pub struct ModeRequest {
 const FAINT: f64 = 1e-4;
 /// The same relative to what distinguishes it from the nearest mode: its shape is then the linear one to a percent.
 const APART: f64 = 1e-2;
-/// Factors by which a mode may begin higher, if Newton's method does not come from the linear mode to the nonlinear one.
-const HIGHER: [f64; 5] = [1.0, 10.0, 100.0, 1e4, 1e6];
+/// Factors by which a mode may begin lower or higher, if Newton's method does not come from the linear mode to the nonlinear one: where a joint
+/// hardly moves in the linear mode, friction alone decides how it does, and with it the phase of its force.
+const OTHERS: [f64; 7] = [1.0, 0.1, 0.01, 1e-3, 10.0, 100.0, 1e4];
 /// Steps, refused ones included. The couples take about 100, internal resonances some hundreds.
 const MOST_STEPS: usize = 4000;
 /// Steps without an amplitude below all before, after which the curve is left: it runs in a loop, or to another mode.
@@ -121,6 +122,10 @@ const FIRST: f64 = 0.02;
 const SHORTEST: f64 = 1e-7;
 /// Steps below this may take a corner: where a sampled joint begins to slip, the curve has kinks.
 const CORNER: f64 = 1e-3;
+/// Most distance of a solution from where the tangent pointed, relative to such a step: a corner of up to 79 degrees.
+const BENT: f64 = 5.0;
+/// Arc length over which the curve may jump: where a sampled force turns within another sample, it is not continuous. Measured 1e-6.
+const GAP: f64 = 1e-5;
 /// Least cosine between the tangents at both ends of a step.
 const STRAIGHT: f64 = 0.9;
 /// Most distance of a solution from where the tangent pointed, relative to the step.
@@ -237,7 +242,7 @@ impl Path {
         };
         let Some(linear) = modes.get(index).cloned() else { return none(None) };
         let faint = equations.faint(&modes, index, FAINT, APART).max(f64::MIN_POSITIVE);
-        let start = HIGHER.iter().find_map(|factor| {
+        let start = OTHERS.iter().find_map(|factor| {
             let amplitude = factor * faint;
             let guess = equations.linear(&linear, amplitude)?;
             let state = equations.solve(&guess, amplitude, amplitude)?;
@@ -255,8 +260,8 @@ impl Path {
                 return path;
             }
             let step = equations.step(now, length, length < CORNER).filter(|step| {
-                step.off <= OFF * length
-                    && (length < CORNER || (step.straight >= STRAIGHT && step.to.side == now.side))
+                let smooth = step.off <= OFF * length && step.straight >= STRAIGHT && step.to.side == now.side;
+                (smooth || (length < CORNER && step.off <= BENT * length + GAP))
                     && equations.assurance(&now.state, &step.to.state) >= SHAPE
             });
             since += 1;
