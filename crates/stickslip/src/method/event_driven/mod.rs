@@ -143,7 +143,8 @@ impl Solver for Exact<'_> {
         let aim = Aim { method: name, omega, residual: CLOSED, sign, rest: NEAR_REST * self.flow.energy_scale };
         let closed = search.find(self, start, |exact| exact.first_state(omega), aim)?;
         // the last run of the iteration was that of the closed state: its segments are the orbit
-        let mut orbit = path::orbit(self.system, self.contracts, &self.flow, omega, symmetry, closed);
+        let mut orbit = path::orbit(self.system, self.contracts, &self.flow, omega, symmetry, closed)
+            .map_err(|cause| OrbitError::Breakdown { method: name, omega, cause })?;
         orbit.method = name;
         // a motion that has settled but for an estimated rest is out of balance by that rest
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);

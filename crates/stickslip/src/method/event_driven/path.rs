@@ -3,6 +3,7 @@
 use super::NAME;
 use super::flow::{Flow, Segment};
 use super::mechanics::Contact;
+use crate::method::Breakdown;
 use crate::method::drive::Drive;
 use crate::method::periodic::Closed;
 use crate::model::System;
@@ -45,10 +46,10 @@ pub(super) fn orbit(
     omega: f64,
     symmetry: Symmetry,
     closed: Closed,
-) -> Orbit {
+) -> Result<Orbit, Breakdown> {
     let path = ExactPath::new(system, flow, symmetry, std::f64::consts::TAU / omega);
-    let places = path.places(omega);
-    let joints = path.joints(flow);
+    let places = path.places(omega)?;
+    let joints = path.joints(flow)?;
     let energy = path.energy(flow, &joints);
     let stuck = joints
         .iter()
@@ -58,7 +59,7 @@ pub(super) fn orbit(
     let rest = super::NEAR_REST * flow.energy_scale;
     let reference = energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive)).max(NO_WORK * rest * rest);
     let balance = energy.work_in - energy.viscous - energy.friction;
-    Orbit {
+    Ok(Orbit {
         method: NAME,
         omega,
         symmetry,
@@ -78,7 +79,7 @@ pub(super) fn orbit(
         return_map: closed.derivative,
         contracts,
         path: Arc::new(path),
-    }
+    })
 }
 
 impl ExactPath {
@@ -118,7 +119,7 @@ impl ExactPath {
         if self.symmetry == Symmetry::HalfPeriod { 2.0 } else { 1.0 }
     }
 
-    fn places(&self, omega: f64) -> Vec<PlaceMotion> {
+    fn places(&self, omega: f64) -> Result<Vec<PlaceMotion>, Breakdown> {
         let n = self.system.dofs();
         let mut scratch = Scratch::default();
         let mut values = Vec::new();
@@ -130,7 +131,7 @@ impl ExactPath {
                     let nb = piece.basis.len();
                     let (x, v) =
                         (&piece.segment.displacement[i * nb..(i + 1) * nb], &piece.velocity[i * nb..(i + 1) * nb]);
-                    let (low, high) = piece.extremes(x, v, &mut scratch, &mut values);
+                    let (low, high) = piece.extremes(x, v, &mut scratch, &mut values)?;
                     (maximum, minimum) = (maximum.max(high), minimum.min(low));
                     if self.symmetry == Symmetry::FullPeriod {
                         integral += piece.basis.integral(x, piece.segment.length);
@@ -142,18 +143,18 @@ impl ExactPath {
                     maximum = maximum.max(-minimum);
                     minimum = -maximum;
                 }
-                PlaceMotion {
+                Ok(PlaceMotion {
                     name: self.system.places[i].clone(),
                     maximum,
                     minimum,
                     mean: integral / self.period,
                     first_harmonic: fourier * (2.0 * self.times() / self.period),
-                }
+                })
             })
             .collect()
     }
 
-    fn joints(&self, flow: &Flow) -> Vec<JointMotion> {
+    fn joints(&self, flow: &Flow) -> Result<Vec<JointMotion>, Breakdown> {
         let n = self.system.dofs();
         let mut scratch = Scratch::default();
         let mut values = Vec::new();
@@ -185,7 +186,7 @@ impl ExactPath {
                     let at_end = real_dot(&u, &values);
                     piece.basis.evaluate(0.0, &mut values);
                     let travel = at_end - real_dot(&u, &values);
-                    let (least, most) = piece.extremes(&u, &velocity, &mut scratch, &mut values);
+                    let (least, most) = piece.extremes(&u, &velocity, &mut scratch, &mut values)?;
                     (low, high) = (low.min(least), high.max(most));
                     for &s in &sliders {
                         dissipation += piece.contacts[s].sign() * flow.mechanics.sliders[s].limit * travel;
@@ -207,14 +208,14 @@ impl ExactPath {
                     high = high.max(-low);
                     low = -high;
                 }
-                JointMotion {
+                Ok(JointMotion {
                     name: joint.name.clone(),
                     dissipation: self.times() * dissipation,
                     // a joint that holds nothing slips all the time
                     slip_fraction: if sliders.is_empty() { 1.0 } else { self.times() * slipping / self.period },
                     displacement: (low, high),
                     switches: self.times() as usize * switches,
-                }
+                })
             })
             .collect()
     }
@@ -367,13 +368,15 @@ impl ExactPath {
 
 impl Piece {
     /// Least and largest value of `signal`, whose derivative is `slope`, over the piece.
+    /// # Errors
+    /// [`Breakdown::TooFast`] if it turns too often.
     fn extremes(
         &self,
         signal: &[Complex64],
         slope: &[Complex64],
         scratch: &mut Scratch,
         values: &mut Vec<Complex64>,
-    ) -> (f64, f64) {
+    ) -> Result<(f64, f64), Breakdown> {
         let nb = self.basis.len();
         values.resize(nb, ZERO);
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -387,31 +390,51 @@ impl Piece {
         let mut now = visit(0.0, values);
         visit(self.segment.length, values);
         // from turning point to turning point: shift the slope to the present time and look for its next zero
+        // what is near the rounding of the signal moves no extreme, but turns millions of times where a mode is very fast
+        let rounding = NEGLIGIBLE * signal.iter().map(|c| c.norm()).sum::<f64>();
+        let mut slope = slope.to_vec();
+        for ((slope, c), exponent) in slope.iter_mut().zip(signal).zip(&self.basis.exponents) {
+            if c.norm() <= rounding && exponent.re <= 0.0 {
+                *slope = ZERO;
+            }
+        }
         let size: f64 = slope.iter().map(|c| c.norm()).sum();
+        let too_fast = Breakdown::TooFast { time: self.segment.start };
+        let mut turns = 0;
         let mut sign = if now < 0.0 { -1.0 } else { 1.0 };
         let mut shifted = vec![ZERO; nb];
         while size > 0.0 && time < self.segment.length {
-            self.basis.shift(slope, time, sign, &mut shifted);
+            self.basis.shift(&slope, time, sign, &mut shifted);
             let begin = if now.abs() > FLAT * size { Begin::Positive } else { Begin::Zero };
             match self.basis.first_zero(&shifted, &[begin], self.segment.length - time, scratch) {
                 FirstZero::At { time: after, .. } => {
                     if after == 0.0 && begin == Begin::Positive {
                         break;
                     }
+                    turns += 1;
+                    if turns > MOST_TURNS {
+                        return Err(too_fast);
+                    }
                     time += after;
                     visit(time, values);
                     now = 0.0;
                     sign = -sign;
                 }
-                FirstZero::None | FirstZero::TooManySteps => break,
+                FirstZero::None => break,
+                FirstZero::TooManySteps => return Err(too_fast),
             }
         }
-        (low, high)
+        Ok((low, high))
     }
 }
 
+/// A mode whose part of a signal is below this fraction of it is rounding: the orbit is closed to 1e-12 of its state.
+const NEGLIGIBLE: f64 = 64.0 * f64::EPSILON;
 /// A slope below this fraction of its terms is a turning point.
 const FLAT: f64 = 1e-12;
+/// Turning points of one signal between two switches beyond which a mode is too fast to be followed. A mode that rings undamped at a hundred
+/// times the drive frequency turns two hundred times in a period.
+const MOST_TURNS: usize = 5000;
 
 impl Path for ExactPath {
     fn sample(&self, time: f64) -> Sample {
