@@ -306,7 +306,9 @@ fn results_belong_to_one_run() {
     assert!(stderr(&output).contains("the whole run in stickslip-out/study/ stays"), "{}", stderr(&output));
     assert_eq!(fs::read_to_string(out.join("record.json")).unwrap(), record);
     let cut_short = folder.path().join("stickslip-out/study.interrupted");
-    assert_eq!(names(&cut_short), ["curve.csv", "peaks.csv", "record.json"]);
+    // peaks are there if a stretch of the curve was finished
+    let found: Vec<String> = names(&cut_short).into_iter().filter(|name| name != "peaks.csv").collect();
+    assert_eq!(found, ["curve.csv", "record.json"]);
 }
 
 /// What is in the way of the results is found before anything is computed.

@@ -144,7 +144,7 @@ impl Frequencies {
     pub fn lowest(&self) -> Option<f64> {
         match self {
             Frequencies::List(list) => list.iter().copied().reduce(f64::min),
-            Frequencies::Range { from, to, .. } => Some(from.min(*to)),
+            Frequencies::Range { from, to, .. } | Frequencies::Adaptive { from, to, .. } => Some(from.min(*to)),
         }
     }
 
