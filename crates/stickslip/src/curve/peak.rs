@@ -29,17 +29,20 @@ pub struct Point {
     pub values: Vec<f64>,
     /// State of the orbit, a start for its neighbours.
     pub start: Option<Vec<f64>>,
+    /// Estimated relative error of the quantities; zero of exact orbits.
+    pub error: f64,
 }
 
 impl Point {
     /// What a curve keeps of an orbit.
     pub fn new(orbit: &Orbit, quantities: &dyn Fn(&Orbit) -> Vec<f64>) -> Self {
-        Point { omega: orbit.omega, values: quantities(orbit), start: Some(orbit.start.clone()) }
+        let error = orbit.evidence.truncation.unwrap_or(0.0);
+        Point { omega: orbit.omega, values: quantities(orbit), start: Some(orbit.start.clone()), error }
     }
 
     /// A frequency at which no orbit was found.
     pub fn failed(omega: f64) -> Self {
-        Point { omega, values: Vec::new(), start: None }
+        Point { omega, values: Vec::new(), start: None, error: 0.0 }
     }
 
     /// A quantity; below all others if there is no orbit.
@@ -51,12 +54,20 @@ impl Point {
 /// Relative rise of a quantity, as the parabola predicts it, below which its peak counts as found: a hundred times the rounding of a
 /// closed orbit. The frequency is then known to 1e-5 of the width of the peak.
 const RISE: f64 = 1e-10;
+/// Share of the estimated error of an orbit below which a rise is its noise, and the largest rise that counts as such: the switches of a
+/// sampled series move in steps.
+const NOISE: f64 = 1e-4;
+const MOST_NOISE: f64 = 1e-7;
+/// Orbits that may fail while the peak of one quantity is refined: what fails costs most.
+const FAILURES: usize = 2;
 /// A point that stands out from its neighbours by less than this share is the rounding of a level curve, not a peak.
 const LEVEL: f64 = 1e-10;
 /// Two orbits closer than this share of the first bracket tell nothing but rounding.
 const CLOSEST: f64 = 1e-7;
 /// Share of the rise that a parabola predicts which must come true for the next trial to be a parabola again.
 const KEPT: f64 = 0.5;
+/// Neighbouring points that share a solver with its memory; chunks are the same on any number of threads.
+const CHUNK: usize = 6;
 /// Broken promises after which only halving is left.
 const JUMP: usize = 15;
 /// Orbits that the peak of one quantity may take beside those that others have asked for; smooth peaks take 3 to 6, kinks up to 15.
@@ -90,7 +101,7 @@ pub fn highest(
     let points: Vec<Point> = omegas
         .iter()
         .zip(values)
-        .map(|(omega, value)| Point { omega: *omega, values: vec![*value], start: None })
+        .map(|(omega, value)| Point { omega: *omega, values: vec![*value], start: None, error: 0.0 })
         .collect();
     let finite = (0..points.len()).filter(|&i| values[i].is_finite());
     let best = finite.max_by(|&a, &b| values[a].total_cmp(&values[b]))?;
@@ -145,17 +156,26 @@ pub fn all(
     wanted: usize,
     quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
 ) -> Result<Vec<PeakOf>, MethodError> {
-    let found: Vec<Result<Vec<PeakOf>, MethodError>> = (1..points.len().saturating_sub(1))
-        .into_par_iter()
-        .map(|i| {
-            let near = &points[i - 1..=i + 1];
-            let wanted: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
-            if wanted.is_empty() {
-                return Ok(Vec::new());
+    let inner: Vec<usize> = (1..points.len().saturating_sub(1)).collect();
+    let found: Vec<Result<Vec<PeakOf>, MethodError>> = inner
+        .par_chunks(CHUNK)
+        .map(|chunk| {
+            let mut solver: Option<Box<dyn Solver + Send + '_>> = None;
+            let mut peaks = Vec::new();
+            for &i in chunk {
+                let near = &points[i - 1..=i + 1];
+                let wanted: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
+                if wanted.is_empty() {
+                    continue;
+                }
+                let solver = match &mut solver {
+                    Some(solver) => solver,
+                    none => none.insert(method.solver(system)?),
+                };
+                let mut found = refine(&mut **solver, near, &wanted, quantities);
+                found.sort_by(|a, b| a.peak.omega.total_cmp(&b.peak.omega));
+                peaks.extend(found);
             }
-            let mut solver = method.solver(system)?;
-            let mut peaks = refine(&mut *solver, near, &wanted, quantities);
-            peaks.sort_by(|a, b| a.peak.omega.total_cmp(&b.peak.omega));
             Ok(peaks)
         })
         .collect();
@@ -184,14 +204,21 @@ fn refine(
     let closest = CLOSEST * (near[2].omega - near[0].omega);
     for &quantity in wanted {
         let mut shrink = Shrink::default();
+        let mut failures = 0;
         for _ in 0..ORBITS {
             let best = best(&points, quantity);
             let Some(omega) = shrink.next(&points, best, quantity, closest) else { break };
+            if failures == FAILURES {
+                break;
+            }
             // the orbit's neighbour on the side of the new point is as good a start as any
             let start = points[best].start.as_deref();
             let point = match solver.orbit(omega, start) {
                 Ok(orbit) => Point { omega, ..Point::new(&orbit, quantities) },
-                Err(_) => Point::failed(omega),
+                Err(_) => {
+                    failures += 1;
+                    Point::failed(omega)
+                }
             };
             let at = points.partition_point(|point| point.omega < omega);
             points.insert(at, point);
@@ -232,15 +259,16 @@ impl Shrink {
         let value = points[best].value(quantity);
         let (rise, vertex) = parabola(points, best, quantity);
         let floor = closest.max(4.0 * f64::EPSILON * middle);
+        let enough = (NOISE * points[best].error).clamp(RISE, MOST_NOISE);
         let at_kink = self.kink.is_some_and(|(omega, promised)| {
-            omega == middle && (form(value) - promised).abs() <= RISE * promised.abs()
+            omega == middle && (form(value) - promised).abs() <= enough * promised.abs()
         });
         match self.promised {
             Some(promised) if value < promised => self.broken += 1,
             _ => self.broken = 0,
         }
         // a promise that nothing more is to be had counts only from who has kept the last one
-        if (rise <= RISE && self.broken == 0) || right - left <= 2.0 * floor || at_kink {
+        if (rise <= enough && self.broken == 0) || right - left <= 2.0 * floor || at_kink {
             return None;
         }
         self.promised = Some(value * (1.0 + KEPT * rise));
@@ -318,7 +346,7 @@ mod tests {
     /// Refines the middle one of three points of a formula; returns frequency, value, and evaluations.
     fn check(curve: &dyn Fn(f64) -> f64, [a, x, b]: [f64; 3]) -> (f64, f64, usize) {
         let formula = Formula { curve };
-        let point = |omega: f64| Point { omega, values: vec![(formula.curve)(omega)], start: None };
+        let point = |omega: f64| Point { omega, values: vec![(formula.curve)(omega)], start: None, error: 0.0 };
         let mut points = vec![point(a), point(x), point(b)];
         let mut shrink = Shrink::default();
         let mut count = 0;
@@ -363,7 +391,7 @@ mod tests {
 
     #[test]
     fn level_curves_and_failed_neighbours_have_no_peak() {
-        let point = |values: &[f64]| Point { omega: 1.0, values: values.to_vec(), start: None };
+        let point = |values: &[f64]| Point { omega: 1.0, values: values.to_vec(), start: None, error: 0.0 };
         assert!(!is_maximum(&[point(&[1.0]), point(&[1.0 + 1e-13]), point(&[1.0])], 0));
         assert!(!is_maximum(&[point(&[]), point(&[2.0]), point(&[1.0])], 0));
         assert!(is_maximum(&[point(&[1.0]), point(&[2.0]), point(&[1.0])], 0));
@@ -379,7 +407,7 @@ mod tests {
     fn orbits_that_fail_leave_the_point_of_the_grid() {
         let curve = |w: f64| 2.0 - (w - 1.0).powi(2);
         let mut formula = Formula { curve: &curve };
-        let near = [0.9, 1.01, 1.1].map(|omega| Point { omega, values: vec![curve(omega)], start: None });
+        let near = [0.9, 1.01, 1.1].map(|omega| Point { omega, values: vec![curve(omega)], start: None, error: 0.0 });
         let peak = refine(&mut formula, &near, &[0], &|_| Vec::new())[0].peak;
         assert_eq!((peak.omega, peak.value), (1.01, curve(1.01)));
     }

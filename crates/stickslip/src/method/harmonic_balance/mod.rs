@@ -38,7 +38,7 @@ use num_complex::Complex64;
 use rest::Rest;
 use solve::Lost;
 use sparse::Sparse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 pub(crate) const NAME: &str = "harmonic-balance";
 
@@ -77,6 +77,8 @@ const TOLERANCE: f64 = 1e-3;
 const FIRST: usize = 7;
 /// Highest harmonic that the program chooses itself; it is checked with twice as many.
 const MOST: usize = 511;
+/// Orbits whose harmonics are kept as starts for their neighbours: those between which a peak is refined.
+const RECENT: usize = 8;
 /// Unknowns beyond which no error is estimated: the elimination would take seconds.
 const LARGEST: usize = 2100;
 /// Unknowns beyond which nothing is begun: the matrices would fill gigabytes.
@@ -197,7 +199,7 @@ impl Method for HarmonicBalance {
             first,
             judge: Judge::new(system),
             levels: BTreeMap::new(),
-            last: None,
+            recent: VecDeque::new(),
         }))
     }
 }
@@ -323,8 +325,8 @@ struct Balance<'a> {
     first: usize,
     judge: Judge,
     levels: BTreeMap<usize, Level>,
-    /// The last orbit: its state at t = 0, its highest harmonic and its motion.
-    last: Option<(Vec<f64>, usize, Motion)>,
+    /// The last orbits, the newest first: state at t = 0, highest harmonic and motion.
+    recent: VecDeque<(Vec<f64>, usize, Motion)>,
 }
 
 impl Balance<'_> {
@@ -397,7 +399,8 @@ impl Balance<'_> {
         };
         let level = self.levels.get_mut(&top).expect("solved");
         let orbit = path::orbit(context, level, &motion, x).ok_or(OrbitError::Drift { method: NAME, omega })?;
-        self.last = Some((orbit.start.clone(), top, motion));
+        self.recent.truncate(RECENT - 1);
+        self.recent.push_front((orbit.start.clone(), top, motion));
         Ok(orbit)
     }
 
@@ -456,11 +459,11 @@ impl Solver for Balance<'_> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
-        // the harmonics of a neighbouring orbit are at hand if it is the last one
-        let warm = match (&self.last, start) {
-            (Some((state, top, motion)), Some(start)) if state == start => Some((*top, motion.clone())),
-            _ => None,
-        };
+        // the harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess
+        let warm = start.and_then(|start| {
+            let same = self.recent.iter().find(|(state, ..)| state == start);
+            same.or(self.recent.front()).map(|(_, top, motion)| (*top, motion.clone()))
+        });
         match self.method.harmonics {
             Some(top) => self.fixed(top, omega, warm),
             None => self.chosen(omega, warm),
