@@ -6,6 +6,7 @@
 //! Solved by block pivoting with Murty's least-index rule as the safeguard that makes it finite.
 //! Source: Cottle, Pang, Stone, "The Linear Complementarity Problem" (1992), Ch. 4; Júdice and Pires (1994).
 
+use crate::eigen;
 use nalgebra::{DMatrix, DVector};
 
 /// Where a component of the solution stands in its box.
@@ -105,9 +106,9 @@ fn solve_inside(
             factor.solve(&right)
         }
         _ => {
-            let svd = scaled.svd(true, true);
-            let rank = RANK * svd.singular_values.amax();
-            svd.solve(&right, rank).unwrap_or_else(|_| DVector::zeros(inside.len()))
+            let least =
+                eigen::singular(scaled).and_then(|svd| svd.solve(&right, RANK * svd.singular_values.amax()).ok());
+            least.unwrap_or_else(|| DVector::zeros(inside.len()))
         }
     };
     for (k, &i) in inside.iter().enumerate() {

@@ -35,11 +35,11 @@ pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     finite(&matrix).then(|| SymmetricEigen::try_new(matrix, f64::EPSILON, steps))?
 }
 
-/// Singular values and vectors; `None` if an entry is not finite or the iteration does not end in time.
+/// Singular values and vectors; `None` if the matrix is empty, an entry is not finite or the iteration does not end in time.
 pub fn singular<T: ComplexField<RealField = f64>>(matrix: DMatrix<T>) -> Option<SVD<T, Dyn, Dyn>> {
     let steps = STEPS * (matrix.nrows().max(matrix.ncols()) + 1);
-    let finite = matrix.iter().all(|z| z.clone().modulus().is_finite());
-    finite.then(|| SVD::try_new(matrix, true, true, 5.0 * f64::EPSILON, steps))?
+    let usable = !matrix.is_empty() && matrix.iter().all(|z| z.clone().modulus().is_finite());
+    usable.then(|| SVD::try_new(matrix, true, true, 5.0 * f64::EPSILON, steps))?
 }
 
 /// All eigenvalues of a square matrix, in no particular order; `None` if an entry is not finite or the iteration does not end in time.
@@ -369,6 +369,7 @@ mod tests {
         assert_eq!(largest_modulus(&dmatrix![f64::INFINITY]), None);
         assert!(symmetric(dmatrix![1.0, f64::NAN; f64::NAN, 1.0]).is_none());
         assert!(singular(dmatrix![f64::INFINITY, 1.0; 0.0, 1.0]).is_none());
+        assert!(singular(DMatrix::<f64>::zeros(0, 0)).is_none());
         assert_eq!(eigenvalues(&DMatrix::zeros(0, 0)), Some(vec![]));
         assert_eq!(largest_modulus(&DMatrix::zeros(0, 0)), Some(0.0));
     }

@@ -5,7 +5,8 @@
 //! A direction that neither springs nor dampers hold (`Kφ = Cφ = 0`) is a *free* one and keeps its double zero: `ρ'' = φᵀ g`.
 //! Source: Tisseur and Meerbergen, "The quadratic eigenvalue problem", SIAM Review 43 (2001), Sec. 3.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use crate::eigen;
+use nalgebra::{DMatrix, DVector, Dyn, Schur, SymmetricEigen};
 use num_complex::Complex64;
 
 /// The modes of a system with unit mass matrix.
@@ -23,7 +24,8 @@ pub struct Modes {
     pub free: DMatrix<f64>,
 }
 
-/// The matrix has no full set of modes: two of them fall together, as at critical damping.
+/// The matrix has no full set of modes: two of them fall together, as at critical damping; or numbers out of range have none, and `lambda` is
+/// not finite.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("two modes fall together at {lambda:.6} rad/s (critical damping); change a damper by a part in a million")]
 pub struct Defective {
@@ -40,6 +42,8 @@ const COUPLED: f64 = 1e-14;
 const CLUSTER: f64 = 1e-7;
 /// `|θ|` relative to `2|λ| + |C|` below which a mode counts as defective: half of the digits are lost then.
 const DEFECTIVE: f64 = 1e-7;
+/// Steps of the QR iteration per eigenvalue; 2 to 4 are usual.
+const SCHUR_STEPS: usize = 40;
 
 impl Modes {
     /// Computes the modes of `q'' + C q' + K q`, both m × m and symmetric.
@@ -66,8 +70,9 @@ impl Modes {
         if m == 0 {
             return Ok(modes);
         }
-        let undamped = SymmetricEigen::new((stiffness + stiffness.transpose()) * 0.5);
-        let basis = split_free(damping, &undamped, &mut modes.free);
+        let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
+        let undamped = eigen::symmetric((stiffness + stiffness.transpose()) * 0.5).ok_or(out_of_range)?;
+        let basis = split_free(damping, &undamped, &mut modes.free).ok_or(out_of_range)?;
         let (c, k) = (basis.transpose() * damping * &basis, basis.transpose() * stiffness * &basis);
         for component in components(&c, &k) {
             let part = DMatrix::from_fn(m, component.len(), |i, j| basis[(i, component[j])]);
@@ -82,7 +87,10 @@ impl Modes {
     /// Modes of a coupled group of coordinates, the columns of `part`.
     fn add_component(&mut self, part: &DMatrix<f64>, c: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(), Defective> {
         let r = c.nrows();
-        let eigenvalues = if r == 1 { single(c[0], k[0]) } else { companion_eigenvalues(c, k) };
+        let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
+        let eigenvalues = if r == 1 { Some(single(c[0], k[0])) } else { companion_eigenvalues(c, k) };
+        let eigenvalues =
+            eigenvalues.filter(|all| all.iter().all(|l| l.re.is_finite() && l.im.is_finite())).ok_or(out_of_range)?;
         let scale = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
         let mut done = vec![false; eigenvalues.len()];
         let part = part.map(|x| Complex64::new(x, 0.0));
@@ -101,22 +109,23 @@ impl Modes {
             if real {
                 lambda.im = 0.0;
             }
-            let mut phi = null_space(&quadratic(&cc, k, lambda), members.len());
+            let mut phi = null_space(&quadratic(&cc, k, lambda), members.len()).ok_or(out_of_range)?;
             let two_lambda_c = |lambda: Complex64| DMatrix::from_diagonal_element(r, r, 2.0 * lambda) + &cc;
             let mut theta = phi.transpose() * two_lambda_c(lambda) * &phi;
             if members.len() == 1 && theta[0].norm() > DEFECTIVE * scale {
                 // one Newton step on φᵀQ(λ)φ = 0 removes the rounding of the unsymmetric eigenvalue problem
                 let correction = (phi.transpose() * quadratic(&cc, k, lambda) * &phi)[0] / theta[0];
                 lambda -= if real { Complex64::new(correction.re, 0.0) } else { correction };
-                phi = null_space(&quadratic(&cc, k, lambda), 1);
+                phi = null_space(&quadratic(&cc, k, lambda), 1).ok_or(out_of_range)?;
                 theta = phi.transpose() * two_lambda_c(lambda) * &phi;
             }
             if real {
-                phi = real_basis(&phi);
+                phi = real_basis(&phi).ok_or(out_of_range)?;
                 theta = phi.transpose() * two_lambda_c(lambda) * &phi;
             }
             let size = (2.0 * lambda.norm() + c.norm()).max(f64::MIN_POSITIVE);
-            let singular = theta.clone().svd(false, false).singular_values.min() <= DEFECTIVE * size;
+            let values = eigen::singular(theta.clone()).ok_or(out_of_range)?.singular_values;
+            let singular = values.min() <= DEFECTIVE * size;
             let inverse = if singular { None } else { theta.try_inverse() };
             let Some(inverse) = inverse else { return Err(Defective { lambda }) };
             let left = inverse * phi.transpose();
@@ -148,9 +157,9 @@ impl Modes {
 /// Free directions into `free`; returns an orthonormal basis of the rest, undamped modes where possible.
 fn split_free(
     damping: &DMatrix<f64>,
-    undamped: &SymmetricEigen<f64, nalgebra::Dyn>,
+    undamped: &SymmetricEigen<f64, Dyn>,
     free: &mut DMatrix<f64>,
-) -> DMatrix<f64> {
+) -> Option<DMatrix<f64>> {
     let m = damping.nrows();
     let largest = undamped.eigenvalues.amax();
     let soft: Vec<usize> = (0..m).filter(|&i| undamped.eigenvalues[i].abs() <= RIGID * largest).collect();
@@ -158,7 +167,7 @@ fn split_free(
         (0..m).filter(|i| !soft.contains(i)).map(|i| undamped.eigenvectors.column(i).into_owned()).collect();
     if !soft.is_empty() {
         let null = undamped.eigenvectors.select_columns(&soft);
-        let inner = SymmetricEigen::new(null.transpose() * damping * &null);
+        let inner = eigen::symmetric(null.transpose() * damping * &null)?;
         let threshold = RIGID * damping.amax();
         let mut free_columns = Vec::new();
         for i in 0..soft.len() {
@@ -169,7 +178,7 @@ fn split_free(
             *free = DMatrix::from_columns(&free_columns);
         }
     }
-    if columns.is_empty() { DMatrix::zeros(m, 0) } else { DMatrix::from_columns(&columns) }
+    Some(if columns.is_empty() { DMatrix::zeros(m, 0) } else { DMatrix::from_columns(&columns) })
 }
 
 /// Groups of coordinates that damping or stiffness couples.
@@ -207,7 +216,7 @@ fn single(c: f64, k: f64) -> Vec<Complex64> {
     vec![Complex64::new(large, 0.0), Complex64::new(small, 0.0)]
 }
 
-fn companion_eigenvalues(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Complex64> {
+fn companion_eigenvalues(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Option<Vec<Complex64>> {
     let r = c.nrows();
     let omega = k.amax().sqrt().max(c.amax()).max(f64::MIN_POSITIVE);
     let mut companion = DMatrix::zeros(2 * r, 2 * r);
@@ -218,7 +227,11 @@ fn companion_eigenvalues(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Complex64> {
             companion[(r + i, r + j)] = -c[(i, j)];
         }
     }
-    companion.complex_eigenvalues().iter().copied().collect()
+    let steps = SCHUR_STEPS * (2 * r + 1);
+    let finite = companion.iter().all(|x| x.is_finite());
+    let schur = finite.then(|| Schur::try_new(companion.clone(), f64::EPSILON, steps))?;
+    // the real iteration gives exact pairs; where it does not end, the complex one does
+    schur.map(|schur| schur.complex_eigenvalues().iter().copied().collect()).or_else(|| eigen::eigenvalues(&companion))
 }
 
 fn quadratic(c: &DMatrix<Complex64>, k: &DMatrix<f64>, lambda: Complex64) -> DMatrix<Complex64> {
@@ -229,28 +242,28 @@ fn quadratic(c: &DMatrix<Complex64>, k: &DMatrix<f64>, lambda: Complex64) -> DMa
 }
 
 /// Orthonormal basis of the directions that the matrix maps closest to zero, one per column.
-fn null_space(matrix: &DMatrix<Complex64>, dimension: usize) -> DMatrix<Complex64> {
+fn null_space(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
     let r = matrix.nrows();
     if r == 1 {
-        return DMatrix::from_element(1, 1, Complex64::new(1.0, 0.0));
+        return Some(DMatrix::from_element(1, 1, Complex64::new(1.0, 0.0)));
     }
-    let svd = matrix.clone().svd(false, true);
+    let svd = eigen::singular(matrix.clone())?;
     let v_t = svd.v_t.expect("asked for");
     let mut order: Vec<usize> = (0..r).collect();
     order.sort_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
-    DMatrix::from_fn(r, dimension.min(r), |i, j| v_t[(order[j], i)].conj())
+    Some(DMatrix::from_fn(r, dimension.min(r), |i, j| v_t[(order[j], i)].conj()))
 }
 
 /// A real basis of the space that the columns span, which is known to have one.
-fn real_basis(columns: &DMatrix<Complex64>) -> DMatrix<Complex64> {
+fn real_basis(columns: &DMatrix<Complex64>) -> Option<DMatrix<Complex64>> {
     let (r, count) = columns.shape();
     let parts =
         DMatrix::from_fn(r, 2 * count, |i, j| if j < count { columns[(i, j)].re } else { columns[(i, j - count)].im });
-    let svd = parts.svd(true, false);
+    let svd = eigen::singular(parts)?;
     let u = svd.u.expect("asked for");
     let mut order: Vec<usize> = (0..svd.singular_values.len()).collect();
     order.sort_by(|&a, &b| svd.singular_values[b].total_cmp(&svd.singular_values[a]));
-    DMatrix::from_fn(r, count, |i, j| Complex64::new(u[(i, order[j])], 0.0))
+    Some(DMatrix::from_fn(r, count, |i, j| Complex64::new(u[(i, order[j])], 0.0)))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use stickslip::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, Law};
 use stickslip::method::event_driven::EventDriven;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::shooting::Shooting;
-use stickslip::method::{Method, OrbitError};
+use stickslip::method::{Method, MethodError, OrbitError};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Orbit, Stability};
 use stickslip_verification::Random;
@@ -208,6 +208,10 @@ fn masses_that_couple_places() {
     let (aa, ab, bb) = (1.3 - square, -0.3 - 0.4 * square, 2.3 - 1.5 * square);
     let determinant = aa * bb - ab * ab;
     let expected = [bb / determinant, -ab / determinant];
+    // masses that are no masses: an error, where a factorisation was expected to exist
+    let mut indefinite = system.clone();
+    (indefinite.mass[(0, 1)], indefinite.mass[(1, 0)]) = (4.0, 4.0);
+    assert!(matches!(EventDriven.solver(&indefinite).err(), Some(MethodError::NotPositive { matrix: "mass", .. })));
     for method in [&EventDriven as &dyn Method, &series(5), &series(1)] {
         let orbit = find(method, &system, omega).unwrap();
         for (place, expected) in orbit.places.iter().zip(expected) {
@@ -215,4 +219,64 @@ fn masses_that_couple_places() {
             assert!((found - expected).norm() < 1e-9 * expected.abs(), "{}: {found} {expected}", orbit.method);
         }
     }
+}
+
+/// Numbers that nobody means end within moments, in an orbit or in an error that says why: no method hangs, and none panics.
+#[test]
+fn absurd_numbers_end() {
+    let smooth = |kt: f64, limit: f64| Law::JenkinsArctan(JenkinsArctan { stiffness: kt, limit, alpha: 25e3 });
+    let exact = |kt: f64, limit: f64| Law::Jenkins(Jenkins { stiffness: kt, limit });
+    let rigid = |_: f64, limit: f64| Law::Coulomb(Coulomb { limit });
+    let creeping = |_: f64, limit: f64| Law::CoulombArctan(CoulombArctan { limit, alpha: 25e3 });
+    let shooting = Shooting::default();
+    let balance = HarmonicBalance::default();
+    type Make<'a> = &'a dyn Fn(f64, f64) -> Law;
+    let pairs: [(&dyn Method, Make); 6] = [
+        (&EventDriven, &exact),
+        (&EventDriven, &rigid),
+        (&balance, &exact),
+        (&balance, &smooth),
+        (&shooting, &creeping),
+        (&shooting, &smooth),
+    ];
+    // mass, stiffness, stiffness of the joint, limit
+    let usual = [1.0, 1e4, 200.0, 0.5];
+    let (mut orbits, mut errors, mut slowest) = (0, 0, (0.0, String::new()));
+    for (method, law) in pairs {
+        for which in 0..4 {
+            for value in [1e-300, 1e-150, 1e-20, 1e20, 1e23, 1e28, 1e150, 1e300] {
+                let mut numbers = usual;
+                numbers[which] = value;
+                let [m, k, kt, limit] = numbers;
+                let model = Model {
+                    masses: vec![mass("m", m)],
+                    springs: vec![spring("m", GROUND, k, 2.0)],
+                    joints: vec![joint("j", "m", GROUND, law(kt, limit))],
+                    forces: vec![force("m", 2.0, 0.0)],
+                    ..Model::default()
+                };
+                let system = model.assemble().unwrap();
+                let clock = Instant::now();
+                let found = method.solver(&system).map(|mut solver| solver.orbit(TAU * 14.0, None));
+                match found {
+                    Ok(Ok(orbit)) => {
+                        assert!(orbit.places[0].amplitude().is_finite());
+                        orbits += 1;
+                    }
+                    _ => errors += 1,
+                }
+                let what = format!("{}, {:?}", method.name(), model.joints[0].law);
+                let seconds = clock.elapsed().as_secs_f64();
+                if seconds > 1.0 {
+                    println!("{what}, number {which} is {value:e}: {seconds:.1} s");
+                }
+                if seconds > slowest.0 {
+                    slowest = (seconds, format!("{what}, number {which} is {value:e}"));
+                }
+            }
+        }
+    }
+    println!("{orbits} orbits, {errors} errors; slowest {:.3} s: {}", slowest.0, slowest.1);
+    assert!(orbits > 60 && errors > 0, "{orbits} {errors}");
+    assert!(slowest.0 < 30.0, "{slowest:?}"); // a second on an idle machine
 }

@@ -161,6 +161,12 @@ pub enum Breakdown {
         /// The step, s.
         step: f64,
     },
+    /// Numbers leave the range of floating point, or what they need to be solved with.
+    #[error("masses, springs and dampers are too far apart to compute with at t = {time:.6e} s; check their units")]
+    OutOfRange {
+        /// When, s.
+        time: f64,
+    },
     /// A number is no longer finite.
     #[error("the motion grows beyond all bounds by t = {time:.6e} s")]
     Unbounded {

@@ -6,6 +6,7 @@
 
 use super::{Breakdown, OrbitError};
 use nalgebra::{DMatrix, DVector};
+use stickslip_numerics::eigen;
 
 /// A flow that can be returned.
 pub(crate) trait ReturnMap {
@@ -237,9 +238,8 @@ fn newton_step(derivative: &DMatrix<f64>, gap: &DVector<f64>, sign: f64, weights
     let solution = if n > 0 && pivots.min() > CONTINUUM * pivots.max() {
         lu.solve(&right)
     } else {
-        let svd = scaled.svd(true, true);
-        let threshold = CONTINUUM * svd.singular_values.amax();
-        svd.solve(&right, threshold).ok()
+        // numbers out of range have no least step: the transient is let die instead
+        eigen::singular(scaled).and_then(|svd| svd.solve(&right, CONTINUUM * svd.singular_values.amax()).ok())
     };
     let mut step = solution.unwrap_or_else(|| right.clone());
     for i in 0..n {

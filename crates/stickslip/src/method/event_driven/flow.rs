@@ -143,7 +143,10 @@ impl Flow {
             let (pattern, driven) = self
                 .memory
                 .pattern(&self.mechanics, &self.drive, &self.decision.contacts)
-                .map_err(|defective| Breakdown::Defective { time, lambda: defective.lambda.norm() })?;
+                .map_err(|defective| match defective.lambda.norm() {
+                    lambda if lambda.is_finite() => Breakdown::Defective { time, lambda },
+                    _ => Breakdown::OutOfRange { time },
+                })?;
             self.start_segment(time, &pattern, driven, state);
             self.watch(&pattern, velocity_scale);
             let rest = end - time;

@@ -96,10 +96,12 @@ impl Mechanics {
                 });
             }
         }
+        let positive = system.mass.clone().cholesky().is_some();
         let inverse_mass = system
             .mass
             .clone()
             .try_inverse()
+            .filter(|inverse| positive && inverse.iter().all(|x| x.is_finite()))
             .ok_or(MethodError::NotPositive { method: super::NAME, matrix: "mass" })?;
         let fastest = (0..n).map(|i| (system.stiffness[(i, i)] / system.mass[(i, i)]).sqrt()).fold(0.0, f64::max);
         Ok(Mechanics {

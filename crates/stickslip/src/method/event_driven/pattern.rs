@@ -8,8 +8,9 @@
 
 use super::mechanics::{Contact, Mechanics};
 use crate::method::drive::Drive;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use stickslip_numerics::eigen;
 use stickslip_numerics::modes::{Defective, Modes};
 use stickslip_numerics::signal::Basis;
 
@@ -101,11 +102,17 @@ impl Pattern {
         let held: Vec<usize> =
             (0..stuck.len()).filter(|&s| stuck[s] && mechanics.sliders[s].stiffness.is_none()).collect();
         let w = DMatrix::from_fn(n, held.len(), |i, s| mechanics.sliders[held[s]].direction[i]);
+        let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
         let inverse_delassus = weighted_inverse(
             &(w.transpose() * &mechanics.inverse_mass * &w),
             &held.iter().map(|&s| mechanics.sliders[s].limit).collect::<Vec<_>>(),
-        );
-        let redundant = !held.is_empty() && inverse_delassus.rank(REDUNDANT * inverse_delassus.amax()) < held.len();
+        )
+        .ok_or(out_of_range)?;
+        let redundant = !held.is_empty() && {
+            let values = eigen::singular(inverse_delassus.clone()).ok_or(out_of_range)?.singular_values;
+            let least = REDUNDANT * inverse_delassus.amax();
+            values.iter().filter(|value| **value > least).count() < held.len()
+        };
         let hold = &mechanics.inverse_mass * &w * &inverse_delassus;
         let multiplier = &inverse_delassus * w.transpose() * &mechanics.inverse_mass;
 
@@ -129,7 +136,7 @@ impl Pattern {
             block -= &stiffness * &hold_projection;
         }
 
-        let basis = free_directions(&mechanics.mass, &w);
+        let basis = free_directions(&mechanics.mass, &w).ok_or(out_of_range)?;
         let modes =
             Modes::new(&(basis.transpose() * &mechanics.damping * &basis), &(basis.transpose() * &stiffness * &basis))?;
         let frozen = mechanics
@@ -477,32 +484,31 @@ fn complex_vector(v: &DVector<f64>) -> DVector<Complex64> {
 }
 
 /// M-orthonormal basis of the displacements that `Wᵀ` maps to zero.
-fn free_directions(mass: &DMatrix<f64>, w: &DMatrix<f64>) -> DMatrix<f64> {
+fn free_directions(mass: &DMatrix<f64>, w: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = mass.nrows();
     if n == 0 {
-        return DMatrix::zeros(0, 0);
+        return Some(DMatrix::zeros(0, 0));
     }
-    let factor = mass.clone().cholesky().expect("the mass matrix was checked to be positive");
-    let l_inverse = factor.l().solve_lower_triangular(&DMatrix::identity(n, n)).expect("positive diagonal");
+    let l_inverse = mass.clone().cholesky()?.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
     if w.ncols() == 0 {
-        return l_inverse.transpose();
+        return Some(l_inverse.transpose());
     }
     let scaled = &l_inverse * w;
-    let eigen = SymmetricEigen::new(&scaled * scaled.transpose());
+    let eigen = eigen::symmetric(&scaled * scaled.transpose())?;
     let largest = eigen.eigenvalues.amax();
     let null: Vec<usize> = (0..n).filter(|&i| eigen.eigenvalues[i] <= REDUNDANT * largest).collect();
-    l_inverse.transpose() * eigen.eigenvectors.select_columns(&null)
+    Some(l_inverse.transpose() * eigen.eigenvectors.select_columns(&null))
 }
 
 /// Inverse of the Delassus matrix; where stuck contacts are redundant, the one that loads them in proportion to their limits.
-fn weighted_inverse(delassus: &DMatrix<f64>, limits: &[f64]) -> DMatrix<f64> {
+fn weighted_inverse(delassus: &DMatrix<f64>, limits: &[f64]) -> Option<DMatrix<f64>> {
     let s = delassus.nrows();
     if s == 0 {
-        return DMatrix::zeros(0, 0);
+        return Some(DMatrix::zeros(0, 0));
     }
     let weight = DMatrix::from_fn(s, s, |i, j| if i == j { limits[i].sqrt() } else { 0.0 });
-    let eigen = SymmetricEigen::new(&weight * delassus * &weight);
+    let eigen = eigen::symmetric(&weight * delassus * &weight)?;
     let largest = eigen.eigenvalues.amax();
     let inverse = eigen.eigenvalues.map(|value| if value > REDUNDANT * largest { 1.0 / value } else { 0.0 });
-    &weight * &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose() * &weight
+    Some(&weight * &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose() * &weight)
 }

@@ -626,7 +626,8 @@ fn resolve(y: f64, s: f64) -> (f64, f64) {
         let slope = 1.0 + FRAC_2_PI * s / (1.0 + s * s * w * w);
         let step = left / slope;
         w -= step;
-        if step.abs() <= f64::EPSILON * target {
+        // the left side is rounded to this; what is no number ends too
+        if step.abs() <= 4.0 * f64::EPSILON * target || step.is_nan() {
             break;
         }
     }

@@ -9,6 +9,10 @@ use stickslip_numerics::dense;
 
 /// Newton iterations; 3 to 15 are usual.
 const ITERATIONS: usize = 60;
+/// Newton iterations in all while slip limits are raised: where they hold, one is enough.
+const MOST_RAISING: usize = 200;
+/// Newton iterations in all while they are lowered; a few hundred are usual.
+const MOST_ITERATIONS: usize = 3000;
 /// Halvings of a step.
 pub(super) const HALVINGS: usize = 7;
 /// Growth of the residual in a whole step beyond which the search is lost.
@@ -165,12 +169,15 @@ impl Level {
         good.c.copy_from_slice(&self.linear);
         let mut limits = 1.0;
         // where everything sticks the equations are linear
+        let mut held = Err(Lost { iterations: good.iterations, residual: f64::INFINITY });
         for _ in 0..60 {
             limits *= 4.0;
-            if self.newton(coordinates, omega, &mut good, Ease { limits, ..GIVEN }, ITERATIONS).is_ok() {
+            held = self.newton(coordinates, omega, &mut good, Ease { limits, ..GIVEN }, ITERATIONS);
+            if held.is_ok() || good.iterations - motion.iterations > MOST_RAISING {
                 break;
             }
         }
+        held?;
         let mut factor: f64 = 0.5;
         while limits > 1.0 {
             motion.copy(&good);
@@ -184,7 +191,7 @@ impl Level {
                 }
                 Err(lost) => {
                     factor = factor.sqrt();
-                    if factor > 0.995 {
+                    if factor > 0.995 || good.iterations > MOST_ITERATIONS {
                         return Err(lost);
                     }
                 }

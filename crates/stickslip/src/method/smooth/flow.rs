@@ -15,6 +15,9 @@ const LEVELS: usize = 44;
 const COARSEST: usize = 4;
 /// The first step of a run is the stretch divided by `2^FIRST_LEVEL`; the control corrects it at once.
 const FIRST_LEVEL: usize = 12;
+/// Steps of one run, tried ones too, beyond which it stalls. The returns of the verification tests take 300 on average, at most 6900; these
+/// take a second for one mass.
+const STEP_LIMIT: usize = 200_000;
 /// The new step aims at this share of the tolerance.
 const SAFETY: f64 = 0.8;
 /// Order of the error estimate plus one.
@@ -116,6 +119,9 @@ impl SmoothFlow {
             let ticks = 1u64 << (LEVELS - self.level);
             let time = start + position as f64 * tick;
             let h = ticks as f64 * tick;
+            if self.accepted + self.rejected >= STEP_LIMIT {
+                return Err(Breakdown::Stalled { time, step: h });
+            }
             if self.eliminated[self.level].is_none() {
                 self.eliminated[self.level] = Some(Eliminated::new(&self.structure, h));
             }
