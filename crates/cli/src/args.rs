@@ -71,6 +71,27 @@ pub enum Command {
         #[arg(long, value_name = "SIZE", value_parser = bytes)]
         memory: Option<u64>,
     },
+    /// Draw stored results again, or several runs in one figure with a table of their differences
+    Plot {
+        /// Folders of results, for example stickslip-out/couple
+        #[arg(required = true)]
+        folders: Vec<PathBuf>,
+        /// Draw all runs in one figure and compare them with the first
+        #[arg(long)]
+        overlay: bool,
+        /// Draw as this study file says in its [figure]; nothing is computed
+        #[arg(long, value_name = "FILE")]
+        study: Option<PathBuf>,
+        /// Where the folder of the comparison goes [default: stickslip-out]
+        #[arg(long, requires = "overlay")]
+        out: Option<PathBuf>,
+        /// Write only these: svg, png, html; with --overlay csv and json too (comma between them)
+        #[arg(long, value_delimiter = ',')]
+        only: Vec<String>,
+        /// Show the figure in the browser
+        #[arg(long)]
+        open: bool,
+    },
     /// Start a study file from a template
     New {
         /// Template (see `stickslip list templates`)

@@ -4,6 +4,7 @@ mod args;
 mod list;
 mod open;
 mod paper;
+mod plot;
 mod progress;
 mod run;
 
@@ -47,6 +48,10 @@ fn main() -> ExitCode {
         }
         Command::Check { files, set, method, memory } => {
             run::check(&run::Request { files: &files, set: &set, method: method.as_deref(), memory })
+        }
+        Command::Plot { folders, overlay, study, out, only, open } => {
+            let study = study.as_deref();
+            plot::plot(&folders, &plot::Wanted { overlay, study, out: out.as_deref(), only: &only, open })
         }
         Command::New { template, file } => new(&template, file.as_deref()),
         Command::List { what } => print(&list::text(what)),

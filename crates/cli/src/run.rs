@@ -73,7 +73,7 @@ fn read(file: &Path, set: &[(String, String)]) -> Result<Study, StudyError> {
 }
 
 /// Prints an error of a study file with its place underlined.
-fn show(error: &StudyError) {
+pub(crate) fn show(error: &StudyError) {
     let report = miette::Report::new(error.clone());
     eprintln!("{report:?}");
 }
@@ -276,7 +276,8 @@ fn complain(dataset: &Dataset) {
     }
 }
 
-fn show_figure(files: &[PathBuf]) {
+/// Shows the figure among these files in the browser.
+pub(crate) fn show_figure(files: &[PathBuf]) {
     match open::figure(files).map(open::show) {
         Some(Ok(())) => {}
         // the results are there all the same

@@ -53,6 +53,18 @@ fn written_before(folder: &Path) -> BTreeSet<String> {
 /// # Errors
 /// [`ReportError`] says which file and why; what was in the folder is there as before.
 pub(crate) fn replace(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
+    put(folder, files, &|| written_before(folder))
+}
+
+/// The same, but what else the run wrote stays: these files belong to it.
+///
+/// # Errors
+/// As [`replace`].
+pub(crate) fn exchange(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
+    put(folder, files, &BTreeSet::new)
+}
+
+fn put(folder: &Path, files: &[File], before: &dyn Fn() -> BTreeSet<String>) -> Result<Vec<PathBuf>, ReportError> {
     let mut names = BTreeSet::new();
     for file in files {
         if !names.insert(file_name(&file.name, "result")?) {
@@ -76,7 +88,7 @@ pub(crate) fn replace(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, Rep
         .into_iter()
         .try_for_each(|part| fs::create_dir_all(part).map_err(failed(folder)))
         .and_then(|()| files.iter().try_for_each(|file| write(&new.join(&file.name), file).map_err(failed(folder))))
-        .and_then(|()| swap(folder, &new, &old, files));
+        .and_then(|()| swap(folder, &new, &old, files, before()));
     // only what this run has put there; what cannot be removed is no reason to fail
     let _ = fs::remove_dir_all(&aside);
     if done.is_err() && fresh {
@@ -91,10 +103,15 @@ fn write(path: &Path, file: &File) -> std::io::Result<()> {
     handle.sync_all()
 }
 
-/// Moves the old files out and the new ones in; on a failure everything back.
-fn swap(folder: &Path, new: &Path, old: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
+/// Moves the old files out, and those of the same names, and the new ones in; on a failure everything back.
+fn swap(
+    folder: &Path,
+    new: &Path,
+    old: &Path,
+    files: &[File],
+    mut out: BTreeSet<String>,
+) -> Result<Vec<PathBuf>, ReportError> {
     let record_last = |name: &&str| *name == RECORD;
-    let mut out = written_before(folder);
     out.extend(files.iter().map(|file| file.name.clone()).filter(|name| folder.join(name).is_file()));
     let mut out: Vec<String> = out.into_iter().collect();
     out.sort_by_key(|name| !record_last(&name.as_str()));
@@ -212,7 +229,7 @@ mod tests {
         fs::create_dir_all(&old).unwrap();
         fs::write(new.join("a.csv"), "new").unwrap();
         let files = [file("a.csv", "new"), file("c.csv", "not written")];
-        assert!(swap(&folder, &new, &old, &files).is_err());
+        assert!(swap(&folder, &new, &old, &files, written_before(&folder)).is_err());
         assert_eq!(names(&folder), ["a.csv", "b.csv", RECORD]);
         assert_eq!(fs::read_to_string(folder.join("a.csv")).unwrap(), "old");
         assert!(replace(&folder, &[file("x.csv", ""), file("x.csv", "")]).is_err());

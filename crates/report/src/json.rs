@@ -39,11 +39,22 @@ pub fn to_json(dataset: &Dataset, files: &[String]) -> Result<String, ReportErro
             "file": format!("{}.csv", t.name),
             "rows": t.rows(),
             "columns": t.columns.iter().map(|c| &c.name).collect::<Vec<_>>(),
+            "values": t.columns.iter().map(|c| sort(&c.values)).collect::<Vec<_>>(),
         })).collect::<Vec<_>>(),
         "study": record.study,
     });
     let text = serde_json::to_string_pretty(&value).map_err(|e| ReportError::encode("record.json", e))?;
     Ok(text + "\n")
+}
+
+/// What the cells of a column hold, so that they can be read again.
+pub(crate) fn sort(values: &Values) -> &'static str {
+    match values {
+        Values::Number(_) => "number",
+        Values::Integer(_) => "integer",
+        Values::Text(_) => "text",
+        Values::Flag(_) => "flag",
+    }
 }
 
 /// The dataset as one line of JSON for other programs: what was run and how it went, and every table as a list of rows, each an object from

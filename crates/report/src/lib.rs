@@ -19,6 +19,7 @@
 mod axis;
 mod clip;
 mod colour;
+pub mod compare;
 pub mod csv;
 pub mod folder;
 mod font;
@@ -28,6 +29,7 @@ pub mod json;
 pub mod output;
 pub mod page;
 pub mod png;
+pub mod stored;
 pub mod svg;
 pub mod terminal;
 

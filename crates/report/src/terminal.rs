@@ -1,5 +1,6 @@
 //! A dataset for the terminal: what was computed, the small tables, what failed, where the files are.
 
+use crate::stored::COMPARISON;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Dataset, Table, Values};
@@ -16,7 +17,7 @@ pub struct Terminal {
 /// Tables longer than this are left to their files, or cut if they hold the main numbers of a study.
 const ROWS: usize = 24;
 /// Tables with the main numbers: these, and all whose names end in `_summary`.
-const MAIN: [&str; 5] = ["summary", "peaks", "optimum", "turns", "orbits"];
+const MAIN: [&str; 6] = ["summary", "peaks", "optimum", "turns", "orbits", "differences"];
 /// Widest table, in characters, where the width of a line is unknown or larger.
 const WIDTH: usize = 120;
 /// Narrowest line that is taken seriously.
@@ -52,16 +53,19 @@ impl Terminal {
         let points = dataset.record.points.iter().map(|(status, count)| format!("{count} {}", clean(status)));
         let points = points.collect::<Vec<_>>().join(", ");
         let time = duration(dataset.record.wall_time_s);
-        let _ = writeln!(
-            out,
-            "{}: {} in {time}{}",
-            clean(&dataset.name),
-            if points.is_empty() { "no points" } else { &points },
-            match &dataset.record.methods[..] {
-                [] => String::new(),
-                methods => format!(" by {}", clean(&methods.join("; "))),
-            }
-        );
+        // a comparison has no points of its own
+        if dataset.kind != COMPARISON {
+            let _ = writeln!(
+                out,
+                "{}: {} in {time}{}",
+                clean(&dataset.name),
+                if points.is_empty() { "no points" } else { &points },
+                match &dataset.record.methods[..] {
+                    [] => String::new(),
+                    methods => format!(" by {}", clean(&methods.join("; "))),
+                }
+            );
+        }
         // warnings have been said on standard error
         let notes: Vec<&String> = dataset.notes.iter().filter(|note| !note.starts_with("warning")).collect();
         for note in notes.iter().take(NOTES) {
@@ -92,6 +96,11 @@ impl Terminal {
         }
         out.push_str(&places(files));
         out
+    }
+
+    /// Where files are: the folder once, then the names.
+    pub fn files(self, files: &[PathBuf]) -> String {
+        places(files)
     }
 
     /// A text in lines no longer than the width, broken between words; all but the first begin with `indent`. A longer

@@ -1,7 +1,7 @@
 //! Runs a study: checks every case (so that what a method cannot take is found before anything is computed), computes its units on all
 //! threads, joins their parts in order, lets the kind draw its figure, and adds the record.
 
-use crate::dataset::{Dataset, Figure, Record};
+use crate::dataset::{Dataset, Figure, Record, Table};
 use crate::drawing::Drawing;
 use crate::error::StudyError;
 use crate::note::Note;
@@ -47,7 +47,7 @@ pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
     let tables = kind.tables.iter().zip(part.tables).map(|(name, rows)| rows.table(name));
     // a table that nothing was ever written to has no columns either
     let tables: Vec<_> = tables.filter(|table| !table.columns.is_empty()).collect();
-    let figure = Figure { title: study.title().to_owned(), ..(kind.draw)(&Drawing { study, tables: &tables }) };
+    let figure = redrawn(study, &tables);
     Ok(Dataset {
         name: study.name().to_owned(),
         title: study.title().to_owned(),
@@ -68,6 +68,11 @@ pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
             interrupted,
         },
     })
+}
+
+/// The figure of finished tables, computed just now or read from a disk. Tables that are none of this study have an empty figure.
+pub fn redrawn(study: &Study, tables: &[Table]) -> Figure {
+    Figure { title: study.title().to_owned(), ..(study.kind().draw)(&Drawing { study, tables }) }
 }
 
 /// Prepares every case and computes nothing: whether [`run()`] would begin.

@@ -376,6 +376,14 @@ impl Study {
         Ok(self)
     }
 
+    /// The same study, drawn as another file says: with its title and its `[figure]`.
+    #[must_use]
+    pub fn drawn_like(mut self, other: &Study) -> Study {
+        self.title.clone_from(&other.title);
+        self.figure = other.figure.clone();
+        self
+    }
+
     /// An error that only shows when the study is run, placed at a key of the file: `table` is `study`, `method`, `mass`, `joint`, …,
     /// `index` the element of a list. The table or the file stands in where the key is absent.
     pub fn error_at(

@@ -236,7 +236,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
 
 /// The column of what a branch runs along stands behind the outer varied parameters.
 fn name_of_axis(table: &Table, outer: usize) -> String {
-    table.columns[outer].name.clone()
+    table.columns.get(outer).map_or_else(String::new, |column| column.name.clone())
 }
 
 /// Which rows are known to be unstable.

@@ -240,6 +240,10 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let (x_axis, x_factor) = drawing.axis(0, "displacement", largest(table, ["displacement_m".to_owned()]), "m");
     let (y_axis, y_factor) = drawing.axis(1, "force", largest(table, ["force_N".to_owned()]), "N");
     let joints = words(table, "joint");
+    // a table from elsewhere may lack columns
+    if joints.len() != table.rows() {
+        return Figure::default();
+    }
     let frequencies = table.numbers("frequency_Hz");
     let several = joints.iter().any(|joint| *joint != joints[0]);
     let same = |a: usize, b: usize| joints[a] == joints[b] && frequencies.is_none_or(|f| f[a] == f[b]);

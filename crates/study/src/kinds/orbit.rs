@@ -131,7 +131,8 @@ fn word(contact: Contact) -> &'static str {
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(motion), Some(system)) = (drawing.table("orbit"), drawing.system(0)) else { return Figure::default() };
     let mut panels = Vec::new();
-    let frequencies = motion.numbers("frequency_Hz").unwrap_or_default();
+    // a table from elsewhere may lack columns
+    let Some(frequencies) = motion.numbers("frequency_Hz") else { return Figure::default() };
     for stretch in drawing.stretches(motion) {
         let mut from = stretch.rows.start;
         for run in frequencies[stretch.rows.clone()].chunk_by(|a, b| a == b) {

@@ -142,7 +142,8 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let stretches = drawing.stretches_of(table, outer);
     let Some(inner) = stretches.first().and_then(|stretch| stretch.varied.last()) else { return Figure::default() };
     let (y_axis, factor) = drawing.axis(1, "resonance peak", largest(table, ["amplitude_m".to_owned()]), "m");
-    let parameter = |table: &crate::dataset::Table, rows| numbers(table, &table.columns[outer].name, rows);
+    let column = inner.column().0;
+    let parameter = |table: &crate::dataset::Table, rows| numbers(table, &column, rows);
     let height = |table, rows| numbers(table, "amplitude_m", rows).iter().map(|y| y * factor).collect::<Vec<f64>>();
     let mut series = Vec::new();
     for (colour, stretch) in stretches.iter().enumerate() {

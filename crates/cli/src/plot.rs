@@ -1,0 +1,139 @@
+//! `stickslip plot`: figures from stored results, and runs beside each other. Nothing is computed.
+
+use crate::run::{show, show_figure};
+use crate::{Ending, print};
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use stickslip_report::compare;
+use stickslip_report::stored::{Stored, StoredError, read};
+use stickslip_report::{Outputs, terminal::Terminal};
+use stickslip_study::read_file;
+
+/// What is to be drawn.
+pub struct Wanted<'a> {
+    /// `--overlay`.
+    pub overlay: bool,
+    /// `--study`.
+    pub study: Option<&'a Path>,
+    /// `--out`.
+    pub out: Option<&'a Path>,
+    /// `--only`.
+    pub only: &'a [String],
+    /// `--open`.
+    pub open: bool,
+}
+
+/// `stickslip plot`.
+pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
+    let outputs = match if wanted.only.is_empty() { Ok(Outputs::all()) } else { Outputs::only(wanted.only) } {
+        Ok(outputs) => outputs,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return Ending::WrongInput;
+        }
+    };
+    let mut runs = Vec::new();
+    let mut wrong = false;
+    // all are read before anything is written
+    for folder in folders {
+        match read(folder).map_err(Some).and_then(|run| like(run, wanted.study).map_err(|()| None)) {
+            Ok(run) => runs.push(run),
+            Err(error) => {
+                match error {
+                    // the place in the study that the record holds is what helps
+                    Some(StoredError::Study { path, cause }) => {
+                        eprintln!("error: {}: the study in it cannot be read", path.display());
+                        show(&cause);
+                    }
+                    Some(error) => eprintln!("error: {error}"),
+                    None => {}
+                }
+                wrong = true;
+            }
+        }
+    }
+    if wrong {
+        return Ending::WrongInput;
+    }
+    for run in runs.iter().filter(|run| run.dataset.record.interrupted) {
+        eprintln!(
+            "warning: {}: the run was interrupted, only the points finished until then are drawn",
+            run.folder.display()
+        );
+    }
+    if wanted.overlay { overlay(&runs, wanted, &outputs) } else { each(&runs, wanted, &outputs) }
+}
+
+/// The run, drawn as the study file says if there is one. An error has been shown.
+fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
+    let Some(file) = file else { return Ok(run) };
+    let study = read_file(file, &run.overrides()).map_err(|error| show(&error))?;
+    // the method may come from the command line, as it did for the run
+    let study = match run.study.case(0).map(|case| study.clone().with_method(&case.method.name)) {
+        Ok(Ok(study)) => study,
+        _ => study,
+    };
+    if study.kind().name != run.dataset.kind {
+        eprintln!(
+            "error: {} is a {}, {} holds a {}",
+            file.display(),
+            study.kind().name,
+            run.folder.display(),
+            run.dataset.kind
+        );
+        return Err(());
+    }
+    if !run.draw_like(&study) {
+        eprintln!(
+            "warning: {} has changed in more than its figure; {} is drawn as it was computed, run the study again for the rest",
+            file.display(),
+            run.folder.display()
+        );
+    }
+    Ok(run)
+}
+
+/// Every run for itself, in its own folder.
+fn each(runs: &[Stored], wanted: &Wanted<'_>, outputs: &Outputs) -> Ending {
+    for run in runs {
+        if run.dataset.figure.panels.is_empty() {
+            eprintln!("warning: {}: there is nothing to draw", run.folder.display());
+        }
+        let files = match run.write_figure(outputs) {
+            Ok(files) => files,
+            Err(error) => return Ending::Failed(error.to_string()),
+        };
+        if std::io::stdout().is_terminal()
+            && let ending @ Ending::Failed(_) = print(&Terminal::default().files(&files))
+        {
+            return ending;
+        }
+        if wanted.open {
+            show_figure(&files);
+        }
+    }
+    Ending::Done
+}
+
+/// All runs in one figure, and their differences.
+fn overlay(runs: &[Stored], wanted: &Wanted<'_>, outputs: &Outputs) -> Ending {
+    let comparison = match compare::compare(runs) {
+        Ok(comparison) => comparison,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return Ending::WrongInput;
+        }
+    };
+    let out = wanted.out.unwrap_or(Path::new("stickslip-out"));
+    let files = match compare::write(&comparison, out, outputs) {
+        Ok(files) => files,
+        Err(error) => return Ending::Failed(error.to_string()),
+    };
+    let colour = std::io::stdout().is_terminal();
+    let width = terminal_size::terminal_size().filter(|_| colour).map(|(width, _)| usize::from(width.0));
+    let ending = print(&Terminal { colour, width }.text(&comparison, &files));
+    if wanted.open {
+        show_figure(&files);
+    }
+    ending
+}
