@@ -213,8 +213,9 @@ fn refine(
             }
             // the orbit's neighbour on the side of the new point is as good a start as any
             let start = points[best].start.as_deref();
-            let point = match solver.orbit(omega, start) {
-                Ok(orbit) => Point { omega, ..Point::new(&orbit, quantities) },
+            let error = points[best].error;
+            let point = match solver.between(omega, start) {
+                Ok(orbit) => Point { omega, error, ..Point::new(&orbit, quantities) },
                 Err(_) => {
                     failures += 1;
                     Point::failed(omega)

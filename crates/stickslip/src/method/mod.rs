@@ -62,6 +62,14 @@ pub trait Solver {
     /// No orbit was found: [`OrbitError`] says how far the method got and what to try. A motion that did not converge is never
     /// returned as an orbit.
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError>;
+
+    /// The same orbit without an estimate of its error, where that costs extra: for searches between orbits whose errors are known.
+    ///
+    /// # Errors
+    /// As [`Solver::orbit`].
+    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.orbit(omega, start)
+    }
 }
 
 /// A method cannot take a system.

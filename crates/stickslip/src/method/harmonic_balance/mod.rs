@@ -404,12 +404,18 @@ impl Balance<'_> {
         Ok(orbit)
     }
 
-    /// The user's number of harmonics, with an estimate of its error.
-    fn fixed(&mut self, top: usize, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
+    /// One number of harmonics, with an estimate of its error if that is wanted.
+    fn fixed(
+        &mut self,
+        top: usize,
+        omega: f64,
+        warm: Option<(usize, Motion)>,
+        wanted: bool,
+    ) -> Result<Orbit, OrbitError> {
         let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(omega, l))?;
         let x = self.places(top, omega, &motion);
         let sparse = self.levels[&top].sparse.is_some();
-        let known = sparse || self.unknowns(self.kept.double(top)) <= LARGEST;
+        let known = wanted && (sparse || self.unknowns(self.kept.double(top)) <= LARGEST);
         let truncation = if known { self.compare(top, omega, &motion, &x).ok().map(|(error, ..)| error) } else { None };
         self.finish(top, omega, motion, x, truncation)
     }
@@ -454,19 +460,34 @@ impl Balance<'_> {
     }
 }
 
+impl Balance<'_> {
+    /// The harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess.
+    fn warm(&self, start: Option<&[f64]>) -> Option<(usize, Motion)> {
+        let start = start?;
+        let same = self.recent.iter().find(|(state, ..)| state == start);
+        same.or(self.recent.front()).map(|(_, top, motion)| (*top, motion.clone()))
+    }
+}
+
 impl Solver for Balance<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
-        // the harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess
-        let warm = start.and_then(|start| {
-            let same = self.recent.iter().find(|(state, ..)| state == start);
-            same.or(self.recent.front()).map(|(_, top, motion)| (*top, motion.clone()))
-        });
+        let warm = self.warm(start);
         match self.method.harmonics {
-            Some(top) => self.fixed(top, omega, warm),
+            Some(top) => self.fixed(top, omega, warm, true),
             None => self.chosen(omega, warm),
+        }
+    }
+
+    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        // the harmonics that the neighbour needed are enough
+        match (self.method.harmonics, self.warm(start)) {
+            (Some(top), warm) | (None, warm @ Some((top, _))) if omega.is_finite() && omega > 0.0 => {
+                self.fixed(top, omega, warm, false)
+            }
+            _ => self.orbit(omega, start),
         }
     }
 }

@@ -13,6 +13,11 @@ const ITERATIONS: usize = 60;
 const MOST_RAISING: usize = 200;
 /// Newton iterations in all while they are lowered; a few hundred are usual.
 const MOST_ITERATIONS: usize = 3000;
+/// Residual at which a search that comes no closer has found all that there is: the force of a sampled slider behind a spring moves in
+/// steps when a switch passes a sample, by 1e-8 to 1e-7 of the forces, far below what the series leaves out.
+const STEPS: f64 = 1e-7;
+/// Iterations without half of the least residual after which a search comes no closer.
+const PATIENCE: usize = 8;
 /// Halvings of a step.
 pub(super) const HALVINGS: usize = 7;
 /// Growth of the residual in a whole step beyond which the search is lost.
@@ -43,8 +48,10 @@ impl Level {
         let mut length = self.length(motion);
         let mut residual = self.evaluate(coordinates, omega, motion, ease, length, true);
         let mut least = f64::INFINITY;
+        // the residual that is to be halved, and for how long it was not
+        let (mut mark, mut waited) = (residual, 0);
         for _ in 0..most {
-            if residual <= SOLVED {
+            if residual <= SOLVED || (waited > PATIENCE && least <= STEPS) {
                 break;
             }
             if !self.newton_step(coordinates, ease, length) {
@@ -73,6 +80,7 @@ impl Level {
                 least = residual;
                 self.best.copy(motion);
             }
+            (mark, waited) = if least < 0.5 * mark { (least, 0) } else { (mark, waited + 1) };
             let now = self.length(motion);
             if now < 0.5 * length || now > 2.0 * length {
                 // the motion was far from what it began with: its own size counts
@@ -89,7 +97,11 @@ impl Level {
             residual = self.evaluate(coordinates, omega, motion, ease, length, false);
         }
         motion.residual = residual;
-        if residual <= SOLVED { Ok(()) } else { Err(Lost { iterations: motion.iterations, residual }) }
+        if residual <= SOLVED || (waited > PATIENCE && residual <= STEPS) {
+            Ok(())
+        } else {
+            Err(Lost { iterations: motion.iterations, residual })
+        }
     }
 
     /// The Newton step into `self.step`, in the unknowns' units.
