@@ -77,6 +77,8 @@ const TOLERANCE: f64 = 1e-3;
 const FIRST: usize = 7;
 /// Highest harmonic that the program chooses itself; it is checked with twice as many.
 const MOST: usize = 511;
+/// Newton iterations from a neighbouring orbit, which take 2 to 5.
+const NEARBY: usize = 20;
 /// Orbits whose harmonics are kept as starts for their neighbours: those between which a peak is refined.
 const RECENT: usize = 8;
 /// Unknowns beyond which no error is estimated: the elimination would take seconds.
@@ -404,18 +406,23 @@ impl Balance<'_> {
         Ok(orbit)
     }
 
-    /// One number of harmonics, with an estimate of its error if that is wanted.
-    fn fixed(
-        &mut self,
-        top: usize,
-        omega: f64,
-        warm: Option<(usize, Motion)>,
-        wanted: bool,
-    ) -> Result<Orbit, OrbitError> {
+    /// The solution near another one, without an estimate of its error, and without the long ways of [`Level::solve`]: a search that asks
+    /// for it can do without.
+    fn nearby(&mut self, top: usize, omega: f64, near: &Motion) -> Result<Orbit, OrbitError> {
+        self.level(top, omega);
+        let mut motion = Motion { iterations: 0, ..near.clone() };
+        let level = self.levels.get_mut(&top).expect("made above");
+        level.polish(&self.coordinates, omega, &mut motion, NEARBY).map_err(|l| self.lost(omega, l))?;
+        let x = self.places(top, omega, &motion);
+        self.finish(top, omega, motion, x, None)
+    }
+
+    /// The user's number of harmonics, with an estimate of its error.
+    fn fixed(&mut self, top: usize, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
         let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(omega, l))?;
         let x = self.places(top, omega, &motion);
         let sparse = self.levels[&top].sparse.is_some();
-        let known = wanted && (sparse || self.unknowns(self.kept.double(top)) <= LARGEST);
+        let known = sparse || self.unknowns(self.kept.double(top)) <= LARGEST;
         let truncation = if known { self.compare(top, omega, &motion, &x).ok().map(|(error, ..)| error) } else { None };
         self.finish(top, omega, motion, x, truncation)
     }
@@ -476,17 +483,15 @@ impl Solver for Balance<'_> {
         }
         let warm = self.warm(start);
         match self.method.harmonics {
-            Some(top) => self.fixed(top, omega, warm, true),
+            Some(top) => self.fixed(top, omega, warm),
             None => self.chosen(omega, warm),
         }
     }
 
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        // the harmonics that the neighbour needed are enough
-        match (self.method.harmonics, self.warm(start)) {
-            (Some(top), warm) | (None, warm @ Some((top, _))) if omega.is_finite() && omega > 0.0 => {
-                self.fixed(top, omega, warm, false)
-            }
+        match self.warm(start) {
+            // the harmonics that the neighbour needed are enough
+            Some((top, motion)) if omega.is_finite() && omega > 0.0 => self.nearby(top, omega, &motion),
             _ => self.orbit(omega, start),
         }
     }
