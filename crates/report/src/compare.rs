@@ -7,6 +7,7 @@
 
 use crate::output::{Outputs, ReportError, file_name, write_dataset};
 use crate::stored::{COMPARISON, Stored, StoredError};
+use crate::terminal;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -98,6 +99,70 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
             interrupted: false,
         },
     })
+}
+
+/// The same comparison with differences in their units and in percent, and without what is the same in all runs.
+pub(crate) fn for_people(comparison: &Dataset) -> Dataset {
+    let mut people = comparison.clone();
+    for table in &mut people.tables {
+        let several = column(table, "run").is_some_and(|column| match &column.values {
+            Values::Text(runs) => runs.iter().any(|run| *run != runs[0]),
+            _ => false,
+        });
+        table.columns.retain(|column| several || column.name != "run");
+        for column in &mut table.columns {
+            if let (Values::Number(values), true) = (&column.values, column.name.ends_with("_change")) {
+                column.values = Values::Text(values.iter().map(|value| percent(*value, true)).collect());
+            }
+        }
+        if table.name == DIFFERENCES {
+            let same = shown_differences(table);
+            if !same.is_empty() {
+                people.notes.push(format!("The same in all runs: {}.", same.join(", ")));
+            }
+        }
+    }
+    people
+}
+
+/// Makes the differences readable; returns what has none.
+fn shown_differences(table: &mut Table) -> Vec<String> {
+    let words = |name: &str| match column(table, name).map(|column| &column.values) {
+        Some(Values::Text(words)) => words.clone(),
+        _ => vec![String::new(); table.rows()],
+    };
+    let numbers = |name: &str| table.numbers(name).map_or_else(|| vec![f64::NAN; table.rows()], <[f64]>::to_vec);
+    let (tables, columns, places, ways) = (words("table"), words("column"), words("at"), words("how"));
+    let (differences, relative) = (numbers("largest_difference"), numbers("relative"));
+    let runs = column(table, "run").map(|_| words("run"));
+    let (differ, same): (Vec<usize>, Vec<usize>) = (0..table.rows()).partition(|row| differences[*row] != 0.0);
+    let of = |all: &[String]| differ.iter().map(|row| all[*row].clone()).collect::<Vec<_>>();
+    let mut made = vec![text("table", of(&tables)), text("column", of(&columns))];
+    made.extend(runs.map(|runs| text("run", of(&runs))));
+    let shown = differ.iter().map(|row| terminal::quantity(&columns[*row], differences[*row]));
+    made.push(text("largest_difference", shown.collect()));
+    made.push(text("relative", differ.iter().map(|row| percent(relative[*row], false)).collect()));
+    made.push(text("at", of(&places)));
+    made.push(text("how", of(&ways)));
+    table.columns = made;
+    let mut names: Vec<String> = same.iter().map(|row| format!("{} of {}", columns[*row], tables[*row])).collect();
+    names.dedup();
+    names
+}
+
+/// A share in percent with three digits.
+fn percent(share: f64, signed: bool) -> String {
+    let percent = 100.0 * share;
+    let decimals = match percent.abs() {
+        size if size == 0.0 || size >= 100.0 => 0,
+        // a rounding error of the machine is nothing to read digits of
+        size => (2 - size.log10().floor() as i32).clamp(0, 9) as usize,
+    };
+    match signed && percent > 0.0 {
+        _ if !percent.is_finite() => "–".to_owned(),
+        true => format!("+{percent:.decimals$} %"),
+        false => format!("{percent:.decimals$} %"),
+    }
 }
 
 /// Writes a comparison into `out/NAME/`, which must be free or hold a comparison.
@@ -323,6 +388,8 @@ fn converted(series: &Series, (x, y): (f64, f64)) -> Series {
 
 // ---------------------------------------------------------------------------------------------------- differences
 
+/// The table of the largest differences.
+const DIFFERENCES: &str = "differences";
 /// Columns that say how well a number is known, not what it is.
 const EVIDENCE: [&str; 3] = ["residual", "energy_gap", "truncation"];
 /// Columns of words and counts that tell rows apart.
@@ -638,8 +705,8 @@ impl Differences {
             let (Some(a), Some(b)) = (table.numbers(name), with.numbers(name)) else { continue };
             let (a, b): (Vec<f64>, Vec<f64>) = pairs.iter().map(|p| (a[p.first], p.value(b))).unzip();
             let relative = a.iter().zip(&b).map(|(a, b)| if a == b { 0.0 } else { (b - a) / a.abs() }).collect();
-            made.push(number(name, b));
             made.push(number(&format!("first_{name}"), a));
+            made.push(number(name, b));
             made.push(number(&format!("{}_change", stem(name)), relative));
         }
         match self.found.iter_mut().find(|t| t.name == table.name) {
@@ -677,7 +744,7 @@ impl Differences {
             numbers("first_value", &|row| row.largest.values.0),
             numbers("value", &|row| row.largest.values.1),
         ];
-        let differences = Table { name: "differences".into(), columns };
+        let differences = Table { name: DIFFERENCES.into(), columns };
         self.found.into_iter().chain([differences]).collect()
     }
 }
@@ -786,6 +853,17 @@ mod tests {
             "1 N | 2 N"
         );
         assert_eq!(overlay(&[("a", &figure("", "mm", 2.0)), ("b", &figure("", "N", 2.0))]).panels.len(), 2);
+    }
+
+    #[test]
+    fn shares_read_as_percent() {
+        assert_eq!(percent(0.0012345, true), "+0.123 %");
+        assert_eq!(percent(-0.25, true), "-25.0 %");
+        assert_eq!(percent(0.0, true), "0 %");
+        assert_eq!(percent(3.4e-6, false), "0.000340 %");
+        assert_eq!([percent(12.5, false), percent(f64::NAN, false)], ["1250 %".to_owned(), "–".to_owned()]);
+        assert_eq!(terminal::quantity("blade1_amplitude_m", 4.987_65e-5), "49.9 µm");
+        assert_eq!(terminal::quantity("slip_fraction", 0.038_24), "0.0382");
     }
 
     #[test]
