@@ -165,6 +165,28 @@ fn methods_and_grids_are_compared_and_told() {
 }
 
 #[test]
+fn one_case_is_compared_with_the_same_case_of_many() {
+    let folder = folder("blade-couple");
+    let folder = folder.path();
+    let study = fs::read_to_string(folder.join("study.toml")).unwrap();
+    fs::write(folder.join("study.toml"), study.replacen("points = 241", "points = 13", 1)).unwrap();
+    run(folder, "many", &[]);
+    run(folder, "one", &["--set", "Ft=4N"]);
+    for (order, words) in [(["many/study", "one/study"], "1 of 4 cases"), (["one/study", "many/study"], "1 of 1 cases")]
+    {
+        let output = stickslip(folder, &["plot", order[0], order[1], "--overlay", "--only", "csv"]);
+        assert_eq!((code(&output), stderr(&output)), (0, String::new()));
+        assert!(stdout(&output).contains(words), "{}", stdout(&output));
+        let differences = rows(&folder.join("stickslip-out/study+study/differences.csv"));
+        let points: Vec<&str> =
+            differences.iter().filter(|row| row["table"] == "curve").map(|row| row["points"].as_str()).collect();
+        assert!(!points.is_empty() && points.iter().all(|points| *points == "13"), "{points:?}");
+        // the same case, the same bits
+        assert!(differences.iter().all(|row| row["largest_difference"] == "0.0"), "{differences:?}");
+    }
+}
+
+#[test]
 fn what_cannot_be_drawn_is_named() {
     let folder = folder("element");
     let folder = folder.path();

@@ -12,7 +12,7 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Axis, Column, Dataset, Emphasis, Figure, Panel, Record, Series, Style, Table, Values};
-use stickslip_study::units;
+use stickslip_study::{Case, VariedValue, units};
 
 /// Why runs cannot be compared.
 #[derive(Debug, thiserror::Error)]
@@ -110,6 +110,8 @@ pub(crate) fn for_people(comparison: &Dataset) -> Dataset {
             _ => false,
         });
         table.columns.retain(|column| several || column.name != "run");
+        // a narrow terminal cuts what stands last
+        table.columns.sort_by_key(|column| column.name.starts_with(FIRST));
         for column in &mut table.columns {
             if let (Values::Number(values), true) = (&column.values, column.name.ends_with("_change")) {
                 column.values = Values::Text(values.iter().map(|value| percent(*value, true)).collect());
@@ -388,6 +390,8 @@ fn converted(series: &Series, (x, y): (f64, f64)) -> Series {
 
 // ---------------------------------------------------------------------------------------------------- differences
 
+/// How columns with the values of the first run begin.
+const FIRST: &str = "first_";
 /// The table of the largest differences.
 const DIFFERENCES: &str = "differences";
 /// Columns that say how well a number is known, not what it is.
@@ -410,12 +414,12 @@ struct Reading {
 impl Reading {
     fn new(run: &Stored, table: &Table) -> Reading {
         let has = |name: &str| table.columns.iter().any(|column| column.name == name);
-        let varied: Vec<String> = run
-            .study
-            .case(0)
-            .map(|case| case.varied.iter().map(|value| value.column().0).collect())
-            .unwrap_or_default();
+        let case = run.study.case(0).ok();
+        let names = |values: &[VariedValue]| values.iter().map(|value| value.column().0).collect::<Vec<_>>();
+        let varied = case.as_ref().map(|case| names(&case.varied)).unwrap_or_default();
         let last = varied.last().cloned();
+        // a value that another run varies stands in a column too
+        let fixed = case.as_ref().map(|case| names(&fixed(case))).unwrap_or_default();
         // a branch along a parameter, an optimum: the last parameter is found, not given
         let along = run.dataset.kind == "branch" && !has("frequency_Hz");
         let abscissa = match table.name.as_str() {
@@ -427,10 +431,12 @@ impl Reading {
             _ => None,
         };
         let found = along || table.name == "optimum";
-        let given = varied.into_iter().filter(|name| !(found && Some(name) == last.as_ref()));
+        let mut given: Vec<String> =
+            varied.into_iter().filter(|name| !(found && Some(name) == last.as_ref())).chain(fixed).collect();
+        given.sort();
         let frequency = BY_FREQUENCY.contains(&table.name.as_str()).then_some("frequency_Hz");
         let named = KEYS.into_iter().chain(["drive_frequency_Hz"]).chain(frequency).map(str::to_owned);
-        let keys = given.chain(named).filter(|name| has(name) && Some(name) != abscissa.as_ref()).collect();
+        let keys = given.into_iter().chain(named).filter(|name| has(name) && Some(name) != abscissa.as_ref()).collect();
         Reading { keys, abscissa: abscissa.filter(|name| has(name)) }
     }
 
@@ -468,6 +474,32 @@ impl Reading {
 
 fn column<'t>(table: &'t Table, name: &str) -> Option<&'t Column> {
     table.columns.iter().find(|column| column.name == name)
+}
+
+/// The parameters of a case that are not varied, each with its column.
+fn fixed(case: &Case) -> Vec<VariedValue> {
+    let fixed = case.parameters.iter().filter(|(name, _)| case.varied.iter().all(|varied| varied.name != **name));
+    fixed
+        .map(|(name, (si, dimension))| VariedValue {
+            name: name.clone(),
+            si: *si,
+            dimension: *dimension,
+            text: String::new(),
+        })
+        .collect()
+}
+
+/// The table with a column for every parameter that the other run varies and this one does not.
+fn completed(run: &Stored, table: &Table, (other, with): (&Stored, &Table)) -> Table {
+    let mut table = table.clone();
+    let (Ok(case), Ok(varied)) = (run.study.case(0), other.study.case(0).map(|case| case.varied)) else { return table };
+    for value in fixed(&case).iter().filter(|value| varied.iter().any(|varied| varied.name == value.name)) {
+        let (name, value) = value.column();
+        if column(with, &name).is_some() && column(&table, &name).is_none() {
+            table.columns.insert(0, number(&name, vec![value; table.rows()]));
+        }
+    }
+    table
 }
 
 /// A row of the first run and what it is compared with: two rows of the other run and the share of the second.
@@ -590,6 +622,8 @@ impl Differences {
                 self.notes.push(format!("{}: {run} has no such table.", table.name));
                 continue;
             };
+            let completed = (completed(first, table, (other, with)), completed(other, with, (first, table)));
+            let (table, with) = (&completed.0, &completed.1);
             let (reading, reading_with) = (Reading::new(first, table), Reading::new(other, with));
             if reading.keys != reading_with.keys || reading.abscissa != reading_with.abscissa {
                 let words = |reading: &Reading| {
@@ -705,7 +739,7 @@ impl Differences {
             let (Some(a), Some(b)) = (table.numbers(name), with.numbers(name)) else { continue };
             let (a, b): (Vec<f64>, Vec<f64>) = pairs.iter().map(|p| (a[p.first], p.value(b))).unzip();
             let relative = a.iter().zip(&b).map(|(a, b)| if a == b { 0.0 } else { (b - a) / a.abs() }).collect();
-            made.push(number(&format!("first_{name}"), a));
+            made.push(number(&format!("{FIRST}{name}"), a));
             made.push(number(name, b));
             made.push(number(&format!("{}_change", stem(name)), relative));
         }
