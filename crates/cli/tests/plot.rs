@@ -215,6 +215,12 @@ fn what_cannot_be_drawn_is_named() {
     let text = wrong(&["plot", "out/study", "couple/study", "--overlay"]);
     assert!(text.contains("out/study holds a hysteresis and couple/study a response"), "{text}");
     assert!(wrong(&["plot", "out/study", "--study", "study.toml"]).contains("holds a hysteresis"));
+    // reference curves are computed
+    let study = fs::read_to_string(folder.join("study.toml")).unwrap();
+    fs::write(folder.join("study.toml"), format!("{study}\n[figure]\nreferences = true\n")).unwrap();
+    let output = stickslip(folder, &["plot", "couple/study", "--study", "study.toml", "--only", "svg"]);
+    assert_eq!(code(&output), 0);
+    assert!(stderr(&output).contains("no reference curves"), "{}", stderr(&output));
     // changed by hand
     let path = folder.join("out/study/loops.csv");
     let text = fs::read_to_string(&path).unwrap();

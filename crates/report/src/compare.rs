@@ -144,12 +144,28 @@ fn shown_differences(table: &mut Table) -> Vec<String> {
     let shown = differ.iter().map(|row| terminal::quantity(&columns[*row], differences[*row]));
     made.push(text("largest_difference", shown.collect()));
     made.push(text("relative", differ.iter().map(|row| percent(relative[*row], false)).collect()));
-    made.push(text("at", of(&places)));
+    made.push(text("at", of(&places).iter().map(|place| rounded(place)).collect()));
     made.push(text("how", of(&ways)));
     table.columns = made;
     let mut names: Vec<String> = same.iter().map(|row| format!("{} of {}", columns[*row], tables[*row])).collect();
     names.dedup();
     names
+}
+
+/// Digits of a place for people; the table has all.
+const PLACE_DIGITS: usize = 7;
+
+/// The text with its numbers rounded.
+fn rounded(text: &str) -> String {
+    let word = |word: &str| match word.trim_end_matches(',').parse::<f64>() {
+        Ok(value) => {
+            let short: f64 = format!("{value:.*e}", PLACE_DIGITS - 1).parse().unwrap_or(value);
+            let comma = if word.ends_with(',') { "," } else { "" };
+            format!("{short}{comma}")
+        }
+        Err(_) => word.to_owned(),
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// A share in percent with three digits.
@@ -514,9 +530,9 @@ impl Pair {
         Pair { first, other: (other, other, 0.0) }
     }
 
-    fn value(&self, values: &[f64]) -> f64 {
+    fn value(&self, column: &str, values: &[f64]) -> f64 {
         let (a, b, share) = self.other;
-        if share == 0.0 { values[a] } else { values[a] + share * (values[b] - values[a]) }
+        if share == 0.0 { values[a] } else { values[a] + share * difference(column, values[a], values[b]) }
     }
 }
 
@@ -674,7 +690,7 @@ impl Differences {
             for (name, largest) in columns.iter().zip(&mut largest) {
                 let (Some(a), Some(b)) = (table.numbers(name), with.numbers(name)) else { continue };
                 for pair in &pairs {
-                    largest.look(name, (a[pair.first], pair.value(b)), &|| {
+                    largest.look(name, (a[pair.first], pair.value(name, b)), &|| {
                         let x = reading.abscissa.as_deref().and_then(|name| column(table, name));
                         let x = x.map(|x| format!("{} = {}", x.name, crate::csv::cell(&x.values, pair.first)));
                         [Some(key.clone()), x]
@@ -737,7 +753,7 @@ impl Differences {
         }
         for name in columns {
             let (Some(a), Some(b)) = (table.numbers(name), with.numbers(name)) else { continue };
-            let (a, b): (Vec<f64>, Vec<f64>) = pairs.iter().map(|p| (a[p.first], p.value(b))).unzip();
+            let (a, b): (Vec<f64>, Vec<f64>) = pairs.iter().map(|p| (a[p.first], p.value(name, b))).unzip();
             let relative = a.iter().zip(&b).map(|(a, b)| if a == b { 0.0 } else { (b - a) / a.abs() }).collect();
             made.push(number(&format!("{FIRST}{name}"), a));
             made.push(number(name, b));
@@ -783,6 +799,12 @@ impl Differences {
     }
 }
 
+/// How far `b` lies beyond `a` in this column: angles go the short way around the circle.
+fn difference(column: &str, a: f64, b: f64) -> f64 {
+    let difference = b - a;
+    if column.ends_with("_deg") { difference - 360.0 * (difference / 360.0).round() } else { difference }
+}
+
 /// The rows of peaks inside the range; all rows of other tables.
 fn inside(table: &Table, rows: &[usize]) -> Vec<usize> {
     match column(table, "at_range_end").map(|column| &column.values) {
@@ -800,11 +822,7 @@ fn stem(name: &str) -> &str {
 
 impl Largest {
     fn look(&mut self, name: &str, (a, b): (f64, f64), at: &dyn Fn() -> String) {
-        let mut difference = b - a;
-        if name.ends_with("_deg") {
-            // the short way around the circle
-            difference -= 360.0 * (difference / 360.0).round();
-        }
+        let difference = difference(name, a, b);
         if !difference.is_finite() {
             return;
         }
@@ -845,7 +863,7 @@ mod tests {
         let (a, b) = ([0.0, 0.25, 1.5, 3.0], [2.0, 1.0, 0.0]);
         let y: Vec<f64> = b.iter().map(|x| 4.0 * x - 1.0).collect();
         let pairs = interpolated((&a, &b), &[0, 1, 2, 3], &[0, 1, 2]);
-        let values: Vec<(usize, f64)> = pairs.iter().map(|pair| (pair.first, pair.value(&y))).collect();
+        let values: Vec<(usize, f64)> = pairs.iter().map(|pair| (pair.first, pair.value("y_m", &y))).collect();
         assert_eq!(values, [(0, -1.0), (1, 0.0), (2, 5.0)]);
     }
 
@@ -856,6 +874,10 @@ mod tests {
         assert_eq!((largest.difference, largest.points), (2.0, 1));
         largest.look("blade_phase_deg", (f64::NAN, 1.0), &String::new);
         assert_eq!(largest.points, 1);
+        // between two points of a curve, too
+        let half = Pair { first: 0, other: (0, 1, 0.5) };
+        assert_eq!(half.value("blade_phase_deg", &[179.0, -179.0]), 180.0);
+        assert_eq!(half.value("blade_amplitude_m", &[179.0, -179.0]), 0.0);
     }
 
     fn figure(title: &str, unit: &str, y: f64) -> Figure {
@@ -898,6 +920,7 @@ mod tests {
         assert_eq!([percent(12.5, false), percent(f64::NAN, false)], ["1250 %".to_owned(), "–".to_owned()]);
         assert_eq!(terminal::quantity("blade1_amplitude_m", 4.987_65e-5), "49.9 µm");
         assert_eq!(terminal::quantity("slip_fraction", 0.038_24), "0.0382");
+        assert_eq!(rounded("Ft_N = 6.0, time_s = 0.030387205387205383"), "Ft_N = 6, time_s = 0.03038721");
     }
 
     #[test]
