@@ -83,6 +83,12 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
         );
         return Err(());
     }
+    if study.wants_references() && !run.study.wants_references() && run.dataset.kind == "response" {
+        eprintln!(
+            "warning: {} has no reference curves, which are computed; run the study again for them",
+            run.folder.display()
+        );
+    }
     if !run.draw_like(&study) {
         eprintln!(
             "warning: {} has changed in more than its figure; {} is drawn as it was computed, run the study again for the rest",

@@ -7,11 +7,12 @@
 
 use crate::output::{Outputs, ReportError, file_name, write_dataset};
 use crate::stored::{COMPARISON, Stored, StoredError};
+use crate::terminal;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Axis, Column, Dataset, Emphasis, Figure, Panel, Record, Series, Style, Table, Values};
-use stickslip_study::units;
+use stickslip_study::{Case, VariedValue, units};
 
 /// Why runs cannot be compared.
 #[derive(Debug, thiserror::Error)]
@@ -98,6 +99,88 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
             interrupted: false,
         },
     })
+}
+
+/// The same comparison with differences in their units and in percent, and without what is the same in all runs.
+pub(crate) fn for_people(comparison: &Dataset) -> Dataset {
+    let mut people = comparison.clone();
+    for table in &mut people.tables {
+        let several = column(table, "run").is_some_and(|column| match &column.values {
+            Values::Text(runs) => runs.iter().any(|run| *run != runs[0]),
+            _ => false,
+        });
+        table.columns.retain(|column| several || column.name != "run");
+        // a narrow terminal cuts what stands last
+        table.columns.sort_by_key(|column| column.name.starts_with(FIRST));
+        for column in &mut table.columns {
+            if let (Values::Number(values), true) = (&column.values, column.name.ends_with("_change")) {
+                column.values = Values::Text(values.iter().map(|value| percent(*value, true)).collect());
+            }
+        }
+        if table.name == DIFFERENCES {
+            let same = shown_differences(table);
+            if !same.is_empty() {
+                people.notes.push(format!("The same in all runs: {}.", same.join(", ")));
+            }
+        }
+    }
+    people
+}
+
+/// Makes the differences readable; returns what has none.
+fn shown_differences(table: &mut Table) -> Vec<String> {
+    let words = |name: &str| match column(table, name).map(|column| &column.values) {
+        Some(Values::Text(words)) => words.clone(),
+        _ => vec![String::new(); table.rows()],
+    };
+    let numbers = |name: &str| table.numbers(name).map_or_else(|| vec![f64::NAN; table.rows()], <[f64]>::to_vec);
+    let (tables, columns, places, ways) = (words("table"), words("column"), words("at"), words("how"));
+    let (differences, relative) = (numbers("largest_difference"), numbers("relative"));
+    let runs = column(table, "run").map(|_| words("run"));
+    let (differ, same): (Vec<usize>, Vec<usize>) = (0..table.rows()).partition(|row| differences[*row] != 0.0);
+    let of = |all: &[String]| differ.iter().map(|row| all[*row].clone()).collect::<Vec<_>>();
+    let mut made = vec![text("table", of(&tables)), text("column", of(&columns))];
+    made.extend(runs.map(|runs| text("run", of(&runs))));
+    let shown = differ.iter().map(|row| terminal::quantity(&columns[*row], differences[*row]));
+    made.push(text("largest_difference", shown.collect()));
+    made.push(text("relative", differ.iter().map(|row| percent(relative[*row], false)).collect()));
+    made.push(text("at", of(&places).iter().map(|place| rounded(place)).collect()));
+    made.push(text("how", of(&ways)));
+    table.columns = made;
+    let mut names: Vec<String> = same.iter().map(|row| format!("{} of {}", columns[*row], tables[*row])).collect();
+    names.dedup();
+    names
+}
+
+/// Digits of a place for people; the table has all.
+const PLACE_DIGITS: usize = 7;
+
+/// The text with its numbers rounded.
+fn rounded(text: &str) -> String {
+    let word = |word: &str| match word.trim_end_matches(',').parse::<f64>() {
+        Ok(value) => {
+            let short: f64 = format!("{value:.*e}", PLACE_DIGITS - 1).parse().unwrap_or(value);
+            let comma = if word.ends_with(',') { "," } else { "" };
+            format!("{short}{comma}")
+        }
+        Err(_) => word.to_owned(),
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
+/// A share in percent with three digits.
+fn percent(share: f64, signed: bool) -> String {
+    let percent = 100.0 * share;
+    let decimals = match percent.abs() {
+        size if size == 0.0 || size >= 100.0 => 0,
+        // a rounding error of the machine is nothing to read digits of
+        size => (2 - size.log10().floor() as i32).clamp(0, 9) as usize,
+    };
+    match signed && percent > 0.0 {
+        _ if !percent.is_finite() => "–".to_owned(),
+        true => format!("+{percent:.decimals$} %"),
+        false => format!("{percent:.decimals$} %"),
+    }
 }
 
 /// Writes a comparison into `out/NAME/`, which must be free or hold a comparison.
@@ -323,6 +406,10 @@ fn converted(series: &Series, (x, y): (f64, f64)) -> Series {
 
 // ---------------------------------------------------------------------------------------------------- differences
 
+/// How columns with the values of the first run begin.
+const FIRST: &str = "first_";
+/// The table of the largest differences.
+const DIFFERENCES: &str = "differences";
 /// Columns that say how well a number is known, not what it is.
 const EVIDENCE: [&str; 3] = ["residual", "energy_gap", "truncation"];
 /// Columns of words and counts that tell rows apart.
@@ -343,12 +430,12 @@ struct Reading {
 impl Reading {
     fn new(run: &Stored, table: &Table) -> Reading {
         let has = |name: &str| table.columns.iter().any(|column| column.name == name);
-        let varied: Vec<String> = run
-            .study
-            .case(0)
-            .map(|case| case.varied.iter().map(|value| value.column().0).collect())
-            .unwrap_or_default();
+        let case = run.study.case(0).ok();
+        let names = |values: &[VariedValue]| values.iter().map(|value| value.column().0).collect::<Vec<_>>();
+        let varied = case.as_ref().map(|case| names(&case.varied)).unwrap_or_default();
         let last = varied.last().cloned();
+        // a value that another run varies stands in a column too
+        let fixed = case.as_ref().map(|case| names(&fixed(case))).unwrap_or_default();
         // a branch along a parameter, an optimum: the last parameter is found, not given
         let along = run.dataset.kind == "branch" && !has("frequency_Hz");
         let abscissa = match table.name.as_str() {
@@ -360,10 +447,12 @@ impl Reading {
             _ => None,
         };
         let found = along || table.name == "optimum";
-        let given = varied.into_iter().filter(|name| !(found && Some(name) == last.as_ref()));
+        let mut given: Vec<String> =
+            varied.into_iter().filter(|name| !(found && Some(name) == last.as_ref())).chain(fixed).collect();
+        given.sort();
         let frequency = BY_FREQUENCY.contains(&table.name.as_str()).then_some("frequency_Hz");
         let named = KEYS.into_iter().chain(["drive_frequency_Hz"]).chain(frequency).map(str::to_owned);
-        let keys = given.chain(named).filter(|name| has(name) && Some(name) != abscissa.as_ref()).collect();
+        let keys = given.into_iter().chain(named).filter(|name| has(name) && Some(name) != abscissa.as_ref()).collect();
         Reading { keys, abscissa: abscissa.filter(|name| has(name)) }
     }
 
@@ -403,6 +492,32 @@ fn column<'t>(table: &'t Table, name: &str) -> Option<&'t Column> {
     table.columns.iter().find(|column| column.name == name)
 }
 
+/// The parameters of a case that are not varied, each with its column.
+fn fixed(case: &Case) -> Vec<VariedValue> {
+    let fixed = case.parameters.iter().filter(|(name, _)| case.varied.iter().all(|varied| varied.name != **name));
+    fixed
+        .map(|(name, (si, dimension))| VariedValue {
+            name: name.clone(),
+            si: *si,
+            dimension: *dimension,
+            text: String::new(),
+        })
+        .collect()
+}
+
+/// The table with a column for every parameter that the other run varies and this one does not.
+fn completed(run: &Stored, table: &Table, (other, with): (&Stored, &Table)) -> Table {
+    let mut table = table.clone();
+    let (Ok(case), Ok(varied)) = (run.study.case(0), other.study.case(0).map(|case| case.varied)) else { return table };
+    for value in fixed(&case).iter().filter(|value| varied.iter().any(|varied| varied.name == value.name)) {
+        let (name, value) = value.column();
+        if column(with, &name).is_some() && column(&table, &name).is_none() {
+            table.columns.insert(0, number(&name, vec![value; table.rows()]));
+        }
+    }
+    table
+}
+
 /// A row of the first run and what it is compared with: two rows of the other run and the share of the second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Pair {
@@ -415,9 +530,9 @@ impl Pair {
         Pair { first, other: (other, other, 0.0) }
     }
 
-    fn value(&self, values: &[f64]) -> f64 {
+    fn value(&self, column: &str, values: &[f64]) -> f64 {
         let (a, b, share) = self.other;
-        if share == 0.0 { values[a] } else { values[a] + share * (values[b] - values[a]) }
+        if share == 0.0 { values[a] } else { values[a] + share * difference(column, values[a], values[b]) }
     }
 }
 
@@ -523,6 +638,8 @@ impl Differences {
                 self.notes.push(format!("{}: {run} has no such table.", table.name));
                 continue;
             };
+            let completed = (completed(first, table, (other, with)), completed(other, with, (first, table)));
+            let (table, with) = (&completed.0, &completed.1);
             let (reading, reading_with) = (Reading::new(first, table), Reading::new(other, with));
             if reading.keys != reading_with.keys || reading.abscissa != reading_with.abscissa {
                 let words = |reading: &Reading| {
@@ -573,7 +690,7 @@ impl Differences {
             for (name, largest) in columns.iter().zip(&mut largest) {
                 let (Some(a), Some(b)) = (table.numbers(name), with.numbers(name)) else { continue };
                 for pair in &pairs {
-                    largest.look(name, (a[pair.first], pair.value(b)), &|| {
+                    largest.look(name, (a[pair.first], pair.value(name, b)), &|| {
                         let x = reading.abscissa.as_deref().and_then(|name| column(table, name));
                         let x = x.map(|x| format!("{} = {}", x.name, crate::csv::cell(&x.values, pair.first)));
                         [Some(key.clone()), x]
@@ -636,10 +753,10 @@ impl Differences {
         }
         for name in columns {
             let (Some(a), Some(b)) = (table.numbers(name), with.numbers(name)) else { continue };
-            let (a, b): (Vec<f64>, Vec<f64>) = pairs.iter().map(|p| (a[p.first], p.value(b))).unzip();
+            let (a, b): (Vec<f64>, Vec<f64>) = pairs.iter().map(|p| (a[p.first], p.value(name, b))).unzip();
             let relative = a.iter().zip(&b).map(|(a, b)| if a == b { 0.0 } else { (b - a) / a.abs() }).collect();
+            made.push(number(&format!("{FIRST}{name}"), a));
             made.push(number(name, b));
-            made.push(number(&format!("first_{name}"), a));
             made.push(number(&format!("{}_change", stem(name)), relative));
         }
         match self.found.iter_mut().find(|t| t.name == table.name) {
@@ -677,9 +794,15 @@ impl Differences {
             numbers("first_value", &|row| row.largest.values.0),
             numbers("value", &|row| row.largest.values.1),
         ];
-        let differences = Table { name: "differences".into(), columns };
+        let differences = Table { name: DIFFERENCES.into(), columns };
         self.found.into_iter().chain([differences]).collect()
     }
+}
+
+/// How far `b` lies beyond `a` in this column: angles go the short way around the circle.
+fn difference(column: &str, a: f64, b: f64) -> f64 {
+    let difference = b - a;
+    if column.ends_with("_deg") { difference - 360.0 * (difference / 360.0).round() } else { difference }
 }
 
 /// The rows of peaks inside the range; all rows of other tables.
@@ -699,11 +822,7 @@ fn stem(name: &str) -> &str {
 
 impl Largest {
     fn look(&mut self, name: &str, (a, b): (f64, f64), at: &dyn Fn() -> String) {
-        let mut difference = b - a;
-        if name.ends_with("_deg") {
-            // the short way around the circle
-            difference -= 360.0 * (difference / 360.0).round();
-        }
+        let difference = difference(name, a, b);
         if !difference.is_finite() {
             return;
         }
@@ -744,7 +863,7 @@ mod tests {
         let (a, b) = ([0.0, 0.25, 1.5, 3.0], [2.0, 1.0, 0.0]);
         let y: Vec<f64> = b.iter().map(|x| 4.0 * x - 1.0).collect();
         let pairs = interpolated((&a, &b), &[0, 1, 2, 3], &[0, 1, 2]);
-        let values: Vec<(usize, f64)> = pairs.iter().map(|pair| (pair.first, pair.value(&y))).collect();
+        let values: Vec<(usize, f64)> = pairs.iter().map(|pair| (pair.first, pair.value("y_m", &y))).collect();
         assert_eq!(values, [(0, -1.0), (1, 0.0), (2, 5.0)]);
     }
 
@@ -755,6 +874,10 @@ mod tests {
         assert_eq!((largest.difference, largest.points), (2.0, 1));
         largest.look("blade_phase_deg", (f64::NAN, 1.0), &String::new);
         assert_eq!(largest.points, 1);
+        // between two points of a curve, too
+        let half = Pair { first: 0, other: (0, 1, 0.5) };
+        assert_eq!(half.value("blade_phase_deg", &[179.0, -179.0]), 180.0);
+        assert_eq!(half.value("blade_amplitude_m", &[179.0, -179.0]), 0.0);
     }
 
     fn figure(title: &str, unit: &str, y: f64) -> Figure {
@@ -786,6 +909,18 @@ mod tests {
             "1 N | 2 N"
         );
         assert_eq!(overlay(&[("a", &figure("", "mm", 2.0)), ("b", &figure("", "N", 2.0))]).panels.len(), 2);
+    }
+
+    #[test]
+    fn shares_read_as_percent() {
+        assert_eq!(percent(0.0012345, true), "+0.123 %");
+        assert_eq!(percent(-0.25, true), "-25.0 %");
+        assert_eq!(percent(0.0, true), "0 %");
+        assert_eq!(percent(3.4e-6, false), "0.000340 %");
+        assert_eq!([percent(12.5, false), percent(f64::NAN, false)], ["1250 %".to_owned(), "–".to_owned()]);
+        assert_eq!(terminal::quantity("blade1_amplitude_m", 4.987_65e-5), "49.9 µm");
+        assert_eq!(terminal::quantity("slip_fraction", 0.038_24), "0.0382");
+        assert_eq!(rounded("Ft_N = 6.0, time_s = 0.030387205387205383"), "Ft_N = 6, time_s = 0.03038721");
     }
 
     #[test]

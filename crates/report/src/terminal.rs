@@ -32,6 +32,14 @@ const FAILURES: usize = 5;
 impl Terminal {
     /// The text, with a final line feed. `files` are the paths that were written; none if nothing was.
     pub fn text(self, dataset: &Dataset, files: &[PathBuf]) -> String {
+        let comparison;
+        let dataset = match dataset.kind.as_str() {
+            COMPARISON => {
+                comparison = crate::compare::for_people(dataset);
+                &comparison
+            }
+            _ => dataset,
+        };
         let mut out = String::new();
         for line in self.wrapped(&clean(&dataset.title), "") {
             let _ = writeln!(out, "{}", self.paint("1", &line));
@@ -174,21 +182,37 @@ const UNITS: [(&str, &str); 14] = [
 /// Prefixes for the units that take one here.
 const PREFIXES: [(i32, &str); 7] = [(9, "G"), (6, "M"), (3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n")];
 
-/// Heading and cells of a column for people.
-fn column(name: &str, values: &Values) -> (String, Vec<String>) {
+/// Unit and prefixed power of ten for the values of a column with this name, and the name without its unit.
+fn unit_of(name: &str, largest: f64) -> (&str, &'static str, i32, &'static str) {
     let (quantity, unit) = UNITS
         .iter()
         .find_map(|(end, unit)| Some((name.strip_suffix(end).filter(|rest| !rest.is_empty())?, *unit)))
         .unwrap_or((name, ""));
-    let Values::Number(numbers) = values else {
-        return (name.replace('_', " "), (0..values.len()).map(|row| clean(&crate::csv::cell(values, row))).collect());
-    };
-    let largest = numbers.iter().filter(|v| v.is_finite()).fold(0.0, |m: f64, v| m.max(v.abs()));
     let prefixed = matches!(unit, "m" | "s" | "N" | "J" | "W" | "N/m") && largest > 0.0;
     let (power, prefix) = PREFIXES
         .into_iter()
         .find(|(power, _)| prefixed && largest < 1e12 && largest >= 0.999_999 * 10f64.powi(*power))
         .unwrap_or((0, ""));
+    (quantity, unit, power, prefix)
+}
+
+/// One value of a column with this name, rounded, with its unit.
+pub(crate) fn quantity(name: &str, value: f64) -> String {
+    let (_, unit, power, prefix) = unit_of(name, value.abs());
+    let number = engineering(&[value / 10f64.powi(power)], DIFFERENCE_DIGITS).remove(0);
+    format!("{number} {prefix}{unit}").trim_end().to_owned()
+}
+
+/// Digits of a difference.
+const DIFFERENCE_DIGITS: i32 = 3;
+
+/// Heading and cells of a column for people.
+fn column(name: &str, values: &Values) -> (String, Vec<String>) {
+    let Values::Number(numbers) = values else {
+        return (name.replace('_', " "), (0..values.len()).map(|row| clean(&crate::csv::cell(values, row))).collect());
+    };
+    let largest = numbers.iter().filter(|v| v.is_finite()).fold(0.0, |m: f64, v| m.max(v.abs()));
+    let (quantity, unit, power, prefix) = unit_of(name, largest);
     let scaled: Vec<f64> = numbers.iter().map(|v| v / 10f64.powi(power)).collect();
     let significant = if unit == "Hz" { 7 } else { 5 };
     let heading = match unit {

@@ -376,6 +376,11 @@ impl Study {
         Ok(self)
     }
 
+    /// Whether `[figure]` asks for reference curves, which a run computes.
+    pub fn wants_references(&self) -> bool {
+        self.figure_values().flag("references") == Some(true)
+    }
+
     /// The same study, drawn as another file says: with its title and its `[figure]`.
     #[must_use]
     pub fn drawn_like(mut self, other: &Study) -> Study {

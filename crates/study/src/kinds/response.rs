@@ -86,7 +86,7 @@ fn compute(work: &Work<'_>) -> Computed {
     } else {
         part.tables.push(Rows::default());
     }
-    if work.study.figure_values().flag("references") == Some(true) && case.index == 0 {
+    if work.study.wants_references() && case.index == 0 {
         part.tables.push(references(work, &stretch.omegas).map_err(|error| (case.index, error))?);
     }
     Ok(part)
