@@ -1,8 +1,10 @@
 //! What a table gives of an orbit beside amplitude, mean and phase, if `output` asks for it. One row of [`TABLE`] each.
 
+use crate::study::Case;
 use crate::work::Prepared;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
+use stickslip::model::System;
 use stickslip::orbit::{Orbit, Sample};
 
 /// Something that `output` can ask for.
@@ -12,7 +14,7 @@ pub(crate) struct Extra {
     /// One line of what it is.
     pub doc: &'static str,
     /// Names of its columns.
-    columns: fn(&Prepared) -> Vec<String>,
+    columns: fn(&System) -> Vec<String>,
     /// Its numbers, one for each column.
     values: fn(&Prepared, &Orbit, &[Sample]) -> Vec<f64>,
 }
@@ -22,7 +24,7 @@ pub(crate) const TABLE: &[Extra] = &[
     Extra {
         name: "joint_force",
         doc: "half of peak to peak of every joint's force",
-        columns: |prepared| of_joints(prepared, "force_amplitude_N"),
+        columns: |system| of_joints(system, "force_amplitude_N"),
         values: |prepared, _, samples| {
             let joints = 0..prepared.system.joints.len();
             joints.map(|j| half_range(samples.iter().map(|sample| sample.joints[j].force))).collect()
@@ -31,7 +33,7 @@ pub(crate) const TABLE: &[Extra] = &[
     Extra {
         name: "joint_motion",
         doc: "half of peak to peak of every joint's relative displacement",
-        columns: |prepared| of_joints(prepared, "amplitude_m"),
+        columns: |system| of_joints(system, "amplitude_m"),
         values: |_, orbit, _| {
             orbit.joints.iter().map(|joint| 0.5 * (joint.displacement.1 - joint.displacement.0).abs()).collect()
         },
@@ -39,7 +41,7 @@ pub(crate) const TABLE: &[Extra] = &[
     Extra {
         name: "velocity",
         doc: "half of peak to peak of every mass's velocity",
-        columns: |prepared| of_places(prepared, "velocity_amplitude_m_per_s"),
+        columns: |system| of_places(system, "velocity_amplitude_m_per_s"),
         values: |prepared, _, samples| {
             let places = 0..prepared.system.dofs();
             places.map(|i| half_range(samples.iter().map(|sample| sample.velocity[i]))).collect()
@@ -48,7 +50,7 @@ pub(crate) const TABLE: &[Extra] = &[
     Extra {
         name: "acceleration",
         doc: "half of peak to peak of every mass's acceleration",
-        columns: |prepared| of_places(prepared, "acceleration_amplitude_m_per_s2"),
+        columns: |system| of_places(system, "acceleration_amplitude_m_per_s2"),
         values: |prepared, _, samples| {
             let places = 0..prepared.system.dofs();
             places.map(|i| half_range(samples.iter().map(|sample| sample.acceleration[i]))).collect()
@@ -57,8 +59,8 @@ pub(crate) const TABLE: &[Extra] = &[
     Extra {
         name: "harmonics",
         doc: "amplitudes of the harmonics 1 to 5 of every mass's displacement",
-        columns: |prepared| {
-            let places = prepared.system.places.iter();
+        columns: |system| {
+            let places = system.places.iter();
             places.flat_map(|place| (1..=HARMONICS).map(move |h| format!("{place}_harmonic{h}_m"))).collect()
         },
         values: |prepared, orbit, _| harmonics(prepared, orbit),
@@ -66,7 +68,7 @@ pub(crate) const TABLE: &[Extra] = &[
     Extra {
         name: "receptance",
         doc: "amplitude of the first harmonic of every mass per unit of the largest force",
-        columns: |prepared| of_places(prepared, "receptance_m_per_N"),
+        columns: |system| of_places(system, "receptance_m_per_N"),
         values: |prepared, orbit, _| {
             let forces = prepared.case.model.forces.iter().filter(|force| force.harmonic == 1);
             let largest = forces.map(|force| force.amplitude.abs()).fold(0.0, f64::max);
@@ -79,14 +81,14 @@ pub(crate) const TABLE: &[Extra] = &[
 /// Highest harmonic of `harmonics`.
 const HARMONICS: usize = 5;
 /// Instants per period at which ranges are read, beside every switch: a sine's range is then known to 2e-6.
-const INSTANTS: usize = 1024;
+pub(crate) const INSTANTS: usize = 1024;
 
-fn of_joints(prepared: &Prepared, quantity: &str) -> Vec<String> {
-    prepared.system.joints.iter().map(|joint| format!("{}_{quantity}", joint.name)).collect()
+fn of_joints(system: &System, quantity: &str) -> Vec<String> {
+    system.joints.iter().map(|joint| format!("{}_{quantity}", joint.name)).collect()
 }
 
-fn of_places(prepared: &Prepared, quantity: &str) -> Vec<String> {
-    prepared.system.places.iter().map(|place| format!("{place}_{quantity}")).collect()
+fn of_places(system: &System, quantity: &str) -> Vec<String> {
+    system.places.iter().map(|place| format!("{place}_{quantity}")).collect()
 }
 
 fn half_range(values: impl Iterator<Item = f64>) -> f64 {
@@ -110,23 +112,23 @@ fn harmonics(prepared: &Prepared, orbit: &Orbit) -> Vec<f64> {
 }
 
 /// What `output` of a case asks for, in the order of [`TABLE`].
-fn wanted(prepared: &Prepared) -> impl Iterator<Item = &'static Extra> + '_ {
-    let names = prepared.case.values.names("output").unwrap_or_default();
+fn wanted(case: &Case) -> impl Iterator<Item = &'static Extra> + '_ {
+    let names = case.values.names("output").unwrap_or_default();
     TABLE.iter().filter(move |extra| names.iter().any(|name| name == extra.name))
 }
 
 /// Names of the columns that `output` asks for.
-pub(crate) fn columns(prepared: &Prepared) -> Vec<String> {
-    wanted(prepared).flat_map(|extra| (extra.columns)(prepared)).collect()
+pub(crate) fn columns(case: &Case, system: &System) -> Vec<String> {
+    wanted(case).flat_map(|extra| (extra.columns)(system)).collect()
 }
 
 /// Their values.
 pub(crate) fn values(prepared: &Prepared, orbit: &Orbit) -> Vec<f64> {
-    if wanted(prepared).next().is_none() {
+    if wanted(&prepared.case).next().is_none() {
         return Vec::new();
     }
     let mut times: Vec<f64> = (0..INSTANTS).map(|i| orbit.period() * i as f64 / INSTANTS as f64).collect();
     times.extend(orbit.switch_times());
     let samples: Vec<Sample> = times.iter().map(|time| orbit.sample(*time)).collect();
-    wanted(prepared).flat_map(|extra| (extra.values)(prepared, orbit, &samples)).collect()
+    wanted(&prepared.case).flat_map(|extra| (extra.values)(prepared, orbit, &samples)).collect()
 }

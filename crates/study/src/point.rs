@@ -70,7 +70,7 @@ impl Summary {
             status: status.to_owned(),
             failure: None,
             stuck: false,
-            extra: vec![f64::NAN; extra::columns(prepared).len()],
+            extra: vec![f64::NAN; extra::columns(&prepared.case, &prepared.system).len()],
         }
     }
 
@@ -86,7 +86,10 @@ impl Summary {
             rows.number(&format!("{}_dissipation_J", joint.name), *dissipation);
             rows.number(&format!("{}_slip_fraction", joint.name), *slip);
         }
-        extra::columns(prepared).iter().zip(&self.extra).for_each(|(column, value)| rows.number(column, *value));
+        extra::columns(&prepared.case, &prepared.system)
+            .iter()
+            .zip(&self.extra)
+            .for_each(|(column, value)| rows.number(column, *value));
         rows.flag("stable", self.stable);
         rows.number("residual", self.residual);
         rows.number("energy_gap", self.energy_gap);

@@ -265,11 +265,6 @@ impl Study {
         self.varied.iter().map(|varied| varied.points.len()).product()
     }
 
-    /// Number of values of each varied parameter, in the order of the file.
-    pub(crate) fn varied_points(&self) -> Vec<usize> {
-        self.varied.iter().map(|varied| varied.points.len()).collect()
-    }
-
     /// The same study, which may take so many bytes of memory.
     pub fn with_memory_limit(mut self, bytes: u64) -> Study {
         self.memory = Some(bytes);

@@ -8,8 +8,8 @@ mod text;
 mod warnings;
 
 pub(crate) use cost::default_limit;
-pub use cost::{MEMORY_LIMIT, Size, bytes_text};
-pub(crate) use warnings::WARNING;
+pub use cost::{Cost, Costing, MEMORY_LIMIT, Shape, Size, bytes_text};
+pub(crate) use warnings::{WARNING, driven, mode_sticks, moved, resonant};
 
 use crate::error::StudyError;
 use crate::study::{Case, Study};
@@ -65,7 +65,8 @@ const LOOKED_AT: usize = 9;
 const LARGE: usize = 60;
 
 /// A case and what is known of its model.
-pub(crate) struct Surveyed {
+#[derive(Debug)]
+pub struct Surveyed {
     case: Case,
     survey: Survey,
 }
@@ -107,6 +108,7 @@ impl ModelSummary {
             onset: onsets.as_ref().map(|onsets| onsets[index].clone()),
         });
         let joints = joints.collect();
+        let (size, seconds) = cost::cost(study, &cases[0]);
         Ok(ModelSummary {
             case: cases[0].case.label(),
             cases: study.cases(),
@@ -117,8 +119,8 @@ impl ModelSummary {
             joints,
             range,
             warnings: warnings::all(study, &cases),
-            size: cost::size(study, &cases[0]),
-            seconds: cost::seconds(study, &cases[0]),
+            size,
+            seconds,
         })
     }
 

@@ -54,7 +54,8 @@ fn the_couple_says_its_modes_and_where_it_slips() {
         assert!(text.contains(word), "{word}: {text}");
     }
     assert!(text.contains("119.5 to 120.2704 Hz, 120.6697 to 122.5 Hz; 0.101 of the excitation is enough"), "{text}");
-    assert!(text.contains("4 cases, 976 rows"), "4 (241 + 3 masses): {text}");
+    // of the three masses one may have two peaks
+    assert!(text.contains("4 cases, 979 rows"), "4 (241 + 1.3 · 3 masses): {text}");
     // a spring before the slider: 2 N / 10 kN/m
     let text = summary(templates::find("blade-couple-massless").unwrap().study).to_string();
     assert!(text.contains("slips at 2 N, 200 µm of relative displacement"), "{text}");

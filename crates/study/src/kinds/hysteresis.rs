@@ -5,6 +5,7 @@ use crate::dataset::{Figure, Panel, Series};
 use crate::drawing::{Drawing, largest, numbers, words};
 use crate::rows::Rows;
 use crate::schema::{Takes, default, optional};
+use crate::summary::{Cost, Costing, Shape, driven};
 use crate::values::{Values, hertz};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use stickslip::dimension::Dimension;
@@ -37,9 +38,33 @@ pub(super) const KIND: Kind = Kind {
     adapts: false,
     tables: &["loops", "loops_summary"],
     grain: |_| Grain::Frequencies,
+    cost,
+    warnings: driven,
     compute,
     draw,
 };
+
+fn cost(costing: &Costing<'_>) -> Cost {
+    let (values, points) = (&costing.case.values, costing.points());
+    let loops = match values.names("loop") {
+        _ if values.flag("sum") == Some(true) => 1.0,
+        Some(names) => names.len() as f64,
+        None if costing.joints > 0.0 => costing.joints,
+        None => costing.case.model.motions.len() as f64,
+    };
+    let rows = points * loops * costing.instants();
+    let keys = costing.varied + costing.several();
+    let read = costing.instants() + loops * (QUADRATURE * GAUSS.len()) as f64;
+    Cost {
+        tables: vec![
+            Shape { rows, numbers: keys + 3.0, words: 1.0 },
+            Shape { rows: points * loops, numbers: keys + 5.0, words: 2.0 },
+        ],
+        drawn: rows,
+        unit: costing.kept_orbits() + costing.samples_bytes(),
+        work: points * (costing.orbit() + costing.reading(read)),
+    }
+}
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     let mut known: Vec<&str> = model.joints.iter().map(|joint| joint.name.as_str()).collect();

@@ -16,6 +16,7 @@ use crate::dataset::Figure;
 use crate::drawing::Drawing;
 use crate::schema::{Key, Takes, default, optional, required};
 use crate::study::Study;
+use crate::summary::{Cost, Costing, Surveyed};
 use crate::values::Values;
 use crate::work::{Computed, Grain, Work};
 use stickslip::dimension::Dimension;
@@ -42,6 +43,10 @@ pub struct Kind {
     pub tables: &'static [&'static str],
     /// How its studies are cut into units of work.
     pub grain: fn(&Study) -> Grain,
+    /// How much its studies hold, and what they take; too much rather than too little.
+    pub cost: fn(&Costing<'_>) -> Cost,
+    /// What looks like a mistake in a study of this kind, as sentences; cases that are spread over all of it.
+    pub warnings: fn(&[Surveyed]) -> Vec<String>,
     /// Computes one unit: rows of its tables.
     pub compute: fn(&Work<'_>) -> Computed,
     /// Draws the figure of finished tables; the title is the study's.

@@ -6,6 +6,7 @@ use crate::drawing::{Drawing, display_unit, largest, numbers};
 use crate::note::Note;
 use crate::rows::Rows;
 use crate::schema::{Key, Takes, Within, default, required};
+use crate::summary::{Cost, Costing, Shape, mode_sticks};
 use crate::values::{Values, hertz};
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode};
@@ -45,9 +46,30 @@ pub(super) const KIND: Kind = Kind {
     adapts: false,
     tables: &["modes", "modes_summary"],
     grain: |_| Grain::Case,
+    cost,
+    warnings: mode_sticks,
     compute,
     draw,
 };
+
+/// Solutions per point.
+const FOLLOWED: f64 = 8.0;
+
+fn cost(costing: &Costing<'_>) -> Cost {
+    let values = &costing.case.values;
+    let points = values.table("amplitude").and_then(|table| table.count("points")).unwrap_or(61) as f64;
+    let rows = costing.cases * points;
+    let harmonics = values.count("harmonics").unwrap_or(HARMONICS) as f64;
+    Cost {
+        tables: vec![
+            Shape { rows, numbers: costing.varied + 4.0 + costing.masses, words: 0.0 },
+            Shape { rows: costing.cases, numbers: costing.varied + 5.0, words: 0.0 },
+        ],
+        drawn: 2.0 * rows,
+        unit: points * costing.series_bytes(harmonics),
+        work: rows * FOLLOWED * costing.series(values.count("harmonics").map(|h| h as f64)),
+    }
+}
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     let range = values.table("amplitude");

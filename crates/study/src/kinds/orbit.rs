@@ -7,6 +7,7 @@ use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
 use crate::schema::{Takes, default};
+use crate::summary::{Cost, Costing, Shape, driven};
 use crate::values::hertz;
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use stickslip::dimension::Dimension;
@@ -33,9 +34,30 @@ pub(super) const KIND: Kind = Kind {
     adapts: false,
     tables: &["orbit", "orbits", "multipliers"],
     grain: |_| Grain::Frequencies,
+    cost,
+    warnings: driven,
     compute,
     draw,
 };
+
+fn cost(costing: &Costing<'_>) -> Cost {
+    let points = costing.points();
+    let rows = points * costing.instants();
+    let orbits = costing.orbits(points);
+    let wanted = costing.case.values.flag("multipliers") == Some(true);
+    let multipliers = if wanted { points * 2.0 * costing.masses } else { 0.0 };
+    Cost {
+        tables: vec![
+            costing.motion(rows),
+            Shape { numbers: orbits.numbers + 4.0, ..orbits },
+            Shape { rows: multipliers, numbers: costing.varied + 5.0, words: 0.0 },
+        ],
+        // the panels beyond the most that are drawn are made all the same
+        drawn: rows * (costing.masses + costing.joints),
+        unit: costing.kept_orbits(),
+        work: points * (costing.orbit() + costing.extra() + costing.reading(costing.instants())),
+    }
+}
 
 fn compute(work: &Work<'_>) -> Computed {
     let mut part = Part::default();

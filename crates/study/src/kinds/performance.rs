@@ -7,7 +7,7 @@ use crate::drawing::{Drawing, largest, numbers};
 use crate::note::Note;
 use crate::rows::Rows;
 use crate::study::{VariedValue, varied_text};
-use crate::summary::WARNING;
+use crate::summary::{Cost, Costing, Shape, WARNING, resonant};
 use crate::values::{Values, hertz};
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
@@ -26,9 +26,28 @@ pub(super) const KIND: Kind = Kind {
     adapts: false,
     tables: &["performance", "optimum"],
     grain: |_| Grain::Curve,
+    cost,
+    warnings: resonant,
     compute,
     draw,
 };
+
+/// Orbits that refine a peak. Values that the search for an optimum tries.
+const REFINING: f64 = 12.0;
+const OPTIMUM: f64 = 35.0;
+
+fn cost(costing: &Costing<'_>) -> Cost {
+    let (cases, curves) = (costing.cases, costing.curves());
+    Cost {
+        tables: vec![
+            Shape { rows: cases, numbers: costing.varied + 4.0, words: 1.0 },
+            Shape { rows: curves, numbers: costing.varied + 2.0, words: 1.0 },
+        ],
+        drawn: cases,
+        unit: costing.orbit_bytes(),
+        work: (cases + curves * OPTIMUM) * (costing.frequencies + REFINING) * costing.orbit(),
+    }
+}
 
 /// Values of the parameter that make a curve.
 const FEWEST_VALUES: usize = 3;

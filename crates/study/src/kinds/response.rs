@@ -9,6 +9,7 @@ use crate::point::{Summary, place_of};
 use crate::rows::Rows;
 use crate::schema::{Key, Takes, default};
 use crate::study::varied_text;
+use crate::summary::{Cost, Costing, Shape, resonant};
 use crate::values::{Frequencies, hertz};
 use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use stickslip::curve::adaptive::Adaptive;
@@ -45,9 +46,37 @@ pub(super) const KIND: Kind = Kind {
     adapts: true,
     tables: &["curve", "peaks", "references"],
     grain: |study| if study.is_adaptive() { Grain::Case } else { Grain::Frequencies },
+    cost,
+    warnings: resonant,
     compute,
     draw,
 };
+
+/// Peaks of a mass: some have two. Orbits that refine one, and those at the border of a unit that two units compute.
+const PEAKS: f64 = 1.3;
+const REFINING: f64 = 6.0;
+
+fn cost(costing: &Costing<'_>) -> Cost {
+    let (points, values) = (costing.points(), &costing.case.values);
+    let sought = values.flag("peaks") != Some(false) && costing.frequencies > 2.0;
+    let peaks = match values.names("peak_of") {
+        _ if !sought => 0.0,
+        Some(_) => costing.cases,
+        None => (costing.cases * costing.masses * PEAKS).floor(),
+    };
+    let linear = if costing.study.figure_values().flag("references") == Some(true) { costing.frequencies } else { 0.0 };
+    let curves = costing.cases.min(MOST_CURVES as f64) * costing.masses.min(MOST_PANELS as f64 + SINGLE as f64);
+    Cost {
+        tables: vec![
+            costing.orbits(points),
+            Shape { rows: peaks, numbers: costing.varied + 3.0, words: 1.0 },
+            Shape { rows: linear, numbers: 1.0 + 2.0 * costing.masses, words: 0.0 },
+        ],
+        drawn: curves * costing.frequencies,
+        unit: costing.orbit_bytes(),
+        work: points * costing.extra() + (points + REFINING * peaks + 2.0 * linear) * costing.orbit(),
+    }
+}
 
 /// A mass below this share of the heaviest is drawn dashed, like the paper's contact masses.
 const LIGHT: f64 = 0.5;

@@ -7,6 +7,7 @@ use crate::drawing::{Drawing, numbers};
 use crate::point::place_of;
 use crate::rows::Rows;
 use crate::schema::{Key, Takes, Within, default, optional, required};
+use crate::summary::{Cost, Costing, Shape, moved};
 use crate::values::{Values, hertz};
 use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Work};
 use std::f64::consts::TAU;
@@ -72,9 +73,38 @@ pub(super) const KIND: Kind = Kind {
     adapts: false,
     tables: &["motion"],
     grain: |_| Grain::Case,
+    cost,
+    warnings: moved,
     compute,
     draw,
 };
+
+/// Duration of one transient (s) and the number of its samples.
+fn lengths(costing: &Costing<'_>) -> (f64, f64) {
+    let values = &costing.case.values;
+    let (low, high) = costing.range().unzip();
+    let period = |omega: f64| TAU / omega;
+    let cycles = values.count("cycles").zip(low).map(|(cycles, omega)| cycles as f64 * period(omega));
+    let run_up = values.table("run_up").and_then(|table| table.quantity("duration"));
+    let duration = values.quantity("duration").or(cycles).or(run_up).unwrap_or(0.0);
+    let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
+    let step = values.quantity("time_step").or(high.map(|omega| period(omega) / per_cycle));
+    (duration, step.filter(|step| *step > 0.0).map_or(0.0, |step| duration / step + 1.0))
+}
+
+fn cost(costing: &Costing<'_>) -> Cost {
+    let (duration, samples) = lengths(costing);
+    let points = costing.points();
+    let table = costing.motion(points * samples);
+    // the motion follows the drive and the modes alike
+    let fastest = costing.range().map_or(0.0, |(_, high)| high).max(costing.slowest_mode());
+    Cost {
+        tables: vec![Shape { numbers: table.numbers + costing.several(), ..table }],
+        drawn: points.min(MOST_PANELS as f64) * samples * costing.masses,
+        unit: 0.0,
+        work: points * (duration * fastest / TAU * costing.period() + costing.reading(samples)),
+    }
+}
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     let free: Vec<&str> = model

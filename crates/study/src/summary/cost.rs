@@ -1,10 +1,13 @@
-//! How much a study will hold and how long it will take, by counting: units of work, samples, columns; and by what
-//! each method was measured to need.
+//! How much a study will hold and how long it will take, by counting: rows, columns, orbits; and by what each method was
+//! measured to need. How many of these a study has, its kind says.
 
 use super::{Surveyed, range};
 use crate::error::{Problem, StudyError};
+use crate::extra;
 use crate::study::{Case, Study};
+use crate::work::Units;
 use std::f64::consts::TAU;
+use stickslip::curve::sweep::BLOCK;
 use stickslip::law::{Law, RateLaw};
 use stickslip::model::System;
 
@@ -30,207 +33,175 @@ const WORD: f64 = 56.0;
 const WRITTEN: f64 = 20.0;
 /// Bytes of a point of a figure, in the dataset and drawn in all formats. Measured: 220 in HTML.
 const DRAWN: f64 = 240.0;
-/// Bytes of a case that waits to be computed, beside its matrices. Measured: 5.9 kB for seven elements.
-const CASE: f64 = 3_500.0;
-const CASE_ELEMENT: f64 = 250.0;
 /// Bytes of an orbit of an exact law, per entry of its state and per switch; and of a smooth law per entry. Measured:
 /// exact 8 kB for the couple and 170 kB for 8 masses and joints, smooth 80 kB and 600 kB.
 const ORBIT_ENTRY: f64 = 500.0;
 const SMOOTH_ENTRY: f64 = 24_000.0;
-/// Samples of a motion are held whole until they are written, bytes per number and per sample.
-const SAMPLE: f64 = 130.0;
+/// Bytes of an orbit that is a series, per harmonic coefficient of a place or joint. Measured: 15 kB for the couple,
+/// 130 kB for 8 masses and joints, at 15 harmonics.
+const SERIES_ENTRY: f64 = 80.0;
+/// Bytes of the motion at one instant, per mass and joint.
+const SAMPLE: f64 = 64.0;
+/// Points that a curve with adaptive frequencies takes, per case. Measured: 100 to 600 at tolerances of 1 %.
+const ADAPTIVE: f64 = 300.0;
+/// Points per period, per joint, that are there beside those that were asked for: the switches.
+const SWITCHES: f64 = 4.0;
 
 /// A table to be: rows and columns.
 #[derive(Debug, Clone, Copy, Default)]
-struct Shape {
-    rows: f64,
-    numbers: f64,
-    words: f64,
+pub struct Shape {
+    /// Rows.
+    pub rows: f64,
+    /// Columns of numbers and flags.
+    pub numbers: f64,
+    /// Columns of words.
+    pub words: f64,
 }
 
-/// What a kind holds.
+/// What a study of a kind costs; the kind says it.
 #[derive(Debug, Default)]
-struct Holds {
-    tables: Vec<Shape>,
+pub struct Cost {
+    /// Its tables.
+    pub tables: Vec<Shape>,
     /// Points of figures.
-    drawn: f64,
-    /// What else it keeps until the end, bytes.
-    kept: f64,
+    pub drawn: f64,
+    /// What one unit of work keeps while it is computed, beside its tables, bytes. Of the units only as many are computed at a time as
+    /// there are threads; the tables of those that wait are counted with the tables.
+    pub unit: f64,
+    /// Time of the methods on one thread, s.
+    pub work: f64,
 }
 
-/// Counts that every kind knows.
-struct Counts {
-    cases: f64,
-    frequencies: f64,
-    varied: f64,
-    n: f64,
-    joints: f64,
+/// What is known of a study when its cost is asked: counts, and what one orbit takes. The first case stands for all.
+#[derive(Debug)]
+pub struct Costing<'a> {
+    /// The study.
+    pub study: &'a Study,
+    /// Its first case.
+    pub case: &'a Case,
+    /// Cases.
+    pub cases: f64,
+    /// Frequencies of a case; of adaptive ones how many they are likely to be.
+    pub frequencies: f64,
+    /// Varied parameters, a column each.
+    pub varied: f64,
+    /// Masses.
+    pub masses: f64,
+    /// Joints.
+    pub joints: f64,
+    surveyed: &'a Surveyed,
     smooth: bool,
 }
 
-impl Counts {
-    fn new(study: &Study, surveyed: &Surveyed) -> Self {
-        let system = surveyed.survey.system();
-        Counts {
+impl<'a> Costing<'a> {
+    pub(super) fn new(study: &'a Study, surveyed: &'a Surveyed) -> Self {
+        let (case, system) = (&surveyed.case, surveyed.survey.system());
+        let given = case.frequencies.as_ref().map_or(1, |f| f.len()) as f64;
+        Costing {
+            study,
+            case,
             cases: study.cases() as f64,
-            frequencies: surveyed.case.frequencies.as_ref().map_or(1, |f| f.len()) as f64,
-            varied: surveyed.case.varied.len() as f64,
-            n: system.dofs() as f64,
+            frequencies: if study.is_adaptive() { ADAPTIVE } else { given },
+            varied: case.varied.len() as f64,
+            masses: system.dofs() as f64,
             joints: system.joints.len() as f64,
+            surveyed,
             smooth: system.joints.iter().any(|joint| joint.law.network().is_none()),
         }
     }
 
-    fn points(&self) -> f64 {
+    /// Cases times frequencies.
+    pub fn points(&self) -> f64 {
         self.cases * self.frequencies
     }
 
+    /// Groups of cases that differ in the last parameter of `vary` only.
+    pub fn curves(&self) -> f64 {
+        self.cases / self.study.last_varied().max(1) as f64
+    }
+
     /// The column of the frequency, where a table has it for several frequencies only.
-    fn several(&self) -> f64 {
+    pub fn several(&self) -> f64 {
         if self.frequencies > 1.0 { 1.0 } else { 0.0 }
     }
 
-    /// Columns of one orbit: amplitude, mean, phase of each mass; dissipation and slip of each joint; evidence.
-    fn orbit_columns(&self) -> (f64, f64) {
-        (self.varied + 3.0 * self.n + 2.0 * self.joints + 6.0, 1.0)
+    /// A table with a row for each of `rows` orbits: frequency, amplitude, mean and phase of each mass, dissipation and slip of each joint,
+    /// what `output` asks for, evidence, status.
+    pub fn orbits(&self, rows: f64) -> Shape {
+        let extra = extra::columns(self.case, self.surveyed.survey.system()).len() as f64;
+        let numbers = self.varied + 3.0 * self.masses + 2.0 * self.joints + extra + 6.0;
+        Shape { rows, numbers, words: 1.0 }
     }
 
-    /// Columns of one instant: time and frequency, displacement and velocity of each mass, three of each joint and its
-    /// contact.
-    fn instant_columns(&self) -> (f64, f64) {
-        (self.varied + 2.0 + 2.0 * self.n + 3.0 * self.joints, self.joints)
+    /// A table with a row for each of `rows` instants: time and frequency, displacement and velocity of each mass, three of each joint and
+    /// its contact.
+    pub fn motion(&self, rows: f64) -> Shape {
+        Shape { rows, numbers: self.varied + 2.0 + 2.0 * self.masses + 3.0 * self.joints, words: self.joints }
     }
 
-    fn orbit_bytes(&self) -> f64 {
-        let state = 2.0 * self.n + self.joints + 1.0;
-        if self.smooth { SMOOTH_ENTRY * state } else { ORBIT_ENTRY * state * (2.0 + 4.0 * self.joints) }
+    /// Instants of a period in a table: `samples` steps, both ends, and the switches.
+    pub fn instants(&self) -> f64 {
+        self.case.values.count("samples").unwrap_or(720) as f64 + 1.0 + SWITCHES * self.joints
     }
-}
 
-/// Instants of a period beside the samples that were asked for: both ends, and the switches.
-fn instants(case: &Case, joints: f64) -> f64 {
-    case.values.count("samples").unwrap_or(720) as f64 + 1.0 + 4.0 * joints
-}
+    /// Lowest and highest drive frequency, rad/s.
+    pub fn range(&self) -> Option<(f64, f64)> {
+        range(self.case)
+    }
 
-/// Duration of one transient (s) and the number of its samples.
-fn transient(case: &Case) -> (f64, f64) {
-    let values = &case.values;
-    let (low, high) = range(case).unzip();
-    let period = |omega: f64| TAU / omega;
-    let cycles = values.count("cycles").zip(low).map(|(cycles, omega)| cycles as f64 * period(omega));
-    let run_up = values.table("run_up").and_then(|table| table.quantity("duration"));
-    let duration = values.quantity("duration").or(cycles).or(run_up).unwrap_or(0.0);
-    let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
-    let step = values.quantity("time_step").or(high.map(|omega| period(omega) / per_cycle));
-    (duration, step.filter(|step| *step > 0.0).map_or(0.0, |step| duration / step + 1.0))
-}
+    /// Lowest natural frequency with all joints stuck, rad/s; zero if there is none.
+    pub fn slowest_mode(&self) -> f64 {
+        self.surveyed.survey.stuck().elastic.first().map_or(0.0, |mode| mode.omega)
+    }
 
-/// Points of a branch for each of the steps that were asked for: it shortens them where it bends. Measured: 3 to 15,
-/// and 109 for a ring of three whose branch turns at every border of stick.
-const BRANCH_POINTS: f64 = 5.0;
-/// Bytes of an orbit that is a series, per harmonic coefficient of a place or joint. Measured: 15 kB for the couple,
-/// 130 kB for 8 masses and joints, at 15 harmonics.
-const SERIES_ENTRY: f64 = 80.0;
-/// Panels of motions that are drawn.
-const PANELS: f64 = 12.0;
+    /// Bytes of the orbits that a unit of frequencies keeps at a time.
+    pub fn kept_orbits(&self) -> f64 {
+        self.frequencies.min(BLOCK as f64) * self.orbit_bytes()
+    }
 
-/// What each kind holds; a kind that is not named here holds one row per point.
-fn holds(study: &Study, surveyed: &Surveyed) -> Holds {
-    let case = &surveyed.case;
-    let counts = Counts::new(study, surveyed);
-    let (points, n) = (counts.points(), counts.n);
-    let (orbit_numbers, orbit_words) = counts.orbit_columns();
-    let orbits = Shape { rows: points, numbers: orbit_numbers, words: orbit_words };
-    match study.kind().name {
-        "hysteresis" => {
-            let loops = case.values.names("loop").map_or(counts.joints.max(1.0), |names| names.len() as f64);
-            let rows = points * loops * instants(case, counts.joints);
-            let table = Shape { rows, numbers: counts.varied + counts.several() + 3.0, words: 1.0 };
-            let numbers = counts.varied + counts.several() + 5.0;
-            let summary = Shape { rows: points * loops, numbers, words: 2.0 };
-            Holds { tables: vec![table, summary], drawn: rows, kept: points * counts.orbit_bytes() }
-        }
-        "orbit" => {
-            let rows = points * instants(case, counts.joints);
-            let (numbers, words) = counts.instant_columns();
-            let multipliers = Shape { rows: points * 2.0 * n, numbers: counts.varied + 5.0, words: 0.0 };
-            let drawn = rows * (n + counts.joints);
-            // beyond some panels the points are made, but not drawn
-            let kept = points * counts.orbit_bytes() + drawn * 2.0 * NUMBER;
-            let drawn = drawn.min(PANELS * instants(case, counts.joints) * (n + counts.joints));
-            Holds { tables: vec![Shape { rows, numbers, words }, orbits, multipliers], drawn, kept }
-        }
-        "transient" => {
-            let samples = transient(case).1;
-            let rows = points * samples;
-            let (numbers, words) = counts.instant_columns();
-            let numbers = numbers + counts.several();
-            let kept = rows * (SAMPLE + NUMBER * (2.0 * n + 4.0 * counts.joints));
-            let drawn = points.min(PANELS) * samples * n;
-            Holds { tables: vec![Shape { rows, numbers, words }], drawn, kept }
-        }
-        "performance" => {
-            let table = Shape { rows: counts.cases, numbers: counts.varied + 4.0, words: 1.0 };
-            let curves = counts.cases / study.varied_points().last().map_or(1.0, |last| *last as f64).max(1.0);
-            let optimum = Shape { rows: curves, numbers: counts.varied + 2.0, words: 1.0 };
-            Holds { tables: vec![table, optimum], drawn: counts.cases, kept: 0.0 }
-        }
-        "modes" => {
-            let rows = counts.cases * mode_points(case);
-            let table = Shape { rows, numbers: counts.varied + 3.0 + n, words: 0.0 };
-            Holds { tables: vec![table], drawn: 2.0 * rows, kept: 0.0 }
-        }
-        "branch" => {
-            let rows = branches(study, case) * steps(case) * BRANCH_POINTS;
-            let table = Shape { rows, numbers: orbit_numbers, words: orbit_words };
-            let harmonics = case.values.count("harmonics").unwrap_or(15) as f64;
-            let kept = rows * SERIES_ENTRY * (2.0 * harmonics + 1.0) * (2.0 * n + 4.0 * counts.joints);
-            Holds { tables: vec![table], drawn: rows * n, kept }
-        }
-        _ => {
-            let peaks = Shape { rows: counts.cases * n, numbers: counts.varied + 3.0, words: 1.0 };
-            Holds { tables: vec![orbits, peaks], drawn: points * n, kept: 0.0 }
-        }
+    /// Bytes of an orbit in memory.
+    pub fn orbit_bytes(&self) -> f64 {
+        let state = 2.0 * self.masses + self.joints + 1.0;
+        if self.smooth { SMOOTH_ENTRY * state } else { ORBIT_ENTRY * state * (2.0 + SWITCHES * self.joints) }
+    }
+
+    /// Bytes of the motion at the instants of one period.
+    pub fn samples_bytes(&self) -> f64 {
+        self.instants() * SAMPLE * (2.0 + self.masses + self.joints)
+    }
+
+    /// Bytes of an orbit in memory that is a series of so many harmonics.
+    pub fn series_bytes(&self, harmonics: f64) -> f64 {
+        SERIES_ENTRY * (2.0 * harmonics + 1.0) * (2.0 * self.masses + 4.0 * self.joints)
     }
 }
 
-fn mode_points(case: &Case) -> f64 {
-    case.values.table("amplitude").and_then(|table| table.count("points")).unwrap_or(61) as f64
-}
+impl Cost {
+    fn rows(&self) -> f64 {
+        self.tables.iter().map(|table| table.rows).sum()
+    }
 
-fn steps(case: &Case) -> f64 {
-    case.values.count("steps").unwrap_or(100) as f64
-}
-
-/// Branches of a study: along the frequency one per case, along a parameter one per combination of the others.
-fn branches(study: &Study, case: &Case) -> f64 {
-    let one_frequency = case.frequencies.as_ref().is_some_and(|f| f.len() == 1);
-    match study.varied_points().last() {
-        Some(last) if one_frequency => study.cases() as f64 / (*last).max(1) as f64,
-        _ => study.cases() as f64,
+    fn cells(&self, number: f64, word: f64) -> f64 {
+        self.tables.iter().map(|table| table.rows * (number * table.numbers + word * table.words)).sum()
     }
 }
 
-pub(super) fn size(study: &Study, surveyed: &Surveyed) -> Size {
-    let holds = holds(study, surveyed);
-    let model = &surveyed.case.model;
-    let elements =
-        model.masses.len() + model.springs.len() + model.joints.len() + model.forces.len() + model.motions.len();
-    let n = surveyed.survey.dofs() as f64;
-    let matrices = NUMBER * n * (3.0 * n + 2.0 * model.joints.len() as f64);
-    let waiting = study.cases() as f64 * (CASE + CASE_ELEMENT * elements as f64 + matrices);
-    let rows: f64 = holds.tables.iter().map(|table| table.rows).sum();
-    let cells = |numbers: f64, words: f64| -> f64 {
-        holds.tables.iter().map(|table| table.rows * (numbers * table.numbers + words * table.words)).sum()
-    };
-    let tables = cells(NUMBER + WRITTEN, WORD + WRITTEN);
+/// Size, and rough time on one thread (s).
+pub(super) fn cost(study: &Study, surveyed: &Surveyed) -> (Size, f64) {
+    let costing = Costing::new(study, surveyed);
+    let cost = (study.kind().cost)(&costing);
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let units = Units::of(study).len().min(threads) as f64;
     // a float that is too large for the type becomes its largest value
     let whole = |value: f64| value as u64;
-    Size {
-        rows: whole(rows),
-        results: whole(cells(NUMBER, NUMBER)),
-        memory: whole(tables + DRAWN * holds.drawn + holds.kept + waiting),
-    }
+    let size = Size {
+        rows: whole(cost.rows()),
+        results: whole(cost.cells(NUMBER, NUMBER)),
+        memory: whole(cost.cells(NUMBER + WRITTEN, WORD + WRITTEN) + DRAWN * cost.drawn + units * cost.unit),
+    };
+    let preparing = costing.cases * PREPARING * (1.0 + (costing.masses + costing.joints).powi(3) / PREPARED);
+    let tables = CELL * cost.cells(1.0, 1.0);
+    (size, OVERHEAD + GENEROUS * (cost.work + preparing + tables + POINT * cost.drawn))
 }
 
 // ------------------------------------------------------------------------------------------ the limit
@@ -323,86 +294,73 @@ const SETTLING: (f64, f64) = (0.1, 1.0);
 const SETTLING_PERIODS: (f64, f64) = (20.0, 50_000.0);
 /// A period of a transient: events, per mass and joint; integration, times their square.
 const PERIOD: (f64, f64, f64) = (3e-4, 2.5e-4, 1.3e-3);
-/// Orbits that refine a peak of one mass.
-const PEAK: f64 = 20.0;
-/// Steps of the search for an optimum.
-const OPTIMUM: f64 = 35.0;
-/// Solutions per point of a mode, and per step of a branch, which it shortens.
-const FOLLOWED: (f64, f64) = (8.0, 15.0);
+/// Resolving and assembling a case, s, and the number of masses and joints (cubed) that doubles it.
+const PREPARING: f64 = 2e-4;
+const PREPARED: f64 = 1e4;
+/// Reading the motion at one instant, per mass and joint, s.
+const INSTANT: f64 = 5e-7;
 /// Joints up to which `auto` takes events.
 const AUTO: f64 = 12.0;
 
-/// Rough time on one thread, s.
-pub(super) fn seconds(study: &Study, surveyed: &Surveyed) -> f64 {
-    let case = &surveyed.case;
-    let counts = Counts::new(study, surveyed);
-    let system = surveyed.survey.system();
-    let points = counts.points();
-    let orbit = orbit(surveyed, &counts);
-    let series = series(system, &counts, case.values.count("harmonics").map(|h| h as f64));
-    let work = match study.kind().name {
-        "transient" => {
-            let fastest = range(case).map_or(0.0, |(_, high)| high);
-            let own = surveyed.survey.stuck().elastic.first().map_or(0.0, |mode| mode.omega);
-            let periods = transient(case).0 * fastest.max(own) / TAU;
-            points * periods * period(system, &counts)
+impl Costing<'_> {
+    /// Time of one orbit by the method of the study, s.
+    pub fn orbit(&self) -> f64 {
+        let (case, system) = (self.case, self.surveyed.survey.system());
+        let size = self.masses + self.joints;
+        let events = EVENT_DRIVEN.0 + EVENT_DRIVEN.1 * (size / EVENT_DRIVEN_SIZE).powi(4);
+        let shooting = size * size * if has_states(system) { SHOOTING.1 } else { SHOOTING.0 };
+        let series = self.series(case.method.options.get("harmonics").copied());
+        match case.method.name.as_str() {
+            "harmonic-balance" => series,
+            "transient" => {
+                let modes = &self.surveyed.survey.free().elastic;
+                let damping = modes.iter().map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE);
+                let digit = std::f64::consts::LN_10 / (TAU * damping);
+                let share = if self.smooth { SETTLING.1 } else { SETTLING.0 };
+                (share * digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1)) * self.period()
+            }
+            _ if self.smooth => shooting,
+            "auto" if self.joints > AUTO => series,
+            _ => events,
         }
-        "performance" => {
-            let curves = study.cases() as f64 / study.varied_points().last().copied().unwrap_or(1).max(1) as f64;
-            (counts.cases + curves * OPTIMUM) * (counts.frequencies + PEAK) * orbit
-        }
-        "modes" => counts.cases * mode_points(case) * FOLLOWED.0 * series,
-        "branch" => branches(study, case) * steps(case) * FOLLOWED.1 * series,
-        "response" if case.values.flag("peaks") != Some(false) && counts.frequencies > 2.0 => {
-            (points + counts.cases * counts.n * PEAK) * orbit
-        }
-        _ => points * orbit,
-    };
-    let holds = holds(study, surveyed);
-    let cells: f64 = holds.tables.iter().map(|table| table.rows * (table.numbers + table.words)).sum();
-    OVERHEAD + GENEROUS * (work + CELL * cells + POINT * holds.drawn)
-}
-
-/// One orbit by the method of a case.
-fn orbit(surveyed: &Surveyed, counts: &Counts) -> f64 {
-    let (case, system, modes) = (&surveyed.case, surveyed.survey.system(), &surveyed.survey.free().elastic);
-    let size = counts.n + counts.joints;
-    let events = EVENT_DRIVEN.0 + EVENT_DRIVEN.1 * (size / EVENT_DRIVEN_SIZE).powi(4);
-    let shooting = size * size * if has_states(system) { SHOOTING.1 } else { SHOOTING.0 };
-    let series = series(system, counts, case.method.options.get("harmonics").copied());
-    match case.method.name.as_str() {
-        "harmonic-balance" => series,
-        "transient" => {
-            let damping = modes.iter().map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE);
-            let digit = std::f64::consts::LN_10 / (TAU * damping);
-            let share = if counts.smooth { SETTLING.1 } else { SETTLING.0 };
-            (share * digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1)) * period(system, counts)
-        }
-        _ if counts.smooth => shooting,
-        "auto" if counts.joints > AUTO => series,
-        _ => events,
     }
-}
 
-fn series(system: &System, counts: &Counts, harmonics: Option<f64>) -> f64 {
-    let rigid = |law: &Law| law.network().is_some_and(|all| all.iter().any(|branch| branch.stiffness.is_none()));
-    let any_rigid = system.joints.iter().any(|joint| rigid(&joint.law));
-    let factor = match (counts.smooth, any_rigid, harmonics) {
-        (false, false, _) => 1.0,
-        (_, _, None) => HARD,
-        (true, _, Some(_)) => HARD_SMOOTH,
-        (false, true, Some(_)) => HARD_RIGID,
-    };
-    let length = (harmonics.unwrap_or(SERIES_HARMONICS) / SERIES_HARMONICS).max(1.0);
-    SERIES * (counts.n + counts.joints).max(1.0) * factor * length * length
-}
+    /// Time of one series of harmonics, s; of as many as it needs if `None`.
+    pub fn series(&self, harmonics: Option<f64>) -> f64 {
+        let system = self.surveyed.survey.system();
+        let rigid = |law: &Law| law.network().is_some_and(|all| all.iter().any(|branch| branch.stiffness.is_none()));
+        let any_rigid = system.joints.iter().any(|joint| rigid(&joint.law));
+        let factor = match (self.smooth, any_rigid, harmonics) {
+            (false, false, _) => 1.0,
+            (_, _, None) => HARD,
+            (true, _, Some(_)) => HARD_SMOOTH,
+            (false, true, Some(_)) => HARD_RIGID,
+        };
+        let length = (harmonics.unwrap_or(SERIES_HARMONICS) / SERIES_HARMONICS).max(1.0);
+        SERIES * (self.masses + self.joints).max(1.0) * factor * length * length
+    }
 
-fn period(system: &System, counts: &Counts) -> f64 {
-    let size = counts.n + counts.joints;
-    match (counts.smooth, has_states(system)) {
-        (false, _) => PERIOD.0 * size,
-        (true, false) => PERIOD.1 * size * size,
-        (true, true) => PERIOD.2 * size * size,
+    /// Time of a period of a transient, s.
+    pub fn period(&self) -> f64 {
+        let size = self.masses + self.joints;
+        match (self.smooth, has_states(self.surveyed.survey.system())) {
+            (false, _) => PERIOD.0 * size,
+            (true, false) => PERIOD.1 * size * size,
+            (true, true) => PERIOD.2 * size * size,
+        }
+    }
+
+    /// Time to read the motion at so many instants, s.
+    pub fn reading(&self, instants: f64) -> f64 {
+        INSTANT * instants * (self.masses + self.joints)
+    }
+
+    /// Time to read what `output` asks of one orbit, s.
+    pub fn extra(&self) -> f64 {
+        match self.case.values.names("output").unwrap_or_default().len() {
+            0 => 0.0,
+            some => self.reading(some as f64 * extra::INSTANTS as f64),
+        }
     }
 }
 

@@ -18,13 +18,10 @@ pub(crate) const WARNING: &str = "warning: ";
 const NAMED: usize = 6;
 
 pub(super) fn all(study: &Study, cases: &[Surveyed]) -> Vec<String> {
-    let mut warnings = Vec::new();
-    warnings.extend(no_excitation(study, cases));
+    let mut warnings = (study.kind().warnings)(cases);
     warnings.extend(loose(cases));
     warnings.extend(unused(study, &cases[0]));
-    warnings.extend(no_resonance(study, cases));
     warnings.extend(bare_angles(study));
-    warnings.extend(mode_sticks(study, cases));
     warnings.into_iter().map(|text| format!("{WARNING}{text}")).collect()
 }
 
@@ -37,8 +34,23 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-fn no_excitation(study: &Study, cases: &[Surveyed]) -> Option<String> {
-    if study.kind().name == "modes" || cases.iter().any(|one| !one.survey.harmonics().is_empty()) {
+/// Of a kind that needs something to drive the motion.
+pub(crate) fn driven(cases: &[Surveyed]) -> Vec<String> {
+    no_excitation(cases, false).into_iter().collect()
+}
+
+/// Of a kind that needs something to set the structure in motion: a drive, or a state to start from.
+pub(crate) fn moved(cases: &[Surveyed]) -> Vec<String> {
+    no_excitation(cases, true).into_iter().collect()
+}
+
+/// Of a kind that looks for resonances in a range of frequencies.
+pub(crate) fn resonant(cases: &[Surveyed]) -> Vec<String> {
+    no_excitation(cases, false).into_iter().chain(no_resonance(cases)).collect()
+}
+
+fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
+    if cases.iter().any(|one| !one.survey.harmonics().is_empty()) {
         return None;
     }
     let starts = |values: &Values| {
@@ -51,7 +63,7 @@ fn no_excitation(study: &Study, cases: &[Surveyed]) -> Option<String> {
         let model = &one.case.model;
         model.forces.iter().any(|force| force.amplitude != 0.0) || model.motions.iter().any(|m| m.amplitude != 0.0)
     };
-    if study.kind().name == "transient" && cases.iter().any(|one| starts(&one.case.values) || constant(one)) {
+    if starts_count && cases.iter().any(|one| starts(&one.case.values) || constant(one)) {
         return None;
     }
     Some(if cases.iter().any(constant) {
@@ -170,14 +182,8 @@ fn each_quantity(table: &StatedTable, each: &mut dyn FnMut(&'static str, &Quanti
     }
 }
 
-/// The kinds that look for resonances in a range of frequencies.
-const RANGED: [&str; 3] = ["response", "performance", "branch"];
-
-fn no_resonance(study: &Study, cases: &[Surveyed]) -> Option<String> {
+fn no_resonance(cases: &[Surveyed]) -> Option<String> {
     let (from, to) = range(&cases[0].case).filter(|(from, to)| from < to)?;
-    if !RANGED.contains(&study.kind().name) {
-        return None;
-    }
     let mut nearest: Option<(f64, f64, &str)> = None;
     for one in cases {
         let harmonics = one.survey.harmonics();
@@ -257,10 +263,12 @@ fn bare_angles(study: &Study) -> Vec<String> {
 /// A range of amplitudes that ends below this share of the first slip shows a linear mode only.
 const STICKS: f64 = 0.99;
 
-fn mode_sticks(study: &Study, cases: &[Surveyed]) -> Option<String> {
-    if study.kind().name != "modes" {
-        return None;
-    }
+/// Of a nonlinear mode whose amplitudes end before any joint slips.
+pub(crate) fn mode_sticks(cases: &[Surveyed]) -> Vec<String> {
+    sticks(cases).into_iter().collect()
+}
+
+fn sticks(cases: &[Surveyed]) -> Option<String> {
     let mut needed = f64::INFINITY;
     let mut asked = 0.0;
     for one in cases {
