@@ -75,7 +75,7 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
     };
     if study.kind().name != run.dataset.kind {
         eprintln!(
-            "error: {} is a {}, {} holds a {}",
+            "error: {} is a study of the kind `{}`, {} holds results of the kind `{}`",
             file.display(),
             study.kind().name,
             run.folder.display(),

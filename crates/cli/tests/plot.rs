@@ -213,8 +213,11 @@ fn what_cannot_be_drawn_is_named() {
     .unwrap();
     run(folder, "couple", &[]);
     let text = wrong(&["plot", "out/study", "couple/study", "--overlay"]);
-    assert!(text.contains("out/study holds a hysteresis and couple/study a response"), "{text}");
-    assert!(wrong(&["plot", "out/study", "--study", "study.toml"]).contains("holds a hysteresis"));
+    assert!(
+        text.contains("out/study holds results of the kind `hysteresis`, couple/study of the kind `response`"),
+        "{text}"
+    );
+    assert!(wrong(&["plot", "out/study", "--study", "study.toml"]).contains("holds results of the kind `hysteresis`"));
     // reference curves are computed
     let study = fs::read_to_string(folder.join("study.toml")).unwrap();
     fs::write(folder.join("study.toml"), format!("{study}\n[figure]\nreferences = true\n")).unwrap();

@@ -21,7 +21,7 @@ pub enum CompareError {
     #[error("a comparison needs two runs: name the folders of both")]
     Single,
     /// Runs of different kinds.
-    #[error("{} holds a {kind} and {} a {other_kind}; only runs of one kind can be compared", folder.display(), other.display())]
+    #[error("{} holds results of the kind `{kind}`, {} of the kind `{other_kind}`; only runs of one kind can be compared", folder.display(), other.display())]
     Kinds {
         /// The folder of the first run.
         folder: PathBuf,
