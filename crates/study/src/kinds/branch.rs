@@ -1,7 +1,9 @@
 //! Branches of orbits by arc length, along the drive frequency or along a design parameter, around turning points.
 
 use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
-use super::{Complaint, FREQUENCY, HARMONICS, Kind, OUTPUT, SERIES_SAMPLES, check_output, check_samples, orbits};
+use super::{
+    Complaint, FREQUENCY, HARMONICS, Kind, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples, orbits,
+};
 use crate::dataset::{Axis, Figure, Panel, Series, Style, Table, Values as Cells};
 use crate::drawing::{Drawing, largest, numbers};
 use crate::point::Summary;
@@ -14,6 +16,7 @@ use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::curve::trace::{Branch, End, Trace, TraceError};
 use stickslip::dimension::Dimension;
+use stickslip::method::Method;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::model::{Model, System};
 
@@ -46,6 +49,7 @@ pub(super) const KIND: Kind = Kind {
     axes: [None, Some(Dimension::LENGTH)],
     // harmonic balance is what branches are made of
     uses_method: false,
+    needs: |system| HarmonicBalance::default().solver(system).map(drop),
     adapts: false,
     tables: &["branch", "peaks", "turns"],
     // along a parameter the cases of one branch differ in the last one only
@@ -79,6 +83,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
 }
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+    check_masses(model)?;
     check_peak_of(values, model)?;
     check_output(values)?;
     if values.quantity("tolerance").is_some_and(|tolerance| tolerance >= 1.0) {

@@ -317,7 +317,8 @@ impl Costing<'_> {
                 let damping = modes.iter().map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE);
                 let digit = std::f64::consts::LN_10 / (TAU * damping);
                 let share = if self.smooth { SETTLING.1 } else { SETTLING.0 };
-                (share * digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1)) * self.period()
+                let most = case.method.options.get("periods").copied().unwrap_or(SETTLING_PERIODS.1);
+                (share * digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1)).min(most) * self.period()
             }
             _ if self.smooth => shooting,
             "auto" if self.joints > AUTO => series,
