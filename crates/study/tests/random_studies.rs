@@ -26,7 +26,7 @@ const FACTOR: f64 = 10.0;
 /// What it may take beside, s: estimates below that are of no interest to anybody.
 const SLACK: f64 = 1.0;
 /// Studies that are estimated to take longer than this are read and checked only, s.
-const LONG: f64 = 1.0;
+const LONG: f64 = 2.0;
 /// Most memory of the whole process, bytes.
 const MEMORY: u64 = 500_000_000;
 /// Fewest studies in a hundred that are accepted; the others test that refusals are errors.
@@ -189,10 +189,7 @@ fn random_studies_end_in_time() {
             let slot = slot.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
             if let Some(Running { seed, text, limit, clock }) = &*slot {
                 let seconds = clock.seconds();
-                assert!(
-                    seconds <= *limit,
-                    "study {seed} takes {seconds:.1} s and more, estimated {limit:.1} s:\n{text}"
-                );
+                assert!(seconds <= *limit, "study {seed} takes {seconds:.1} s, more than {limit:.1} s:\n{text}");
             }
         }
     }

@@ -39,7 +39,7 @@ pub struct Kind {
     /// Whether it finds its orbits with the method of `[method]`, which must then be able to take the model.
     pub uses_method: bool,
     /// What it needs of a system, beside what its method needs.
-    pub needs: fn(&System) -> Result<(), MethodError>,
+    pub needs: fn(&Values, &System) -> Result<(), MethodError>,
     /// Whether it can place its frequencies where the curve bends.
     pub adapts: bool,
     /// Its tables, the most important first.
@@ -105,7 +105,7 @@ fn check_masses(model: &Model) -> Result<(), Complaint> {
 }
 
 /// Of a kind that needs nothing of a system beside what its method needs.
-fn anything(_: &System) -> Result<(), MethodError> {
+fn anything(_: &Values, _: &System) -> Result<(), MethodError> {
     Ok(())
 }
 
