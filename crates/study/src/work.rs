@@ -73,6 +73,7 @@ impl Prepared {
         if study.kind().uses_method {
             method.solver(&system).map_err(|error| refused(study, &case, &error))?;
         }
+        (study.kind().needs)(&case.values, &system).map_err(|error| refused(study, &case, &error))?;
         Ok(Prepared { case, system, method })
     }
 }

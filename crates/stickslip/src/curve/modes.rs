@@ -153,6 +153,14 @@ struct Path {
     lost: Option<Lost>,
 }
 
+/// Whether a system can have nonlinear modes.
+///
+/// # Errors
+/// A place without mass, or a law that cannot be followed.
+pub fn check(system: &System) -> Result<(), MethodError> {
+    ModeEquations::new(system, 1, 8).map(drop)
+}
+
 /// Follows a mode from an amplitude at which friction hardly matters downwards.
 ///
 /// # Errors

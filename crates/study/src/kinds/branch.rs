@@ -1,7 +1,9 @@
 //! Branches of orbits by arc length, along the drive frequency or along a design parameter, around turning points.
 
 use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
-use super::{Complaint, FREQUENCY, HARMONICS, Kind, OUTPUT, SERIES_SAMPLES, check_output, check_samples, orbits};
+use super::{
+    Complaint, FREQUENCY, HARMONICS, Kind, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples, orbits,
+};
 use crate::dataset::{Axis, Figure, Panel, Series, Style, Table, Values as Cells};
 use crate::drawing::{Drawing, largest, numbers};
 use crate::point::Summary;
@@ -14,6 +16,7 @@ use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::curve::trace::{Branch, End, Trace, TraceError};
 use stickslip::dimension::Dimension;
+use stickslip::method::Method;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::model::{Model, System};
 
@@ -46,6 +49,7 @@ pub(super) const KIND: Kind = Kind {
     axes: [None, Some(Dimension::LENGTH)],
     // harmonic balance is what branches are made of
     uses_method: false,
+    needs: |values, system| method(values).solver(system).map(drop),
     adapts: false,
     tables: &["branch", "peaks", "turns"],
     // along a parameter the cases of one branch differ in the last one only
@@ -79,6 +83,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
 }
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+    check_masses(model)?;
     check_peak_of(values, model)?;
     check_output(values)?;
     if values.quantity("tolerance").is_some_and(|tolerance| tolerance >= 1.0) {
@@ -175,6 +180,16 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
+/// The method that solves the series of a branch.
+fn method(values: &Values) -> HarmonicBalance {
+    let count = |key: &str, default: u64| values.count(key).unwrap_or(default) as usize;
+    HarmonicBalance {
+        harmonics: Some(count("harmonics", HARMONICS)),
+        samples: Some(count("samples", SERIES_SAMPLES)),
+        tolerance: values.quantity("tolerance"),
+    }
+}
+
 fn follow(work: &Work<'_>, along: Option<&VariedValue>) -> Result<Branch, Missing> {
     let (prepared, last) = (work.case(), &work.cases[work.cases.len() - 1]);
     let range = match (along, split(work.study, &last.case.varied).1) {
@@ -185,7 +200,6 @@ fn follow(work: &Work<'_>, along: Option<&VariedValue>) -> Result<Branch, Missin
         return Err(Missing::NoRange);
     }
     let values = &prepared.case.values;
-    let count = |key: &str, default: u64| values.count(key).unwrap_or(default) as usize;
     let system = |value: f64| -> Option<System> {
         let case = work.study.case_with(prepared.case.index, &along?.name, value).ok()?;
         case.model.assemble().ok()
@@ -198,13 +212,9 @@ fn follow(work: &Work<'_>, along: Option<&VariedValue>) -> Result<Branch, Missin
     let places = peak_places(prepared);
     let trace = Trace {
         at: &at,
-        method: HarmonicBalance {
-            harmonics: Some(count("harmonics", HARMONICS)),
-            samples: Some(count("samples", SERIES_SAMPLES)),
-            tolerance: values.quantity("tolerance"),
-        },
+        method: method(values),
         range,
-        step: (range.1 - range.0).abs() / count("steps", 100) as f64,
+        step: (range.1 - range.0).abs() / values.count("steps").unwrap_or(100) as f64,
         quantity: &|orbit| worst(orbit, &places),
     };
     trace.branch().map_err(Missing::Trace)

@@ -1,6 +1,6 @@
 //! Hysteresis loops: force over displacement of joints and moved places, over one period of the steady motion.
 
-use super::{Complaint, FREQUENCY, Kind, SAMPLES, orbits};
+use super::{Complaint, FREQUENCY, Kind, SAMPLES, anything, orbits};
 use crate::dataset::{Figure, Panel, Series};
 use crate::drawing::{Drawing, largest, numbers, words};
 use crate::rows::Rows;
@@ -35,6 +35,7 @@ pub(super) const KIND: Kind = Kind {
     check,
     axes: [Some(Dimension::LENGTH), Some(Dimension::FORCE)],
     uses_method: true,
+    needs: anything,
     adapts: false,
     tables: &["loops", "loops_summary"],
     grain: |_| Grain::Frequencies,

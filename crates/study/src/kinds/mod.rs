@@ -20,7 +20,8 @@ use crate::summary::{Cost, Costing, Surveyed};
 use crate::values::Values;
 use crate::work::{Computed, Grain, Work};
 use stickslip::dimension::Dimension;
-use stickslip::model::Model;
+use stickslip::method::MethodError;
+use stickslip::model::{Model, System};
 
 /// A row of the table of study kinds.
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +38,8 @@ pub struct Kind {
     pub axes: [Option<Dimension>; 2],
     /// Whether it finds its orbits with the method of `[method]`, which must then be able to take the model.
     pub uses_method: bool,
+    /// What it needs of a system, beside what its method needs.
+    pub needs: fn(&Values, &System) -> Result<(), MethodError>,
     /// Whether it can place its frequencies where the curve bends.
     pub adapts: bool,
     /// Its tables, the most important first.
@@ -90,6 +93,20 @@ impl Complaint {
         let message = format!("there is no {what} `{}`", crate::near::shown(name));
         Complaint { key, name: Some(name.to_owned()), message, help: Some(help) }
     }
+}
+
+/// Whether there is a mass whose peak could count.
+fn check_masses(model: &Model) -> Result<(), Complaint> {
+    if model.masses.is_empty() {
+        let help = "add a [[mass]], or ask for kind = \"hysteresis\"";
+        return Err(Complaint::new("kind", "the model has no mass, so no amplitude has a peak", help));
+    }
+    Ok(())
+}
+
+/// Of a kind that needs nothing of a system beside what its method needs.
+fn anything(_: &Values, _: &System) -> Result<(), MethodError> {
+    Ok(())
 }
 
 /// Most samples per period.

@@ -43,6 +43,7 @@ pub(super) const KIND: Kind = Kind {
     axes: [Some(Dimension::LENGTH), None],
     // free vibration has no drive frequency: harmonic balance with an unknown frequency and damping is solved
     uses_method: false,
+    needs: |_, system| stickslip::curve::modes::check(system),
     adapts: false,
     tables: &["modes", "modes_summary"],
     grain: |_| Grain::Case,

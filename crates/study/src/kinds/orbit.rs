@@ -1,6 +1,6 @@
 //! Orbits: the steady motion over one period, in time.
 
-use super::{FREQUENCY, Kind, OUTPUT, SAMPLES, check_output, orbits};
+use super::{FREQUENCY, Kind, OUTPUT, SAMPLES, anything, check_output, orbits};
 use crate::dataset::{Axis, Figure, Panel, Series};
 use crate::drawing::{Drawing, display_unit, largest, numbers};
 use crate::note::Note;
@@ -31,6 +31,7 @@ pub(super) const KIND: Kind = Kind {
     check: |values, _| check_output(values),
     axes: [Some(Dimension::TIME), None],
     uses_method: true,
+    needs: anything,
     adapts: false,
     tables: &["orbit", "orbits", "multipliers"],
     grain: |_| Grain::Frequencies,

@@ -1,7 +1,7 @@
 //! Performance curves: the resonance peak as a function of a design parameter, and its best value.
 
 use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
-use super::{Complaint, FREQUENCY, Kind};
+use super::{Complaint, FREQUENCY, Kind, anything, check_masses};
 use crate::dataset::{Axis, Figure, Panel, Series};
 use crate::drawing::{Drawing, largest, numbers};
 use crate::note::Note;
@@ -23,6 +23,7 @@ pub(super) const KIND: Kind = Kind {
     check,
     axes: [None, Some(Dimension::LENGTH)],
     uses_method: true,
+    needs: anything,
     adapts: false,
     tables: &["performance", "optimum"],
     grain: |_| Grain::Curve,
@@ -53,6 +54,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
 const FEWEST_VALUES: usize = 3;
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+    check_masses(model)?;
     check_peak_of(values, model)?;
     if values.frequencies("frequency").is_some_and(|f| f.len() < FEWEST_VALUES) {
         let help = "write frequency = { from = …, to = …, points = … } around the resonance";

@@ -1,7 +1,7 @@
 //! Response curves: amplitude over drive frequency.
 
 use super::peak_of::{PEAK_OF, check_peak_of, named_places, worst};
-use super::{FREQUENCY, Kind, OUTPUT, check_output, orbits};
+use super::{FREQUENCY, Kind, OUTPUT, anything, check_output, orbits};
 use crate::dataset::{Figure, Panel, Series, Sharing, Style, Table};
 use crate::drawing::{Drawing, Layout, MOST_CURVES, Stretch, largest, numbers, thinned, words};
 use crate::note::Note;
@@ -43,6 +43,7 @@ pub(super) const KIND: Kind = Kind {
     },
     axes: [Some(Dimension::FREQUENCY), Some(Dimension::LENGTH)],
     uses_method: true,
+    needs: anything,
     adapts: true,
     tables: &["curve", "peaks", "references"],
     grain: |study| if study.is_adaptive() { Grain::Case } else { Grain::Frequencies },

@@ -1,7 +1,7 @@
 //! Transients: the motion in time from rest or from given displacements; free decay, switched-on drive, or run-up.
 
 use super::orbit::write_sample;
-use super::{Complaint, Kind, MOST_SAMPLES};
+use super::{Complaint, Kind, MOST_SAMPLES, anything};
 use crate::dataset::{Figure, Panel, Series};
 use crate::drawing::{Drawing, numbers};
 use crate::point::place_of;
@@ -70,6 +70,7 @@ pub(super) const KIND: Kind = Kind {
     axes: [Some(Dimension::TIME), Some(Dimension::LENGTH)],
     // exact and smooth laws alike are followed in time; there is no orbit to be found
     uses_method: false,
+    needs: anything,
     adapts: false,
     tables: &["motion"],
     grain: |_| Grain::Case,

@@ -9,7 +9,6 @@ use crate::work::Units;
 use std::f64::consts::TAU;
 use stickslip::curve::sweep::BLOCK;
 use stickslip::law::{Law, RateLaw};
-use stickslip::model::System;
 
 /// Memory that a run may take unless it is told otherwise, bytes. What the machine has free may be less.
 pub const MEMORY_LIMIT: u64 = 2_000_000_000;
@@ -90,12 +89,18 @@ pub struct Costing<'a> {
     /// Joints.
     pub joints: f64,
     surveyed: &'a Surveyed,
+    /// Whether a law is smooth, or made so, and whether one has internal states, which makes the flow stiff.
     smooth: bool,
+    has_states: bool,
 }
 
 impl<'a> Costing<'a> {
     pub(super) fn new(study: &'a Study, surveyed: &'a Surveyed) -> Self {
         let (case, system) = (&surveyed.case, surveyed.survey.system());
+        // a width makes exact laws smooth
+        let width = case.method.options.get("width");
+        let followed = |law: Law| width.and_then(|width| law.regularised(*width)).unwrap_or(law);
+        let laws: Vec<Law> = system.joints.iter().map(|joint| followed(joint.law)).collect();
         let given = case.frequencies.as_ref().map_or(1, |f| f.len()) as f64;
         Costing {
             study,
@@ -106,7 +111,8 @@ impl<'a> Costing<'a> {
             masses: system.dofs() as f64,
             joints: system.joints.len() as f64,
             surveyed,
-            smooth: system.joints.iter().any(|joint| joint.law.network().is_none()),
+            smooth: laws.iter().any(|law| law.network().is_none()),
+            has_states: laws.iter().any(|law| law.rate().is_some_and(|rate| rate.states() > 0)),
         }
     }
 
@@ -305,10 +311,10 @@ const AUTO: f64 = 12.0;
 impl Costing<'_> {
     /// Time of one orbit by the method of the study, s.
     pub fn orbit(&self) -> f64 {
-        let (case, system) = (self.case, self.surveyed.survey.system());
+        let case = self.case;
         let size = self.masses + self.joints;
         let events = EVENT_DRIVEN.0 + EVENT_DRIVEN.1 * (size / EVENT_DRIVEN_SIZE).powi(4);
-        let shooting = size * size * if has_states(system) { SHOOTING.1 } else { SHOOTING.0 };
+        let shooting = size * size * if self.has_states { SHOOTING.1 } else { SHOOTING.0 };
         let series = self.series(case.method.options.get("harmonics").copied());
         match case.method.name.as_str() {
             "harmonic-balance" => series,
@@ -317,7 +323,8 @@ impl Costing<'_> {
                 let damping = modes.iter().map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE);
                 let digit = std::f64::consts::LN_10 / (TAU * damping);
                 let share = if self.smooth { SETTLING.1 } else { SETTLING.0 };
-                (share * digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1)) * self.period()
+                let most = case.method.options.get("periods").copied().unwrap_or(SETTLING_PERIODS.1);
+                (share * digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1)).min(most) * self.period()
             }
             _ if self.smooth => shooting,
             "auto" if self.joints > AUTO => series,
@@ -343,7 +350,7 @@ impl Costing<'_> {
     /// Time of a period of a transient, s.
     pub fn period(&self) -> f64 {
         let size = self.masses + self.joints;
-        match (self.smooth, has_states(self.surveyed.survey.system())) {
+        match (self.smooth, self.has_states) {
             (false, _) => PERIOD.0 * size,
             (true, false) => PERIOD.1 * size * size,
             (true, true) => PERIOD.2 * size * size,
@@ -362,9 +369,4 @@ impl Costing<'_> {
             some => self.reading(some as f64 * extra::INSTANTS as f64),
         }
     }
-}
-
-/// Whether a law has internal states, which makes the flow stiff.
-fn has_states(system: &System) -> bool {
-    system.joints.iter().any(|joint| joint.law.rate().is_some_and(|law| law.states() > 0))
 }

@@ -6,7 +6,7 @@
 //! a whole orbit.
 
 use crate::law::{Rate, RateLaw, Relative};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Dim, Dyn, LU, Matrix, StorageMut};
 use stickslip_numerics::dual::{Dual, Real};
 use stickslip_numerics::radau::{A, C, STAGES, squared};
 
@@ -187,7 +187,7 @@ pub(crate) struct Step {
     points: Vec<LawPoint>,
     residual: DVector<f64>,
     jacobian: DMatrix<f64>,
-    factor: Option<nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>>,
+    factor: Option<LU<f64, Dyn, Dyn>>,
     structural: DVector<f64>,
 }
 
@@ -237,7 +237,7 @@ impl Step {
             self.evaluate(structure, eliminated, loads, state);
             let Some(factor) = factorised(&self.jacobian) else { return false };
             let mut step = -&self.residual;
-            if !factor.solve_mut(&mut step) || step.iter().any(|s| !s.is_finite()) {
+            if !solved(&factor, &mut step) || step.iter().any(|s| !s.is_finite()) {
                 return false;
             }
             self.unknown += &step;
@@ -368,7 +368,7 @@ impl Step {
             }
         }
         right.rows_mut(0, STAGES * j).gemm(1.0, &eliminated.velocity_from_force, &direct, 1.0);
-        if !factor.solve_mut(&mut right) {
+        if !solved(factor, &mut right) {
             return;
         }
         let mut force = direct;
@@ -405,7 +405,12 @@ impl Step {
     }
 }
 
-fn factorised(jacobian: &DMatrix<f64>) -> Option<nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>> {
+fn factorised(jacobian: &DMatrix<f64>) -> Option<LU<f64, Dyn, Dyn>> {
     let factor = jacobian.clone().lu();
     factor.is_invertible().then_some(factor)
+}
+
+/// Solves for `right`. A structure without joints has no unknowns, and `nalgebra` counts from one less.
+fn solved<C: Dim, S: StorageMut<f64, Dyn, C>>(factor: &LU<f64, Dyn, Dyn>, right: &mut Matrix<f64, Dyn, C, S>) -> bool {
+    right.nrows() == 0 || factor.solve_mut(right)
 }
