@@ -214,6 +214,12 @@ pub(crate) fn largest(table: &Table, columns: impl IntoIterator<Item = String>) 
     columns.flatten().map(|value| value.abs()).filter(|value| value.is_finite()).fold(0.0, f64::max)
 }
 
+/// A frequency in a title or legend, to a microhertz: `80 Hz`.
+pub(crate) fn shown_hertz(frequency: f64) -> String {
+    let text = format!("{frequency:.6}");
+    format!("{} Hz", text.trim_end_matches('0').trim_end_matches('.'))
+}
+
 /// The unit in which `largest` (SI) lies between 0.5 and 500: its name and the factor from SI.
 pub(crate) fn display_unit(largest: f64, si: &str) -> (String, f64) {
     for (prefix, factor) in [("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)] {

@@ -4,6 +4,7 @@
 //! case once, so that whatever is wrong is found before anything is written. [`schema`] describes all tables and keys as data.
 
 pub mod dataset;
+mod decay;
 mod document;
 mod drawing;
 mod error;

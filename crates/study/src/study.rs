@@ -515,7 +515,9 @@ impl Study {
             };
             // as the user wrote it, if that is a number with its unit
             let text = match literal.filter(|q| q.inner.is_some() && q.expression.is_literal()) {
-                Some(quantity) if quantity.text.contains(|c: char| c.is_alphabetic() && c != 'e' && c != 'E') => {
+                Some(quantity)
+                    if quantity.text.contains(|c: char| c == '%' || (c.is_alphabetic() && c != 'e' && c != 'E')) =>
+                {
                     quantity.text.trim().to_owned()
                 }
                 _ => displayed(value.si, value.dimension),

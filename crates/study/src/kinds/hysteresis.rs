@@ -2,7 +2,7 @@
 
 use super::{Complaint, FREQUENCY, Kind, SAMPLES, anything, orbits};
 use crate::dataset::{Figure, Panel, Series};
-use crate::drawing::{Drawing, largest, numbers, words};
+use crate::drawing::{Drawing, largest, numbers, shown_hertz, words};
 use crate::rows::Rows;
 use crate::schema::{Takes, default, optional};
 use crate::summary::{Cost, Costing, Shape, driven};
@@ -286,7 +286,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             let title = title.join(", ");
             let mut label: Vec<String> = inner.iter().map(|v| v.text.clone()).collect();
             if let Some(frequencies) = frequencies {
-                label.push(format!("{:.4} Hz", frequencies[from]));
+                label.push(shown_hertz(frequencies[from]));
             }
             let label = if label.is_empty() { joints[from].clone() } else { label.join(", ") };
             let at = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {

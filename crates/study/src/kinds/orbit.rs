@@ -2,7 +2,7 @@
 
 use super::{FREQUENCY, Kind, OUTPUT, SAMPLES, anything, check_output, orbits};
 use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, display_unit, largest, numbers};
+use crate::drawing::{Drawing, display_unit, largest, numbers, shown_hertz};
 use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
@@ -161,7 +161,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         for run in frequencies[stretch.rows.clone()].chunk_by(|a, b| a == b) {
             let rows = from..from + run.len();
             from = rows.end;
-            let frequency = format!("{:.6} Hz", run[0]);
+            let frequency = shown_hertz(run[0]);
             let title = if stretch.varied.is_empty() { frequency } else { format!("{}, {frequency}", stretch.label()) };
             let times = numbers(motion, "time_s", rows.clone());
             let (time_unit, time_factor) = display_unit(times.last().copied().unwrap_or(0.0), "s");

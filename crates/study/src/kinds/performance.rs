@@ -171,6 +171,17 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         let label = varied_text(&stretch.varied[..outer]);
         let label = if label.is_empty() { "peak".to_owned() } else { label };
         let (x, y) = (parameter(table, stretch.rows.clone()), height(table, stretch.rows.clone()));
+        let mut points: Vec<(f64, f64)> = x.into_iter().zip(y).collect();
+        if let Some(optima) = drawing.table("optimum").filter(|optima| colour < optima.rows()) {
+            // one row for every curve; the refined optimum is a point of the line
+            let best = (parameter(optima, colour..colour + 1)[0], height(optima, colour..colour + 1)[0]);
+            let rising = points.is_sorted_by(|a, b| a.0 < b.0);
+            if rising && best.0.is_finite() {
+                let at = points.partition_point(|point| point.0 < best.0);
+                points.insert(at, best);
+            }
+        }
+        let (x, y) = points.into_iter().unzip();
         series.push(Series::line(label, x, y, colour));
     }
     if let Some(optima) = drawing.table("optimum") {

@@ -2,8 +2,8 @@
 
 use super::peak_of::{PEAK_OF, check_peak_of, named_places, worst};
 use super::{FREQUENCY, Kind, OUTPUT, anything, check_output, orbits};
-use crate::dataset::{Figure, Panel, Series, Sharing, Style, Table};
-use crate::drawing::{Drawing, Layout, MOST_CURVES, Stretch, largest, numbers, thinned, words};
+use crate::dataset::{Axis, Figure, Panel, Series, Sharing, Style, Table};
+use crate::drawing::{Drawing, Layout, MOST_CURVES, Stretch, display_unit, largest, numbers, thinned, words};
 use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
@@ -83,6 +83,13 @@ fn cost(costing: &Costing<'_>) -> Cost {
 const LIGHT: f64 = 0.5;
 /// Masses that are drawn one by one; of more the largest amplitude is, with the single ones pale behind it.
 const SINGLE: usize = 7;
+/// Two points before a peak that differ from it by less than this share are level with it: more than the rounding of an orbit, and less
+/// than a resonance falls between two points of any curve that can be drawn.
+const LEVEL: f64 = 1e-8;
+/// Points of the linear references between two points of the curve: their peaks are sharper than that of any damped curve.
+const REFERENCE_POINTS: usize = 4;
+/// Masses whose largest amplitudes differ by less than this share are equally bad.
+const EQUAL: f64 = 1e-6;
 /// Panels of a figure; the tables have all.
 const MOST_PANELS: usize = 12;
 
@@ -274,14 +281,28 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
         last = at_end(end, neighbour);
     }
     let quantities = |orbit: &Orbit| amplitudes(orbit, &named);
-    let inner = peak::all(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
+    let mut inner = peak::all(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
+    inner.retain(|peak| !ends_a_level(&points, peak.quantity, &peak.peak));
     let inner = inner.into_iter().map(|peak| found(peak.quantity, peak.peak, &peak.values));
     Ok(first.into_iter().chain(inner).chain(last).collect())
+}
+
+/// Whether a peak is only where a level stretch ends: a mass that rides along with what moves it until a joint breaks loose.
+fn ends_a_level(points: &[Point], quantity: usize, peak: &Peak) -> bool {
+    let at = points.partition_point(|point| point.omega < peak.omega);
+    let as_high = |point: &Point| {
+        point.values.get(quantity).is_some_and(|value| (value - peak.value).abs() <= LEVEL * peak.value)
+    };
+    at >= 2 && points[at - 2..at].iter().all(as_high)
 }
 
 /// The responses of the same structure with all joints free and with all joints stuck.
 fn references(work: &Work<'_>, omegas: &[f64]) -> Result<Rows, MethodError> {
     let prepared = work.case();
+    let between = omegas.windows(2).flat_map(|pair| {
+        (0..REFERENCE_POINTS).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / REFERENCE_POINTS as f64)
+    });
+    let omegas: Vec<f64> = between.chain(omegas.last().copied()).collect();
     let with = |change: &dyn Fn(Law) -> Law| {
         let mut model = prepared.case.model.clone();
         model.joints.iter_mut().for_each(|joint| joint.law = change(joint.law));
@@ -331,13 +352,16 @@ impl Drawn<'_> {
         self.with_peaks(stretch, x.into_iter().zip(y).collect(), &|mass, _| mass == name)
     }
 
-    /// The largest amplitude over the shown masses, and which mass has the largest of all.
+    /// The largest amplitude over the shown masses, and which mass has the largest of all in words.
     fn envelope(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>, String) {
         let x = numbers(self.curve, "frequency_Hz", stretch.rows.clone());
         let all: Vec<Vec<f64>> =
             self.shown.iter().map(|(name, _)| numbers(self.curve, &self.column(name), stretch.rows.clone())).collect();
         let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let worst = (0..all.len()).max_by(|&a, &b| highest(&all[a]).total_cmp(&highest(&all[b]))).unwrap_or(0);
+        let most = all.iter().map(|values| highest(values)).fold(f64::NEG_INFINITY, f64::max);
+        // which of equal ones is larger by a rounding says nothing
+        let bad = |values: &Vec<f64>| highest(values) >= (1.0 - EQUAL) * most;
+        let worst = if all.iter().all(bad) { None } else { all.iter().position(bad) };
         let y: Vec<f64> = (0..x.len()).map(|i| all.iter().map(|values| values[i]).fold(f64::NAN, f64::max)).collect();
         let below = |omega: f64| {
             let at = x.partition_point(|x| *x < omega).clamp(1, x.len().max(2) - 1);
@@ -347,7 +371,7 @@ impl Drawn<'_> {
         let points: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).collect();
         // a peak of one mass below another one is none of the envelope
         let (x, y) = self.with_peaks(stretch, points, &|_, peak| x.len() > 1 && peak.1 > below(peak.0));
-        (x, y, self.shown[worst].0.clone())
+        (x, y, worst.map_or_else(|| "all are alike".to_owned(), |worst| format!("worst is {}", self.shown[worst].0)))
     }
 
     fn with_peaks(
@@ -382,18 +406,28 @@ impl Drawn<'_> {
                     .map(|name| numbers(table, &format!("{name}_{what}_amplitude_m"), 0..table.rows()))
                     .collect();
                 let y = (0..x.len()).map(|i| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max) * self.factor.1);
-                let line = Series::line(format!("all joints {what}"), x.clone(), y.collect(), 0);
+                let of = if names.len() > 1 { ", largest" } else { "" };
+                let line = Series::line(format!("all joints {what}{of}"), x.clone(), y.collect(), 0);
                 Series { style, ..line.reference() }
             })
             .collect()
     }
 }
 
+/// The parts of a title that there are.
+fn join(parts: impl IntoIterator<Item = String>) -> String {
+    parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
+}
+
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(curve), Some(system)) = (drawing.table("curve"), drawing.system(0)) else { return Figure::default() };
     let places = system.places.iter().cloned().zip(0..);
     let shown: Vec<(String, usize)> = places.filter(|(name, _)| drawing.shows(name)).collect();
-    if shown.is_empty() {
+    let force = |joint: &str| format!("{joint}_force_amplitude_N");
+    // with `output = "joint_force"` only
+    let names = system.joints.iter().map(|joint| joint.name.as_str());
+    let joints: Vec<&str> = names.filter(|name| drawing.shows(name) && curve.numbers(&force(name)).is_some()).collect();
+    if shown.is_empty() && joints.is_empty() {
         return Figure::default();
     }
     let columns = || shown.iter().map(|(name, _)| format!("{name}_amplitude_m"));
@@ -403,6 +437,15 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let layout = drawing.layout(shown.len(), stretches.len());
     let drawn = Drawn { drawing, curve, peaks: peaks_by_case(drawing), factor: (x_factor, y_factor), shown };
     let panel = |title: String| Panel { title, x: x.clone(), y: y.clone(), series: Vec::new() };
+    let (unit, force_factor) = display_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
+    // a force between nothing and its limit needs no decades
+    let force_panel = |title: String| Panel { y: Axis::new("joint force", unit.clone()), ..panel(title) };
+    let force_line = |stretch: &Stretch, joint: &str| -> (Vec<f64>, Vec<f64>) {
+        let of = |column: &str, factor: f64| {
+            numbers(curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
+        };
+        (of("frequency_Hz", x_factor), of(&force(joint), force_factor))
+    };
     let heaviest = system.mass.diagonal().max();
     let light = |place: usize| system.mass[(place, place)] < LIGHT * heaviest;
     let single = drawn.shown.len() <= SINGLE;
@@ -427,9 +470,21 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                     panel.series.push(Series::line(format!("each of {} masses", names.len()), x, y, 1).pale());
                 }
                 let (x, y, worst) = drawn.envelope(stretch);
-                panel.series.push(Series::line(format!("largest (of all {worst})"), x, y, 0));
+                panel.title = join([panel.title, worst]);
+                panel.series.push(Series::line(format!("largest of {} masses", names.len()), x, y, 0));
             }
-            panels.push(panel);
+            if !drawn.shown.is_empty() {
+                panels.push(panel);
+            }
+            if !joints.is_empty() {
+                let mut panel = force_panel(stretch.label());
+                for (i, joint) in joints.iter().enumerate() {
+                    let (x, y) = force_line(stretch, joint);
+                    // beside the colours of the masses
+                    panel.series.push(Series::line(*joint, x, y, drawn.shown.len() + i));
+                }
+                panels.push(panel);
+            }
         }
         return Figure { panels, ..Figure::default() };
     }
@@ -471,6 +526,21 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                     let marks = drawn.marks(stretch, name, colour);
                     panel.series.extend(marks.map(|marks| Series { value, ..marks }));
                 }
+            }
+            panels.push(panel);
+        }
+    }
+    for group in stretches.chunk_by(|a, b| outer(a) == outer(b)) {
+        for joint in &joints {
+            let named = Some((*joint).to_owned()).filter(|_| joints.len() > 1 || system.joints.len() > 1);
+            let mut panel = force_panel(join(named.into_iter().chain([outer(&group[0])])));
+            for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
+                let (x, y) = force_line(stretch, joint);
+                let label = stretch.varied.last().map_or_else(|| (*joint).to_owned(), |varied| varied.text.clone());
+                let value = stretch.varied.last().map(|varied| varied.on_axis().0);
+                // one curve has a colour of its own, beside those of the masses
+                let colour = if stretch.varied.is_empty() { system.dofs() } else { colour };
+                panel.series.push(Series { value, ..Series::line(label, x, y, colour) });
             }
             panels.push(panel);
         }

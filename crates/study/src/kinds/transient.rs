@@ -3,13 +3,14 @@
 use super::orbit::write_sample;
 use super::{Complaint, Kind, MOST_SAMPLES, anything};
 use crate::dataset::{Figure, Panel, Series};
-use crate::drawing::{Drawing, numbers};
+use crate::decay::Decay;
+use crate::drawing::{Drawing, numbers, shown_hertz};
 use crate::point::place_of;
 use crate::rows::Rows;
 use crate::schema::{Key, Takes, Within, default, optional, required};
 use crate::summary::{Cost, Costing, Shape, moved};
 use crate::values::{Values, hertz};
-use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Work};
+use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 use stickslip::method::transient::{Excitation, Transient};
@@ -72,7 +73,7 @@ pub(super) const KIND: Kind = Kind {
     uses_method: false,
     needs: anything,
     adapts: false,
-    tables: &["motion"],
+    tables: &["motion", "decay", "decay_summary"],
     grain: |_| Grain::Case,
     cost,
     warnings: moved,
@@ -183,7 +184,7 @@ fn compute(work: &Work<'_>) -> Computed {
         prepared.system.places.iter().map(|p| given.and_then(|g| g.get(p)).copied().unwrap_or(0.0)).collect()
     };
     let mut part = Part::default();
-    let mut rows = Rows::default();
+    let (mut rows, mut decay, mut summary) = (Rows::default(), Rows::default(), Rows::default());
     for drive in drives {
         let excitation = drive.map(Excitation::Steady).or(run_up).unwrap_or(Excitation::Free);
         let fastest = match excitation {
@@ -206,6 +207,7 @@ fn compute(work: &Work<'_>) -> Computed {
             width: case.method.options.get("width").copied(),
         };
         let mut stopped = false;
+        let mut decays = vec![Decay::default(); prepared.system.dofs()];
         let end = transient.run(&prepared.system, &mut |time, omega, sample| {
             rows.varied(case);
             if work.several_frequencies() {
@@ -215,9 +217,15 @@ fn compute(work: &Work<'_>) -> Computed {
             rows.number("frequency_Hz", hertz(omega));
             write_sample(prepared, sample, &mut rows);
             rows.end();
+            for (i, decay) in decays.iter_mut().enumerate() {
+                decay.add(time, sample.displacement[i], sample.velocity[i]);
+            }
             stopped = work.context.stopped();
             !stopped
         });
+        if excitation == Excitation::Free {
+            read_off(prepared, &decays, &mut decay, &mut summary);
+        }
         (work.context.finished)();
         let at = || drive.map_or_else(|| case.label(), |omega| place_of(case, omega));
         match end {
@@ -226,8 +234,34 @@ fn compute(work: &Work<'_>) -> Computed {
             Err(error) => part.count(at, "breakdown", Some(error.to_string())),
         }
     }
-    part.tables = vec![rows];
+    part.tables = vec![rows, decay, summary];
     Ok(part)
+}
+
+/// Frequency and damping, cycle by cycle, of the mass that moves most.
+fn read_off(prepared: &Prepared, decays: &[Decay], rows: &mut Rows, summary: &mut Rows) {
+    let most = (0..decays.len()).max_by(|&a, &b| decays[a].largest().total_cmp(&decays[b].largest()));
+    let Some((mass, cycles)) = most.map(|most| (&prepared.system.places[most], decays[most].cycles())) else { return };
+    for cycle in &cycles {
+        rows.varied(&prepared.case);
+        rows.number("time_s", cycle.time);
+        rows.text("mass", mass);
+        rows.number("amplitude_m", cycle.amplitude);
+        rows.number("frequency_Hz", cycle.frequency);
+        rows.number("damping_ratio", cycle.damping_ratio);
+        rows.end();
+    }
+    let highest = cycles.iter().max_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
+    let (Some(first), Some(last), Some(highest)) = (cycles.first(), cycles.last(), highest) else { return };
+    summary.varied(&prepared.case);
+    summary.text("mass", mass);
+    summary.integer("cycles", cycles.len() as u64);
+    for (when, cycle) in [("first", first), ("largest", highest), ("last", last)] {
+        summary.number(&format!("{when}_damping_ratio"), cycle.damping_ratio);
+        summary.number(&format!("{when}_amplitude_m"), cycle.amplitude);
+        summary.number(&format!("{when}_frequency_Hz"), cycle.frequency);
+    }
+    summary.end();
 }
 
 /// More panels than this say nothing; the table has all.
@@ -244,7 +278,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             let to = (from + 1..stretch.rows.end).find(|row| !same(*row)).unwrap_or(stretch.rows.end);
             let mut title = stretch.label();
             if let Some(drives) = drives {
-                let frequency = format!("frequency = {:.6} Hz", drives[from]);
+                let frequency = format!("frequency = {}", shown_hertz(drives[from]));
                 title = if title.is_empty() { frequency } else { format!("{title}, {frequency}") };
             }
             let displacement = |place: &String| numbers(motion, &format!("{place}_displacement_m"), from..to);

@@ -1,0 +1,131 @@
+//! Damping read off a free decay, cycle by cycle.
+//!
+//! Three turning points in a row make a cycle of two swings, `s` and `s'` (half of what the motion covers between two turning points, so
+//! that an offset does not matter). Their logarithmic decrement `δ = 2 ln(s/s')` is that of a whole cycle, and
+//! `ζ = δ/√(4π² + δ²)` the damping ratio of the linear oscillator that would lose as much.
+
+use std::f64::consts::TAU;
+
+/// Swings below this share of the largest are rest.
+const REST: f64 = 1e-9;
+
+/// One cycle of a decay.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cycle {
+    /// When it begins, s.
+    pub time: f64,
+    /// Mean of its two swings, m.
+    pub amplitude: f64,
+    /// One over its duration, Hz.
+    pub frequency: f64,
+    /// Damping ratio of the linear oscillator with the same decrement.
+    pub damping_ratio: f64,
+}
+
+/// The turning points of one place, found as the samples come.
+#[derive(Debug, Clone, Default)]
+pub struct Decay {
+    last: Option<[f64; 3]>,
+    turns: Vec<(f64, f64)>,
+}
+
+impl Decay {
+    /// Takes in a sample: time (s), displacement (m), velocity (m/s).
+    pub fn add(&mut self, time: f64, displacement: f64, velocity: f64) {
+        match self.last {
+            // a motion that begins at rest begins with a turning point
+            None if velocity == 0.0 => self.turns.push((time, displacement)),
+            Some([t, x, v]) if v != 0.0 && v * velocity <= 0.0 => {
+                let turn = turning_point([t, x, v], [time, displacement, velocity]);
+                self.turns.push(turn);
+            }
+            _ => {}
+        }
+        self.last = Some([time, displacement, velocity]);
+    }
+
+    /// Largest swing, m.
+    pub fn largest(&self) -> f64 {
+        self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).fold(0.0, f64::max)
+    }
+
+    /// The cycles one after the other, until the motion rests.
+    pub fn cycles(&self) -> Vec<Cycle> {
+        let least = REST * self.largest();
+        let cycles = self.turns.windows(3).step_by(2).map_while(|turns| {
+            let (down, up) = (swing(turns[0], turns[1]), swing(turns[1], turns[2]));
+            let duration = turns[2].0 - turns[0].0;
+            let decrement = 2.0 * (down / up).ln();
+            (up > least && duration > 0.0).then(|| Cycle {
+                time: turns[0].0,
+                amplitude: 0.5 * (down + up),
+                frequency: 1.0 / duration,
+                damping_ratio: decrement / TAU.hypot(decrement),
+            })
+        });
+        cycles.collect()
+    }
+}
+
+fn swing(a: (f64, f64), b: (f64, f64)) -> f64 {
+    0.5 * (a.1 - b.1).abs()
+}
+
+/// Time and displacement where the cubic through two samples and their velocities turns.
+fn turning_point([t0, x0, v0]: [f64; 3], [t1, x1, v1]: [f64; 3]) -> (f64, f64) {
+    let step = t1 - t0;
+    // x = x0 + step (v0 s + b s² + c s³) with 0 <= s <= 1
+    let mean = (x1 - x0) / step;
+    let (b, c) = (3.0 * mean - 2.0 * v0 - v1, v0 + v1 - 2.0 * mean);
+    let velocity = |s: f64| v0 + s * (2.0 * b + s * 3.0 * c);
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if velocity(middle) * v0 > 0.0 { low = middle } else { high = middle }
+    }
+    let s = 0.5 * (low + high);
+    (t0 + s * step, x0 + step * s * (v0 + s * (b + s * c)))
+}
+
+/// Halvings of the time between two samples: all bits of a double.
+const HALVINGS: usize = 53;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decay(motion: impl Fn(f64) -> (f64, f64), duration: f64, step: f64) -> Vec<Cycle> {
+        let mut decay = Decay::default();
+        for i in 0..=(duration / step) as usize {
+            let time = i as f64 * step;
+            let (x, v) = motion(time);
+            decay.add(time, x, v);
+        }
+        decay.cycles()
+    }
+
+    /// `x = e^(-ζ ω t) cos(ω_d t)` with an offset.
+    #[test]
+    fn a_linear_oscillator_has_its_damping_ratio_in_every_cycle() {
+        let (zeta, omega) = (0.03f64, TAU * 10.0);
+        let damped = omega * (1.0 - zeta * zeta).sqrt();
+        let motion = |t: f64| {
+            let fall = (-zeta * omega * t).exp();
+            let (cos, sin) = ((damped * t).cos(), (damped * t).sin());
+            (0.2 + fall * cos, -fall * (zeta * omega * cos + damped * sin))
+        };
+        let cycles = decay(motion, 1.0, 1e-3);
+        assert!(cycles.len() >= 8, "{}", cycles.len());
+        for cycle in &cycles {
+            // the cubic between samples 1/100 of a period apart errs by 1e-7
+            assert!((cycle.damping_ratio - zeta).abs() < 1e-5, "{cycle:?}");
+            assert!((cycle.frequency - damped / TAU).abs() < 1e-4, "{cycle:?}");
+        }
+    }
+
+    #[test]
+    fn rest_and_a_single_swing_have_no_cycle() {
+        assert!(decay(|_| (1.0, 0.0), 1.0, 0.01).is_empty());
+        assert!(decay(|t| (t * t, 2.0 * t), 1.0, 0.01).is_empty());
+    }
+}
