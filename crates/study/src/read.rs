@@ -320,7 +320,7 @@ impl Reader {
                 }
                 let message = format!("expected {}, found {whole}", schema::described(&key.takes));
                 let problem = Problem::new(&node.place, key.name, message);
-                let limit = *to == MOST_POINTS as i64 && whole > to;
+                let limit = key.name == "points" && *to == MOST_POINTS as i64 && whole > to;
                 let help = limit.then(|| format!("the limit of a study is {MOST_POINTS} points"));
                 self.problems.push(problem.maybe_help(help));
                 None

@@ -118,7 +118,7 @@ const AHEAD: usize = 8;
 const LOOK: Duration = Duration::from_millis(20);
 /// How long an interrupted run waits for what is under way, which ends with the orbit that it is at: less than the second that a user
 /// waits gladly.
-const GRACE: Duration = Duration::from_millis(700);
+const GRACE: Duration = Duration::from_millis(500);
 
 /// Computes all units and joins their parts in order.
 ///

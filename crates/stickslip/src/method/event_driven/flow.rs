@@ -81,6 +81,9 @@ pub(crate) struct Flow {
     row: DVector<f64>,
 }
 
+/// What springs before sliders can hold counts up to this multiple of what the loads can give: structures that slip at all have it below 10.
+const PRELOADED: f64 = 10.0;
+
 impl Flow {
     pub fn new(mechanics: Mechanics, drive: Drive) -> Self {
         let (work, decision) = (Work::new(&mechanics, drive.rates.len()), Decision::new(&mechanics));
@@ -199,7 +202,10 @@ impl Flow {
         self.work = Work::new(&self.mechanics, drive.rates.len());
         let mechanics = &self.mechanics;
         let springs = mechanics.sliders.iter().filter_map(|slider| Some(slider.limit / slider.stiffness?.sqrt()));
-        self.energy_scale = drive.energy_scale(&mechanics.mass, &mechanics.stiffness) + springs.sum::<f64>();
+        let loads = drive.energy_scale(&mechanics.mass, &mechanics.stiffness);
+        // a limit that the loads never reach says nothing of the motion
+        let most = if loads > 0.0 { PRELOADED * loads } else { f64::INFINITY };
+        self.energy_scale = loads + springs.map(|energy| energy.min(most)).sum::<f64>();
         let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax().sqrt() };
         self.moving = drive.imposed_velocity().max(super::NEAR_REST * self.energy_scale * mobility);
         self.drive = drive;

@@ -1,0 +1,222 @@
+//! What a response can be asked for beside its curve, against closed forms of linear oscillators and against sums over single loops.
+
+use std::f64::consts::TAU;
+use stickslip_study::dataset::{Dataset, Emphasis, Table, Values};
+use stickslip_study::read_study;
+use stickslip_study::run::{Context, run};
+
+fn dataset(text: &str) -> Dataset {
+    run(&read_study("study.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap()
+}
+
+fn table<'a>(dataset: &'a Dataset, name: &str) -> &'a Table {
+    dataset.tables.iter().find(|table| table.name == name).unwrap()
+}
+
+fn numbers<'a>(dataset: &'a Dataset, name: &str, column: &str) -> &'a [f64] {
+    let found = table(dataset, name).numbers(column);
+    found.unwrap_or_else(|| panic!("{column} in {:?}", table(dataset, name).columns.iter().map(|c| &c.name)))
+}
+
+/// 1 kg on 100 N/m and 0.5 N s/m under 2 N, with a joint of 50 N/m.
+fn oscillator(limit: &str, study: &str) -> Dataset {
+    dataset(&format!(
+        r#"
+schema = 1
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "100 N/m"
+damping = "0.5 N s/m"
+[[joint]]
+name = "foot"
+between = ["m", "ground"]
+law = {{ kind = "jenkins", stiffness = "50 N/m", limit = "{limit}" }}
+[[force]]
+on = "m"
+amplitude = "2 N"
+{study}
+"#
+    ))
+}
+
+/// Amplitude of a linear oscillator of 1 kg and 0.5 N s/m under 2 N.
+fn linear(stiffness: f64, omega: f64) -> f64 {
+    2.0 / (stiffness - omega * omega).hypot(0.5 * omega)
+}
+
+#[test]
+fn references_are_the_linear_structures() {
+    let found = oscillator(
+        "0.5 N",
+        r#"
+[study]
+kind = "response"
+frequency = { from = "1 Hz", to = "3 Hz", points = 21 }
+[figure]
+references = true
+"#,
+    );
+    let frequency = numbers(&found, "references", "frequency_Hz");
+    let (free, stuck) =
+        (numbers(&found, "references", "m_free_amplitude_m"), numbers(&found, "references", "m_stuck_amplitude_m"));
+    for (i, f) in frequency.iter().enumerate() {
+        let ratios = (free[i] / linear(100.0, TAU * f) - 1.0, stuck[i] / linear(150.0, TAU * f) - 1.0);
+        assert!(ratios.0.abs() < 1e-9 && ratios.1.abs() < 1e-9, "{f} Hz: {ratios:?}");
+    }
+    let references = found.figure.panels[0].series.iter().filter(|series| series.emphasis == Emphasis::Reference);
+    assert_eq!(
+        references.map(|series| series.label.as_str()).collect::<Vec<_>>(),
+        ["all joints free", "all joints stuck"]
+    );
+}
+
+#[test]
+fn outputs_of_a_linear_oscillator() {
+    let found = oscillator(
+        "0 N",
+        r#"
+[study]
+kind = "response"
+frequency = ["1 Hz", "2 Hz"]
+output = ["velocity", "acceleration", "harmonics", "receptance", "joint_force", "joint_motion"]
+"#,
+    );
+    for (row, f) in [1.0, 2.0].into_iter().enumerate() {
+        let omega = TAU * f;
+        let amplitude = linear(100.0, omega);
+        let near = |column: &str, expected: f64| {
+            let value = numbers(&found, "curve", column)[row];
+            assert!((value - expected).abs() < 1e-5 * expected + 1e-12, "{column}: {value} {expected}");
+        };
+        near("m_velocity_amplitude_m_per_s", omega * amplitude);
+        near("m_acceleration_amplitude_m_per_s2", omega * omega * amplitude);
+        near("m_receptance_m_per_N", amplitude / 2.0);
+        near("m_harmonic1_m", amplitude);
+        near("m_harmonic3_m", 0.0);
+        near("foot_force_amplitude_N", 0.0);
+        near("foot_amplitude_m", amplitude);
+    }
+}
+
+#[test]
+fn a_slipping_joint_carries_its_limit() {
+    let study = "[study]\nkind = \"response\"\nfrequency = [\"1.7 Hz\"]\noutput = \"joint_force\"";
+    let found = oscillator("0.5 N", study);
+    assert!((numbers(&found, "curve", "foot_force_amplitude_N")[0] - 0.5).abs() < 1e-12);
+}
+
+/// Two masses: of the named ones the worst counts, at every frequency anew.
+#[test]
+fn the_worst_of_several_masses_counts() {
+    let text = r#"
+schema = 1
+[model]
+template = "blade-couple"
+[study]
+kind = "response"
+frequency = { from = "119.5 Hz", to = "122.5 Hz", points = 61 }
+vary = { Ft = ["2 N", "8 N"] }
+peak_of = "all"
+"#;
+    let found = dataset(text);
+    let single = dataset(&text.replace("peak_of = \"all\"", ""));
+    let all = table(&single, "peaks");
+    let (limits, heights) = (numbers(&single, "peaks", "Ft_N"), numbers(&single, "peaks", "amplitude_m"));
+    let Values::Text(masses) = &table(&found, "peaks").columns[1].values else { panic!() };
+    for limit in [2.0, 8.0] {
+        let highest = (0..all.rows()).filter(|&row| limits[row] == limit).map(|row| heights[row]).fold(0.0, f64::max);
+        let rows = (0..masses.len()).filter(|&row| numbers(&found, "peaks", "Ft_N")[row] == limit);
+        let worst = rows.map(|row| numbers(&found, "peaks", "amplitude_m")[row]).fold(0.0, f64::max);
+        assert!((worst / highest - 1.0).abs() < 1e-9, "{limit} N: {worst} {highest}");
+    }
+    assert!(masses.iter().any(|mass| mass == "blade1"), "{masses:?}");
+}
+
+/// Ten sliders side by side: force and loss of the sum are the sums.
+#[test]
+fn loops_of_several_joints_add_up() {
+    let text = r#"
+schema = 1
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[motion]]
+on = "m"
+amplitude = "1 mm"
+[[joint]]
+repeat = { i = 10 }
+name = "j{i}"
+between = ["m", "ground"]
+law = { kind = "jenkins", stiffness = "0.2 N/mm", limit = "0.015 N * i" }
+[study]
+kind = "hysteresis"
+frequency = "1 rad/s"
+sum = true
+"#;
+    let found = dataset(text);
+    // 4 Ft (a - Ft/kt) of those that slip, Ft < kt a = 0.2 N
+    let loss: f64 = (1..=10).map(|i| 0.015 * f64::from(i)).map(|ft| 4.0 * ft * (1e-3 - ft / 200.0)).sum();
+    assert!((numbers(&found, "loops_summary", "dissipation_J")[0] / loss - 1.0).abs() < 1e-9);
+    let largest = numbers(&found, "loops", "force_N").iter().fold(0.0f64, |a, f| a.max(f.abs()));
+    assert!((largest - 0.015 * 55.0).abs() < 1e-12, "{largest}");
+    // over the displacement of the mass it is the same loop
+    let against = dataset(
+        &text
+            .replace("sum = true", "sum = true\nagainst = \"m\"")
+            .replace("[[motion]]\non = \"m\"\namplitude = \"1 mm\"", "[[force]]\non = \"m\"\namplitude = \"2 mN\""),
+    );
+    assert_eq!(table(&against, "loops_summary").rows(), 1);
+}
+
+#[test]
+fn adaptive_frequencies_lie_where_the_curve_bends() {
+    let found = oscillator(
+        "0.5 N",
+        "[study]\nkind = \"response\"\nfrequency = { from = \"0.5 Hz\", to = \"20 Hz\", tolerance = \"0.5 %\" }",
+    );
+    let frequency = numbers(&found, "curve", "frequency_Hz");
+    assert_eq!((frequency[0], frequency[frequency.len() - 1]), (0.5, 20.0));
+    assert!(frequency.is_sorted());
+    let within = |from: f64, to: f64| frequency.iter().filter(|f| (from..to).contains(*f)).count() as f64 / (to - from);
+    // resonances between 1.6 Hz (free) and 1.95 Hz (stuck)
+    assert!(within(1.5, 2.1) > 10.0 * within(10.0, 20.0), "{} {}", within(1.5, 2.1), within(10.0, 20.0));
+    let text = "schema = 1\n[model]\ntemplate = \"blade-couple\"\n[study]\nkind = \"orbit\"\nfrequency = { from = \"1 Hz\", to = \"2 Hz\", tolerance = \"1 %\" }";
+    let error = read_study("study.toml", text, &[]).unwrap_err().to_string();
+    assert!(error.contains("needs to know its frequencies"), "{error}");
+}
+
+#[test]
+fn many_masses_are_drawn_as_their_envelope() {
+    let found = dataset(
+        r#"
+schema = 1
+[[mass]]
+repeat = { i = 9 }
+name = "b{i}"
+mass = "1 kg"
+[[spring]]
+repeat = { i = 9 }
+between = ["b{i}", "ground"]
+stiffness = "100 N/m * (1 + 0.01*i)"
+damping = "1 N s/m"
+[[force]]
+repeat = { i = 9 }
+on = "b{i}"
+amplitude = "1 N"
+[study]
+kind = "response"
+frequency = { from = "1 Hz", to = "2 Hz", points = 41 }
+"#,
+    );
+    let series = &found.figure.panels[0].series;
+    let (pale, normal): (Vec<_>, Vec<_>) = series.iter().partition(|series| series.emphasis == Emphasis::Pale);
+    assert_eq!((pale.len(), normal.len()), (9, 1));
+    let highest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+    let largest = pale.iter().map(|series| highest(&series.y)).fold(0.0, f64::max);
+    assert_eq!(highest(&normal[0].y), largest);
+    // the softest of equally damped ones moves most at its resonance: F/(c ω)
+    assert!(found.figure.panels[0].title.contains("worst is b1"), "{}", found.figure.panels[0].title);
+}
