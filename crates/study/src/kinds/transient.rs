@@ -264,11 +264,10 @@ fn read_off(prepared: &Prepared, decays: &[Decay], rows: &mut Rows, summary: &mu
     summary.varied(&prepared.case);
     summary.text("mass", mass);
     summary.integer("cycles", cycles.len() as u64);
-    for (when, cycle) in [("first", first), ("largest", highest), ("last", last)] {
-        summary.number(&format!("{when}_damping_ratio"), cycle.damping_ratio);
-        summary.number(&format!("{when}_amplitude_m"), cycle.amplitude);
-        summary.number(&format!("{when}_frequency_Hz"), cycle.frequency);
-    }
+    let named = [("first", first), ("largest", highest), ("last", last)];
+    named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_damping_ratio"), cycle.damping_ratio));
+    named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_amplitude_m"), cycle.amplitude));
+    named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_frequency_Hz"), cycle.frequency));
     summary.end();
 }
 
