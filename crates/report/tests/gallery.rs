@@ -265,6 +265,9 @@ fn the_isolator_breaks_loose_where_inertia_reaches_the_limit() {
         }
     }
     assert!(seen.iter().all(|count| *count > 20), "{seen:?}");
+    // riding along with the floor, by 0.5 mm, is level and has no peak
+    let peaks = column(&found, "peaks", "amplitude_m");
+    assert!(peaks.len() == 4 && peaks.iter().all(|peak| (peak - 0.5e-3).abs() > 1e-5), "{peaks:?}");
 }
 
 /// Where the branch of the flutter study turns: where `F0(A) = A |k + keq - m ω² + j (ω c + ω ceq)|` of one harmonic does.
@@ -287,6 +290,22 @@ fn the_flutter_branch_turns_where_one_harmonic_says() {
     for (found, expected) in found.iter().zip(expected) {
         // the joint has higher harmonics, which the mass hardly follows
         close(*found, expected, 5e-3);
+    }
+}
+
+#[test]
+fn figures_say_what_they_show() {
+    let titles = |name: &str| -> Vec<String> {
+        dataset(name, &reduced(&text(name))).figure.panels.into_iter().map(|panel| panel.title).collect()
+    };
+    assert_eq!(titles("preload")[0], "displacement, P = 0 N, 80 Hz");
+    let ring = titles("mistuned_ring");
+    assert_eq!(ring[0], "spread = 0 %, all are alike");
+    assert!(ring[1].starts_with("spread = 2 %, worst is blade"), "{ring:?}");
+    // the refined optimum is a point of its curve
+    let best = dataset("best_slip_force", &text("best_slip_force"));
+    for (series, limit) in best.figure.panels[0].series.iter().zip(column(&best, "optimum", "Ft_N")) {
+        assert!(series.x.contains(limit) && series.x.is_sorted(), "{limit} {:?}", series.x);
     }
 }
 

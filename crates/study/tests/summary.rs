@@ -257,6 +257,13 @@ fn sizes_are_those_of_the_tables() {
         template("blade-couple", &[small, ("kind = \"response\"", "kind = \"performance\"")]),
         template("blade-couple", &[(drive, "kind = \"transient\"\nfrequency = \"121 Hz\"\ncycles = 20")]),
         template(
+            "blade-couple",
+            &[(
+                drive,
+                "kind = \"transient\"\nstart = { blade1 = \"1 mm\" }\nduration = \"0.2 s\"\ntime_step = \"0.5 ms\"",
+            )],
+        ),
+        template(
             "blade-couple-massless",
             &[(drive, "kind = \"modes\"\namplitude = { from = \"1 um\", to = \"1 mm\" }")],
         ),

@@ -65,7 +65,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
         Some(_) => costing.cases,
         None => (costing.cases * costing.masses * PEAKS).floor(),
     };
-    let linear = if costing.study.figure_values().flag("references") == Some(true) { costing.frequencies } else { 0.0 };
+    let references = costing.study.figure_values().flag("references") == Some(true);
+    let linear = if references { costing.frequencies * REFERENCE_POINTS as f64 } else { 0.0 };
     let curves = costing.cases.min(MOST_CURVES as f64) * costing.masses.min(MOST_PANELS as f64 + SINGLE as f64);
     Cost {
         tables: vec![

@@ -100,8 +100,16 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let table = costing.motion(points * samples);
     // the motion follows the drive and the modes alike
     let fastest = costing.range().map_or(0.0, |(_, high)| high).max(costing.slowest_mode());
+    // the cycles of a free decay, and their summary
+    let free = costing.range().is_none();
+    let cycles = if free { points * (duration * fastest / TAU).floor() } else { 0.0 };
+    let summaries = if free { points } else { 0.0 };
     Cost {
-        tables: vec![Shape { numbers: table.numbers + costing.several(), ..table }],
+        tables: vec![
+            Shape { numbers: table.numbers + costing.several(), ..table },
+            Shape { rows: cycles, numbers: costing.varied + 4.0, words: 1.0 },
+            Shape { rows: summaries, numbers: costing.varied + 10.0, words: 1.0 },
+        ],
         drawn: points.min(MOST_PANELS as f64) * samples * costing.masses,
         unit: 0.0,
         work: points * (duration * fastest / TAU * costing.period() + costing.reading(samples)),
@@ -256,11 +264,10 @@ fn read_off(prepared: &Prepared, decays: &[Decay], rows: &mut Rows, summary: &mu
     summary.varied(&prepared.case);
     summary.text("mass", mass);
     summary.integer("cycles", cycles.len() as u64);
-    for (when, cycle) in [("first", first), ("largest", highest), ("last", last)] {
-        summary.number(&format!("{when}_damping_ratio"), cycle.damping_ratio);
-        summary.number(&format!("{when}_amplitude_m"), cycle.amplitude);
-        summary.number(&format!("{when}_frequency_Hz"), cycle.frequency);
-    }
+    let named = [("first", first), ("largest", highest), ("last", last)];
+    named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_damping_ratio"), cycle.damping_ratio));
+    named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_amplitude_m"), cycle.amplitude));
+    named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_frequency_Hz"), cycle.frequency));
     summary.end();
 }
 
