@@ -114,3 +114,22 @@ fn its_loop_has_no_area() {
         assert!((low + 1e-3).abs() < 1e-9 && (high - 1e-3).abs() < 1e-9, "{}: {low} {high}", row.name);
     }
 }
+
+/// A joint whose slip limit nothing reaches is a spring, however large the limit: at the resonance of the stuck structure, where a motion
+/// that is only nearly closed would show.
+#[test]
+fn a_limit_that_nothing_reaches_makes_a_spring() {
+    for limit in [1e3, 1e6, 1e12] {
+        let law = Law::Jenkins(law::Jenkins { stiffness: 5e3, limit });
+        let system = oscillator(&[law]).assemble().unwrap();
+        let omega = (1.5e4f64).sqrt();
+        // F/(c Ω) where k + kt = m Ω²
+        let expected = 3.0 / (20.0 * omega);
+        // a slider that was made smooth creeps
+        for (name, method) in methods(law).into_iter().filter(|(name, _)| *name != "shooting") {
+            let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+            let ratio = orbit.places[0].amplitude() / expected - 1.0;
+            assert!(ratio.abs() < NEAR, "{name} with {limit:e} N: {ratio:e}");
+        }
+    }
+}
