@@ -284,7 +284,7 @@ const EVENT_DRIVEN_SIZE: f64 = 16.0;
 const SERIES: f64 = 5e-4;
 /// Rigid sliders and smooth laws need more harmonics and more steps: measured 20 ms at 4 blades, 0.9 s at 32. Where
 /// the harmonics are given they need more steps only.
-const HARD: f64 = 20.0;
+const HARD: f64 = 40.0;
 const HARD_RIGID: f64 = 3.0;
 const HARD_SMOOTH: f64 = 10.0;
 /// Harmonics of [`SERIES`].
