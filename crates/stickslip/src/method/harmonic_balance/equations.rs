@@ -43,6 +43,8 @@ const NOTHING: f64 = 1e-150;
 /// All that belongs to one number of harmonics.
 #[derive(Debug, Clone)]
 pub(super) struct Level {
+    /// How often the derivative was assembled in the present search.
+    pub assembled: usize,
     pub alternation: Alternation,
     /// Receptance per harmonic, q × q.
     receptance: Vec<DMatrix<Complex64>>,
@@ -105,6 +107,7 @@ impl Level {
         let nh = harmonics.len();
         let size = 2 * nh * coordinates;
         Level {
+            assembled: 0,
             alternation: Alternation::new(harmonics, samples),
             receptance: Vec::new(),
             penalty: vec![0.0; coordinates],
@@ -224,6 +227,7 @@ impl Level {
         length: f64,
         tangent: bool,
     ) -> f64 {
+        self.assembled += usize::from(tangent);
         let (nh, count) = (self.harmonics().len(), coordinates.len());
         let block = 4 * nh * nh;
         for (q, coordinate) in coordinates.iter().enumerate() {

@@ -27,6 +27,11 @@ pub(super) const SHORTENS: f64 = 1e-3;
 /// Shares of the penalty that are tried first if Newton's method fails with the whole.
 const GENTLE: [f64; 3] = [0.04, 0.2, 1.0];
 
+/// Multiplications in the eliminations of one search, about five seconds of one core, but for [`FEWEST`] eliminations in any case: a
+/// search that is to end takes a few of them.
+const WORK: f64 = 1e10;
+const FEWEST: f64 = 40.0;
+
 /// The search did not end.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lost {
@@ -51,7 +56,7 @@ impl Level {
         // the residual that is to be halved, and for how long it was not
         let (mut mark, mut waited) = (residual, 0);
         for _ in 0..most {
-            if residual <= SOLVED || (waited > PATIENCE && least <= STEPS) {
+            if self.is_exhausted() || residual <= SOLVED || (waited > PATIENCE && least <= STEPS) {
                 break;
             }
             if !self.newton_step(coordinates, ease, length) {
@@ -67,7 +72,7 @@ impl Level {
                 }
                 self.advance(coordinates, motion, fraction, length);
                 after = self.evaluate(coordinates, omega, motion, ease, length, true);
-                if after < (1.0 - SHORTENS * fraction) * residual {
+                if after < (1.0 - SHORTENS * fraction) * residual || self.is_exhausted() {
                     break;
                 }
                 fraction *= 0.5;
@@ -102,6 +107,17 @@ impl Level {
         } else {
             Err(Lost { iterations: motion.iterations, residual })
         }
+    }
+
+    /// Whether the search has taken all the work that it may.
+    fn is_exhausted(&self) -> bool {
+        let size = self.residual.len() as f64;
+        let one = match self.sparse {
+            // blocks of all harmonics of a coordinate and its neighbours
+            Some(_) => size * (4 * self.harmonics().len()).pow(2) as f64,
+            None => size * size * size / 3.0,
+        };
+        self.assembled as f64 > (WORK / one).max(FEWEST)
     }
 
     /// The Newton step into `self.step`, in the unknowns' units.
@@ -150,12 +166,14 @@ impl Level {
         motion: &mut Motion,
         most: usize,
     ) -> Result<(), Lost> {
+        self.assembled = 0;
         self.newton(coordinates, omega, motion, GIVEN, most)
     }
 
     /// The solution, from `start`.
     pub fn solve(&mut self, coordinates: &[Coordinate], omega: f64, mut start: Motion) -> Result<Motion, Lost> {
         start.iterations = 0;
+        self.assembled = 0;
         let mut motion = start.clone();
         if self.newton(coordinates, omega, &mut motion, GIVEN, ITERATIONS).is_ok() {
             return Ok(motion);
@@ -185,7 +203,7 @@ impl Level {
         for _ in 0..60 {
             limits *= 4.0;
             held = self.newton(coordinates, omega, &mut good, Ease { limits, ..GIVEN }, ITERATIONS);
-            if held.is_ok() || good.iterations - motion.iterations > MOST_RAISING {
+            if held.is_ok() || self.is_exhausted() || good.iterations - motion.iterations > MOST_RAISING {
                 break;
             }
         }
@@ -203,7 +221,7 @@ impl Level {
                 }
                 Err(lost) => {
                     factor = factor.sqrt();
-                    if factor > 0.995 || good.iterations > MOST_ITERATIONS {
+                    if factor > 0.995 || self.is_exhausted() || good.iterations > MOST_ITERATIONS {
                         return Err(lost);
                     }
                 }
