@@ -53,7 +53,9 @@ pub(crate) fn document(title: &str, style: &str, body: &str, script_path: &str) 
     )
 }
 
+// the scroll bar has its place from the start: figures take the width that is there when they are drawn
 const STYLE: &str = "\
+html { overflow-y: scroll; }
 body { margin: 0 auto; padding: 1.5rem; font: 16px/1.55 system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif; color: #1a1a1a; background: #fff; }
 h1 { font-size: 1.45rem; line-height: 1.25; margin: 0 0 .75rem; overflow-wrap: anywhere; }
 .figure { width: 100%; margin: .5rem 0 1rem; overflow-x: clip; }
