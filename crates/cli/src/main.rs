@@ -1,5 +1,21 @@
 //! The `stickslip` command.
 
+/// Says something on standard error; a reader that has gone away is no reason to end.
+macro_rules! complain {
+    ($($text:tt)*) => {{
+        use std::io::Write;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+
+/// The same without a line feed.
+macro_rules! complain_on {
+    ($($text:tt)*) => {{
+        use std::io::Write;
+        let _ = write!(std::io::stderr(), $($text)*);
+    }};
+}
+
 mod args;
 mod list;
 mod open;
@@ -73,7 +89,7 @@ fn main() -> ExitCode {
         }
     };
     if let Ending::Failed(message) = &ending {
-        eprintln!("error: {message}");
+        complain!("error: {message}");
     }
     ending.code()
 }
@@ -89,7 +105,7 @@ fn print(text: &str) -> Ending {
 fn new(name: &str, file: Option<&Path>) -> Ending {
     let Some(template) = stickslip::model::templates::find(name) else {
         let names: Vec<&str> = stickslip::model::templates::TABLE.iter().map(|t| t.name).collect();
-        eprintln!("error: there is no template `{name}`; there are {}", names.join(", "));
+        complain!("error: there is no template `{name}`; there are {}", names.join(", "));
         return Ending::WrongInput;
     };
     let Some(file) = file else { return print(template.study) };
@@ -101,7 +117,7 @@ fn new(name: &str, file: Option<&Path>) -> Ending {
     match written {
         Ok(()) => Ending::Done,
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
-            eprintln!("error: {} is there already and stays as it is; choose another name", file.display());
+            complain!("error: {} is there already and stays as it is; choose another name", file.display());
             Ending::WrongInput
         }
         Err(error) => Ending::Failed(format!("{}: {error}", file.display())),

@@ -28,7 +28,7 @@ pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
     let outputs = match if wanted.only.is_empty() { Ok(Outputs::all()) } else { Outputs::only(wanted.only) } {
         Ok(outputs) => outputs,
         Err(error) => {
-            eprintln!("error: {error}");
+            complain!("error: {error}");
             return Ending::WrongInput;
         }
     };
@@ -42,10 +42,10 @@ pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
                 match error {
                     // the place in the study that the record holds is what helps
                     Some(StoredError::Study { path, cause }) => {
-                        eprintln!("error: {}: the study in it cannot be read", path.display());
+                        complain!("error: {}: the study in it cannot be read", path.display());
                         show(&cause);
                     }
-                    Some(error) => eprintln!("error: {error}"),
+                    Some(error) => complain!("error: {error}"),
                     None => {}
                 }
                 wrong = true;
@@ -56,7 +56,7 @@ pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
         return Ending::WrongInput;
     }
     for run in runs.iter().filter(|run| run.dataset.record.interrupted) {
-        eprintln!(
+        complain!(
             "warning: {}: the run was interrupted, only the points finished until then are drawn",
             run.folder.display()
         );
@@ -74,7 +74,7 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
         _ => study,
     };
     if study.kind().name != run.dataset.kind {
-        eprintln!(
+        complain!(
             "error: {} is a study of the kind `{}`, {} holds results of the kind `{}`",
             file.display(),
             study.kind().name,
@@ -84,13 +84,13 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
         return Err(());
     }
     if study.wants_references() && !run.study.wants_references() && run.dataset.kind == "response" {
-        eprintln!(
+        complain!(
             "warning: {} has no reference curves, which are computed; run the study again for them",
             run.folder.display()
         );
     }
     if !run.draw_like(&study) {
-        eprintln!(
+        complain!(
             "warning: {} has changed in more than its figure; {} is drawn as it was computed, run the study again for the rest",
             file.display(),
             run.folder.display()
@@ -103,7 +103,7 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
 fn each(runs: &[Stored], wanted: &Wanted<'_>, outputs: &Outputs) -> Ending {
     for run in runs {
         if run.dataset.figure.panels.is_empty() {
-            eprintln!("warning: {}: there is nothing to draw", run.folder.display());
+            complain!("warning: {}: there is nothing to draw", run.folder.display());
         }
         let files = match run.write_figure(outputs) {
             Ok(files) => files,
@@ -126,7 +126,7 @@ fn overlay(runs: &[Stored], wanted: &Wanted<'_>, outputs: &Outputs) -> Ending {
     let comparison = match compare::compare(runs) {
         Ok(comparison) => comparison,
         Err(error) => {
-            eprintln!("error: {error}");
+            complain!("error: {error}");
             return Ending::WrongInput;
         }
     };

@@ -2,23 +2,35 @@
 
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 /// The flag that Ctrl-C sets; a second Ctrl-C ends the program at once.
 pub fn stop_flag() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = stop.clone();
+    let first = Mutex::new(None::<Instant>);
     // a second handler in the same process is an error that changes nothing
     let _ = ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(1);
+            // some senders signal a process and then its group: that is one request
+            let repeated = first.lock().is_ok_and(|first| first.is_some_and(|first| first.elapsed() < REPEATED));
+            if !repeated {
+                std::process::exit(1);
+            }
+            return;
         }
-        eprintln!("\nstopping: finished points are kept; Ctrl-C again ends at once");
+        if let Ok(mut first) = first.lock() {
+            *first = Some(Instant::now());
+        }
+        complain!("\nstopping: finished points are kept; Ctrl-C again ends at once");
     });
     stop
 }
+
+/// Signals closer than this to the first are the same request.
+const REPEATED: Duration = Duration::from_millis(400);
 
 /// A bar over `points`; it draws nothing unless standard error is a terminal.
 pub fn bar(points: u64, what: &str) -> ProgressBar {

@@ -75,7 +75,7 @@ fn read(file: &Path, set: &[(String, String)]) -> Result<Study, StudyError> {
 /// Prints an error of a study file with its place underlined.
 pub(crate) fn show(error: &StudyError) {
     let report = miette::Report::new(error.clone());
-    eprintln!("{report:?}");
+    complain!("{report:?}");
 }
 
 /// `stickslip check`.
@@ -123,7 +123,7 @@ pub struct Wanted<'a> {
 fn summary(study: &Study) -> Option<ModelSummary> {
     // the study was checked, and its summary with it
     let summary = ModelSummary::new(study).ok()?;
-    summary.warnings.iter().for_each(|warning| eprintln!("{warning}"));
+    summary.warnings.iter().for_each(|warning| complain!("{warning}"));
     Some(summary)
 }
 
@@ -132,12 +132,12 @@ pub fn run(request: &Request<'_>, place: &Place, wanted: &Wanted<'_>) -> Ending 
     let outputs = match if wanted.only.is_empty() { Ok(Outputs::all()) } else { Outputs::only(wanted.only) } {
         Ok(outputs) => outputs,
         Err(error) => {
-            eprintln!("error: {error}");
+            complain!("error: {error}");
             return Ending::WrongInput;
         }
     };
     if wanted.watch && request.files.iter().any(|file| file == Path::new(STDIN)) {
-        eprintln!("error: standard input does not change, --watch needs files");
+        complain!("error: standard input does not change, --watch needs files");
         return Ending::WrongInput;
     }
     let threads = match pool(place) {
@@ -155,9 +155,9 @@ pub fn run(request: &Request<'_>, place: &Place, wanted: &Wanted<'_>) -> Ending 
         // the browser shows it; a reload shows what follows
         open &= matches!(ending, Ending::WrongInput);
         if let Ending::Failed(message) = &ending {
-            eprintln!("error: {message}");
+            complain!("error: {message}");
         }
-        eprintln!("waiting for a change; Ctrl-C ends");
+        complain!("waiting for a change; Ctrl-C ends");
         while contents(request.files) == before {
             std::thread::sleep(LOOK);
             if stop.load(Ordering::Relaxed) {
@@ -189,7 +189,7 @@ fn once(
     };
     let mut names = BTreeSet::new();
     if let Some(twice) = studies.iter().find(|study| !names.insert(study.name())) {
-        eprintln!("error: two files are called `{}`, their results would be in one folder; rename one", twice.name());
+        complain!("error: two files are called `{}`, their results would be in one folder; rename one", twice.name());
         return Ending::WrongInput;
     }
     if let Some(error) = studies.iter().find_map(|study| check_writable(&place.out.join(study.name())).err()) {
@@ -199,7 +199,7 @@ fn once(
     for study in &studies {
         let summary = summary(study);
         if let Some(summary) = summary.as_ref().filter(|_| std::io::stderr().is_terminal()) {
-            eprint!("{}\n{summary}", study.title());
+            complain_on!("{}\n{summary}", study.title());
         }
         let bar = progress::bar(study.points() as u64, study.name());
         let counter = bar.clone();
@@ -216,7 +216,7 @@ fn once(
         // those of the summary stand there already
         let known = |note: &&String| summary.as_ref().is_some_and(|summary| summary.warnings.contains(note));
         let late = dataset.notes.iter().filter(|note| note.starts_with("warning") && !known(note));
-        late.for_each(|warning| eprintln!("{warning}"));
+        late.for_each(|warning| complain!("{warning}"));
         failed |= dataset.record.points.keys().any(|status| status != CONVERGED);
         let files = match write(&dataset, &place.out, outputs, json) {
             Ok(files) => files,
@@ -257,18 +257,18 @@ fn print_json(dataset: &Dataset) -> Ending {
 /// Points that failed or are not what was asked for, on standard error.
 fn complain(dataset: &Dataset) {
     for failure in dataset.failures.iter().take(NAMED_FAILURES) {
-        eprintln!("{}: failed at {}: {}", dataset.name, failure.at, failure.reason);
+        complain!("{}: failed at {}: {}", dataset.name, failure.at, failure.reason);
     }
     for status in [Accuracy::Truncated, Accuracy::Unchecked].map(Accuracy::status) {
         if let Some(points) = dataset.record.points.get(status) {
-            eprintln!(
+            complain!(
                 "{}: {points} {status}, less accurate than was asked; the notes in record.json say how far",
                 dataset.name
             );
         }
     }
     if dataset.failures.len() > NAMED_FAILURES {
-        eprintln!(
+        complain!(
             "{}: and {} more failed points, see record.json",
             dataset.name,
             dataset.failures.len() - NAMED_FAILURES
@@ -281,8 +281,8 @@ pub(crate) fn show_figure(files: &[PathBuf]) {
     match open::figure(files).map(open::show) {
         Some(Ok(())) => {}
         // the results are there all the same
-        Some(Err(message)) => eprintln!("{message}"),
-        None => eprintln!("there is no figure to show: it is not among the outputs of --only"),
+        Some(Err(message)) => complain!("{message}"),
+        None => complain!("there is no figure to show: it is not among the outputs of --only"),
     }
 }
 
@@ -317,7 +317,7 @@ pub fn paper(place: &Place, open: bool) -> Ending {
     let context = Context { stop: progress::stop_flag(), ..Context::unwatched(threads) };
     let say = |line: &str| {
         if std::io::stderr().is_terminal() {
-            eprintln!("{line}");
+            complain!("{line}");
         }
     };
     match paper::paper(&place.out, &context, &say) {
@@ -327,7 +327,7 @@ pub fn paper(place: &Place, open: bool) -> Ending {
                 return ending;
             }
             if open && let Err(message) = open::show(&outcome.report) {
-                eprintln!("{message}");
+                complain!("{message}");
             }
             if context.stopped() {
                 Ending::Failed("interrupted; the finished figures are written".to_owned())

@@ -49,7 +49,7 @@ pub(crate) fn check(figure: &Values, kind: &Kind, model: &Model) -> Result<(), C
             return Err(Complaint::new(key, message, "leave it out"));
         };
         let example = expected.name_and_unit().map_or("", |(_, unit)| unit);
-        match units::find(text) {
+        match units::parse(text) {
             Some(unit) if unit.dimension == expected => {}
             found => {
                 let what = if found.is_some() { "a unit of another quantity" } else { "no unit that is known" };
@@ -99,7 +99,7 @@ impl<'a> Drawing<'a> {
     pub(crate) fn axis(&self, which: usize, quantity: &str, largest: f64, si: &str) -> (Axis, f64) {
         let options = self.options();
         let (unit_key, scale_key) = [("x_unit", "x"), ("y_unit", "y")][which];
-        let asked = options.text(unit_key).and_then(|text| Some((text.to_owned(), units::find(text)?)));
+        let asked = options.text(unit_key).and_then(|text| Some((text.to_owned(), units::parse(text)?)));
         let (unit, factor) = match asked {
             Some((text, unit)) => (text, units::find(si).map_or(1.0, |si| si.scale("1")) / unit.scale("1")),
             None if si == "Hz" => (si.to_owned(), 1.0),

@@ -11,6 +11,8 @@ pub enum Note {
     Truncated(usize, f64),
     /// Points whose series was not compared with a longer one.
     Unchecked(usize),
+    /// Points whose orbit is unstable.
+    Unstable(usize),
     /// Of one case (its varied parameters in words): points at which a joint sticks for the whole period, of so many.
     Stuck {
         /// The case.
@@ -41,7 +43,7 @@ impl Note {
                     *largest = largest.max(*other);
                     return;
                 }
-                (Note::Unchecked(points), Note::Unchecked(more)) => {
+                (Note::Unchecked(points), Note::Unchecked(more)) | (Note::Unstable(points), Note::Unstable(more)) => {
                     *points += more;
                     return;
                 }
@@ -72,6 +74,11 @@ impl Note {
             Note::Unchecked(count) => Some(format!(
                 "At {} nothing is known of the error of the series: the longer one that tells it has too many unknowns or was not found. \
                  Try fewer `harmonics`.",
+                points(*count)
+            )),
+            Note::Unstable(count) => Some(format!(
+                "warning: at {} the orbit is unstable (`stable` is false): no motion stays on it, and the real one is another; \
+                 look for it with kind = \"transient\"",
                 points(*count)
             )),
             Note::Stuck { points: 0, .. } => None,

@@ -139,6 +139,12 @@ pub(crate) fn find(name: &str) -> Option<Unit> {
     })
 }
 
+/// The unit that a whole text is: `mm`, `rad/s`, `kN/mm`.
+pub(crate) fn parse(text: &str) -> Option<Unit> {
+    let names = Names { parameter: &|_| false, function: &|_| false };
+    read(text, 0, &names).ok().filter(|(_, end)| *end == text.len()).map(|(unit, _)| unit)
+}
+
 /// A unit that was probably meant by `name`: one that differs by case or a slip, or two units written together (`Nm`).
 pub(crate) fn nearest_unit(name: &str) -> Option<String> {
     let cut = name.char_indices().skip(1).map(|(i, _)| name.split_at(i));

@@ -220,3 +220,45 @@ frequency = { from = "1 Hz", to = "2 Hz", points = 41 }
     // the softest of equally damped ones moves most at its resonance: F/(c ω)
     assert!(found.figure.panels[0].title.contains("worst is b1"), "{}", found.figure.panels[0].title);
 }
+
+#[test]
+fn axes_take_every_unit_of_their_quantity() {
+    for (unit, shown) in [("rad/s", TAU), ("kHz", 1e-3), ("Hz", 1.0)] {
+        let found = oscillator(
+            "0.5 N",
+            &format!("[study]\nkind = \"response\"\nfrequency = [\"1 Hz\", \"2 Hz\"]\n[figure]\nx_unit = \"{unit}\""),
+        );
+        let panel = &found.figure.panels[0];
+        assert_eq!(panel.x.unit, unit);
+        assert!((panel.series[0].x[1] / (2.0 * shown) - 1.0).abs() < 1e-12, "{unit}: {:?}", panel.series[0].x);
+    }
+}
+
+/// Without damping, below the force that friction can bound, no orbit is the highest.
+#[test]
+fn a_peak_without_neighbours_is_none() {
+    let text = r#"
+schema = 1
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "10 N/mm"
+[[joint]]
+name = "foot"
+between = ["m", "ground"]
+law = { kind = "coulomb", limit = "0.2 N" }
+[[force]]
+on = "m"
+amplitude = "2 N"
+[study]
+kind = "response"
+frequency = { from = "14 Hz", to = "19 Hz", points = 101 }
+"#;
+    let found = dataset(text);
+    assert!(found.record.points.contains_key("peak-unsettled"), "{:?}", found.record.points);
+    let damped = text.replace("stiffness = \"10 N/mm\"", "stiffness = \"10 N/mm\"\ndamping = \"2 N s/m\"");
+    let found = dataset(&damped);
+    assert_eq!(found.record.points.keys().collect::<Vec<_>>(), ["converged"]);
+}

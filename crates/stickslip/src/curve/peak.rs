@@ -18,6 +18,8 @@ pub struct Peak {
     pub value: f64,
     /// True if the largest value stands at an end of the range: the real peak may lie beyond.
     pub at_end: bool,
+    /// True if orbits beside it were not found: the real peak may be higher.
+    pub unsettled: bool,
 }
 
 /// A point of a curve on which peaks are sought.
@@ -60,6 +62,8 @@ const NOISE: f64 = 1e-4;
 const MOST_NOISE: f64 = 1e-7;
 /// Orbits that may fail while the peak of one quantity is refined: what fails costs most.
 const FAILURES: usize = 2;
+/// Relative rise to an orbit that was not found, below which that no longer matters to a peak.
+const SETTLED: f64 = 1e-5;
 /// A point that stands out from its neighbours by less than this share is the rounding of a level curve, not a peak.
 const LEVEL: f64 = 1e-10;
 /// Two orbits closer than this share of the first bracket tell nothing but rounding.
@@ -106,7 +110,7 @@ pub fn highest(
     let finite = (0..points.len()).filter(|&i| values[i].is_finite());
     let best = finite.max_by(|&a, &b| values[a].total_cmp(&values[b]))?;
     let at_end = best == 0 || best + 1 == points.len();
-    let mut peak = Peak { omega: omegas[best], value: values[best], at_end };
+    let mut peak = Peak { omega: omegas[best], value: values[best], at_end, unsettled: false };
     for i in (1..points.len().saturating_sub(1)).filter(|&i| values[i] >= CANDIDATE * values[best]) {
         if is_maximum(&points[i - 1..=i + 1], 0) {
             let refined = refine(solver, &points[i - 1..=i + 1], &[0], &|orbit| vec![quantity(orbit)])[0].peak;
@@ -228,11 +232,25 @@ fn refine(
     wanted
         .iter()
         .map(|&quantity| {
-            let point = &points[best(&points, quantity)];
-            let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false };
+            let top = best(&points, quantity);
+            let point = &points[top];
+            let unsettled = is_unsettled(&points[top - 1..=top + 1], quantity);
+            let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false, unsettled };
             PeakOf { quantity, peak, values: point.values.clone() }
         })
         .collect()
+}
+
+/// Whether an orbit beside the highest of three points was not found, and the line from the other side through that point rises to there.
+fn is_unsettled(near: &[Point], quantity: usize) -> bool {
+    let rises = |other: usize, failed: usize| {
+        let run = (near[failed].omega - near[1].omega) / (near[1].omega - near[other].omega);
+        let here = form(near[1].value(quantity));
+        let rise = (here - form(near[other].value(quantity))) * run / (2.0 * here.abs());
+        // without an orbit on the other side nothing is known
+        near[failed].values.is_empty() && (near[other].values.is_empty() || rise > SETTLED)
+    };
+    rises(0, 2) || rises(2, 0)
 }
 
 /// The highest inner point; the first and the last one are not above it.
@@ -410,6 +428,6 @@ mod tests {
         let mut formula = Formula { curve: &curve };
         let near = [0.9, 1.01, 1.1].map(|omega| Point { omega, values: vec![curve(omega)], start: None, error: 0.0 });
         let peak = refine(&mut formula, &near, &[0], &|_| Vec::new())[0].peak;
-        assert_eq!((peak.omega, peak.value), (1.01, curve(1.01)));
+        assert_eq!((peak.omega, peak.value, peak.unsettled), (1.01, curve(1.01), true));
     }
 }

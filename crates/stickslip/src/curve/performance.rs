@@ -98,6 +98,8 @@ impl<E: Send> Performance<'_, E> {
             })
             .collect();
         let peak = highest(&mut *solver, &omegas, &values, &|orbit| (self.quantity)(orbit));
+        // orbits that the search did not find beside the peak count too
+        failed += usize::from(peak.is_some_and(|peak| peak.unsettled));
         Ok(Row { value, peak, failed, inaccurate })
     }
 

@@ -31,14 +31,17 @@ impl Auto {
     fn chosen(system: &System) -> (Box<dyn Method>, String) {
         let joints = system.joints.len();
         let exact = system.joints.iter().all(|joint| joint.law.network().is_some());
+        let smooth = system.joints.iter().all(|joint| joint.law.rate().is_some());
         if joints > FOLLOWED {
             let because = format!("{joints} joints are more than {FOLLOWED}");
             (Box::new(HarmonicBalance::default()), because)
         } else if exact {
             let because = if joints == 0 { "there are no joints" } else { "every law is exact" };
             (Box::new(EventDriven), because.to_owned())
+        } else if !smooth {
+            (Box::new(HarmonicBalance::default()), "exact and smooth laws stand side by side".to_owned())
         } else {
-            (Box::new(Shooting::default()), "a law is smooth".to_owned())
+            (Box::new(Shooting::default()), "the laws are smooth".to_owned())
         }
     }
 }

@@ -147,12 +147,28 @@ impl Transient {
         Ok(())
     }
 
-    /// Drive frequency of the cycle that begins at `time`.
+    /// Drive frequency of the cycle that begins at `time`: of a run-up the one with which the cycle ends when that of the frequency that
+    /// changes all the time does, so that the phase never runs late.
     fn frequency(&self, time: f64) -> f64 {
         match self.excitation {
             Excitation::Free => 0.0,
             Excitation::Steady(omega) => omega,
-            Excitation::RunUp { from, to, duration } => from + (to - from) * (time / duration).min(1.0),
+            Excitation::RunUp { from, to, duration } => {
+                let (rate, left) = ((to - from) / duration, duration - time);
+                if left <= 0.0 {
+                    return to;
+                }
+                let begin = from + rate * time;
+                // ω τ + ½ ω' τ² = 2π
+                let discriminant = begin * begin + 2.0 * TAU * rate;
+                let whole = 2.0 * TAU / (begin + discriminant.max(0.0).sqrt());
+                if discriminant >= 0.0 && whole <= left {
+                    return TAU / whole;
+                }
+                // the rest of the cycle has the last frequency
+                let turned = begin * left + 0.5 * rate * left * left;
+                TAU / (left + (TAU - turned) / to)
+            }
         }
     }
 }
@@ -184,6 +200,66 @@ impl Runner {
                 flow.run(state, 0.0, length, None)?;
                 Ok(Box::new(SteppedPath::new(system, flow, Symmetry::FullPeriod, length)))
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Force, GROUND, Mass, Model, Spring};
+
+    /// A linear oscillator run up through its resonance, against the classical Runge-Kutta method with the phase of a frequency that
+    /// changes all the time.
+    #[test]
+    fn a_run_up_has_the_phase_of_its_frequency() {
+        let between = || ["m".to_owned(), GROUND.to_owned()];
+        let model = Model {
+            masses: vec![Mass { name: "m".into(), mass: 1.0 }],
+            springs: vec![Spring { between: between(), stiffness: 1e4, damping: 2.0 }],
+            forces: vec![Force { on: "m".into(), amplitude: 5.0, phase: 0.0, harmonic: 1 }],
+            ..Model::default()
+        };
+        let (from, to) = (TAU * 10.0, TAU * 22.0);
+        for (from, to, duration) in [(from, to, 2.0), (to, from, 3.0), (from, to, 20.0)] {
+            let step = 1e-3;
+            let run_up = Transient {
+                displacement: vec![0.0],
+                velocity: vec![0.0],
+                excitation: Excitation::RunUp { from, to, duration },
+                duration,
+                step,
+                width: None,
+            };
+            let mut motion = Vec::new();
+            run_up
+                .run(&model.assemble().unwrap(), &mut |_, _, state| {
+                    motion.push(state.displacement[0]);
+                    true
+                })
+                .unwrap();
+            let rate = |t: f64, [x, v]: [f64; 2]| {
+                let phase = from * t + 0.5 * (to - from) / duration * t * t;
+                [v, 5.0 * phase.cos() - 1e4 * x - 2.0 * v]
+            };
+            let (mut state, mut largest, mut worst) = ([0.0f64; 2], 0.0f64, 0.0f64);
+            let small = step / 10.0;
+            for (i, x) in motion.iter().enumerate() {
+                largest = largest.max(state[0].abs());
+                worst = worst.max((x - state[0]).abs());
+                for j in 0..10 {
+                    let t = i as f64 * step + f64::from(j) * small;
+                    let on = |k: [f64; 2], h: f64| [state[0] + h * k[0], state[1] + h * k[1]];
+                    let a = rate(t, state);
+                    let b = rate(t + 0.5 * small, on(a, 0.5 * small));
+                    let c = rate(t + 0.5 * small, on(b, 0.5 * small));
+                    let d = rate(t + small, on(c, small));
+                    state = std::array::from_fn(|k| state[k] + small / 6.0 * (a[k] + 2.0 * b[k] + 2.0 * c[k] + d[k]));
+                }
+            }
+            // within a cycle the frequency is held, and the phase is off by its change over a quarter of a cycle
+            let change = (to - from).abs() / duration * (TAU / from.min(to)).powi(2) / 8.0;
+            assert!(worst < (0.002 + change) * largest, "{from} {duration}: {worst} of {largest}, {change}");
         }
     }
 }

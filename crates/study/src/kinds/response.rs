@@ -80,6 +80,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
+/// Amplitudes below this share of the largest are rounding.
+const ROUNDING: f64 = 1e-10;
 /// A mass below this share of the heaviest is drawn dashed, like the paper's contact masses.
 const LIGHT: f64 = 0.5;
 /// Masses that are drawn one by one; of more the largest amplitude is, with the single ones pale behind it.
@@ -113,6 +115,13 @@ fn compute(work: &Work<'_>) -> Computed {
     if !points.is_empty() && !work.context.stopped() {
         let mut peaks = Rows::default();
         for found in peaks_of(work, points).map_err(|error| (case.index, error))? {
+            if found.peak.unsettled {
+                let at =
+                    || format!("peak of {}, {}", prepared.system.places[found.mass], place_of(case, found.peak.omega));
+                let reason = "orbits beside this peak were not found, and the real one may be much higher: there is little or no \
+                              damping, or friction that cannot bound the motion; look closer with a finer range";
+                part.count(at, "peak-unsettled", Some(reason.to_owned()));
+            }
             peaks.varied(case);
             peaks.text("mass", &prepared.system.places[found.mass]);
             peaks.number("frequency_Hz", hertz(found.peak.omega));
@@ -152,6 +161,9 @@ impl<'a> Computing<'a> {
         };
         self.part.count(|| place_of(case, omega), &summary.status, summary.failure.clone());
         self.stuck += usize::from(summary.stuck);
+        if summary.stable == Some(false) {
+            Note::Unstable(1).join(&mut self.part.notes);
+        }
         if let Some(note) = note {
             note.join(&mut self.part.notes);
         }
@@ -267,7 +279,9 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
         let falls = |q: &usize| neighbour.values.get(*q).is_some_and(|value| end.values[*q] > *value);
         (0..wanted.min(end.values.len()))
             .filter(falls)
-            .map(|q| found(q, Peak { omega: end.omega, value: end.values[q], at_end: true }, &end.values))
+            .map(|q| {
+                found(q, Peak { omega: end.omega, value: end.values[q], at_end: true, unsettled: false }, &end.values)
+            })
             .collect()
     };
     let (mut first, mut last) = (Vec::new(), Vec::new());
@@ -282,8 +296,10 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
         last = at_end(end, neighbour);
     }
     let quantities = |orbit: &Orbit| amplitudes(orbit, &named);
+    // a place that friction holds moves by rounding only
+    let largest = points.iter().flat_map(|point| &point.values).fold(0.0f64, |a, b| a.max(*b));
     let mut inner = peak::all(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
-    inner.retain(|peak| !ends_a_level(&points, peak.quantity, &peak.peak));
+    inner.retain(|peak| peak.peak.value > ROUNDING * largest && !ends_a_level(&points, peak.quantity, &peak.peak));
     let inner = inner.into_iter().map(|peak| found(peak.quantity, peak.peak, &peak.values));
     Ok(first.into_iter().chain(inner).chain(last).collect())
 }
