@@ -62,6 +62,8 @@ const NOISE: f64 = 1e-4;
 const MOST_NOISE: f64 = 1e-7;
 /// Orbits that may fail while the peak of one quantity is refined: what fails costs most.
 const FAILURES: usize = 2;
+/// Share of the first bracket beyond which an orbit that its neighbour does not lead to is sought in every way.
+const AWAY: f64 = 1e-3;
 /// Relative rise to an orbit that was not found, below which that no longer matters to a peak.
 const SETTLED: f64 = 1e-5;
 /// A point that stands out from its neighbours by less than this share is the rounding of a level curve, not a peak.
@@ -218,7 +220,14 @@ fn refine(
             // the orbit's neighbour on the side of the new point is as good a start as any
             let start = points[best].start.as_deref();
             let error = points[best].error;
-            let point = match solver.between(omega, start) {
+            let found = match solver.between(omega, start) {
+                // far from the neighbour it takes more than its help; close to it there is nothing to be gained
+                Err(_) if (omega - points[best].omega).abs() > AWAY * (near[2].omega - near[0].omega) => {
+                    solver.orbit(omega, start)
+                }
+                found => found,
+            };
+            let point = match found {
                 Ok(orbit) => Point { omega, error, ..Point::new(&orbit, quantities) },
                 Err(_) => {
                     failures += 1;

@@ -118,8 +118,8 @@ fn compute(work: &Work<'_>) -> Computed {
             if found.peak.unsettled {
                 let at =
                     || format!("peak of {}, {}", prepared.system.places[found.mass], place_of(case, found.peak.omega));
-                let reason = "orbits beside this peak were not found, and the real one may be much higher: there is little or no \
-                              damping, or friction that cannot bound the motion; look closer with a finer range";
+                let reason = "orbits beside this peak were not found, and the real one may be higher: much higher with little or \
+                              no damping, or where friction cannot bound the motion; look closer with a finer range or another method";
                 part.count(at, "peak-unsettled", Some(reason.to_owned()));
             }
             peaks.varied(case);
