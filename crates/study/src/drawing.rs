@@ -86,6 +86,11 @@ impl<'a> Drawing<'a> {
 
     /// How curves of so many masses and cases are laid out.
     pub(crate) fn layout(&self, masses: usize, cases: usize) -> Layout {
+        match self.options().text("panels") {
+            Some("cases") => return Layout::Cases,
+            Some("masses") => return Layout::Masses,
+            _ => {}
+        }
         match self.options().flag("overlay") {
             Some(true) => Layout::Masses,
             Some(false) => Layout::Cases,

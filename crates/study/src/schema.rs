@@ -179,6 +179,12 @@ pub const FIGURE: &[Key] = &[
          masses (false); absent: overlaid for one mass or more than six cases",
         "true",
     ),
+    optional(
+        "panels",
+        Takes::Choice(panel_names),
+        "what has a panel of its own; the same as `overlay`, and stronger",
+        "\"cases\"",
+    ),
     optional("only", Takes::Names, "the masses, or joints, that are shown; all when absent", "[\"blade1\"]"),
     default(
         "references",
@@ -192,6 +198,10 @@ pub const FIGURE: &[Key] = &[
     optional("x_unit", Takes::Text, "unit of the horizontal axis", "\"kHz\""),
     optional("y_unit", Takes::Text, "unit of the vertical axis", "\"mm\""),
 ];
+
+fn panel_names() -> Vec<(&'static str, &'static str)> {
+    vec![("cases", "every case, with a curve for every mass"), ("masses", "every mass, with a curve for every case")]
+}
 
 fn scale_names() -> Vec<(&'static str, &'static str)> {
     vec![("linear", "equal differences are equal lengths"), ("log", "equal ratios are equal lengths")]

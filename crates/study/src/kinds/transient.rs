@@ -74,7 +74,7 @@ pub(super) const KIND: Kind = Kind {
     uses_method: false,
     needs: anything,
     adapts: false,
-    tables: &["motion", "decay", "decay_summary"],
+    tables: &["motion", "motion_summary", "decay", "decay_summary"],
     grain: |_| Grain::Case,
     cost,
     warnings: moved,
@@ -108,6 +108,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     Cost {
         tables: vec![
             Shape { numbers: table.numbers + costing.several(), ..table },
+            Shape { rows: points * costing.masses, numbers: costing.varied + costing.several() + 2.0, words: 1.0 },
             Shape { rows: cycles, numbers: costing.varied + 4.0, words: 1.0 },
             Shape { rows: summaries, numbers: costing.varied + 10.0, words: 1.0 },
         ],
@@ -193,7 +194,8 @@ fn compute(work: &Work<'_>) -> Computed {
         prepared.system.places.iter().map(|p| given.and_then(|g| g.get(p)).copied().unwrap_or(0.0)).collect()
     };
     let mut part = Part::default();
-    let (mut rows, mut decay, mut summary) = (Rows::default(), Rows::default(), Rows::default());
+    let (mut rows, mut extremes) = (Rows::default(), Rows::default());
+    let (mut decay, mut summary) = (Rows::default(), Rows::default());
     for drive in drives {
         let excitation = drive.map(Excitation::Steady).or(run_up).unwrap_or(Excitation::Free);
         let fastest = match excitation {
@@ -216,6 +218,8 @@ fn compute(work: &Work<'_>) -> Computed {
             width: case.method.options.get("width").copied(),
         };
         let mut stopped = false;
+        // of every mass the largest displacement, and when
+        let mut largest = vec![(0.0f64, 0.0); prepared.system.dofs()];
         let mut decays = vec![Decay::default(); prepared.system.dofs()];
         let end = transient.run(&prepared.system, &mut |time, omega, sample| {
             rows.varied(case);
@@ -227,11 +231,25 @@ fn compute(work: &Work<'_>) -> Computed {
             write_sample(prepared, sample, &mut rows);
             rows.end();
             for (i, decay) in decays.iter_mut().enumerate() {
-                decay.add(time, sample.displacement[i], sample.velocity[i]);
+                let x = sample.displacement[i];
+                decay.add(time, x, sample.velocity[i]);
+                if x.abs() > largest[i].0 {
+                    largest[i] = (x.abs(), time);
+                }
             }
             stopped = work.context.stopped();
             !stopped
         });
+        for (place, (displacement, time)) in prepared.system.places.iter().zip(largest) {
+            extremes.varied(case);
+            if work.several_frequencies() {
+                extremes.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
+            }
+            extremes.text("mass", place);
+            extremes.number("largest_displacement_m", displacement);
+            extremes.number("time_s", time);
+            extremes.end();
+        }
         if excitation == Excitation::Free {
             part.notes.extend(read_off(prepared, &decays, step, &mut decay, &mut summary));
         }
@@ -243,7 +261,7 @@ fn compute(work: &Work<'_>) -> Computed {
             Err(error) => part.count(at, "breakdown", Some(error.to_string())),
         }
     }
-    part.tables = vec![rows, decay, summary];
+    part.tables = vec![rows, extremes, decay, summary];
     Ok(part)
 }
 
