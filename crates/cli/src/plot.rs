@@ -1,6 +1,6 @@
 //! `stickslip plot`: figures from stored results, and runs beside each other. Nothing is computed.
 
-use crate::run::{show, show_figure};
+use crate::run::{outputs, show, show_figure};
 use crate::{Ending, print};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -25,12 +25,9 @@ pub struct Wanted<'a> {
 
 /// `stickslip plot`.
 pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
-    let outputs = match if wanted.only.is_empty() { Ok(Outputs::all()) } else { Outputs::only(wanted.only) } {
+    let outputs = match outputs(wanted.only) {
         Ok(outputs) => outputs,
-        Err(error) => {
-            complain!("error: {error}");
-            return Ending::WrongInput;
-        }
+        Err(ending) => return ending,
     };
     let mut runs = Vec::new();
     let mut wrong = false;

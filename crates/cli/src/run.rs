@@ -127,14 +127,20 @@ fn summary(study: &Study) -> Option<ModelSummary> {
     Some(summary)
 }
 
+/// The outputs that `--only` names; all without it.
+pub(crate) fn outputs(only: &[String]) -> Result<Outputs, Ending> {
+    let outputs = if only.is_empty() { Ok(Outputs::all()) } else { Outputs::only(only) };
+    outputs.map_err(|error| {
+        complain!("error: {error}");
+        Ending::WrongInput
+    })
+}
+
 /// `stickslip run`.
 pub fn run(request: &Request<'_>, place: &Place, wanted: &Wanted<'_>) -> Ending {
-    let outputs = match if wanted.only.is_empty() { Ok(Outputs::all()) } else { Outputs::only(wanted.only) } {
+    let outputs = match outputs(wanted.only) {
         Ok(outputs) => outputs,
-        Err(error) => {
-            complain!("error: {error}");
-            return Ending::WrongInput;
-        }
+        Err(ending) => return ending,
     };
     if wanted.watch && request.files.iter().any(|file| file == Path::new(STDIN)) {
         complain!("error: standard input does not change, --watch needs files");

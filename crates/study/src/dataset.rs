@@ -83,6 +83,20 @@ impl Table {
             _ => None,
         })
     }
+    /// The words of a column.
+    pub fn texts(&self, column: &str) -> Option<&[String]> {
+        self.columns.iter().find(|c| c.name == column).and_then(|c| match &c.values {
+            Values::Text(v) => Some(v.as_slice()),
+            _ => None,
+        })
+    }
+    /// The flags of a column.
+    pub fn flags(&self, column: &str) -> Option<&[Option<bool>]> {
+        self.columns.iter().find(|c| c.name == column).and_then(|c| match &c.values {
+            Values::Flag(v) => Some(v.as_slice()),
+            _ => None,
+        })
+    }
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, |c| c.values.len())

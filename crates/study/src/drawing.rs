@@ -133,9 +133,9 @@ impl<'a> Drawing<'a> {
         self.tables.iter().find(|table| table.name == name && table.rows() > 0)
     }
 
-    /// The system of a case; cases differ in numbers only.
-    pub(crate) fn system(&self, case: usize) -> Option<System> {
-        self.study.case(case).ok()?.model.assemble().ok()
+    /// The system of the first case; the others differ from it in numbers only.
+    pub(crate) fn system(&self) -> Option<System> {
+        self.study.case(0).ok()?.model.assemble().ok()
     }
 
     /// The rows of `table` case by case. The first columns of a table are the varied parameters, all of them or all but the last.
@@ -183,6 +183,8 @@ impl<'a> Drawing<'a> {
     }
 }
 
+/// More panels than this say nothing; the tables have all.
+pub(crate) const MOST_PANELS: usize = 12;
 /// Up to this many cases each has a panel with all masses; beyond, each mass has a panel with all cases.
 const MOST_CASES: usize = 6;
 /// Ratio of the ends of a parameter's values from which on they may be spaced by ratios.
@@ -206,11 +208,7 @@ pub(crate) fn numbers(table: &Table, column: &str, rows: Range<usize>) -> Vec<f6
 
 /// The words of a column.
 pub(crate) fn words<'t>(table: &'t Table, column: &str) -> &'t [String] {
-    let found = table.columns.iter().find(|c| c.name == column);
-    match found.map(|column| &column.values) {
-        Some(Cells::Text(words)) => words,
-        _ => &[],
-    }
+    table.texts(column).unwrap_or_default()
 }
 
 /// Largest finite size among the columns of these names.

@@ -4,7 +4,7 @@ use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
 use super::{
     Complaint, FREQUENCY, HARMONICS, Kind, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples, orbits,
 };
-use crate::dataset::{Axis, Figure, Panel, Series, Style, Table, Values as Cells};
+use crate::dataset::{Axis, Figure, Panel, Series, Style, Table};
 use crate::drawing::{Drawing, largest, numbers};
 use crate::point::Summary;
 use crate::rows::Rows;
@@ -276,8 +276,8 @@ fn name_of_axis(table: &Table, outer: usize) -> String {
 
 /// Which rows are known to be unstable.
 fn unstable(table: &Table) -> Vec<bool> {
-    match table.columns.iter().find(|column| column.name == "stable").map(|column| &column.values) {
-        Some(Cells::Flag(flags)) => flags.iter().map(|stable| *stable == Some(false)).collect(),
-        _ => vec![false; table.rows()],
+    match table.flags("stable") {
+        Some(flags) => flags.iter().map(|stable| *stable == Some(false)).collect(),
+        None => vec![false; table.rows()],
     }
 }

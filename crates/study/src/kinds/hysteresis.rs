@@ -131,15 +131,8 @@ fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
     let several = work.several_frequencies();
     let sources = sources(prepared);
-    for (omega, point) in orbits::all(work)? {
-        let orbit = match point {
-            Some(Ok(orbit)) => orbit,
-            other => {
-                orbits::count_missing(&mut part, &prepared.case, omega, other.as_ref());
-                continue;
-            }
-        };
-        orbits::count(&mut part, &prepared.case, &orbit);
+    for orbit in orbits::found(work, &mut part)? {
+        let omega = orbit.omega;
         let times = orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
         let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();
         for (name, source) in &sources {

@@ -215,7 +215,7 @@ fn remarks(prepared: &Prepared, mode: &Mode) -> Vec<String> {
 
 /// Of every case the place that moves most at the largest amplitude.
 fn draw(drawing: &Drawing<'_>) -> Figure {
-    let (Some(table), Some(system)) = (drawing.table("modes"), drawing.system(0)) else { return Figure::default() };
+    let (Some(table), Some(system)) = (drawing.table("modes"), drawing.system()) else { return Figure::default() };
     let column = |place: &String| format!("{place}_amplitude_m");
     let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, system.places.iter().map(column)), "m");
     let stretches = drawing.stretches(table);

@@ -2,7 +2,7 @@
 
 use super::{FREQUENCY, Kind, OUTPUT, SAMPLES, anything, check_output, orbits};
 use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, display_unit, largest, numbers, shown_hertz};
+use crate::drawing::{Drawing, MOST_PANELS, display_unit, largest, numbers, shown_hertz};
 use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
@@ -64,15 +64,8 @@ fn compute(work: &Work<'_>) -> Computed {
     let mut part = Part::default();
     let (mut motion, mut summary, mut multipliers) = (Rows::default(), Rows::default(), Rows::default());
     let prepared = work.case();
-    for (omega, point) in orbits::all(work)? {
-        let orbit = match point {
-            Some(Ok(orbit)) => orbit,
-            other => {
-                orbits::count_missing(&mut part, &prepared.case, omega, other.as_ref());
-                continue;
-            }
-        };
-        orbits::count(&mut part, &prepared.case, &orbit);
+    for orbit in orbits::found(work, &mut part)? {
+        let omega = orbit.omega;
         part.notes.extend(one_of_many(prepared, &orbit));
         summary.varied(&prepared.case);
         summary.number("frequency_Hz", hertz(omega));
@@ -125,9 +118,6 @@ fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
     })
 }
 
-/// More panels than this say nothing; the tables have all.
-const MOST_PANELS: usize = 12;
-
 /// The cells of one instant.
 pub(super) fn write_sample(prepared: &Prepared, sample: &Sample, rows: &mut Rows) {
     for (i, place) in prepared.system.places.iter().enumerate() {
@@ -152,7 +142,7 @@ fn word(contact: Contact) -> &'static str {
 
 /// Displacements of the masses, and forces of the joints, over time: two panels for every orbit.
 fn draw(drawing: &Drawing<'_>) -> Figure {
-    let (Some(motion), Some(system)) = (drawing.table("orbit"), drawing.system(0)) else { return Figure::default() };
+    let (Some(motion), Some(system)) = (drawing.table("orbit"), drawing.system()) else { return Figure::default() };
     let mut panels = Vec::new();
     // a table from elsewhere may lack columns
     let Some(frequencies) = motion.numbers("frequency_Hz") else { return Figure::default() };

@@ -9,7 +9,7 @@ use stickslip::method::{MethodError, OrbitError};
 use stickslip::orbit::Orbit;
 
 /// A frequency (rad/s) and what was found there; `None` if the run was stopped before.
-pub(super) type Point = (f64, Option<Result<Orbit, OrbitError>>);
+type Point = (f64, Option<Result<Orbit, OrbitError>>);
 
 /// The outcomes at the frequencies of a unit of one case, each started from its neighbour; `see` looks at each as soon as it is there.
 pub(super) fn sweep(work: &Work<'_>, see: &mut See<'_>) -> Result<(), MethodError> {
@@ -20,13 +20,29 @@ pub(super) fn sweep(work: &Work<'_>, see: &mut See<'_>) -> Result<(), MethodErro
 }
 
 /// The orbits of a unit of one case.
-pub(super) fn all(work: &Work<'_>) -> Result<Vec<Point>, (usize, MethodError)> {
+fn all(work: &Work<'_>) -> Result<Vec<Point>, (usize, MethodError)> {
     let mut points = Vec::with_capacity(work.points.len());
     sweep(work, &mut |omega, outcome| {
         points.push((omega, outcome.map(|outcome| outcome.cloned().map_err(Clone::clone))));
     })
     .map_err(|error| (work.case().case.index, error))?;
     Ok(points)
+}
+
+/// The orbits of a unit of one case that there are; all its points are counted, and what is missing is named.
+pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Orbit>, (usize, MethodError)> {
+    let case = &work.case().case;
+    let mut orbits = Vec::with_capacity(work.points.len());
+    for (omega, point) in all(work)? {
+        match point {
+            Some(Ok(orbit)) => {
+                count(part, case, &orbit);
+                orbits.push(orbit);
+            }
+            other => count_missing(part, case, omega, other.as_ref()),
+        }
+    }
+    Ok(orbits)
 }
 
 /// Counts an orbit and notes what its accuracy asks for.
@@ -38,7 +54,7 @@ pub(super) fn count(part: &mut Part, case: &Case, orbit: &Orbit) {
 }
 
 /// Counts a point that has no orbit.
-pub(super) fn count_missing(part: &mut Part, case: &Case, omega: f64, point: Option<&Result<Orbit, OrbitError>>) {
+fn count_missing(part: &mut Part, case: &Case, omega: f64, point: Option<&Result<Orbit, OrbitError>>) {
     match point {
         Some(Err(error)) => part.count(|| place_of(case, omega), error.status(), Some(error.to_string())),
         _ => part.count(|| place_of(case, omega), NOT_REACHED, None),

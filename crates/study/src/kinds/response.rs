@@ -3,7 +3,9 @@
 use super::peak_of::{PEAK_OF, check_peak_of, named_places, worst};
 use super::{FREQUENCY, Kind, OUTPUT, anything, check_output, orbits};
 use crate::dataset::{Axis, Figure, Panel, Series, Sharing, Style, Table};
-use crate::drawing::{Drawing, Layout, MOST_CURVES, Stretch, display_unit, largest, numbers, thinned, words};
+use crate::drawing::{
+    Drawing, Layout, MOST_CURVES, MOST_PANELS, Stretch, display_unit, largest, numbers, thinned, words,
+};
 use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
@@ -65,8 +67,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         Some(_) => costing.cases,
         None => (costing.cases * costing.masses * PEAKS).floor(),
     };
-    let references = costing.study.figure_values().flag("references") == Some(true);
-    let linear = if references { costing.frequencies * REFERENCE_POINTS as f64 } else { 0.0 };
+    let linear = if costing.study.wants_references() { costing.frequencies * REFERENCE_POINTS as f64 } else { 0.0 };
     let curves = costing.cases.min(MOST_CURVES as f64) * costing.masses.min(MOST_PANELS as f64 + SINGLE as f64);
     Cost {
         tables: vec![
@@ -93,8 +94,6 @@ const LEVEL: f64 = 1e-8;
 const REFERENCE_POINTS: usize = 4;
 /// Masses whose largest amplitudes differ by less than this share are equally bad.
 const EQUAL: f64 = 1e-6;
-/// Panels of a figure; the tables have all.
-const MOST_PANELS: usize = 12;
 
 fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
@@ -437,7 +436,7 @@ fn join(parts: impl IntoIterator<Item = String>) -> String {
 }
 
 fn draw(drawing: &Drawing<'_>) -> Figure {
-    let (Some(curve), Some(system)) = (drawing.table("curve"), drawing.system(0)) else { return Figure::default() };
+    let (Some(curve), Some(system)) = (drawing.table("curve"), drawing.system()) else { return Figure::default() };
     let places = system.places.iter().cloned().zip(0..);
     let shown: Vec<(String, usize)> = places.filter(|(name, _)| drawing.shows(name)).collect();
     let force = |joint: &str| format!("{joint}_force_amplitude_N");
@@ -512,12 +511,8 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     for group in stretches.chunk_by(|a, b| outer(a) == outer(b)) {
         for mass in &masses {
             let named = mass.filter(|_| masses.len() > 1).map(str::to_owned);
-            let mut title: Vec<String> =
-                named.into_iter().chain([outer(&group[0])]).filter(|t| !t.is_empty()).collect();
-            if group.len() > MOST_CURVES {
-                title.push(format!("{MOST_CURVES} of {} cases", group.len()));
-            }
-            let mut panel = panel(title.join(", "));
+            let thinned_out = (group.len() > MOST_CURVES).then(|| format!("{MOST_CURVES} of {} cases", group.len()));
+            let mut panel = panel(join(named.into_iter().chain([outer(&group[0])]).chain(thinned_out)));
             if mass.is_none() {
                 panel.y.quantity = format!("largest amplitude of {} masses", drawn.shown.len());
             } else if masses.len() == 1 && system.dofs() > 1 {
@@ -569,10 +564,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
 /// The peaks inside the range: case, and mass, frequency (Hz), amplitude (m).
 fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<(usize, (String, f64, f64))> {
     let Some(table) = drawing.table("peaks") else { return Vec::new() };
-    let at_end = match table.columns.iter().find(|column| column.name == "at_range_end").map(|column| &column.values) {
-        Some(crate::dataset::Values::Flag(flags)) => flags.as_slice(),
-        _ => &[],
-    };
+    let at_end = table.flags("at_range_end").unwrap_or_default();
     let masses = words(table, "mass");
     // a table from elsewhere may lack columns
     if masses.len() != table.rows() {

@@ -4,7 +4,7 @@ use super::orbit::write_sample;
 use super::{Complaint, Kind, MOST_SAMPLES, anything};
 use crate::dataset::{Figure, Panel, Series};
 use crate::decay::Decay;
-use crate::drawing::{Drawing, numbers, shown_hertz};
+use crate::drawing::{Drawing, MOST_PANELS, numbers, shown_hertz};
 use crate::note::Note;
 use crate::point::place_of;
 use crate::rows::Rows;
@@ -299,11 +299,8 @@ fn read_off(prepared: &Prepared, decays: &[Decay], step: f64, rows: &mut Rows, s
     None
 }
 
-/// More panels than this say nothing; the table has all.
-const MOST_PANELS: usize = 12;
-
 fn draw(drawing: &Drawing<'_>) -> Figure {
-    let (Some(motion), Some(system)) = (drawing.table("motion"), drawing.system(0)) else { return Figure::default() };
+    let (Some(motion), Some(system)) = (drawing.table("motion"), drawing.system()) else { return Figure::default() };
     let drives = motion.numbers("drive_frequency_Hz");
     let mut panels = Vec::new();
     for stretch in drawing.stretches(motion) {
