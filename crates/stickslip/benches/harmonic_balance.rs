@@ -102,12 +102,12 @@ fn chain(blades: usize) -> System {
     let name = |i: usize| format!("b{i}");
     let mut model = Model::default();
     for i in 0..blades {
-        model.masses.push(Mass { name: name(i), mass: 0.182 });
+        model.masses.push(Mass::new(name(i), 0.182));
         model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness: 105_103.0, damping: 0.2 });
         let phase = TAU * 3.0 * i as f64 / blades as f64;
         model.forces.push(Force { on: name(i), amplitude: 10.0, phase, harmonic: 1 });
         if i > 0 {
-            let law = Law::Jenkins(Jenkins { stiffness: 1e4, limit: 2.0 });
+            let law = Arc::new(Jenkins { stiffness: 1e4, limit: 2.0 });
             model.joints.push(Joint { name: format!("j{i}"), between: [name(i - 1), name(i)], law });
         }
     }

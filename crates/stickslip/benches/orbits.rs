@@ -13,7 +13,7 @@ fn main() {
 fn couple(ft: f64, alpha: Option<f64>) -> System {
     let mut model = templates::find("blade-couple").unwrap().model_with(&[("Ft", ft)]).unwrap();
     if let Some(alpha) = alpha {
-        model.joints[0].law = Law::CoulombArctan(CoulombArctan { limit: ft, alpha });
+        model.joints[0].law = Arc::new(CoulombArctan { limit: ft, alpha });
     }
     model.assemble().unwrap()
 }

@@ -69,7 +69,7 @@ impl Ours {
         let couple = |smooth: bool| -> System {
             let mut model = templates::find("blade-couple").unwrap().model_with(&[("Ft", ft)]).unwrap();
             if smooth {
-                model.joints[0].law = Law::CoulombArctan(CoulombArctan { limit: ft, alpha: ALPHA });
+                model.joints[0].law = Arc::new(CoulombArctan { limit: ft, alpha: ALPHA });
             }
             model.assemble().unwrap()
         };

@@ -9,3 +9,4 @@ pub mod law;
 pub mod method;
 pub mod model;
 pub mod orbit;
+pub mod structure;

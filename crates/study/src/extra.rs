@@ -26,8 +26,8 @@ pub(crate) const TABLE: &[Extra] = &[
         doc: "half of peak to peak of every joint's force",
         columns: |system| of_joints(system, "force_amplitude_N"),
         values: |prepared, _, samples| {
-            let joints = 0..prepared.system.joints.len();
-            joints.map(|j| half_range(samples.iter().map(|sample| sample.joints[j].force))).collect()
+            let joints = 0..prepared.system.joints().len();
+            joints.map(|j| half_range(samples.iter().map(|sample| sample.joints[j].force[0]))).collect()
         },
     },
     Extra {
@@ -35,7 +35,7 @@ pub(crate) const TABLE: &[Extra] = &[
         doc: "half of peak to peak of every joint's relative displacement",
         columns: |system| of_joints(system, "amplitude_m"),
         values: |_, orbit, _| {
-            orbit.joints.iter().map(|joint| 0.5 * (joint.displacement.1 - joint.displacement.0).abs()).collect()
+            orbit.joints.iter().map(|joint| 0.5 * (joint.displacement[0].1 - joint.displacement[0].0).abs()).collect()
         },
     },
     Extra {
@@ -60,7 +60,7 @@ pub(crate) const TABLE: &[Extra] = &[
         name: "harmonics",
         doc: "amplitudes of the harmonics 1 to 5 of every mass's displacement",
         columns: |system| {
-            let places = system.places.iter();
+            let places = system.places().iter();
             places.flat_map(|place| (1..=HARMONICS).map(move |h| format!("{place}_harmonic{h}_m"))).collect()
         },
         values: |prepared, orbit, _| harmonics(prepared, orbit),
@@ -84,11 +84,11 @@ const HARMONICS: usize = 5;
 pub(crate) const INSTANTS: usize = 1024;
 
 fn of_joints(system: &System, quantity: &str) -> Vec<String> {
-    system.joints.iter().map(|joint| format!("{}_{quantity}", joint.name)).collect()
+    system.joints().iter().map(|joint| format!("{}_{quantity}", joint.name)).collect()
 }
 
 fn of_places(system: &System, quantity: &str) -> Vec<String> {
-    system.places.iter().map(|place| format!("{place}_{quantity}")).collect()
+    system.places().iter().map(|place| format!("{place}_{quantity}")).collect()
 }
 
 fn half_range(values: impl Iterator<Item = f64>) -> f64 {

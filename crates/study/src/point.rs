@@ -61,7 +61,7 @@ impl Summary {
         let system = &prepared.system;
         Summary {
             places: vec![[f64::NAN; 3]; system.dofs()],
-            joints: vec![[f64::NAN; 2]; system.joints.len()],
+            joints: vec![[f64::NAN; 2]; system.joints().len()],
             stable: None,
             residual: f64::NAN,
             energy_gap: f64::NAN,
@@ -77,12 +77,12 @@ impl Summary {
     /// The cells of the row, after the varied parameters and the frequency.
     pub fn write(&self, prepared: &Prepared, rows: &mut Rows) {
         let system = &prepared.system;
-        for (place, [amplitude, mean, phase]) in system.places.iter().zip(&self.places) {
+        for (place, [amplitude, mean, phase]) in system.places().iter().zip(&self.places) {
             rows.number(&format!("{place}_amplitude_m"), *amplitude);
             rows.number(&format!("{place}_mean_m"), *mean);
             rows.number(&format!("{place}_phase_deg"), *phase);
         }
-        for (joint, [dissipation, slip]) in system.joints.iter().zip(&self.joints) {
+        for (joint, [dissipation, slip]) in system.joints().iter().zip(&self.joints) {
             rows.number(&format!("{}_dissipation_J", joint.name), *dissipation);
             rows.number(&format!("{}_slip_fraction", joint.name), *slip);
         }

@@ -706,7 +706,7 @@ fn model_of(lists: &Lists, environment: &Environment<'_>, problems: &mut Vec<Pro
     let harmonic = |values: &Values| values.count("harmonic").and_then(|h| u32::try_from(h).ok()).unwrap_or(1);
     for table in &lists.mass {
         let values = table.values(environment, problems);
-        model.masses.push(Mass { name: text(&values, "name"), mass: number(&values, "mass") });
+        model.masses.push(Mass::new(text(&values, "name"), number(&values, "mass")));
     }
     for table in &lists.spring {
         let values = table.values(environment, problems);

@@ -91,7 +91,7 @@ const END: &str = "<!-- end generated: methods x laws -->";
 fn rubbing(law: law::Law) -> System {
     let between = || ["body".to_owned(), GROUND.to_owned()];
     Model {
-        masses: vec![Mass { name: "body".to_owned(), mass: 1.0 }],
+        masses: vec![Mass::new("body", 1.0)],
         springs: vec![Spring { between: between(), stiffness: 1e4, damping: 1.0 }],
         joints: vec![Joint { name: "foot".to_owned(), between: between(), law }],
         forces: vec![Force { on: "body".to_owned(), amplitude: 1.0, phase: 0.0, harmonic: 1 }],

@@ -47,7 +47,7 @@ pub fn random_model(seed: u64) -> (Model, f64) {
     let mut model = Model::default();
     let name = |i: usize| if i == 0 { GROUND.to_owned() } else { format!("m{i}") };
     for i in 1..=count {
-        model.masses.push(Mass { name: name(i), mass: random.between(0.1, 2.0) });
+        model.masses.push(Mass::new(name(i), random.between(0.1, 2.0)));
         // every mass is held by something: by the ground, or by a mass before it
         let other = if random.unit() < 0.6 { 0 } else { random.below(i) };
         let stiffness = 10f64.powf(random.between(2.0, 4.0));
@@ -59,9 +59,9 @@ pub fn random_model(seed: u64) -> (Model, f64) {
         let b = (a + 1 + random.below(count)) % (count + 1);
         let limit = 10f64.powf(random.between(-1.0, 1.0));
         let law = if random.unit() < 0.5 {
-            Law::Coulomb(Coulomb { limit })
+            Arc::new(Coulomb { limit })
         } else {
-            Law::Jenkins(Jenkins { stiffness: 10f64.powf(random.between(2.0, 4.0)), limit })
+            Arc::new(Jenkins { stiffness: 10f64.powf(random.between(2.0, 4.0)), limit })
         };
         model.joints.push(Joint { name: format!("j{}", j + 1), between: [name(a), name(b)], law });
     }
@@ -77,7 +77,7 @@ pub fn random_model(seed: u64) -> (Model, f64) {
     }
     let system = model.assemble().expect("random models are well formed");
     let at = random.below(count);
-    let natural = (system.stiffness[(at, at)] / system.mass[(at, at)]).sqrt();
+    let natural = (system.structure().stiffness()[(at, at)] / system.structure().mass()[(at, at)]).sqrt();
     let factor = if seed.is_multiple_of(3) { 1.0 } else { 3f64.powf(random.between(-1.0, 1.0)) };
     (model, natural * factor)
 }

@@ -96,12 +96,12 @@ fn figures_6_7_and_10_by_continuation() {
 fn along_a_force_around_a_turning_point() {
     let (kt, omega, damping) = (0.2, 1.0488, -0.03);
     let model = |force: f64| Model {
-        masses: vec![Mass { name: "m".into(), mass: 1.0 }],
+        masses: vec![Mass::new("m", 1.0)],
         springs: vec![Spring { between: ["m".into(), GROUND.into()], stiffness: 1.0, damping }],
         joints: vec![Joint {
             name: "damper".into(),
             between: ["m".into(), GROUND.into()],
-            law: Law::Jenkins(Jenkins { stiffness: kt, limit: 1.0 }),
+            law: Arc::new(Jenkins { stiffness: kt, limit: 1.0 }),
         }],
         forces: vec![Force { on: "m".into(), amplitude: force, phase: 0.0, harmonic: 1 }],
         ..Model::default()
@@ -138,12 +138,12 @@ fn rigid_friction_around_two_turning_points() {
     let omega = 1.1f64.sqrt();
     let system = |force: f64| {
         let model = Model {
-            masses: vec![Mass { name: "m".into(), mass: 1.0 }],
+            masses: vec![Mass::new("m", 1.0)],
             springs: vec![Spring { between: ["m".into(), GROUND.into()], stiffness: 1.0, damping: -0.03 }],
             joints: vec![Joint {
                 name: "contact".into(),
                 between: ["m".into(), GROUND.into()],
-                law: Law::Coulomb(Coulomb { limit: 1.0 }),
+                law: Arc::new(Coulomb { limit: 1.0 }),
             }],
             forces: vec![Force { on: "m".into(), amplitude: force, phase: 0.0, harmonic: 1 }],
             ..Model::default()

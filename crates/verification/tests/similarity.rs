@@ -60,7 +60,7 @@ fn theory_5_exact_law_needs_no_condition() {
 #[test]
 fn theory_5_smooth_law_needs_alpha_scaled() {
     let couple = |ft: f64, f0: f64, alpha: f64| {
-        let law = |limit| Law::CoulombArctan(CoulombArctan { limit, alpha });
+        let law = |limit| Arc::new(CoulombArctan { limit, alpha });
         template_with("blade-couple", &[("Ft", ft), ("F0", f0)], law)
     };
     let (mut same, mut other) = (0.0f64, [0.0f64; 3]);
@@ -96,7 +96,7 @@ fn theory_5_groups_of_the_element() {
     let (q, p, l) = (7.0, 3.0, 0.4); // factors of frequency, stiffness, length
     let values = |kt: f64, ft: f64, a: f64| vec![("kt", kt), ("Ft", ft), ("a", a)];
     let massless = |kt: f64, ft: f64, a: f64, alpha: f64, w: f64| {
-        let law = |limit| Law::JenkinsArctan(JenkinsArctan { stiffness: kt, limit, alpha });
+        let law = |limit| Arc::new(JenkinsArctan { stiffness: kt, limit, alpha });
         smooth(&template_with("element", &values(kt, ft, a), law), w).energy.friction
     };
     close(

@@ -12,7 +12,7 @@ use stickslip::orbit::Orbit;
 use stickslip_verification::{close, exact, near, number, table, template, template_with};
 
 fn couple(ft: f64, alpha: f64) -> System {
-    template_with("blade-couple", &[("Ft", ft)], |limit| Law::CoulombArctan(CoulombArctan { limit, alpha }))
+    template_with("blade-couple", &[("Ft", ft)], |limit| Arc::new(CoulombArctan { limit, alpha }))
 }
 
 fn shoot(system: &System, omega: f64, tolerance: f64) -> Orbit {

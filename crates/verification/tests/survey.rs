@@ -10,7 +10,7 @@ fn couple(template: &str, changes: &[(&str, f64)]) -> Survey {
 }
 
 fn mass(name: impl Into<String>, mass: f64) -> Mass {
-    Mass { name: name.into(), mass }
+    Mass::new(name, mass)
 }
 
 fn spring(a: impl Into<String>, b: impl Into<String>, stiffness: f64, damping: f64) -> Spring {
@@ -26,11 +26,11 @@ fn force(on: &str, amplitude: f64, phase: f64, harmonic: u32) -> Force {
 }
 
 fn jenkins(stiffness: f64, limit: f64) -> Law {
-    Law::Jenkins(Jenkins { stiffness, limit })
+    Arc::new(Jenkins { stiffness, limit })
 }
 
 fn coulomb(limit: f64) -> Law {
-    Law::Coulomb(Coulomb { limit })
+    Arc::new(Coulomb { limit })
 }
 
 fn omegas(modes: &Modes) -> Vec<f64> {

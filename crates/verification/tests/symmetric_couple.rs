@@ -78,7 +78,7 @@ fn theory_4_1_sum_of_the_blades_is_linear() {
 fn theory_4_1_sum_of_the_blades_is_linear_for_the_smooth_law() {
     for alpha in [250.0, 25e3] {
         for (ft, hertz) in [(2.0, 120.93), (4.0, 121.1), (1.0, 120.5)] {
-            let law = |limit| Law::CoulombArctan(CoulombArctan { limit, alpha });
+            let law = |limit| Arc::new(CoulombArctan { limit, alpha });
             let system = template_with("symmetric-couple", &[("Ft", ft), ("mu", MU[0])], law);
             let method = Shooting { tolerance: 1e-10, width: None };
             let orbit = method.solver(&system).unwrap().orbit(TAU * hertz, None).unwrap();
@@ -103,7 +103,7 @@ fn theory_4_2_contact_force_and_onset_of_slip() {
     for (hertz, printed) in printed {
         near("printed contact force", stuck_force(mu, hertz), printed, 0.5e-4);
         let orbit = exact(&couple(mu, 1e3), TAU * hertz);
-        let force = |time: f64| orbit.sample(time).joints[0].force;
+        let force = |time: f64| orbit.sample(time).joints[0].force[0];
         close("contact force", force(0.0).hypot(force(0.25 * orbit.period())), stuck_force(mu, hertz), 1e-8);
         // slip begins where the limit falls below it
         let slips = |ft: f64| match EventDriven.solver(&couple(mu, ft)).unwrap().orbit(TAU * hertz, None) {

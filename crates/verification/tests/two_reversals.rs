@@ -90,20 +90,20 @@ impl Line {
     /// Displacements are scaled by `rate`, so that they and velocities are of one size.
     fn new(system: &System, rate: f64) -> Line {
         let n = system.dofs();
-        assert_eq!(system.joints.len(), 1);
-        let w = &system.joints[0].direction;
+        assert_eq!(system.joints().len(), 1);
+        let w = system.joints()[0].direction;
         let mut a = vec![vec![0.0; 2 * n]; 2 * n];
         let (mut g, mut h, mut c) = (vec![0.0; 2 * n], vec![0.0; 2 * n], vec![0.0; 2 * n]);
         let force = &system.excitation(rate)[0].1;
         for i in 0..n {
-            let mass = system.mass[(i, i)]; // point masses: diagonal
+            let mass = system.structure().mass()[(i, i)]; // point masses: diagonal
             a[i][n + i] = rate;
             for k in 0..n {
-                a[n + i][k] = -system.stiffness[(i, k)] / mass / rate;
-                a[n + i][n + k] = -system.damping[(i, k)] / mass;
+                a[n + i][k] = -system.structure().stiffness()[(i, k)] / mass / rate;
+                a[n + i][n + k] = -system.structure().damping()[(i, k)] / mass;
             }
             g[n + i] = force[i].re / mass;
-            h[n + i] = w[(i, 0)] * system.joints[0].law.limit() / mass;
+            h[n + i] = w[(i, 0)] * system.joints()[0].law.limit() / mass;
             c[n + i] = w[(i, 0)];
         }
         Line { n, a, g, h, c }
@@ -236,7 +236,7 @@ fn compare(system: &System, hertz: f64) -> bool {
         });
         b - a
     };
-    close("loss", orbit.joints[0].dissipation, 4.0 * system.joints[0].law.limit() * slide, 1e-8);
+    close("loss", orbit.joints[0].dissipation, 4.0 * system.joints()[0].law.limit() * slide, 1e-8);
     true
 }
 
@@ -285,7 +285,7 @@ fn theory_8_printed_point() {
     near("input", orbit.energy.work_in, 1.0129933, 0.5e-7);
     near("viscous", orbit.energy.viscous, 0.5095171, 0.5e-7);
     near("friction", orbit.energy.friction, 0.5034762, 0.5e-7);
-    let slide = 0.5 * (orbit.joints[0].displacement.1 - orbit.joints[0].displacement.0);
+    let slide = 0.5 * (orbit.joints[0].displacement[0].1 - orbit.joints[0].displacement[0].0);
     close("4 Ft0 a_rel", orbit.energy.friction, 16.0 * slide, 1e-9);
 }
 
@@ -303,20 +303,20 @@ fn theory_8_4_fourier_form() {
             let dynamic: Matrix<Complex64> = (0..n)
                 .map(|i| {
                     let entry =
-                        |k: usize| s * s * system.mass[(i, k)] + s * system.damping[(i, k)] + system.stiffness[(i, k)];
+                        |k: usize| s * s * system.structure().mass()[(i, k)] + s * system.structure().damping()[(i, k)] + system.structure().stiffness()[(i, k)];
                     (0..n).map(entry).collect()
                 })
                 .collect();
             let right = (0..n).map(|i| vec![Complex64::new(unit(i), 0.0)]).collect();
             solve(&dynamic, &right).into_iter().map(|row| row[0]).collect()
         };
-        let w = |i: usize| system.joints[0].direction[(i, 0)];
+        let w = |i: usize| system.joints()[0].direction[(i, 0)];
         let slide = |x: &[Complex64]| -> Complex64 { (0..n).map(|i| x[i] * w(i)).sum() };
         let drive = slide(&response(omega, &|i| if i == 0 { 10.0 } else { 0.0 })) * Complex64::new(0.0, omega);
         // s(t) = (4/pi) sum over odd h of sin(h w (t - t0))/h: at t0 its part of the velocity is sum of Im(Y_h)/h, and the
         // sum converges as 1/h^2 because Re Y, Im Y fall as 1/h^3, 1/h; the tail follows from Y ~ 1/(jw m)
         let mut sum = 0.0;
-        let inverse_mass: f64 = (0..n).map(|i| w(i) * w(i) / system.mass[(i, i)]).sum();
+        let inverse_mass: f64 = (0..n).map(|i| w(i) * w(i) / system.structure().mass()[(i, i)]).sum();
         let last = 20_001u32;
         for h in (1..=last).step_by(2) {
             let rate = f64::from(h) * omega;
@@ -328,7 +328,7 @@ fn theory_8_4_fourier_form() {
         let friction = -ft * 4.0 / PI * sum;
         // psi: Re(drive e^{j psi}) + friction = 0 at the reversal to positive sliding
         let t0 =
-            orbit.switch_times().into_iter().find(|t| orbit.sample(t + 1e-3 * orbit.period()).joints[0].velocity > 0.0);
+            orbit.switch_times().into_iter().find(|t| orbit.sample(t + 1e-3 * orbit.period()).joints[0].velocity[0] > 0.0);
         let psi = omega * t0.unwrap();
         let balance = (drive * Complex64::from_polar(1.0, psi)).re + friction;
         near("velocity at the reversal", balance, 0.0, 1e-8 * drive.norm());

@@ -35,7 +35,7 @@ impl Optimum {
         let system = |limit: f64| {
             let mut model = case.model.clone();
             for joint in &mut model.joints {
-                joint.law = Law::Coulomb(Coulomb { limit });
+                joint.law = Arc::new(Coulomb { limit });
             }
             model.assemble()
         };

@@ -484,8 +484,8 @@ mod tests {
                 for (k, harmonic) in (1..=31u32).step_by(2).enumerate() {
                     let x = &state.x[k * n..(k + 1) * n];
                     let h = f64::from(harmonic);
-                    for (i, place) in system.places.iter().enumerate() {
-                        let moved = x[i] * system.mass[(i, i)];
+                    for (i, place) in system.places().iter().enumerate() {
+                        let moved = x[i] * system.structure().mass()[(i, i)];
                         inertia += h * h * (x[i].conj() * moved).re;
                         let force = moved * Complex64::new(0.0, 2.0 * state.damping * h * state.omega * state.omega);
                         let (amplitude, phase) = force.to_polar();

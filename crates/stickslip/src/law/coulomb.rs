@@ -3,40 +3,52 @@
 //! `f = limit · Sgn(u')`: any force in `[-limit, limit]` while the faces stick, `±limit` while they slip.
 //! Source: the "2V" law of Pust, Pesek, Radolfova (2015), Sec. 1; as a set-valued law Moreau (1988).
 
-use super::{Branch, CoulombArctan, FrictionLaw, Law, Parameter};
+use super::{CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, SharedLaw};
 use num_complex::Complex64;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
-/// Rigid dry friction with a fixed slip limit.
+/// The row of this law in [`super::TABLE`].
+pub(super) static INFO: LawInfo = LawInfo {
+    name: "coulomb",
+    summary: "rigid dry friction, f = limit Sgn(u'), exact",
+    parameters: &[Parameter::limit("slip limit: friction force while slipping")],
+    sample: &[2.0],
+    build: |values| Arc::new(Coulomb { limit: values[0] }),
+};
+
+/// Rigid dry friction.
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{Coulomb, FrictionLaw};
-/// assert_eq!(Coulomb { limit: 2.0 }.network().unwrap()[0].stiffness, None);
+/// use stickslip::law::{Coulomb, Law, Piece};
+/// let law = Coulomb { limit: 2.0 };
+/// assert_eq!(law.pieces().unwrap(), [Piece::slider(None, 2.0)]);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coulomb {
     /// Slip limit `Ft0`, N.
     pub limit: f64,
 }
 
-impl FrictionLaw for Coulomb {
-    const NAME: &'static str = "coulomb";
-    const SUMMARY: &'static str = "rigid dry friction, f = limit Sgn(u'), exact";
-    const PARAMETERS: &'static [Parameter] = &[Parameter::limit("slip limit: friction force while slipping")];
-
-    fn from_values(values: &[f64]) -> Self {
-        Coulomb { limit: values[0] }
+impl Law for Coulomb {
+    fn info(&self) -> &'static LawInfo {
+        &INFO
     }
     fn values(&self) -> Vec<f64> {
         vec![self.limit]
     }
-    fn network(&self) -> Option<Vec<Branch>> {
-        Some(vec![Branch { stiffness: None, limit: self.limit }])
+    fn scale(&self) -> f64 {
+        self.limit
     }
-    fn regularised(&self, width: f64) -> Option<Law> {
-        Some(Law::CoulombArctan(CoulombArctan { limit: self.limit, alpha: 1.0 / width }))
+    fn pieces(&self) -> Option<Vec<Piece>> {
+        Some(vec![Piece::slider(None, self.limit)])
+    }
+    fn prox(&self) -> Option<&dyn Prox> {
+        Some(self)
+    }
+    fn regularised(&self, width: f64) -> Option<SharedLaw> {
+        Some(Arc::new(CoulombArctan { limit: self.limit, alpha: 1.0 / width }))
     }
     fn is_incrementally_passive(&self) -> bool {
         true // the force is a monotone function of velocity, if a set-valued one
@@ -46,5 +58,13 @@ impl FrictionLaw for Coulomb {
             return Complex64::new(0.0, 0.0); // also without motion
         }
         Complex64::new(0.0, 4.0 * self.limit / (PI * amplitude))
+    }
+}
+
+impl Prox for Coulomb {
+    /// The projection onto `[-limit, limit]`.
+    fn resolve(&self, y: &[f64], _penalty: f64, force: &mut [f64], slope: &mut [f64]) {
+        force[0] = y[0].clamp(-self.limit, self.limit);
+        slope[0] = if y[0].abs() < self.limit { 1.0 } else { 0.0 };
     }
 }

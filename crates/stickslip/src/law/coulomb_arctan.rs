@@ -4,12 +4,24 @@
 //! It never sticks: at `|f| < limit` it creeps with `u' = tan(π f / (2 limit)) / alpha`.
 //! Source: Pust, Pesek, Radolfova (2015), Eq. (2). The paper's alpha = 25 s/mm is 25 000 s/m in SI.
 
-use super::{FrictionLaw, Parameter, Rate, RateLaw, Relative};
+use super::{Law, LawInfo, Parameter, Prox, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_2_PI, PI};
+use std::sync::Arc;
 use stickslip_numerics::dual::Real;
+
+/// The row of this law in [`super::TABLE`].
+pub(super) static INFO: LawInfo = LawInfo {
+    name: "coulomb-arctan",
+    summary: "smoothed dry friction, f = limit (2/pi) arctan(alpha u'), paper Eq. (2)",
+    parameters: &[
+        Parameter::limit("friction force at high sliding velocity"),
+        Parameter::positive("alpha", Dimension::INVERSE_VELOCITY, "steepness of the arctangent at rest"),
+    ],
+    sample: &[2.0, 25_000.0],
+    build: |values| Arc::new(CoulombArctan { limit: values[0], alpha: values[1] }),
+};
 
 /// Smooth dry friction.
 ///
@@ -20,7 +32,7 @@ use stickslip_numerics::dual::Real;
 /// let force = law.evaluate(&Relative::along(0.0, 1.0), &[], &mut []);
 /// assert!((force[0] - 1.0).abs() < 1e-15);   // arctan 1 = π/4, half the limit
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CoulombArctan {
     /// Force that the law tends to at high velocity, N.
     pub limit: f64,
@@ -28,22 +40,21 @@ pub struct CoulombArctan {
     pub alpha: f64,
 }
 
-impl FrictionLaw for CoulombArctan {
-    const NAME: &'static str = "coulomb-arctan";
-    const SUMMARY: &'static str = "smoothed dry friction, f = limit (2/pi) arctan(alpha u'), paper Eq. (2)";
-    const PARAMETERS: &'static [Parameter] = &[
-        Parameter::limit("friction force at high sliding velocity"),
-        Parameter::positive("alpha", Dimension::INVERSE_VELOCITY, "steepness of the arctangent at rest"),
-    ];
-
-    fn from_values(values: &[f64]) -> Self {
-        CoulombArctan { limit: values[0], alpha: values[1] }
+impl Law for CoulombArctan {
+    fn info(&self) -> &'static LawInfo {
+        &INFO
     }
     fn values(&self) -> Vec<f64> {
         vec![self.limit, self.alpha]
     }
-    fn rate(&self) -> Option<Rate> {
-        Some(Rate::CoulombArctan(*self))
+    fn scale(&self) -> f64 {
+        self.limit
+    }
+    fn rate(&self) -> Option<&dyn Rate> {
+        Some(self)
+    }
+    fn prox(&self) -> Option<&dyn Prox> {
+        Some(self)
     }
     fn is_incrementally_passive(&self) -> bool {
         true // the force grows with velocity
@@ -60,15 +71,45 @@ impl FrictionLaw for CoulombArctan {
 }
 
 impl RateLaw for CoulombArctan {
-    #[inline]
-    fn states(&self) -> usize {
-        0
-    }
     #[doc(alias = "eq2")]
     #[inline]
-    fn evaluate<S: Real>(&self, contact: &Relative<S>, _z: &[S], _z_rate: &mut [S]) -> [S; 3] {
-        let zero = S::from_f64(0.0);
-        let scaled = contact.velocity[0] * S::from_f64(self.alpha);
-        [scaled.atan() * S::from_f64(self.limit * FRAC_2_PI), zero, zero] // Eq. (2)
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+        let zero = S::from(0.0);
+        let scaled = motion.velocity[0] * self.alpha;
+        [scaled.atan() * (self.limit * FRAC_2_PI), zero, zero] // Eq. (2)
     }
 }
+
+impl Prox for CoulombArctan {
+    fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
+        let (value, rise) = resolve(y[0] / self.limit, self.alpha * self.limit / penalty);
+        (force[0], slope[0]) = (self.limit * value, rise);
+    }
+    fn at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
+        let scaled = self.alpha * velocity;
+        let size = self.limit * FRAC_2_PI;
+        Some((size * scaled.atan(), size * self.alpha / (1.0 + scaled * scaled)))
+    }
+}
+
+/// `λ` and `dλ/dy` of `λ + w = y`, `λ = (2/π) atan(s w)`.
+fn resolve(y: f64, s: f64) -> (f64, f64) {
+    let target = y.abs();
+    // the left side rises with a falling slope in w: Newton's method from a w that is too small never passes the root
+    let mut w = (target - 1.0).max(target / (1.0 + FRAC_2_PI * s));
+    for _ in 0..RESOLVED {
+        let left = w + FRAC_2_PI * (s * w).atan() - target;
+        let slope = 1.0 + FRAC_2_PI * s / (1.0 + s * s * w * w);
+        let step = left / slope;
+        w -= step;
+        // the left side is rounded to this; what is no number ends too
+        if step.abs() <= 4.0 * f64::EPSILON * target || step.is_nan() {
+            break;
+        }
+    }
+    let slope = FRAC_2_PI * s / (1.0 + s * s * w * w);
+    ((target - w).copysign(y), slope / (1.0 + slope))
+}
+
+/// Iterations of [`resolve`], which doubles its digits.
+const RESOLVED: usize = 60;

@@ -4,12 +4,25 @@
 //! `f' = kt (u' - tan(π f / (2 limit)) / alpha)`, `|f| < limit`.
 //! Source: Pust, Pesek, Radolfova (2015), Sec. 3, the equation of Fig. 3.
 
-use super::{FrictionLaw, Jenkins, Parameter, Rate, RateLaw, Relative};
+use super::{CoulombArctan, Jenkins, Law, LawInfo, Parameter, Prox, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
+use std::sync::Arc;
 use stickslip_numerics::dual::Real;
+
+/// The row of this law in [`super::TABLE`].
+pub(super) static INFO: LawInfo = LawInfo {
+    name: "jenkins-arctan",
+    summary: "spring and smoothed slider in series, f' = kt (u' - tan(pi f/(2 limit))/alpha)",
+    parameters: &[
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "tangential contact stiffness"),
+        Parameter::limit("friction force at high sliding velocity"),
+        Parameter::positive("alpha", Dimension::INVERSE_VELOCITY, "steepness of the arctangent at rest"),
+    ],
+    sample: &[10_000.0, 2.0, 25_000.0],
+    build: |values| Arc::new(JenkinsArctan { stiffness: values[0], limit: values[1], alpha: values[2] }),
+};
 
 /// Spring and smooth slider in series.
 ///
@@ -27,7 +40,7 @@ use stickslip_numerics::dual::Real;
 /// assert_eq!(force[0], 0.0);
 /// assert!((rate[0] - 1e4 * std::f64::consts::PI / 4.0 * 1e-3).abs() < 1e-12);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JenkinsArctan {
     /// Stiffness of the spring `kt`, N/m.
     pub stiffness: f64,
@@ -37,23 +50,21 @@ pub struct JenkinsArctan {
     pub alpha: f64,
 }
 
-impl FrictionLaw for JenkinsArctan {
-    const NAME: &'static str = "jenkins-arctan";
-    const SUMMARY: &'static str = "spring and smoothed slider in series, f' = kt (u' - tan(pi f/(2 limit))/alpha)";
-    const PARAMETERS: &'static [Parameter] = &[
-        Parameter::positive("stiffness", Dimension::STIFFNESS, "tangential contact stiffness"),
-        Parameter::limit("friction force at high sliding velocity"),
-        Parameter::positive("alpha", Dimension::INVERSE_VELOCITY, "steepness of the arctangent at rest"),
-    ];
-
-    fn from_values(values: &[f64]) -> Self {
-        JenkinsArctan { stiffness: values[0], limit: values[1], alpha: values[2] }
+impl Law for JenkinsArctan {
+    fn info(&self) -> &'static LawInfo {
+        &INFO
     }
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.limit, self.alpha]
     }
-    fn rate(&self) -> Option<Rate> {
-        Some(Rate::JenkinsArctan(*self))
+    fn scale(&self) -> f64 {
+        self.limit
+    }
+    fn rate(&self) -> Option<&dyn Rate> {
+        Some(self)
+    }
+    fn prox(&self) -> Option<&dyn Prox> {
+        Some(self)
     }
     fn is_incrementally_passive(&self) -> bool {
         true // the spring keeps δf²/(2 kt), and the slider's velocity grows with the force
@@ -64,31 +75,48 @@ impl FrictionLaw for JenkinsArctan {
     }
 }
 
+/// The share of the limit that a force can have, but for rounding.
+const BELOW: f64 = 1.0 - 1e-12;
+
 impl JenkinsArctan {
-    /// The internal state at which the element carries `force`, N; forces beyond the limit count as just below it.
-    pub(crate) fn state(&self, force: f64) -> f64 {
-        let share = (force / self.limit).clamp(-BELOW, BELOW);
-        (share / FRAC_2_PI).tan().asinh()
+    /// The slider without its spring.
+    fn slider(&self) -> CoulombArctan {
+        CoulombArctan { limit: self.limit, alpha: self.alpha }
     }
 }
 
-/// The share of the limit that a force can have, but for rounding.
-const BELOW: f64 = 1.0 - 1e-12;
+impl Prox for JenkinsArctan {
+    fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
+        self.slider().resolve(y, penalty, force, slope);
+    }
+    fn at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
+        self.slider().at_velocity(velocity)
+    }
+    fn compliance(&self) -> f64 {
+        1.0 / self.stiffness
+    }
+}
 
 impl RateLaw for JenkinsArctan {
     #[inline]
     fn states(&self) -> usize {
         usize::from(self.limit > 0.0) // a slider that holds nothing leaves its spring without force
     }
+    fn state_under(&self, force: f64, z: &mut [f64]) -> bool {
+        // forces beyond the limit count as just below it
+        let share = (force / self.limit).clamp(-BELOW, BELOW);
+        z.fill((share / FRAC_2_PI).tan().asinh());
+        true
+    }
     #[inline]
-    fn evaluate<S: Real>(&self, contact: &Relative<S>, z: &[S], z_rate: &mut [S]) -> [S; 3] {
-        let zero = S::from_f64(0.0);
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+        let zero = S::from(0.0);
         if z.is_empty() {
             return [zero, zero, zero];
         }
         let (sinh, cosh) = (z[0].sinh(), z[0].cosh());
-        let creep = contact.velocity[0] - sinh * S::from_f64(1.0 / self.alpha);
-        z_rate[0] = cosh * creep * S::from_f64(self.stiffness * FRAC_PI_2 / self.limit);
-        [sinh.atan() * S::from_f64(self.limit * FRAC_2_PI), zero, zero]
+        let creep = motion.velocity[0] - sinh * (1.0 / self.alpha);
+        rate[0] = cosh * creep * (self.stiffness * FRAC_PI_2 / self.limit);
+        [sinh.atan() * (self.limit * FRAC_2_PI), zero, zero]
     }
 }

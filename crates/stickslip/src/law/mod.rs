@@ -1,124 +1,139 @@
-//! Friction laws: what happens where two places rub.
+//! Laws: what happens where two places rub or touch.
 //!
-//! A law is plain data: one variant of [`Law`] and one file. It offers the *views* that are honest for it, and a method asks
-//! for the view it needs:
+//! A law is an object behind [`Law`], with its data in one file. It offers the *views* that are honest for it, and a method asks for the view
+//! that it can work with:
 //!
 //! | view | what it is | who asks |
 //! | --- | --- | --- |
-//! | [`FrictionLaw::network`] | ideal sliders, each behind a spring or rigid | event-driven, harmonic balance |
-//! | [`FrictionLaw::rate`] | `z' = g(u, u', z)`, `f = h(u, u', z)`, smooth | transient, shooting, harmonic balance |
-//! | [`FrictionLaw::regularised`] | the smooth neighbour of an exact law | comparison of the two |
+//! | [`Law::pieces`] | ideal sliders, springs and stops side by side | event-driven, harmonic balance |
+//! | [`Law::rate`] | `f = h(u, u', z)`, `z' = g(u, u', z)`, smooth | transient, shooting, harmonic balance |
+//! | [`Law::step`] | the force at the end of a step of `u`, from the state before it | harmonic balance, motion in small steps |
+//! | [`Law::prox`] | the resolvent of a law of velocity, rigid or steep | harmonic balance |
 //!
-//! A joint acts along a direction matrix `W` (n × d): `u = Wᵀ x`, force on the structure `-W f`. All laws that exist now have
-//! d = 1; [`Relative`] carries three components and a normal force, so that laws of sliding in a plane fit the same traits.
+//! A law that offers one view works in every method that asks for this view, and a method that finds none says which it misses.
 //!
-//! To add a law: write its file, declare it with `mod`, then one line in `friction_laws!` below. Everything else (the variant of [`Law`], its
-//! name in study files, its row of [`TABLE`], its place among the smooth laws) follows from that line.
+//! A joint acts along one to three directions. Along each of them `u` is the motion of its first place relative to its second, and the law's
+//! force `f` acts on the first place as `-f`. A law that knows a normal has it as its last direction.
+//!
+//! To add a law: write its file, with its [`LawInfo`], then one line in [`TABLE`]. A law from another crate, or one that only a test needs,
+//! is put into a [`crate::model::Joint`] without any line.
 
+mod contact;
 mod coulomb;
 mod coulomb_arctan;
+mod describing;
 mod jenkins;
 mod jenkins_arctan;
+mod parameter;
+mod prox;
+mod rate;
+mod step;
 
-use crate::dimension::Dimension;
+pub use contact::Contact;
+pub(crate) use contact::SLIPS_ABOVE;
+pub use coulomb::Coulomb;
+pub use coulomb_arctan::CoulombArctan;
+pub use jenkins::Jenkins;
+pub use jenkins_arctan::JenkinsArctan;
+pub use parameter::{BuildError, LawError, LawInfo, Parameter, Range};
+pub use prox::{Mean, Prox};
+pub use rate::{Rate, RateLaw, RatePoint, Relative};
+pub use step::{Step, StepLaw, StepPoint};
+
 use num_complex::Complex64;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use stickslip_numerics::dual::Real;
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use std::fmt::Debug;
+use std::sync::Arc;
 
-/// One parameter of a law: its key in a study file, its dimension, what it means.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parameter {
-    /// Key in `law = { kind = …, KEY = … }`.
-    pub key: &'static str,
-    /// Physical dimension, for units and for error messages.
-    pub dimension: Dimension,
-    /// Whether it may be zero; otherwise it is more than zero.
-    pub may_be_zero: bool,
-    /// One line for the documentation and for editors.
-    pub doc: &'static str,
+/// Every law there is, in the order in which lists show them.
+pub const TABLE: &[&LawInfo] = &[&coulomb::INFO, &coulomb_arctan::INFO, &jenkins::INFO, &jenkins_arctan::INFO];
+
+/// The row of [`TABLE`] with this name.
+pub fn find(name: &str) -> Option<&'static LawInfo> {
+    TABLE.iter().copied().find(|row| row.name == name)
 }
 
-impl Parameter {
-    /// A parameter that is more than zero.
-    pub const fn positive(key: &'static str, dimension: Dimension, doc: &'static str) -> Self {
-        Parameter { key, dimension, may_be_zero: false, doc }
-    }
+/// A law that many joints, cases and threads share.
+pub type SharedLaw = Arc<dyn Law>;
 
-    /// The slip limit, N; zero is a joint that carries no force: the free reference of a damper.
-    pub const fn limit(doc: &'static str) -> Self {
-        Parameter { key: "limit", dimension: Dimension::FORCE, may_be_zero: true, doc }
-    }
+/// The most directions that a joint can have.
+pub const MOST_DIRECTIONS: usize = 3;
 
-    /// Whether the law can have this value, SI.
-    fn takes(&self, value: f64) -> bool {
-        value.is_finite() && (value > 0.0 || self.may_be_zero && value == 0.0)
-    }
-}
-
-/// The relative motion at a contact, up to three components (the first `d` count), and the normal force.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Relative<S> {
-    /// Relative displacement `u = Wᵀ x`, m.
-    pub displacement: [S; 3],
-    /// Relative velocity `u'`, m/s.
-    pub velocity: [S; 3],
-    /// Normal force, N; laws with a fixed slip limit do not read it.
-    pub normal_force: S,
-}
-
-impl<S: Real> Relative<S> {
-    /// Motion along one direction, without a normal force.
-    pub fn along(displacement: S, velocity: S) -> Self {
-        let zero = S::from_f64(0.0);
-        Relative { displacement: [displacement, zero, zero], velocity: [velocity, zero, zero], normal_force: zero }
-    }
-}
-
-/// One ideal slider of a law's network, in series with a spring.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Branch {
-    /// Stiffness of the spring in front of the slider, N/m; `None` if the slider is rigid.
-    pub stiffness: Option<f64>,
-    /// Slip limit, N: the slider holds while `|f| < limit` and moves with `|f| = limit`.
-    pub limit: f64,
-}
-
-/// A law of rate form: `f = h(u, u', z)`, `z' = g(u, u', z)`, both smooth.
-pub trait RateLaw {
-    /// Number of internal states `z`.
-    fn states(&self) -> usize;
-    /// Force and rates at one instant. `z` and `z_rate` have length [`RateLaw::states`]; units belong to the law.
-    /// Returns the force components, N.
-    fn evaluate<S: Real>(&self, contact: &Relative<S>, z: &[S], z_rate: &mut [S]) -> [S; 3];
-}
-
-/// What every friction law answers. Views that a law cannot offer stay `None`.
-pub trait FrictionLaw {
-    /// Name in study files.
-    const NAME: &'static str;
-    /// One line of what the law is, with its equation.
-    const SUMMARY: &'static str;
-    /// Keys of the parameters, in the order of [`FrictionLaw::values`].
-    const PARAMETERS: &'static [Parameter];
-    /// Builds the law from values in the order of `PARAMETERS`, SI units; no check is made here.
-    fn from_values(values: &[f64]) -> Self;
-    /// The parameters' values in SI, in the order of `PARAMETERS`.
+/// What every law answers. It offers at least one view.
+///
+/// # Example
+/// A law from outside: a spring that stiffens, `f = k (u + b u³)`.
+/// ```
+/// use std::sync::Arc;
+/// use stickslip::dimension::Dimension;
+/// use stickslip::law::{Law, LawInfo, Parameter, Rate, RateLaw, Relative};
+/// use stickslip_numerics::dual::Real;
+///
+/// #[derive(Debug)]
+/// struct Stiffening { stiffness: f64, growth: f64 }
+///
+/// static INFO: LawInfo = LawInfo {
+///     name: "stiffening",
+///     summary: "f = stiffness (u + growth u^3)",
+///     parameters: &[
+///         Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness at rest"),
+///         Parameter::positive("growth", Dimension::NONE, "growth of the stiffness, 1/m^2"),
+///     ],
+///     sample: &[1e4, 1e6],
+///     build: |values| Arc::new(Stiffening { stiffness: values[0], growth: values[1] }),
+/// };
+///
+/// impl Law for Stiffening {
+///     fn info(&self) -> &'static LawInfo { &INFO }
+///     fn values(&self) -> Vec<f64> { vec![self.stiffness, self.growth] }
+///     fn rate(&self) -> Option<&dyn Rate> { Some(self) }
+/// }
+///
+/// impl RateLaw for Stiffening {
+///     fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+///         let u = motion.displacement[0];
+///         let force = (u + u * u * u * S::from(self.growth)) * S::from(self.stiffness);
+///         [force, S::from(0.0), S::from(0.0)]
+///     }
+/// }
+///
+/// let law = Stiffening { stiffness: 1e4, growth: 1e6 };
+/// // the describing function of f = k (u + b u³) is k (1 + ¾ b a²)
+/// assert!((law.linearised(1e-3, 1.0).re - 1.75e4).abs() < 1e-6);
+/// ```
+pub trait Law: Debug + Send + Sync {
+    /// Its row: name, summary, parameters.
+    fn info(&self) -> &'static LawInfo;
+    /// The parameters' values in SI, in the order of its row.
     fn values(&self) -> Vec<f64>;
-    /// Directions of relative motion (1, 2 or 3).
+    /// Directions of relative motion, 1 to [`MOST_DIRECTIONS`].
     fn directions(&self) -> usize {
         1
     }
-    /// Exact view: parallel branches of spring and ideal slider.
-    fn network(&self) -> Option<Vec<Branch>> {
+    /// The size of its forces, N, for tolerances and guesses: a slip limit, or infinity if nothing bounds them.
+    fn scale(&self) -> f64 {
+        f64::INFINITY
+    }
+    /// Ideal sliders, springs and stops side by side; exact.
+    fn pieces(&self) -> Option<Vec<Piece>> {
         None
     }
-    /// Smooth view.
-    fn rate(&self) -> Option<Rate> {
+    /// Smooth force and rates of internal states.
+    fn rate(&self) -> Option<&dyn Rate> {
         None
     }
-    /// Complex stiffness of the first harmonic under `u = amplitude cos Ωt` (N/m): where methods begin to search.
-    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64;
+    /// The force after a step.
+    fn step(&self) -> Option<&dyn Step> {
+        None
+    }
+    /// The resolvent of a law of velocity.
+    fn prox(&self) -> Option<&dyn Prox> {
+        None
+    }
+    /// Whether the force changes its sign with the motion: `f(-u) = -f(u)` for whole histories.
+    fn is_odd(&self) -> bool {
+        true
+    }
     /// Whether two contacts with this law that move differently never give energy to their difference: `∫ δf δu' dt` from equal states on is
     /// never negative. Then what both keep of it elastically cannot exceed what went in, and motions do not separate
     /// ([`crate::model::System::contracts`]). Friction that grows with velocity or does not depend on it is of this kind at constant slip limits;
@@ -126,236 +141,142 @@ pub trait FrictionLaw {
     fn is_incrementally_passive(&self) -> bool {
         false
     }
-    /// Whether the force changes its sign with the motion: `f(-u) = -f(u)` for whole histories.
-    fn is_odd(&self) -> bool {
-        true
+    /// What the faces do at this velocity (m/s) under this force (N), along the law's directions.
+    fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
+        Contact::by_limit(self.scale(), velocity, force)
+    }
+    /// Complex stiffness of the first harmonic under `u = amplitude cos Ωt` along the first direction (N/m): where methods begin to search.
+    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+        describing::stiffness(self.pieces(), self.rate(), self.step(), self.prox(), (amplitude, omega))
     }
     /// The smooth law that tends to this one as `width` (m/s, the velocity over which friction changes its sign) goes to zero.
-    fn regularised(&self, _width: f64) -> Option<Law> {
+    fn regularised(&self, _width: f64) -> Option<SharedLaw> {
         None
+    }
+    /// Whether the parameters fit each other; what is wrong and what was expected if they do not.
+    ///
+    /// # Errors
+    /// A sentence without the law's name, such as "`beta + gamma` must be more than zero".
+    fn consistent(&self) -> Result<(), String> {
+        Ok(())
     }
 }
 
-/// Why a law's parameters are refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{law}: `{key}` must be a finite {dimension}, {}, found {value}", if *may_be_zero { "zero or more" } else { "more than zero" })]
-pub struct LawError {
-    /// Name of the law.
-    pub law: &'static str,
-    /// Key of the parameter.
-    pub key: &'static str,
-    /// What is measured by it.
-    pub dimension: Dimension,
-    /// Whether zero is allowed.
-    pub may_be_zero: bool,
-    /// The value that was given, SI.
-    pub value: f64,
+/// One of the ideal parts of a law; parts of one law stand side by side and move alike.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Piece {
+    /// Holds while its force is below its limit, and moves with the force at its limit.
+    Slider(Slider),
+    /// A spring that acts only beyond a gap: `f = stiffness max(u - gap, 0)`.
+    Stop {
+        /// Displacement at which it begins to act, m; negative if it is compressed at rest.
+        gap: f64,
+        /// Stiffness beyond the gap, N/m.
+        stiffness: f64,
+    },
 }
 
-/// A row of the table of laws: what can be known of a law without an instance of it.
-#[derive(Debug, Clone, Copy)]
-pub struct LawInfo {
-    /// Name in study files.
-    pub name: &'static str,
-    /// One line of what it is.
-    pub summary: &'static str,
-    /// Its parameters.
-    pub parameters: &'static [Parameter],
-    /// A typical instance, for examples and for tests that run over all laws.
-    pub sample: fn() -> Law,
-    build: fn(&[f64]) -> Law,
+/// An ideal slider, rigid or in series with a spring.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slider {
+    /// Stiffness of the spring in front of it, N/m; `None` if it is rigid.
+    pub stiffness: Option<f64>,
+    /// Force while it moves, N.
+    pub limit: f64,
+    /// Force up to which it holds once it rests, N; not below `limit`.
+    pub static_limit: f64,
 }
 
-macro_rules! friction_laws {
-    ($($file:ident::$variant:ident $name:literal [$($sample:expr),*] $(rate $smooth:ident)?;)*) => {
-        $(pub use $file::$variant;)*
+impl Piece {
+    /// A slider that holds up to the force with which it moves.
+    pub fn slider(stiffness: Option<f64>, limit: f64) -> Self {
+        Piece::Slider(Slider { stiffness, limit, static_limit: limit })
+    }
 
-        /// A friction law, as data.
-        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-        #[serde(tag = "kind")]
-        pub enum Law {
-            $(#[doc = concat!("See [`struct@", stringify!($variant), "`].")]
-            #[serde(rename = $name)]
-            $variant($variant),)*
+    /// Whether it never carries a force.
+    fn is_nothing(&self) -> bool {
+        match self {
+            Piece::Slider(slider) => slider.static_limit == 0.0,
+            Piece::Stop { stiffness, .. } => *stiffness == 0.0,
         }
-
-        /// Every law there is, in the order in which lists show them.
-        pub const TABLE: &[LawInfo] = &[$(LawInfo {
-            name: <$variant as FrictionLaw>::NAME,
-            summary: <$variant as FrictionLaw>::SUMMARY,
-            parameters: <$variant as FrictionLaw>::PARAMETERS,
-            sample: || Law::$variant($variant::from_values(&[$($sample),*])),
-            build: |values| Law::$variant($variant::from_values(values)),
-        }),*];
-
-        impl Law {
-            /// Name in study files.
-            pub fn name(&self) -> &'static str {
-                match self { $(Law::$variant(_) => <$variant as FrictionLaw>::NAME,)* }
-            }
-            /// The parameters' values, SI, in the order of the law's table row.
-            pub fn values(&self) -> Vec<f64> {
-                match self { $(Law::$variant(law) => law.values(),)* }
-            }
-            /// Directions of relative motion.
-            pub fn directions(&self) -> usize {
-                match self { $(Law::$variant(law) => law.directions(),)* }
-            }
-            /// Exact view, see [`FrictionLaw::network`]; a slider that holds nothing is left out.
-            pub fn network(&self) -> Option<Vec<Branch>> {
-                let mut branches = match self { $(Law::$variant(law) => law.network(),)* }?;
-                branches.retain(|branch| branch.limit > 0.0);
-                Some(branches)
-            }
-            /// Smooth view, see [`FrictionLaw::rate`].
-            pub fn rate(&self) -> Option<Rate> {
-                match self { $(Law::$variant(law) => law.rate(),)* }
-            }
-            /// First-harmonic stiffness, see [`FrictionLaw::linearised`].
-            pub fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
-                match self { $(Law::$variant(law) => law.linearised(amplitude, omega),)* }
-            }
-            /// Whether the difference of two motions gains nothing, see [`FrictionLaw::is_incrementally_passive`].
-            pub fn is_incrementally_passive(&self) -> bool {
-                match self { $(Law::$variant(law) => law.is_incrementally_passive(),)* }
-            }
-            /// Whether the force changes its sign with the motion, see [`FrictionLaw::is_odd`].
-            pub fn is_odd(&self) -> bool {
-                match self { $(Law::$variant(law) => law.is_odd(),)* }
-            }
-            /// Smooth neighbour, see [`FrictionLaw::regularised`].
-            pub fn regularised(&self, width: f64) -> Option<Law> {
-                match self { $(Law::$variant(law) => law.regularised(width),)* }
-            }
-        }
-
-        /// The smooth laws behind one type, so that inner loops call them without dynamic dispatch.
-        #[derive(Debug, Clone, Copy, PartialEq)]
-        pub enum Rate {
-            $($(#[doc = concat!("See [`struct@", stringify!($smooth), "`].")]
-            $smooth($smooth),)?)*
-        }
-
-        impl RateLaw for Rate {
-            #[inline]
-            fn states(&self) -> usize {
-                match self { $($(Rate::$smooth(law) => law.states(),)?)* }
-            }
-            #[inline]
-            fn evaluate<S: Real>(&self, contact: &Relative<S>, z: &[S], z_rate: &mut [S]) -> [S; 3] {
-                match self { $($(Rate::$smooth(law) => law.evaluate(contact, z, z_rate),)?)* }
-            }
-        }
-    };
-}
-
-// file :: type, name in study files, values of a sample in the order of PARAMETERS; `rate` and the type again if it is a RateLaw
-friction_laws! {
-    coulomb::Coulomb "coulomb" [2.0];
-    coulomb_arctan::CoulombArctan "coulomb-arctan" [2.0, 25_000.0] rate CoulombArctan;
-    jenkins::Jenkins "jenkins" [10_000.0, 2.0];
-    jenkins_arctan::JenkinsArctan "jenkins-arctan" [10_000.0, 2.0, 25_000.0] rate JenkinsArctan;
+    }
 }
 
 /// A slip limit that nothing reaches, N; the weight of a mountain.
 const STUCK: f64 = 1e15;
 
-impl Law {
-    /// Slip limit, N: the largest force of the law.
-    pub fn limit(&self) -> f64 {
-        let at = self.info().parameters.iter().position(|p| p.key == "limit");
-        at.map_or(f64::INFINITY, |at| self.values()[at])
+/// The key of a slip limit.
+const LIMIT: &str = "limit";
+
+impl dyn Law + '_ {
+    /// Name in study files.
+    pub fn name(&self) -> &'static str {
+        self.info().name
     }
 
-    /// The row of [`TABLE`] that describes this law.
-    pub fn info(&self) -> &'static LawInfo {
-        // every variant has its row, by the macro
-        TABLE.iter().find(|row| row.name == self.name()).expect("every law has its row")
+    /// Its sliders, if sliders are all that it is; those that hold nothing are left out.
+    pub fn sliders(&self) -> Option<Vec<Slider>> {
+        let slider = |piece: &Piece| match piece {
+            Piece::Slider(slider) => Some(*slider),
+            Piece::Stop { .. } => None,
+        };
+        self.pieces()?.iter().filter(|piece| !piece.is_nothing()).map(slider).collect()
     }
 
-    /// The same law with another slip limit, N.
-    fn limited(&self, limit: f64) -> Law {
+    /// The value of a parameter, SI.
+    pub fn value(&self, key: &str) -> Option<f64> {
+        let at = self.info().parameters.iter().position(|p| p.key == key)?;
+        self.values().get(at).copied()
+    }
+
+    /// The same law with another slip limit, N; `None` if it has none.
+    fn limited(&self, limit: f64) -> Option<SharedLaw> {
         let (info, mut values) = (self.info(), self.values());
-        if let Some(at) = info.parameters.iter().position(|p| p.key == "limit") {
-            values[at] = limit;
-        }
-        (info.build)(&values)
+        let at = info.parameters.iter().position(|p| p.key == LIMIT)?;
+        values[at] = limit;
+        Some((info.build)(&values))
     }
 
-    /// The same joint free of friction, a linear reference: its slip limit is zero.
-    pub fn free(&self) -> Law {
+    /// The same joint free of friction, a linear reference: its slip limit is zero. `None` if the law has no limit.
+    pub fn free(&self) -> Option<SharedLaw> {
         self.limited(0.0)
     }
 
-    /// The same joint stuck, a linear reference: no force reaches its slip limit.
-    pub fn stuck(&self) -> Law {
+    /// The same joint stuck, a linear reference: no force reaches its slip limit. `None` if the law has no limit.
+    pub fn stuck(&self) -> Option<SharedLaw> {
         self.limited(STUCK)
     }
 
     /// Whether the law can never carry a force: its slip limit is zero.
     pub fn is_free(&self) -> bool {
-        self.limit() == 0.0
+        self.value(LIMIT) == Some(0.0)
     }
 
-    /// Checks that every parameter is finite and in its range: more than zero, or zero for a slip limit.
+    /// Checks that every parameter is finite and in its range, and that they fit each other.
     ///
     /// # Errors
     /// [`LawError`] names the first parameter that is not.
     pub fn check(&self) -> Result<(), LawError> {
-        let info = self.info();
-        for (parameter, value) in info.parameters.iter().zip(self.values()) {
-            if !parameter.takes(value) {
-                let Parameter { key, dimension, may_be_zero, .. } = *parameter;
-                return Err(LawError { law: info.name, key, dimension, may_be_zero, value });
-            }
-        }
-        Ok(())
+        parameter::check(self.info(), &self.values())?;
+        self.consistent().map_err(|message| LawError::Inconsistent { law: self.name(), message })
     }
 }
 
-impl LawInfo {
-    /// Builds the law from values by key (SI).
-    ///
-    /// # Errors
-    /// The keys that are missing, or a value that is not finite or out of its range.
-    ///
-    /// # Example
-    /// ```
-    /// use std::collections::BTreeMap;
-    /// let row = stickslip::law::find("coulomb").unwrap();
-    /// let law = row.build(&BTreeMap::from([("limit", 2.0)])).unwrap();
-    /// assert_eq!(law.values(), [2.0]);
-    /// ```
-    pub fn build(&self, values: &BTreeMap<&str, f64>) -> Result<Law, BuildError> {
-        let missing: Vec<&'static str> =
-            self.parameters.iter().map(|p| p.key).filter(|key| !values.contains_key(key)).collect();
-        if !missing.is_empty() {
-            return Err(BuildError::Missing { law: self.name, keys: missing });
-        }
-        let ordered: Vec<f64> = self.parameters.iter().map(|p| values[p.key]).collect();
-        let law = (self.build)(&ordered);
-        law.check()?;
-        Ok(law)
+impl PartialEq for dyn Law + '_ {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self.info(), other.info()) && self.values() == other.values()
     }
 }
 
-/// Why a law could not be built.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum BuildError {
-    /// Parameters are missing.
-    #[error("law `{law}` needs {}", .keys.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", "))]
-    Missing {
-        /// Name of the law.
-        law: &'static str,
-        /// The keys that are missing.
-        keys: Vec<&'static str>,
-    },
-    /// A value is refused.
-    #[error(transparent)]
-    Value(#[from] LawError),
-}
-
-/// The row of [`TABLE`] with this name.
-pub fn find(name: &str) -> Option<&'static LawInfo> {
-    TABLE.iter().find(|row| row.name == name)
+impl Serialize for dyn Law + '_ {
+    /// As in a study file, in SI: `{ kind = …, KEY = … }`.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let (info, values) = (self.info(), self.values());
+        let mut map = serializer.serialize_map(Some(1 + values.len()))?;
+        map.serialize_entry("kind", info.name)?;
+        for (parameter, value) in info.parameters.iter().zip(values) {
+            map.serialize_entry(parameter.key, &value)?;
+        }
+        map.end()
+    }
 }

@@ -29,9 +29,9 @@ pub struct Auto;
 
 impl Auto {
     fn chosen(system: &System) -> (Box<dyn Method>, String) {
-        let joints = system.joints.len();
-        let exact = system.joints.iter().all(|joint| joint.law.network().is_some());
-        let smooth = system.joints.iter().all(|joint| joint.law.rate().is_some());
+        let joints = system.joints().len();
+        let exact = system.joints().iter().all(|joint| joint.law().sliders().is_some());
+        let smooth = system.joints().iter().all(|joint| joint.law().rate().is_some());
         if joints > FOLLOWED {
             let because = format!("{joints} joints are more than {FOLLOWED}");
             (Box::new(HarmonicBalance::default()), because)

@@ -25,8 +25,8 @@ impl Drive {
         let n = system.dofs();
         let excitation = system.excitation(omega);
         let mut harmonics: Vec<u32> = excitation.iter().map(|(h, _)| *h).collect();
-        harmonics.extend(system.joints.iter().flat_map(|joint| joint.imposed.iter().map(|(h, _)| *h)));
-        harmonics.extend(system.moved.iter().flat_map(|place| place.motion.iter().map(|(h, _)| *h)));
+        harmonics.extend(system.joints().iter().flat_map(|joint| joint.axes().iter().flat_map(|axis| axis.imposed()).map(|(h, _)| *h)));
+        harmonics.extend(system.moved().iter().flat_map(|place| place.motion.iter().map(|(h, _)| *h)));
         harmonics.sort_unstable();
         harmonics.dedup();
         harmonics.retain(|&h| h > 0);
@@ -36,8 +36,7 @@ impl Drive {
             contacts
                 .iter()
                 .map(|&joint| {
-                    let imposed = &system.joints[joint].imposed;
-                    imposed.iter().find(|(k, _)| *k == h).map_or(Complex64::new(0.0, 0.0), |(_, g)| *g)
+                    system.joints()[joint].axes()[0].imposed_at(h)
                 })
                 .collect()
         };

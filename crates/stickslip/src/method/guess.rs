@@ -23,18 +23,18 @@ impl Guess {
         let n = system.dofs();
         let excitation = system.excitation(omega);
         let mut harmonics: Vec<u32> = excitation.iter().map(|(h, _)| *h).collect();
-        harmonics.extend(system.joints.iter().flat_map(|joint| joint.imposed.iter().map(|(h, _)| *h)));
+        harmonics.extend(system.joints().iter().flat_map(|joint| joint.axes().iter().flat_map(|axis| axis.imposed()).map(|(h, _)| *h)));
         harmonics.sort_unstable();
         harmonics.dedup();
-        let mut amplitudes = vec![f64::INFINITY; system.joints.len()];
-        let mut guess = Guess { harmonics: Vec::new(), joints: vec![Complex64::new(0.0, 0.0); system.joints.len()] };
+        let mut amplitudes = vec![f64::INFINITY; system.joints().len()];
+        let mut guess = Guess { harmonics: Vec::new(), joints: vec![Complex64::new(0.0, 0.0); system.joints().len()] };
         for _ in 0..ROUNDS {
             guess.joints = system
-                .joints
+                .joints()
                 .iter()
                 .zip(&amplitudes)
                 .map(
-                    |(joint, &a)| if a.is_finite() { joint.law.linearised(a, omega) } else { Complex64::new(0.0, 0.0) },
+                    |(joint, &a)| if a.is_finite() { joint.law().linearised(a, omega) } else { Complex64::new(0.0, 0.0) },
                 )
                 .collect();
             guess.harmonics = harmonics
@@ -48,14 +48,14 @@ impl Guess {
                 })
                 .collect();
             let mut settled = true;
-            for (j, joint) in system.joints.iter().enumerate() {
+            for (j, joint) in system.joints().iter().enumerate() {
                 let size: f64 = harmonics
                     .iter()
                     .zip(&guess.harmonics)
                     .filter(|(h, _)| **h > 0)
                     .map(|(h, (_, x))| {
-                        let u: Complex64 = (0..n).map(|i| x[i] * joint.direction[(i, 0)]).sum();
-                        (u + joint.imposed.iter().find(|(k, _)| k == h).map_or(Complex64::new(0.0, 0.0), |(_, g)| *g))
+                        let u: Complex64 = joint.axes()[0].along_complex(&x);
+                        (u + joint.axes()[0].imposed_at(*h))
                             .norm()
                     })
                     .sum();
@@ -77,11 +77,11 @@ impl Guess {
         }
         let s = Complex64::new(0.0, f64::from(h) * omega);
         let mut dynamic = DMatrix::from_fn(n, n, |i, k| {
-            s * s * system.mass[(i, k)] + s * system.damping[(i, k)] + system.stiffness[(i, k)]
+            s * s * system.structure().mass()[(i, k)] + s * system.structure().damping()[(i, k)] + system.structure().stiffness()[(i, k)]
         });
-        for (joint, &kappa) in system.joints.iter().zip(&self.joints) {
-            let w = joint.direction.column(0);
-            let g = joint.imposed.iter().find(|(k, _)| *k == h).map_or(Complex64::new(0.0, 0.0), |(_, g)| *g);
+        for (joint, &kappa) in system.joints().iter().zip(&self.joints) {
+            let w = joint.axes()[0].dense(n);
+            let g = joint.axes()[0].imposed_at(h);
             for i in 0..n {
                 force[i] -= kappa * g * w[i];
                 for k in 0..n {

@@ -14,8 +14,6 @@ pub mod shooting;
 mod smooth;
 pub mod transient;
 
-pub use event_driven::Contact;
-
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::Orbit;

@@ -88,7 +88,7 @@ impl Method for Settling {
         // an odd system returns twice a period
         let returns = if system.is_odd() { 2 * self.periods } else { self.periods };
         let search = Search::Settle { tolerance: self.tolerance, returns };
-        let exact = self.width.is_none() && system.joints.iter().all(|joint| joint.law.network().is_some());
+        let exact = self.width.is_none() && system.joints().iter().all(|joint| joint.law().sliders().is_some());
         if exact {
             return Ok(Box::new(Exact::new(system, NAME, search)?));
         }

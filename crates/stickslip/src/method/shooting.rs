@@ -69,7 +69,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// use stickslip::law::{CoulombArctan, Law};
 /// use stickslip::method::{Method, shooting::Shooting};
 /// let mut model = stickslip::model::templates::find("blade-couple").unwrap().model();
-/// model.joints[0].law = Law::CoulombArctan(CoulombArctan { limit: 2.0, alpha: 25e3 });
+/// model.joints[0].law = Arc::new(CoulombArctan { limit: 2.0, alpha: 25e3 });
 /// let system = model.assemble().unwrap();
 /// let orbit = Shooting::default().solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25, None).unwrap();
 /// assert!(orbit.evidence.residual < 1e-9);
@@ -125,7 +125,7 @@ impl<'a> Smooth<'a> {
     pub fn new(system: &'a System, options: Shooting, name: &'static str, search: Search) -> Result<Self, MethodError> {
         let structure = Structure::new(system, options.width, name)?;
         let weights = vec![1.0; structure.states()];
-        let owners = (0..system.joints.len()).collect();
+        let owners = (0..system.joints().len()).collect();
         let flow = SmoothFlow::new(structure, options.tolerance);
         // smooth neighbours are passive where the exact laws are
         let contracts = system.contracts();

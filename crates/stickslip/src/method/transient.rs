@@ -91,9 +91,9 @@ impl Transient {
     /// use stickslip::method::transient::{Excitation, Transient};
     /// use stickslip::model::{GROUND, Joint, Mass, Model, Spring};
     /// let model = Model {
-    ///     masses: vec![Mass { name: "m".into(), mass: 1.0 }],
+    ///     masses: vec![Mass::new("m", 1.0)],
     ///     springs: vec![Spring { between: ["m".into(), GROUND.into()], stiffness: 1.0, damping: 0.0 }],
-    ///     joints: vec![Joint { name: "j".into(), between: ["m".into(), GROUND.into()], law: Law::Coulomb(Coulomb { limit: 0.01 }) }],
+    ///     joints: vec![Joint { name: "j".into(), between: ["m".into(), GROUND.into()], law: Arc::new(Coulomb { limit: 0.01 }) }],
     ///     ..Model::default()
     /// };
     /// let motion = Transient { displacement: vec![1.0], velocity: vec![0.0], excitation: Excitation::Free,
@@ -107,7 +107,7 @@ impl Transient {
         system: &System,
         sample: &mut dyn FnMut(f64, f64, &Sample) -> bool,
     ) -> Result<(), TransientError> {
-        let exact = self.width.is_none() && system.joints.iter().all(|joint| joint.law.network().is_some());
+        let exact = self.width.is_none() && system.joints().iter().all(|joint| joint.law().sliders().is_some());
         let (mut runner, contacts) = if exact {
             let mechanics = Mechanics::new(system)?;
             let owners = mechanics.owners();
@@ -116,7 +116,7 @@ impl Transient {
             let structure = Structure::new(system, self.width, NAME)?;
             let mut flow = SmoothFlow::new(structure, TOLERANCE);
             flow.record = true;
-            (Runner::Smooth(Box::new(flow)), (0..system.joints.len()).collect())
+            (Runner::Smooth(Box::new(flow)), (0..system.joints().len()).collect())
         };
         let mut state = [self.displacement.as_slice(), &self.velocity].concat();
         state.resize(runner.states(), 0.0);
@@ -215,7 +215,7 @@ mod tests {
     fn a_run_up_has_the_phase_of_its_frequency() {
         let between = || ["m".to_owned(), GROUND.to_owned()];
         let model = Model {
-            masses: vec![Mass { name: "m".into(), mass: 1.0 }],
+            masses: vec![Mass::new("m", 1.0)],
             springs: vec![Spring { between: between(), stiffness: 1e4, damping: 2.0 }],
             forces: vec![Force { on: "m".into(), amplitude: 5.0, phase: 0.0, harmonic: 1 }],
             ..Model::default()

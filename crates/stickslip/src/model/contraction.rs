@@ -26,17 +26,17 @@ impl System {
     /// ```
     /// let mut system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
     /// assert!(system.contracts());
-    /// system.damping[(0, 0)] = -0.1;
+    /// system.structure().damping()[(0, 0)] = -0.1;
     /// assert!(!system.contracts());
     /// ```
     pub fn contracts(&self) -> bool {
-        if !self.joints.iter().all(|joint| joint.law.is_incrementally_passive()) {
+        if !self.joints().iter().all(|joint| joint.law().is_incrementally_passive()) {
             return false;
         }
         // a part of the damping that only turns velocities takes no power
-        let damping = (&self.damping + self.damping.transpose()) * 0.5;
+        let damping = (self.structure().damping() + self.structure().damping().transpose()) * 0.5;
         let (Some(rank), Some(_), Some(_)) =
-            (semidefinite(&self.mass), semidefinite(&damping), semidefinite(&self.stiffness))
+            (semidefinite(self.structure().mass()), semidefinite(&damping), semidefinite(self.structure().stiffness()))
         else {
             return false;
         };
@@ -44,7 +44,7 @@ impl System {
         rank == n || {
             // each with its own unit: what one of them holds is held
             let share = |matrix: &nalgebra::DMatrix<f64>| matrix / matrix.amax().max(f64::MIN_POSITIVE);
-            semidefinite(&(share(&self.mass) + share(&damping) + share(&self.stiffness))) == Some(n)
+            semidefinite(&(share(self.structure().mass()) + share(&damping) + share(self.structure().stiffness()))) == Some(n)
         }
     }
 }
@@ -61,7 +61,7 @@ mod tests {
             stiffness,
             damping,
         });
-        let mass = |name: &str, mass: f64| Mass { name: name.into(), mass };
+        let mass = |name: &str, mass: f64| Mass::new(name, mass);
         Model {
             masses: vec![mass("a", masses[0]), mass("b", masses[1])],
             springs: springs.collect(),

@@ -5,21 +5,23 @@
 mod assemble;
 mod contraction;
 mod survey;
+mod system;
 pub mod templates;
 
-pub use assemble::{Element, Load, ModelError, MovedPlace, System, SystemJoint, is_identifier};
+pub use assemble::{Element, ModelError, is_identifier};
 pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey};
+pub use system::{Axis, Load, MovedPlace, System, SystemBuilder, SystemError, SystemJoint};
 
-use crate::law::Law;
-use serde::{Deserialize, Serialize};
+use crate::law::SharedLaw;
+use serde::Serialize;
 
 /// Name of the fixed frame.
 pub const GROUND: &str = "ground";
 
 /// A structure with joints and its excitation, as stated by the user; all values SI.
 ///
-/// A place is a mass, [`GROUND`], or a place that is moved (see [`Motion`]).
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+/// A place is a mass, a direction of one (`name.direction`), [`GROUND`], or a place that is moved (see [`Motion`]).
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Model {
     /// Point masses; each is one degree of freedom.
     pub masses: Vec<Mass>,
@@ -33,17 +35,33 @@ pub struct Model {
     pub motions: Vec<Motion>,
 }
 
-/// A point mass with one displacement.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// A point mass. It has one displacement and is a place, or several, and then is a node with a place `name.direction` for each.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mass {
     /// Identifier.
     pub name: String,
     /// Mass, kg.
     pub mass: f64,
+    /// Its directions if it is a node, at most three, in the order in which laws take them; a normal is the last.
+    pub directions: Vec<String>,
+}
+
+impl Mass {
+    /// A mass with one displacement.
+    pub fn new(name: impl Into<String>, mass: f64) -> Self {
+        Mass { name: name.into(), mass, directions: Vec::new() }
+    }
+
+    /// The same mass free to move along several directions.
+    #[must_use]
+    pub fn along(mut self, directions: &[&str]) -> Self {
+        self.directions = directions.iter().map(|&along| along.to_owned()).collect();
+        self
+    }
 }
 
 /// A spring, with a viscous damper in parallel to it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spring {
     /// The two places it joins.
     pub between: [String; 2],
@@ -53,20 +71,26 @@ pub struct Spring {
     pub damping: f64,
 }
 
-/// Two places that rub: `u` is the displacement of the first minus that of the second, and the law's force `f` acts on the
+/// Two places or nodes that rub or touch: along each direction `u` is the displacement of the first minus that of the second, and the law's force `f` acts on the
 /// first as `-f`, on the second as `+f`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Joint {
     /// Identifier.
     pub name: String,
     /// The two places.
     pub between: [String; 2],
     /// Friction law.
-    pub law: Law,
+    pub law: SharedLaw,
+}
+
+impl PartialEq for Joint {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name && self.between == other.between && *self.law == *other.law
+    }
 }
 
 /// A force `amplitude · cos(harmonic · Ω t + phase)`; a harmonic 0 makes it constant.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Force {
     /// The mass it acts on.
     pub on: String,
@@ -80,7 +104,7 @@ pub struct Force {
 
 /// An imposed motion `amplitude · cos(harmonic · Ω t + phase)` of a place. The place is either one that exists only by this
 /// motion, or a mass, which then is no degree of freedom any more. Several motions of one place add up.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Motion {
     /// The place that is moved.
     pub on: String,

@@ -102,8 +102,8 @@ enum Hold {
 }
 
 impl Hold {
-    fn of(law: &Law) -> Hold {
-        let Some(branches) = law.network() else { return Hold::smooth(law) };
+    fn of(law: &dyn Law) -> Hold {
+        let Some(branches) = law.sliders() else { return Hold::smooth(law) };
         let branches = || branches.iter().filter(|branch| branch.limit > 0.0);
         let rigid = branches().filter(|branch| branch.stiffness.is_none()).map(|branch| branch.limit);
         if let Some(limit) = rigid.reduce(|a, b| a + b) {
@@ -117,8 +117,8 @@ impl Hold {
 
     /// A smooth law: the spring that it is in small motion, or rigid where its resistance is viscous. The steeper its
     /// slope, the nearer it is to that.
-    fn smooth(law: &Law) -> Hold {
-        let (limit, stiffness) = (law.limit(), law.linearised(SMALL, 1.0).re);
+    fn smooth(law: &dyn Law) -> Hold {
+        let (limit, stiffness) = (law.scale(), law.linearised(SMALL, 1.0).re);
         match (limit > 0.0, stiffness > 0.0) {
             (false, _) => Hold::Nothing,
             (true, true) => Hold::Spring { stiffness, limit, displacement: limit / stiffness },
@@ -180,7 +180,7 @@ impl Model {
     /// ```
     pub fn survey(&self) -> Result<Survey, ModelError> {
         let system = self.assemble()?;
-        let index: HashMap<&str, usize> = system.places.iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
+        let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
         let ends = |between: &[String; 2]| -> Vec<(usize, f64)> {
             let ends = between.iter().zip([1.0, -1.0]);
             ends.filter_map(|(name, sign)| Some((*index.get(name.as_str())?, sign))).collect()
@@ -191,8 +191,8 @@ impl Model {
             .map(|s| Link { at: ends(&s.between), stiffness: s.stiffness, damping: s.damping })
             .filter(|link| !link.at.is_empty())
             .collect();
-        let joints: Vec<Stuck> = system.joints.iter().map(Stuck::new).collect();
-        let mass: Vec<f64> = system.mass.diagonal().iter().copied().collect();
+        let joints: Vec<Stuck> = system.joints().iter().map(Stuck::new).collect();
+        let mass: Vec<f64> = system.structure().mass().diagonal().iter().copied().collect();
         let loose = self.loose(&joints);
         if system.dofs() > LARGEST {
             let unknown = || Linear { modes: Modes { lost: mass.len(), ..Modes::default() }, shapes: None };
@@ -253,9 +253,8 @@ impl Model {
 
 impl Stuck {
     fn new(joint: &SystemJoint) -> Self {
-        let column = joint.direction.column(0);
-        let at = column.iter().enumerate().filter(|(_, w)| **w != 0.0).map(|(i, w)| (i, *w)).collect();
-        Stuck { name: joint.name.clone(), at, hold: Hold::of(&joint.law) }
+        let at = joint.axes()[0].rows().to_vec();
+        Stuck { name: joint.name().to_owned(), at, hold: Hold::of(&**joint.law()) }
     }
 }
 
@@ -643,7 +642,7 @@ impl Survey {
         let motion = |joint: &Stuck| joint.at.iter().map(|(i, w)| w * shape[*i]).sum::<f64>();
         let (n, rigid) = (self.dofs(), self.rigid());
         // the constraint forces balance what springs and inertia leave: W f = ω²Mφ - Kφ - W k u
-        let mut rest = &self.system.mass * &shape * (omega * omega) - &self.system.stiffness * &shape;
+        let mut rest = self.system.structure().mass() * &shape * (omega * omega) - self.system.structure().stiffness() * &shape;
         for joint in &self.joints {
             if let Hold::Spring { stiffness, .. } = joint.hold {
                 let force = stiffness * motion(joint);
@@ -746,19 +745,16 @@ impl Survey {
         let mut b = DVector::<Complex64>::zeros(n + rigid.len());
         for i in 0..n {
             for j in 0..n {
-                let real = system.stiffness[(i, j)] - w * w * system.mass[(i, j)];
-                a[(i, j)] = Complex64::new(real, w * system.damping[(i, j)]);
+                let real = system.structure().stiffness()[(i, j)] - w * w * system.structure().mass()[(i, j)];
+                a[(i, j)] = Complex64::new(real, w * system.structure().damping()[(i, j)]);
             }
         }
-        if let Some(load) = system.loads.iter().find(|load| load.harmonic == h) {
+        if let Some(load) = system.loads().iter().find(|load| load.harmonic == h) {
             for i in 0..n {
                 b[i] = load.force[i] + Complex64::new(0.0, w) * load.by_velocity[i];
             }
         }
-        let imposed = |joint: usize| {
-            let motion = &system.joints[joint].imposed;
-            motion.iter().find(|(harmonic, _)| *harmonic == h).map_or(Complex64::ZERO, |(_, amplitude)| *amplitude)
-        };
+        let imposed = |joint: usize| system.joints()[joint].axes()[0].imposed_at(h);
         for (index, joint) in self.joints.iter().enumerate() {
             if let Hold::Spring { stiffness, .. } = joint.hold {
                 for (i, wi) in &joint.at {
@@ -853,16 +849,16 @@ mod tests {
     #[test]
     fn laws_hold_as_they_do_in_small_motion() {
         let spring = Hold::Spring { stiffness: 1e4, limit: 2.0, displacement: 2e-4 };
-        assert_eq!(Hold::of(&Law::Jenkins(Jenkins { stiffness: 1e4, limit: 2.0 })), spring);
-        assert_eq!(Hold::of(&Law::JenkinsArctan(JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 })), spring);
-        assert_eq!(Hold::of(&Law::Coulomb(Coulomb { limit: 2.0 })), Hold::Rigid { limit: 2.0 });
+        assert_eq!(Hold::of(&Arc::new(Jenkins { stiffness: 1e4, limit: 2.0 })), spring);
+        assert_eq!(Hold::of(&Arc::new(JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 })), spring);
+        assert_eq!(Hold::of(&Arc::new(Coulomb { limit: 2.0 })), Hold::Rigid { limit: 2.0 });
         assert_eq!(
-            Hold::of(&Law::CoulombArctan(CoulombArctan { limit: 2.0, alpha: 25e3 })),
+            Hold::of(&Arc::new(CoulombArctan { limit: 2.0, alpha: 25e3 })),
             Hold::Rigid { limit: 2.0 }
         );
         // without a limit a joint is a free reference
-        assert_eq!(Hold::of(&Law::Jenkins(Jenkins { stiffness: 1e4, limit: 0.0 })), Hold::Nothing);
-        assert_eq!(Hold::of(&Law::Coulomb(Coulomb { limit: 0.0 })), Hold::Nothing);
+        assert_eq!(Hold::of(&Arc::new(Jenkins { stiffness: 1e4, limit: 0.0 })), Hold::Nothing);
+        assert_eq!(Hold::of(&Arc::new(Coulomb { limit: 0.0 })), Hold::Nothing);
     }
 
     #[test]

@@ -5,7 +5,8 @@
 
 mod stability;
 
-pub use crate::method::Contact;
+pub use crate::law::Contact;
+use crate::law::MOST_DIRECTIONS;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 pub use stability::Stability;
@@ -83,8 +84,8 @@ pub struct JointMotion {
     pub dissipation: f64,
     /// Fraction of the period in which the joint slips.
     pub slip_fraction: f64,
-    /// Largest and smallest relative displacement, m.
-    pub displacement: (f64, f64),
+    /// Smallest and largest relative displacement along each of its directions, m.
+    pub displacement: Vec<(f64, f64)>,
     /// Changes between stick and slip, or of the slip direction, per period.
     pub switches: usize,
 }
@@ -160,14 +161,27 @@ pub struct Sample {
 /// A joint at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointSample {
-    /// Relative displacement, m.
-    pub displacement: f64,
+    /// Relative displacement, m; along the joint's directions, as many as it has, like all that follows.
+    pub displacement: [f64; MOST_DIRECTIONS],
     /// Relative velocity, m/s.
-    pub velocity: f64,
-    /// Friction force, N.
-    pub force: f64,
-    /// Stick or slip.
+    pub velocity: [f64; MOST_DIRECTIONS],
+    /// Force, N.
+    pub force: [f64; MOST_DIRECTIONS],
+    /// Stick, slip or apart.
     pub contact: Contact,
+}
+
+impl JointSample {
+    /// Of a joint with one direction.
+    pub fn along(displacement: f64, velocity: f64, force: f64, contact: Contact) -> Self {
+        let first = |value: f64| [value, 0.0, 0.0];
+        JointSample { displacement: first(displacement), velocity: first(velocity), force: first(force), contact }
+    }
+
+    /// Power that the joint takes, W.
+    pub fn power(&self) -> f64 {
+        self.force.iter().zip(self.velocity).map(|(f, v)| f * v).sum()
+    }
 }
 
 /// A motion that can be evaluated at any time of its period.

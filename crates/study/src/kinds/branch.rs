@@ -227,18 +227,18 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     };
     let (system, places) = (&prepared.system, peak_places(&prepared));
     let (outer, along) = split(drawing.study, &prepared.case.varied);
-    let column = |place: usize| format!("{}_amplitude_m", system.places[place]);
+    let column = |place: usize| format!("{}_amplitude_m", system.places()[place]);
     let (y, factor) = drawing.axis(1, "amplitude", largest(table, (0..system.dofs()).map(column)), "m");
     let (name, _) = axis(along);
     let along_unit = along.map_or("Hz".to_owned(), |parameter| parameter.on_axis().1);
     let stretches = drawing.stretches_of(table, outer.len());
     let one = stretches.len() == 1;
-    let names: Vec<&str> = places.iter().map(|place| system.places[*place].as_str()).collect();
+    let names: Vec<&str> = places.iter().map(|place| system.places()[*place].as_str()).collect();
     let y = if one { y } else { Axis { quantity: format!("amplitude of {}", names.join(", ")), ..y } };
     // of several branches the masses whose peaks count are shown, the largest amplitude of them
     let shown: Vec<Vec<usize>> = match one {
         true => {
-            (0..system.dofs()).filter(|place| drawing.shows(&system.places[*place])).map(|place| vec![place]).collect()
+            (0..system.dofs()).filter(|place| drawing.shows(system.places()[*place])).map(|place| vec![place]).collect()
         }
         false => vec![places],
     };
@@ -248,7 +248,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     for stretch in &stretches {
         for places in &shown {
             let label =
-                if one { system.places[places[0]].clone() } else { varied_text(&stretch.varied[..outer.len()]) };
+                if one { system.places()[places[0]].clone() } else { varied_text(&stretch.varied[..outer.len()]) };
             let mut from = stretch.rows.start;
             // unstable stretches are dashed; each begins at the last point of the one before
             for run in unstable[stretch.rows.clone()].chunk_by(|a, b| a == b) {

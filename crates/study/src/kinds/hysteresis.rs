@@ -116,7 +116,7 @@ impl Source {
     fn read(&self, sample: &Sample) -> (f64, f64) {
         let (displacement, force) = match &self.force {
             Of::Joints(joints) => {
-                let force = joints.iter().map(|j| sample.joints[*j].force).sum();
+                let force = joints.iter().map(|j| sample.joints[*j].force[0]).sum();
                 (sample.joints[joints[0]].displacement, force)
             }
             Of::Moved(m) => sample.moved[*m],
@@ -170,22 +170,22 @@ fn compute(work: &Work<'_>) -> Computed {
 /// The loops that the study asks for.
 fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
     let (system, values) = (&prepared.system, &prepared.case.values);
-    let against = values.text("against").and_then(|name| system.places.iter().position(|place| place == name));
-    let all = || system.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
+    let against = values.text("against").and_then(|name| system.places().iter().position(|place| place == name));
+    let all = || system.joints().iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
     let mut names = values.names("loop").map_or_else(all, <[String]>::to_vec);
     if names.is_empty() {
-        names = system.moved.iter().map(|place| place.name.clone()).collect();
+        names = system.moved().iter().map(|place| place.name.clone()).collect();
     }
-    let joint = |name: &String| system.joints.iter().position(|joint| joint.name == *name);
+    let joint = |name: &String| system.joints().iter().position(|joint| joint.name == *name);
     if values.flag("sum") == Some(true) {
         let joints: Vec<usize> = names.iter().filter_map(joint).collect();
-        let name = joints.iter().map(|j| system.joints[*j].name.as_str()).collect::<Vec<_>>().join(" + ");
+        let name = joints.iter().map(|j| system.joints()[*j].name.as_str()).collect::<Vec<_>>().join(" + ");
         let sum = (name, Source { force: Of::Joints(joints.clone()), against });
         return if joints.is_empty() { Vec::new() } else { vec![sum] };
     }
     let find = |name: &String| {
         let joint = joint(name).map(|joint| Of::Joints(vec![joint]));
-        joint.or_else(|| system.moved.iter().position(|place| place.name == *name).map(Of::Moved))
+        joint.or_else(|| system.moved().iter().position(|place| place.name == *name).map(Of::Moved))
     };
     names.iter().filter_map(|name| Some((name.clone(), Source { force: find(name)?, against }))).collect()
 }
@@ -195,7 +195,7 @@ fn exact_loss(prepared: &Prepared, orbit: &Orbit, source: &Source) -> Option<f64
     match &source.force {
         _ if source.against.is_some() => None,
         Of::Joints(joints) => Some(joints.iter().map(|j| orbit.joints[*j].dissipation).sum()),
-        Of::Moved(_) if prepared.system.moved.len() == 1 && prepared.case.model.forces.is_empty() => {
+        Of::Moved(_) if prepared.system.moved().len() == 1 && prepared.case.model.forces.is_empty() => {
             Some(orbit.energy.work_in)
         }
         Of::Moved(_) => None,

@@ -106,7 +106,7 @@ fn compute(work: &Work<'_>) -> Computed {
         rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
         rows.number("frequency_Hz", hertz(point.omega));
         rows.number("damping_ratio", point.damping);
-        for (place, amplitude) in prepared.system.places.iter().zip(&point.places) {
+        for (place, amplitude) in prepared.system.places().iter().zip(&point.places) {
             rows.number(&format!("{place}_amplitude_m"), *amplitude);
         }
         rows.integer("stretch", stretch);
@@ -132,7 +132,7 @@ fn number(prepared: &Prepared) -> usize {
 
 /// Modal amplitude of a unit displacement of the place that moves most, m √kg per m.
 fn unit(prepared: &Prepared) -> f64 {
-    prepared.system.modal_unit(number(prepared))
+    prepared.system.structure().modal_unit(number(prepared))
 }
 
 fn follow(prepared: &Prepared) -> Result<Mode, MethodError> {
@@ -217,7 +217,7 @@ fn remarks(prepared: &Prepared, mode: &Mode) -> Vec<String> {
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(table), Some(system)) = (drawing.table("modes"), drawing.system()) else { return Figure::default() };
     let column = |place: &String| format!("{place}_amplitude_m");
-    let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, system.places.iter().map(column)), "m");
+    let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, system.places().iter().map(column)), "m");
     let stretches = drawing.stretches(table);
     let parts = match table.columns.iter().find(|column| column.name == "stretch").map(|column| &column.values) {
         Some(Cells::Integer(parts)) => parts.clone(),
@@ -233,7 +233,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             .flat_map(|(colour, stretch)| {
                 let at_last = |place: &&String| numbers(table, &column(place), stretch.rows.clone()).last().copied();
                 let moves = |place: &&String| at_last(place).unwrap_or(0.0);
-                let Some(widest) = system.places.iter().max_by(|a, b| moves(a).total_cmp(&moves(b))) else {
+                let Some(widest) = system.places().iter().max_by(|a, b| moves(a).total_cmp(&moves(b))) else {
                     return Vec::new();
                 };
                 let label = if stretch.varied.is_empty() { widest.clone() } else { stretch.label() };

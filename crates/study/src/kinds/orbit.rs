@@ -120,11 +120,11 @@ fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
 
 /// The cells of one instant.
 pub(super) fn write_sample(prepared: &Prepared, sample: &Sample, rows: &mut Rows) {
-    for (i, place) in prepared.system.places.iter().enumerate() {
+    for (i, place) in prepared.system.places().iter().enumerate() {
         rows.number(&format!("{place}_displacement_m"), sample.displacement[i]);
         rows.number(&format!("{place}_velocity_m_per_s"), sample.velocity[i]);
     }
-    for (joint, state) in prepared.system.joints.iter().zip(&sample.joints) {
+    for (joint, state) in prepared.system.joints().iter().zip(&sample.joints) {
         rows.number(&format!("{}_displacement_m", joint.name), state.displacement);
         rows.number(&format!("{}_velocity_m_per_s", joint.name), state.velocity);
         rows.number(&format!("{}_force_N", joint.name), state.force);
@@ -171,11 +171,11 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 }
             };
             if system.dofs() > 0 {
-                let names = system.places.iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
+                let names = system.places().iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
                 panels.push(panel("displacement", "m", names, "displacement_m", 0));
             }
-            if !system.joints.is_empty() {
-                let names = system.joints.iter().map(|j| j.name.as_str()).filter(|name| drawing.shows(name)).collect();
+            if !system.joints().is_empty() {
+                let names = system.joints().iter().map(|j| j.name.as_str()).filter(|name| drawing.shows(name)).collect();
                 panels.push(panel("joint force", "N", names, "force_N", system.dofs()));
             }
         }

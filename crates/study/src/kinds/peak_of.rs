@@ -32,7 +32,7 @@ pub(super) fn check_peak_of(values: &Values, model: &Model) -> Result<(), Compla
 /// The places that the key names; none if it is absent.
 pub(super) fn named_places(prepared: &Prepared) -> Vec<usize> {
     let names = prepared.case.values.names("peak_of").unwrap_or_default();
-    let places = &prepared.system.places;
+    let places = &prepared.system.places();
     if names.iter().any(|name| name == ALL) && !places.iter().any(|place| place == ALL) {
         return (0..places.len()).collect();
     }
@@ -46,7 +46,7 @@ pub(super) fn peak_places(prepared: &Prepared) -> Vec<usize> {
         return named;
     }
     let driven = prepared.case.model.forces.first().map(|force| &force.on);
-    let driven = driven.and_then(|name| prepared.system.places.iter().position(|place| place == name));
+    let driven = driven.and_then(|name| prepared.system.places().iter().position(|place| place == name));
     vec![driven.unwrap_or(0)]
 }
 

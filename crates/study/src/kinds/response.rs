@@ -116,13 +116,13 @@ fn compute(work: &Work<'_>) -> Computed {
         for found in peaks_of(work, points).map_err(|error| (case.index, error))? {
             if found.peak.unsettled {
                 let at =
-                    || format!("peak of {}, {}", prepared.system.places[found.mass], place_of(case, found.peak.omega));
+                    || format!("peak of {}, {}", prepared.system.places()[found.mass], place_of(case, found.peak.omega));
                 let reason = "orbits beside this peak were not found, and the real one may be higher: much higher with little or \
                               no damping, or where friction cannot bound the motion; look closer with a finer range or another method";
                 part.count(at, "peak-unsettled", Some(reason.to_owned()));
             }
             peaks.varied(case);
-            peaks.text("mass", &prepared.system.places[found.mass]);
+            peaks.text("mass", &prepared.system.places()[found.mass]);
             peaks.number("frequency_Hz", hertz(found.peak.omega));
             peaks.number("amplitude_m", found.peak.value);
             peaks.flag("at_range_end", Some(found.peak.at_end));
@@ -334,7 +334,7 @@ fn references(work: &Work<'_>, omegas: &[f64]) -> Result<Rows, MethodError> {
     for (i, omega) in omegas.iter().enumerate() {
         rows.number("frequency_Hz", hertz(*omega));
         for (what, (_, curve)) in ["free", "stuck"].iter().zip(&systems) {
-            for (place, name) in prepared.system.places.iter().enumerate() {
+            for (place, name) in prepared.system.places().iter().enumerate() {
                 let orbit = curve.get(i).and_then(|orbit| orbit.as_ref());
                 let amplitude = orbit.map_or(f64::NAN, |orbit| orbit.places[place].amplitude());
                 rows.number(&format!("{name}_{what}_amplitude_m"), amplitude);
@@ -437,11 +437,11 @@ fn join(parts: impl IntoIterator<Item = String>) -> String {
 
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(curve), Some(system)) = (drawing.table("curve"), drawing.system()) else { return Figure::default() };
-    let places = system.places.iter().cloned().zip(0..);
+    let places = system.places().iter().cloned().zip(0..);
     let shown: Vec<(String, usize)> = places.filter(|(name, _)| drawing.shows(name)).collect();
     let force = |joint: &str| format!("{joint}_force_amplitude_N");
     // with `output = "joint_force"` only
-    let names = system.joints.iter().map(|joint| joint.name.as_str());
+    let names = system.joints().iter().map(|joint| joint.name.as_str());
     let joints: Vec<&str> = names.filter(|name| drawing.shows(name) && curve.numbers(&force(name)).is_some()).collect();
     if shown.is_empty() && joints.is_empty() {
         return Figure::default();
@@ -462,8 +462,8 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         };
         (of("frequency_Hz", x_factor), of(&force(joint), force_factor))
     };
-    let heaviest = system.mass.diagonal().max();
-    let light = |place: usize| system.mass[(place, place)] < LIGHT * heaviest;
+    let heaviest = system.structure().mass().diagonal().max();
+    let light = |place: usize| system.structure().mass()[(place, place)] < LIGHT * heaviest;
     let single = drawn.shown.len() <= SINGLE;
     let mut panels = Vec::new();
     if layout == Layout::Cases {
@@ -544,7 +544,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     }
     for group in stretches.chunk_by(|a, b| outer(a) == outer(b)) {
         for joint in &joints {
-            let named = Some((*joint).to_owned()).filter(|_| joints.len() > 1 || system.joints.len() > 1);
+            let named = Some((*joint).to_owned()).filter(|_| joints.len() > 1 || system.joints().len() > 1);
             let mut panel = force_panel(join(named.into_iter().chain([outer(&group[0])])));
             for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
                 let (x, y) = force_line(stretch, joint);

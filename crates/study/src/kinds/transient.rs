@@ -191,7 +191,7 @@ fn compute(work: &Work<'_>) -> Computed {
     };
     let initial = |key: &str| -> Vec<f64> {
         let given = values.by_name(key);
-        prepared.system.places.iter().map(|p| given.and_then(|g| g.get(p)).copied().unwrap_or(0.0)).collect()
+        prepared.system.places().iter().map(|p| given.and_then(|g| g.get(p)).copied().unwrap_or(0.0)).collect()
     };
     let mut part = Part::default();
     let (mut rows, mut extremes) = (Rows::default(), Rows::default());
@@ -240,7 +240,7 @@ fn compute(work: &Work<'_>) -> Computed {
             stopped = work.context.stopped();
             !stopped
         });
-        for (place, (displacement, time)) in prepared.system.places.iter().zip(largest) {
+        for (place, (displacement, time)) in prepared.system.places().iter().zip(largest) {
             extremes.varied(case);
             if work.several_frequencies() {
                 extremes.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
@@ -271,7 +271,7 @@ const PER_CYCLE: f64 = 20.0;
 /// Frequency and damping, cycle by cycle, of the mass that moves most; with too few samples a note instead.
 fn read_off(prepared: &Prepared, decays: &[Decay], step: f64, rows: &mut Rows, summary: &mut Rows) -> Option<Note> {
     let most = (0..decays.len()).max_by(|&a, &b| decays[a].largest().total_cmp(&decays[b].largest()));
-    let (mass, cycles) = most.map(|most| (&prepared.system.places[most], decays[most].cycles()))?;
+    let (mass, cycles) = most.map(|most| (&prepared.system.places()[most], decays[most].cycles()))?;
     if cycles.iter().any(|cycle| cycle.frequency * step * PER_CYCLE > 1.0) {
         let text = "warning: the samples are too far apart to read damping off the decay, or it moves too fast for them: take a \
                     `time_step` below a twentieth of its period";
@@ -314,7 +314,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 title = if title.is_empty() { frequency } else { format!("{title}, {frequency}") };
             }
             let displacement = |place: &String| numbers(motion, &format!("{place}_displacement_m"), from..to);
-            let all = system.places.iter().flat_map(displacement);
+            let all = system.places().iter().flat_map(displacement);
             let highest = all.map(f64::abs).filter(|x| x.is_finite()).fold(0.0, f64::max);
             let (y_axis, factor) = drawing.axis(1, "displacement", highest, "m");
             let times = numbers(motion, "time_s", from..to);
@@ -327,7 +327,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 title,
                 x: x_axis,
                 y: y_axis,
-                series: system.places.iter().enumerate().filter(|(_, place)| drawing.shows(place)).map(line).collect(),
+                series: system.places().iter().enumerate().filter(|(_, place)| drawing.shows(place)).map(line).collect(),
             });
             from = to;
         }

@@ -100,7 +100,7 @@ impl<'a> Costing<'a> {
         // a width makes exact laws smooth
         let width = case.method.options.get("width");
         let followed = |law: Law| width.and_then(|width| law.regularised(*width)).unwrap_or(law);
-        let laws: Vec<Law> = system.joints.iter().map(|joint| followed(joint.law)).collect();
+        let laws: Vec<Law> = system.joints().iter().map(|joint| followed(joint.law)).collect();
         let given = case.frequencies.as_ref().map_or(1, |f| f.len()) as f64;
         Costing {
             study,
@@ -109,7 +109,7 @@ impl<'a> Costing<'a> {
             frequencies: if study.is_adaptive() { ADAPTIVE } else { given },
             varied: case.varied.len() as f64,
             masses: system.dofs() as f64,
-            joints: system.joints.len() as f64,
+            joints: system.joints().len() as f64,
             surveyed,
             smooth: laws.iter().any(|law| law.network().is_none()),
             has_states: laws.iter().any(|law| law.rate().is_some_and(|rate| rate.states() > 0)),
@@ -336,7 +336,7 @@ impl Costing<'_> {
     pub fn series(&self, harmonics: Option<f64>) -> f64 {
         let system = self.surveyed.survey.system();
         let rigid = |law: &Law| law.network().is_some_and(|all| all.iter().any(|branch| branch.stiffness.is_none()));
-        let any_rigid = system.joints.iter().any(|joint| rigid(&joint.law));
+        let any_rigid = system.joints().iter().any(|joint| rigid(&joint.law));
         let factor = match (self.smooth, any_rigid, harmonics) {
             (false, false, _) => 1.0,
             (_, _, None) => HARD,

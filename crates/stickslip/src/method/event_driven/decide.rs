@@ -6,7 +6,8 @@
 //! ends, the same problem for the next derivative decides, and so on.
 //! Source: Glocker, "Set-Valued Force Laws" (2001), Ch. 10; Leine and Nijmeijer (2004), Ch. 6.
 
-use super::mechanics::{Contact, Mechanics};
+use super::mechanics::Mechanics;
+use crate::law::Contact;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::complementarity;

@@ -1,7 +1,8 @@
 //! The motion over a stretch of time: closed-form segments joined at the switches, with its exact sensitivity.
 
 use super::decide::{AT_LIMIT, Decision, REST};
-use super::mechanics::{Contact, Mechanics};
+use super::mechanics::Mechanics;
+use crate::law::Contact;
 use super::memory::Memory;
 use super::pattern::{Beginning, Driven, Pattern, Work};
 use crate::method::Breakdown;

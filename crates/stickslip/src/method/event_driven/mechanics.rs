@@ -3,33 +3,6 @@
 use crate::method::MethodError;
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
-
-/// Whether a slider rests or moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Contact {
-    /// The faces rest on each other.
-    Stick,
-    /// They slide with `u' > 0`.
-    SlipForward,
-    /// They slide with `u' < 0`.
-    SlipBackward,
-}
-
-impl Contact {
-    /// The slip direction: +1, -1, or 0 in stick.
-    pub fn sign(self) -> f64 {
-        match self {
-            Contact::Stick => 0.0,
-            Contact::SlipForward => 1.0,
-            Contact::SlipBackward => -1.0,
-        }
-    }
-
-    pub(crate) fn slip(sign: f64) -> Self {
-        if sign > 0.0 { Contact::SlipForward } else { Contact::SlipBackward }
-    }
-}
 
 /// One ideal slider, rigid or behind a spring.
 #[derive(Debug, Clone)]
@@ -66,20 +39,20 @@ impl Mechanics {
     /// A joint whose law has no exact view, or that acts in more than one direction; a place without mass.
     pub fn new(system: &System) -> Result<Self, MethodError> {
         let n = system.dofs();
-        if let Some(i) = (0..n).find(|&i| system.mass[(i, i)] <= 0.0) {
-            return Err(MethodError::NeedsMass { method: super::NAME, place: system.places[i].clone() });
+        if let Some(i) = (0..n).find(|&i| system.structure().mass()[(i, i)] <= 0.0) {
+            return Err(MethodError::NeedsMass { method: super::NAME, place: system.places()[i].clone() });
         }
         let mut sliders = Vec::new();
         let mut elastic = 0;
-        for (j, joint) in system.joints.iter().enumerate() {
+        for (j, joint) in system.joints().iter().enumerate() {
             let unsupported = |instead: &'static str| MethodError::Law {
                 method: super::NAME,
-                joint: joint.name.clone(),
-                law: joint.law.name(),
+                joint: joint.name().to_owned(),
+                law: joint.law().name(),
                 instead,
             };
-            let branches = joint.law.network().ok_or_else(|| unsupported("method `shooting`, or the exact law"))?;
-            if joint.direction.ncols() != 1 {
+            let branches = joint.law().sliders().ok_or_else(|| unsupported("method `shooting`, or the exact law"))?;
+            if joint.axes().len() != 1 {
                 return Err(unsupported("a law with one direction"));
             }
             for branch in branches {
@@ -89,28 +62,29 @@ impl Mechanics {
                 });
                 sliders.push(Slider {
                     joint: j,
-                    direction: joint.direction.column(0).into_owned(),
+                    direction: joint.axes()[0].dense(n),
                     stiffness: branch.stiffness,
                     limit: branch.limit,
                     state,
                 });
             }
         }
-        let positive = system.mass.clone().cholesky().is_some();
+        let positive = system.structure().mass().clone().cholesky().is_some();
         let inverse_mass = system
-            .mass
+            .structure()
+            .mass()
             .clone()
             .try_inverse()
             .filter(|inverse| positive && inverse.iter().all(|x| x.is_finite()))
             .ok_or(MethodError::NotPositive { method: super::NAME, matrix: "mass" })?;
-        let fastest = (0..n).map(|i| (system.stiffness[(i, i)] / system.mass[(i, i)]).sqrt()).fold(0.0, f64::max);
+        let fastest = (0..n).map(|i| (system.structure().stiffness()[(i, i)] / system.structure().mass()[(i, i)]).sqrt()).fold(0.0, f64::max);
         Ok(Mechanics {
             n,
             fastest,
-            mass: system.mass.clone(),
+            mass: system.structure().mass().clone(),
             inverse_mass,
-            damping: system.damping.clone(),
-            stiffness: system.stiffness.clone(),
+            damping: system.structure().damping().clone(),
+            stiffness: system.structure().stiffness().clone(),
             sliders,
             elastic,
         })

@@ -4,7 +4,8 @@
 //! mostly the same: those that were not used for longest go first. A pattern that is made again has the same bits, so that nothing
 //! but time depends on what was kept.
 
-use super::mechanics::{Contact, Mechanics};
+use super::mechanics::Mechanics;
+use crate::law::Contact;
 use super::pattern::{Driven, Pattern};
 use crate::method::drive::Drive;
 use std::collections::BTreeMap;
@@ -102,7 +103,7 @@ mod tests {
         let name = |i: usize| format!("m{i}");
         let before = |i: usize| if i == 0 { GROUND.to_owned() } else { name(i - 1) };
         let model = Model {
-            masses: (0..n).map(|i| Mass { name: name(i), mass: 1.0 + 0.1 * i as f64 }).collect(),
+            masses: (0..n).map(|i| Mass::new(name(i), 1.0 + 0.1 * i as f64)).collect(),
             springs: (0..n)
                 .map(|i| Spring { between: [before(i), name(i)], stiffness: 100.0 + i as f64, damping: 0.1 })
                 .collect(),
@@ -110,7 +111,7 @@ mod tests {
                 .map(|i| Joint {
                     name: format!("j{i}"),
                     between: [name(i), GROUND.to_owned()],
-                    law: Law::Jenkins(Jenkins { stiffness: 50.0, limit: 1.0 }),
+                    law: Arc::new(Jenkins { stiffness: 50.0, limit: 1.0 }),
                 })
                 .collect(),
             forces: vec![Force { on: name(0), amplitude: 1.0, phase: 0.0, harmonic: 1 }],

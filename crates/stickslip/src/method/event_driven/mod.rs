@@ -18,7 +18,6 @@ mod path;
 mod pattern;
 
 pub(crate) use flow::Flow;
-pub use mechanics::Contact;
 pub(crate) use mechanics::Mechanics;
 pub(crate) use path::ExactPath;
 

@@ -2,7 +2,7 @@
 
 use super::NAME;
 use super::flow::{Flow, Segment};
-use super::mechanics::Contact;
+use crate::law::Contact;
 use crate::method::Breakdown;
 use crate::method::drive::Drive;
 use crate::method::periodic::Closed;
@@ -53,9 +53,9 @@ pub(super) fn orbit(
     let energy = path.energy(flow, &joints);
     let stuck = joints
         .iter()
-        .zip(&system.joints)
+        .zip(system.joints())
         .filter(|(motion, _)| motion.slip_fraction == 0.0)
-        .map(|(_, j)| j.name.clone());
+        .map(|(_, j)| j.name().to_owned());
     let rest = super::NEAR_REST * flow.energy_scale;
     let reference = energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive)).max(NO_WORK * rest * rest);
     let balance = energy.work_in - energy.viscous - energy.friction;
@@ -144,7 +144,7 @@ impl ExactPath {
                     minimum = -maximum;
                 }
                 Ok(PlaceMotion {
-                    name: self.system.places[i].clone(),
+                    name: self.system.places()[i].clone(),
                     maximum,
                     minimum,
                     mean: integral / self.period,
@@ -159,7 +159,7 @@ impl ExactPath {
         let mut scratch = Scratch::default();
         let mut values = Vec::new();
         self.system
-            .joints
+            .joints()
             .iter()
             .enumerate()
             .map(|(j, joint)| {
@@ -172,13 +172,13 @@ impl ExactPath {
                     let nb = piece.basis.len();
                     let mut u = vec![ZERO; nb];
                     for i in 0..n {
-                        let w = joint.direction[(i, 0)];
+                        let w = joint.axes()[0].dense(n)[i];
                         if w != 0.0 {
                             let x = &piece.segment.displacement[i * nb..(i + 1) * nb];
                             u.iter_mut().zip(x).for_each(|(u, x)| *u += x * w);
                         }
                     }
-                    self.add_imposed(piece, &joint.imposed, &mut u);
+                    self.add_imposed(piece, joint.axes()[0].imposed(), &mut u);
                     let mut velocity = vec![ZERO; nb];
                     piece.basis.differentiate(&u, &mut velocity);
                     values.resize(nb, ZERO);
@@ -209,11 +209,11 @@ impl ExactPath {
                     low = -high;
                 }
                 Ok(JointMotion {
-                    name: joint.name.clone(),
+                    name: joint.name().to_owned(),
                     dissipation: self.times() * dissipation,
                     // a joint that holds nothing slips all the time
                     slip_fraction: if sliders.is_empty() { 1.0 } else { self.times() * slipping / self.period },
-                    displacement: (low, high),
+                    displacement: vec![(low, high)],
                     switches: self.times() as usize * switches,
                 })
             })
@@ -251,13 +251,13 @@ impl ExactPath {
                     work += product(&force, velocity(i));
                 }
                 for k in 0..=i {
-                    let c = self.system.damping[(i, k)];
+                    let c = self.system.structure().damping()[(i, k)];
                     if c != 0.0 {
                         viscous += if k == i { c } else { 2.0 * c } * product(velocity(i), velocity(k));
                     }
                 }
             }
-            for (m, place) in self.system.moved.iter().enumerate() {
+            for (m, place) in self.system.moved().iter().enumerate() {
                 let (motion, speed) = self.moved_motion(piece, m);
                 work += product(&self.reaction(piece, m, flow), &speed);
                 for i in 0..n {
@@ -296,7 +296,7 @@ impl ExactPath {
     /// Displacement and velocity of a moved place as signals.
     fn moved_motion(&self, piece: &Piece, m: usize) -> (Vec<Complex64>, Vec<Complex64>) {
         let mut motion = vec![ZERO; piece.basis.len()];
-        self.add_imposed(piece, &self.system.moved[m].motion, &mut motion);
+        self.add_imposed(piece, &self.system.moved()[m].motion, &mut motion);
         let mut speed = motion.clone();
         piece.basis.differentiate(&motion, &mut speed);
         (motion, speed)
@@ -308,7 +308,7 @@ impl ExactPath {
     }
 
     fn reaction_of(&self, piece: &Piece, m: usize, owners: &[usize]) -> Vec<Complex64> {
-        let (n, nb, place) = (self.system.dofs(), piece.basis.len(), &self.system.moved[m]);
+        let (n, nb, place) = (self.system.dofs(), piece.basis.len(), &self.system.moved()[m]);
         let mut force = vec![ZERO; nb];
         let add = |force: &mut [Complex64], signal: &[Complex64], factor: f64| {
             if factor != 0.0 {
@@ -348,11 +348,11 @@ impl ExactPath {
             (0..self.system.dofs()).map(|i| drive.forces.iter().map(|f| f[i].norm()).sum::<f64>() * fastest(i)).sum();
         let joints: f64 = self
             .system
-            .joints
+            .joints()
             .iter()
             .map(|joint| {
-                let limit: f64 = joint.law.network().unwrap_or_default().iter().map(|b| b.limit).sum();
-                limit * joint.imposed.iter().map(|(h, g)| f64::from(*h) * g.norm()).sum::<f64>() / self.period
+                let limit: f64 = joint.law().sliders().unwrap_or_default().iter().map(|b| b.limit).sum();
+                limit * joint.axes()[0].imposed().iter().map(|(h, g)| f64::from(*h) * g.norm()).sum::<f64>() / self.period
             })
             .sum();
         self.period * (loads + joints)
@@ -453,32 +453,30 @@ impl Path for ExactPath {
         let owners = slider_owners(&self.system);
         let joints = self
             .system
-            .joints
+            .joints()
             .iter()
             .enumerate()
             .map(|(j, joint)| {
                 let mut imposed = vec![ZERO; nb];
-                self.add_imposed(piece, &joint.imposed, &mut imposed);
+                self.add_imposed(piece, joint.axes()[0].imposed(), &mut imposed);
                 let mut speed = vec![ZERO; nb];
                 piece.basis.differentiate(&imposed, &mut speed);
-                let along = |v: &[f64]| (0..n).map(|i| joint.direction[(i, 0)] * v[i]).sum::<f64>();
+                let along = |v: &[f64]| joint.axes()[0].along(v);
                 let mine = || owners.iter().enumerate().filter(|(_, owner)| **owner == j).map(|(s, _)| s);
                 let contact =
                     mine().map(|s| piece.contacts[s]).find(|c| *c != Contact::Stick).unwrap_or(Contact::Stick);
                 let joint_velocity = along(&velocity) + sign * real_dot(&speed, &values);
-                JointSample {
-                    displacement: along(&displacement) + sign * real_dot(&imposed, &values),
-                    velocity: joint_velocity,
-                    force: mine().map(|s| row(&piece.segment.force, s)).sum(),
-                    contact: match contact {
-                        Contact::Stick if mine().next().is_none() => Contact::slip(joint_velocity),
-                        Contact::Stick => contact,
-                        _ => Contact::slip(sign * contact.sign()),
-                    },
-                }
+                let contact = match contact {
+                    Contact::Stick if mine().next().is_none() => Contact::slip(joint_velocity),
+                    Contact::Stick => contact,
+                    _ => Contact::slip(sign * contact.sign()),
+                };
+                let joint_displacement = along(&displacement) + sign * real_dot(&imposed, &values);
+                let force = mine().map(|s| row(&piece.segment.force, s)).sum();
+                JointSample::along(joint_displacement, joint_velocity, force, contact)
             })
             .collect();
-        let moved = (0..self.system.moved.len())
+        let moved = (0..self.system.moved().len())
             .map(|m| {
                 let (motion, _) = self.moved_motion(piece, m);
                 let reaction = self.reaction_of(piece, m, &owners);
@@ -508,6 +506,6 @@ impl Path for ExactPath {
 
 /// The joint of every slider, in the order in which `Mechanics` lists them.
 fn slider_owners(system: &System) -> Vec<usize> {
-    let branches = |joint: &crate::model::SystemJoint| joint.law.network().map_or(0, |b| b.len());
-    system.joints.iter().enumerate().flat_map(|(j, joint)| std::iter::repeat_n(j, branches(joint))).collect()
+    let branches = |joint: &crate::model::SystemJoint| joint.law().sliders().map_or(0, |b| b.len());
+    system.joints().iter().enumerate().flat_map(|(j, joint)| std::iter::repeat_n(j, branches(joint))).collect()
 }

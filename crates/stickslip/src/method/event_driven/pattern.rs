@@ -6,7 +6,8 @@
 //! [`stickslip_numerics::modes`] solve in closed form. Nothing here depends on time, drive frequency or slip direction:
 //! a pattern is known by what sticks.
 
-use super::mechanics::{Contact, Mechanics};
+use super::mechanics::Mechanics;
+use crate::law::Contact;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;

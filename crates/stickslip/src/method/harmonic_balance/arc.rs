@@ -134,7 +134,7 @@ impl ModeEquations<'_> {
             let first = 2 * k * n;
             for i in 0..n {
                 for l in 0..n {
-                    let m = self.system.mass[(i, l)];
+                    let m = self.system.structure().mass()[(i, l)];
                     out[first + 2 * i] += m * direction[first + 2 * l];
                     out[first + 2 * i + 1] += m * direction[first + 2 * l + 1];
                 }
@@ -142,7 +142,7 @@ impl ModeEquations<'_> {
         }
         for coordinate in &self.elastic {
             let Element::Springs(springs) = &coordinate.element else { continue };
-            let w = self.system.joints[coordinate.joint].direction.column(0);
+            let w = self.system.joints()[coordinate.joint].axes()[0].dense(self.system.dofs());
             let along =
                 |k: usize, value: &dyn Fn(usize) -> f64| -> f64 { (0..n).map(|i| w[i] * value(k * n + i)).sum() };
             let square: f64 = (0..nh)

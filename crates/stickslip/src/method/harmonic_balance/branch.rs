@@ -103,15 +103,15 @@ impl<'a> BranchEquations<'a> {
             }
             _ => return false,
         }
-        let same = system.mass == self.rest_of.mass
-            && system.damping == self.rest_of.damping
-            && system.stiffness == self.rest_of.stiffness;
+        let same = system.structure().mass() == self.rest_of.structure().mass()
+            && system.structure().damping() == self.rest_of.structure().damping()
+            && system.structure().stiffness() == self.rest_of.structure().stiffness();
         if !same {
             self.rest = Rest::new(&system, &self.coordinates);
             self.rest_of = system.clone();
         }
         self.level.drive(&system, &self.coordinates, &self.rest, omega);
-        if !same || self.system.joints != system.joints {
+        if !same || self.system.joints() != system.joints() {
             self.judge = Judge::new(&system);
         }
         (self.system, self.omega, self.value) = (system, omega, value);

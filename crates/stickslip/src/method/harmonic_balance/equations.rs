@@ -162,15 +162,15 @@ impl Level {
                 }
             }
             for (q, coordinate) in coordinates.iter().enumerate() {
-                let joint = &system.joints[coordinate.joint];
-                let imposed = joint.imposed.iter().find(|(number, _)| *number as usize == h).map_or(ZERO, |(_, g)| *g);
-                let u: Complex64 = (0..n).map(|i| free[i] * joint.direction[(i, 0)]).sum();
+                let joint = &system.joints()[coordinate.joint];
+                let imposed = joint.axes()[0].imposed_at(h as u32);
+                let u: Complex64 = joint.axes()[0].along_complex(&free);
                 self.linear[q * nh + k] = u + imposed;
             }
             self.free.push(free);
         }
         let top = self.alternation.harmonics[nh - 1].max(1);
-        let stiff = 1.0 / system.stiffness.amax().max(omega * omega * system.mass.amax()).max(f64::MIN_POSITIVE);
+        let stiff = 1.0 / system.structure().stiffness().amax().max(omega * omega * system.structure().mass().amax()).max(f64::MIN_POSITIVE);
         if !coordinates.iter().any(|c| matches!(c.element, Element::Velocity(_))) {
             return;
         }
@@ -199,12 +199,12 @@ impl Level {
         let mut motion = Motion { c: self.linear.clone(), ..Motion::rest(self.linear.len()) };
         let Some(guess) = guess else { return motion };
         for (q, coordinate) in coordinates.iter().enumerate() {
-            let joint = &system.joints[coordinate.joint];
+            let joint = &system.joints()[coordinate.joint];
             for (rate, x) in &guess.harmonics {
                 let h = (rate / omega).round() as usize;
                 let Ok(k) = self.harmonics().binary_search(&h) else { continue };
-                let imposed = joint.imposed.iter().find(|(k, _)| *k as usize == h).map_or(ZERO, |(_, g)| *g);
-                let u = (0..x.len()).map(|i| x[i] * joint.direction[(i, 0)]).sum::<Complex64>() + imposed;
+                let imposed = joint.axes()[0].imposed_at(h as u32);
+                let u = joint.axes()[0].along_complex(x) + imposed;
                 let force = guess.joints[coordinate.joint] * u;
                 if !force.is_finite() {
                     continue; // rigid friction that does not move at all
@@ -559,13 +559,13 @@ mod tests {
         let name = |i: usize| format!("m{i}");
         let mut model = Model::default();
         let laws = [
-            Law::Jenkins(Jenkins { stiffness: 2.0, limit: 0.3 }),
-            Law::Coulomb(Coulomb { limit: 0.2 }),
-            Law::CoulombArctan(CoulombArctan { limit: 0.25, alpha: 5.0 }),
-            Law::JenkinsArctan(JenkinsArctan { stiffness: 3.0, limit: 0.2, alpha: 8.0 }),
+            Arc::new(Jenkins { stiffness: 2.0, limit: 0.3 }),
+            Arc::new(Coulomb { limit: 0.2 }),
+            Arc::new(CoulombArctan { limit: 0.25, alpha: 5.0 }),
+            Arc::new(JenkinsArctan { stiffness: 3.0, limit: 0.2, alpha: 8.0 }),
         ];
         for i in 0..masses {
-            model.masses.push(Mass { name: name(i), mass: 1.0 + 0.1 * i as f64 });
+            model.masses.push(Mass::new(name(i), 1.0 + 0.1 * i as f64));
             model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness: 1.0, damping: 0.05 });
             if i > 0 {
                 let law = laws[i % if masses < 10 { 4 } else { 3 }];

@@ -10,9 +10,8 @@
 //! - Steep maps change within a sample. Their mean over it is taken for an argument `y + eξ`, `-1 < ξ < 1`, that is linear there: so a
 //!   zero of the velocity is placed within its sample, and the forces stay the gradient of a convex function.
 
-use crate::law::Rate;
 use crate::method::MethodError;
-use crate::method::smooth::path::SLIPS_ABOVE;
+use crate::law::SLIPS_ABOVE;
 use crate::model::System;
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
@@ -70,18 +69,18 @@ pub(super) struct Coordinate {
 /// A law with more than one direction.
 pub(super) fn coordinates(system: &System) -> Result<Vec<Coordinate>, MethodError> {
     let mut list = Vec::new();
-    for (j, joint) in system.joints.iter().enumerate() {
+    for (j, joint) in system.joints().iter().enumerate() {
         let unsupported = |instead| MethodError::Law {
             method: super::NAME,
-            joint: joint.name.clone(),
-            law: joint.law.name(),
+            joint: joint.name().to_owned(),
+            law: joint.law().name(),
             instead,
         };
-        if joint.direction.ncols() != 1 {
+        if joint.axes().len() != 1 {
             return Err(unsupported("a law with one direction"));
         }
         let mut add = |series, element| list.push(Coordinate { joint: j, series, element });
-        if let Some(branches) = joint.law.network() {
+        if let Some(branches) = joint.law().sliders() {
             let springs = branches.iter().filter_map(|branch| {
                 let stiffness = branch.stiffness?;
                 Some(Spring { stiffness, limit: branch.limit })
@@ -98,12 +97,10 @@ pub(super) fn coordinates(system: &System) -> Result<Vec<Coordinate>, MethodErro
             }
             continue;
         }
-        let (series, law) = match joint.law.rate() {
-            Some(Rate::CoulombArctan(law)) => (0.0, Velocity { limit: law.limit, alpha: law.alpha }),
-            Some(Rate::JenkinsArctan(law)) => (1.0 / law.stiffness, Velocity { limit: law.limit, alpha: law.alpha }),
-            #[allow(unreachable_patterns)] // a law of rate form that is added later
-            _ => return Err(unsupported("method `shooting`")),
+        let (Some(prox), Some(alpha)) = (joint.law().prox(), joint.law().value("alpha")) else {
+            return Err(unsupported("method `shooting`"));
         };
+        let (series, law) = (prox.compliance(), Velocity { limit: joint.law().scale(), alpha });
         if law.limit > 0.0 {
             add(series, Element::Velocity(law));
         }

@@ -61,7 +61,7 @@ impl Judge {
                 Some(derivative)
             }
             Judge::Smooth(flow) => {
-                let owners: Vec<usize> = (0..system.joints.len()).collect();
+                let owners: Vec<usize> = (0..system.joints().len()).collect();
                 flow.drive = Drive::new(system, &owners, omega);
                 let states = 2 * flow.structure.n + flow.structure.internal;
                 let mut state = start.to_vec();

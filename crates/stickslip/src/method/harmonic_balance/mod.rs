@@ -222,7 +222,7 @@ impl Kept {
         let present: Vec<usize> = system.harmonics_of_excitation(counts).into_iter().map(|h| h as usize).collect();
         let unit = present.iter().fold(0, |a, &b| common_divisor(a, b)).max(1);
         let highest = present.iter().copied().max().unwrap_or(0);
-        let laws = system.joints.iter().all(|joint| joint.law.is_odd());
+        let laws = system.joints().iter().all(|joint| joint.law().is_odd());
         Kept { unit, odd: laws && present.iter().all(|h| (h / unit) % 2 == 1), highest }
     }
 

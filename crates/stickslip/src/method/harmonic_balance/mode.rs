@@ -71,15 +71,15 @@ impl<'a> ModeEquations<'a> {
     /// # Errors
     /// A law with several directions, a place without mass, a mass matrix that is not positive definite.
     pub fn new(system: &'a System, harmonics: usize, samples: usize) -> Result<Self, MethodError> {
-        if let Some(massless) = (0..system.dofs()).find(|&i| system.mass[(i, i)] == 0.0) {
-            return Err(MethodError::NeedsMass { method: super::NAME, place: system.places[massless].clone() });
+        if let Some(massless) = (0..system.dofs()).find(|&i| system.structure().mass()[(i, i)] == 0.0) {
+            return Err(MethodError::NeedsMass { method: super::NAME, place: system.places()[massless].clone() });
         }
-        if system.mass.clone().cholesky().is_none() {
+        if system.structure().mass().clone().cholesky().is_none() {
             return Err(MethodError::NotPositive { method: super::NAME, matrix: "mass" });
         }
         let (mut elastic, mut contacts) = (Vec::new(), Vec::new());
         for coordinate in coordinates(system)? {
-            let w = system.joints[coordinate.joint].direction.column(0).into_owned();
+            let w = system.joints()[coordinate.joint].axes()[0].dense(system.dofs());
             match coordinate.element {
                 Element::Springs(_) => elastic.push(coordinate),
                 // between places whose motion is imposed it does nothing to the structure, and nothing in the mode moves it
@@ -95,20 +95,20 @@ impl<'a> ModeEquations<'a> {
     /// The linear modes of the structure without its joints, by rising frequency.
     pub fn linear_modes(&self) -> Vec<LinearMode> {
         let n = self.system.dofs();
-        let mut stiffness = self.system.stiffness.clone();
+        let mut stiffness = self.system.structure().stiffness().clone();
         // a trace of the joints stays, so that equal blades move with or against each other as the joints make them
         for coordinate in &self.elastic {
-            let w = self.system.joints[coordinate.joint].direction.column(0);
+            let w = self.system.joints()[coordinate.joint].axes()[0].dense(self.system.dofs());
             if let Element::Springs(springs) = &coordinate.element {
                 let kt: f64 = springs.iter().map(|spring| spring.stiffness).sum();
-                stiffness += w * w.transpose() * (TRACE * kt);
+                stiffness += &w * w.transpose() * (TRACE * kt);
             }
         }
         for Contact { w, series, .. } in &self.contacts {
-            let kt = if *series > 0.0 { 1.0 / series } else { self.system.stiffness.amax() };
+            let kt = if *series > 0.0 { 1.0 / series } else { self.system.structure().stiffness().amax() };
             stiffness += w * w.transpose() * (TRACE * kt);
         }
-        let Some(factor) = self.system.mass.clone().cholesky() else { return Vec::new() };
+        let Some(factor) = self.system.structure().mass().clone().cholesky() else { return Vec::new() };
         let lower = factor.l();
         let Some(inverse) = lower.solve_lower_triangular(&DMatrix::identity(n, n)) else { return Vec::new() };
         let Some(eigen) = (&inverse * stiffness * inverse.transpose()).try_symmetric_eigen(f64::EPSILON, EIGEN_STEPS)
@@ -131,7 +131,7 @@ impl<'a> ModeEquations<'a> {
         for i in 0..n {
             x[i].re = a * mode.shape[i];
         }
-        let lost = mode.shape.dot(&(&self.system.damping * &mode.shape));
+        let lost = mode.shape.dot(&(self.system.structure().damping() * &mode.shape));
         let force = vec![ZERO; nh * self.contacts.len()];
         (omega > 0.0).then(|| ModeState { x, force, omega, damping: lost / (2.0 * omega) })
     }
@@ -142,7 +142,7 @@ impl<'a> ModeEquations<'a> {
         let n = self.system.dofs();
         for i in 0..n {
             for l in 0..n {
-                let m = self.system.mass[(i, l)];
+                let m = self.system.structure().mass()[(i, l)];
                 cross += one.x[i].conj() * other.x[l] * m;
                 squares[0] += (one.x[i].conj() * one.x[l]).re * m;
                 squares[1] += (other.x[i].conj() * other.x[l]).re * m;
@@ -158,8 +158,8 @@ impl<'a> ModeEquations<'a> {
             for i in 0..n {
                 for l in 0..n {
                     let pair = (state.x[k * n + i].conj() * state.x[k * n + l]).re * (h * h) as f64;
-                    lost += pair * self.system.damping[(i, l)];
-                    whole += pair * self.system.mass[(i, l)];
+                    lost += pair * self.system.structure().damping()[(i, l)];
+                    whole += pair * self.system.structure().mass()[(i, l)];
                 }
             }
         }
@@ -178,7 +178,7 @@ impl<'a> ModeEquations<'a> {
         let (mut transposed, mut adjoint) = (ZERO, 0.0);
         for i in 0..self.system.dofs() {
             for l in 0..self.system.dofs() {
-                let m = self.system.mass[(i, l)];
+                let m = self.system.structure().mass()[(i, l)];
                 transposed += state.x[i] * state.x[l] * m;
                 adjoint += (state.x[i].conj() * state.x[l]).re * m;
             }
@@ -193,7 +193,7 @@ impl<'a> ModeEquations<'a> {
         let mut forces: Vec<(DVector<f64>, f64)> = Vec::new();
         for coordinate in &self.elastic {
             if let Element::Springs(springs) = &coordinate.element {
-                let w = self.system.joints[coordinate.joint].direction.column(0).into_owned();
+                let w = self.system.joints()[coordinate.joint].axes()[0].dense(self.system.dofs());
                 forces.push((w, springs.iter().map(|spring| spring.limit).sum()));
             }
         }
@@ -220,7 +220,7 @@ impl<'a> ModeEquations<'a> {
         }
         let top = self.alternation.harmonics[self.alternation.harmonics.len() - 1];
         let rate = top as f64 * omega;
-        let stiff = &self.system.stiffness + &self.system.mass * (rate * rate);
+        let stiff = self.system.structure().stiffness() + self.system.structure().mass() * (rate * rate);
         // masses are positive: only an ω that overflows has no factor, and its residual is no number either
         let factor = stiff.cholesky();
         let receptance = |w: &DVector<f64>| factor.as_ref().map_or(0.0, |factor| w.dot(&factor.solve(w)));
@@ -258,7 +258,7 @@ impl<'a> ModeEquations<'a> {
                 let (mut sum, mut by_omega, mut by_zeta) = (ZERO, ZERO, ZERO);
                 for l in 0..n {
                     let (m, c, s) =
-                        (self.system.mass[(i, l)], self.system.damping[(i, l)], self.system.stiffness[(i, l)]);
+                        (self.system.structure().mass()[(i, l)], self.system.structure().damping()[(i, l)], self.system.structure().stiffness()[(i, l)]);
                     if m == 0.0 && c == 0.0 && s == 0.0 {
                         continue;
                     }
@@ -286,7 +286,7 @@ impl<'a> ModeEquations<'a> {
         for i in 0..n {
             let (mut x, mut before) = (ZERO, ZERO);
             for l in 0..n {
-                let m = self.system.mass[(i, l)] / (a * a);
+                let m = self.system.structure().mass()[(i, l)] / (a * a);
                 x += state.x[l] * m;
                 before += start.x[l] * m;
             }
@@ -310,7 +310,7 @@ impl<'a> ModeEquations<'a> {
         let mut tangent = vec![0.0; 4 * nh * nh];
         for coordinate in &self.elastic {
             let Element::Springs(springs) = &coordinate.element else { continue };
-            let w = self.system.joints[coordinate.joint].direction.column(0);
+            let w = self.system.joints()[coordinate.joint].axes()[0].dense(self.system.dofs());
             let c: Vec<Complex64> =
                 (0..nh).map(|k| (0..n).map(|i| state.x[k * n + i] * w[i]).sum::<Complex64>()).collect();
             let wanted = jacobian.is_some().then_some(&mut tangent[..]);
@@ -392,7 +392,7 @@ impl<'a> ModeEquations<'a> {
 
     /// Units of the residual: elastic forces, slip limits; amplitude and phase are relative.
     pub(super) fn units(&self, start: &ModeState, a: f64) -> Vec<f64> {
-        let stiffness = self.system.stiffness.amax().max(start.omega * start.omega * self.system.mass.amax());
+        let stiffness = self.system.structure().stiffness().amax().max(start.omega * start.omega * self.system.structure().mass().amax());
         let mut scale = vec![(stiffness * a).max(f64::MIN_POSITIVE); 2 * start.x.len()];
         let width = 2 * self.alternation.harmonics.len();
         scale.extend(self.contacts.iter().flat_map(|contact| vec![contact.law.limit; width]));
@@ -469,15 +469,15 @@ mod tests {
     /// A row of masses with a joint of every law.
     fn mixed() -> System {
         let laws = [
-            Law::Jenkins(Jenkins { stiffness: 2.0, limit: 0.3 }),
-            Law::Coulomb(Coulomb { limit: 0.2 }),
-            Law::CoulombArctan(CoulombArctan { limit: 0.25, alpha: 5.0 }),
-            Law::JenkinsArctan(JenkinsArctan { stiffness: 3.0, limit: 0.2, alpha: 8.0 }),
+            Arc::new(Jenkins { stiffness: 2.0, limit: 0.3 }),
+            Arc::new(Coulomb { limit: 0.2 }),
+            Arc::new(CoulombArctan { limit: 0.25, alpha: 5.0 }),
+            Arc::new(JenkinsArctan { stiffness: 3.0, limit: 0.2, alpha: 8.0 }),
         ];
         let name = |i: usize| format!("m{i}");
         let mut model = Model::default();
         for i in 0..=laws.len() {
-            model.masses.push(Mass { name: name(i), mass: 1.0 + 0.1 * i as f64 });
+            model.masses.push(Mass::new(name(i), 1.0 + 0.1 * i as f64));
             model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness: 1.0, damping: 0.05 });
         }
         for (i, law) in laws.into_iter().enumerate() {

@@ -4,8 +4,7 @@ use super::equations::{Level, Motion};
 use super::joints::{Alternation, Coordinate, Element};
 use super::judge::Judge;
 use super::rest::Rest;
-use crate::law::Rate;
-use crate::method::Contact;
+use crate::law::Contact;
 use crate::model::{MovedPlace, System};
 use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
 use nalgebra::{DMatrix, DVector};
@@ -51,13 +50,13 @@ pub(super) fn stays(context: &Context, level: &Level, motion: &Motion, x: &[DVec
     let mut size = left.norm();
     for (q, coordinate) in context.coordinates.iter().enumerate() {
         let force = motion.force[q * nh].re;
-        let direction = system.joints[coordinate.joint].direction.column(0);
+        let direction = system.joints()[coordinate.joint].axes()[0].dense(system.dofs());
         left -= direction.map(|w| Complex64::new(w * force, 0.0));
         size += direction.norm() * force.abs();
     }
-    let held = &system.stiffness * x[0].map(|z| z.re);
+    let held = system.structure().stiffness() * x[0].map(|z| z.re);
     // positions far away have forces that are rounding
-    let rounding = f64::EPSILON * system.stiffness.amax() * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+    let rounding = f64::EPSILON * system.structure().stiffness().amax() * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
     (left.map(|z| z.re) - held).norm() <= UNHELD * size + 1e3 * rounding
 }
 
@@ -94,12 +93,12 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     let (n, nh) = (system.dofs(), level.harmonics().len());
     let harmonics = level.harmonics().to_vec();
     let samples = level.alternation.samples();
-    let mut force = vec![vec![0.0; samples]; system.joints.len()];
-    let mut contact = vec![vec![Contact::Stick; samples]; system.joints.len()];
+    let mut force = vec![vec![0.0; samples]; system.joints().len()];
+    let mut contact = vec![vec![Contact::Stick; samples]; system.joints().len()];
     let mut joints = Vec::new();
     let mut elastic_states = Vec::new();
     let mut stuck = Vec::new();
-    for (j, joint) in system.joints.iter().enumerate() {
+    for (j, joint) in system.joints().iter().enumerate() {
         // ∮ f du with the projected force: for the series it is the integral itself
         let mut dissipation = 0.0;
         for (q, coordinate) in coordinates.iter().enumerate().filter(|(_, coordinate)| coordinate.joint == j) {
@@ -125,8 +124,10 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
                 }
                 Element::Velocity(law) => {
                     level.apply(*law, q, omega, motion);
-                    if let Some(Rate::JenkinsArctan(law)) = joint.law.rate() {
-                        elastic_states.push(law.state((0..nh).map(|k| f[k].re).sum()));
+                    if let Some(rate) = joint.law().rate() {
+                        let mut z = vec![0.0; rate.states()];
+                        rate.state_under((0..nh).map(|k| f[k].re).sum(), &mut z);
+                        elastic_states.extend(z);
                     }
                     add(&level.alternation);
                 }
@@ -136,11 +137,11 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
             .iter()
             .zip(&x)
             .map(|(&h, x)| {
-                let imposed = joint.imposed.iter().find(|(k, _)| *k as usize == h).map_or(ZERO, |(_, g)| *g);
-                (h, imposed + (0..n).map(|i| x[i] * joint.direction[(i, 0)]).sum::<Complex64>())
+                let imposed = joint.axes()[0].imposed_at(h as u32);
+                (h, imposed + joint.axes()[0].along_complex(x))
             })
             .collect();
-        if joint.law.is_free() {
+        if joint.law().is_free() {
             // what holds nothing slips all the time
             let velocity: Vec<_> = u.iter().map(|(h, c)| (*h, Complex64::new(0.0, *h as f64 * omega) * c)).collect();
             level.alternation.fourier.synthesise(&velocity, &mut level.alternation.signal);
@@ -150,13 +151,13 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
         let slipping = contact[j].iter().filter(|c| **c != Contact::Stick).count();
         let switches = (0..samples).filter(|&i| contact[j][i] != contact[j][(i + 1) % samples]).count();
         if slipping == 0 {
-            stuck.push(joint.name.clone());
+            stuck.push(joint.name().to_owned());
         }
         joints.push(JointMotion {
-            name: joint.name.clone(),
+            name: joint.name().to_owned(),
             dissipation,
             slip_fraction: slipping as f64 / samples as f64,
-            displacement: (low, high),
+            displacement: vec![(low, high)],
             switches,
         });
     }
@@ -165,7 +166,7 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
             let series: Vec<(usize, Complex64)> = (0..nh).map(|k| (harmonics[k], x[k][i])).collect();
             let (minimum, maximum) = extremes(&series, level);
             let at = |h: usize| harmonics.binary_search(&h).map_or(ZERO, |k| x[k][i]);
-            PlaceMotion { name: system.places[i].clone(), maximum, minimum, mean: at(0).re, first_harmonic: at(1) }
+            PlaceMotion { name: system.places()[i].clone(), maximum, minimum, mean: at(0).re, first_harmonic: at(1) }
         })
         .collect();
     let energy = energy(system, coordinates, omega, &harmonics, &x, motion, &joints);
@@ -239,13 +240,13 @@ fn energy(
         }
         for i in 0..n {
             for l in 0..n {
-                let c = system.damping[(i, l)];
+                let c = system.structure().damping()[(i, l)];
                 if c != 0.0 {
                     viscous += cycle_work(h, s * x[l] * c, x[i]);
                 }
             }
         }
-        for (m, place) in system.moved.iter().enumerate() {
+        for (m, place) in system.moved().iter().enumerate() {
             let g = moved(place, h);
             let forces = |j: usize| -> Complex64 {
                 coordinates
@@ -255,7 +256,7 @@ fn energy(
                     .map(|(q, _)| motion.force[q * nh + k])
                     .sum()
             };
-            let joint_part: Complex64 = (0..system.joints.len()).map(|j| place.joints[j] * forces(j)).sum();
+            let joint_part: Complex64 = (0..system.joints().len()).map(|j| place.joints[j] * forces(j)).sum();
             work += cycle_work(h, linear_reaction(system, m, h, s, x) + joint_part, g);
             for i in 0..n {
                 let (stiffness, damping) = (place.stiffness.0[i], place.damping.0[i]);
@@ -264,7 +265,7 @@ fn energy(
                 viscous += 2.0 * cycle_work(h, s * g * damping, x[i]);
             }
             for (other, c) in place.damping.1.iter().enumerate() {
-                viscous += cycle_work(h, s * moved(&system.moved[other], h) * *c, g);
+                viscous += cycle_work(h, s * moved(&system.moved()[other], h) * *c, g);
             }
         }
     }
@@ -273,10 +274,10 @@ fn energy(
 
 /// The force that moves a place, without that of the joints.
 fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVector<Complex64>) -> Complex64 {
-    let place = &system.moved[m];
+    let place = &system.moved()[m];
     let mut force = moved(place, h) * s * s * place.mass;
     for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
-        force += moved(&system.moved[other], h) * (*k + s * *c);
+        force += moved(&system.moved()[other], h) * (*k + s * *c);
     }
     for i in 0..x.len() {
         force += x[i] * (place.stiffness.0[i] + s * place.damping.0[i]);
@@ -337,7 +338,7 @@ impl Path for Series {
     fn sample(&self, time: f64) -> Sample {
         let n = self.system.dofs();
         let (mut x, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        let mut moved_now = vec![(0.0, 0.0); self.system.moved.len()];
+        let mut moved_now = vec![(0.0, 0.0); self.system.moved().len()];
         for (&h, amplitude) in self.harmonics.iter().zip(&self.x) {
             let s = Complex64::new(0.0, h as f64 * self.omega);
             let turn = Complex64::cis(h as f64 * self.omega * time);
@@ -348,42 +349,35 @@ impl Path for Series {
                 a[i] += (s * s * z).re;
             }
             for (m, now) in moved_now.iter_mut().enumerate() {
-                now.0 += (moved(&self.system.moved[m], h) * turn).re;
+                now.0 += (moved(&self.system.moved()[m], h) * turn).re;
                 now.1 += (linear_reaction(&self.system, m, h, s, amplitude) * turn).re;
             }
         }
         let period = TAU / self.omega;
         let joints: Vec<JointSample> = self
             .system
-            .joints
+            .joints()
             .iter()
             .enumerate()
             .map(|(j, joint)| {
                 let samples = self.force[j].len();
                 let at = time / period * samples as f64;
                 let (low, part) = (at.floor() as usize, at.fract());
-                let (mut displacement, mut velocity) = (0.0, 0.0);
-                for i in 0..n {
-                    displacement += joint.direction[(i, 0)] * x[i];
-                    velocity += joint.direction[(i, 0)] * v[i];
-                }
-                for &(h, g) in &joint.imposed {
+                let axis = &joint.axes()[0];
+                let (mut displacement, mut velocity) = (axis.along(&x), axis.along(&v));
+                for &(h, g) in joint.axes()[0].imposed() {
                     let rate = f64::from(h) * self.omega;
                     let z = g * Complex64::cis(rate * time);
                     displacement += z.re;
                     velocity -= rate * z.im;
                 }
-                JointSample {
-                    displacement,
-                    velocity,
-                    force: (1.0 - part) * self.force[j][low % samples] + part * self.force[j][(low + 1) % samples],
-                    contact: self.contact[j][(at.round() as usize) % samples],
-                }
+                let force = (1.0 - part) * self.force[j][low % samples] + part * self.force[j][(low + 1) % samples];
+                JointSample::along(displacement, velocity, force, self.contact[j][(at.round() as usize) % samples])
             })
             .collect();
         for (m, now) in moved_now.iter_mut().enumerate() {
             now.1 +=
-                joints.iter().zip(&self.system.moved[m].joints).map(|(joint, sign)| joint.force * sign).sum::<f64>();
+                joints.iter().zip(&self.system.moved()[m].joints).map(|(joint, sign)| joint.force[0] * sign).sum::<f64>();
         }
         Sample { displacement: x, velocity: v, acceleration: a, joints, moved: moved_now }
     }

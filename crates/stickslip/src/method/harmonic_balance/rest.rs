@@ -50,14 +50,14 @@ impl Rest {
     pub fn new(system: &System, coordinates: &[Coordinate]) -> Self {
         let n = system.dofs();
         let direction =
-            DMatrix::from_fn(n, coordinates.len(), |i, q| system.joints[coordinates[q].joint].direction[(i, 0)]);
+            DMatrix::from_columns(&coordinates.iter().map(|c| system.joints()[c.joint].axes()[0].dense(n)).collect::<Vec<_>>());
         Rest {
             n,
             // where the banded form takes over, the modes are not needed
             modal: if Sparse::new(system, coordinates, &[1]).is_some() { None } else { modal(system, &direction) },
-            mass: system.mass.clone(),
-            damping: system.damping.clone(),
-            stiffness: system.stiffness.clone(),
+            mass: system.structure().mass().clone(),
+            damping: system.structure().damping().clone(),
+            stiffness: system.structure().stiffness().clone(),
             direction,
         }
     }
@@ -174,10 +174,10 @@ fn free_fraction(s: Complex64, omega: f64) -> Complex64 {
 fn modal(system: &System, direction: &DMatrix<f64>) -> Option<Modal> {
     let n = system.dofs();
     // M = L Lᵀ; with q = Lᵀ x the masses are ones
-    let factor = system.mass.clone().cholesky()?;
+    let factor = system.structure().mass().clone().cholesky()?;
     let to = factor.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
     let back = to.transpose();
-    let modes = Modes::new(&(&to * &system.damping * &back), &(&to * &system.stiffness * &back)).ok()?;
+    let modes = Modes::new(&(&to * system.structure().damping() * &back), &(&to * system.structure().stiffness() * &back)).ok()?;
     let complex = |matrix: &DMatrix<f64>| matrix.map(|w| Complex64::new(w, 0.0));
     let shape = complex(&back) * modes.shape;
     let left = modes.from_velocity * complex(&to);

@@ -55,7 +55,7 @@ impl Sparse {
         let mut entries = Vec::new();
         for i in 0..n {
             for k in 0..n {
-                let values = [system.mass[(i, k)], system.damping[(i, k)], system.stiffness[(i, k)]];
+                let values = [system.structure().mass()[(i, k)], system.structure().damping()[(i, k)], system.structure().stiffness()[(i, k)]];
                 if values.iter().any(|v| *v != 0.0) {
                     entries.push((i, k, values));
                 }
@@ -64,8 +64,7 @@ impl Sparse {
         let ends: Vec<Vec<(usize, f64)>> = coordinates
             .iter()
             .map(|c| {
-                let w = system.joints[c.joint].direction.column(0);
-                (0..n).filter(|&i| w[i] != 0.0).map(|i| (i, w[i])).collect()
+                system.joints()[c.joint].axes()[0].rows().to_vec()
             })
             .collect();
         let mut links: Vec<(usize, usize)> = entries.iter().map(|(i, k, _)| (*i, *k)).collect();

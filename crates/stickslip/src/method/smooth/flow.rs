@@ -297,7 +297,7 @@ impl SmoothFlow {
         let u = along(&state[..n]) + self.drive.imposed_at(q, time, 0);
         let velocity = along(&state[n..2 * n]) + self.drive.imposed_at(q, time, 1);
         let first = 2 * n + joint.first_state;
-        LawPoint::new(&joint.law, u, velocity, &state[first..first + joint.states])
+        LawPoint::new(&*joint.law, u, velocity, &state[first..first + joint.states])
     }
 
     /// Error of the step relative to the tolerance: the embedded estimate, filtered so that stiff components do not dominate it.

@@ -8,7 +8,7 @@ pub(crate) mod flow;
 pub(crate) mod path;
 pub(crate) mod step;
 
-use crate::law::{Law, RateLaw};
+use crate::law::SharedLaw;
 use crate::method::MethodError;
 use crate::model::System;
 use step::{MOST_STATES, SmoothJoint, Structure};
@@ -18,51 +18,51 @@ impl Structure {
     /// A joint whose law has no smooth view (and cannot be smoothed with `width`), a place without mass.
     pub fn new(system: &System, width: Option<f64>, method: &'static str) -> Result<Self, MethodError> {
         let n = system.dofs();
-        if let Some(i) = (0..n).find(|&i| system.mass[(i, i)] <= 0.0) {
-            return Err(MethodError::NeedsMass { method, place: system.places[i].clone() });
+        if let Some(i) = (0..n).find(|&i| system.structure().mass()[(i, i)] <= 0.0) {
+            return Err(MethodError::NeedsMass { method, place: system.places()[i].clone() });
         }
         let inverse_mass =
-            system.mass.clone().try_inverse().ok_or(MethodError::NotPositive { method, matrix: "mass" })?;
+            system.structure().mass().clone().try_inverse().ok_or(MethodError::NotPositive { method, matrix: "mass" })?;
         let mut internal = 0;
         let mut joints = Vec::new();
-        for joint in &system.joints {
+        for joint in system.joints() {
             let refused = |instead: &'static str| MethodError::Law {
                 method,
-                joint: joint.name.clone(),
-                law: joint.law.name(),
+                joint: joint.name().to_owned(),
+                law: joint.law().name(),
                 instead,
             };
-            let smoothed: Option<Law> = width.and_then(|width| joint.law.regularised(width));
-            let law = smoothed.unwrap_or(joint.law);
+            let smoothed: Option<SharedLaw> = width.and_then(|width| joint.law().regularised(width));
+            let law = smoothed.unwrap_or_else(|| joint.law().clone());
             let rate = law.rate().ok_or_else(|| {
                 refused(
                     "method `event-driven`, or give the method a `width` (m/s) over which friction changes its sign",
                 )
             })?;
-            if joint.direction.ncols() != 1 {
+            if joint.axes().len() != 1 {
                 return Err(refused("a law with one direction"));
             }
             if rate.states() > MOST_STATES {
                 return Err(refused("a law with fewer internal states"));
             }
             joints.push(SmoothJoint {
-                mobility: &inverse_mass * joint.direction.column(0),
-                direction: joint.direction.column(0).into_owned(),
-                law: rate,
+                mobility: &inverse_mass * joint.axes()[0].dense(n),
+                direction: joint.axes()[0].dense(n),
+                law: law.clone(),
                 first_state: internal,
                 states: rate.states(),
-                limit: law.limit(),
+                limit: law.scale(),
             });
             internal += rate.states();
         }
         Ok(Structure {
             n,
-            damping_rate: &inverse_mass * &system.damping,
-            stiffness_rate: &inverse_mass * &system.stiffness,
-            mass: system.mass.clone(),
+            damping_rate: &inverse_mass * system.structure().damping(),
+            stiffness_rate: &inverse_mass * system.structure().stiffness(),
+            mass: system.structure().mass().clone(),
             inverse_mass,
-            damping: system.damping.clone(),
-            stiffness: system.stiffness.clone(),
+            damping: system.structure().damping().clone(),
+            stiffness: system.structure().stiffness().clone(),
             joints,
             internal,
         })

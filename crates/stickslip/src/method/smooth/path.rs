@@ -1,7 +1,7 @@
 //! The orbit's numbers from its integration steps.
 
 use super::flow::{SmoothFlow, StepRecord};
-use crate::method::Contact;
+use crate::law::{Contact, SLIPS_ABOVE};
 use crate::method::drive::Drive;
 use crate::method::periodic::Closed;
 use crate::model::System;
@@ -12,8 +12,6 @@ use stickslip_numerics::radau::{C, quintic};
 
 use super::step::{LawPoint, Structure};
 
-/// A smooth joint counts as slipping while its force is above this fraction of its limit: a smooth law never quite sticks.
-pub(crate) const SLIPS_ABOVE: f64 = 0.95;
 /// Turning points are refined until the step in time is below this fraction of the integration step.
 const REFINED: f64 = 1e-12;
 
@@ -127,16 +125,16 @@ fn places(system: &System, flow: &SmoothFlow, omega: f64, symmetry: Symmetry) ->
                 mean = 0.0;
                 first_harmonic *= 2.0;
             }
-            PlaceMotion { name: system.places[i].clone(), maximum, minimum, mean, first_harmonic }
+            PlaceMotion { name: system.places()[i].clone(), maximum, minimum, mean, first_harmonic }
         })
         .collect()
 }
 
 fn joints(system: &System, flow: &SmoothFlow, period: f64, symmetry: Symmetry) -> Vec<JointMotion> {
-    let (n, j) = (flow.structure.n, flow.structure.joints.len());
+    let j = flow.structure.joints.len();
     let times = if symmetry == Symmetry::HalfPeriod { 2.0 } else { 1.0 };
     system
-        .joints
+        .joints()
         .iter()
         .enumerate()
         .map(|(q, joint)| {
@@ -146,7 +144,7 @@ fn joints(system: &System, flow: &SmoothFlow, period: f64, symmetry: Symmetry) -
             let (mut switches, mut before) = (0, None);
             for step in &flow.steps {
                 for (state, time) in [(&step.from, step.start), (&step.to, step.start + step.length)] {
-                    let structural: f64 = (0..n).map(|i| joint.direction[(i, 0)] * state[i]).sum();
+                    let structural: f64 = joint.axes()[0].along(state);
                     let u = structural + flow.drive.imposed_at(q, time, 0);
                     (low, high) = (low.min(u), high.max(u));
                 }
@@ -160,12 +158,12 @@ fn joints(system: &System, flow: &SmoothFlow, period: f64, symmetry: Symmetry) -
                 low = -high;
             }
             JointMotion {
-                name: joint.name.clone(),
+                name: joint.name().to_owned(),
                 dissipation: times
                     * flow.integral(|step, stage| step.joints[stage * j + q].0 * step.joints[stage * j + q].1),
                 slip_fraction: times / period
                     * flow.integral(|step, stage| f64::from(u8::from(slips(step.joints[stage * j + q].1)))),
-                displacement: (low, high),
+                displacement: vec![(low, high)],
                 switches: times as usize * switches,
             }
         })
@@ -173,7 +171,7 @@ fn joints(system: &System, flow: &SmoothFlow, period: f64, symmetry: Symmetry) -
 }
 
 fn energy(system: &System, flow: &SmoothFlow, times: f64) -> Energy {
-    let (n, j) = (system.dofs(), system.joints.len());
+    let (n, j) = (system.dofs(), system.joints().len());
     let velocity = |step: &StepRecord, stage: usize, i: usize| step.stages[(C.len() + stage) * n + i];
     let time = |step: &StepRecord, stage: usize| step.start + C[stage] * step.length;
     let work = flow.integral(|step, stage| {
@@ -184,9 +182,9 @@ fn energy(system: &System, flow: &SmoothFlow, times: f64) -> Energy {
         let x: Vec<f64> = (0..n).map(|i| step.stages[stage * n + i]).collect();
         let v: Vec<f64> = (0..n).map(|i| velocity(step, stage, i)).collect();
         let forces: Vec<f64> = (0..j).map(|q| step.joints[stage * j + q].1).collect();
-        let by_motion: f64 = (0..system.moved.len())
+        let by_motion: f64 = (0..system.moved().len())
             .map(|m| {
-                let place = &system.moved[m];
+                let place = &system.moved()[m];
                 let coupling: f64 = (0..n)
                     .map(|i| (place.stiffness.0[i] * at.motion[m].0 + place.damping.0[i] * at.motion[m].1) * v[i])
                     .sum();
@@ -200,13 +198,13 @@ fn energy(system: &System, flow: &SmoothFlow, times: f64) -> Energy {
         let mut sum = 0.0;
         for i in 0..n {
             for k in 0..n {
-                sum += system.damping[(i, k)] * velocity(step, stage, i) * velocity(step, stage, k);
+                sum += system.structure().damping()[(i, k)] * velocity(step, stage, i) * velocity(step, stage, k);
             }
-            for (m, place) in system.moved.iter().enumerate() {
+            for (m, place) in system.moved().iter().enumerate() {
                 sum += 2.0 * place.damping.0[i] * velocity(step, stage, i) * at.motion[m].1;
             }
         }
-        for (m, place) in system.moved.iter().enumerate() {
+        for (m, place) in system.moved().iter().enumerate() {
             for (other, c) in place.damping.1.iter().enumerate() {
                 sum += c * at.motion[m].1 * at.motion[other].1;
             }
@@ -225,7 +223,7 @@ struct MovedAt {
 
 impl MovedAt {
     fn new(system: &System, omega: f64, time: f64) -> Self {
-        let motion = system.moved.iter().map(|place| {
+        let motion = system.moved().iter().map(|place| {
             let mut out = (0.0, 0.0, 0.0);
             for &(h, amplitude) in &place.motion {
                 let rate = f64::from(h) * omega;
@@ -242,7 +240,7 @@ impl MovedAt {
 
     /// The force that moves place `m`.
     fn reaction(&self, system: &System, m: usize, x: &[f64], v: &[f64], forces: &[f64]) -> f64 {
-        let place = &system.moved[m];
+        let place = &system.moved()[m];
         let mut force = place.mass * self.motion[m].2;
         for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
             force += k * self.motion[other].0 + c * self.motion[other].1;
@@ -263,7 +261,7 @@ impl SteppedPath {
         let u = along(&step.from[..n]) + self.drive.imposed_at(q, step.start, 0);
         let velocity = along(&step.from[n..2 * n]) + self.drive.imposed_at(q, step.start, 1);
         let first = 2 * n + joint.first_state;
-        let begin = LawPoint::new(&joint.law, u, velocity, &step.from[first..first + joint.states]).force;
+        let begin = LawPoint::new(&*joint.law, u, velocity, &step.from[first..first + joint.states]).force;
         let nodes = [0.0, C[0], C[1], C[2]];
         let values = [begin, step.joints[q].1, step.joints[j + q].1, step.joints[2 * j + q].1];
         (0..nodes.len())
@@ -299,22 +297,17 @@ impl Path for SteppedPath {
                 let u = along(&x) + self.drive.imposed_at(q, time, 0);
                 let velocity = along(&v) + self.drive.imposed_at(q, time, 1);
                 let force = match joint.states {
-                    0 => LawPoint::new(&joint.law, u, velocity, &[]).force,
+                    0 => LawPoint::new(&*joint.law, u, velocity, &[]).force,
                     _ => self.force_between(step, q, s),
                 };
                 let slips = force.abs() >= SLIPS_ABOVE * joint.limit;
                 let along_force = if joint.limit > 0.0 { force } else { velocity };
-                JointSample {
-                    displacement: sign * u,
-                    velocity: sign * velocity,
-                    force: sign * force,
-                    contact: if slips { Contact::slip(sign * along_force) } else { Contact::Stick },
-                }
+                JointSample::along(sign * u, sign * velocity, sign * force, if slips { Contact::slip(sign * along_force) } else { Contact::Stick })
             })
             .collect();
         let at = MovedAt::new(&self.system, self.drive.omega, time);
-        let forces: Vec<f64> = joints.iter().map(|joint| sign * joint.force).collect();
-        let moved = (0..self.system.moved.len())
+        let forces: Vec<f64> = joints.iter().map(|joint| sign * joint.force[0]).collect();
+        let moved = (0..self.system.moved().len())
             .map(|m| (sign * at.motion[m].0, sign * at.reaction(&self.system, m, &x, &v, &forces)))
             .collect();
         Sample {

@@ -5,9 +5,8 @@
 //! state of a law), however many masses there are. Step lengths are powers of two times a tick, so that a few eliminations serve
 //! a whole orbit.
 
-use crate::law::{Rate, RateLaw, Relative};
+use crate::law::{Law, RatePoint, Relative, SharedLaw};
 use nalgebra::{DMatrix, DVector, Dim, Dyn, LU, Matrix, StorageMut};
-use stickslip_numerics::dual::{Dual, Real};
 use stickslip_numerics::radau::{A, C, STAGES, squared};
 
 /// The structure and its joints as the smooth methods see them.
@@ -31,7 +30,7 @@ pub(crate) struct SmoothJoint {
     pub direction: DVector<f64>,
     /// `M⁻¹` times the direction: accelerations that a unit force takes away.
     pub mobility: DVector<f64>,
-    pub law: Rate,
+    pub law: SharedLaw,
     /// Index of its first internal state.
     pub first_state: usize,
     pub states: usize,
@@ -66,19 +65,17 @@ pub(crate) struct LawPoint {
 
 impl LawPoint {
     #[inline]
-    pub fn new(law: &Rate, u: f64, velocity: f64, z: &[f64]) -> Self {
-        let mut state = [Dual::<ARGUMENTS>::from_f64(0.0); MOST_STATES];
-        let mut rate = state;
-        for (k, &value) in z.iter().enumerate() {
-            state[k] = Dual::variable(value, 2 + k);
+    pub fn new(law: &dyn Law, u: f64, velocity: f64, z: &[f64]) -> Self {
+        let mut point = RatePoint::new(1, z.len());
+        if let Some(rate) = law.rate() {
+            rate.linearise(1, &Relative::along(u, velocity), z, &mut point);
         }
-        let contact = Relative::along(Dual::variable(u, 0), Dual::variable(velocity, 1));
-        let force = law.evaluate(&contact, &state[..z.len()], &mut rate[..z.len()])[0];
+        let slopes = |row: &[f64]| std::array::from_fn(|i| row.get(i).copied().unwrap_or(0.0));
         LawPoint {
-            force: force.value,
-            force_slope: force.partials,
-            rate: rate.map(|r| r.value),
-            rate_slope: rate.map(|r| r.partials),
+            force: point.force[0],
+            force_slope: slopes(point.force_slope(0)),
+            rate: std::array::from_fn(|s| point.rate.get(s).copied().unwrap_or(0.0)),
+            rate_slope: std::array::from_fn(|s| if s < z.len() { slopes(point.rate_slope(s)) } else { [0.0; ARGUMENTS] }),
         }
     }
 }
@@ -276,7 +273,7 @@ impl Step {
                 }
                 let first = z_at(stage, joint.first_state);
                 let z = &self.unknown.as_slice()[first..first + joint.states];
-                let point = LawPoint::new(&joint.law, u, self.unknown[row], z);
+                let point = LawPoint::new(&*joint.law, u, self.unknown[row], z);
                 self.force[row] = point.force;
                 self.points[row] = point;
             }

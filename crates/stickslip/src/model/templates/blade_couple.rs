@@ -5,7 +5,8 @@
 
 use super::{GROUND, Model, Template, Values, force, joint, mass, parameter, spring};
 use crate::dimension::Dimension;
-use crate::law::{Coulomb, Law};
+use crate::law::Coulomb;
+use std::sync::Arc;
 
 pub(super) const TEMPLATE: Template = Template {
     name: "blade-couple",
@@ -33,7 +34,7 @@ fn build(values: &Values) -> Model {
             spring("blade3", GROUND, values["k"], values["b"]),
             spring("contact", "blade3", values["kt"], 0.0),
         ],
-        joints: vec![joint("shroud", "blade1", "contact", Law::Coulomb(Coulomb { limit: values["Ft"] }))],
+        joints: vec![joint("shroud", "blade1", "contact", Arc::new(Coulomb { limit: values["Ft"] }))],
         forces: vec![force("blade1", values["F0"])],
         ..Model::default()
     }

@@ -4,7 +4,8 @@
 
 use super::{GROUND, Model, Template, Values, force, joint, mass, parameter, spring};
 use crate::dimension::Dimension;
-use crate::law::{Jenkins, Law};
+use crate::law::Jenkins;
+use std::sync::Arc;
 
 pub(super) const TEMPLATE: Template = Template {
     name: "blade-couple-massless",
@@ -22,7 +23,7 @@ pub(super) const TEMPLATE: Template = Template {
 };
 
 fn build(values: &Values) -> Model {
-    let law = Law::Jenkins(Jenkins { stiffness: values["kt"], limit: values["Ft"] });
+    let law = Arc::new(Jenkins { stiffness: values["kt"], limit: values["Ft"] });
     Model {
         masses: vec![mass("blade1", values["m"]), mass("blade3", values["m"])],
         springs: vec![

@@ -4,7 +4,8 @@
 
 use super::{GROUND, Model, Template, Values, joint, motion, parameter};
 use crate::dimension::Dimension;
-use crate::law::{Jenkins, Law};
+use crate::law::Jenkins;
+use std::sync::Arc;
 
 pub(super) const TEMPLATE: Template = Template {
     name: "element",
@@ -19,7 +20,7 @@ pub(super) const TEMPLATE: Template = Template {
 };
 
 fn build(values: &Values) -> Model {
-    let law = Law::Jenkins(Jenkins { stiffness: values["kt"], limit: values["Ft"] });
+    let law = Arc::new(Jenkins { stiffness: values["kt"], limit: values["Ft"] });
     Model {
         motions: vec![motion("mover", values["a"])],
         joints: vec![joint("contact", "mover", GROUND, law)],

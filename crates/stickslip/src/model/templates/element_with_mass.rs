@@ -4,7 +4,8 @@
 
 use super::{GROUND, Model, Template, Values, joint, mass, motion, parameter, spring};
 use crate::dimension::Dimension;
-use crate::law::{Coulomb, Law};
+use crate::law::Coulomb;
+use std::sync::Arc;
 
 pub(super) const TEMPLATE: Template = Template {
     name: "element-with-mass",
@@ -24,7 +25,7 @@ fn build(values: &Values) -> Model {
         masses: vec![mass("slider", values["m1"])],
         springs: vec![spring("mover", "slider", values["kt"], 0.0)],
         motions: vec![motion("mover", values["a"])],
-        joints: vec![joint("contact", "slider", GROUND, Law::Coulomb(Coulomb { limit: values["Ft"] }))],
+        joints: vec![joint("contact", "slider", GROUND, Arc::new(Coulomb { limit: values["Ft"] }))],
         ..Model::default()
     }
 }

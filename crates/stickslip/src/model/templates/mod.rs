@@ -10,7 +10,7 @@ mod symmetric_couple;
 
 use super::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
 use crate::dimension::Dimension;
-use crate::law::Law;
+use crate::law::SharedLaw;
 use std::collections::BTreeMap;
 
 /// A ready model with named parameters.
@@ -99,14 +99,14 @@ const fn parameter(
 }
 
 fn mass(name: &str, mass: f64) -> Mass {
-    Mass { name: name.to_owned(), mass }
+    Mass::new(name, mass)
 }
 
 fn spring(a: &str, b: &str, stiffness: f64, damping: f64) -> Spring {
     Spring { between: [a.to_owned(), b.to_owned()], stiffness, damping }
 }
 
-fn joint(name: &str, a: &str, b: &str, law: Law) -> Joint {
+fn joint(name: &str, a: &str, b: &str, law: SharedLaw) -> Joint {
     Joint { name: name.to_owned(), between: [a.to_owned(), b.to_owned()], law }
 }
 

@@ -6,7 +6,8 @@
 
 use super::{GROUND, Model, Template, Values, force, joint, mass, parameter, spring};
 use crate::dimension::Dimension;
-use crate::law::{Coulomb, Law};
+use crate::law::Coulomb;
+use std::sync::Arc;
 
 pub(super) const TEMPLATE: Template = Template {
     name: "symmetric-couple",
@@ -35,7 +36,7 @@ fn build(values: &Values) -> Model {
             spring("blade1", "contact2", values["kt"], 0.0),
             spring("contact3", "blade4", values["kt"], 0.0),
         ],
-        joints: vec![joint("shroud", "contact2", "contact3", Law::Coulomb(Coulomb { limit: values["Ft"] }))],
+        joints: vec![joint("shroud", "contact2", "contact3", Arc::new(Coulomb { limit: values["Ft"] }))],
         forces: vec![force("blade1", values["F0"])],
         ..Model::default()
     }

@@ -1,0 +1,197 @@
+//! The parameters of a law, and the row that describes it.
+
+use super::SharedLaw;
+use crate::dimension::Dimension;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// The values that a parameter may have; all are finite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Range {
+    /// More than zero.
+    Positive,
+    /// Zero or more.
+    ZeroOrMore,
+    /// Any number.
+    Any,
+    /// From the first number on, up to the second.
+    Within(f64, f64),
+    /// A whole number from 1.
+    Count,
+}
+
+impl Range {
+    /// Whether `value` lies in it.
+    pub fn has(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Range::Positive => value > 0.0,
+                Range::ZeroOrMore => value >= 0.0,
+                Range::Any => true,
+                Range::Within(least, most) => (least..=most).contains(&value),
+                Range::Count => value >= 1.0 && value.fract() == 0.0,
+            }
+    }
+}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Range::Positive => write!(f, "more than zero"),
+            Range::ZeroOrMore => write!(f, "zero or more"),
+            Range::Any => write!(f, "of either sign"),
+            Range::Within(least, most) => write!(f, "from {least} to {most}"),
+            Range::Count => write!(f, "a whole number from 1"),
+        }
+    }
+}
+
+/// One parameter of a law: its key in a study file, its dimension, what it means.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Key in `law = { kind = …, KEY = … }`.
+    pub key: &'static str,
+    /// Physical dimension, for units and for error messages.
+    pub dimension: Dimension,
+    /// What it may be.
+    pub range: Range,
+    /// Its value when the key is absent, SI; `None` if it must be given.
+    pub default: Option<f64>,
+    /// One line for the documentation and for editors.
+    pub doc: &'static str,
+}
+
+impl Parameter {
+    /// A parameter within a range.
+    pub const fn new(key: &'static str, dimension: Dimension, range: Range, doc: &'static str) -> Self {
+        Parameter { key, dimension, range, default: None, doc }
+    }
+
+    /// A parameter that is more than zero.
+    pub const fn positive(key: &'static str, dimension: Dimension, doc: &'static str) -> Self {
+        Parameter::new(key, dimension, Range::Positive, doc)
+    }
+
+    /// The slip limit, N; zero is a joint that carries no force: the free reference of a damper.
+    pub const fn limit(doc: &'static str) -> Self {
+        Parameter::new(super::LIMIT, Dimension::FORCE, Range::ZeroOrMore, doc)
+    }
+
+    /// The same parameter with a value for when its key is absent, SI.
+    pub const fn or(self, default: f64) -> Self {
+        Parameter { default: Some(default), ..self }
+    }
+}
+
+/// What can be known of a law without an instance of it.
+#[derive(Debug)]
+pub struct LawInfo {
+    /// Name in study files.
+    pub name: &'static str,
+    /// One line of what it is, with its equation.
+    pub summary: &'static str,
+    /// Its parameters.
+    pub parameters: &'static [Parameter],
+    /// Values of a typical instance in the order of `parameters`, SI: for examples and for tests that run over all laws.
+    pub sample: &'static [f64],
+    /// Builds the law from values in the order of `parameters`, SI; no check is made here.
+    pub build: fn(&[f64]) -> SharedLaw,
+}
+
+impl LawInfo {
+    /// A typical instance.
+    pub fn sample(&self) -> SharedLaw {
+        (self.build)(self.sample)
+    }
+
+    /// Builds the law from values by key (SI).
+    ///
+    /// # Errors
+    /// The keys that are missing, or a value that is not finite or out of its range.
+    ///
+    /// # Example
+    /// ```
+    /// use std::collections::BTreeMap;
+    /// let row = stickslip::law::find("coulomb").unwrap();
+    /// let law = row.build(&BTreeMap::from([("limit", 2.0)])).unwrap();
+    /// assert_eq!(law.values(), [2.0]);
+    /// ```
+    pub fn build(&self, values: &BTreeMap<&str, f64>) -> Result<SharedLaw, BuildError> {
+        let value = |p: &Parameter| values.get(p.key).copied().or(p.default);
+        let missing: Vec<&'static str> =
+            self.parameters.iter().filter(|p| value(p).is_none()).map(|p| p.key).collect();
+        if !missing.is_empty() {
+            return Err(BuildError::Missing { law: self.name, keys: missing });
+        }
+        let ordered: Vec<f64> = self.parameters.iter().filter_map(value).collect();
+        // numbers out of range could not be built from
+        check(self, &ordered)?;
+        let law = (self.build)(&ordered);
+        law.check()?;
+        Ok(law)
+    }
+}
+
+/// Whether every value is in its range.
+pub(super) fn check(info: &LawInfo, values: &[f64]) -> Result<(), LawError> {
+    for (parameter, &value) in info.parameters.iter().zip(values) {
+        if !parameter.range.has(value) {
+            let Parameter { key, dimension, range, .. } = *parameter;
+            return Err(LawError::Value { law: info.name, key, dimension, range, value });
+        }
+    }
+    Ok(())
+}
+
+/// Why a law's parameters are refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LawError {
+    /// A value is out of its range.
+    #[error("{law}: `{key}` must be a finite {dimension}, {range}, found {value}")]
+    Value {
+        /// Name of the law.
+        law: &'static str,
+        /// Key of the parameter.
+        key: &'static str,
+        /// What is measured by it.
+        dimension: Dimension,
+        /// What it may be.
+        range: Range,
+        /// The value that was given, SI.
+        value: f64,
+    },
+    /// The values do not fit each other.
+    #[error("{law}: {message}")]
+    Inconsistent {
+        /// Name of the law.
+        law: &'static str,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+impl LawError {
+    /// The key of the parameter that is wrong, if one alone is.
+    pub fn key(&self) -> Option<&'static str> {
+        match self {
+            LawError::Value { key, .. } => Some(key),
+            LawError::Inconsistent { .. } => None,
+        }
+    }
+}
+
+/// Why a law could not be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BuildError {
+    /// Parameters are missing.
+    #[error("law `{law}` needs {}", .keys.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", "))]
+    Missing {
+        /// Name of the law.
+        law: &'static str,
+        /// The keys that are missing.
+        keys: Vec<&'static str>,
+    },
+    /// A value is refused.
+    #[error(transparent)]
+    Value(#[from] LawError),
+}

@@ -1,0 +1,171 @@
+//! The step view: the force at the end of a step, from the motion over it and the state before it (return map).
+
+use super::MOST_DIRECTIONS;
+use std::fmt::Debug;
+use stickslip_numerics::dual::{Dual, Real, partials, variable};
+
+/// What the author of a law of step form writes, once for numbers and for dual numbers. Time does not occur in it: what happens depends on the
+/// way and not on the speed.
+pub trait StepLaw {
+    /// Number of internal states `z`; all are zero in a contact that has not been moved.
+    fn states(&self) -> usize;
+    /// The size that internal states have in motion, in their own unit.
+    fn state_scale(&self) -> f64 {
+        1.0
+    }
+    /// Force (N) at the end of a straight step of the displacement `from` one point `to` the next (m); `z` is replaced by the states at its end.
+    fn advance<S: Real>(
+        &self,
+        from: &[S; MOST_DIRECTIONS],
+        to: &[S; MOST_DIRECTIONS],
+        z: &mut [S],
+    ) -> [S; MOST_DIRECTIONS];
+}
+
+/// The step view as methods see it; every [`StepLaw`] has it.
+pub trait Step: Debug + Send + Sync {
+    /// Number of internal states.
+    fn states(&self) -> usize;
+    /// Their size in motion, see [`StepLaw::state_scale`].
+    fn state_scale(&self) -> f64;
+    /// Force (N) at the end of a step; `z` is replaced by the states there.
+    fn value(
+        &self,
+        from: &[f64; MOST_DIRECTIONS],
+        to: &[f64; MOST_DIRECTIONS],
+        z: &mut [f64],
+    ) -> [f64; MOST_DIRECTIONS];
+    /// The same with exact derivatives, along the first `directions`; `z` stays.
+    fn linearise(
+        &self,
+        directions: usize,
+        from: &[f64; MOST_DIRECTIONS],
+        to: &[f64; MOST_DIRECTIONS],
+        z: &[f64],
+        point: &mut StepPoint,
+    );
+}
+
+/// Force and states at the end of a step, with derivatives by its arguments: the displacement before along all directions, the one after along
+/// all directions, the states before.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StepPoint {
+    /// Force along the directions, N.
+    pub force: [f64; MOST_DIRECTIONS],
+    /// States at the end.
+    pub state: Vec<f64>,
+    /// Derivatives, one row of arguments for each force, then for each state.
+    slopes: Vec<f64>,
+    directions: usize,
+    arguments: usize,
+}
+
+impl StepPoint {
+    /// For a law with so many directions and internal states.
+    pub fn new(directions: usize, states: usize) -> Self {
+        let arguments = 2 * directions + states;
+        StepPoint {
+            force: [0.0; MOST_DIRECTIONS],
+            state: vec![0.0; states],
+            slopes: vec![0.0; (directions + states) * arguments],
+            directions,
+            arguments,
+        }
+    }
+
+    /// Derivatives of force `a` by all arguments.
+    pub fn force_slope(&self, a: usize) -> &[f64] {
+        &self.slopes[a * self.arguments..(a + 1) * self.arguments]
+    }
+
+    /// Derivatives of state `s` at the end by all arguments.
+    pub fn state_slope(&self, s: usize) -> &[f64] {
+        let row = self.directions + s;
+        &self.slopes[row * self.arguments..(row + 1) * self.arguments]
+    }
+}
+
+/// Derivatives that are computed in one pass, where there are more than fit a smaller number.
+const WIDTH: usize = 8;
+
+impl<L: StepLaw + Debug + Send + Sync> Step for L {
+    fn states(&self) -> usize {
+        StepLaw::states(self)
+    }
+    fn state_scale(&self) -> f64 {
+        StepLaw::state_scale(self)
+    }
+    #[inline]
+    fn value(
+        &self,
+        from: &[f64; MOST_DIRECTIONS],
+        to: &[f64; MOST_DIRECTIONS],
+        z: &mut [f64],
+    ) -> [f64; MOST_DIRECTIONS] {
+        self.advance(from, to, z)
+    }
+    fn linearise(
+        &self,
+        directions: usize,
+        from: &[f64; MOST_DIRECTIONS],
+        to: &[f64; MOST_DIRECTIONS],
+        z: &[f64],
+        point: &mut StepPoint,
+    ) {
+        match 2 * directions + z.len() {
+            0..=3 => pass::<3, L>(self, directions, (from, to), z, 0, point),
+            4 | 5 => pass::<5, L>(self, directions, (from, to), z, 0, point),
+            arguments => {
+                for first in (0..arguments).step_by(WIDTH) {
+                    pass::<WIDTH, L>(self, directions, (from, to), z, first, point);
+                }
+            }
+        }
+    }
+}
+
+/// Internal states that are kept on the stack.
+const FEW: usize = 8;
+
+/// Derivatives by the arguments from `first` on, as many as the dual number has.
+fn pass<const N: usize, L: StepLaw>(
+    law: &L,
+    directions: usize,
+    (from, to): (&[f64; MOST_DIRECTIONS], &[f64; MOST_DIRECTIONS]),
+    z: &[f64],
+    first: usize,
+    point: &mut StepPoint,
+) {
+    let seeded = |value: f64, argument: usize| -> Dual<N> {
+        match argument.checked_sub(first) {
+            Some(at) if at < N => variable(value, at),
+            _ => Dual::from(value),
+        }
+    };
+    let zero = Dual::<N>::from(0.0);
+    let (mut before, mut after) = ([zero; MOST_DIRECTIONS], [zero; MOST_DIRECTIONS]);
+    for a in 0..directions {
+        before[a] = seeded(from[a], a);
+        after[a] = seeded(to[a], directions + a);
+    }
+    let mut few = [zero; FEW];
+    let mut many = vec![zero; if z.len() > FEW { z.len() } else { 0 }];
+    let state = if z.len() > FEW { &mut many[..] } else { &mut few[..z.len()] };
+    for (s, (dual, &value)) in state.iter_mut().zip(z).enumerate() {
+        *dual = seeded(value, 2 * directions + s);
+    }
+    let force = law.advance(&before, &after, state);
+    let width = N.min(point.arguments - first);
+    let mut keep = |row: usize, value: &Dual<N>| {
+        let at = row * point.arguments + first;
+        point.slopes[at..at + width].copy_from_slice(&partials(value)[..width]);
+    };
+    for a in 0..directions {
+        point.force[a] = force[a].re;
+        keep(a, &force[a]);
+    }
+    for (s, state) in state.iter().enumerate() {
+        point.state[s] = state.re;
+        keep(directions + s, state);
+    }
+}
