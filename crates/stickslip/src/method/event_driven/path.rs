@@ -43,11 +43,11 @@ pub(super) fn orbit(
     system: &System,
     contracts: bool,
     flow: &Flow,
-    omega: f64,
+    (omega, periods): (f64, usize),
     symmetry: Symmetry,
     closed: Closed,
 ) -> Result<Orbit, Breakdown> {
-    let path = ExactPath::new(system, flow, symmetry, std::f64::consts::TAU / omega);
+    let path = ExactPath::new(system, flow, symmetry, periods as f64 * std::f64::consts::TAU / omega);
     let places = path.places(omega)?;
     let joints = path.joints(flow)?;
     let energy = path.energy(flow, &joints);
@@ -62,6 +62,7 @@ pub(super) fn orbit(
     Ok(Orbit {
         method: NAME,
         omega,
+        periods,
         symmetry,
         start: closed.state,
         evidence: Evidence {
@@ -70,6 +71,7 @@ pub(super) fn orbit(
             switches: joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
             truncation: closed.missing,
+            return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,
             stuck: stuck.collect(),
         },
