@@ -118,8 +118,7 @@ impl LawInfo {
     /// ```
     pub fn build(&self, values: &BTreeMap<&str, f64>) -> Result<SharedLaw, BuildError> {
         let value = |p: &Parameter| values.get(p.key).copied().or(p.default);
-        let missing: Vec<&'static str> =
-            self.parameters.iter().filter(|p| value(p).is_none()).map(|p| p.key).collect();
+        let missing: Vec<&'static str> = self.parameters.iter().filter(|p| value(p).is_none()).map(|p| p.key).collect();
         if !missing.is_empty() {
             return Err(BuildError::Missing { law: self.name, keys: missing });
         }
