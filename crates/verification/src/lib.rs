@@ -91,7 +91,6 @@ pub fn template(name: &str, changes: &[(&str, f64)]) -> System {
     template.model_with(changes).unwrap_or_else(|key| panic!("no parameter {key}")).assemble().expect("well formed")
 }
 
-/// The same with the laws of all joints replaced by `law(limit)`, given the slip limit of each.
 /// The same system with another mass matrix, as it is; a mass matrix that is none is refused.
 ///
 /// # Errors
@@ -104,6 +103,7 @@ pub fn with_mass(system: &System, change: impl FnOnce(&mut DMatrix<f64>)) -> Res
     Ok(system.on(structure).expect("as many degrees of freedom"))
 }
 
+/// A template with the laws of all joints replaced by `law(limit)`, given the slip limit of each.
 pub fn template_with(name: &str, changes: &[(&str, f64)], law: impl Fn(f64) -> SharedLaw) -> System {
     let template = templates::find(name).unwrap_or_else(|| panic!("no template {name}"));
     let mut model = template.model_with(changes).unwrap_or_else(|key| panic!("no parameter {key}"));
