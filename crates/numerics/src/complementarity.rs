@@ -36,6 +36,9 @@ const RANK: f64 = 1e-12;
 /// ```
 pub fn solve(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<f64>) -> Option<DVector<f64>> {
     let n = b.len();
+    if n == 1 {
+        return solve_one(d[0], b[0], low[0], high[0]).map(|lambda| DVector::from_element(1, lambda));
+    }
     let mut side = vec![Side::Inside; n];
     let (mut fewest, mut patience) = (n + 1, PATIENCE);
     for _ in 0..(100 + 20 * n * n) {
@@ -71,6 +74,18 @@ pub fn solve(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVec
         }
     }
     None
+}
+
+/// One component: inside if it can be, else at the side that it is beyond.
+fn solve_one(d: f64, b: f64, low: f64, high: f64) -> Option<f64> {
+    let lambda = if d > 0.0 { b / d } else { 0.0 };
+    let beyond = if lambda > high { high } else { low };
+    if (low..=high).contains(&lambda) || (lambda - beyond).abs() <= FEASIBLE * lambda.abs() {
+        return Some(lambda.clamp(low, high));
+    }
+    let w = b - d * beyond;
+    let wrong = if beyond == high { -w } else { w };
+    (wrong <= FEASIBLE * (b.abs() + (d * beyond).abs())).then_some(beyond)
 }
 
 fn solve_inside(

@@ -29,6 +29,9 @@ pub(crate) struct Decision {
     pub acceleration: DVector<f64>,
     /// Largest force on a mass without those of rigid sliders at rest, N.
     pushed: f64,
+    /// Accelerations that unit forces of the sliders cause, `M⁻¹ W`, n × sliders, and the relative ones, `Wᵀ M⁻¹ W`.
+    response: DMatrix<f64>,
+    delassus: DMatrix<f64>,
     free: DVector<f64>,
     jerk: DVector<f64>,
     at_rest: Vec<usize>,
@@ -37,7 +40,15 @@ pub(crate) struct Decision {
 
 impl Decision {
     pub fn new(mechanics: &Mechanics) -> Self {
+        let count = mechanics.sliders.len();
+        let mut response = DMatrix::zeros(mechanics.n, count);
+        for (i, slider) in mechanics.sliders.iter().enumerate() {
+            response.set_column(i, &(&mechanics.inverse_mass * &slider.direction));
+        }
+        let delassus = DMatrix::from_fn(count, count, |a, b| mechanics.sliders[a].direction.dot(&response.column(b)));
         Decision {
+            response,
+            delassus,
             contacts: vec![Contact::Stick; mechanics.sliders.len()],
             acceleration: DVector::zeros(mechanics.n),
             pushed: 0.0,
@@ -119,7 +130,7 @@ impl Decision {
         }
         let limits =
             DVector::from_iterator(self.at_rest.len(), self.at_rest.iter().map(|&i| mechanics.sliders[i].limit));
-        let delassus = delassus(mechanics, &self.at_rest);
+        let delassus = self.delassus_at_rest();
         let push = self.push(mechanics, drive, time, 2, &self.acceleration);
         let Some(lambda) = complementarity::solve(&delassus, &push, &-&limits, &limits) else {
             return false;
@@ -133,7 +144,7 @@ impl Decision {
             } else if lambda[k].abs() >= limits[k] * (1.0 - AT_LIMIT) {
                 self.undecided.push(i);
             }
-            self.acceleration -= &mechanics.inverse_mass * &mechanics.sliders[i].direction * lambda[k];
+            self.acceleration.axpy(-lambda[k], &self.response.column(i), 1.0);
         }
         if !self.undecided.is_empty() {
             let signs: Vec<(usize, f64)> = self
@@ -187,7 +198,7 @@ impl Decision {
         ];
         for level in 1..LEVELS {
             self.at_rest.retain(|i| self.contacts[*i] == Contact::Stick);
-            let delassus = delassus(mechanics, &self.at_rest);
+            let delassus = self.delassus_at_rest();
             self.free_derivative(mechanics, drive, time, level, &derivatives);
             let mut jerk = std::mem::replace(&mut self.jerk, DVector::zeros(0));
             multiply(&mechanics.inverse_mass, &self.free, &mut jerk);
@@ -215,7 +226,7 @@ impl Decision {
                         left.push((i, sign));
                     }
                 }
-                jerk -= &mechanics.inverse_mass * &mechanics.sliders[i].direction * rate[k];
+                jerk.axpy(-rate[k], &self.response.column(i), 1.0);
             }
             derivatives.push(jerk.clone());
             self.jerk = jerk;
@@ -227,6 +238,12 @@ impl Decision {
         if self.jerk.len() != n {
             self.jerk = DVector::zeros(n);
         }
+    }
+
+    /// `Wᵀ M⁻¹ W` of the sliders at rest.
+    fn delassus_at_rest(&self) -> DMatrix<f64> {
+        let at = &self.at_rest;
+        DMatrix::from_fn(at.len(), at.len(), |a, b| self.delassus[(at[a], at[b])])
     }
 
     /// The `level`-th derivative of the forces other than those of rigid sliders at rest, into `self.free`.
@@ -290,24 +307,17 @@ impl Decision {
             self.free_derivative(mechanics, drive, time, level, &derivatives);
             let mut next = &mechanics.inverse_mass * &self.free;
             if !self.at_rest.is_empty() {
-                let delassus = delassus(mechanics, &self.at_rest);
+                let delassus = self.delassus_at_rest();
                 let push = self.push(mechanics, drive, time, level + 2, &next);
                 let infinite = DVector::from_element(self.at_rest.len(), f64::INFINITY);
                 let Some(rate) = complementarity::solve(&delassus, &push, &-&infinite, &infinite) else { return };
                 for (k, &i) in self.at_rest.iter().enumerate() {
-                    next -= &mechanics.inverse_mass * &mechanics.sliders[i].direction * rate[k];
+                    next.axpy(-rate[k], &self.response.column(i), 1.0);
                 }
             }
             derivatives.push(next);
         }
     }
-}
-
-fn delassus(mechanics: &Mechanics, sliders: &[usize]) -> DMatrix<f64> {
-    DMatrix::from_fn(sliders.len(), sliders.len(), |a, b| {
-        let (wa, wb) = (&mechanics.sliders[sliders[a]].direction, &mechanics.sliders[sliders[b]].direction);
-        wa.dot(&(&mechanics.inverse_mass * wb))
-    })
 }
 
 fn relative(slider: &super::mechanics::Slider, v: &[f64]) -> f64 {
