@@ -35,10 +35,28 @@ const RANK: f64 = 1e-12;
 /// assert_eq!(λ[0], 2.0);
 /// ```
 pub fn solve(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<f64>) -> Option<DVector<f64>> {
+    let mut lambda = DVector::zeros(b.len());
+    solve_into(d, b, low, high, &mut lambda).then_some(lambda)
+}
+
+/// As [`solve`], into `lambda`; returns false where it returns `None`. One component takes no memory.
+pub fn solve_into(
+    d: &DMatrix<f64>,
+    b: &DVector<f64>,
+    low: &DVector<f64>,
+    high: &DVector<f64>,
+    lambda: &mut DVector<f64>,
+) -> bool {
+    let solution = match b.len() {
+        1 => solve_one(d[0], b[0], low[0], high[0]).map(|one| lambda[0] = one),
+        _ => pivot(d, b, low, high).map(|all| lambda.copy_from(&all)),
+    };
+    solution.is_some()
+}
+
+/// Block pivoting.
+fn pivot(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<f64>) -> Option<DVector<f64>> {
     let n = b.len();
-    if n == 1 {
-        return solve_one(d[0], b[0], low[0], high[0]).map(|lambda| DVector::from_element(1, lambda));
-    }
     let mut side = vec![Side::Inside; n];
     let (mut fewest, mut patience) = (n + 1, PATIENCE);
     for _ in 0..(100 + 20 * n * n) {

@@ -204,7 +204,8 @@ impl Basis {
     pub fn first_zero(&self, signals: &[Complex64], begins: &[Begin], end: f64, scratch: &mut Scratch) -> FirstZero {
         let (nb, count) = (self.len(), begins.len());
         scratch.prepare(nb, count);
-        let Scratch { values, magnitudes, first, second, third, second_weights, third_weights, clear_until } = scratch;
+        let Scratch { values, magnitudes, first, second, third, second_weights, third_weights, clear_until, rising } =
+            scratch;
         for k in 0..count {
             let range = k * nb..(k + 1) * nb;
             self.differentiate(&signals[range.clone()], &mut first[range.clone()]);
@@ -220,7 +221,7 @@ impl Basis {
         for k in 0..count {
             clear_until[k] = match begins[k] {
                 Begin::Positive => 0.0,
-                Begin::Zero => match self.rises_until(&signals[k * nb..(k + 1) * nb], magnitudes) {
+                Begin::Zero => match self.rises_until(&first[k * nb..(k + 1) * nb], magnitudes, rising) {
                     Some(until) => until,
                     None => return FirstZero::At { index: k, time: 0.0 },
                 },
@@ -286,21 +287,24 @@ impl Basis {
         FirstZero::TooManySteps
     }
 
-    /// For a signal that starts at zero: how long it certainly stays positive, or `None` if it falls.
-    fn rises_until(&self, signal: &[Complex64], magnitudes: &[f64]) -> Option<f64> {
-        let nb = self.len();
-        let mut current = signal.to_vec();
-        let mut next = vec![Complex64::new(0.0, 0.0); nb];
+    /// For a signal that starts at zero, with derivative `slope`: how long it certainly stays positive, or `None` if it falls.
+    fn rises_until(&self, slope: &[Complex64], magnitudes: &[f64], memory: &mut [Vec<Complex64>; 2]) -> Option<f64> {
+        let [current, next] = memory;
+        current.clear();
+        current.extend_from_slice(slope);
+        next.resize(slope.len(), Complex64::new(0.0, 0.0));
         for order in 1..=4 {
-            self.differentiate(&current, &mut next);
-            std::mem::swap(&mut current, &mut next);
-            let value = self.beginning(&current);
+            if order > 1 {
+                self.differentiate(current, next);
+                std::mem::swap(current, next);
+            }
+            let value = self.beginning(current);
             let size: f64 = current[..=self.constant()].iter().map(|c| c.norm()).sum();
             if value.abs() > VANISHES * size {
                 if value < 0.0 {
                     return None;
                 }
-                self.differentiate(&current, &mut next);
+                self.differentiate(current, next);
                 let bound: f64 = next.iter().zip(magnitudes).map(|(c, m)| c.norm() * m).sum();
                 // g ≥ value τ^k/k! - bound τ^{k+1}/(k+1)!
                 return Some(if bound == 0.0 { f64::INFINITY } else { 0.5 * f64::from(order + 1) * value / bound });
@@ -484,6 +488,7 @@ pub struct Scratch {
     second_weights: Vec<f64>,
     third_weights: Vec<f64>,
     clear_until: Vec<f64>,
+    rising: [Vec<Complex64>; 2],
 }
 
 impl Scratch {

@@ -23,6 +23,8 @@ const STILL: f64 = 1e-13;
 /// A harmonic this close to a mode (relative) is integrated as a resonant pair; nearer than this the plain particular solution
 /// would lose more than the last five digits.
 const RESONANT: f64 = 1e-5;
+/// States from which packing the factors of a product for the cache costs less than it saves.
+const LARGE: usize = 24;
 
 /// The closed-form motion of one pattern.
 #[derive(Debug, Clone)]
@@ -486,7 +488,17 @@ impl Pattern {
                 }
             }
         }
-        work.product.gemm(1.0, &work.transition, sensitivity, 0.0);
+        if states >= LARGE {
+            work.product.gemm(1.0, &work.transition, sensitivity, 0.0);
+        } else {
+            let columns = sensitivity.as_slice().chunks_exact(states);
+            for (to, from) in work.product.as_mut_slice().chunks_exact_mut(states).zip(columns) {
+                to.fill(0.0);
+                for (column, factor) in work.transition.as_slice().chunks_exact(states).zip(from) {
+                    to.iter_mut().zip(column).for_each(|(to, x)| *to += x * factor);
+                }
+            }
+        }
         sensitivity.copy_from(&work.product);
     }
 }
