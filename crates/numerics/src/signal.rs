@@ -211,10 +211,10 @@ impl Basis {
             self.differentiate(&signals[range.clone()], &mut first[range.clone()]);
             self.differentiate(&first[range.clone()], &mut second[range.clone()]);
             self.differentiate(&second[range.clone()], third);
-            for b in 0..nb {
-                // no overflow here: hypot would only cost
-                second_weights[k * nb + b] = second[k * nb + b].norm_sqr().sqrt();
-                third_weights[k * nb + b] = third[b].norm_sqr().sqrt();
+            for (weights, signal) in
+                [(&mut second_weights[range.clone()], &second[range.clone()]), (&mut third_weights[range], &third[..])]
+            {
+                weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = size_of(c));
             }
         }
         self.magnitudes(end, magnitudes);
@@ -299,13 +299,13 @@ impl Basis {
                 std::mem::swap(current, next);
             }
             let value = self.beginning(current);
-            let size: f64 = current[..=self.constant()].iter().map(|c| c.norm()).sum();
+            let size: f64 = current[..=self.constant()].iter().map(size_of).sum();
             if value.abs() > VANISHES * size {
                 if value < 0.0 {
                     return None;
                 }
                 self.differentiate(current, next);
-                let bound: f64 = next.iter().zip(magnitudes).map(|(c, m)| c.norm() * m).sum();
+                let bound: f64 = next.iter().zip(magnitudes).map(|(c, m)| size_of(c) * m).sum();
                 // g ≥ value τ^k/k! - bound τ^{k+1}/(k+1)!
                 return Some(if bound == 0.0 { f64::INFINITY } else { 0.5 * f64::from(order + 1) * value / bound });
             }
@@ -469,6 +469,12 @@ fn fall(g: f64, slope: f64, curvature: f64) -> f64 {
 #[inline]
 fn bounded_by(weights: &[f64], magnitudes: &[f64]) -> f64 {
     weights.iter().zip(magnitudes).map(|(w, m)| w * m).sum()
+}
+
+/// Size of a coefficient; no overflow here, so that `hypot` would only cost.
+#[inline]
+pub fn size_of(c: &Complex64) -> f64 {
+    c.norm_sqr().sqrt()
 }
 
 /// `Re Σ c_b B_b`.

@@ -10,7 +10,7 @@ use crate::model::System;
 use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::signal::{Basis, Begin, FirstZero, FourierIntegrals, Products, Scratch, real_dot};
+use stickslip_numerics::signal::{Basis, Begin, FirstZero, FourierIntegrals, Products, Scratch, real_dot, size_of};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -340,7 +340,7 @@ impl ExactPath {
         let fastest = |i: usize| {
             let sizes = self.pieces.iter().map(|piece| {
                 let nb = piece.basis().len();
-                piece.velocity[i * nb..(i + 1) * nb].iter().map(|c| c.norm()).sum::<f64>()
+                piece.velocity[i * nb..(i + 1) * nb].iter().map(size_of).sum::<f64>()
             });
             sizes.fold(0.0, f64::max)
         };
@@ -447,11 +447,6 @@ impl Piece {
         }
         Ok((low, high))
     }
-}
-
-/// Size of a coefficient; no overflow here, so that `hypot` would only cost.
-fn size_of(c: &Complex64) -> f64 {
-    c.norm_sqr().sqrt()
 }
 
 /// A mode whose part of a signal is below this fraction of it is rounding: the orbit is closed to 1e-12 of its state.
