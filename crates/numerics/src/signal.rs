@@ -179,6 +179,19 @@ impl Basis {
         out[c + 2] = square * factor;
     }
 
+    /// Bounds on the sizes of the coefficients of a derivative from those of the signal, into `out`; `speeds` are the sizes of the exponents.
+    #[inline]
+    fn differentiate_sizes(&self, sizes: &[f64], speeds: &[f64], out: &mut [f64]) {
+        let (e, c) = (self.exponents.len(), self.constant());
+        for ((out, size), speed) in out[..c].iter_mut().zip(sizes).zip(speeds) {
+            *out = size * speed;
+        }
+        for (r, &driven_by) in self.driven_by.iter().enumerate() {
+            out[driven_by] += sizes[e + r];
+        }
+        (out[c], out[c + 1], out[c + 2]) = (sizes[c + 1], sizes[c + 2], 0.0);
+    }
+
     /// Bounds `max |B_b|` over `[0, end]`, into `out`.
     fn magnitudes(&self, end: f64, out: &mut [f64]) {
         let e = self.exponents.len();
@@ -204,18 +217,17 @@ impl Basis {
     pub fn first_zero(&self, signals: &[Complex64], begins: &[Begin], end: f64, scratch: &mut Scratch) -> FirstZero {
         let (nb, count) = (self.len(), begins.len());
         scratch.prepare(nb, count);
-        let Scratch { values, magnitudes, first, second, third, second_weights, third_weights, clear_until, rising } =
+        let Scratch { values, magnitudes, speeds, first, second, second_weights, third_weights, clear_until, rising } =
             scratch;
+        let every = self.exponents.iter().chain(self.resonant.iter().map(|(s, _)| s));
+        speeds.iter_mut().zip(every).for_each(|(speed, s)| *speed = size_of(s));
         for k in 0..count {
             let range = k * nb..(k + 1) * nb;
             self.differentiate(&signals[range.clone()], &mut first[range.clone()]);
             self.differentiate(&first[range.clone()], &mut second[range.clone()]);
-            self.differentiate(&second[range.clone()], third);
-            for (weights, signal) in
-                [(&mut second_weights[range.clone()], &second[range.clone()]), (&mut third_weights[range], &third[..])]
-            {
-                weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = size_of(c));
-            }
+            let (weights, signal) = (&mut second_weights[range.clone()], &second[range.clone()]);
+            weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = size_of(c));
+            self.differentiate_sizes(weights, speeds, &mut third_weights[range]);
         }
         self.magnitudes(end, magnitudes);
         for k in 0..count {
@@ -488,9 +500,9 @@ pub fn real_dot(coefficients: &[Complex64], values: &[Complex64]) -> f64 {
 pub struct Scratch {
     values: Vec<Complex64>,
     magnitudes: Vec<f64>,
+    speeds: Vec<f64>,
     first: Vec<Complex64>,
     second: Vec<Complex64>,
-    third: Vec<Complex64>,
     second_weights: Vec<f64>,
     third_weights: Vec<f64>,
     clear_until: Vec<f64>,
@@ -502,9 +514,9 @@ impl Scratch {
         let zero = Complex64::new(0.0, 0.0);
         self.values.resize(nb, zero);
         self.magnitudes.resize(nb, 0.0);
+        self.speeds.resize(nb, 0.0);
         self.first.resize(nb * count, zero);
         self.second.resize(nb * count, zero);
-        self.third.resize(nb, zero);
         self.second_weights.resize(nb * count, 0.0);
         self.third_weights.resize(nb * count, 0.0);
         self.clear_until.resize(count, 0.0);

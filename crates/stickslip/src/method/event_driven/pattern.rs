@@ -449,37 +449,42 @@ impl Pattern {
         work: &mut Work,
     ) {
         let (n, count, states) = (mechanics.n, self.lambda.len(), mechanics.states());
+        if states == 0 {
+            return;
+        }
         let drifts = self.drifts();
         for (k, value) in values[..count].iter().enumerate() {
+            let (real, imaginary) = work.moved[4 * n * k..4 * n * (k + 1)].split_at_mut(2 * n);
             for row in 0..n {
                 let now = self.shape[(row, k)] * value;
-                work.moved[k * n + row] = (now, now * self.lambda[k]);
+                let rate = now * self.lambda[k];
+                (real[row], real[n + row]) = (now.re, rate.re);
+                (imaginary[row], imaginary[n + row]) = (now.im, rate.im);
             }
         }
         // one column of the derivative of the end state with respect to the initial one after the other
         for (j, column) in work.transition.as_mut_slice().chunks_exact_mut(states).enumerate() {
-            let (place, rest) = column.split_at_mut(n);
-            let (speed, springs) = rest.split_at_mut(n);
-            place.copy_from_slice(&self.place.as_slice()[j * n..(j + 1) * n]);
-            speed.fill(0.0);
+            let (motion, springs) = column.split_at_mut(2 * n);
+            motion[..n].copy_from_slice(&self.place.as_slice()[j * n..(j + 1) * n]);
+            motion[n..].fill(0.0);
             if drifts {
                 for row in 0..n {
                     let (drift, fall) = (self.drift[(row, j)], self.fall[(row, j)]);
-                    place[row] += drift * length + 0.5 * fall * length * length;
-                    speed[row] += drift + fall * length;
+                    motion[row] += drift * length + 0.5 * fall * length * length;
+                    motion[n + row] += drift + fall * length;
                 }
             }
             let starts = &self.start.as_slice()[j * count..(j + 1) * count];
-            for (start, moved) in starts.iter().zip(work.moved.chunks_exact(n)) {
-                for ((place, speed), (now, rate)) in place.iter_mut().zip(&mut *speed).zip(moved) {
-                    *place += now.re * start.re - now.im * start.im;
-                    *speed += rate.re * start.re - rate.im * start.im;
+            for (start, moved) in starts.iter().zip(work.moved.chunks_exact(4 * n.max(1))) {
+                let (real, imaginary) = moved.split_at(2 * n);
+                for ((motion, re), im) in motion.iter_mut().zip(real).zip(imaginary) {
+                    *motion += re * start.re - im * start.im;
                 }
             }
             for (slider, stuck) in mechanics.sliders.iter().zip(&self.stuck) {
                 if let (Some(kt), Some(state)) = (slider.stiffness, slider.state) {
                     springs[state] = if *stuck {
-                        let moved: f64 = slider.direction.iter().zip(&*place).map(|(w, x)| w * x).sum();
+                        let moved: f64 = slider.direction.iter().zip(&*motion).map(|(w, x)| w * x).sum();
                         let before = if j < n { slider.direction[j] } else { 0.0 };
                         kt * (moved - before) + if j == 2 * n + state { 1.0 } else { 0.0 }
                     } else {
@@ -513,8 +518,8 @@ pub(crate) struct Work {
     pub turn: Vec<Complex64>,
     eta: Vec<Complex64>,
     fixed: Vec<Complex64>,
-    /// Displacement and velocity of the modes at the end of a stretch, per unit of their coordinates: mode after mode.
-    moved: Vec<(Complex64, Complex64)>,
+    /// Displacements and velocities at the end of a stretch per unit of a modal coordinate: 2n real parts and 2n imaginary parts of every mode.
+    moved: Vec<f64>,
     transition: DMatrix<f64>,
     product: DMatrix<f64>,
 }
@@ -529,7 +534,7 @@ impl Work {
             turn: vec![ZERO; harmonics],
             eta: vec![ZERO; 2 * n],
             fixed: vec![ZERO; 2 * n],
-            moved: vec![(ZERO, ZERO); 2 * n * n],
+            moved: vec![0.0; 8 * n * n],
             transition: DMatrix::zeros(states, states),
             product: DMatrix::zeros(states, states),
         }
