@@ -9,7 +9,7 @@ use crate::clip::{self, Point, Window};
 use crate::colour::Colour;
 use crate::font::{self, Weight};
 use crate::frame::{self, AREA, Axes, Entry, PALE, Shades};
-use crate::output::{File, Output, ReportError};
+use crate::file::{File, Output, ReportError};
 use std::fmt::Write;
 use stickslip_study::dataset::{Axis, Dataset, Emphasis, Figure, Panel, Series, Style};
 
