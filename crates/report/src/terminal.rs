@@ -28,7 +28,7 @@ const EVIDENCE: [&str; 4] = ["residual", "energy_gap", "iterations", "truncation
 /// Notes printed; of more than these only the number is told.
 const NOTES: usize = 8;
 /// Headings and words longer than this are cut in their middle where a table is too wide: more than any of Stickslip's own.
-const LONG: usize = 32;
+const LONG: usize = 28;
 /// Failures named one by one; of more than these only the number is told.
 const FAILURES: usize = 5;
 
@@ -365,7 +365,12 @@ results/fig02/: loops_summary.csv, figure.svg
         let mass = Column { name: "mass".to_owned(), values: Values::Text(vec![name("left"), name("right")]) };
         dataset.tables = vec![Table {
             name: "peaks".to_owned(),
-            columns: vec![mass, numbers("frequency_Hz".to_owned()), numbers(name("amplitude_m")), numbers(name("mean_m"))],
+            columns: vec![
+                mass,
+                numbers("frequency_Hz".to_owned()),
+                numbers(name("amplitude_m")),
+                numbers(name("mean_m")),
+            ],
         }];
         for width in [80, 120] {
             let text = Terminal { width: Some(width), ..Terminal::default() }.text(&dataset, &[]);

@@ -1,12 +1,12 @@
 //! Figures from finished tables: what the kinds need to draw, whether the tables were computed just now or read from a disk.
 
 use crate::dataset::{Axis, Table, Values as Cells};
-use crate::kinds::{Complaint, Kind};
 use crate::study::{Study, VariedValue};
 use crate::units;
 use crate::values::Values;
+use crate::words::display_unit;
 use std::ops::Range;
-use stickslip::model::{Model, System};
+use stickslip::model::System;
 
 /// A study and its finished tables.
 #[derive(Debug, Clone, Copy)]
@@ -33,32 +33,6 @@ impl Stretch {
     pub fn label(&self) -> String {
         crate::study::varied_text(&self.varied)
     }
-}
-
-/// What is wrong in `[figure]`.
-pub(crate) fn check(figure: &Values, kind: &Kind, model: &Model) -> Result<(), Complaint> {
-    let masses = model.masses.iter().map(|mass| mass.name.as_str());
-    let known: Vec<&str> = masses.chain(model.joints.iter().map(|joint| joint.name.as_str())).collect();
-    if let Some(name) = figure.names("only").unwrap_or_default().iter().find(|name| !known.contains(&name.as_str())) {
-        return Err(Complaint::unknown("only", "mass or joint", name, &known));
-    }
-    for (key, axis) in [("x_unit", kind.axes[0]), ("y_unit", kind.axes[1])] {
-        let Some(text) = figure.text(key) else { continue };
-        let Some(expected) = axis else {
-            let message = format!("the figure of the kind `{}` has no single unit on this axis", kind.name);
-            return Err(Complaint::new(key, message, "leave it out"));
-        };
-        let example = expected.name_and_unit().map_or("", |(_, unit)| unit);
-        match units::parse(text) {
-            Some(unit) if unit.dimension == expected => {}
-            found => {
-                let what = if found.is_some() { "a unit of another quantity" } else { "no unit that is known" };
-                let help = format!("write a unit such as {example}");
-                return Err(Complaint::new(key, format!("`{}` is {what}", crate::near::shown(text)), help));
-            }
-        }
-    }
-    Ok(())
 }
 
 /// More curves than this in a panel say nothing; they are thinned out evenly, and the panel says so.
@@ -215,20 +189,4 @@ pub(crate) fn words<'t>(table: &'t Table, column: &str) -> &'t [String] {
 pub(crate) fn largest(table: &Table, columns: impl IntoIterator<Item = String>) -> f64 {
     let columns = columns.into_iter().filter_map(|column| table.numbers(&column));
     columns.flatten().map(|value| value.abs()).filter(|value| value.is_finite()).fold(0.0, f64::max)
-}
-
-/// A frequency in a title or legend, to a microhertz: `80 Hz`.
-pub(crate) fn shown_hertz(frequency: f64) -> String {
-    let text = format!("{frequency:.6}");
-    format!("{} Hz", text.trim_end_matches('0').trim_end_matches('.'))
-}
-
-/// The unit in which `largest` (SI) lies between 0.5 and 500: its name and the factor from SI.
-pub(crate) fn display_unit(largest: f64, si: &str) -> (String, f64) {
-    for (prefix, factor) in [("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)] {
-        if largest * factor >= 0.5 {
-            return (format!("{prefix}{si}"), factor);
-        }
-    }
-    (si.to_owned(), 1.0)
 }

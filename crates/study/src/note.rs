@@ -2,6 +2,9 @@
 
 use stickslip::orbit::{Accuracy, Orbit};
 
+/// How a note begins that is a warning.
+pub(crate) const WARNING: &str = "warning: ";
+
 /// A note.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Note {

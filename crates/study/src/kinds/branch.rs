@@ -1,17 +1,20 @@
 //! Branches of orbits by arc length, along the drive frequency or along a design parameter, around turning points.
 
+use super::keys::{FREQUENCY, HARMONICS, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples};
+use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
-use super::{
-    Complaint, FREQUENCY, HARMONICS, Kind, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples, orbits,
-};
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Style, Table};
 use crate::drawing::{Drawing, largest, numbers};
+use crate::info::Complaint;
+use crate::info::KindInfo;
+use crate::key::{Takes, Within, default};
+use crate::kind::Kind;
 use crate::point::Summary;
 use crate::rows::Rows;
-use crate::schema::{Takes, Within, default};
 use crate::study::{Study, VariedValue, varied_text};
-use crate::summary::{Cost, Costing, Shape, resonant};
 use crate::values::{Values, hertz};
+use crate::warnings::resonant;
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::curve::trace::{Branch, End, Trace, TraceError};
@@ -21,37 +24,39 @@ use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::model::{Model, System};
 
 pub(super) const KIND: Kind = Kind {
-    name: "branch",
-    summary: "a branch of orbits by continuation, around turning points: along a range of `frequency`, or at one frequency along the last \
-              parameter of `vary`, from its first value to its last",
-    keys: &[
-        FREQUENCY,
-        default(
-            "steps",
-            Takes::Count(2, 100_000),
-            "100",
-            "steps over the range at least; they shorten where it bends",
-            "100",
-        ),
-        PEAK_OF,
-        OUTPUT,
-        default("harmonics", Takes::Count(1, 255), "15", "highest harmonic", "15"),
-        default("samples", Takes::Count(8, 1 << 16), "1024", "samples per period", "1024"),
-        default(
-            "tolerance",
-            Takes::Quantity(Dimension::NONE, Within::Positive),
-            "0.001",
-            "estimated error relative to the largest amplitude, beyond which a point is `truncated`",
-            "0.001",
-        ),
-    ],
-    check,
-    axes: [None, Some(Dimension::LENGTH)],
-    // harmonic balance is what branches are made of
-    uses_method: false,
-    needs: |values, system| method(values).solver(system).map(drop),
-    adapts: false,
-    tables: &["branch", "peaks", "turns"],
+    info: KindInfo {
+        name: "branch",
+        summary: "a branch of orbits by continuation, around turning points: along a range of `frequency`, or at one frequency along the last \
+                  parameter of `vary`, from its first value to its last",
+        keys: &[
+            FREQUENCY,
+            default(
+                "steps",
+                Takes::Count(2, 100_000),
+                "100",
+                "steps over the range at least; they shorten where it bends",
+                "100",
+            ),
+            PEAK_OF,
+            OUTPUT,
+            default("harmonics", Takes::Count(1, 255), "15", "highest harmonic", "15"),
+            default("samples", Takes::Count(8, 1 << 16), "1024", "samples per period", "1024"),
+            default(
+                "tolerance",
+                Takes::Quantity(Dimension::NONE, Within::Positive),
+                "0.001",
+                "estimated error relative to the largest amplitude, beyond which a point is `truncated`",
+                "0.001",
+            ),
+        ],
+        check,
+        axes: [None, Some(Dimension::LENGTH)],
+        // harmonic balance is what branches are made of
+        uses_method: false,
+        needs: |values, system| method(values).solver(system).map(drop),
+        adapts: false,
+        tables: &["branch", "peaks", "turns"],
+    },
     // along a parameter the cases of one branch differ in the last one only
     grain: |study| if along_parameter(study) { Grain::Curve } else { Grain::Case },
     cost,

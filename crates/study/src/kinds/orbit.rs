@@ -1,39 +1,46 @@
 //! Orbits: the steady motion over one period, in time.
 
-use super::{FREQUENCY, Kind, OUTPUT, SAMPLES, anything, check_output, orbits};
+use super::keys::{FREQUENCY, OUTPUT, SAMPLES, anything, check_output};
+use super::orbits;
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, MOST_PANELS, display_unit, largest, numbers, shown_hertz};
+use crate::drawing::{Drawing, MOST_PANELS, largest, numbers};
+use crate::info::KindInfo;
+use crate::key::{Takes, default};
+use crate::kind::Kind;
 use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
-use crate::schema::{Takes, default};
-use crate::summary::{Cost, Costing, Shape, driven};
 use crate::values::hertz;
+use crate::warnings::driven;
+use crate::words::{display_unit, shown_hertz};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
 pub(super) const KIND: Kind = Kind {
-    name: "orbit",
-    summary: "the steady motion over one period: displacements, velocities, joint forces",
-    keys: &[
-        FREQUENCY,
-        SAMPLES,
-        OUTPUT,
-        default(
-            "multipliers",
-            Takes::Flag,
-            "false",
-            "whether all Floquet multipliers are computed, into `multipliers.csv`; `stable` needs no more than the largest, if any",
-            "true",
-        ),
-    ],
-    check: |values, _| check_output(values),
-    axes: [Some(Dimension::TIME), None],
-    uses_method: true,
-    needs: anything,
-    adapts: false,
-    tables: &["orbit", "orbits", "multipliers"],
+    info: KindInfo {
+        name: "orbit",
+        summary: "the steady motion over one period: displacements, velocities, joint forces",
+        keys: &[
+            FREQUENCY,
+            SAMPLES,
+            OUTPUT,
+            default(
+                "multipliers",
+                Takes::Flag,
+                "false",
+                "whether all Floquet multipliers are computed, into `multipliers.csv`; `stable` needs no more than the largest, if any",
+                "true",
+            ),
+        ],
+        check: |values, _| check_output(values),
+        axes: [Some(Dimension::TIME), None],
+        uses_method: true,
+        needs: anything,
+        adapts: false,
+        tables: &["orbit", "orbits", "multipliers"],
+    },
     grain: |_| Grain::Frequencies,
     cost,
     warnings: driven,

@@ -1,14 +1,19 @@
 //! Performance curves: the resonance peak as a function of a design parameter, and its best value.
 
+use super::keys::{FREQUENCY, anything, check_masses};
 use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
-use super::{Complaint, FREQUENCY, Kind, anything, check_masses};
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series};
 use crate::drawing::{Drawing, largest, numbers};
+use crate::info::Complaint;
+use crate::info::KindInfo;
+use crate::kind::Kind;
 use crate::note::Note;
+use crate::note::WARNING;
 use crate::rows::Rows;
 use crate::study::{VariedValue, varied_text};
-use crate::summary::{Cost, Costing, Shape, WARNING, resonant};
 use crate::values::{Values, hertz};
+use crate::warnings::resonant;
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
 use stickslip::dimension::Dimension;
@@ -17,15 +22,17 @@ use stickslip::model::Model;
 use stickslip::orbit::Accuracy;
 
 pub(super) const KIND: Kind = Kind {
-    name: "performance",
-    summary: "the resonance peak over a design parameter (the last one of `vary`), with the optimum refined",
-    keys: &[FREQUENCY, PEAK_OF],
-    check,
-    axes: [None, Some(Dimension::LENGTH)],
-    uses_method: true,
-    needs: anything,
-    adapts: false,
-    tables: &["performance", "optimum"],
+    info: KindInfo {
+        name: "performance",
+        summary: "the resonance peak over a design parameter (the last one of `vary`), with the optimum refined",
+        keys: &[FREQUENCY, PEAK_OF],
+        check,
+        axes: [None, Some(Dimension::LENGTH)],
+        uses_method: true,
+        needs: anything,
+        adapts: false,
+        tables: &["performance", "optimum"],
+    },
     grain: |_| Grain::Curve,
     cost,
     warnings: resonant,

@@ -1,18 +1,21 @@
 //! Response curves: amplitude over drive frequency.
 
+use super::keys::{FREQUENCY, OUTPUT, anything, check_output};
+use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of, named_places, worst};
-use super::{FREQUENCY, Kind, OUTPUT, anything, check_output, orbits};
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Sharing, Style, Table};
-use crate::drawing::{
-    Drawing, Layout, MOST_CURVES, MOST_PANELS, Stretch, display_unit, largest, numbers, thinned, words,
-};
+use crate::drawing::{Drawing, Layout, MOST_CURVES, MOST_PANELS, Stretch, largest, numbers, thinned, words};
+use crate::info::KindInfo;
+use crate::key::{Key, Takes, default};
+use crate::kind::Kind;
 use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
-use crate::schema::{Key, Takes, default};
 use crate::study::varied_text;
-use crate::summary::{Cost, Costing, Shape, resonant};
 use crate::values::{Frequencies, hertz};
+use crate::warnings::resonant;
+use crate::words::display_unit;
 use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::peak::{self, Peak, Point};
@@ -22,32 +25,34 @@ use stickslip::method::{MethodError, OrbitError};
 use stickslip::orbit::Orbit;
 
 pub(super) const KIND: Kind = Kind {
-    name: "response",
-    summary: "response curves over the drive frequency, with refined peaks",
-    keys: &[
-        FREQUENCY,
-        default(
-            "peaks",
-            Takes::Flag,
-            "true",
-            "refines every peak of every mass between the points of the curve; with `peak_of` those of the worst mass",
-            "false",
-        ),
-        Key {
-            doc: "the masses of which the worst counts in peaks.csv, or \"all\"; absent: every mass for itself",
-            ..PEAK_OF
+    info: KindInfo {
+        name: "response",
+        summary: "response curves over the drive frequency, with refined peaks",
+        keys: &[
+            FREQUENCY,
+            default(
+                "peaks",
+                Takes::Flag,
+                "true",
+                "refines every peak of every mass between the points of the curve; with `peak_of` those of the worst mass",
+                "false",
+            ),
+            Key {
+                doc: "the masses of which the worst counts in peaks.csv, or \"all\"; absent: every mass for itself",
+                ..PEAK_OF
+            },
+            OUTPUT,
+        ],
+        check: |values, model| {
+            check_peak_of(values, model)?;
+            check_output(values)
         },
-        OUTPUT,
-    ],
-    check: |values, model| {
-        check_peak_of(values, model)?;
-        check_output(values)
+        axes: [Some(Dimension::FREQUENCY), Some(Dimension::LENGTH)],
+        uses_method: true,
+        needs: anything,
+        adapts: true,
+        tables: &["curve", "peaks", "references"],
     },
-    axes: [Some(Dimension::FREQUENCY), Some(Dimension::LENGTH)],
-    uses_method: true,
-    needs: anything,
-    adapts: true,
-    tables: &["curve", "peaks", "references"],
     grain: |study| if study.is_adaptive() { Grain::Case } else { Grain::Frequencies },
     cost,
     warnings: resonant,
