@@ -88,11 +88,11 @@ impl<'a> Drawing<'a> {
         (if options.text(scale_key) == Some("log") { axis.log() } else { axis }, factor)
     }
 
-    /// What the colours of curves mean whose last varied parameter differs; none if there is none, or it has no numbers to tell.
-    pub(crate) fn varied_axis(&self, stretches: &[Stretch]) -> Option<Axis> {
-        let last = stretches.first()?.varied.last()?;
+    /// What the colours of curves mean whose varied parameter number `which` differs; none if there is none, or it has no numbers to tell.
+    pub(crate) fn varied_axis(&self, stretches: &[Stretch], which: usize) -> Option<Axis> {
+        let last = stretches.first()?.varied.get(which)?;
         let values: Vec<f64> =
-            stretches.iter().filter_map(|stretch| Some(stretch.varied.last()?.on_axis().0)).collect();
+            stretches.iter().filter_map(|stretch| Some(stretch.varied.get(which)?.on_axis().0)).collect();
         let axis = Axis::new(&last.name, last.on_axis().1);
         // values that are spaced by ratios belong on a logarithmic scale
         let positive = values.iter().all(|value| *value > 0.0);

@@ -16,8 +16,9 @@ pub struct KindInfo {
     pub summary: &'static str,
     /// Its keys of `[study]`, beside those that every kind has.
     pub keys: &'static [Key],
-    /// What one key alone cannot tell: conditions between keys, and names that must exist in the model.
-    pub check: fn(&Values, &Model) -> Result<(), Complaint>,
+    /// What one key alone cannot tell: conditions between keys, names that must exist in the model, and how many values the last parameter
+    /// of `vary` must have (1 if there is none).
+    pub check: fn(&Values, &Model, usize) -> Result<(), Complaint>,
     /// Dimensions of the two axes of its figure, if they are the same in every panel.
     pub axes: [Option<Dimension>; 2],
     /// Whether it finds its orbits with the method of `[method]`, which must then be able to take the model.

@@ -5,6 +5,9 @@ use stickslip::dimension::Dimension;
 /// The schema version that this program reads.
 pub const VERSION: i64 = 1;
 
+/// Most points of a study: cases times frequencies.
+pub const MOST_POINTS: usize = 1_000_000;
+
 /// One key of a table.
 #[derive(Debug, Clone, Copy)]
 pub struct Key {

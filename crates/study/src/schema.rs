@@ -9,10 +9,7 @@ use serde_json::{Map, Value, json};
 use stickslip::dimension::Dimension;
 use stickslip::{law, method, model::templates};
 
-pub use crate::key::{Key, Presence, Takes, VERSION, Within, default, optional, required};
-
-/// Most points of a study: cases times frequencies.
-pub const MOST_POINTS: usize = 1_000_000;
+pub use crate::key::{Key, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, required};
 
 /// Most elements in one list (`[[spring]]`, …), repetitions counted.
 pub const MOST_ELEMENTS: usize = 10_000;

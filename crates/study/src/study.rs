@@ -563,7 +563,7 @@ impl Study {
             problems.push(self.model_problem(&error, &model));
             return None;
         }
-        if let Err(complaint) = (self.kind.check)(&values, &model) {
+        if let Err(complaint) = (self.kind.check)(&values, &model, self.last_varied()) {
             problems.push(self.complaint(complaint));
             return None;
         }

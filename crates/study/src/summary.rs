@@ -84,8 +84,12 @@ impl ModelSummary {
         for i in 1..=others {
             cases.push(Surveyed::new(study, last * i / others)?);
         }
-        let range = range(&cases[0].case);
-        let first = &cases[0].survey;
+        // a joint whose limit is zero tells nothing: the first case in which most of them hold
+        let holds = |one: &Surveyed| one.survey.first_slip().iter().filter(|slip| slip.limit > 0.0).count();
+        let most = cases.iter().map(holds).max().unwrap_or(0);
+        let shown = cases.iter().find(|one| holds(one) == most).unwrap_or(&cases[0]);
+        let range = range(&shown.case);
+        let first = &shown.survey;
         let onsets = range.and_then(|(from, to)| first.onset(from, to));
         let joints = first.first_slip().into_iter().enumerate().map(|(index, slip)| JointSummary {
             name: slip.joint,
@@ -98,7 +102,7 @@ impl ModelSummary {
         let costing = Costing::new(study, &cases[0]);
         let (size, seconds) = costing.total(&(kind.cost)(&costing), Units::of(study, (kind.grain)(study)).len());
         Ok(ModelSummary {
-            case: cases[0].case.label(),
+            case: shown.case.label(),
             cases: study.cases(),
             dofs: first.dofs(),
             too_large: first.is_too_large(),

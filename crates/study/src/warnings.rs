@@ -1,10 +1,11 @@
 //! What looks like a mistake in the studies of some kinds: each names those that concern it.
 
+use crate::key::MOST_POINTS;
 use crate::survey::{Surveyed, range};
-use crate::values::Values;
+use crate::values::{Frequencies, Values};
 use crate::words::{quantity, significant};
 use std::f64::consts::TAU;
-use stickslip::model::Modes;
+use stickslip::model::{LinearMode, Modes};
 
 /// Of a kind that needs something to drive the motion.
 pub(crate) fn driven(cases: &[Surveyed]) -> Vec<String> {
@@ -19,6 +20,11 @@ pub(crate) fn moved(cases: &[Surveyed]) -> Vec<String> {
 /// Of a kind that looks for resonances in a range of frequencies.
 pub(crate) fn resonant(cases: &[Surveyed]) -> Vec<String> {
     no_excitation(cases, false).into_iter().chain(no_resonance(cases)).collect()
+}
+
+/// Of a kind that takes its frequencies as they are: the same, and whether they lie close enough for the resonances.
+pub(crate) fn sampled(cases: &[Surveyed]) -> Vec<String> {
+    resonant(cases).into_iter().chain(coarse(cases)).collect()
 }
 
 fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
@@ -81,6 +87,65 @@ fn no_resonance(cases: &[Surveyed]) -> Option<String> {
     let (_, omega, name) = nearest?;
     let (from, to, omega) = (hertz(from), hertz(to), hertz(omega));
     Some(format!("no resonance lies between {from} and {to} Hz: the nearest is at {omega} Hz with all joints {name}"))
+}
+
+/// A resonance of the linear structure that is narrower than the steps of a range of frequencies.
+struct Narrow {
+    /// Drive frequency and width of the resonance, rad/s.
+    at: f64,
+    width: f64,
+    /// Points of the range whose steps are no wider.
+    points: f64,
+}
+
+/// Of frequencies that lie further apart than a resonance is wide. The width is that at half of the power, twice damping times frequency, and
+/// of joints free or stuck the larger one: friction only adds to it.
+fn coarse(cases: &[Surveyed]) -> Option<String> {
+    let Some(Frequencies::Range { points, .. }) = cases[0].case.frequencies else { return None };
+    // what is said holds for every case
+    let narrow = cases.iter().map(narrowest).collect::<Option<Vec<Narrow>>>()?;
+    let Narrow { at, width, points: enough } = narrow.into_iter().max_by(|a, b| a.points.total_cmp(&b.points))?;
+    let (from, to) = range(&cases[0].case)?;
+    let hertz = |omega: f64, digits: i32| significant(omega / TAU, digits);
+    let step = (to - from) / (points - 1) as f64;
+    let several = if enough <= MOST_POINTS as f64 {
+        format!("{enough} points would do")
+    } else {
+        "take a narrower range".to_owned()
+    };
+    Some(format!(
+        "the frequencies are {} Hz apart, and the resonance at {} Hz is only {} Hz wide where friction does not damp it: the curve may step over it; {several}",
+        hertz(step, 2),
+        hertz(at, 5),
+        hertz(width, 2)
+    ))
+}
+
+/// The narrowest resonance between two frequencies of a case, if it is narrower than their distance.
+fn narrowest(one: &Surveyed) -> Option<Narrow> {
+    let Some(Frequencies::Range { from, to, points }) = one.case.frequencies else { return None };
+    let (free, stuck) = (one.survey.free(), one.survey.stuck());
+    if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
+        return None; // not known
+    }
+    let width = |mode: &LinearMode| 2.0 * mode.damping * mode.omega;
+    let paired = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
+    let harmonics = one.survey.harmonics();
+    let all = paired.flat_map(|(free, stuck)| {
+        let width = width(free).max(width(stuck));
+        harmonics.iter().map(|h| f64::from(*h)).map(move |h| {
+            let (low, high) = (free.omega.min(stuck.omega) / h, free.omega.max(stuck.omega) / h);
+            (low, high, width / h)
+        })
+    });
+    // without damping there is no width, and where friction bounds the motion it is that of friction
+    let inside = all.filter(|(low, high, width)| *low >= from && *high <= to && *width > 0.0);
+    let (at, _, width) = inside.min_by(|a, b| a.2.total_cmp(&b.2))?;
+    ((to - from) / (points - 1) as f64 > width).then(|| Narrow {
+        at,
+        width,
+        points: ((to - from) / width).ceil() + 1.0,
+    })
 }
 
 /// A range of amplitudes that ends below this share of the first slip shows a linear mode only.

@@ -13,7 +13,7 @@ use crate::kind::Kind;
 use crate::point::Summary;
 use crate::rows::Rows;
 use crate::study::{Study, VariedValue, varied_text};
-use crate::values::{Values, hertz};
+use crate::values::{Frequencies, Values, hertz};
 use crate::warnings::resonant;
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
@@ -87,8 +87,12 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, values_of_last: usize) -> Result<(), Complaint> {
     check_masses(model)?;
+    let none = |f: &Frequencies| f.get(0) == f.get(f.len() - 1) && (f.len() > 1 || values_of_last < 2);
+    if values.frequencies("frequency").is_some_and(none) {
+        return Err(Complaint::new("frequency", "a branch needs a range", RANGE));
+    }
     check_peak_of(values, model)?;
     check_output(values)?;
     if values.quantity("tolerance").is_some_and(|tolerance| tolerance >= 1.0) {
@@ -100,6 +104,10 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     }
     check_samples(values)
 }
+
+/// What a branch can run along.
+const RANGE: &str =
+    "write frequency = { from = …, to = …, points = 2 }, or vary = { Ft = [ … ] } with two different values";
 
 /// Why there is no branch.
 enum Missing {
@@ -140,8 +148,7 @@ fn compute(work: &Work<'_>) -> Computed {
             return Ok(part);
         }
         Err(Missing::NoRange) => {
-            let reason = "a branch needs a range: frequency = { from = …, to = …, points = 2 }, or vary = { Ft = [ … ] } with two values";
-            part.count(label, "no-range", Some(reason.to_owned()));
+            part.count(label, "no-range", Some(format!("a branch needs a range: {RANGE}")));
             return Ok(part);
         }
     };
@@ -157,9 +164,10 @@ fn compute(work: &Work<'_>) -> Computed {
     };
     let (mut rows, mut peaks, mut turns) = (Rows::default(), Rows::default(), Rows::default());
     for point in &branch.points {
-        orbits::count(&mut part, &prepared.case, &point.orbit);
+        let stable = point.orbit.is_stable();
+        orbits::count(&mut part, &prepared.case, &point.orbit, stable);
         begin(&mut rows, point.value);
-        Summary::new(prepared, Ok(&point.orbit)).write(prepared, &mut rows);
+        Summary::of(prepared, &point.orbit, stable).write(prepared, &mut rows);
         rows.end();
     }
     for (value, height) in &branch.peaks {

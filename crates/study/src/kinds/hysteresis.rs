@@ -75,7 +75,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     let mut known: Vec<&str> = model.joints.iter().map(|joint| joint.name.as_str()).collect();
     known.extend(model.motions.iter().map(|motion| motion.on.as_str()));
     for name in values.names("loop").unwrap_or_default() {
@@ -139,7 +139,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
     let several = work.several_frequencies();
     let sources = sources(prepared);
-    for orbit in orbits::found(work, &mut part)? {
+    for (orbit, _) in orbits::found(work, &mut part)? {
         let omega = orbit.omega;
         let times = orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
         let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();

@@ -79,7 +79,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     let range = values.table("amplitude");
     if let Some((from, to)) = range.and_then(|t| t.quantity("from").zip(t.quantity("to")))
         && from >= to

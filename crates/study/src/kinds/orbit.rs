@@ -34,7 +34,7 @@ pub(super) const KIND: Kind = Kind {
                 "true",
             ),
         ],
-        check: |values, _| check_output(values),
+        check: |values, _, _| check_output(values),
         axes: [Some(Dimension::TIME), None],
         uses_method: true,
         needs: anything,
@@ -71,12 +71,12 @@ fn compute(work: &Work<'_>) -> Computed {
     let mut part = Part::default();
     let (mut motion, mut summary, mut multipliers) = (Rows::default(), Rows::default(), Rows::default());
     let prepared = work.case();
-    for orbit in orbits::found(work, &mut part)? {
+    for (orbit, stable) in orbits::found(work, &mut part)? {
         let omega = orbit.omega;
         part.notes.extend(one_of_many(prepared, &orbit));
         summary.varied(&prepared.case);
         summary.number("frequency_Hz", hertz(omega));
-        Summary::new(prepared, Ok(&orbit)).write(prepared, &mut summary);
+        Summary::of(prepared, &orbit, stable).write(prepared, &mut summary);
         summary.number("work_in_J", orbit.energy.work_in);
         summary.number("viscous_J", orbit.energy.viscous);
         summary.number("friction_J", orbit.energy.friction);
