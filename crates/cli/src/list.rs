@@ -43,7 +43,7 @@ fn one(what: What) -> String {
             }
         }
         What::Studies => {
-            for row in kinds::TABLE {
+            for row in kinds::TABLE.iter().map(|kind| kind.info) {
                 let keys: Vec<_> = row.keys.iter().map(|k| (k.name.to_owned(), k.doc.to_owned())).collect();
                 entry(row.name, row.summary, &keys);
             }

@@ -35,24 +35,29 @@ pub(crate) struct Summary {
 impl Summary {
     pub fn new(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> Self {
         match outcome {
-            Ok(orbit) => Summary {
-                places: orbit.places.iter().map(|p| [p.amplitude(), p.mean, p.phase_deg()]).collect(),
-                joints: orbit.joints.iter().map(|j| [j.dissipation, j.slip_fraction]).collect(),
-                stable: orbit.is_stable(),
-                residual: orbit.evidence.residual,
-                energy_gap: orbit.evidence.energy_gap,
-                truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),
-                iterations: orbit.evidence.iterations as u64,
-                status: orbit.evidence.accuracy.status().to_owned(),
-                failure: None,
-                stuck: orbit.is_one_of_many(),
-                extra: extra::values(prepared, orbit),
-            },
+            Ok(orbit) => Summary::of(prepared, orbit, orbit.is_stable()),
             Err(error) => {
                 let mut row = Summary::missing(prepared, error.status());
                 row.failure = Some(error.to_string());
                 row
             }
+        }
+    }
+
+    /// Of an orbit whose stability was looked at before.
+    pub fn of(prepared: &Prepared, orbit: &Orbit, stable: Option<bool>) -> Self {
+        Summary {
+            places: orbit.places.iter().map(|p| [p.amplitude(), p.mean, p.phase_deg()]).collect(),
+            joints: orbit.joints.iter().map(|j| [j.dissipation, j.slip_fraction]).collect(),
+            stable,
+            residual: orbit.evidence.residual,
+            energy_gap: orbit.evidence.energy_gap,
+            truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),
+            iterations: orbit.evidence.iterations as u64,
+            status: orbit.evidence.accuracy.status().to_owned(),
+            failure: None,
+            stuck: orbit.is_one_of_many(),
+            extra: extra::values(prepared, orbit),
         }
     }
 

@@ -2,14 +2,15 @@
 
 use crate::document::{self, Content, Entry, Node, Table};
 use crate::error::{Place, Problem, Source, StudyError};
-use crate::expression::{Expression, Value, described, is_reserved};
+use crate::expression::{Expression, is_reserved};
+use crate::info::KindInfo;
 use crate::kinds;
 use crate::near::{nearest, one_of, shown};
 use crate::repeat::{Index, Repetition, Turn};
 use crate::schema::{
     self, FILE, Key, MOST_BYTES, MOST_ELEMENTS, MOST_MASSES, MOST_POINTS, Presence, STUDY, Takes, Within,
 };
-use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable};
+use crate::statement::{Quantity, Stated, StatedEntry, StatedTable};
 use crate::study::{Lists, Parameter, Replaced, Structure, Study, Varied, VariedPoints};
 use crate::values::Given;
 use std::collections::HashMap;
@@ -540,7 +541,7 @@ impl Reader {
         let mut keys = vec![schema::required("kind", Takes::Text, "law", "\"coulomb\"")];
         keys.extend(row.parameters.iter().map(|p| Key {
             name: p.key,
-            takes: Takes::Quantity(p.dimension, schema::within(p.range)),
+            takes: Takes::Quantity(p.dimension, crate::key::within(p.range)),
             presence: if p.default.is_some() { Presence::Optional } else { Presence::Required },
             doc: p.doc,
             example: example_of(p.dimension),
@@ -579,14 +580,14 @@ impl Reader {
         Some(self.table(table, &keys, &format!("method `{}`", row.name)))
     }
 
-    fn request<'a>(&mut self, root: &'a Table) -> Option<(&'static kinds::Kind, StatedTable, Option<&'a Entry>)> {
+    fn request<'a>(&mut self, root: &'a Table) -> Option<(&'static KindInfo, StatedTable, Option<&'a Entry>)> {
         let node = &root.get("study")?.node;
         let Content::Table(table) = &node.value else {
             let message = format!("expected a table, found {}", node.value.described());
             self.problems.push(Problem::new(&node.place, "study", message).help("write [study] and below it its kind"));
             return None;
         };
-        let kind = self.kind(table, ("[study]", "response"), kinds::TABLE, |row| row.name)?;
+        let kind = &self.kind(table, ("[study]", "response"), kinds::TABLE, |row| row.info.name)?.info;
         let mut keys = STUDY.to_vec();
         keys.extend(kind.keys);
         // `vary` is not a value of the kind: it makes the cases
@@ -1066,30 +1067,4 @@ fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
         }
     }
     Ok(order)
-}
-
-/// The value of a parameter in the dimension that it must have.
-pub(crate) fn settled(
-    quantity: &Quantity,
-    name: &str,
-    dimension: Option<Dimension>,
-    environment: &Environment<'_>,
-) -> Result<Value, Problem> {
-    let value = quantity.value(name, environment)?;
-    in_dimension(quantity, value, name, dimension, environment)
-}
-
-pub(crate) fn in_dimension(
-    quantity: &Quantity,
-    value: Value,
-    name: &str,
-    dimension: Option<Dimension>,
-    environment: &Environment<'_>,
-) -> Result<Value, Problem> {
-    let Some(dimension) = dimension else { return Ok(value) };
-    let number = quantity.convert(value, dimension, name, "", environment).map_err(|problem| match problem.help {
-        None => problem.help(format!("the parameter `{name}` is {}", described(dimension))),
-        Some(_) => problem,
-    })?;
-    Ok(Value::of(number, dimension))
 }

@@ -2,10 +2,12 @@
 
 use crate::error::{Place, Problem, Source, StudyError};
 use crate::expression::{Value, displayed};
+use crate::figure;
 use crate::immovable::immovable;
-use crate::kinds::{Complaint, Kind};
+use crate::info::{Complaint, KindInfo};
+use crate::key::VERSION;
+use crate::memory;
 use crate::near::{nearest, one_of, shown};
-use crate::read::{in_dimension, settled};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
 use crate::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
 use serde_json::{Value as Json, json};
@@ -23,7 +25,7 @@ pub struct Study {
     pub(crate) title: String,
     pub(crate) source: Option<String>,
     pub(crate) text: String,
-    pub(crate) kind: &'static Kind,
+    pub(crate) kind: &'static KindInfo,
     pub(crate) overrides: Vec<(String, String)>,
     pub(crate) sources: Vec<Arc<Source>>,
     pub(crate) names: Vec<String>,
@@ -242,7 +244,7 @@ impl Study {
     }
 
     /// The study kind.
-    pub fn kind(&self) -> &'static Kind {
+    pub fn kind(&self) -> &'static KindInfo {
         self.kind
     }
 
@@ -271,10 +273,10 @@ impl Study {
         self
     }
 
-    /// Memory that a run may take, bytes: what was said, or [`MEMORY_LIMIT`](crate::summary::MEMORY_LIMIT), or what the machine has
+    /// Memory that a run may take, bytes: what was said, or [`MEMORY_LIMIT`](memory::MEMORY_LIMIT), or what the machine has
     /// free if that is less.
     pub fn memory_limit(&self) -> u64 {
-        self.memory.unwrap_or_else(crate::summary::default_limit)
+        self.memory.unwrap_or_else(memory::default_limit)
     }
 
     /// Number of points: cases times frequencies.
@@ -340,7 +342,7 @@ impl Study {
             return Err(StudyError::file(&self.sources[0].name, message, None));
         }
         let mut problems = Vec::new();
-        let parts = self.parts(index, fixed, &mut problems);
+        let parts = self.parts(index, Look::Again(fixed), &mut problems);
         let error = StudyError::all(&self.sources, problems);
         match (parts, error) {
             (Some(parts), None) => Ok(self.finished(index, parts)),
@@ -426,7 +428,7 @@ impl Study {
             }
         }
         json!({
-            "schema": crate::schema::VERSION,
+            "schema": VERSION,
             "name": self.name,
             "title": self.title,
             "source": self.source,
@@ -451,7 +453,7 @@ impl Study {
         }
         for index in 0..self.cases() {
             let mut problems = Vec::new();
-            self.parts(index, None, &mut problems);
+            self.parts(index, Look::First, &mut problems);
             if let Some(error) = StudyError::all(&self.sources, problems) {
                 return Err(error);
             }
@@ -459,13 +461,13 @@ impl Study {
         Ok(())
     }
 
-    fn parts(&self, index: usize, fixed: Option<(usize, f64)>, problems: &mut Vec<Problem>) -> Option<Parts> {
-        let parts = self.resolve(index, fixed, problems);
+    fn parts(&self, index: usize, look: Look, problems: &mut Vec<Problem>) -> Option<Parts> {
+        let parts = self.resolve(index, look, problems);
         if !problems.is_empty() && self.cases() > 1 {
             // what is wrong in the first case and in the last is no matter of one case
             let mut others = Vec::new();
             if index == 0 {
-                self.resolve(self.cases() - 1, fixed, &mut others);
+                self.resolve(self.cases() - 1, look, &mut others);
             }
             for problem in problems.iter_mut().filter(|problem| !others.contains(problem)) {
                 problem.message = format!("{} ({})", problem.message, self.case_words(index));
@@ -527,7 +529,11 @@ impl Study {
         values.collect()
     }
 
-    fn resolve(&self, index: usize, fixed: Option<(usize, f64)>, problems: &mut Vec<Problem>) -> Option<Parts> {
+    fn resolve(&self, index: usize, look: Look, problems: &mut Vec<Problem>) -> Option<Parts> {
+        let (first_look, fixed) = match look {
+            Look::First => (index == 0, None),
+            Look::Again(fixed) => (false, fixed),
+        };
         let choice = self.choice(index);
         let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed) {
             Ok(values) => values,
@@ -546,7 +552,7 @@ impl Study {
         if !problems.is_empty() {
             return None;
         }
-        if (index == 0 || !numbers_hold(&model))
+        if (first_look || !numbers_hold(&model))
             && let Err(error) = model.assemble()
         {
             problems.push(self.model_problem(&error, &model));
@@ -557,13 +563,11 @@ impl Study {
             problems.push(self.model_problem(&error, &model));
             return None;
         }
-        if let Err(complaint) = (self.kind.check)(&values, &model) {
+        if let Err(complaint) = (self.kind.check)(&values, &model, self.last_varied()) {
             problems.push(self.complaint(complaint));
             return None;
         }
-        if index == 0
-            && let Err(complaint) = crate::drawing::check(&self.figure_values(), self.kind, &model)
-        {
+        if first_look && let Err(complaint) = figure::check(&self.figure_values(), self.kind, &model) {
             let place = self.figure.place_of(complaint.key, complaint.name.as_deref());
             problems.push(Problem::new(place, complaint.key, complaint.message).maybe_help(complaint.help));
             return None;
@@ -659,6 +663,15 @@ impl Study {
     }
 }
 
+/// How a case is looked at.
+#[derive(Debug, Clone, Copy)]
+enum Look {
+    /// For the first time: the first case is assembled, and the figure looked at. The other cases differ in numbers only.
+    First,
+    /// After that, with a parameter at another value or as it stands: numbers are enough.
+    Again(Option<(usize, f64)>),
+}
+
 struct Parts {
     environment: Vec<Value>,
     model: Model,
@@ -679,14 +692,14 @@ pub(crate) fn evaluate(
         let (parameter, name) = (&parameters[index], &names[index]);
         let dimension = parameter.dimension;
         let value = match choice.get(&index).map(|(varied, point)| (&varied.points, *point)) {
-            None => settled(&parameter.quantity, name, dimension, &environment)?,
-            Some((VariedPoints::List(list), point)) => settled(&list[point], name, dimension, &environment)?,
+            None => parameter.quantity.settled(name, dimension, &environment)?,
+            Some((VariedPoints::List(list), point)) => list[point].settled(name, dimension, &environment)?,
             Some((VariedPoints::Range { from, to, points }, point)) => {
                 let start = from.value("from", &environment)?;
                 let end = to.value("to", &environment)?;
                 let dimension = dimension.or(start.dimension).or(end.dimension);
-                let start = in_dimension(from, start, name, dimension, &environment)?;
-                let end = in_dimension(to, end, name, dimension, &environment)?;
+                let start = from.in_dimension(start, name, dimension, &environment)?;
+                let end = to.in_dimension(end, name, dimension, &environment)?;
                 not_empty(start.si, end.si, to, dimension)?;
                 Value { si: between(start.si, end.si, dimension, point, *points), ..start }
             }

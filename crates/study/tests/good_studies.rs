@@ -251,7 +251,7 @@ fn vary_takes_a_single_value() {
 #[test]
 fn the_reference_names_every_key_law_method_kind_and_template() {
     let book = schema::markdown();
-    let keys = kinds::TABLE.iter().flat_map(|kind| kind.keys).chain(schema::FILE).chain(schema::STUDY);
+    let keys = kinds::TABLE.iter().flat_map(|kind| kind.info.keys).chain(schema::FILE).chain(schema::STUDY);
     let names = keys.map(|key| key.name).chain(law::TABLE.iter().map(|row| row.name));
     for name in names.chain(method::TABLE.iter().map(|row| row.name)).chain(templates::TABLE.iter().map(|row| row.name))
     {
@@ -262,7 +262,7 @@ fn the_reference_names_every_key_law_method_kind_and_template() {
 #[test]
 fn the_example_of_every_key_is_toml() {
     for kind in kinds::TABLE {
-        for key in kind.keys.iter().chain(schema::FILE).chain(schema::STUDY) {
+        for key in kind.info.keys.iter().chain(schema::FILE).chain(schema::STUDY) {
             let text = format!("{} = {}", key.name, key.example);
             assert!(toml::from_str::<toml::Value>(&text).is_ok(), "{text}");
         }

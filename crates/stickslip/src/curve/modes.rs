@@ -249,7 +249,9 @@ impl Path {
             Path { linear, arcs: Vec::new(), lost: Some(lost) }
         };
         let Some(linear) = modes.get(index).cloned() else { return none(None) };
-        let faint = equations.faint(&modes, index, FAINT, APART).max(f64::MIN_POSITIVE);
+        let faint = equations.faint(&modes, index, FAINT, APART);
+        // without friction any amplitude will do
+        let faint = if faint > 0.0 { faint } else { low };
         let start = OTHERS.iter().find_map(|factor| {
             let amplitude = factor * faint;
             let guess = equations.linear(&linear, amplitude)?;

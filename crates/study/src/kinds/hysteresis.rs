@@ -1,43 +1,51 @@
 //! Hysteresis loops: force over displacement of joints and moved places, over one period of the steady motion.
 
-use super::{Complaint, FREQUENCY, Kind, SAMPLES, anything, orbits};
+use super::keys::{FREQUENCY, SAMPLES, anything};
+use super::orbits;
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Figure, Panel, Series};
-use crate::drawing::{Drawing, largest, numbers, shown_hertz, words};
+use crate::drawing::{Drawing, largest, numbers, words};
+use crate::info::Complaint;
+use crate::info::KindInfo;
+use crate::key::{Takes, default, optional};
+use crate::kind::Kind;
 use crate::rows::Rows;
-use crate::schema::{Takes, default, optional};
-use crate::summary::{Cost, Costing, Shape, driven};
 use crate::values::{Values, hertz};
+use crate::warnings::driven;
+use crate::words::shown_hertz;
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use stickslip::dimension::Dimension;
 use stickslip::model::Model;
 use stickslip::orbit::{Orbit, Sample};
 
 pub(super) const KIND: Kind = Kind {
-    name: "hysteresis",
-    summary: "force-displacement loops with dissipation, equivalent stiffness and damping",
-    keys: &[
-        FREQUENCY,
-        optional(
-            "loop",
-            Takes::Names,
-            "joints, or moved places (the force that moves them), whose loops are wanted; every joint when absent",
-            "\"shroud\"",
-        ),
-        optional(
-            "against",
-            Takes::Name,
-            "the mass whose displacement is the abscissa of the loops; absent: the relative displacement of the joint",
-            "\"blade1\"",
-        ),
-        default("sum", Takes::Flag, "false", "adds the forces of the joints up to one loop", "true"),
-        SAMPLES,
-    ],
-    check,
-    axes: [Some(Dimension::LENGTH), Some(Dimension::FORCE)],
-    uses_method: true,
-    needs: anything,
-    adapts: false,
-    tables: &["loops", "loops_summary"],
+    info: KindInfo {
+        name: "hysteresis",
+        summary: "force-displacement loops with dissipation, equivalent stiffness and damping",
+        keys: &[
+            FREQUENCY,
+            optional(
+                "loop",
+                Takes::Names,
+                "joints, or moved places (the force that moves them), whose loops are wanted; every joint when absent",
+                "\"shroud\"",
+            ),
+            optional(
+                "against",
+                Takes::Name,
+                "the mass whose displacement is the abscissa of the loops; absent: the relative displacement of the joint",
+                "\"blade1\"",
+            ),
+            default("sum", Takes::Flag, "false", "adds the forces of the joints up to one loop", "true"),
+            SAMPLES,
+        ],
+        check,
+        axes: [Some(Dimension::LENGTH), Some(Dimension::FORCE)],
+        uses_method: true,
+        needs: anything,
+        adapts: false,
+        tables: &["loops", "loops_summary"],
+    },
     grain: |_| Grain::Frequencies,
     cost,
     warnings: driven,
@@ -67,7 +75,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     let labels: Vec<String> = model.joints.iter().flat_map(|joint| model.joint_labels(joint)).collect();
     let mut known: Vec<&str> = labels.iter().map(String::as_str).collect();
     known.extend(model.motions.iter().map(|motion| motion.on.as_str()));
@@ -134,7 +142,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
     let several = work.several_frequencies();
     let sources = sources(prepared);
-    for orbit in orbits::found(work, &mut part)? {
+    for (orbit, _) in orbits::found(work, &mut part)? {
         let omega = orbit.omega;
         let times = orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
         let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();

@@ -1,14 +1,19 @@
 //! Performance curves: the resonance peak as a function of a design parameter, and its best value.
 
+use super::keys::{FREQUENCY, anything, check_masses};
 use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
-use super::{Complaint, FREQUENCY, Kind, anything, check_masses};
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series};
 use crate::drawing::{Drawing, largest, numbers};
+use crate::info::Complaint;
+use crate::info::KindInfo;
+use crate::kind::Kind;
 use crate::note::Note;
+use crate::note::WARNING;
 use crate::rows::Rows;
 use crate::study::{VariedValue, varied_text};
-use crate::summary::{Cost, Costing, Shape, WARNING, resonant};
 use crate::values::{Values, hertz};
+use crate::warnings::sampled;
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
 use stickslip::dimension::Dimension;
@@ -17,18 +22,20 @@ use stickslip::model::Model;
 use stickslip::orbit::Accuracy;
 
 pub(super) const KIND: Kind = Kind {
-    name: "performance",
-    summary: "the resonance peak over a design parameter (the last one of `vary`), with the optimum refined",
-    keys: &[FREQUENCY, PEAK_OF],
-    check,
-    axes: [None, Some(Dimension::LENGTH)],
-    uses_method: true,
-    needs: anything,
-    adapts: false,
-    tables: &["performance", "optimum"],
+    info: KindInfo {
+        name: "performance",
+        summary: "the resonance peak over a design parameter (the last one of `vary`), with the optimum refined",
+        keys: &[FREQUENCY, PEAK_OF],
+        check,
+        axes: [None, Some(Dimension::LENGTH)],
+        uses_method: true,
+        needs: anything,
+        adapts: false,
+        tables: &["performance", "optimum"],
+    },
     grain: |_| Grain::Curve,
     cost,
-    warnings: resonant,
+    warnings: sampled,
     compute,
     draw,
 };
@@ -53,7 +60,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
 /// Values of the parameter that make a curve.
 const FEWEST_VALUES: usize = 3;
 
-fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     check_masses(model)?;
     check_peak_of(values, model)?;
     if values.frequencies("frequency").is_some_and(|f| f.len() < FEWEST_VALUES) {
@@ -166,6 +173,12 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let column = inner.column().0;
     let parameter = |table: &crate::dataset::Table, rows| numbers(table, &column, rows);
     let height = |table, rows| numbers(table, "amplitude_m", rows).iter().map(|y| y * factor).collect::<Vec<f64>>();
+    // of several outer parameters no single value tells a curve
+    let varied = if outer == 1 { drawing.varied_axis(&stretches, 0) } else { None };
+    let value = |curve: usize| {
+        let parameter = varied.as_ref().and(stretches.get(curve))?.varied.first();
+        parameter.map(|parameter| parameter.on_axis().0)
+    };
     let mut series = Vec::new();
     for (colour, stretch) in stretches.iter().enumerate() {
         let label = varied_text(&stretch.varied[..outer]);
@@ -182,17 +195,17 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             }
         }
         let (x, y) = points.into_iter().unzip();
-        series.push(Series::line(label, x, y, colour));
+        series.push(Series { value: value(colour), ..Series::line(label, x, y, colour) });
     }
     if let Some(optima) = drawing.table("optimum") {
         // one row for every curve
         for row in 0..optima.rows() {
             let (x, y) = (parameter(optima, row..row + 1), height(optima, row..row + 1));
             if x[0].is_finite() {
-                series.push(Series::marks("optimum", x, y, row));
+                series.push(Series { value: value(row), ..Series::marks("optimum", x, y, row) });
             }
         }
     }
     let panel = Panel { title: String::new(), x: Axis::new(&inner.name, inner.on_axis().1), y: y_axis, series };
-    Figure { panels: vec![panel], ..Figure::default() }
+    Figure { panels: vec![panel], varied, ..Figure::default() }
 }

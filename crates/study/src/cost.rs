@@ -1,17 +1,14 @@
 //! How much a study will hold and how long it will take, by counting: rows, columns, orbits; and by what each method was
 //! measured to need. How many of these a study has, its kind says.
 
-use super::{Surveyed, range};
 use crate::error::{Problem, StudyError};
 use crate::extra;
 use crate::study::{Case, Study};
-use crate::work::Units;
+use crate::survey::{Surveyed, range};
+use crate::words::bytes_text;
 use std::f64::consts::TAU;
 use stickslip::curve::sweep::BLOCK;
 use stickslip::law::SharedLaw;
-
-/// Memory that a run may take unless it is told otherwise, bytes. What the machine has free may be less.
-pub const MEMORY_LIMIT: u64 = 2_000_000_000;
 
 /// What a study will hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -95,7 +92,7 @@ pub struct Costing<'a> {
 }
 
 impl<'a> Costing<'a> {
-    pub(super) fn new(study: &'a Study, surveyed: &'a Surveyed) -> Self {
+    pub(crate) fn new(study: &'a Study, surveyed: &'a Surveyed) -> Self {
         let (case, system) = (&surveyed.case, surveyed.survey.system());
         // a width makes exact laws smooth
         let width = case.method.options.get("width");
@@ -192,22 +189,22 @@ impl Cost {
     }
 }
 
-/// Size, and rough time on one thread (s).
-pub(super) fn cost(study: &Study, surveyed: &Surveyed) -> (Size, f64) {
-    let costing = Costing::new(study, surveyed);
-    let cost = (study.kind().cost)(&costing);
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let units = Units::of(study).len().min(threads) as f64;
-    // a float that is too large for the type becomes its largest value
-    let whole = |value: f64| value as u64;
-    let size = Size {
-        rows: whole(cost.rows()),
-        results: whole(cost.cells(NUMBER, NUMBER)),
-        memory: whole(cost.cells(NUMBER + WRITTEN, WORD + WRITTEN) + DRAWN * cost.drawn + units * cost.unit),
-    };
-    let preparing = costing.cases * PREPARING * (1.0 + (costing.masses + costing.joints).powi(3) / PREPARED);
-    let tables = CELL * cost.cells(1.0, 1.0);
-    (size, OVERHEAD + GENEROUS * (cost.work + preparing + tables + POINT * cost.drawn))
+impl Costing<'_> {
+    /// Size, and rough time on one thread (s), of a study of this cost whose work is cut into so many units.
+    pub(crate) fn total(&self, cost: &Cost, units: usize) -> (Size, f64) {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let units = units.min(threads) as f64;
+        // a float that is too large for the type becomes its largest value
+        let whole = |value: f64| value as u64;
+        let size = Size {
+            rows: whole(cost.rows()),
+            results: whole(cost.cells(NUMBER, NUMBER)),
+            memory: whole(cost.cells(NUMBER + WRITTEN, WORD + WRITTEN) + DRAWN * cost.drawn + units * cost.unit),
+        };
+        let preparing = self.cases * PREPARING * (1.0 + (self.masses + self.joints).powi(3) / PREPARED);
+        let tables = CELL * cost.cells(1.0, 1.0);
+        (size, OVERHEAD + GENEROUS * (cost.work + preparing + tables + POINT * cost.drawn))
+    }
 }
 
 // ------------------------------------------------------------------------------------------ the limit
@@ -238,30 +235,6 @@ impl Size {
         };
         Some(StudyError::at(&study.sources, Problem::new(place, "memory", message).help(help)))
     }
-}
-
-/// What may be used when nobody says: [`MEMORY_LIMIT`], or what the machine has if that is less.
-pub(crate) fn default_limit() -> u64 {
-    MEMORY_LIMIT.min(available().unwrap_or(MEMORY_LIMIT))
-}
-
-/// Memory that the machine can give, where Linux tells it.
-fn available() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
-}
-
-/// A number of bytes for people: `4.2 GB`.
-pub fn bytes_text(bytes: u64) -> String {
-    let value = bytes as f64;
-    for (size, unit) in [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")] {
-        if value >= size {
-            let scaled = value / size;
-            return if scaled < 10.0 { format!("{scaled:.1} {unit}") } else { format!("{scaled:.0} {unit}") };
-        }
-    }
-    format!("{bytes} B")
 }
 
 // ------------------------------------------------------------------------------------------ time
