@@ -10,9 +10,9 @@ mod python;
 use python::{Peer, number};
 use std::f64::consts::TAU;
 use std::time::Instant;
-use stickslip::law::{CoulombArctan, Law};
+use stickslip::law::{Coulomb, CoulombArctan, Law};
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
-use stickslip::model::{System, templates};
+use stickslip::model::{System, example};
 
 const SCIPY: Peer = Peer { package: "scipy", version: "1.17.1", folder: "peers" };
 /// Slip limit (N) and frequency (Hz): slip only, stick-slip, stick-slip.
@@ -67,10 +67,12 @@ struct Ours {
 impl Ours {
     fn new((ft, hertz): (f64, f64)) -> Self {
         let couple = |smooth: bool| -> System {
-            let mut model = templates::find("blade-couple").unwrap().model_with(&[("Ft", ft)]).unwrap();
-            if smooth {
-                model.joints[0].law = Law::CoulombArctan(CoulombArctan { limit: ft, alpha: ALPHA });
-            }
+            let mut model = example::blade_couple();
+            model.joints[0].law = if smooth {
+                Law::CoulombArctan(CoulombArctan { limit: ft, alpha: ALPHA })
+            } else {
+                Law::Coulomb(Coulomb { limit: ft })
+            };
             model.assemble().unwrap()
         };
         let (_, exact) = time(&EventDriven, &couple(false), hertz);

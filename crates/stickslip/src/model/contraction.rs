@@ -24,7 +24,7 @@ impl System {
     ///
     /// # Example
     /// ```
-    /// let mut system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+    /// let mut system = stickslip::model::example::blade_couple().assemble().unwrap();
     /// assert!(system.contracts());
     /// system.damping[(0, 0)] = -0.1;
     /// assert!(!system.contracts());

@@ -4,6 +4,7 @@
 
 mod assemble;
 mod contraction;
+pub mod example;
 mod survey;
 pub mod templates;
 
