@@ -13,7 +13,7 @@ fn stickslip(folder: &Path, arguments: &[&str]) -> Output {
 /// A folder with the starting study of a template, edited.
 fn folder(template: &str, edits: &[(&str, &str)]) -> (TempDir, PathBuf) {
     let folder = TempDir::new().unwrap();
-    let mut text = stickslip::model::templates::find(template).unwrap().study.to_owned();
+    let mut text = stickslip_study::templates::find(template).unwrap().study.to_owned();
     for (from, to) in edits {
         assert!(text.contains(from), "{from} is not in the template");
         text = text.replacen(from, to, 1);
@@ -329,7 +329,7 @@ fn an_unwritable_folder_is_found_first() {
 #[test]
 fn a_study_comes_from_standard_input() {
     let folder = TempDir::new().unwrap();
-    let text = stickslip::model::templates::find("element").unwrap().study;
+    let text = stickslip_study::templates::find("element").unwrap().study;
     let run = |text: &str, arguments: &[&str]| {
         let mut command = Command::cargo_bin("stickslip").unwrap();
         command.current_dir(folder.path()).args(arguments).write_stdin(text).output().unwrap()
@@ -423,7 +423,7 @@ fn lists_templates_schema_and_completions() {
     let schema: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(schema["properties"]["study"].is_object());
     assert_eq!(code(&stickslip(folder.path(), &["completions", "bash"])), 0);
-    for template in stickslip::model::templates::TABLE {
+    for template in stickslip_study::templates::TABLE {
         let file = format!("{}.toml", template.name);
         assert_eq!(code(&stickslip(folder.path(), &["new", template.name, &file])), 0);
         assert_eq!(code(&stickslip(folder.path(), &["check", &file])), 0);

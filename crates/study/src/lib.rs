@@ -23,6 +23,7 @@ pub mod schema;
 mod statement;
 mod study;
 pub mod summary;
+pub mod templates;
 pub mod units;
 mod values;
 pub mod work;

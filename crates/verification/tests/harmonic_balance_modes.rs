@@ -4,7 +4,8 @@
 use std::f64::consts::{PI, TAU};
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode};
 use stickslip::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, Law};
-use stickslip::model::{GROUND, Joint, Mass, Model, Spring, System, templates};
+use stickslip::model::{GROUND, Joint, Mass, Model, Spring, System};
+use stickslip_study::templates;
 
 /// One mass of 1 kg on a spring of 1 N/m with a joint to the ground.
 fn oscillator(law: Law) -> System {

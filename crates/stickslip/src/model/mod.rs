@@ -6,7 +6,6 @@ mod assemble;
 mod contraction;
 pub mod example;
 mod survey;
-pub mod templates;
 
 pub use assemble::{Element, Load, ModelError, MovedPlace, System, SystemJoint, is_identifier};
 pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey};
