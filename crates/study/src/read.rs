@@ -131,18 +131,22 @@ pub(crate) struct CompiledTemplate {
     pub parameters: Vec<Parameter>,
     order: Vec<usize>,
     structure: Structure,
-    pub sources: Vec<Arc<Source>>,
+    sources: Vec<Arc<Source>>,
 }
 
 impl CompiledTemplate {
     /// The values of the parameters; those that are `fixed` have that value, SI.
-    pub fn values(&self, fixed: &[(usize, f64)]) -> Result<Vec<Value>, Problem> {
-        evaluate(&self.names, &self.parameters, &self.order, &HashMap::new(), fixed)
+    pub fn values(&self, fixed: &[(usize, f64)]) -> Result<Vec<Value>, StudyError> {
+        let values = evaluate(&self.names, &self.parameters, &self.order, &HashMap::new(), fixed);
+        values.map_err(|problem| StudyError::at(&self.sources, problem))
     }
 
-    /// The model with these values; what is wrong goes to `problems`.
-    pub fn model(&self, values: Vec<Value>, problems: &mut Vec<Problem>) -> Model {
-        model_of(&self.structure, &Environment { names: &self.names, values }, problems)
+    /// The model; parameters that are `fixed` have that value, SI.
+    pub fn model(&self, fixed: &[(usize, f64)]) -> Result<Model, StudyError> {
+        let environment = Environment { names: &self.names, values: self.values(fixed)? };
+        let mut problems = Vec::new();
+        let model = model_of(&self.structure, &environment, &mut problems);
+        StudyError::all(&self.sources, problems).map_or(Ok(model), Err)
     }
 }
 

@@ -103,8 +103,8 @@ pub(crate) struct NamedTemplate {
 }
 
 impl NamedTemplate {
-    /// Words a problem for a user who has not written the template: at the place where it is named.
-    fn word(&self, element: Element, problem: &mut Problem) {
+    /// Rewords a problem in the template's file for a user who has not written it: at the place where the template is named.
+    fn reword(&self, element: Element, problem: &mut Problem) {
         if problem.place.source == self.source {
             problem.message = self.blame(element, &problem.key, &problem.message);
             problem.place = self.table.place_of("template", None).clone();
@@ -697,7 +697,7 @@ pub(crate) fn model_of(structure: &Structure, environment: &Environment<'_>, pro
         let before = problems.len();
         let values = table.values(environment, problems);
         if let Some(template) = template {
-            problems[before..].iter_mut().for_each(|problem| template.word(element, problem));
+            problems[before..].iter_mut().for_each(|problem| template.reword(element, problem));
         }
         values
     };

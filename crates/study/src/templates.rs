@@ -6,7 +6,7 @@
 //!
 //! To add one: write its file, then its name in [`TABLE`].
 
-use crate::error::{Problem, StudyError};
+use crate::error::StudyError;
 use crate::near::nearest;
 use crate::read::compile_template;
 use stickslip::dimension::Dimension;
@@ -26,7 +26,7 @@ pub struct Template {
 pub struct TemplateParameter {
     /// Name.
     pub key: String,
-    /// Physical dimension: that of the default.
+    /// Physical dimension: that of the default; a bare number counts as a pure one.
     pub dimension: Dimension,
     /// Default as in the file: a quantity, or an expression over other parameters.
     pub default: String,
@@ -69,18 +69,20 @@ impl Template {
     /// # Panics
     /// If the file is wrong; those of [`TABLE`] are tested.
     pub fn parameters(&self) -> Vec<TemplateParameter> {
-        let compiled = compile_template(self).unwrap_or_else(|error| panic!("template {}: {error}", self.name));
-        let values = compiled.values(&[]).unwrap_or_else(|problem| panic!("template {}: {problem:?}", self.name));
-        let one = |((key, parameter), value): ((&String, &crate::study::Parameter), crate::expression::Value)| {
-            TemplateParameter {
-                key: key.clone(),
-                dimension: parameter.dimension.unwrap_or(Dimension::NONE),
-                default: parameter.quantity.text.clone(),
+        let compiled = compile_template(self).and_then(|compiled| Ok((compiled.values(&[])?, compiled)));
+        let (values, compiled) = compiled.unwrap_or_else(|error| panic!("template {}: {error}", self.name));
+        let mut parameters = Vec::with_capacity(values.len());
+        for (i, value) in values.iter().enumerate() {
+            let quantity = &compiled.parameters[i].quantity;
+            parameters.push(TemplateParameter {
+                key: compiled.names[i].clone(),
+                dimension: value.dimension.unwrap_or(Dimension::NONE),
+                default: quantity.text.clone(),
                 value: value.si,
-                doc: comment_behind(self.study, parameter.quantity.place.span.end).to_owned(),
-            }
-        };
-        compiled.names.iter().zip(&compiled.parameters).zip(values).map(one).collect()
+                doc: comment_behind(self.study, quantity.place.span.end).to_owned(),
+            });
+        }
+        parameters
     }
 
     /// The model with every parameter at its default.
@@ -118,19 +120,7 @@ impl Template {
             };
             fixed.push((index, *si));
         }
-        let mut problems: Vec<Problem> = Vec::new();
-        let model = match compiled.values(&fixed) {
-            Ok(values) => Some(compiled.model(values, &mut problems)),
-            Err(problem) => {
-                problems.push(problem);
-                None
-            }
-        };
-        match (StudyError::all(&compiled.sources, problems), model) {
-            (None, Some(model)) => Ok(model),
-            (Some(error), _) => Err(error),
-            (None, None) => Err(StudyError::file(self.name, "the model could not be resolved", None)),
-        }
+        compiled.model(&fixed)
     }
 }
 
