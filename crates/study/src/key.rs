@@ -1,7 +1,7 @@
 //! Keys of the tables of a study file: what one takes, whether it must stand there, and what stands for it if not.
 
-use stickslip::law;
 use stickslip::dimension::Dimension;
+use stickslip::law;
 
 /// The schema version that this program reads.
 pub const VERSION: i64 = 1;

@@ -30,6 +30,7 @@ mod statement;
 mod study;
 pub mod summary;
 mod survey;
+pub mod templates;
 pub mod units;
 mod values;
 mod warnings;

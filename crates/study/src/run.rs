@@ -26,7 +26,7 @@ pub use crate::work::{CONVERGED, Context, NOT_REACHED, Prepared};
 /// # Example
 /// ```
 /// use stickslip_study::{read_study, run::{Context, run}};
-/// let text = stickslip::model::templates::find("element").unwrap().study;
+/// let text = stickslip_study::templates::find("element").unwrap().study;
 /// let study = read_study("element.toml", text, &[]).unwrap();
 /// let dataset = run(&study, &Context::unwatched(1)).unwrap();
 /// let loss = dataset.tables[1].numbers("dissipation_J").unwrap();

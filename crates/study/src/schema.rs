@@ -4,10 +4,10 @@
 //! methods come from [`stickslip::law::TABLE`] and [`stickslip::method::TABLE`], study kinds from [`crate::kinds::TABLE`].
 
 use crate::kind::Kind;
-use crate::kinds;
+use crate::{kinds, templates};
 use serde_json::{Map, Value, json};
 use stickslip::dimension::Dimension;
-use stickslip::{law, method, model::templates};
+use stickslip::{law, method};
 
 pub use crate::key::{Key, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, required};
 
@@ -195,7 +195,7 @@ pub const ADAPTIVE: &[Key] = &[
 pub const METHOD: &[Key] = &[default("kind", Takes::Choice(method_names), "auto", "the method", "\"event-driven\"")];
 
 fn template_names() -> Vec<(&'static str, &'static str)> {
-    templates::TABLE.iter().map(|row| (row.name, row.summary)).collect()
+    templates::TABLE.iter().map(|row| (row.name, row.summary())).collect()
 }
 
 fn kind_names() -> Vec<(&'static str, &'static str)> {
@@ -438,8 +438,9 @@ pub fn markdown() -> String {
     }
     book.push_str("\n## Templates\n\n");
     for row in templates::TABLE {
-        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc)).collect();
-        named(&mut book, row.name, row.summary, &keys);
+        let parameters = row.parameters();
+        let keys: Vec<_> = parameters.iter().map(|p| (p.key.as_str(), p.dimension, p.doc.as_str())).collect();
+        named(&mut book, row.name, row.summary(), &keys);
     }
     book
 }

@@ -15,7 +15,6 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
 use stickslip::method::{self, Options};
-use stickslip::model::templates::Template;
 use stickslip::model::{Element, Force, Joint, Mass, Model, ModelError, Motion, Spring};
 
 /// A study file, read and checked.
@@ -89,11 +88,34 @@ impl VariedPoints {
     }
 }
 
-/// How the model is stated.
+/// How the model is stated: in lists, of this file or of a template's.
 #[derive(Debug, Clone)]
-pub(crate) enum Structure {
-    Lists(Lists),
-    Template(&'static Template, StatedTable),
+pub(crate) struct Structure {
+    pub lists: Lists,
+    pub template: Option<NamedTemplate>,
+}
+
+/// The template that a study names.
+#[derive(Debug, Clone)]
+pub(crate) struct NamedTemplate {
+    /// `[model]`.
+    pub table: StatedTable,
+    /// Its file among the sources.
+    pub source: usize,
+}
+
+impl NamedTemplate {
+    /// Rewords a problem in the template's file for a user who has not written it: at the place where the template is named.
+    fn reword(&self, element: Element, problem: &mut Problem) {
+        if problem.place.source == self.source {
+            problem.message = self.blame(element, &problem.key, &problem.message);
+            problem.place = self.table.place_of("template", None).clone();
+        }
+    }
+
+    fn blame(&self, element: Element, key: &str, message: &str) -> String {
+        format!("these parameters make {element} of the template wrong: `{key}` {message}")
+    }
 }
 
 #[derive(Debug, Clone, Default)]
@@ -298,7 +320,7 @@ impl Study {
     /// The varied parameters of the case with this number, without its model; `None` if there is no such case.
     pub(crate) fn varied_values(&self, index: usize) -> Option<Vec<VariedValue>> {
         let choice = self.choice(index);
-        let environment = evaluate(&self.names, &self.parameters, &self.order, &choice, None).ok()?;
+        let environment = evaluate(&self.names, &self.parameters, &self.order, &choice, &[]).ok()?;
         Some(self.varied_of(&environment, &choice))
     }
 
@@ -396,16 +418,16 @@ impl Study {
         message: impl Into<String>,
         help: Option<String>,
     ) -> StudyError {
-        let stated = match (table, &self.structure) {
+        let stated = match (table, &self.structure.template) {
             ("study", _) => Some(&self.study),
             ("method", _) => Some(&self.method),
             ("figure", _) => Some(&self.figure),
-            (_, Structure::Lists(lists)) => lists.get(table).get(index),
-            (_, Structure::Template(_, table)) => Some(table),
+            (_, Some(template)) => Some(&template.table),
+            (_, None) => self.structure.lists.get(table).get(index),
         };
         let whole = Place::default();
-        let place = stated.map_or(&whole, |table| match (table.entry(key), &self.structure) {
-            (None, Structure::Template(..)) => table.place_of("template", None),
+        let place = stated.map_or(&whole, |table| match (table.entry(key), &self.structure.template) {
+            (None, Some(_)) => table.place_of("template", None),
             _ => table.place_of(key, None),
         });
         StudyError::at(&self.sources, Problem::new(place, key, message).maybe_help(help))
@@ -479,7 +501,7 @@ impl Study {
     /// A case in words, with its number among all: `N = 0 N, case 1 of 8`.
     pub(crate) fn case_words(&self, index: usize) -> String {
         let choice = self.choice(index);
-        let words = match evaluate(&self.names, &self.parameters, &self.order, &choice, None) {
+        let words = match evaluate(&self.names, &self.parameters, &self.order, &choice, &[]) {
             Ok(environment) => varied_text(&self.varied_of(&environment, &choice)),
             // without values: as they stand in the file
             Err(_) => {
@@ -535,7 +557,7 @@ impl Study {
             Look::Again(fixed) => (false, fixed),
         };
         let choice = self.choice(index);
-        let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed) {
+        let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed.as_slice()) {
             Ok(values) => values,
             Err(problem) => {
                 problems.push(problem);
@@ -543,10 +565,7 @@ impl Study {
             }
         };
         let environment = Environment { names: &self.names, values };
-        let model = match &self.structure {
-            Structure::Lists(lists) => model_of(lists, &environment, problems),
-            Structure::Template(row, table) => self.template_model(row, table, &environment, problems),
-        };
+        let model = model_of(&self.structure, &environment, problems);
         let values = self.study.values(&environment, problems);
         let method = self.method.values(&environment, problems);
         if !problems.is_empty() {
@@ -573,27 +592,6 @@ impl Study {
             return None;
         }
         Some(Parts { environment: environment.values, model, values, method })
-    }
-
-    fn template_model(
-        &self,
-        row: &'static Template,
-        table: &StatedTable,
-        environment: &Environment<'_>,
-        problems: &mut Vec<Problem>,
-    ) -> Model {
-        let changes: Vec<(&str, f64)> = row
-            .parameters
-            .iter()
-            .filter_map(|p| Some((p.key, environment.values[self.names.iter().position(|name| name == p.key)?].si)))
-            .collect();
-        let values = table.values(environment, problems);
-        let law = values.law("law");
-        let mut model = row.model_with(&changes).unwrap_or_default();
-        for joint in &mut model.joints {
-            joint.law = law.unwrap_or(&joint.law).clone();
-        }
-        model
     }
 
     fn finished(&self, index: usize, parts: Parts) -> Case {
@@ -626,19 +624,15 @@ impl Study {
             Element::Whole => ("", 0),
         };
         let whole = Place::default();
-        let (place, message) = match &self.structure {
-            Structure::Lists(lists) => {
-                let table = lists.get(list).get(index);
+        let (place, message) = match &self.structure.template {
+            None => {
+                let table = self.structure.lists.get(list).get(index);
                 let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
                 (place, table.map_or_else(|| error.message.clone(), |table| table.with_turn(&error.message)))
             }
-            Structure::Template(_, table) => {
-                let place = table.place_of(if error.key == "law" { "law" } else { "template" }, None);
-                let message = format!(
-                    "these parameters make {} of the template wrong: `{}` {}",
-                    error.element, error.key, error.message
-                );
-                (place, message)
+            Some(template) => {
+                let place = template.table.place_of(if error.key == "law" { "law" } else { "template" }, None);
+                (place, template.blame(error.element, error.key, &error.message))
             }
         };
         let places = model.place_names();
@@ -679,13 +673,13 @@ struct Parts {
     method: Values,
 }
 
-/// The values of all parameters, with the choices made for the varied ones.
+/// The values of all parameters, with the choices made for the varied ones; those that are `fixed` have that value, SI, whatever is stated.
 pub(crate) fn evaluate(
     names: &[String],
     parameters: &[Parameter],
     order: &[usize],
     choice: &HashMap<usize, (&Varied, usize)>,
-    fixed: Option<(usize, f64)>,
+    fixed: &[(usize, f64)],
 ) -> Result<Vec<Value>, Problem> {
     let mut environment = Environment { names, values: vec![Value::bare(f64::NAN); parameters.len()] };
     for &index in order {
@@ -704,16 +698,25 @@ pub(crate) fn evaluate(
                 Value { si: between(start.si, end.si, dimension, point, *points), ..start }
             }
         };
-        environment.values[index] = match fixed {
-            Some((parameter, si)) if parameter == index => Value { si, ..value },
-            _ => value,
+        environment.values[index] = match fixed.iter().rfind(|(parameter, _)| *parameter == index) {
+            Some((_, si)) => Value { si: *si, ..value },
+            None => value,
         };
     }
     Ok(environment.values)
 }
 
-fn model_of(lists: &Lists, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Model {
+pub(crate) fn model_of(structure: &Structure, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Model {
+    let Structure { lists, template } = structure;
     let mut model = Model::default();
+    let mut resolve = |element: Element, table: &StatedTable| {
+        let before = problems.len();
+        let values = table.values(environment, problems);
+        if let Some(template) = template {
+            problems[before..].iter_mut().for_each(|problem| template.reword(element, problem));
+        }
+        values
+    };
     let text = |values: &Values, key: &str| values.text(key).unwrap_or_default().to_owned();
     let number = |values: &Values, key: &str| values.quantity(key).unwrap_or(0.0);
     let between = |values: &Values| match values.names("between") {
@@ -721,33 +724,33 @@ fn model_of(lists: &Lists, environment: &Environment<'_>, problems: &mut Vec<Pro
         _ => Default::default(),
     };
     let harmonic = |values: &Values| values.count("harmonic").and_then(|h| u32::try_from(h).ok()).unwrap_or(1);
-    for table in &lists.mass {
-        let values = table.values(environment, problems);
+    for (i, table) in lists.mass.iter().enumerate() {
+        let values = resolve(Element::Mass(i), table);
         model.masses.push(Mass {
             name: text(&values, "name"),
             mass: number(&values, "mass"),
             directions: values.names("directions").unwrap_or_default().to_vec(),
         });
     }
-    for table in &lists.spring {
-        let values = table.values(environment, problems);
+    for (i, table) in lists.spring.iter().enumerate() {
+        let values = resolve(Element::Spring(i), table);
         let (stiffness, damping) = (number(&values, "stiffness"), number(&values, "damping"));
         model.springs.push(Spring { between: between(&values), stiffness, damping });
     }
-    for table in &lists.joint {
-        let values = table.values(environment, problems);
+    for (i, table) in lists.joint.iter().enumerate() {
+        let values = resolve(Element::Joint(i), table);
         // without a law there is a problem, and the model is not used
         if let Some(law) = values.law("law") {
             model.joints.push(Joint { name: text(&values, "name"), between: between(&values), law: law.clone() });
         }
     }
-    for table in &lists.force {
-        let values = table.values(environment, problems);
+    for (i, table) in lists.force.iter().enumerate() {
+        let values = resolve(Element::Force(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
         model.forces.push(Force { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }
-    for table in &lists.motion {
-        let values = table.values(environment, problems);
+    for (i, table) in lists.motion.iter().enumerate() {
+        let values = resolve(Element::Motion(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
         model.motions.push(Motion { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }

@@ -71,8 +71,8 @@ impl ModelSummary {
     ///
     /// # Example
     /// ```
-    /// use stickslip_study::{read_study, summary::ModelSummary};
-    /// let text = stickslip::model::templates::find("blade-couple").unwrap().study;
+    /// use stickslip_study::{read_study, summary::ModelSummary, templates};
+    /// let text = templates::find("blade-couple").unwrap().study;
     /// let summary = ModelSummary::new(&read_study("couple.toml", text, &[]).unwrap()).unwrap();
     /// assert_eq!((summary.dofs, summary.free.elastic.len(), summary.warnings.len()), (3, 3, 0));
     /// assert!(summary.to_string().contains("120.94"));   // a stuck mode, Hz

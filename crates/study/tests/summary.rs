@@ -1,10 +1,9 @@
 //! What a study says of itself before it is run.
 
 use std::sync::Arc;
-use stickslip::model::templates;
 use stickslip_study::run::{Context, check, run};
 use stickslip_study::summary::ModelSummary;
-use stickslip_study::{Study, read_study};
+use stickslip_study::{Study, read_study, templates};
 
 fn study(text: &str) -> Study {
     read_study("study.toml", text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))

@@ -112,10 +112,14 @@ impl<E: Send> Performance<'_, E> {
     /// ```
     /// use stickslip::curve::performance::Performance;
     /// use stickslip::method::event_driven::EventDriven;
-    /// use stickslip::model::templates;
-    /// let couple = templates::find("blade-couple").unwrap();
+    /// use stickslip::law::{Coulomb, Law};
+    /// use stickslip::model::example;
     /// let curve = Performance {
-    ///     system: &|limit| couple.model_with(&[("Ft", limit)]).unwrap().assemble(),
+    ///     system: &|limit| {
+    ///         let mut couple = example::blade_couple();
+    ///         couple.joints[0].law = Law::Coulomb(Coulomb { limit });
+    ///         couple.assemble()
+    ///     },
     ///     method: &EventDriven,
     ///     range: (119.5 * std::f64::consts::TAU, 122.5 * std::f64::consts::TAU),
     ///     points: 31,

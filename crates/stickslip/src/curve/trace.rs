@@ -72,8 +72,7 @@ impl Trace<'_> {
     /// ```
     /// use stickslip::curve::trace::Trace;
     /// use stickslip::method::harmonic_balance::HarmonicBalance;
-    /// use stickslip::model::templates;
-    /// let system = templates::find("blade-couple-massless").unwrap().model().assemble().unwrap();
+    /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
     /// let branch = Trace {
     ///     at: &|omega| (system.clone(), omega),
     ///     method: HarmonicBalance { harmonics: Some(5), ..HarmonicBalance::default() },

@@ -171,7 +171,7 @@ impl Model {
     /// # Example
     /// ```
     /// use std::f64::consts::TAU;
-    /// let couple = stickslip::model::templates::find("blade-couple").unwrap().model();
+    /// let couple = stickslip::model::example::blade_couple();
     /// let survey = couple.survey().unwrap();
     /// // both blades on their springs, and the contact mass on the shroud's spring
     /// assert_eq!(survey.free().elastic.len(), 3);

@@ -3,7 +3,7 @@
 use crate::expression::displayed;
 use crate::note::WARNING;
 use crate::statement::{Environment, Quantity, Stated, StatedTable};
-use crate::study::{Structure, Study, evaluate};
+use crate::study::{Study, evaluate};
 use crate::survey::Surveyed;
 use crate::words::significant;
 use std::collections::{BTreeSet, HashMap};
@@ -17,7 +17,7 @@ const NAMED: usize = 6;
 pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[Surveyed]) -> Vec<String> {
     let mut warnings = of_kind;
     warnings.extend(loose(cases));
-    warnings.extend(unused(study, &cases[0]));
+    warnings.extend(unused(study));
     warnings.extend(bare_angles(study));
     warnings.into_iter().map(|text| format!("{WARNING}{text}")).collect()
 }
@@ -45,11 +45,11 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
     cases[0].survey.loose().iter().take(NAMED).map(one).collect()
 }
 
-fn unused(study: &Study, first: &Surveyed) -> Option<String> {
-    let used = used_parameters(study, first);
+fn unused(study: &Study) -> Option<String> {
+    let used = used_parameters(study);
     let from_template = |index: usize| {
         let source = study.parameters[index].quantity.place.source;
-        study.sources.get(source).is_some_and(|source| source.name.starts_with("template parameter"))
+        study.structure.template.as_ref().is_some_and(|template| template.source == source)
     };
     let varied: BTreeSet<usize> = study.varied.iter().map(|varied| varied.index).collect();
     let idle = (0..study.names.len()).filter(|i| !used.contains(i) && (varied.contains(i) || !from_template(*i)));
@@ -70,42 +70,16 @@ fn unused(study: &Study, first: &Surveyed) -> Option<String> {
 }
 
 /// The parameters that a value of the model, of the study or of the method depends on.
-fn used_parameters(study: &Study, first: &Surveyed) -> BTreeSet<usize> {
+fn used_parameters(study: &Study) -> BTreeSet<usize> {
     let mut open: Vec<usize> = Vec::new();
     let mut from = |table: &StatedTable| {
         each_quantity(table, &mut |_, quantity, _| open.extend(quantity.expression.parameters()));
     };
     from(&study.study);
     from(&study.method);
-    match &study.structure {
-        Structure::Lists(lists) => {
-            for list in [&lists.mass, &lists.spring, &lists.joint, &lists.force, &lists.motion] {
-                list.iter().for_each(&mut from);
-            }
-        }
-        Structure::Template(row, table) => {
-            from(table);
-            // a parameter of a template is used if the model changes with it; a law that is replaced takes its
-            // parameters away
-            let replaced = table.entry("law").and(first.case.model.joints.first()).map(|joint| joint.law.clone());
-            let values: Vec<(&str, f64)> =
-                row.parameters.iter().filter_map(|p| Some((p.key, first.case.parameters.get(p.key)?.0))).collect();
-            let model = |values: &[(&str, f64)]| {
-                let mut model = row.model_with(values).unwrap_or_default();
-                for joint in &mut model.joints {
-                    joint.law = replaced.clone().unwrap_or_else(|| joint.law.clone());
-                }
-                model
-            };
-            let before = model(&values);
-            for index in 0..values.len() {
-                let mut other = values.clone();
-                other[index].1 = 1.5 * other[index].1 + 1.0;
-                if model(&other) != before {
-                    open.extend(study.names.iter().position(|name| name == other[index].0));
-                }
-            }
-        }
+    let lists = &study.structure.lists;
+    for list in [&lists.mass, &lists.spring, &lists.joint, &lists.force, &lists.motion] {
+        list.iter().for_each(&mut from);
     }
     let mut used = BTreeSet::new();
     while let Some(index) = open.pop() {
@@ -143,10 +117,10 @@ fn each_quantity(table: &StatedTable, each: &mut dyn FnMut(&'static str, &Quanti
 /// Bare numbers as angles: they count as radians, as bare frequencies count as Hz.
 fn bare_angles(study: &Study) -> Vec<String> {
     let choice: HashMap<_, _> = study.varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
-    let Ok(values) = evaluate(&study.names, &study.parameters, &study.order, &choice, None) else { return Vec::new() };
+    let Ok(values) = evaluate(&study.names, &study.parameters, &study.order, &choice, &[]) else { return Vec::new() };
     let environment = Environment { names: &study.names, values };
     let mut found: Vec<(String, String, usize)> = Vec::new();
-    let Structure::Lists(lists) = &study.structure else { return Vec::new() };
+    let lists = &study.structure.lists;
     for (list, tables) in [("force", &lists.force), ("motion", &lists.motion)] {
         for (index, table) in tables.iter().enumerate() {
             each_quantity(table, &mut |key, quantity, dimension| {

@@ -2,8 +2,7 @@
 
 use std::fmt::Write;
 use stickslip::law;
-use stickslip::model::templates;
-use stickslip_study::kinds;
+use stickslip_study::{kinds, templates};
 
 /// Random numbers by splitmix64 (Steele, Lea, Flood 2014): the same for a seed on every machine.
 pub struct Chance(u64);

@@ -55,7 +55,7 @@ const ENERGY_GAP: f64 = 1e-8;
 /// # Example
 /// ```
 /// use stickslip::method::{Method, event_driven::EventDriven};
-/// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+/// let system = stickslip::model::example::blade_couple().assemble().unwrap();
 /// let orbit = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25, None).unwrap();
 /// assert!((orbit.place("blade1").unwrap().amplitude() - 0.0489246).abs() < 1e-6);
 /// assert!(orbit.evidence.energy_gap < 1e-9);

@@ -1,13 +1,13 @@
 //! Amplitude error of harmonic balance against the exact method over the paper's curves, by number of harmonics.
 //!
-//! `cargo run --release -p stickslip --example harmonic_balance_table`
+//! `cargo run --release -p stickslip-verification --example harmonic_balance_table`
 
 #![allow(clippy::print_stdout)] // a table is what this prints
 
 use std::f64::consts::TAU;
 use std::time::Instant;
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
-use stickslip::model::templates;
+use stickslip_study::templates;
 
 /// Points of a curve, 119.5 to 122.5 Hz.
 const POINTS: u32 = 49;
