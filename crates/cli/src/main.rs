@@ -19,7 +19,6 @@ macro_rules! complain_on {
 mod args;
 mod list;
 mod open;
-mod paper;
 mod plot;
 mod progress;
 mod run;

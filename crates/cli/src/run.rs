@@ -1,7 +1,7 @@
 //! `stickslip run`, `check` and `paper`.
 
 use crate::args::Place;
-use crate::{Ending, open, paper, print, progress};
+use crate::{Ending, open, print, progress};
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
@@ -329,7 +329,7 @@ pub fn paper(place: &Place, open: bool) -> Ending {
             complain!("{line}");
         }
     };
-    match paper::paper(&place.out, &context, &say) {
+    match stickslip_paper::paper(&place.out, &context, &say) {
         Err(error) => Ending::Failed(error.to_string()),
         Ok(outcome) => {
             if let ending @ Ending::Failed(_) = print(&outcome.summary) {

@@ -3,6 +3,7 @@
 //! [`read_study`] turns a text into a [`Study`]: tree ([`toml`]), statements (every expression compiled, every place known), then every
 //! case once, so that whatever is wrong is found before anything is written. [`schema`] describes all tables and keys as data.
 
+mod columns;
 pub mod cost;
 pub mod dataset;
 mod decay;
@@ -23,6 +24,7 @@ mod note;
 mod point;
 mod read;
 mod repeat;
+pub mod results;
 mod rows;
 pub mod run;
 pub mod schema;

@@ -1,5 +1,6 @@
 //! What a table keeps of one orbit, or of its failure.
 
+use crate::columns;
 use crate::extra;
 use crate::rows::Rows;
 use crate::study::Case;
@@ -83,7 +84,7 @@ impl Summary {
     pub fn write(&self, prepared: &Prepared, rows: &mut Rows) {
         let system = &prepared.system;
         for (place, [amplitude, mean, phase]) in system.places().iter().zip(&self.places) {
-            rows.number(&format!("{place}_amplitude_m"), *amplitude);
+            rows.number(&columns::amplitude_of(place), *amplitude);
             rows.number(&format!("{place}_mean_m"), *mean);
             rows.number(&format!("{place}_phase_deg"), *phase);
         }
@@ -96,8 +97,8 @@ impl Summary {
             .zip(&self.extra)
             .for_each(|(column, value)| rows.number(column, *value));
         rows.flag("stable", self.stable);
-        rows.number("residual", self.residual);
-        rows.number("energy_gap", self.energy_gap);
+        rows.number(columns::RESIDUAL, self.residual);
+        rows.number(columns::ENERGY_GAP, self.energy_gap);
         rows.number("truncation", self.truncation);
         rows.integer("iterations", self.iterations);
         rows.text("status", &self.status);

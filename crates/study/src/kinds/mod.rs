@@ -3,14 +3,14 @@
 //! A kind states its keys of `[study]`; the reader checks them and hands over their [`Values`](crate::Values) for every case.
 
 mod branch;
-mod hysteresis;
+pub mod hysteresis;
 mod keys;
 mod modes;
 mod orbit;
 mod orbits;
 mod peak_of;
-mod performance;
-mod response;
+pub mod performance;
+pub mod response;
 mod transient;
 
 use crate::extra;

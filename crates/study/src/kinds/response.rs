@@ -1,8 +1,13 @@
 //! Response curves: amplitude over drive frequency.
 
+mod tables;
+
+pub use tables::{Curve, MassCurve, curves};
+
 use super::keys::{FREQUENCY, OUTPUT, anything, check_output};
 use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of, named_places, worst};
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, amplitude_of};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Sharing, Style, Table};
 use crate::drawing::{Drawing, Layout, MOST_CURVES, MOST_PANELS, Stretch, largest, numbers, thinned, words};
@@ -27,7 +32,7 @@ use stickslip::orbit::Orbit;
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
-        name: "response",
+        name: tables::NAME,
         summary: "response curves over the drive frequency, with refined peaks",
         keys: &[
             FREQUENCY,
@@ -52,7 +57,7 @@ pub(super) const KIND: Kind = Kind {
         uses_method: true,
         needs: anything,
         adapts: true,
-        tables: &["curve", "peaks", "references"],
+        tables: &[tables::CURVE, tables::PEAKS, tables::REFERENCES],
     },
     grain: |study| if study.is_adaptive() { Grain::Case } else { Grain::Frequencies },
     cost,
@@ -129,10 +134,10 @@ fn compute(work: &Work<'_>) -> Computed {
                 part.count(at, "peak-unsettled", Some(reason.to_owned()));
             }
             peaks.varied(case);
-            peaks.text("mass", &prepared.system.places()[found.mass]);
-            peaks.number("frequency_Hz", hertz(found.peak.omega));
-            peaks.number("amplitude_m", found.peak.value);
-            peaks.flag("at_range_end", Some(found.peak.at_end));
+            peaks.text(tables::MASS, &prepared.system.places()[found.mass]);
+            peaks.number(DRIVE, hertz(found.peak.omega));
+            peaks.number(AMPLITUDE, found.peak.value);
+            peaks.flag(AT_RANGE_END, Some(found.peak.at_end));
             peaks.end();
         }
         part.tables.push(peaks);
@@ -170,7 +175,7 @@ impl<'a> Computing<'a> {
         notes.into_iter().for_each(|note| note.join(&mut self.part.notes));
         self.omegas.push(omega);
         self.rows.varied(case);
-        self.rows.number("frequency_Hz", hertz(omega));
+        self.rows.number(DRIVE, hertz(omega));
         summary.write(self.prepared, &mut self.rows);
         self.rows.end();
     }
@@ -339,12 +344,12 @@ fn references(work: &Work<'_>, omegas: &[f64]) -> Result<Rows, MethodError> {
     }
     let mut rows = Rows::default();
     for (i, omega) in omegas.iter().enumerate() {
-        rows.number("frequency_Hz", hertz(*omega));
+        rows.number(DRIVE, hertz(*omega));
         for (what, (_, curve)) in ["free", "stuck"].iter().zip(&systems) {
             for (place, name) in prepared.system.places().iter().enumerate() {
                 let orbit = curve.get(i).and_then(|orbit| orbit.as_ref());
                 let amplitude = orbit.map_or(f64::NAN, |orbit| orbit.places[place].amplitude());
-                rows.number(&format!("{name}_{what}_amplitude_m"), amplitude);
+                rows.number(&amplitude_of(&format!("{name}_{what}")), amplitude);
             }
         }
         rows.end();
@@ -373,19 +378,19 @@ struct Drawn<'a> {
 
 impl Drawn<'_> {
     fn column(&self, name: &str) -> String {
-        format!("{name}_amplitude_m")
+        amplitude_of(name)
     }
 
     /// The curve of one mass in one case, with its peaks among its points.
     fn line(&self, stretch: &Stretch, name: &str) -> (Vec<f64>, Vec<f64>) {
-        let x = numbers(self.curve, "frequency_Hz", stretch.rows.clone());
+        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
         let y = numbers(self.curve, &self.column(name), stretch.rows.clone());
         self.with_peaks(stretch, x.into_iter().zip(y).collect(), &|mass, _| mass == name)
     }
 
     /// The largest amplitude over the shown masses, and which mass has the largest of all in words.
     fn envelope(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>, String) {
-        let x = numbers(self.curve, "frequency_Hz", stretch.rows.clone());
+        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
         let all: Vec<Vec<f64>> =
             self.shown.iter().map(|(name, _)| numbers(self.curve, &self.column(name), stretch.rows.clone())).collect();
         let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -427,14 +432,14 @@ impl Drawn<'_> {
 
     /// Grey curves of the linear structures: of one mass, or the largest over the shown ones.
     fn references(&self, names: &[&str]) -> Vec<Series> {
-        let Some(table) = self.drawing.table("references") else { return Vec::new() };
-        let x: Vec<f64> = numbers(table, "frequency_Hz", 0..table.rows()).iter().map(|x| x * self.factor.0).collect();
+        let Some(table) = self.drawing.table(tables::REFERENCES) else { return Vec::new() };
+        let x: Vec<f64> = numbers(table, DRIVE, 0..table.rows()).iter().map(|x| x * self.factor.0).collect();
         [("free", Style::Solid), ("stuck", Style::Dotted)]
             .into_iter()
             .map(|(what, style)| {
                 let all: Vec<Vec<f64>> = names
                     .iter()
-                    .map(|name| numbers(table, &format!("{name}_{what}_amplitude_m"), 0..table.rows()))
+                    .map(|name| numbers(table, &amplitude_of(&format!("{name}_{what}")), 0..table.rows()))
                     .collect();
                 let y = (0..x.len()).map(|i| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max) * self.factor.1);
                 let of = if names.len() > 1 { ", largest" } else { "" };
@@ -451,7 +456,9 @@ fn join(parts: impl IntoIterator<Item = String>) -> String {
 }
 
 fn draw(drawing: &Drawing<'_>) -> Figure {
-    let (Some(curve), Some(system)) = (drawing.table("curve"), drawing.system()) else { return Figure::default() };
+    let (Some(curve), Some(system)) = (drawing.table(tables::CURVE), drawing.system()) else {
+        return Figure::default();
+    };
     let places = system.places().iter().cloned().zip(0..);
     let shown: Vec<(String, usize)> = places.filter(|(name, _)| drawing.shows(name)).collect();
     // with `output = "joint_force"` only
@@ -461,8 +468,8 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     if shown.is_empty() && joints.is_empty() {
         return Figure::default();
     }
-    let columns = || shown.iter().map(|(name, _)| format!("{name}_amplitude_m"));
-    let (x, x_factor) = drawing.axis(0, "frequency", largest(curve, ["frequency_Hz".to_owned()]), "Hz");
+    let columns = || shown.iter().map(|(name, _)| amplitude_of(name));
+    let (x, x_factor) = drawing.axis(0, "frequency", largest(curve, [DRIVE.to_owned()]), "Hz");
     let (y, y_factor) = drawing.axis(1, "amplitude", largest(curve, columns()), "m");
     let (unit, force_factor) = display_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
     let stretches = drawing.stretches(curve);
@@ -638,17 +645,16 @@ fn of_case(stretch: &Stretch, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usi
 
 /// The peaks inside the range: case, and mass, frequency (Hz), amplitude (m).
 fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<(usize, (String, f64, f64))> {
-    let Some(table) = drawing.table("peaks") else { return Vec::new() };
-    let at_end = table.flags("at_range_end").unwrap_or_default();
-    let masses = words(table, "mass");
+    let Some(table) = drawing.table(tables::PEAKS) else { return Vec::new() };
+    let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
+    let masses = words(table, tables::MASS);
     // a table from elsewhere may lack columns
     if masses.len() != table.rows() {
         return Vec::new();
     }
     let mut peaks = Vec::new();
     for stretch in drawing.stretches(table) {
-        let (x, y) =
-            (numbers(table, "frequency_Hz", stretch.rows.clone()), numbers(table, "amplitude_m", stretch.rows.clone()));
+        let (x, y) = (numbers(table, DRIVE, stretch.rows.clone()), numbers(table, AMPLITUDE, stretch.rows.clone()));
         for (i, row) in stretch.rows.clone().enumerate() {
             if at_end.get(row) == Some(&Some(false)) {
                 peaks.push((stretch.case, (masses[row].clone(), x[i], y[i])));

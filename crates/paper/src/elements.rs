@@ -1,9 +1,11 @@
 //! Figs. 2-4: the loops of the friction elements, and what the paper says of them.
 
-use super::measure::Loop;
-use super::studies::Results;
-use super::verdict::{APPROXIMATE, DIFFERENT, SIMILAR, in_all, small};
-use super::{Further, Part, finding, largest, list, percent};
+use crate::further::Further;
+use crate::measure::{Loop, largest};
+use crate::part::{Part, finding};
+use crate::studies::Results;
+use crate::text::{join, list, percent, words};
+use crate::verdict::{APPROXIMATE, DIFFERENT, SIMILAR, in_all, small};
 use stickslip_report::{PageTable, Section, Verdict};
 use stickslip_study::dataset::{Figure, Panel};
 
@@ -245,13 +247,4 @@ pub fn coulomb(results: &Results) -> Option<Part> {
         ..Section::default()
     };
     Some(Part { section, findings })
-}
-
-fn join(numbers: &[usize]) -> String {
-    numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
-}
-
-/// Words as strings.
-pub(super) fn words(words: &[&str]) -> Vec<String> {
-    words.iter().map(|word| (*word).to_owned()).collect()
 }

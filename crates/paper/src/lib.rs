@@ -1,20 +1,27 @@
-//! `stickslip paper`: every figure of the paper, and its claims beside measured numbers.
+//! Every figure of the paper, and its claims beside measured numbers: what `stickslip paper` does.
+//!
+//! The study files under `studies/paper/` are run as any other; a file per group of figures measures what they yield against what the text
+//! says, and the rules that decide stand in one file.
 //!
 //! Source: Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and Computational Mechanics 9 (2015) 31-40.
 
 mod couple;
 mod elements;
 mod evidence;
+mod further;
 mod measure;
 mod optimum;
+mod part;
 mod studies;
+mod text;
 mod verdict;
 
-use optimum::Optimum;
-use std::error::Error;
+use further::Further;
+use part::{Finding, Part};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use stickslip_report::{Claim, Outputs, Page, Section, Verdict, write_dataset};
+use stickslip_report::{Outputs, Page, ReportError, Section, Verdict, write_dataset};
+use stickslip_study::StudyError;
 use stickslip_study::run::{Context, run};
 use studies::{FILES, Results, read};
 
@@ -29,25 +36,15 @@ pub struct Outcome {
     pub report: PathBuf,
 }
 
-/// What can go wrong: a file cannot be written.
-type Failure = Box<dyn Error + Send + Sync>;
-
-/// A claim with the short name that the terminal shows.
-#[derive(Debug, Clone)]
-struct Finding {
-    name: &'static str,
-    claim: Claim,
-}
-
-fn finding(name: &'static str, text: &str, measured: String, verdict: Verdict) -> Finding {
-    Finding { name, claim: Claim { text: text.to_owned(), measured, verdict } }
-}
-
-/// A section of the report before its claims are handed over.
-#[derive(Debug, Clone, Default)]
-struct Part {
-    section: Section,
-    findings: Vec<Finding>,
+/// Why the figures cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum PaperError {
+    /// A study cannot be run here, for example because it needs more memory than there is.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
 }
 
 /// How much is computed; tests take less.
@@ -62,27 +59,36 @@ struct Extent {
 /// An interrupted run writes what is finished and measures what is complete.
 ///
 /// # Errors
-/// A file cannot be written.
-pub fn paper(out: &Path, context: &Context, say: &dyn Fn(&str)) -> Result<Outcome, Failure> {
+/// [`PaperError`]: a file cannot be written, or a study cannot be run here. The figures finished before stay.
+///
+/// # Example
+/// ```no_run
+/// use stickslip_study::run::Context;
+/// let outcome = stickslip_paper::paper("out".as_ref(), &Context::unwatched(1), &|line| eprintln!("{line}"))?;
+/// print!("{}", outcome.summary);
+/// # Ok::<(), stickslip_paper::PaperError>(())
+/// ```
+pub fn paper(out: &Path, context: &Context, say: &dyn Fn(&str)) -> Result<Outcome, PaperError> {
     produce(out, context, say, &Extent { points: None, outputs: Outputs::all() })
 }
 
-fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -> Result<Outcome, Failure> {
+fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -> Result<Outcome, PaperError> {
     let mut results = Results::default();
     for (name, _) in FILES {
         if context.stopped() {
             break;
         }
-        let dataset = run(&read(name, extent.points, &[])?, context)?;
+        let study = read(name, extent.points, &[])?;
+        let dataset = run(&study, context)?;
         write_dataset(&dataset, out, &extent.outputs)?;
         let points: u64 = dataset.record.points.values().sum();
         let failed = dataset.failures.len();
         let failed = if failed > 0 { format!(", {failed} failed") } else { String::new() };
         say(&format!("{}: {points} points{failed}, {:.2} s", dataset.title, dataset.record.wall_time_s));
-        results.insert(dataset);
+        results.insert(study, dataset);
     }
     say("Further cases that the claims ask for: other slip limits, contact stiffnesses, frequencies");
-    let further = Further::new(context, extent);
+    let further = Further::new(context, extent.points);
     let parts: Vec<Part> = [
         elements::exact(&results),
         elements::approximate(&results, &further),
@@ -107,63 +113,6 @@ fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -
     let summary = summary(&report, &parts, &results);
     page(parts).write(&report)?;
     Ok(Outcome { summary, failed: results.failed(), report })
-}
-
-/// Cases beyond the figures that the claims ask for; absent if the run was interrupted.
-#[derive(Debug, Default)]
-struct Further {
-    /// Contact stiffness (N/m) and the curves of Fig. 6 with it.
-    stiffness: Vec<(f64, Vec<measure::Curve>)>,
-    /// Peaks over the slip limit, non-symmetric element.
-    couple: Option<Optimum>,
-    /// The same with m1 = m/200.
-    light: Option<Optimum>,
-    /// The same with the symmetric element.
-    symmetric: Option<Optimum>,
-    /// Frequency of the loops (rad/s), and those of Figs. 3 and 4.
-    omega: Vec<(f64, Vec<measure::Loop>, Vec<measure::Loop>)>,
-}
-
-/// Contact stiffnesses for the claim about `kt`.
-const STIFFNESSES: [(f64, &str); 4] = [(5e3, "5000 N/m"), (1e4, "10000 N/m"), (2e4, "20000 N/m"), (4e4, "40000 N/m")];
-/// Frequencies for the inference of the loops' frequency.
-const OMEGAS: [(f64, &str); 4] =
-    [(0.5, "0.5 rad/s"), (1.0, "1 rad/s"), (2.0, "2 rad/s"), (std::f64::consts::TAU, "6.283185307179586 rad/s")];
-
-impl Further {
-    fn new(context: &Context, extent: &Extent) -> Further {
-        // an interrupted or failed extra case only leaves its claim unmeasured
-        let with =
-            |name: &str, key: &str, value: &str| run(&read(name, extent.points, &[(key, value)]).ok()?, context).ok();
-        let stopped = || context.stopped();
-        if stopped() {
-            return Further::default();
-        }
-        let stiffness = STIFFNESSES
-            .iter()
-            .filter_map(|(kt, text)| Some((*kt, measure::curves(&with("fig06", "kt", text)?)?)))
-            .collect();
-        let all = |names: [&str; 2], text: &str| {
-            let mut all = Vec::new();
-            for name in names {
-                all.extend(measure::loops(&with(name, "omega", text)?)?);
-            }
-            Some(all)
-        };
-        let omega = OMEGAS
-            .iter()
-            .filter_map(|(w, text)| Some((*w, all(["fig03a", "fig03b"], text)?, all(["fig04a", "fig04b"], text)?)))
-            .collect();
-        let optimum = |name: &str| Optimum::new(&read(name, extent.points, &[]).ok()?, context);
-        let further = Further {
-            stiffness,
-            omega,
-            couple: optimum("fig06"),
-            light: optimum("fig07"),
-            symmetric: optimum("fig10"),
-        };
-        if stopped() { Further::default() } else { further }
-    }
 }
 
 fn page(parts: Vec<Part>) -> Page {
@@ -218,28 +167,6 @@ fn summary(report: &Path, parts: &[Part], results: &Results) -> String {
     text
 }
 
-/// Numbers in a row, with digits after the point.
-fn list(values: impl IntoIterator<Item = f64>, digits: usize) -> String {
-    values.into_iter().map(|value| format!("{value:.digits$}")).collect::<Vec<_>>().join(", ")
-}
-
-/// A small part as per cent: enough digits for what it is.
-fn percent(part: f64) -> String {
-    let value = 100.0 * part;
-    match value.abs() {
-        v if v >= 10.0 => format!("{value:.0} %"),
-        v if v >= 1.0 => format!("{value:.1} %"),
-        v if v >= 0.01 => format!("{value:.2} %"),
-        0.0 => "0 %".to_owned(),
-        _ => format!("{value:.1e} %"),
-    }
-}
-
-/// The largest of some numbers; NaN if there is none.
-fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
-    values.into_iter().fold(f64::NAN, f64::max)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -268,7 +195,12 @@ mod tests {
         {
             assert!(report.contains(&format!("<h2>{heading}")), "{heading}");
         }
-        assert!(outcome.summary.contains("claims:") && outcome.summary.contains("report.html"), "{}", outcome.summary);
+        // a claim whose numbers cannot be read would be absent
+        assert!(
+            outcome.summary.contains("28 claims:") && outcome.summary.contains("report.html"),
+            "{}",
+            outcome.summary
+        );
     }
 
     #[test]
@@ -290,10 +222,5 @@ mod tests {
         assert_eq!(std::fs::read_to_string(&whole).unwrap(), "whole");
         assert!(outcome.report.ends_with("report.interrupted.html") && outcome.report.is_file());
         assert!(outcome.summary.contains("report.interrupted.html"), "{}", outcome.summary);
-    }
-
-    #[test]
-    fn per_cent_keep_two_digits() {
-        assert_eq!([0.65, 0.0123, 0.00046, 1e-9, 0.0].map(percent), ["65 %", "1.2 %", "0.05 %", "1.0e-7 %", "0 %"]);
     }
 }

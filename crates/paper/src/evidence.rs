@@ -1,10 +1,11 @@
 //! What the paper leaves open, and how far the numbers of the report may be trusted.
 
-use super::elements::words;
-use super::studies::Results;
-use super::{Further, Part, largest, list};
+use crate::further::Further;
+use crate::part::Part;
+use crate::studies::Results;
+use crate::text::{list, words};
 use stickslip_report::{PageTable, Section};
-use stickslip_study::dataset::{Dataset, Values};
+use stickslip_study::results::worst_evidence;
 
 /// What had to be inferred, and what is misprinted.
 pub fn open(further: &Further) -> Part {
@@ -81,12 +82,13 @@ pub fn open(further: &Further) -> Part {
 pub fn record(results: &Results) -> Part {
     let rows = results.all().map(|dataset| {
         let points: u64 = dataset.record.points.values().sum();
+        let evidence = worst_evidence(dataset);
         vec![
             dataset.name.clone(),
             points.to_string(),
             dataset.failures.len().to_string(),
-            worst(dataset, "residual"),
-            worst(dataset, "energy_gap"),
+            shown(evidence.residual),
+            shown(evidence.energy_gap),
             format!("{:.2}", dataset.record.wall_time_s),
         ]
     });
@@ -107,12 +109,7 @@ pub fn record(results: &Results) -> Part {
     Part { section, findings: Vec::new() }
 }
 
-/// The largest value of a column over all tables.
-fn worst(dataset: &Dataset, column: &str) -> String {
-    let columns = dataset.tables.iter().flat_map(|table| &table.columns).filter(|c| c.name == column);
-    let value = largest(columns.flat_map(|c| match &c.values {
-        Values::Number(values) => values.clone(),
-        _ => Vec::new(),
-    }));
-    if value.is_nan() { String::new() } else { format!("{value:.1e}") }
+/// A number of the evidence, if there is one.
+fn shown(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |value| format!("{value:.1e}"))
 }

@@ -1,6 +1,9 @@
-//! Numbers read off datasets: peaks and differences of response curves, corners and areas of loops.
+//! Numbers read off results: peaks and differences of response curves, corners and areas of loops.
 
-use stickslip_study::dataset::{Dataset, Table, Values};
+use stickslip_study::dataset::Dataset;
+use stickslip_study::kinds::{hysteresis, response};
+use stickslip_study::results::Peak;
+use stickslip_study::{Study, VariedValue};
 
 /// The response at one slip limit.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -11,8 +14,8 @@ pub struct Curve {
     pub frequency: Vec<f64>,
     /// Amplitudes (m) by mass, then frequency.
     pub amplitude: Vec<Vec<f64>>,
-    /// Refined peak of every mass: frequency (Hz), amplitude (m).
-    pub peak: Vec<(f64, f64)>,
+    /// Highest refined peak of every mass.
+    pub peak: Vec<Peak>,
 }
 
 /// A loop of force over displacement.
@@ -32,81 +35,50 @@ pub struct Loop {
     pub area: f64,
 }
 
-fn table<'a>(dataset: &'a Dataset, name: &str) -> Option<&'a Table> {
-    dataset.tables.iter().find(|table| table.name == name)
+/// A varied parameter of a case, SI.
+fn value(varied: &[VariedValue], name: &str) -> Option<f64> {
+    varied.iter().find(|varied| varied.name == name).map(|varied| varied.si)
 }
 
-/// Runs of equal keys as ranges of rows.
-fn runs(keys: &[(f64, f64)]) -> Vec<std::ops::Range<usize>> {
-    let mut ranges = Vec::new();
-    let mut from = 0;
-    for run in keys.chunk_by(|a, b| a == b) {
-        ranges.push(from..from + run.len());
-        from += run.len();
-    }
-    ranges
-}
-
-/// The curves of a response study that varies `Ft`.
-pub fn curves(dataset: &Dataset) -> Option<Vec<Curve>> {
-    let (curve, peaks) = (table(dataset, "curve")?, table(dataset, "peaks")?);
-    let places: Vec<&str> = curve.columns.iter().filter_map(|c| c.name.strip_suffix("_amplitude_m")).collect();
-    let limit = curve.numbers("Ft_N")?;
-    let frequency = curve.numbers("frequency_Hz")?;
-    let (peak_limit, peak_frequency, peak_amplitude) =
-        (peaks.numbers("Ft_N")?, peaks.numbers("frequency_Hz")?, peaks.numbers("amplitude_m")?);
-    let Values::Text(masses) = &peaks.columns.iter().find(|column| column.name == "mass")?.values else { return None };
-    let keys: Vec<(f64, f64)> = limit.iter().map(|limit| (*limit, 0.0)).collect();
-    runs(&keys)
-        .into_iter()
-        .map(|rows| {
-            let limit = limit[rows.start];
-            let peak_of = |place: &str| {
-                let rows = (0..peaks.rows()).filter(|&i| peak_limit[i] == limit && masses[i] == place);
-                let row = rows.max_by(|&a, &b| peak_amplitude[a].total_cmp(&peak_amplitude[b]))?;
-                Some((peak_frequency[row], peak_amplitude[row]))
-            };
-            Some(Curve {
-                limit,
-                frequency: frequency[rows.clone()].to_vec(),
-                amplitude: places
-                    .iter()
-                    .map(|place| Some(curve.numbers(&format!("{place}_amplitude_m"))?[rows.clone()].to_vec()))
-                    .collect::<Option<_>>()?,
-                peak: places.iter().map(|place| peak_of(place)).collect::<Option<_>>()?,
-            })
+/// The curves of a response study that varies `Ft`; `None` if it is no such study, or a mass has no peak.
+pub fn curves(study: &Study, dataset: &Dataset) -> Option<Vec<Curve>> {
+    let curves = response::curves(study, dataset).ok()?;
+    let measured = curves.into_iter().map(|curve| {
+        Some(Curve {
+            limit: value(&curve.varied, "Ft")?,
+            frequency: curve.frequency,
+            peak: curve.masses.iter().map(response::MassCurve::highest_peak).collect::<Option<_>>()?,
+            amplitude: curve.masses.into_iter().map(|mass| mass.amplitude).collect(),
         })
-        .collect()
+    });
+    measured.collect()
 }
 
-/// The loops of a hysteresis study that varies `kt` and `a`.
-pub fn loops(dataset: &Dataset) -> Option<Vec<Loop>> {
-    let (points, summary) = (table(dataset, "loops")?, table(dataset, "loops_summary")?);
-    let column = |name: &str| points.numbers(name);
-    let (kt, a, time, u, force) =
-        (column("kt_N_per_m")?, column("a_m")?, column("time_s")?, column("displacement_m")?, column("force_N")?);
-    let keys: Vec<(f64, f64)> = kt.iter().copied().zip(a.iter().copied()).collect();
-    let areas = summary.numbers("dissipation_J")?;
-    let runs = runs(&keys);
-    (runs.len() == areas.len()).then(|| {
-        runs.into_iter()
-            .zip(areas)
-            .map(|(rows, area)| Loop {
-                stiffness: kt[rows.start],
-                amplitude: a[rows.start],
-                time: time[rows.clone()].to_vec(),
-                displacement: u[rows.clone()].to_vec(),
-                force: force[rows].to_vec(),
-                area: *area,
-            })
-            .collect()
-    })
+/// The loops of a hysteresis study that varies `kt` and `a`; `None` if it is no such study.
+pub fn loops(study: &Study, dataset: &Dataset) -> Option<Vec<Loop>> {
+    let loops = hysteresis::loops(study, dataset).ok()?;
+    let measured = loops.into_iter().map(|found| {
+        Some(Loop {
+            stiffness: value(&found.varied, "kt")?,
+            amplitude: value(&found.varied, "a")?,
+            time: found.time,
+            displacement: found.displacement,
+            force: found.force,
+            area: found.dissipation,
+        })
+    });
+    measured.collect()
+}
+
+/// The largest of some numbers; NaN if there is none.
+pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(f64::NAN, f64::max)
 }
 
 impl Curve {
     /// The highest of the peaks, m.
     pub fn highest(&self) -> f64 {
-        self.peak.iter().map(|peak| peak.1).fold(f64::NAN, f64::max)
+        self.peak.iter().map(|peak| peak.amplitude).fold(f64::NAN, f64::max)
     }
 
     /// Largest difference to another curve at the same frequencies, after `factor` has been applied to the other, as a part
@@ -134,7 +106,7 @@ impl Curve {
 
     /// Largest distance of the peaks of all masses, as a part of the highest.
     pub fn peak_spread(&self) -> f64 {
-        let lowest = self.peak.iter().map(|peak| peak.1).fold(f64::NAN, f64::min);
+        let lowest = self.peak.iter().map(|peak| peak.amplitude).fold(f64::NAN, f64::min);
         1.0 - lowest / self.highest()
     }
 }
@@ -301,7 +273,7 @@ mod tests {
             limit: 2.0,
             frequency: vec![1.0, 2.0],
             amplitude: vec![vec![1.0, 4.0], vec![1.0, 2.0]],
-            peak: vec![(2.0, 4.0), (2.0, 2.0)],
+            peak: [4.0, 2.0].map(|amplitude| Peak { frequency: 2.0, amplitude, at_range_end: false }).to_vec(),
         };
         let tenth = Curve { amplitude: vec![vec![0.1, 0.4], vec![0.1, 0.24]], ..a.clone() };
         assert!((a.difference(&tenth, 10.0) - 0.1).abs() < 1e-12);

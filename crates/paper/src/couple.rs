@@ -1,12 +1,14 @@
 //! Figs. 6-8 and 10: the response of the blade couple, and what the paper says of it.
 
-use super::elements::words;
-use super::measure::Curve;
-use super::optimum::{self, Optimum};
-use super::studies::Results;
-use super::verdict::{APPROXIMATE, DIFFERENT, PRINTED, SIMILAR, both, in_all, monotone, small};
-use super::{Further, Part, finding, largest, list, percent};
+use crate::further::Further;
+use crate::measure::{Curve, largest};
+use crate::optimum::{self, Optimum};
+use crate::part::{Finding, Part, finding};
+use crate::studies::Results;
+use crate::text::{list, percent, words};
+use crate::verdict::{APPROXIMATE, DIFFERENT, PRINTED, SIMILAR, both, in_all, monotone, small};
 use std::f64::consts::TAU;
+use stickslip::model::Model;
 use stickslip_report::{PageTable, Section, Verdict};
 use stickslip_study::dataset::{Axis, Figure, Panel, Series, Style};
 
@@ -19,12 +21,12 @@ const BLADE4: usize = 3;
 
 /// Peaks of one mass over the slip limits: amplitudes in cm.
 fn heights(curves: &[Curve], mass: usize) -> Vec<f64> {
-    curves.iter().map(|curve| 100.0 * curve.peak[mass].1).collect()
+    curves.iter().map(|curve| 100.0 * curve.peak[mass].amplitude).collect()
 }
 
 /// And their frequencies, Hz.
 fn frequencies(curves: &[Curve], mass: usize) -> Vec<f64> {
-    curves.iter().map(|curve| curve.peak[mass].0).collect()
+    curves.iter().map(|curve| curve.peak[mass].frequency).collect()
 }
 
 /// By how much the peak of one mass lies above that of another in frequency, Hz.
@@ -51,7 +53,7 @@ fn peaks(caption: &str, curves: &[Curve], masses: &[(&str, usize)]) -> PageTable
     let row = |curve: &Curve| {
         let mut row = vec![format!("{}", curve.limit)];
         for (_, mass) in masses {
-            row.extend([list([100.0 * curve.peak[*mass].1], 4), list([curve.peak[*mass].0], 3)]);
+            row.extend([list([100.0 * curve.peak[*mass].amplitude], 4), list([curve.peak[*mass].frequency], 3)]);
         }
         row
     };
@@ -69,12 +71,9 @@ fn section(results: &Results, name: &str, heading: &str, paragraph: &str) -> Opt
     })
 }
 
-/// The mass of this name in the study's first case, kg.
-fn mass_of(results: &Results, study: &str, name: &str) -> Option<f64> {
-    results.get(study)?.record.study["cases"][0]["model"]["masses"].as_array().and_then(|masses| {
-        let mass = masses.iter().find(|mass| mass["name"] == name)?;
-        mass["mass"].as_f64()
-    })
+/// The mass of this name in a model, kg.
+fn mass_of(model: &Model, name: &str) -> Option<f64> {
+    model.masses.iter().find(|mass| mass.name == name).map(|mass| mass.mass)
 }
 
 /// The claim that a1 falls, with the limit at which it turns.
@@ -105,8 +104,9 @@ pub fn figure6(results: &Results, further: &Further) -> Option<Part> {
     let (a2, a3) = (heights(&curves, CONTACT), heights(&curves, BLADE3));
     let (f1, f3) = (frequencies(&curves, BLADE1), frequencies(&curves, BLADE3));
     let at = limits(&curves);
-    let (blade, small_mass) = (mass_of(results, "fig06", "blade1")?, mass_of(results, "fig06", "contact")?);
-    let stiffness = results.get("fig06")?.record.study["cases"][0]["model"]["springs"][0]["stiffness"].as_f64()?;
+    let model = results.model("fig06")?;
+    let (blade, small_mass) = (mass_of(&model, "blade1")?, mass_of(&model, "contact")?);
+    let stiffness = model.springs.first()?.stiffness;
     let first = (stiffness / blade).sqrt() / TAU;
     let second = (stiffness / (blade + small_mass)).sqrt() / TAU;
     let mut findings = vec![
@@ -171,7 +171,7 @@ pub fn figure6(results: &Results, further: &Further) -> Option<Part> {
     Some(Part { section, findings })
 }
 
-fn close_at_the_highest(curves: &[Curve], name: &'static str, text: &str) -> Option<super::Finding> {
+fn close_at_the_highest(curves: &[Curve], name: &'static str, text: &str) -> Option<Finding> {
     let last = curves.last()?;
     let (spread, frequency) = last.spread();
     let verdict = match (small(last.peak_spread(), APPROXIMATE, DIFFERENT), small(spread, APPROXIMATE, DIFFERENT)) {
@@ -185,7 +185,7 @@ fn close_at_the_highest(curves: &[Curve], name: &'static str, text: &str) -> Opt
         format!(
             "At {} N the peaks are {} cm, within {}; beside the peak the amplitudes differ by up to {} of it, at {frequency:.2} Hz.",
             last.limit,
-            list(last.peak.iter().map(|peak| 100.0 * peak.1), 3),
+            list(last.peak.iter().map(|peak| 100.0 * peak.amplitude), 3),
             percent(last.peak_spread()),
             percent(spread)
         ),
@@ -194,13 +194,13 @@ fn close_at_the_highest(curves: &[Curve], name: &'static str, text: &str) -> Opt
 }
 
 /// What is said of `kt`.
-fn stiffness_claims(curves: &[Curve], further: &[(f64, Vec<Curve>)]) -> Vec<super::Finding> {
+fn stiffness_claims(curves: &[Curve], further: &[(f64, Vec<Curve>)]) -> Vec<Finding> {
     // largest distance of a2 and a3 as a part of their own peak, at each slip limit
     let apart = |curve: &Curve| {
         let pairs = curve.amplitude[CONTACT].iter().zip(&curve.amplitude[BLADE3]);
-        largest(pairs.map(|(a, b)| (a - b).abs())) / curve.peak[BLADE3].1
+        largest(pairs.map(|(a, b)| (a - b).abs())) / curve.peak[BLADE3].amplitude
     };
-    let ratio = |curve: &Curve| curve.peak[CONTACT].1 / curve.peak[BLADE3].1 - 1.0;
+    let ratio = |curve: &Curve| curve.peak[CONTACT].amplitude / curve.peak[BLADE3].amplitude - 1.0;
     let mut findings = Vec::new();
     if further.len() > 1 {
         let worst: Vec<f64> = further.iter().map(|(_, curves)| largest(curves.iter().map(ratio))).collect();
@@ -314,9 +314,9 @@ pub fn figure7(results: &Results, further: &Further) -> Option<Part> {
 /// The conclusion about all parameters.
 pub fn dependence(results: &Results, further: &Further) -> Option<Part> {
     let (heavy, light) = (results.curves("fig06")?, results.curves("fig07")?);
-    let case = &results.get("fig06")?.record.study["cases"][0]["model"];
+    let model = results.model("fig06")?;
     // half-power width of a blade's resonance, Hz
-    let width = case["springs"][0]["damping"].as_f64()? / (TAU * mass_of(results, "fig06", "blade1")?);
+    let width = model.springs.first()?.damping / (TAU * mass_of(&model, "blade1")?);
     let double = further.stiffness.iter().find(|(kt, _)| *kt == 2e4).map(|(_, curves)| curves)?;
     let changes = [("Ft doubled", heavy.get(1)?), ("kt doubled", double.first()?), ("m1 halved", light.first()?)];
     let base = heavy.first()?;
@@ -326,8 +326,10 @@ pub fn dependence(results: &Results, further: &Further) -> Option<Part> {
         let mut row = vec![what.to_owned()];
         let mut most = (0.0f64, 0.0f64);
         for (_, mass) in MASSES {
-            let (height, shift) =
-                (curve.peak[mass].1 / base.peak[mass].1 - 1.0, curve.peak[mass].0 - base.peak[mass].0);
+            let (height, shift) = (
+                curve.peak[mass].amplitude / base.peak[mass].amplitude - 1.0,
+                curve.peak[mass].frequency - base.peak[mass].frequency,
+            );
             most = (most.0.max(height.abs()), most.1.max(shift.abs()));
             row.extend([format!("{:+.1}", 100.0 * height), format!("{shift:+.3}")]);
         }
@@ -409,14 +411,14 @@ pub fn figure10(results: &Results) -> Option<Part> {
     let at = limits(&symmetric);
     let (here, before) = (shifts(&symmetric, BLADE1, BLADE4), shifts(&couple, BLADE1, BLADE3));
     let removed: Vec<bool> = here.iter().map(|shift| shift.abs() <= SAME_FREQUENCY).collect();
-    let first = |curves: &[Curve], mass: usize| curves.first().map_or(f64::NAN, |curve| 100.0 * curve.peak[mass].1);
+    let first =
+        |curves: &[Curve], mass: usize| curves.first().map_or(f64::NAN, |curve| 100.0 * curve.peak[mass].amplitude);
     let excited = first(&symmetric, BLADE1) / first(&couple, BLADE1) - 1.0;
     let other = first(&symmetric, BLADE4) / first(&couple, BLADE3) - 1.0;
-    let case = &results.get("fig10")?.record.study["cases"][0]["model"];
-    let number = |list: &str, key: &str| case[list][0][key].as_f64();
-    let mass = number("masses", "mass")? + mass_of(results, "fig10", "contact2")?;
-    let floor = 100.0 * number("forces", "amplitude")?
-        / (2.0 * number("springs", "damping")? * (number("springs", "stiffness")? / mass).sqrt());
+    let model = results.model("fig10")?;
+    let (ground, force) = (model.springs.first()?, model.forces.first()?);
+    let mass = mass_of(&model, "blade1")? + mass_of(&model, "contact2")?;
+    let floor = 100.0 * force.amplitude / (2.0 * ground.damping * (ground.stiffness / mass).sqrt());
     let excess: Vec<f64> =
         heights(&symmetric, BLADE1).iter().zip(heights(&couple, BLADE1)).map(|(s, c)| s / c - 1.0).collect();
     let findings = vec![
@@ -532,8 +534,8 @@ pub fn laws(results: &Results) -> Option<Part> {
         let (Some(exact), Some(arctan)) = (results.curves(exact), results.curves(arctan)) else { continue };
         for (a, b) in exact.iter().zip(&arctan) {
             let pairs = || a.peak.iter().zip(&b.peak);
-            let height = largest(pairs().map(|(a, b)| (b.1 / a.1 - 1.0).abs()));
-            let place = largest(pairs().map(|(a, b)| (b.0 - a.0).abs()));
+            let height = largest(pairs().map(|(a, b)| (b.amplitude / a.amplitude - 1.0).abs()));
+            let place = largest(pairs().map(|(a, b)| (b.frequency - a.frequency).abs()));
             worst.push((a.difference(b, 1.0), height));
             rows.push(vec![
                 figure.to_owned(),
