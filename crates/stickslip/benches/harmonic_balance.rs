@@ -4,9 +4,10 @@
 
 use divan::Bencher;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 use std::time::Instant;
 use stickslip::curve::performance::Performance;
-use stickslip::law::{Jenkins, Law};
+use stickslip::law::Jenkins;
 use stickslip::method::{Method, Solver, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, templates};
 

@@ -2,7 +2,8 @@
 
 use divan::Bencher;
 use std::f64::consts::TAU;
-use stickslip::law::{CoulombArctan, Law};
+use std::sync::Arc;
+use stickslip::law::CoulombArctan;
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::{System, templates};
 

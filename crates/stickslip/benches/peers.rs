@@ -9,8 +9,9 @@ mod python;
 
 use python::{Peer, number};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 use std::time::Instant;
-use stickslip::law::{CoulombArctan, Law};
+use stickslip::law::CoulombArctan;
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::{System, templates};
 

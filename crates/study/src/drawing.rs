@@ -35,9 +35,15 @@ impl Stretch {
     }
 }
 
+/// Whether `name` is an axis or a direction of what `whole` names: `root.x` of `root`.
+fn is_of(whole: &str, name: &str) -> bool {
+    name.strip_prefix(whole).is_some_and(|rest| rest.starts_with('.'))
+}
+
 /// What is wrong in `[figure]`.
 pub(crate) fn check(figure: &Values, kind: &Kind, model: &Model) -> Result<(), Complaint> {
-    let masses = model.masses.iter().map(|mass| mass.name.as_str());
+    let places: Vec<String> = model.masses.iter().flat_map(|mass| mass.places()).collect();
+    let masses = places.iter().map(String::as_str);
     let known: Vec<&str> = masses.chain(model.joints.iter().map(|joint| joint.name.as_str())).collect();
     if let Some(name) = figure.names("only").unwrap_or_default().iter().find(|name| !known.contains(&name.as_str())) {
         return Err(Complaint::unknown("only", "mass or joint", name, &known));
@@ -81,7 +87,7 @@ impl<'a> Drawing<'a> {
 
     /// Whether the figure shows a mass or joint of this name.
     pub(crate) fn shows(&self, name: &str) -> bool {
-        self.options().names("only").is_none_or(|names| names.iter().any(|shown| shown == name))
+        self.options().names("only").is_none_or(|names| names.iter().any(|shown| shown == name || is_of(shown, name)))
     }
 
     /// How curves of so many masses and cases are laid out.

@@ -83,8 +83,8 @@ impl Summary {
             rows.number(&format!("{place}_phase_deg"), *phase);
         }
         for (joint, [dissipation, slip]) in system.joints().iter().zip(&self.joints) {
-            rows.number(&format!("{}_dissipation_J", joint.name), *dissipation);
-            rows.number(&format!("{}_slip_fraction", joint.name), *slip);
+            rows.number(&format!("{}_dissipation_J", joint.name()), *dissipation);
+            rows.number(&format!("{}_slip_fraction", joint.name()), *slip);
         }
         extra::columns(&prepared.case, &prepared.system)
             .iter()

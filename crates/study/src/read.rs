@@ -17,9 +17,10 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
+use stickslip::law::{self, LawInfo};
+use stickslip::method;
 use stickslip::model::is_identifier;
 use stickslip::model::templates::{self, Template};
-use stickslip::{law, method};
 
 /// Most errors that are reported at once.
 const MOST_ERRORS: usize = 20;
@@ -535,12 +536,12 @@ impl Reader {
     }
 
     fn law(&mut self, table: &Table) -> Option<Stated> {
-        let row = self.kind(table, ("the law", "coulomb"), law::TABLE, |row| row.name)?;
+        let row: &'static LawInfo = *self.kind(table, ("the law", "coulomb"), law::TABLE, |row| row.name)?;
         let mut keys = vec![schema::required("kind", Takes::Text, "law", "\"coulomb\"")];
         keys.extend(row.parameters.iter().map(|p| Key {
             name: p.key,
-            takes: Takes::Quantity(p.dimension, if p.may_be_zero { Within::AtLeastZero } else { Within::Positive }),
-            presence: Presence::Required,
+            takes: Takes::Quantity(p.dimension, schema::within(p.range)),
+            presence: if p.default.is_some() { Presence::Optional } else { Presence::Required },
             doc: p.doc,
             example: example_of(p.dimension),
         }));

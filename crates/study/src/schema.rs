@@ -101,6 +101,15 @@ pub enum Within {
     Positive,
 }
 
+/// The range of a law's parameter as far as a reader can tell without the law, which checks the rest itself.
+pub(crate) fn within(range: law::Range) -> Within {
+    match range {
+        law::Range::Positive | law::Range::Count => Within::Positive,
+        law::Range::ZeroOrMore => Within::AtLeastZero,
+        law::Range::Any | law::Range::Within(..) => Within::Finite,
+    }
+}
+
 impl Within {
     /// Whether the number is in the range.
     pub fn holds(self, value: f64) -> bool {
@@ -223,6 +232,12 @@ const REPEAT: Key = optional(
 const MASS: &[Key] = &[
     required("name", Takes::Name, "name of the place, for springs, joints and forces", "\"blade1\""),
     required("mass", Takes::Quantity(Dimension::MASS, Within::AtLeastZero), "mass", "\"182 g\""),
+    optional(
+        "directions",
+        Takes::Names,
+        "directions in which it moves, if more than one: each is a place `name.direction`; a normal is the last",
+        "[\"x\", \"z\"]",
+    ),
     REPEAT,
 ];
 
@@ -250,7 +265,12 @@ const SPRING: &[Key] = &[
 
 const JOINT: &[Key] = &[
     required("name", Takes::Name, "name, for results", "\"shroud\""),
-    required("between", Takes::Pair, "the two places that rub", "[\"blade1\", \"contact\"]"),
+    required(
+        "between",
+        Takes::Pair,
+        "the two places, or nodes with the law's directions, that rub or touch",
+        "[\"blade1\", \"contact\"]",
+    ),
     required("law", Takes::Law, "friction law", "{ kind = \"coulomb\", limit = \"2 N\" }"),
     REPEAT,
 ];
@@ -425,7 +445,7 @@ fn takes_schema(takes: &Takes) -> Value {
             ] },
         }),
         Takes::Law => {
-            let one = |row: &law::LawInfo| {
+            let one = |row: &&law::LawInfo| {
                 let parameters = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc));
                 kind_object(row.name, row.summary, parameters, true)
             };

@@ -583,10 +583,11 @@ impl Study {
             .iter()
             .filter_map(|p| Some((p.key, environment.values[self.names.iter().position(|name| name == p.key)?].si)))
             .collect();
-        let law = table.values(environment, problems).law("law");
+        let values = table.values(environment, problems);
+        let law = values.law("law");
         let mut model = row.model_with(&changes).unwrap_or_default();
         for joint in &mut model.joints {
-            joint.law = law.unwrap_or(joint.law);
+            joint.law = law.unwrap_or(&joint.law).clone();
         }
         model
     }
@@ -638,9 +639,12 @@ impl Study {
         };
         let places = model.place_names();
         let help = match &error.wrong_name {
-            Some(wrong) => Some(match nearest(wrong, places.iter().copied()) {
+            Some(wrong) => Some(match nearest(wrong, places.iter().map(String::as_str)) {
                 Some(near) => format!("did you mean `{near}`?"),
-                None => format!("the places are {}", one_of(places.into_iter().take(20)).replace(" or ", ", ")),
+                None => format!(
+                    "the places are {}",
+                    one_of(places.iter().take(20).map(String::as_str)).replace(" or ", ", ")
+                ),
             }),
             None if error.element == Element::Whole => Some("add a [[mass]] or a [[motion]]".to_owned()),
             None if error.key == "name" => Some("choose another name".to_owned()),
@@ -706,7 +710,11 @@ fn model_of(lists: &Lists, environment: &Environment<'_>, problems: &mut Vec<Pro
     let harmonic = |values: &Values| values.count("harmonic").and_then(|h| u32::try_from(h).ok()).unwrap_or(1);
     for table in &lists.mass {
         let values = table.values(environment, problems);
-        model.masses.push(Mass::new(text(&values, "name"), number(&values, "mass")));
+        model.masses.push(Mass {
+            name: text(&values, "name"),
+            mass: number(&values, "mass"),
+            directions: values.names("directions").unwrap_or_default().to_vec(),
+        });
     }
     for table in &lists.spring {
         let values = table.values(environment, problems);
@@ -717,7 +725,7 @@ fn model_of(lists: &Lists, environment: &Environment<'_>, problems: &mut Vec<Pro
         let values = table.values(environment, problems);
         // without a law there is a problem, and the model is not used
         if let Some(law) = values.law("law") {
-            model.joints.push(Joint { name: text(&values, "name"), between: between(&values), law });
+            model.joints.push(Joint { name: text(&values, "name"), between: between(&values), law: law.clone() });
         }
     }
     for table in &lists.force {

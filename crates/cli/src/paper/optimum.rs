@@ -1,7 +1,8 @@
 //! The highest resonance peak over the slip limit: the curve on which the paper's four values lie, and its lowest point.
 
+use std::sync::Arc;
 use stickslip::curve::performance::Performance;
-use stickslip::law::{Coulomb, Law};
+use stickslip::law::Coulomb;
 use stickslip::method::find;
 use stickslip_study::Study;
 use stickslip_study::dataset::{Axis, Figure, Panel, Series, Style};

@@ -25,21 +25,20 @@ impl Drive {
         let n = system.dofs();
         let excitation = system.excitation(omega);
         let mut harmonics: Vec<u32> = excitation.iter().map(|(h, _)| *h).collect();
-        harmonics.extend(system.joints().iter().flat_map(|joint| joint.axes().iter().flat_map(|axis| axis.imposed()).map(|(h, _)| *h)));
+        harmonics.extend(
+            system
+                .joints()
+                .iter()
+                .flat_map(|joint| joint.axes().iter().flat_map(|axis| axis.imposed()).map(|(h, _)| *h)),
+        );
         harmonics.extend(system.moved().iter().flat_map(|place| place.motion.iter().map(|(h, _)| *h)));
         harmonics.sort_unstable();
         harmonics.dedup();
         harmonics.retain(|&h| h > 0);
         let force_at = |h: u32| excitation.iter().find(|(k, _)| *k == h).map(|(_, f)| f.clone());
         let zero = || DVector::from_element(n, Complex64::new(0.0, 0.0));
-        let imposed_at = |h: u32| {
-            contacts
-                .iter()
-                .map(|&joint| {
-                    system.joints()[joint].axes()[0].imposed_at(h)
-                })
-                .collect()
-        };
+        let imposed_at =
+            |h: u32| contacts.iter().map(|&joint| system.joints()[joint].axes()[0].imposed_at(h)).collect();
         Drive {
             omega,
             rates: harmonics.iter().map(|&h| f64::from(h) * omega).collect(),

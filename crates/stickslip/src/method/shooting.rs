@@ -67,6 +67,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// # Example
 /// ```
 /// use stickslip::law::{CoulombArctan, Law};
+/// use std::sync::Arc;
 /// use stickslip::method::{Method, shooting::Shooting};
 /// let mut model = stickslip::model::templates::find("blade-couple").unwrap().model();
 /// model.joints[0].law = Arc::new(CoulombArctan { limit: 2.0, alpha: 25e3 });

@@ -88,6 +88,7 @@ impl Transient {
     /// A sliding oscillator loses `4 F/k` of amplitude per cycle.
     /// ```
     /// use stickslip::law::{Coulomb, Law};
+    /// use std::sync::Arc;
     /// use stickslip::method::transient::{Excitation, Transient};
     /// use stickslip::model::{GROUND, Joint, Mass, Model, Spring};
     /// let model = Model {

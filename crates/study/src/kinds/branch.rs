@@ -237,9 +237,10 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let y = if one { y } else { Axis { quantity: format!("amplitude of {}", names.join(", ")), ..y } };
     // of several branches the masses whose peaks count are shown, the largest amplitude of them
     let shown: Vec<Vec<usize>> = match one {
-        true => {
-            (0..system.dofs()).filter(|place| drawing.shows(system.places()[*place])).map(|place| vec![place]).collect()
-        }
+        true => (0..system.dofs())
+            .filter(|place| drawing.shows(&system.places()[*place]))
+            .map(|place| vec![place])
+            .collect(),
         false => vec![places],
     };
     let unstable = unstable(table);

@@ -68,16 +68,18 @@ fn cost(costing: &Costing<'_>) -> Cost {
 }
 
 fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
-    let mut known: Vec<&str> = model.joints.iter().map(|joint| joint.name.as_str()).collect();
+    let labels: Vec<String> = model.joints.iter().flat_map(|joint| model.joint_labels(joint)).collect();
+    let mut known: Vec<&str> = labels.iter().map(String::as_str).collect();
     known.extend(model.motions.iter().map(|motion| motion.on.as_str()));
     for name in values.names("loop").unwrap_or_default() {
         if !known.contains(&name.as_str()) {
             return Err(Complaint::unknown("loop", "joint or moved place", name, &known));
         }
     }
-    let masses: Vec<&str> = model.masses.iter().map(|mass| mass.name.as_str()).collect();
-    if let Some(name) = values.text("against").filter(|name| !masses.contains(name)) {
-        return Err(Complaint::unknown("against", "mass", name, &masses));
+    let places: Vec<String> = model.masses.iter().flat_map(|mass| mass.places()).collect();
+    let places: Vec<&str> = places.iter().map(String::as_str).collect();
+    if let Some(name) = values.text("against").filter(|name| !places.contains(name)) {
+        return Err(Complaint::unknown("against", "mass", name, &places));
     }
     if values.flag("sum") == Some(true) && values.text("against").is_none() {
         let summed = |name: &str| values.names("loop").is_none_or(|names| names.iter().any(|n| n == name));
@@ -106,8 +108,8 @@ struct Source {
 
 #[derive(Debug, Clone, PartialEq)]
 enum Of {
-    /// The sum over these joints.
-    Joints(Vec<usize>),
+    /// The sum over these joints, each with one of its axes.
+    Joints(Vec<(usize, usize)>),
     Moved(usize),
 }
 
@@ -116,8 +118,9 @@ impl Source {
     fn read(&self, sample: &Sample) -> (f64, f64) {
         let (displacement, force) = match &self.force {
             Of::Joints(joints) => {
-                let force = joints.iter().map(|j| sample.joints[*j].force[0]).sum();
-                (sample.joints[joints[0]].displacement, force)
+                let force = joints.iter().map(|(j, axis)| sample.joints[*j].force[*axis]).sum();
+                let (first, axis) = joints[0];
+                (sample.joints[first].displacement[axis], force)
             }
             Of::Moved(m) => sample.moved[*m],
         };
@@ -171,15 +174,21 @@ fn compute(work: &Work<'_>) -> Computed {
 fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
     let (system, values) = (&prepared.system, &prepared.case.values);
     let against = values.text("against").and_then(|name| system.places().iter().position(|place| place == name));
-    let all = || system.joints().iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
+    let axes: Vec<(String, (usize, usize))> = system
+        .joints()
+        .iter()
+        .enumerate()
+        .flat_map(|(j, joint)| joint.labels().enumerate().map(move |(axis, label)| (label, (j, axis))))
+        .collect();
+    let all = || axes.iter().map(|(label, _)| label.clone()).collect::<Vec<_>>();
     let mut names = values.names("loop").map_or_else(all, <[String]>::to_vec);
     if names.is_empty() {
         names = system.moved().iter().map(|place| place.name.clone()).collect();
     }
-    let joint = |name: &String| system.joints().iter().position(|joint| joint.name == *name);
+    let joint = |name: &String| axes.iter().find(|(label, _)| label == name).map(|(_, at)| *at);
     if values.flag("sum") == Some(true) {
-        let joints: Vec<usize> = names.iter().filter_map(joint).collect();
-        let name = joints.iter().map(|j| system.joints()[*j].name.as_str()).collect::<Vec<_>>().join(" + ");
+        let joints: Vec<(usize, usize)> = names.iter().filter_map(joint).collect();
+        let name = names.iter().filter(|name| joint(name).is_some()).cloned().collect::<Vec<_>>().join(" + ");
         let sum = (name, Source { force: Of::Joints(joints.clone()), against });
         return if joints.is_empty() { Vec::new() } else { vec![sum] };
     }
@@ -194,7 +203,9 @@ fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
 fn exact_loss(prepared: &Prepared, orbit: &Orbit, source: &Source) -> Option<f64> {
     match &source.force {
         _ if source.against.is_some() => None,
-        Of::Joints(joints) => Some(joints.iter().map(|j| orbit.joints[*j].dissipation).sum()),
+        // what a joint loses along one of several directions is not told apart
+        Of::Joints(joints) if joints.iter().any(|(j, _)| prepared.system.joints()[*j].axes().len() > 1) => None,
+        Of::Joints(joints) => Some(joints.iter().map(|(j, _)| orbit.joints[*j].dissipation).sum()),
         Of::Moved(_) if prepared.system.moved().len() == 1 && prepared.case.model.forces.is_empty() => {
             Some(orbit.energy.work_in)
         }

@@ -125,10 +125,12 @@ pub(super) fn write_sample(prepared: &Prepared, sample: &Sample, rows: &mut Rows
         rows.number(&format!("{place}_velocity_m_per_s"), sample.velocity[i]);
     }
     for (joint, state) in prepared.system.joints().iter().zip(&sample.joints) {
-        rows.number(&format!("{}_displacement_m", joint.name), state.displacement);
-        rows.number(&format!("{}_velocity_m_per_s", joint.name), state.velocity);
-        rows.number(&format!("{}_force_N", joint.name), state.force);
-        rows.text(&format!("{}_contact", joint.name), word(state.contact));
+        for (a, label) in joint.labels().enumerate() {
+            rows.number(&format!("{label}_displacement_m"), state.displacement[a]);
+            rows.number(&format!("{label}_velocity_m_per_s"), state.velocity[a]);
+            rows.number(&format!("{label}_force_N"), state.force[a]);
+        }
+        rows.text(&format!("{}_contact", joint.name()), word(state.contact));
     }
 }
 
@@ -137,6 +139,8 @@ fn word(contact: Contact) -> &'static str {
         Contact::Stick => "stick",
         Contact::SlipForward => "slip+",
         Contact::SlipBackward => "slip-",
+        Contact::Slip => "slip",
+        Contact::Open => "open",
     }
 }
 
@@ -175,7 +179,8 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 panels.push(panel("displacement", "m", names, "displacement_m", 0));
             }
             if !system.joints().is_empty() {
-                let names = system.joints().iter().map(|j| j.name.as_str()).filter(|name| drawing.shows(name)).collect();
+                let labels: Vec<String> = system.joints().iter().flat_map(|joint| joint.labels()).collect();
+                let names = labels.iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
                 panels.push(panel("joint force", "N", names, "force_N", system.dofs()));
             }
         }

@@ -17,7 +17,7 @@ use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::peak::{self, Peak, Point};
 use stickslip::dimension::Dimension;
-use stickslip::law::Law;
+use stickslip::law::{Law, SharedLaw};
 use stickslip::method::{MethodError, OrbitError};
 use stickslip::orbit::Orbit;
 
@@ -115,8 +115,9 @@ fn compute(work: &Work<'_>) -> Computed {
         let mut peaks = Rows::default();
         for found in peaks_of(work, points).map_err(|error| (case.index, error))? {
             if found.peak.unsettled {
-                let at =
-                    || format!("peak of {}, {}", prepared.system.places()[found.mass], place_of(case, found.peak.omega));
+                let at = || {
+                    format!("peak of {}, {}", prepared.system.places()[found.mass], place_of(case, found.peak.omega))
+                };
                 let reason = "orbits beside this peak were not found, and the real one may be higher: much higher with little or \
                               no damping, or where friction cannot bound the motion; look closer with a finer range or another method";
                 part.count(at, "peak-unsettled", Some(reason.to_owned()));
@@ -319,9 +320,12 @@ fn references(work: &Work<'_>, omegas: &[f64]) -> Result<Rows, MethodError> {
         (0..REFERENCE_POINTS).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / REFERENCE_POINTS as f64)
     });
     let omegas: Vec<f64> = between.chain(omegas.last().copied()).collect();
-    let with = |change: &dyn Fn(Law) -> Law| {
+    // laws without a slip limit have neither reference
+    let with = |change: &dyn Fn(&dyn Law) -> Option<SharedLaw>| {
         let mut model = prepared.case.model.clone();
-        model.joints.iter_mut().for_each(|joint| joint.law = change(joint.law));
+        for joint in &mut model.joints {
+            joint.law = change(&*joint.law)?;
+        }
         model.assemble().ok()
     };
     let mut systems = [with(&|law| law.free()), with(&|law| law.stuck())].map(|system| (system, Vec::new()));
@@ -441,7 +445,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let shown: Vec<(String, usize)> = places.filter(|(name, _)| drawing.shows(name)).collect();
     let force = |joint: &str| format!("{joint}_force_amplitude_N");
     // with `output = "joint_force"` only
-    let names = system.joints().iter().map(|joint| joint.name.as_str());
+    let names = system.joints().iter().map(|joint| joint.name());
     let joints: Vec<&str> = names.filter(|name| drawing.shows(name) && curve.numbers(&force(name)).is_some()).collect();
     if shown.is_empty() && joints.is_empty() {
         return Figure::default();

@@ -327,7 +327,13 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 title,
                 x: x_axis,
                 y: y_axis,
-                series: system.places().iter().enumerate().filter(|(_, place)| drawing.shows(place)).map(line).collect(),
+                series: system
+                    .places()
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, place)| drawing.shows(place))
+                    .map(line)
+                    .collect(),
             });
             from = to;
         }

@@ -8,7 +8,7 @@ use crate::study::{Case, Study};
 use crate::work::Units;
 use std::f64::consts::TAU;
 use stickslip::curve::sweep::BLOCK;
-use stickslip::law::{Law, RateLaw};
+use stickslip::law::SharedLaw;
 
 /// Memory that a run may take unless it is told otherwise, bytes. What the machine has free may be less.
 pub const MEMORY_LIMIT: u64 = 2_000_000_000;
@@ -99,8 +99,8 @@ impl<'a> Costing<'a> {
         let (case, system) = (&surveyed.case, surveyed.survey.system());
         // a width makes exact laws smooth
         let width = case.method.options.get("width");
-        let followed = |law: Law| width.and_then(|width| law.regularised(*width)).unwrap_or(law);
-        let laws: Vec<Law> = system.joints().iter().map(|joint| followed(joint.law)).collect();
+        let followed = |law: &SharedLaw| width.and_then(|width| law.regularised(*width)).unwrap_or_else(|| law.clone());
+        let laws: Vec<SharedLaw> = system.joints().iter().map(|joint| followed(joint.law())).collect();
         let given = case.frequencies.as_ref().map_or(1, |f| f.len()) as f64;
         Costing {
             study,
@@ -111,7 +111,7 @@ impl<'a> Costing<'a> {
             masses: system.dofs() as f64,
             joints: system.joints().len() as f64,
             surveyed,
-            smooth: laws.iter().any(|law| law.network().is_none()),
+            smooth: laws.iter().any(|law| law.pieces().is_none()),
             has_states: laws.iter().any(|law| law.rate().is_some_and(|rate| rate.states() > 0)),
         }
     }
@@ -335,8 +335,9 @@ impl Costing<'_> {
     /// Time of one series of harmonics, s; of as many as it needs if `None`.
     pub fn series(&self, harmonics: Option<f64>) -> f64 {
         let system = self.surveyed.survey.system();
-        let rigid = |law: &Law| law.network().is_some_and(|all| all.iter().any(|branch| branch.stiffness.is_none()));
-        let any_rigid = system.joints().iter().any(|joint| rigid(&joint.law));
+        let rigid =
+            |law: &SharedLaw| law.sliders().is_some_and(|all| all.iter().any(|branch| branch.stiffness.is_none()));
+        let any_rigid = system.joints().iter().any(|joint| rigid(joint.law()));
         let factor = match (self.smooth, any_rigid, harmonics) {
             (false, false, _) => 1.0,
             (_, _, None) => HARD,

@@ -129,13 +129,13 @@ fn used_parameters(study: &Study, first: &Surveyed) -> BTreeSet<usize> {
             from(table);
             // a parameter of a template is used if the model changes with it; a law that is replaced takes its
             // parameters away
-            let replaced = table.entry("law").and(first.case.model.joints.first()).map(|joint| joint.law);
+            let replaced = table.entry("law").and(first.case.model.joints.first()).map(|joint| joint.law.clone());
             let values: Vec<(&str, f64)> =
                 row.parameters.iter().filter_map(|p| Some((p.key, first.case.parameters.get(p.key)?.0))).collect();
             let model = |values: &[(&str, f64)]| {
                 let mut model = row.model_with(values).unwrap_or_default();
                 for joint in &mut model.joints {
-                    joint.law = replaced.unwrap_or(joint.law);
+                    joint.law = replaced.clone().unwrap_or_else(|| joint.law.clone());
                 }
                 model
             };

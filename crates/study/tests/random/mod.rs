@@ -122,7 +122,8 @@ fn template(chance: &mut Chance, text: &mut String) -> (Names, Scales) {
 
 /// A law with parameters of these scales; half of the limits are the parameter `limit`.
 fn law_text(chance: &mut Chance, scales: &Scales, smooth: bool) -> String {
-    let rows: Vec<&law::LawInfo> = law::TABLE.iter().filter(|row| row.name.ends_with("arctan") == smooth).collect();
+    let rows: Vec<&law::LawInfo> =
+        law::TABLE.iter().copied().filter(|row| row.name.ends_with("arctan") == smooth).collect();
     let row = chance.of(&rows);
     let mut text = format!("{{ kind = \"{}\"", row.name);
     for parameter in row.parameters {

@@ -2,9 +2,9 @@
 
 use super::decide::{AT_LIMIT, Decision, REST};
 use super::mechanics::Mechanics;
-use crate::law::Contact;
 use super::memory::Memory;
 use super::pattern::{Beginning, Driven, Pattern, Work};
+use crate::law::Contact;
 use crate::method::Breakdown;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};

@@ -5,8 +5,8 @@
 //! but time depends on what was kept.
 
 use super::mechanics::Mechanics;
-use crate::law::Contact;
 use super::pattern::{Driven, Pattern};
+use crate::law::Contact;
 use crate::method::drive::Drive;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -95,8 +95,9 @@ impl Memory {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Jenkins, Law};
+    use crate::law::Jenkins;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
+    use std::sync::Arc;
 
     /// A chain of masses, each with its slider.
     fn chain(n: usize) -> (Mechanics, Drive) {

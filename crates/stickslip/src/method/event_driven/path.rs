@@ -352,7 +352,8 @@ impl ExactPath {
             .iter()
             .map(|joint| {
                 let limit: f64 = joint.law().sliders().unwrap_or_default().iter().map(|b| b.limit).sum();
-                limit * joint.axes()[0].imposed().iter().map(|(h, g)| f64::from(*h) * g.norm()).sum::<f64>() / self.period
+                limit * joint.axes()[0].imposed().iter().map(|(h, g)| f64::from(*h) * g.norm()).sum::<f64>()
+                    / self.period
             })
             .sum();
         self.period * (loads + joints)
