@@ -106,7 +106,7 @@ fn wrong_input_names_its_place_and_writes_nothing() {
             &["study.toml:LINE:", "blade4", "did you mean"],
         ),
         ("name = \"contact\"", "name = \"blade1\"", &["study.toml:LINE:", "twice"]),
-        ("m1 = \"m / 100\"", "m1 = \"kt / 100 * m1 / m1\"", &["study.toml:", "m1 -> m1"]),
+        ("m1 = \"m / 100\"", "m1 = \"kt / 100 * m1 / m1\"", &["study.toml:LINE:", "in a circle"]),
         ("mass = \"m1\"", "mass = \"m1 +\"", &["study.toml:LINE:"]),
         ("from = \"119.5 Hz\"", "from = \"123.5 Hz\"", &["study.toml:", "from"]),
         ("points = 241", "points = 10000000", &["study.toml:", "1000000"]),

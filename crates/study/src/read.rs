@@ -655,7 +655,8 @@ impl Reader {
 
     // ------------------------------------------------------------------------------------------ the model
 
-    /// Reads a template's file, first of all that has parameters: its texts know its own alone, whatever names a study adds.
+    /// Reads a template's file, first of all that has parameters: its texts know its own alone, whatever names a
+    /// study adds.
     fn template(&mut self, row: &Template) -> Option<TemplateFile> {
         let source = self.text(format!("template {}", row.name), row.study.to_owned()).source;
         let root = match document::parse(row.study, source) {

@@ -105,7 +105,8 @@ pub(crate) struct NamedTemplate {
 }
 
 impl NamedTemplate {
-    /// Rewords a problem in the template's file for a user who has not written it: at the place where the template is named.
+    /// Rewords a problem in the template's file for a user who has not written it: at the place where the template is
+    /// named.
     fn reword(&self, element: Element, problem: &mut Problem) {
         if problem.place.source == self.source {
             problem.message = self.blame(element, &problem.key, &problem.message);
@@ -673,7 +674,8 @@ struct Parts {
     method: Values,
 }
 
-/// The values of all parameters, with the choices made for the varied ones; those that are `fixed` have that value, SI, whatever is stated.
+/// The values of all parameters, with the choices made for the varied ones; those that are `fixed` have that value,
+/// SI, whatever is stated.
 pub(crate) fn evaluate(
     names: &[String],
     parameters: &[Parameter],

@@ -1,8 +1,8 @@
-//! Models that come ready: the paper's. Each is one file, `templates/NAME.toml`, a whole study to start from; another study takes its model
-//! with `model = { template = "NAME" }` and gives those parameters that it wants otherwise.
+//! Models that come ready: the paper's. Each is one file, `templates/NAME.toml`, a whole study to start from; another
+//! study takes its model with `model = { template = "NAME" }` and gives those parameters that it wants otherwise.
 //!
-//! What is known of a template stands in its file: its first line, a comment, is the summary, `[parameters]` are its parameters, and the comment
-//! behind each is what the book and the lists say of it.
+//! What is known of a template stands in its file: its first line, a comment, is the summary, `[parameters]` are its
+//! parameters, and the comment behind each is what the book and the lists say of it.
 //!
 //! To add one: write its file, then its name in [`TABLE`].
 
@@ -93,8 +93,8 @@ impl Template {
         self.model_with(&[]).unwrap_or_else(|error| panic!("template {}: {error}", self.name))
     }
 
-    /// The model with some parameters changed (SI). A parameter whose default is an expression over changed ones follows them, unless it is
-    /// given too.
+    /// The model with some parameters changed (SI). A parameter whose default is an expression over changed ones
+    /// follows them, unless it is given too.
     ///
     /// # Errors
     /// [`StudyError`]: a name that is no parameter of this template, or values that the model cannot have.

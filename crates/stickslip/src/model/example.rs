@@ -1,7 +1,7 @@
 //! Two models to try things on, built by calls: blade couples of Pust, Pesek, Radolfova (2015), Sec. 4.
 //!
-//! Values in SI: blades of 0.182 kg on springs of 105103 N/m with dampers of 0.2 kg/s, a contact stiffness of 1e4 N/m, a slip limit of
-//! 2 N, a force of 10 N on blade 1. Alone, a blade has its resonance at 121.25 Hz.
+//! Values in SI: blades of 0.182 kg on springs of 105103 N/m with dampers of 0.2 kg/s, a contact stiffness of 1e4
+//! N/m, a slip limit of 2 N, a force of 10 N on blade 1. Alone, a blade has its resonance at 121.25 Hz.
 
 use super::{Force, GROUND, Joint, Mass, Model, Spring};
 use crate::law::{Coulomb, Jenkins, SharedLaw};
@@ -16,7 +16,8 @@ const STIFFNESS: f64 = 1e4;
 /// Slip limit, N.
 const LIMIT: f64 = 2.0;
 
-/// Two blades with friction between the first and a small contact mass, which a spring ties to the other: Fig. 5b, Eqs. (3)-(4).
+/// Two blades with friction between the first and a small contact mass, which a spring ties to the other: Fig. 5b,
+/// Eqs. (3)-(4).
 ///
 /// # Example
 /// ```
