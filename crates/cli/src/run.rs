@@ -43,7 +43,9 @@ impl Request<'_> {
                     Some(bytes) => study.with_memory_limit(bytes),
                     None => study,
                 })
-                .and_then(|study| check_study(&study));
+                .and_then(|study| check_study(&study))
+                // of many studies, large ones perhaps, none keeps what its run makes again
+                .map(|checked| if self.files.len() > 1 { checked.lean() } else { checked });
             match study {
                 Ok(study) => studies.push(study),
                 Err(error) => {

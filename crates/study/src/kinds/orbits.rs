@@ -29,9 +29,11 @@ fn all(work: &Work<'_>) -> Result<Vec<Point>, (usize, MethodError)> {
     Ok(points)
 }
 
-/// The orbits of a unit of one case that there are, and whether they are stable, if that is known; all its points are counted, and what is
-/// missing is named.
-pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<(Orbit, Option<bool>)>, (usize, MethodError)> {
+/// An orbit, and whether it is stable, if that is known.
+type Judged = (Orbit, Option<bool>);
+
+/// The orbits of a unit of one case that there are; all its points are counted, and what is missing is named.
+pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Judged>, (usize, MethodError)> {
     let case = &work.case().case;
     let mut orbits = Vec::with_capacity(work.points.len());
     for (omega, point) in all(work)? {
