@@ -9,6 +9,7 @@ pub mod dual;
 pub mod eigen;
 pub mod fourier;
 pub mod lu;
+pub mod maximum;
 pub mod modes;
 pub mod radau;
 pub mod signal;

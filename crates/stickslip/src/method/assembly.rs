@@ -77,6 +77,7 @@ impl Assembly {
             first_axis += directions;
             internal += count;
         }
+        let axes: Vec<_> = system.axes().map(|(_, axis)| axis.dense(n)).collect();
         Ok(Assembly {
             n,
             mass: structure.mass().clone(),
@@ -84,7 +85,7 @@ impl Assembly {
             damping: structure.damping().clone(),
             stiffness: structure.stiffness().clone(),
             axes: system.axes().map(|(_, axis)| axis.clone()).collect(),
-            directions: system.directions(),
+            directions: DMatrix::from_fn(n, first_axis, |row, axis| axes[axis][row]),
             joints,
             internal,
         })

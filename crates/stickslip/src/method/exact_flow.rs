@@ -43,7 +43,7 @@ impl Flow for ExactFlow {
         self.segments.run(state, 0.0, duration, sensitivity)
     }
     fn keep(&mut self, _keep: bool) {} // segments are always kept: they are what it computes with
-    fn path(&self, system: &System, symmetry: Symmetry, period: f64) -> Arc<dyn Path> {
-        Arc::new(ExactPath::new(system, &self.segments, symmetry, period))
+    fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Arc<dyn Path> {
+        Arc::new(ExactPath::new(system.clone(), &self.segments, symmetry, period))
     }
 }

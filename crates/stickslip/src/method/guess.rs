@@ -23,7 +23,12 @@ impl Guess {
         let n = system.dofs();
         let excitation = system.excitation(omega);
         let mut harmonics: Vec<u32> = excitation.iter().map(|(h, _)| *h).collect();
-        harmonics.extend(system.joints().iter().flat_map(|joint| joint.axes().iter().flat_map(|axis| axis.imposed()).map(|(h, _)| *h)));
+        harmonics.extend(
+            system
+                .joints()
+                .iter()
+                .flat_map(|joint| joint.axes().iter().flat_map(|axis| axis.imposed()).map(|(h, _)| *h)),
+        );
         harmonics.sort_unstable();
         harmonics.dedup();
         let mut amplitudes = vec![f64::INFINITY; system.joints().len()];
@@ -34,7 +39,9 @@ impl Guess {
                 .iter()
                 .zip(&amplitudes)
                 .map(
-                    |(joint, &a)| if a.is_finite() { joint.law().linearised(a, omega) } else { Complex64::new(0.0, 0.0) },
+                    |(joint, &a)| {
+                        if a.is_finite() { joint.law().linearised(a, omega) } else { Complex64::new(0.0, 0.0) }
+                    },
                 )
                 .collect();
             guess.harmonics = harmonics
@@ -55,8 +62,7 @@ impl Guess {
                     .filter(|(h, _)| **h > 0)
                     .map(|(h, (_, x))| {
                         let u: Complex64 = joint.axes()[0].along_complex(&x);
-                        (u + joint.axes()[0].imposed_at(*h))
-                            .norm()
+                        (u + joint.axes()[0].imposed_at(*h)).norm()
                     })
                     .sum();
                 let old = amplitudes[j];
@@ -77,7 +83,9 @@ impl Guess {
         }
         let s = Complex64::new(0.0, f64::from(h) * omega);
         let mut dynamic = DMatrix::from_fn(n, n, |i, k| {
-            s * s * system.structure().mass()[(i, k)] + s * system.structure().damping()[(i, k)] + system.structure().stiffness()[(i, k)]
+            s * s * system.structure().mass()[(i, k)]
+                + s * system.structure().damping()[(i, k)]
+                + system.structure().stiffness()[(i, k)]
         });
         for (joint, &kappa) in system.joints().iter().zip(&self.joints) {
             let w = joint.axes()[0].dense(n);

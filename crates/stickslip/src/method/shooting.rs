@@ -76,9 +76,10 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{CoulombArctan, Law};
+/// use stickslip::law::CoulombArctan;
+/// use std::sync::Arc;
 /// use stickslip::method::{Method, shooting::Shooting};
-/// let mut model = stickslip::model::templates::find("blade-couple").unwrap().model();
+/// let mut model = stickslip::model::example::blade_couple();
 /// model.joints[0].law = Arc::new(CoulombArctan { limit: 2.0, alpha: 25e3 });
 /// let system = model.assemble().unwrap();
 /// let orbit = Shooting::default().solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25, None).unwrap();
@@ -130,7 +131,7 @@ impl Stepping {
         }
     }
 
-    fn path(&self, system: &System, symmetry: Symmetry, period: f64) -> SteppedPath {
+    fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
         match self {
             Stepping::Smooth(flow) => flow.stepped(system, symmetry, period),
             Stepping::Incremental(flow) => flow.stepped(system, symmetry, period),
@@ -141,6 +142,7 @@ impl Stepping {
 /// Finds orbits by integration, with either search.
 pub(super) struct Shooter<'a> {
     system: &'a System,
+    shared: Arc<System>,
     /// The method that it works for.
     name: &'static str,
     search: Search,
@@ -176,6 +178,7 @@ impl<'a> Shooter<'a> {
         };
         Ok(Shooter {
             system,
+            shared: Arc::new(system.clone()),
             name,
             search,
             periods: options.period,
@@ -283,7 +286,7 @@ impl<'a> Shooter<'a> {
     /// Puts the orbit together from its last, kept run.
     fn orbit_of(&self, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
         let period = self.periods as f64 * std::f64::consts::TAU / omega;
-        let path = self.stepping.path(self.system, symmetry, period);
+        let path = self.stepping.path(&self.shared, symmetry, period);
         let Ok(measured) = measure(self.system, &path, omega, (symmetry, period));
         Orbit {
             method: self.name,

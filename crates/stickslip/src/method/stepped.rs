@@ -8,6 +8,7 @@ use crate::orbit::measure::Signals;
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
 use num_complex::Complex64;
 use std::convert::Infallible;
+use std::sync::Arc;
 use stickslip_numerics::radau::quintic;
 
 /// Turning points are refined until the step in time is below this fraction of the integration step.
@@ -66,7 +67,7 @@ pub(crate) struct SteppedPath {
     steps: Steps,
     assembly: Assembly,
     drive: Drive,
-    system: System,
+    system: Arc<System>,
     symmetry: Symmetry,
     period: f64,
 }
@@ -74,7 +75,7 @@ pub(crate) struct SteppedPath {
 impl SteppedPath {
     /// Of the record of a run that repeats after `period`.
     pub fn new(
-        (system, assembly): (&System, &Assembly),
+        (system, assembly): (&Arc<System>, &Assembly),
         drive: &Drive,
         steps: &Steps,
         (symmetry, period): (Symmetry, f64),

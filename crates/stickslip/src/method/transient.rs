@@ -1,13 +1,13 @@
 //! Motion in time from given displacements: free decay, switched-on drive, run-up.
 //!
-//! Exact laws are followed by events, smooth laws by stiff integration, others and mixtures in equal steps, all in stretches of one drive period. In
-//! a run-up every
-//! cycle has its own frequency, constant over the cycle and continuous in phase, as in a stepped-sine test.
+//! Exact laws are followed by events, smooth laws by stiff integration, others and mixtures in equal steps, all in stretches of one drive
+//! period. In a run-up every cycle has its own frequency, constant over the cycle and continuous in phase, as in a stepped-sine test.
 
 use super::{Breakdown, MethodError, flow};
 use crate::model::System;
 use crate::orbit::{Sample, Symmetry};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 const NAME: &str = "transient";
 
@@ -78,6 +78,7 @@ impl Transient {
     /// A sliding oscillator loses `4 F/k` of amplitude per cycle.
     /// ```
     /// use stickslip::law::{Coulomb, Law};
+    /// use std::sync::Arc;
     /// use stickslip::method::transient::{Excitation, Transient};
     /// use stickslip::model::{GROUND, Joint, Mass, Model, Spring};
     /// let model = Model {
@@ -97,6 +98,7 @@ impl Transient {
         system: &System,
         sample: &mut dyn FnMut(f64, f64, &Sample) -> bool,
     ) -> Result<(), TransientError> {
+        let shared = Arc::new(system.clone());
         let mut flow = flow::of(system, self.width, TOLERANCE, NAME)?;
         flow.keep(true);
         let mut state = [self.displacement.as_slice(), &self.velocity].concat();
@@ -109,7 +111,7 @@ impl Transient {
             let length = if omega > 0.0 { TAU / omega } else { STRETCH as f64 * self.step };
             flow.set_drive(system, omega);
             flow.follow(&mut state, length).map_err(|cause| TransientError::Breakdown { time: begin, cause })?;
-            let path = flow.path(system, Symmetry::FullPeriod, length);
+            let path = flow.path(&shared, Symmetry::FullPeriod, length);
             let end = begin + length;
             while next <= samples && next as f64 * self.step < end {
                 let time = next as f64 * self.step;

@@ -165,13 +165,21 @@ fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Sig
             work += k * signals.product(motion, &velocity[row]) + c * signals.product(speed, &velocity[row]);
             viscous += 2.0 * c * signals.product(speed, &velocity[row]);
         }
-        for (sign, force) in place.joints.iter().zip(forces) {
-            if *sign != 0.0 {
-                signals.add(&mut reaction, force, *sign);
-            }
-        }
         work += signals.product(&reaction, speed);
         possible += (signals.product(&reaction, &reaction) * signals.product(speed, speed)).sqrt();
+    }
+    // what joints take from imposed motion
+    for ((_, axis), force) in system.axes().zip(forces) {
+        let parts: Vec<(f64, Complex64)> = axis
+            .imposed()
+            .iter()
+            .map(|&(h, g)| (f64::from(h) * omega, g * Complex64::new(0.0, f64::from(h) * omega)))
+            .collect();
+        if !parts.is_empty() {
+            let speed = signals.harmonics(&parts);
+            work += signals.product(force, &speed);
+            possible += (signals.product(force, force) * signals.product(&speed, &speed)).sqrt();
+        }
     }
     ((work, viscous), possible)
 }

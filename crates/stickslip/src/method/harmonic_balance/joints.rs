@@ -10,8 +10,8 @@
 //! - Steep maps change within a sample. Their mean over it is taken for an argument `y + eξ`, `-1 < ξ < 1`, that is linear there: so a
 //!   zero of the velocity is placed within its sample, and the forces stay the gradient of a convex function.
 
-use crate::method::MethodError;
 use crate::law::SLIPS_ABOVE;
+use crate::method::MethodError;
 use crate::model::System;
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, PI, TAU};

@@ -257,8 +257,11 @@ impl<'a> ModeEquations<'a> {
                 let row = 2 * (k * n + i);
                 let (mut sum, mut by_omega, mut by_zeta) = (ZERO, ZERO, ZERO);
                 for l in 0..n {
-                    let (m, c, s) =
-                        (self.system.structure().mass()[(i, l)], self.system.structure().damping()[(i, l)], self.system.structure().stiffness()[(i, l)]);
+                    let (m, c, s) = (
+                        self.system.structure().mass()[(i, l)],
+                        self.system.structure().damping()[(i, l)],
+                        self.system.structure().stiffness()[(i, l)],
+                    );
                     if m == 0.0 && c == 0.0 && s == 0.0 {
                         continue;
                     }
@@ -392,7 +395,12 @@ impl<'a> ModeEquations<'a> {
 
     /// Units of the residual: elastic forces, slip limits; amplitude and phase are relative.
     pub(super) fn units(&self, start: &ModeState, a: f64) -> Vec<f64> {
-        let stiffness = self.system.structure().stiffness().amax().max(start.omega * start.omega * self.system.structure().mass().amax());
+        let stiffness = self
+            .system
+            .structure()
+            .stiffness()
+            .amax()
+            .max(start.omega * start.omega * self.system.structure().mass().amax());
         let mut scale = vec![(stiffness * a).max(f64::MIN_POSITIVE); 2 * start.x.len()];
         let width = 2 * self.alternation.harmonics.len();
         scale.extend(self.contacts.iter().flat_map(|contact| vec![contact.law.limit; width]));
@@ -463,12 +471,13 @@ impl<'a> ModeEquations<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, Law};
+    use crate::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw};
     use crate::model::{GROUND, Joint, Mass, Model, Spring};
+    use std::sync::Arc;
 
     /// A row of masses with a joint of every law.
     fn mixed() -> System {
-        let laws = [
+        let laws: [SharedLaw; 4] = [
             Arc::new(Jenkins { stiffness: 2.0, limit: 0.3 }),
             Arc::new(Coulomb { limit: 0.2 }),
             Arc::new(CoulombArctan { limit: 0.25, alpha: 5.0 }),

@@ -56,7 +56,8 @@ pub(super) fn stays(context: &Context, level: &Level, motion: &Motion, x: &[DVec
     }
     let held = system.structure().stiffness() * x[0].map(|z| z.re);
     // positions far away have forces that are rounding
-    let rounding = f64::EPSILON * system.structure().stiffness().amax() * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+    let rounding =
+        f64::EPSILON * system.structure().stiffness().amax() * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
     (left.map(|z| z.re) - held).norm() <= UNHELD * size + 1e3 * rounding
 }
 
@@ -378,8 +379,11 @@ impl Path for Series {
             })
             .collect();
         for (m, now) in moved_now.iter_mut().enumerate() {
-            now.1 +=
-                joints.iter().zip(&self.system.moved()[m].joints).map(|(joint, sign)| joint.force[0] * sign).sum::<f64>();
+            now.1 += joints
+                .iter()
+                .zip(&self.system.moved()[m].joints)
+                .map(|(joint, sign)| joint.force[0] * sign)
+                .sum::<f64>();
         }
         Sample { displacement: x, velocity: v, acceleration: a, joints, moved: moved_now }
     }

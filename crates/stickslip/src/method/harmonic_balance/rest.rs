@@ -49,8 +49,9 @@ struct Modal {
 impl Rest {
     pub fn new(system: &System, coordinates: &[Coordinate]) -> Self {
         let n = system.dofs();
-        let direction =
-            DMatrix::from_columns(&coordinates.iter().map(|c| system.joints()[c.joint].axes()[0].dense(n)).collect::<Vec<_>>());
+        let direction = DMatrix::from_columns(
+            &coordinates.iter().map(|c| system.joints()[c.joint].axes()[0].dense(n)).collect::<Vec<_>>(),
+        );
         Rest {
             n,
             // where the banded form takes over, the modes are not needed
@@ -177,7 +178,9 @@ fn modal(system: &System, direction: &DMatrix<f64>) -> Option<Modal> {
     let factor = system.structure().mass().clone().cholesky()?;
     let to = factor.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
     let back = to.transpose();
-    let modes = Modes::new(&(&to * system.structure().damping() * &back), &(&to * system.structure().stiffness() * &back)).ok()?;
+    let modes =
+        Modes::new(&(&to * system.structure().damping() * &back), &(&to * system.structure().stiffness() * &back))
+            .ok()?;
     let complex = |matrix: &DMatrix<f64>| matrix.map(|w| Complex64::new(w, 0.0));
     let shape = complex(&back) * modes.shape;
     let left = modes.from_velocity * complex(&to);

@@ -55,18 +55,18 @@ impl Sparse {
         let mut entries = Vec::new();
         for i in 0..n {
             for k in 0..n {
-                let values = [system.structure().mass()[(i, k)], system.structure().damping()[(i, k)], system.structure().stiffness()[(i, k)]];
+                let values = [
+                    system.structure().mass()[(i, k)],
+                    system.structure().damping()[(i, k)],
+                    system.structure().stiffness()[(i, k)],
+                ];
                 if values.iter().any(|v| *v != 0.0) {
                     entries.push((i, k, values));
                 }
             }
         }
-        let ends: Vec<Vec<(usize, f64)>> = coordinates
-            .iter()
-            .map(|c| {
-                system.joints()[c.joint].axes()[0].rows().to_vec()
-            })
-            .collect();
+        let ends: Vec<Vec<(usize, f64)>> =
+            coordinates.iter().map(|c| system.joints()[c.joint].axes()[0].rows().to_vec()).collect();
         let mut links: Vec<(usize, usize)> = entries.iter().map(|(i, k, _)| (*i, *k)).collect();
         for ends in &ends {
             links.extend(ends.iter().flat_map(|a| ends.iter().map(|b| (a.0, b.0))));

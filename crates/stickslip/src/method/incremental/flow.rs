@@ -96,7 +96,7 @@ impl IncrementalFlow {
     }
 
     /// The motion of the last kept run, which repeats after `period`.
-    pub fn stepped(&self, system: &System, symmetry: Symmetry, period: f64) -> SteppedPath {
+    pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
         SteppedPath::new((system, &self.assembly), &self.drive, &self.steps, (symmetry, period))
     }
 }
@@ -186,7 +186,7 @@ impl Flow for IncrementalFlow {
         self.keep = keep;
     }
 
-    fn path(&self, system: &System, symmetry: Symmetry, period: f64) -> Arc<dyn Path> {
+    fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Arc<dyn Path> {
         Arc::new(self.stepped(system, symmetry, period))
     }
 }

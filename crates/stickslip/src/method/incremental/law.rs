@@ -1,6 +1,7 @@
 //! What a law answers to a step: the force and its states at the end, with derivatives by everything before and after.
 //!
-//! Laws with a step view answer by it. Ideal sliders behind springs move their force with the displacement up to their limit, and stops know
+//! Laws with a step view answer by it. In a plane a step knows the direction of slip to first order only, so that there two halves of it are
+//! taken, and the answer is extrapolated: `2 (two halves) - (whole)`. Ideal sliders behind springs move their force with the displacement up to their limit, and stops know
 //! where they are. Laws with a rate view are integrated by the trapezoidal rule, `z₁ = z₀ + h/2 (g₀ + g₁)`.
 
 use crate::law::{Contact, MOST_DIRECTIONS, Piece, RatePoint, Relative, SharedLaw, StepPoint};
@@ -73,7 +74,9 @@ pub(super) struct Follower {
     /// Derivatives of the forces, then of the states, by (u₀, u₀', z₀, u₁, u₁').
     slopes: Vec<f64>,
     slipping: Option<f64>,
+    /// The whole step, and its halves.
     step: StepPoint,
+    halves: [StepPoint; 2],
     before: RatePoint,
     after: RatePoint,
     lu: Lu,
@@ -102,6 +105,7 @@ impl Follower {
             slopes: vec![0.0; (directions + states) * (4 * directions + states)],
             slipping: None,
             step: StepPoint::new(directions, states),
+            halves: std::array::from_fn(|_| StepPoint::new(directions, states)),
             before: RatePoint::new(directions, states),
             after: RatePoint::new(directions, states),
             lu: Lu::default(),
@@ -129,7 +133,8 @@ impl Follower {
     pub fn contact(&self, law: &SharedLaw, velocity: &[f64]) -> Contact {
         match self.slipping {
             Some(sign) => Contact::slip(sign),
-            None if self.view == View::Pieces && law.scale() > 0.0 => Contact::Stick,
+            // below its limit a slider holds
+            None if self.view == View::Pieces && self.states > 0 => Contact::Stick,
             None => law.contact(velocity, &self.force[..self.directions]),
         }
     }
@@ -173,28 +178,60 @@ impl Follower {
                 true
             }
             View::Step => {
-                let (directions, states, width) = (self.directions, self.states, self.arguments());
-                if let Some(step) = law.step() {
-                    let (u, to) = (&from.motion.displacement, &to.displacement);
-                    step.linearise(directions, u, to, from.z, &mut self.step);
-                }
-                self.force = self.step.force;
-                self.state.copy_from_slice(&self.step.state);
-                for row in 0..directions + states {
-                    let slope = if row < directions {
-                        self.step.force_slope(row)
-                    } else {
-                        self.step.state_slope(row - directions)
-                    };
-                    let out = &mut self.slopes[row * width..(row + 1) * width];
-                    out[..directions].copy_from_slice(&slope[..directions]);
-                    let z = 2 * directions;
-                    out[z..z + states].copy_from_slice(&slope[2 * directions..]);
-                    out[z + states..z + states + directions].copy_from_slice(&slope[directions..2 * directions]);
-                }
+                self.step_over(law, from, to);
                 true
             }
             View::Rate => self.integrate(law, from, to, h),
+        }
+    }
+
+    /// One step of a law that knows steps; in a plane also in two halves.
+    fn step_over(&mut self, law: &SharedLaw, from: At, to: &Relative<f64>) {
+        let (directions, states, width) = (self.directions, self.states, self.arguments());
+        let Some(step) = law.step() else { return };
+        let (start, end) = (&from.motion.displacement, &to.displacement);
+        step.linearise(directions, start, end, from.z, &mut self.step);
+        let (z, after) = (2 * directions, 2 * directions + states);
+        let row_of = |point: &StepPoint, row: usize, argument: usize| {
+            let slope = if row < directions { point.force_slope(row) } else { point.state_slope(row - directions) };
+            slope[argument]
+        };
+        if directions == 1 {
+            self.force = self.step.force;
+            self.state.copy_from_slice(&self.step.state);
+            for row in 0..directions + states {
+                let out = &mut self.slopes[row * width..(row + 1) * width];
+                out[0] = row_of(&self.step, row, 0);
+                (0..states).for_each(|s| out[z + s] = row_of(&self.step, row, 2 + s));
+                out[after] = row_of(&self.step, row, 1);
+            }
+            return;
+        }
+        let middle = std::array::from_fn(|d| 0.5 * (start[d] + end[d]));
+        let [first, second] = &mut self.halves;
+        step.linearise(directions, start, &middle, from.z, first);
+        step.linearise(directions, &middle, end, &first.state, second);
+        for d in 0..directions {
+            self.force[d] = 2.0 * second.force[d] - self.step.force[d];
+        }
+        for s in 0..states {
+            self.state[s] = 2.0 * second.state[s] - self.step.state[s];
+        }
+        for row in 0..directions + states {
+            let out = &mut self.slopes[row * width..(row + 1) * width];
+            // through the state in the middle
+            let through = |argument: usize| -> f64 {
+                (0..states).map(|s| row_of(second, row, z + s) * first.state_slope(s)[argument]).sum()
+            };
+            for d in 0..directions {
+                let half = 0.5 * (row_of(second, row, d) + through(directions + d));
+                out[d] = 2.0 * (half + through(d)) - row_of(&self.step, row, d);
+                let ended = row_of(second, row, directions + d);
+                out[after + d] = 2.0 * (half + ended) - row_of(&self.step, row, directions + d);
+            }
+            for s in 0..states {
+                out[z + s] = 2.0 * through(z + s) - row_of(&self.step, row, z + s);
+            }
         }
     }
 

@@ -310,11 +310,3 @@ fn relative(assembly: &Assembly, q: usize, state: &[f64], drive: &Drive, time: f
     }
     motion
 }
-
-#[cfg(test)]
-impl Step {
-    /// Motion along the axes at the end, for tests.
-    pub fn to(&self) -> &[Relative<f64>] {
-        &self.to
-    }
-}
