@@ -16,8 +16,8 @@ pub enum Range {
     Any,
     /// From the first number on, up to the second.
     Within(f64, f64),
-    /// A whole number from 1.
-    Count,
+    /// A whole number from 1 up to this.
+    Count(u32),
 }
 
 impl Range {
@@ -29,7 +29,7 @@ impl Range {
                 Range::ZeroOrMore => value >= 0.0,
                 Range::Any => true,
                 Range::Within(least, most) => (least..=most).contains(&value),
-                Range::Count => value >= 1.0 && value.fract() == 0.0,
+                Range::Count(most) => value >= 1.0 && value <= f64::from(most) && value.fract() == 0.0,
             }
     }
 }
@@ -41,7 +41,7 @@ impl fmt::Display for Range {
             Range::ZeroOrMore => write!(f, "zero or more"),
             Range::Any => write!(f, "of either sign"),
             Range::Within(least, most) => write!(f, "from {least} to {most}"),
-            Range::Count => write!(f, "a whole number from 1"),
+            Range::Count(most) => write!(f, "a whole number from 1 to {most}"),
         }
     }
 }
