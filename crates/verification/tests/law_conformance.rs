@@ -105,7 +105,7 @@ fn no_energy_is_created_over_closed_histories() {
         let law = row.sample();
         let (mut least, mut most) = (f64::INFINITY, 0.0f64);
         for view in views(&*law) {
-            for seed in 0..8 {
+            for seed in 0..4 {
                 for speed in [0.1, 20.0] {
                     let motion = random_motion(seed, law.directions(), speed);
                     let times = steps(1.0 / speed, 6, SAMPLES);
@@ -221,7 +221,7 @@ fn views_agree_at_any_speed_that_they_know() {
         let law = row.sample();
         let views = views(&*law);
         let timeless = views.iter().any(|view| matches!(view, View::Pieces | View::Step));
-        for seed in 0..6 {
+        for seed in 0..3 {
             let run = |view: View, speed: f64| {
                 let motion = random_motion(seed, law.directions(), speed);
                 forces(&*law, view, &motion, &steps(1.0 / speed, 2, 4 * SAMPLES))
@@ -401,7 +401,7 @@ fn what_laws_say_of_themselves() {
         for law in [Some(sample.clone()), sample.regularised(1e-4)].into_iter().flatten() {
             let (mut least, mut most, mut oddest) = (0.0f64, 0.0f64, 0.0f64);
             for view in views(&*law) {
-                for seed in 0..10 {
+                for seed in 0..5 {
                     let times = steps(2.0, 2, SAMPLES);
                     let one = random_motion(seed, law.directions(), 0.5);
                     let two = random_motion(seed + 100, law.directions(), 0.5);
@@ -486,7 +486,8 @@ fn describing_functions_are_first_harmonics() {
     for row in TABLE {
         let law = row.sample();
         for amplitude in [1e-4, 1e-3] {
-            let omega = 3.0;
+            // fast beside the width of the smooth laws, whose start is that of their exact neighbour
+            let omega = 300.0;
             let motion = |time: f64| {
                 let (sin, cos) = (omega * time).sin_cos();
                 ([amplitude * cos, 0.0, 0.0], [-amplitude * omega * sin, 0.0, 0.0])
