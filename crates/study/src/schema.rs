@@ -3,16 +3,13 @@
 //! The reader checks files against this table, and the documentation and the JSON Schema for editors are generated from it. Laws and
 //! methods come from [`stickslip::law::TABLE`] and [`stickslip::method::TABLE`], study kinds from [`crate::kinds::TABLE`].
 
-use crate::kinds;
+use crate::kind::Kind;
+use crate::{kinds, templates};
 use serde_json::{Map, Value, json};
 use stickslip::dimension::Dimension;
-use stickslip::{law, method, model::templates};
+use stickslip::{law, method};
 
-/// The schema version that this program reads.
-pub const VERSION: i64 = 1;
-
-/// Most points of a study: cases times frequencies.
-pub const MOST_POINTS: usize = 1_000_000;
+pub use crate::key::{Key, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, required};
 
 /// Most elements in one list (`[[spring]]`, …), repetitions counted.
 pub const MOST_ELEMENTS: usize = 10_000;
@@ -22,135 +19,6 @@ pub const MOST_MASSES: usize = 2_000;
 
 /// Most bytes of a study file.
 pub const MOST_BYTES: u64 = 4 * 1024 * 1024;
-
-/// One key of a table.
-#[derive(Debug, Clone, Copy)]
-pub struct Key {
-    /// The key.
-    pub name: &'static str,
-    /// What it takes.
-    pub takes: Takes,
-    /// Whether it must stand there, or what happens without it.
-    pub presence: Presence,
-    /// One line of what it is.
-    pub doc: &'static str,
-    /// An example of the value, as TOML.
-    pub example: &'static str,
-}
-
-/// Whether a key must stand in its table.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Presence {
-    /// It must.
-    Required,
-    /// It may be absent, and then nothing stands for it.
-    Optional,
-    /// It may be absent, and this (as the content of a TOML string, or a bare value) stands for it.
-    Default(&'static str),
-}
-
-/// What a key takes.
-#[derive(Debug, Clone, Copy)]
-pub enum Takes {
-    /// Any text.
-    Text,
-    /// An identifier.
-    Name,
-    /// A name or a list of names.
-    Names,
-    /// Two names of places.
-    Pair,
-    /// A quantity of a dimension within a range.
-    Quantity(Dimension, Within),
-    /// A whole number within these bounds.
-    Count(i64, i64),
-    /// `true` or `false`.
-    Flag,
-    /// Frequencies: one, a list, or `{ from, to, points }`.
-    Frequencies,
-    /// A table from a name to a quantity: `{ blade1 = "1 mm" }`.
-    ByName(Dimension),
-    /// A table of its own with these keys.
-    Table(&'static [Key]),
-    /// A friction law: `{ kind = …, … }`.
-    Law,
-    /// One of the words that the function lists, each with a line of what it is.
-    Choice(fn() -> Vec<(&'static str, &'static str)>),
-    /// `[parameters]`: quantities by name.
-    Parameters,
-    /// `vary`: lists of quantities, or ranges, by parameter.
-    Vary,
-    /// `[method]`: `kind` and the options of that method.
-    Method,
-    /// `[study]`: `kind`, `vary` and the keys of that kind.
-    Study,
-    /// `repeat`: indices, each with how often, or from where to where.
-    Repeat,
-    /// A list of tables with these keys: `[[mass]]`.
-    List(&'static [Key]),
-}
-
-/// The range of a quantity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Within {
-    /// Any finite number.
-    Finite,
-    /// Zero or more.
-    AtLeastZero,
-    /// More than zero.
-    Positive,
-}
-
-/// The range of a law's parameter as far as a reader can tell without the law, which checks the rest itself.
-pub(crate) fn within(range: law::Range) -> Within {
-    match range {
-        law::Range::Positive | law::Range::Count(_) => Within::Positive,
-        law::Range::ZeroOrMore => Within::AtLeastZero,
-        law::Range::Any | law::Range::Within(..) => Within::Finite,
-    }
-}
-
-impl Within {
-    /// Whether the number is in the range.
-    pub fn holds(self, value: f64) -> bool {
-        value.is_finite()
-            && match self {
-                Within::Finite => true,
-                Within::AtLeastZero => value >= 0.0,
-                Within::Positive => value > 0.0,
-            }
-    }
-
-    /// In words.
-    pub fn described(self) -> &'static str {
-        match self {
-            Within::Finite => "a finite number",
-            Within::AtLeastZero => "zero or more",
-            Within::Positive => "more than zero",
-        }
-    }
-}
-
-/// A key that must be there.
-pub const fn required(name: &'static str, takes: Takes, doc: &'static str, example: &'static str) -> Key {
-    Key { name, takes, presence: Presence::Required, doc, example }
-}
-
-/// A key that may be absent.
-pub const fn optional(name: &'static str, takes: Takes, doc: &'static str, example: &'static str) -> Key {
-    Key { name, takes, presence: Presence::Optional, doc, example }
-}
-
-/// A key that may be absent, and what then stands for it.
-pub const fn default(
-    name: &'static str,
-    takes: Takes,
-    value: &'static str,
-    doc: &'static str,
-    example: &'static str,
-) -> Key {
-    Key { name, takes, presence: Presence::Default(value), doc, example }
-}
 
 /// The keys at the top of the file.
 pub const FILE: &[Key] = &[
@@ -327,11 +195,11 @@ pub const ADAPTIVE: &[Key] = &[
 pub const METHOD: &[Key] = &[default("kind", Takes::Choice(method_names), "auto", "the method", "\"event-driven\"")];
 
 fn template_names() -> Vec<(&'static str, &'static str)> {
-    templates::TABLE.iter().map(|row| (row.name, row.summary)).collect()
+    templates::TABLE.iter().map(|row| (row.name, row.summary())).collect()
 }
 
 fn kind_names() -> Vec<(&'static str, &'static str)> {
-    kinds::TABLE.iter().map(|row| (row.name, row.summary)).collect()
+    kinds::TABLE.iter().map(|row| (row.info.name, row.info.summary)).collect()
 }
 
 fn method_names() -> Vec<(&'static str, &'static str)> {
@@ -446,8 +314,8 @@ fn takes_schema(takes: &Takes) -> Value {
         }),
         Takes::Law => {
             let one = |row: &&law::LawInfo| {
-                let parameters = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc));
-                kind_object(row.name, row.summary, parameters, true)
+                let parameters = row.parameters.iter().map(|p| (p.key, p.takes(), p.doc, p.default.is_none()));
+                kind_object(row.name, row.summary, parameters)
             };
             json!({ "oneOf": law::TABLE.iter().map(one).collect::<Vec<_>>() })
         }
@@ -463,8 +331,9 @@ fn takes_schema(takes: &Takes) -> Value {
         }),
         Takes::Method => {
             let one = |row: &method::MethodInfo| {
-                let mut schema =
-                    kind_object(row.name, row.summary, row.options.iter().map(|o| (o.key, o.dimension, o.doc)), false);
+                let takes = crate::expression::described;
+                let options = row.options.iter().map(|o| (o.key, takes(o.dimension), o.doc, false));
+                let mut schema = kind_object(row.name, row.summary, options);
                 for option in row.options.iter().filter(|option| option.count) {
                     schema["properties"][option.key] =
                         json!({ "type": "integer", "minimum": 1, "description": option.doc });
@@ -479,7 +348,7 @@ fn takes_schema(takes: &Takes) -> Value {
             json!({ "oneOf": all })
         }
         Takes::Study => {
-            let one = |row: &kinds::Kind| {
+            let one = |Kind { info: row, .. }: &Kind| {
                 let mut schema = object(&[STUDY, row.keys].concat());
                 schema["description"] = json!(row.summary);
                 schema["properties"]["kind"] = json!({ "const": row.name, "description": row.summary });
@@ -493,16 +362,15 @@ fn takes_schema(takes: &Takes) -> Value {
 fn kind_object(
     name: &str,
     summary: &str,
-    parameters: impl Iterator<Item = (&'static str, Dimension, &'static str)>,
-    all_required: bool,
+    parameters: impl Iterator<Item = (&'static str, String, &'static str, bool)>,
 ) -> Value {
     let mut properties = Map::new();
     let mut required = vec!["kind"];
     properties.insert("kind".to_owned(), json!({ "const": name }));
-    for (key, dimension, doc) in parameters {
-        let doc = format!("{doc}: {}", crate::expression::described(dimension));
+    for (key, takes, doc, must) in parameters {
+        let doc = format!("{doc}: {takes}");
         properties.insert(key.to_owned(), json!({ "$ref": "#/$defs/quantity", "description": doc }));
-        if all_required {
+        if must {
             required.push(key);
         }
     }
@@ -544,7 +412,7 @@ pub fn markdown() -> String {
         }
     }
     rows(&mut book, "`[study]`", "The keys of every kind; each kind adds its own.", STUDY);
-    for kind in kinds::TABLE {
+    for Kind { info: kind, .. } in kinds::TABLE {
         rows(&mut book, &format!("`[study]` with `kind = \"{}\"`", kind.name), kind.summary, kind.keys);
         for key in kind.keys {
             if let Takes::Table(keys) = key.takes {
@@ -552,26 +420,28 @@ pub fn markdown() -> String {
             }
         }
     }
-    let named = |book: &mut String, name: &str, summary: &str, keys: &[(&str, Dimension, &str)]| {
+    let named = |book: &mut String, name: &str, summary: &str, keys: &[(&str, String, &str)]| {
         book.push_str(&format!("- `{name}`: {summary}\n"));
-        for (key, dimension, doc) in keys {
-            book.push_str(&format!("  - `{key}` ({}): {doc}\n", crate::expression::described(*dimension)));
+        for (key, takes, doc) in keys {
+            book.push_str(&format!("  - `{key}` ({takes}): {doc}\n"));
         }
     };
+    let described = crate::expression::described;
     book.push_str("## Laws\n\n");
     for row in law::TABLE {
-        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc)).collect();
+        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.takes(), p.doc)).collect();
         named(&mut book, row.name, row.summary, &keys);
     }
     book.push_str("\n## Methods\n\n");
     for row in method::TABLE {
-        let keys: Vec<_> = row.options.iter().map(|o| (o.key, o.dimension, o.doc)).collect();
+        let keys: Vec<_> = row.options.iter().map(|o| (o.key, described(o.dimension), o.doc)).collect();
         named(&mut book, row.name, row.summary, &keys);
     }
     book.push_str("\n## Templates\n\n");
     for row in templates::TABLE {
-        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc)).collect();
-        named(&mut book, row.name, row.summary, &keys);
+        let parameters = row.parameters();
+        let keys: Vec<_> = parameters.iter().map(|p| (p.key.as_str(), described(p.dimension), p.doc.as_str())).collect();
+        named(&mut book, row.name, row.summary(), &keys);
     }
     book
 }

@@ -1,12 +1,12 @@
 //! What a file states, compiled: every expression parsed, every place known, nothing evaluated yet.
 
 use crate::error::{Place, Problem};
-use crate::expression::{Expression, Value, displayed};
-use crate::schema::Within;
+use crate::expression::{Expression, Value, described, displayed};
+use crate::key::Within;
 use crate::values::{Frequencies, Given, Values};
 use std::collections::BTreeMap;
 use stickslip::dimension::Dimension;
-use stickslip::law::LawInfo;
+use stickslip::law::{BuildError, LawInfo, Parameter, SharedLaw};
 
 /// A quantity as it stands in a text.
 #[derive(Debug, Clone, PartialEq)]
@@ -127,6 +127,33 @@ impl Quantity {
         Err(self.problem(key, "this is not a finite number"))
     }
 
+    /// The value of the parameter `name` that this is, in the dimension that it must have.
+    pub fn settled(
+        &self,
+        name: &str,
+        dimension: Option<Dimension>,
+        environment: &Environment<'_>,
+    ) -> Result<Value, Problem> {
+        let value = self.value(name, environment)?;
+        self.in_dimension(value, name, dimension, environment)
+    }
+
+    /// `value`, which this quantity has, in the dimension that the parameter `name` must have.
+    pub fn in_dimension(
+        &self,
+        value: Value,
+        name: &str,
+        dimension: Option<Dimension>,
+        environment: &Environment<'_>,
+    ) -> Result<Value, Problem> {
+        let Some(dimension) = dimension else { return Ok(value) };
+        let number = self.convert(value, dimension, name, "", environment).map_err(|problem| match problem.help {
+            None => problem.help(format!("the parameter `{name}` is {}", described(dimension))),
+            Some(_) => problem,
+        })?;
+        Ok(Value::of(number, dimension))
+    }
+
     pub fn problem(&self, key: &str, message: impl Into<String>) -> Problem {
         let span = match self.inner {
             Some(start) => start..start + self.text.len(),
@@ -200,20 +227,51 @@ impl Stated {
                 }
                 Given::ByName(table, *dimension)
             }
-            Stated::Law(row, table) => {
-                let before = problems.len();
-                let values = table.values(environment, problems);
-                if problems.len() > before {
-                    // already said; the caller only needs to know that there is no law
-                    return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.place, key, "")));
-                }
-                let numbers = row.parameters.iter().filter_map(|p| Some((p.key, values.quantity(p.key)?))).collect();
-                let law = row.build(&numbers).map_err(|error| Problem::new(&table.place, key, error.to_string()))?;
-                Given::Law(law)
-            }
+            Stated::Law(row, table) => Given::Law(law(row, table, key, environment, problems)?),
             Stated::Table(table) => Given::Table(table.values(environment, problems)),
         })
     }
+}
+
+/// A law by the values of its table. A parameter whose dimension is raised to the value of another one is read after that.
+fn law(
+    row: &'static LawInfo,
+    table: &StatedTable,
+    key: &'static str,
+    environment: &Environment<'_>,
+    problems: &mut Vec<Problem>,
+) -> Result<SharedLaw, Problem> {
+    let before = problems.len();
+    let mut numbers: BTreeMap<&str, f64> = BTreeMap::new();
+    let (raised, plain): (Vec<&Parameter>, Vec<&Parameter>) = row.parameters.iter().partition(|p| p.power.is_some());
+    for parameter in plain.into_iter().chain(raised) {
+        let Some(entry) = table.entry(parameter.key) else { continue };
+        let Stated::Quantity { quantity, within, example, .. } = &entry.value else { continue };
+        let value = |key: &str| {
+            let default = || row.parameters.iter().find(|p| p.key == key)?.default;
+            numbers.get(key).copied().or_else(default)
+        };
+        // to a power that is not whole: a plain number in SI
+        let dimension = parameter.dimension_under(value).unwrap_or(Dimension::NONE);
+        match quantity.number(parameter.key, (dimension, *within), example, environment) {
+            Ok(number) => {
+                numbers.insert(parameter.key, number);
+            }
+            Err(problem) => problems.push(problem),
+        }
+    }
+    if problems.len() > before {
+        // already said; the caller only needs to know that there is no law
+        return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.place, key, "")));
+    }
+    row.build(&numbers).map_err(|error| {
+        let wrong = match &error {
+            BuildError::Value(error) => error.key(),
+            BuildError::Missing { .. } => None,
+        };
+        let place = wrong.map_or(&table.place, |wrong| table.place_of(wrong, None));
+        Problem::new(place, wrong.unwrap_or(key), error.to_string())
+    })
 }
 
 /// Tolerances of adaptive frequencies: finer ones take more points than they are worth, coarser ones show nothing.

@@ -7,8 +7,9 @@ use stickslip::curve::modes::{ModeRequest, mode, self_excited};
 use stickslip::curve::performance::Performance;
 use stickslip::law::{Coulomb, CoulombArctan, Jenkins, SharedLaw};
 use stickslip::method::{Method, OrbitError, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
-use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System, templates};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System};
 use stickslip::orbit::{Accuracy, Orbit};
+use stickslip_study::templates;
 
 fn balance(harmonics: usize, samples: usize) -> HarmonicBalance {
     HarmonicBalance { harmonics: Some(harmonics), samples: Some(samples), tolerance: None }

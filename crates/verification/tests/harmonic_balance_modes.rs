@@ -6,8 +6,9 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode};
 use stickslip::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw};
-use stickslip::model::{Axis, GROUND, Joint, Mass, Model, Spring, System, templates};
+use stickslip::model::{Axis, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::structure::Structure;
+use stickslip_study::templates;
 
 /// One mass of 1 kg on a spring of 1 N/m with a joint to the ground.
 fn oscillator(law: SharedLaw) -> System {

@@ -433,7 +433,7 @@ fn theory_13_orbits_are_stable_and_shift_with_the_force() {
     for (ft, hertz) in [(2.0, 121.25), (4.0, 120.75), (8.0, 121.0), (4.0, 121.1)] {
         let plain = orbit("blade-couple", &[("Ft", ft)], hertz);
         assert_eq!(plain.is_stable(), Some(true), "{:?}", plain.multipliers());
-        let mut model = stickslip::model::templates::find("blade-couple").unwrap().model_with(&[("Ft", ft)]).unwrap();
+        let mut model = stickslip_study::templates::find("blade-couple").unwrap().model_with(&[("Ft", ft)]).unwrap();
         model.forces[0].phase = PI / 3.0;
         let shifted = exact(&model.assemble().unwrap(), TAU * hertz);
         for (a, b) in plain.places.iter().zip(&shifted.places) {

@@ -194,7 +194,7 @@ fn negative_damping_is_computed() {
 /// Two masses that a third, common one couples: `M x'' + K x = F cos Ωt` in closed form, by every method.
 #[test]
 fn masses_that_couple_places() {
-    let mut system = Model {
+    let system = Model {
         masses: vec![mass("a", 1.0), mass("b", 1.5)],
         springs: vec![spring("a", GROUND, 1.0, 0.0), spring("b", GROUND, 2.0, 0.0)],
         // far below its limit: a spring

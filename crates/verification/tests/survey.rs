@@ -4,7 +4,8 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stickslip::law::{Coulomb, Jenkins, SharedLaw};
-use stickslip::model::{Force, GROUND, Joint, Mass, Model, Modes, Motion, Onset, Spring, Survey, templates};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Modes, Motion, Onset, Spring, Survey};
+use stickslip_study::templates;
 
 fn couple(template: &str, changes: &[(&str, f64)]) -> Survey {
     templates::find(template).unwrap().model_with(changes).unwrap().survey().unwrap()

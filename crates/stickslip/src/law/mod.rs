@@ -283,15 +283,25 @@ impl dyn Law + '_ {
         self.values().get(at).copied()
     }
 
-    /// The same law with another slip limit, N; `None` if it has none.
-    fn limited(&self, limit: f64) -> Option<SharedLaw> {
+    /// The same law with another value of one parameter, SI, unchecked; `None` if it has no such parameter.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip::law::{Dahl, Law};
+    /// let law: &dyn Law = &Dahl { stiffness: 1e4, limit: 2.0 };
+    /// assert_eq!(law.with("limit", 3.0).unwrap().values(), [1e4, 3.0]);
+    /// ```
+    pub fn with(&self, key: &str, value: f64) -> Option<SharedLaw> {
         let (info, mut values) = (self.info(), self.values());
-        let at = info.parameters.iter().position(|p| p.key == LIMIT)?;
-        values[at] = limit;
-        if let Some(at) = info.parameters.iter().position(|p| p.key == STATIC_LIMIT) {
-            values[at] = limit;
-        }
+        let at = info.parameters.iter().position(|p| p.key == key)?;
+        values[at] = value;
         Some((info.build)(&values))
+    }
+
+    /// The same law with another slip limit, N, static or not; `None` if it has none.
+    fn limited(&self, limit: f64) -> Option<SharedLaw> {
+        let law = self.with(LIMIT, limit)?;
+        Some(law.with(STATIC_LIMIT, limit).unwrap_or(law))
     }
 
     /// The same joint free of friction, a linear reference: its slip limit is zero. `None` if the law has no limit.

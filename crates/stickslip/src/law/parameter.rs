@@ -93,6 +93,28 @@ impl Parameter {
         }
     }
 
+    /// What it takes, in words: dimension, range, and what holds without it.
+    ///
+    /// # Example
+    /// ```
+    /// let parameter = |law, key| {
+    ///     let row = stickslip::law::find(law).unwrap();
+    ///     row.parameters.iter().find(|p| p.key == key).unwrap().takes()
+    /// };
+    /// assert_eq!(parameter("dahl", "limit"), "force (N), zero or more");
+    /// assert_eq!(parameter("bouc-wen", "gamma"), "inverse length (1/m) to the power `exponent`, of either sign");
+    /// assert_eq!(parameter("friction-contact", "tangents"), "a whole number from 1 to 2; 2 if absent");
+    /// ```
+    pub fn takes(&self) -> String {
+        let power = self.power.map(|power| format!(" to the power `{power}`")).unwrap_or_default();
+        let what = match (self.range, self.dimension) {
+            (Range::Count(_), _) => self.range.to_string(),
+            (range, Dimension::NONE) => format!("pure number{power}, {range}"),
+            (range, dimension) => format!("{dimension}{power}, {range}"),
+        };
+        what + &self.default.map(|value| format!("; {value} if absent")).unwrap_or_default()
+    }
+
     /// The same parameter with a value for when its key is absent, SI.
     pub const fn or(self, default: f64) -> Self {
         Parameter { default: Some(default), ..self }

@@ -88,7 +88,8 @@ impl Drive {
 
     /// The k-th time derivative of the imposed motion of a contact.
     pub fn imposed_at(&self, contact: usize, time: f64, derivative: u32) -> f64 {
-        self.rates.iter().zip(&self.imposed).map(|(rate, g)| (g[contact] * phasor(*rate, time, derivative)).re).sum()
+        let moving = self.rates.iter().zip(&self.imposed).filter(|(_, g)| g[contact] != Complex64::new(0.0, 0.0));
+        moving.map(|(rate, g)| (g[contact] * phasor(*rate, time, derivative)).re).sum()
     }
 }
 

@@ -196,9 +196,7 @@ impl Model {
     ///
     /// # Example
     /// ```
-    /// use stickslip::model::templates;
-    /// let model = templates::find("blade-couple").unwrap().model();
-    /// let system = model.assemble().unwrap();
+    /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
     /// assert_eq!(system.places(), ["blade1", "contact", "blade3"]);
     /// ```
     pub fn assemble(&self) -> Result<System, ModelError> {

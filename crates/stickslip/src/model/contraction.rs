@@ -25,7 +25,7 @@ impl System {
     /// # Example
     /// ```
     /// use stickslip::structure::Structure;
-    /// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+    /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
     /// assert!(system.contracts());
     /// let old = system.structure();
     /// let mut damping = old.damping().clone();

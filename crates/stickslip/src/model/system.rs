@@ -19,7 +19,6 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// use num_complex::Complex64;
 /// use std::sync::Arc;
 /// use stickslip::law::Coulomb;
-/// use std::sync::Arc;
 /// use stickslip::model::{Axis, System};
 /// use stickslip::structure::Structure;
 /// let places = vec!["a".to_owned(), "b".to_owned()];

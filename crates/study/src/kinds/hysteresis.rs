@@ -1,43 +1,57 @@
 //! Hysteresis loops: force over displacement of joints and moved places, over one period of the steady motion.
 
-use super::{Complaint, FREQUENCY, Kind, SAMPLES, anything, orbits};
+mod tables;
+
+pub use tables::{Loop, loops};
+
+use self::tables::{DAMPING, DISPLACEMENT, DISSIPATION, FORCE, JOINT, LOOPS, STIFFNESS, SUMMARY, TIME};
+use super::keys::{FREQUENCY, SAMPLES, anything};
+use super::orbits;
+use crate::columns::{ENERGY_GAP, FREQUENCY as DRIVE, RESIDUAL};
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Figure, Panel, Series};
-use crate::drawing::{Drawing, largest, numbers, shown_hertz, words};
+use crate::drawing::{Drawing, largest, numbers, words};
+use crate::info::Complaint;
+use crate::info::KindInfo;
+use crate::key::{Takes, default, optional};
+use crate::kind::Kind;
 use crate::rows::Rows;
-use crate::schema::{Takes, default, optional};
-use crate::summary::{Cost, Costing, Shape, driven};
 use crate::values::{Values, hertz};
+use crate::warnings::driven;
+use crate::words::shown_hertz;
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use stickslip::dimension::Dimension;
 use stickslip::model::Model;
 use stickslip::orbit::{Orbit, Sample};
 
 pub(super) const KIND: Kind = Kind {
-    name: "hysteresis",
-    summary: "force-displacement loops with dissipation, equivalent stiffness and damping",
-    keys: &[
-        FREQUENCY,
-        optional(
-            "loop",
-            Takes::Names,
-            "joints, or moved places (the force that moves them), whose loops are wanted; every joint when absent",
-            "\"shroud\"",
-        ),
-        optional(
-            "against",
-            Takes::Name,
-            "the mass whose displacement is the abscissa of the loops; absent: the relative displacement of the joint",
-            "\"blade1\"",
-        ),
-        default("sum", Takes::Flag, "false", "adds the forces of the joints up to one loop", "true"),
-        SAMPLES,
-    ],
-    check,
-    axes: [Some(Dimension::LENGTH), Some(Dimension::FORCE)],
-    uses_method: true,
-    needs: anything,
-    adapts: false,
-    tables: &["loops", "loops_summary"],
+    info: KindInfo {
+        name: tables::NAME,
+        summary: "force-displacement loops with dissipation, equivalent stiffness and damping",
+        keys: &[
+            FREQUENCY,
+            optional(
+                "loop",
+                Takes::Names,
+                "joints, or moved places (the force that moves them), whose loops are wanted; every joint when absent",
+                "\"shroud\"",
+            ),
+            optional(
+                "against",
+                Takes::Name,
+                "the mass whose displacement is the abscissa of the loops; absent: the relative displacement of the joint",
+                "\"blade1\"",
+            ),
+            default("sum", Takes::Flag, "false", "adds the forces of the joints up to one loop", "true"),
+            SAMPLES,
+        ],
+        check,
+        axes: [Some(Dimension::LENGTH), Some(Dimension::FORCE)],
+        uses_method: true,
+        needs: anything,
+        adapts: false,
+        tables: &[LOOPS, SUMMARY],
+    },
     grain: |_| Grain::Frequencies,
     cost,
     warnings: driven,
@@ -67,7 +81,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     let labels: Vec<String> = model.joints.iter().flat_map(|joint| model.joint_labels(joint)).collect();
     let mut known: Vec<&str> = labels.iter().map(String::as_str).collect();
     known.extend(model.motions.iter().map(|motion| motion.on.as_str()));
@@ -134,7 +148,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
     let several = work.several_frequencies();
     let sources = sources(prepared);
-    for orbit in orbits::found(work, &mut part)? {
+    for (orbit, _) in orbits::found(work, &mut part)? {
         let omega = orbit.omega;
         let times = orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
         let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();
@@ -143,25 +157,25 @@ fn compute(work: &Work<'_>) -> Computed {
                 let (displacement, force) = source.read(sample);
                 table.varied(&prepared.case);
                 if several {
-                    table.number("frequency_Hz", hertz(omega));
+                    table.number(DRIVE, hertz(omega));
                 }
-                table.text("joint", name);
-                table.number("time_s", *time);
-                table.number("displacement_m", displacement);
-                table.number("force_N", force);
+                table.text(JOINT, name);
+                table.number(TIME, *time);
+                table.number(DISPLACEMENT, displacement);
+                table.number(FORCE, force);
                 table.end();
             }
             let first = First::new(&orbit, source);
             summary.varied(&prepared.case);
             if several {
-                summary.number("frequency_Hz", hertz(omega));
+                summary.number(DRIVE, hertz(omega));
             }
-            summary.text("joint", name);
-            summary.number("dissipation_J", exact_loss(prepared, &orbit, source).unwrap_or(first.loss));
-            summary.number("equivalent_stiffness_N_per_m", first.stiffness);
-            summary.number("equivalent_damping_kg_per_s", first.damping);
-            summary.number("residual", orbit.evidence.residual);
-            summary.number("energy_gap", orbit.evidence.energy_gap);
+            summary.text(JOINT, name);
+            summary.number(DISSIPATION, exact_loss(prepared, &orbit, source).unwrap_or(first.loss));
+            summary.number(STIFFNESS, first.stiffness);
+            summary.number(DAMPING, first.damping);
+            summary.number(RESIDUAL, orbit.evidence.residual);
+            summary.number(ENERGY_GAP, orbit.evidence.energy_gap);
             summary.text("status", orbit.evidence.accuracy.status());
             summary.end();
         }
@@ -266,23 +280,21 @@ impl First {
 
 /// The fastest varied parameter and the frequency tell the loops of one panel apart, the others the panels.
 fn draw(drawing: &Drawing<'_>) -> Figure {
-    let Some(table) = drawing.table("loops") else { return Figure::default() };
-    let (x_axis, x_factor) = drawing.axis(0, "displacement", largest(table, ["displacement_m".to_owned()]), "m");
-    let (y_axis, y_factor) = drawing.axis(1, "force", largest(table, ["force_N".to_owned()]), "N");
-    let joints = words(table, "joint");
+    let Some(table) = drawing.table(LOOPS) else { return Figure::default() };
+    let (x_axis, x_factor) = drawing.axis(0, "displacement", largest(table, [DISPLACEMENT.to_owned()]), "m");
+    let (y_axis, y_factor) = drawing.axis(1, "force", largest(table, [FORCE.to_owned()]), "N");
+    let joints = words(table, JOINT);
     // a table from elsewhere may lack columns
     if joints.len() != table.rows() {
         return Figure::default();
     }
-    let frequencies = table.numbers("frequency_Hz");
+    let frequencies = table.numbers(DRIVE);
     let several = joints.iter().any(|joint| *joint != joints[0]);
-    let same = |a: usize, b: usize| joints[a] == joints[b] && frequencies.is_none_or(|f| f[a] == f[b]);
     let mut panels: Vec<Panel> = Vec::new();
     for stretch in drawing.stretches(table) {
         let (outer, inner) = stretch.varied.split_at(stretch.varied.len().saturating_sub(1));
-        let mut from = stretch.rows.start;
-        while from < stretch.rows.end {
-            let to = (from + 1..stretch.rows.end).find(|row| !same(from, *row)).unwrap_or(stretch.rows.end);
+        for rows in tables::single(table, stretch.rows.clone()) {
+            let from = rows.start;
             let mut title: Vec<String> = outer.iter().map(|v| v.text.clone()).collect();
             if several {
                 title.push(joints[from].clone());
@@ -297,11 +309,10 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 panels.push(Panel { title, x: x_axis.clone(), y: y_axis.clone(), series: Vec::new() });
                 panels.len() - 1
             });
-            let x = numbers(table, "displacement_m", from..to).iter().map(|u| u * x_factor).collect();
-            let y = numbers(table, "force_N", from..to).iter().map(|f| f * y_factor).collect();
+            let x = numbers(table, DISPLACEMENT, rows.clone()).iter().map(|u| u * x_factor).collect();
+            let y = numbers(table, FORCE, rows).iter().map(|f| f * y_factor).collect();
             let colour = panels[at].series.len();
             panels[at].series.push(Series::line(label, x, y, colour));
-            from = to;
         }
     }
     Figure { panels, ..Figure::default() }
