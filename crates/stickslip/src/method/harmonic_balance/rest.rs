@@ -3,7 +3,7 @@
 //! With the modes `(λ, φ)` of `M x'' + C x' + K x`, computed once, the response to `Re(F e^{st})` is a sum of `φ (ψᵀF) / (s - λ)`.
 //! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored.
 
-use super::joints::Coordinate;
+use super::ports::Ports;
 use super::sparse::Sparse;
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
@@ -27,7 +27,7 @@ pub(super) struct Rest {
     mass: DMatrix<f64>,
     damping: DMatrix<f64>,
     stiffness: DMatrix<f64>,
-    /// Directions of the coordinates, n × q.
+    /// Directions of the axes, n × q.
     direction: DMatrix<f64>,
 }
 
@@ -38,7 +38,7 @@ struct Modal {
     /// n × modes, and modes × n.
     shape: DMatrix<Complex64>,
     left: DMatrix<Complex64>,
-    /// The same along the coordinates: q × modes, and modes × q.
+    /// The same along the axes: q × modes, and modes × q.
     shape_at: DMatrix<Complex64>,
     left_at: DMatrix<Complex64>,
     /// Free directions, n × r and r × q.
@@ -47,14 +47,14 @@ struct Modal {
 }
 
 impl Rest {
-    pub fn new(system: &System, coordinates: &[Coordinate]) -> Self {
+    pub fn new(system: &System, ports: &Ports) -> Self {
         let n = system.dofs();
-        let direction =
-            DMatrix::from_columns(&coordinates.iter().map(|c| system.joints()[c.joint].axes()[0].dense(n)).collect::<Vec<_>>());
+        let columns: Vec<DVector<f64>> = (0..ports.count()).map(|q| ports.axis(system, q).dense(n)).collect();
+        let direction = if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) };
         Rest {
             n,
             // where the banded form takes over, the modes are not needed
-            modal: if Sparse::new(system, coordinates, &[1]).is_some() { None } else { modal(system, &direction) },
+            modal: if Sparse::new(system, ports, &[1]).is_some() { None } else { modal(system, &direction) },
             mass: system.structure().mass().clone(),
             damping: system.structure().damping().clone(),
             stiffness: system.structure().stiffness().clone(),
@@ -62,7 +62,7 @@ impl Rest {
         }
     }
 
-    /// Displacements along the coordinates under unit forces along them, at `s = jhΩ`, q × q, m/N.
+    /// Displacements along the axes under unit forces along them, at `s = jhΩ`, q × q, m/N.
     pub fn receptance(&self, harmonic: usize, omega: f64) -> DMatrix<Complex64> {
         self.receptance_at(Complex64::new(0.0, harmonic as f64 * omega), omega)
     }
@@ -139,7 +139,7 @@ impl Rest {
         found
     }
 
-    /// `W f`: forces on all places from forces along the coordinates.
+    /// `W f`: forces on all places from forces along the axes.
     pub fn spread(&self, along: impl Fn(usize) -> Complex64) -> DVector<Complex64> {
         let mut force = DVector::from_element(self.n, ZERO);
         for q in 0..self.direction.ncols() {
