@@ -2,8 +2,8 @@
 
 use crate::args::What;
 use clap::ValueEnum;
-use stickslip::{law, method, model::templates};
-use stickslip_study::kinds;
+use stickslip::{law, method};
+use stickslip_study::{kinds, templates};
 
 /// The list as text; without a choice all of them, each under its heading.
 pub fn text(what: Option<What>) -> String {
@@ -38,12 +38,12 @@ fn one(what: What) -> String {
         What::Templates => {
             for row in templates::TABLE {
                 let keys: Vec<_> =
-                    row.parameters.iter().map(|p| (format!("{} = {}", p.key, p.default), p.doc.to_owned())).collect();
-                entry(row.name, row.summary, &keys);
+                    row.parameters().into_iter().map(|p| (format!("{} = {}", p.key, p.default), p.doc)).collect();
+                entry(row.name, row.summary(), &keys);
             }
         }
         What::Studies => {
-            for row in kinds::TABLE {
+            for row in kinds::TABLE.iter().map(|kind| kind.info) {
                 let keys: Vec<_> = row.keys.iter().map(|k| (k.name.to_owned(), k.doc.to_owned())).collect();
                 entry(row.name, row.summary, &keys);
             }

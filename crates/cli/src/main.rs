@@ -19,7 +19,6 @@ macro_rules! complain_on {
 mod args;
 mod list;
 mod open;
-mod paper;
 mod plot;
 mod progress;
 mod run;
@@ -103,8 +102,8 @@ fn print(text: &str) -> Ending {
 }
 
 fn new(name: &str, file: Option<&Path>) -> Ending {
-    let Some(template) = stickslip::model::templates::find(name) else {
-        let names: Vec<&str> = stickslip::model::templates::TABLE.iter().map(|t| t.name).collect();
+    let Some(template) = stickslip_study::templates::find(name) else {
+        let names: Vec<&str> = stickslip_study::templates::TABLE.iter().map(|t| t.name).collect();
         complain!("error: there is no template `{name}`; there are {}", names.join(", "));
         return Ending::WrongInput;
     };

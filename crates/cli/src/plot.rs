@@ -134,7 +134,7 @@ fn overlay(runs: &[Stored], wanted: &Wanted<'_>, outputs: &Outputs) -> Ending {
     };
     let colour = std::io::stdout().is_terminal();
     let width = terminal_size::terminal_size().filter(|_| colour).map(|(width, _)| usize::from(width.0));
-    let ending = print(&Terminal { colour, width }.text(&comparison, &files));
+    let ending = print(&Terminal { colour, width }.text(&compare::for_people(&comparison), &files));
     if wanted.open {
         show_figure(&files);
     }

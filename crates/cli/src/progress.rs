@@ -32,10 +32,14 @@ pub fn stop_flag() -> Arc<AtomicBool> {
 /// Signals closer than this to the first are the same request.
 const REPEATED: Duration = Duration::from_millis(400);
 
-/// A bar over `points`; it draws nothing unless standard error is a terminal.
-pub fn bar(points: u64, what: &str) -> ProgressBar {
-    let bar = ProgressBar::new(points);
-    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:24} {pos}/{len} points, {left}") {
+/// A bar over `points`, or a count where their number is not known before; it draws nothing unless standard error is a terminal.
+pub fn bar(points: Option<u64>, what: &str) -> ProgressBar {
+    let bar = points.map_or_else(ProgressBar::no_length, ProgressBar::new);
+    let template = match points {
+        Some(_) => "{msg} {bar:24} {pos}/{len} points, {left}",
+        None => "{msg} {pos} points, as many as the curve needs",
+    };
+    if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style.with_key("left", |state: &ProgressState, out: &mut dyn Write| {
             let _ = out.write_str(&left(state.pos(), state.len().unwrap_or(0), state.eta()));
         }));

@@ -1,7 +1,7 @@
 //! `stickslip run`, `check` and `paper`.
 
 use crate::args::Place;
-use crate::{Ending, open, paper, print, progress};
+use crate::{Ending, open, print, progress};
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use std::time::Duration;
 use stickslip::orbit::Accuracy;
 use stickslip_report::{Outputs, check_writable, json::write_dataset_json, terminal::Terminal, write_dataset};
 use stickslip_study::dataset::Dataset;
-use stickslip_study::run::{CONVERGED, Context, check as check_study, run as run_study};
+use stickslip_study::run::{CONVERGED, Checked, Context, check as check_study};
 use stickslip_study::schema::MOST_BYTES;
 use stickslip_study::summary::ModelSummary;
 use stickslip_study::{Study, StudyError, read_bytes, read_file};
@@ -30,7 +30,7 @@ pub struct Request<'a> {
 
 impl Request<'_> {
     /// Reads and checks every file before anything runs.
-    fn read(&self) -> Result<Vec<Study>, Ending> {
+    fn read(&self) -> Result<Vec<Checked>, Ending> {
         let mut studies = Vec::new();
         let mut wrong = false;
         for file in self.files {
@@ -43,7 +43,9 @@ impl Request<'_> {
                     Some(bytes) => study.with_memory_limit(bytes),
                     None => study,
                 })
-                .and_then(|study| check_study(&study).map(|()| study));
+                .and_then(|study| check_study(&study))
+                // of many studies, large ones perhaps, none keeps what its run makes again
+                .map(|checked| if self.files.len() > 1 { checked.lean() } else { checked });
             match study {
                 Ok(study) => studies.push(study),
                 Err(error) => {
@@ -84,11 +86,11 @@ pub fn check(request: &Request<'_>) -> Ending {
         Err(ending) => ending,
         Ok(studies) => {
             let mut text = String::new();
-            for (study, file) in studies.iter().zip(request.files) {
+            for (checked, file) in studies.iter().zip(request.files) {
+                let (study, summary) = (checked.study(), warned(checked));
                 let (cases, points) = (study.cases(), study.points());
                 let plural = |count: usize| if count == 1 { "" } else { "s" };
-                let summary = summary(study);
-                let verdict = match summary.as_ref().map_or(0, |summary| summary.warnings.len()) {
+                let verdict = match summary.warnings.len() {
                     0 => "nothing wrong".to_owned(),
                     warnings => format!("{warnings} warning{}", plural(warnings)),
                 };
@@ -100,7 +102,7 @@ pub fn check(request: &Request<'_>) -> Ending {
                     plural(points)
                 );
                 text.extend(study.notes().iter().map(|note| format!("  note: {note}\n")));
-                text += &summary.map(|summary| summary.to_string()).unwrap_or_default();
+                text += &summary.to_string();
             }
             print(&text)
         }
@@ -120,11 +122,9 @@ pub struct Wanted<'a> {
 }
 
 /// What is known of a study before it is run, with its warnings on standard error.
-fn summary(study: &Study) -> Option<ModelSummary> {
-    // the study was checked, and its summary with it
-    let summary = ModelSummary::new(study).ok()?;
-    summary.warnings.iter().for_each(|warning| complain!("{warning}"));
-    Some(summary)
+fn warned(checked: &Checked) -> &ModelSummary {
+    checked.summary().warnings.iter().for_each(|warning| complain!("{warning}"));
+    checked.summary()
 }
 
 /// The outputs that `--only` names; all without it.
@@ -194,23 +194,28 @@ fn once(
         Err(ending) => return ending,
     };
     let mut names = BTreeSet::new();
-    if let Some(twice) = studies.iter().find(|study| !names.insert(study.name())) {
+    if let Some(twice) = studies.iter().map(Checked::study).find(|study| !names.insert(study.name())) {
         complain!("error: two files are called `{}`, their results would be in one folder; rename one", twice.name());
         return Ending::WrongInput;
     }
-    if let Some(error) = studies.iter().find_map(|study| check_writable(&place.out.join(study.name())).err()) {
+    if let Some(error) =
+        studies.iter().find_map(|checked| check_writable(&place.out.join(checked.study().name())).err())
+    {
         return Ending::Failed(error.to_string());
     }
     let mut failed = false;
-    for study in &studies {
-        let summary = summary(study);
-        if let Some(summary) = summary.as_ref().filter(|_| std::io::stderr().is_terminal()) {
+    // each is let go once it was run, with the case that it keeps
+    for checked in studies {
+        let (study, summary) = (checked.study(), warned(&checked));
+        if std::io::stderr().is_terminal() {
             complain_on!("{}\n{summary}", study.title());
         }
-        let bar = progress::bar(study.points() as u64, study.name());
+        // of adaptive frequencies nobody knows the number before
+        let points = Some(study.points() as u64).filter(|_| !study.is_adaptive());
+        let bar = progress::bar(points, study.name());
         let counter = bar.clone();
         let context = Context { threads, stop: stop.clone(), finished: Arc::new(move || counter.inc(1)) };
-        let result = run_study(study, &context);
+        let result = checked.run(&context);
         bar.finish_and_clear();
         let dataset = match result {
             Ok(dataset) => dataset,
@@ -220,7 +225,7 @@ fn once(
             }
         };
         // those of the summary stand there already
-        let known = |note: &&String| summary.as_ref().is_some_and(|summary| summary.warnings.contains(note));
+        let known = |note: &&String| summary.warnings.contains(note);
         let late = dataset.notes.iter().filter(|note| note.starts_with("warning") && !known(note));
         late.for_each(|warning| complain!("{warning}"));
         failed |= dataset.record.points.keys().any(|status| status != CONVERGED);
@@ -326,7 +331,7 @@ pub fn paper(place: &Place, open: bool) -> Ending {
             complain!("{line}");
         }
     };
-    match paper::paper(&place.out, &context, &say) {
+    match stickslip_paper::paper(&place.out, &context, &say) {
         Err(error) => Ending::Failed(error.to_string()),
         Ok(outcome) => {
             if let ending @ Ending::Failed(_) = print(&outcome.summary) {

@@ -25,7 +25,7 @@ fn stdout(output: &Output) -> String {
 /// A folder with the starting study of a template as `study.toml`.
 fn folder(template: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("study.toml"), stickslip::model::templates::find(template).unwrap().study).unwrap();
+    fs::write(folder.path().join("study.toml"), stickslip_study::templates::find(template).unwrap().study).unwrap();
     folder
 }
 
@@ -208,7 +208,7 @@ fn what_cannot_be_drawn_is_named() {
     // other kinds
     fs::write(
         folder.join("study.toml"),
-        stickslip::model::templates::find("blade-couple").unwrap().study.replacen("points = 241", "points = 3", 1),
+        stickslip_study::templates::find("blade-couple").unwrap().study.replacen("points = 241", "points = 3", 1),
     )
     .unwrap();
     run(folder, "couple", &[]);

@@ -35,6 +35,27 @@ const RANK: f64 = 1e-12;
 /// assert_eq!(λ[0], 2.0);
 /// ```
 pub fn solve(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<f64>) -> Option<DVector<f64>> {
+    let mut lambda = DVector::zeros(b.len());
+    solve_into(d, b, low, high, &mut lambda).then_some(lambda)
+}
+
+/// As [`solve`], into `lambda`; returns false where it returns `None`. One component takes no memory.
+pub fn solve_into(
+    d: &DMatrix<f64>,
+    b: &DVector<f64>,
+    low: &DVector<f64>,
+    high: &DVector<f64>,
+    lambda: &mut DVector<f64>,
+) -> bool {
+    let solution = match b.len() {
+        1 => solve_one(d[0], b[0], low[0], high[0]).map(|one| lambda[0] = one),
+        _ => pivot(d, b, low, high).map(|all| lambda.copy_from(&all)),
+    };
+    solution.is_some()
+}
+
+/// Block pivoting.
+fn pivot(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<f64>) -> Option<DVector<f64>> {
     let n = b.len();
     let mut side = vec![Side::Inside; n];
     let (mut fewest, mut patience) = (n + 1, PATIENCE);
@@ -71,6 +92,18 @@ pub fn solve(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVec
         }
     }
     None
+}
+
+/// One component: inside if it can be, else at the side that it is beyond.
+fn solve_one(d: f64, b: f64, low: f64, high: f64) -> Option<f64> {
+    let lambda = if d > 0.0 { b / d } else { 0.0 };
+    let beyond = if lambda > high { high } else { low };
+    if (low..=high).contains(&lambda) || (lambda - beyond).abs() <= FEASIBLE * lambda.abs() {
+        return Some(lambda.clamp(low, high));
+    }
+    let w = b - d * beyond;
+    let wrong = if beyond == high { -w } else { w };
+    (wrong <= FEASIBLE * (b.abs() + (d * beyond).abs())).then_some(beyond)
 }
 
 fn solve_inside(

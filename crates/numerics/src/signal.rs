@@ -33,11 +33,17 @@ const SERIES_BELOW: f64 = 1e-3;
 /// `(e^z - 1) / z`, accurate for every `z`.
 #[inline]
 fn phi1(z: Complex64) -> Complex64 {
-    if z.norm_sqr() < SERIES_BELOW * SERIES_BELOW {
-        Complex64::new(1.0, 0.0) + z * (0.5 + z * (1.0 / 6.0 + z * (1.0 / 24.0 + z / 120.0)))
-    } else {
-        (z.exp() - 1.0) / z
-    }
+    if z.norm_sqr() < SERIES_BELOW * SERIES_BELOW { phi1_series(z) } else { (z.exp() - 1.0) / z }
+}
+
+/// [`phi1`] where `e^z` is known.
+#[inline]
+fn phi1_of(z: Complex64, exp: Complex64) -> Complex64 {
+    if z.norm_sqr() < SERIES_BELOW * SERIES_BELOW { phi1_series(z) } else { (exp - 1.0) / z }
+}
+
+fn phi1_series(z: Complex64) -> Complex64 {
+    Complex64::new(1.0, 0.0) + z * (0.5 + z * (1.0 / 6.0 + z * (1.0 / 24.0 + z / 120.0)))
 }
 
 /// Where a march for the first zero ended.
@@ -93,11 +99,28 @@ impl Basis {
     /// The basis functions at `time`, into `out` (length [`Basis::len`]).
     #[inline]
     pub fn evaluate(&self, time: f64, out: &mut [Complex64]) {
+        self.evaluate_and(time, out, |_, _| {});
+    }
+
+    /// As [`Basis::evaluate`]; `size` gets the magnitude of every exponential that decays or grows.
+    #[inline]
+    fn evaluate_and(&self, time: f64, out: &mut [Complex64], mut size: impl FnMut(usize, f64)) {
         let e = self.exponents.len();
-        for (value, s) in out[..e].iter_mut().zip(&self.exponents) {
+        if time == 0.0 {
+            out[..e].fill(Complex64::new(1.0, 0.0));
+            out[e..].fill(Complex64::new(0.0, 0.0));
+            out[self.constant()] = Complex64::new(1.0, 0.0);
+            return;
+        }
+        for (b, (value, s)) in out[..e].iter_mut().zip(&self.exponents).enumerate() {
             let (sin, cos) = (s.im * time).sin_cos();
-            let decay = if s.re == 0.0 { 1.0 } else { (s.re * time).exp() };
-            *value = Complex64::new(decay * cos, decay * sin);
+            if s.re == 0.0 {
+                *value = Complex64::new(cos, sin);
+            } else {
+                let decay = (s.re * time).exp();
+                size(b, decay);
+                *value = Complex64::new(decay * cos, decay * sin);
+            }
         }
         for (value, (s, delta)) in out[e..].iter_mut().zip(&self.resonant) {
             *value = (s * time).exp() * time * phi1(delta * time);
@@ -106,6 +129,11 @@ impl Basis {
         out[c] = Complex64::new(1.0, 0.0);
         out[c + 1] = Complex64::new(time, 0.0);
         out[c + 2] = Complex64::new(0.5 * time * time, 0.0);
+    }
+
+    /// The value of a signal at `τ = 0`: exponentials contribute their coefficient, polynomials the constant, resonant pairs nothing.
+    pub fn beginning(&self, coefficients: &[Complex64]) -> f64 {
+        coefficients[..self.exponents.len()].iter().map(|c| c.re).sum::<f64>() + coefficients[self.constant()].re
     }
 
     /// Coefficients of the derivative of a signal, into `out`.
@@ -126,17 +154,24 @@ impl Basis {
         out[c + 2] = Complex64::new(0.0, 0.0);
     }
 
-    /// Coefficients of `factor · g(time + τ)` as a signal of τ, into `out`.
-    pub fn shift(&self, coefficients: &[Complex64], time: f64, factor: f64, out: &mut [Complex64]) {
+    /// Coefficients of `factor · g(time + τ)` as a signal of τ, into `out`; `values` are the basis functions at `time`.
+    pub fn shift(
+        &self,
+        coefficients: &[Complex64],
+        time: f64,
+        values: &[Complex64],
+        factor: f64,
+        out: &mut [Complex64],
+    ) {
         let (e, c) = (self.exponents.len(), self.constant());
-        for ((o, g), s) in out[..e].iter_mut().zip(coefficients).zip(&self.exponents) {
-            *o = g * (s * time).exp() * factor;
+        for ((o, g), value) in out[..e].iter_mut().zip(coefficients).zip(values) {
+            *o = g * value * factor;
         }
-        for (r, (s, delta)) in self.resonant.iter().enumerate() {
+        for (r, (s, _)) in self.resonant.iter().enumerate() {
             // D(a + τ) = e^{sa} D(τ) + D(a) e^{(s+δ)τ}
             let g = coefficients[e + r] * factor;
             out[e + r] = g * (s * time).exp();
-            out[self.driven_by[r]] += g * (s * time).exp() * time * phi1(delta * time);
+            out[self.driven_by[r]] += g * values[e + r];
         }
         let (one, linear, square) = (coefficients[c], coefficients[c + 1], coefficients[c + 2]);
         out[c] = (one + linear * time + square * (0.5 * time * time)) * factor;
@@ -144,12 +179,24 @@ impl Basis {
         out[c + 2] = square * factor;
     }
 
-    /// Bounds `max |B_b|` over `[start, end]`, into `out`.
+    /// Bounds on the sizes of the coefficients of a derivative from those of the signal, into `out`; `speeds` are the sizes of the exponents.
     #[inline]
-    fn magnitudes(&self, start: f64, end: f64, out: &mut [f64]) {
+    fn differentiate_sizes(&self, sizes: &[f64], speeds: &[f64], out: &mut [f64]) {
+        let (e, c) = (self.exponents.len(), self.constant());
+        for ((out, size), speed) in out[..c].iter_mut().zip(sizes).zip(speeds) {
+            *out = size * speed;
+        }
+        for (r, &driven_by) in self.driven_by.iter().enumerate() {
+            out[driven_by] += sizes[e + r];
+        }
+        (out[c], out[c + 1], out[c + 2]) = (sizes[c + 1], sizes[c + 2], 0.0);
+    }
+
+    /// Bounds `max |B_b|` over `[0, end]`, into `out`.
+    fn magnitudes(&self, end: f64, out: &mut [f64]) {
         let e = self.exponents.len();
         for (value, s) in out[..e].iter_mut().zip(&self.exponents) {
-            *value = if s.re == 0.0 { 1.0 } else { (s.re * if s.re > 0.0 { end } else { start }).exp() };
+            *value = if s.re > 0.0 { (s.re * end).exp() } else { 1.0 };
         }
         for (value, (s, delta)) in out[e..].iter_mut().zip(&self.resonant) {
             // |e^{sτ} τ φ(δτ)| ≤ τ e^{max(Re s, Re (s+δ), 0) τ}
@@ -164,25 +211,29 @@ impl Basis {
     /// The first time in `(0, end]` at which one of the `signals` vanishes.
     ///
     /// `signals` holds the coefficients one after the other, `begins` says of each how it starts. Every signal is positive until
-    /// then. The march steps over `h` with `g + g' h - max|g''| h²/2 > 0`, so no zero is missed, and close to a simple zero the
-    /// step is Newton's: it converges quadratically from the left. Scratch memory comes from the caller.
+    /// then. The march steps over `h` with `g + g' h - max|g''| h²/2 > 0`, so no zero is missed. Where the second derivative is known
+    /// to be milder over such a stretch, from its value and the bound on the third, the step is the longer one that this allows: close to
+    /// a simple zero it converges cubically, from the left. Scratch memory comes from the caller.
     pub fn first_zero(&self, signals: &[Complex64], begins: &[Begin], end: f64, scratch: &mut Scratch) -> FirstZero {
         let (nb, count) = (self.len(), begins.len());
         scratch.prepare(nb, count);
-        let Scratch { values, magnitudes, first, second, weights, clear_until } = scratch;
+        let Scratch { values, magnitudes, speeds, first, second, second_weights, third_weights, clear_until, rising } =
+            scratch;
+        let every = self.exponents.iter().chain(self.resonant.iter().map(|(s, _)| s));
+        speeds.iter_mut().zip(every).for_each(|(speed, s)| *speed = size_of(s));
         for k in 0..count {
-            let g = &signals[k * nb..(k + 1) * nb];
-            self.differentiate(g, &mut first[k * nb..(k + 1) * nb]);
-            self.differentiate(&first[k * nb..(k + 1) * nb], &mut second[k * nb..(k + 1) * nb]);
-            for b in 0..nb {
-                weights[k * nb + b] = second[k * nb + b].norm_sqr().sqrt(); // no overflow here: hypot would only cost
-            }
+            let range = k * nb..(k + 1) * nb;
+            self.differentiate(&signals[range.clone()], &mut first[range.clone()]);
+            self.differentiate(&first[range.clone()], &mut second[range.clone()]);
+            let (weights, signal) = (&mut second_weights[range.clone()], &second[range.clone()]);
+            weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = size_of(c));
+            self.differentiate_sizes(weights, speeds, &mut third_weights[range]);
         }
-        self.magnitudes(0.0, end, magnitudes);
+        self.magnitudes(end, magnitudes);
         for k in 0..count {
             clear_until[k] = match begins[k] {
                 Begin::Positive => 0.0,
-                Begin::Zero => match self.rises_until(&signals[k * nb..(k + 1) * nb], magnitudes) {
+                Begin::Zero => match self.rises_until(&first[k * nb..(k + 1) * nb], magnitudes, rising) {
                     Some(until) => until,
                     None => return FirstZero::At { index: k, time: 0.0 },
                 },
@@ -191,13 +242,16 @@ impl Basis {
         let mut time = 0.0;
         let resolution = TIME_RESOLUTION * end;
         for _ in 0..MARCH_STEPS {
-            self.evaluate(time, values);
-            self.magnitudes(time, end, magnitudes);
-            let (mut step, mut nearest) = (f64::INFINITY, 0);
+            self.evaluate_and(time, values, |b, size| {
+                if self.exponents[b].re < 0.0 {
+                    magnitudes[b] = size; // from here on it is smaller
+                }
+            });
+            let (mut step, mut nearest, mut settled) = (f64::INFINITY, 0, false);
             for k in 0..count {
                 if time < clear_until[k] {
                     if clear_until[k] - time < step {
-                        (step, nearest) = (clear_until[k] - time, k);
+                        (step, nearest, settled) = (clear_until[k] - time, k, false);
                     }
                     continue;
                 }
@@ -207,16 +261,31 @@ impl Basis {
                     return FirstZero::At { index: k, time };
                 }
                 let slope = real_dot(&first[range.clone()], values);
-                let bound: f64 = weights[range].iter().zip(&*magnitudes).map(|(w, m)| w * m).sum();
-                // the positive root of g + slope h - bound h²/2, in the form that does not cancel
-                let root = (slope * slope + 2.0 * bound * g).sqrt();
-                let safe = if slope < 0.0 { 2.0 * g / (root - slope) } else { (slope + root) / bound };
-                if safe < step {
-                    (step, nearest) = (safe, k);
+                let bound = bounded_by(&second_weights[range.clone()], magnitudes);
+                let safe = fall(g, slope, -bound);
+                if safe >= step {
+                    continue;
+                }
+                // over twice that step the second derivative is within `change` of its value
+                let reach = 2.0 * safe;
+                let curvature = real_dot(&second[range.clone()], values);
+                let change = reach * bounded_by(&third_weights[range], magnitudes);
+                let (mut first_possible, mut last_possible) = (safe, f64::INFINITY);
+                if curvature - change > -bound {
+                    first_possible = fall(g, slope, curvature - change).min(reach);
+                    last_possible = fall(g, slope, curvature + change);
+                }
+                if first_possible < step {
+                    // time itself has no room for more digits
+                    let settled_here = last_possible <= reach && last_possible - first_possible <= resolution;
+                    (step, nearest, settled) = (first_possible, k, settled_here);
                 }
             }
             if time + step >= end {
                 return FirstZero::None;
+            }
+            if settled {
+                return FirstZero::At { index: nearest, time: time + step };
             }
             if step <= resolution {
                 let range = nearest * nb..(nearest + 1) * nb;
@@ -230,46 +299,30 @@ impl Basis {
         FirstZero::TooManySteps
     }
 
-    /// For a signal that starts at zero: how long it certainly stays positive, or `None` if it falls.
-    fn rises_until(&self, signal: &[Complex64], magnitudes: &[f64]) -> Option<f64> {
-        let nb = self.len();
-        let mut current = signal.to_vec();
-        let mut next = vec![Complex64::new(0.0, 0.0); nb];
+    /// For a signal that starts at zero, with derivative `slope`: how long it certainly stays positive, or `None` if it falls.
+    fn rises_until(&self, slope: &[Complex64], magnitudes: &[f64], memory: &mut [Vec<Complex64>; 2]) -> Option<f64> {
+        let [current, next] = memory;
+        current.clear();
+        current.extend_from_slice(slope);
+        next.resize(slope.len(), Complex64::new(0.0, 0.0));
         for order in 1..=4 {
-            self.differentiate(&current, &mut next);
-            std::mem::swap(&mut current, &mut next);
-            // polynomials contribute their constant at τ = 0, exponentials their coefficient, resonant pairs nothing
-            let value: f64 =
-                current[..self.exponents.len()].iter().map(|c| c.re).sum::<f64>() + current[self.constant()].re;
-            let size: f64 = current[..=self.constant()].iter().map(|c| c.norm()).sum();
+            if order > 1 {
+                self.differentiate(current, next);
+                std::mem::swap(current, next);
+            }
+            let value = self.beginning(current);
+            let size: f64 = current[..=self.constant()].iter().map(size_of).sum();
             if value.abs() > VANISHES * size {
                 if value < 0.0 {
                     return None;
                 }
-                self.differentiate(&current, &mut next);
-                let bound: f64 = next.iter().zip(magnitudes).map(|(c, m)| c.norm() * m).sum();
+                self.differentiate(current, next);
+                let bound: f64 = next.iter().zip(magnitudes).map(|(c, m)| size_of(c) * m).sum();
                 // g ≥ value τ^k/k! - bound τ^{k+1}/(k+1)!
                 return Some(if bound == 0.0 { f64::INFINITY } else { 0.5 * f64::from(order + 1) * value / bound });
             }
         }
         Some(f64::INFINITY) // flat: a contact that stays exactly at its limit
-    }
-
-    /// `∫ g dτ` over `[0, length]`.
-    pub fn integral(&self, coefficients: &[Complex64], length: f64) -> f64 {
-        self.fourier_integral(coefficients, 0.0, length).re
-    }
-
-    /// `∫ g e^{-jντ} dτ` over `[0, length]`.
-    pub fn fourier_integral(&self, coefficients: &[Complex64], nu: f64, length: f64) -> Complex64 {
-        let probe = Basis { exponents: vec![Complex64::new(0.0, nu)], ..Basis::default() };
-        let part = |turn: Complex64| {
-            let mut harmonic = [Complex64::new(0.0, 0.0); 1 + POLYNOMIALS];
-            harmonic[0] = turn;
-            integral_of_product((self, coefficients), (&probe, &harmonic), length)
-        };
-        // Re e^{jντ} = cos ντ, Re(-j e^{jντ}) = sin ντ
-        Complex64::new(part(Complex64::new(1.0, 0.0)), -part(Complex64::new(0.0, -1.0)))
     }
 
     fn is_exponential(&self, coefficients: &[Complex64]) -> bool {
@@ -279,35 +332,106 @@ impl Basis {
     }
 }
 
-/// `∫ g h dτ` over `[0, length]` of two signals, in closed form for exponentials.
-pub fn integral_of_product(
-    (g_basis, g): (&Basis, &[Complex64]),
-    (h_basis, h): (&Basis, &[Complex64]),
+/// Integrals of products of the signals of one basis over one stretch of time, in closed form for exponentials: with `e_b` the exponentials
+/// and the constant, the integrals `∫ e_b e_c dτ` and `∫ e_b e_c* dτ` serve all signals.
+#[derive(Debug, Clone, Default)]
+pub struct Products {
     length: f64,
-) -> f64 {
-    if !(g_basis.is_exponential(g) && h_basis.is_exponential(h)) {
-        return quadrature((g_basis, g), (h_basis, h), length);
-    }
-    let zero = Complex64::new(0.0, 0.0);
-    let terms = |basis: &Basis, coefficients: &[Complex64]| {
-        let constant = (zero, coefficients[basis.constant()]);
-        basis.exponents.iter().copied().zip(coefficients.iter().copied()).chain([constant]).collect::<Vec<_>>()
-    };
-    let mut sum = 0.0;
-    let inner = terms(h_basis, h);
-    for (s, c) in terms(g_basis, g) {
-        if c == zero {
-            continue;
-        }
-        for &(r, d) in &inner {
-            if d != zero {
-                // Re a Re b = Re (a b + a b*) / 2
-                let both = c * d * phi1((s + r) * length) + c * d.conj() * phi1((s + r.conj()) * length);
-                sum += 0.5 * both.re;
+    /// Number of exponentials and the constant.
+    terms: usize,
+    /// `∫ e_b e_c dτ`, terms × terms.
+    plain: Vec<Complex64>,
+    /// `∫ e_b e_c* dτ`, terms × terms.
+    mixed: Vec<Complex64>,
+}
+
+impl Products {
+    /// Integrals over `[0, length]`; `at_end` are the basis functions at `length`.
+    pub fn new(basis: &Basis, at_end: &[Complex64], length: f64) -> Self {
+        let (e, zero, one) = (basis.exponents.len(), Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));
+        let terms = e + 1;
+        let term = |b: usize| if b < e { (basis.exponents[b], at_end[b]) } else { (zero, one) };
+        let (mut plain, mut mixed) = (vec![zero; terms * terms], vec![zero; terms * terms]);
+        for b in 0..terms {
+            let (s, s_end) = term(b);
+            for c in 0..=b {
+                let (r, r_end) = term(c);
+                let value = phi1_of((s + r) * length, s_end * r_end) * length;
+                plain[b * terms + c] = value;
+                plain[c * terms + b] = value;
+                let value = phi1_of((s + r.conj()) * length, s_end * r_end.conj()) * length;
+                mixed[b * terms + c] = value;
+                mixed[c * terms + b] = value.conj();
             }
         }
+        Products { length, terms, plain, mixed }
     }
-    sum * length
+
+    /// `∫ g h dτ`
+    pub fn integral(&self, basis: &Basis, g: &[Complex64], h: &[Complex64]) -> f64 {
+        if !(basis.is_exponential(g) && basis.is_exponential(h)) {
+            return quadrature((basis, g), (basis, h), self.length);
+        }
+        let zero = Complex64::new(0.0, 0.0);
+        let coefficient = |of: &[Complex64], b: usize| of[if b + 1 < self.terms { b } else { basis.constant() }];
+        let mut sum = 0.0;
+        for b in 0..self.terms {
+            let c = coefficient(g, b);
+            if c == zero {
+                continue;
+            }
+            // Re a Re b = Re (a b + a b*) / 2
+            let mut inner = zero;
+            for k in 0..self.terms {
+                let d = coefficient(h, k);
+                inner += d * self.plain[b * self.terms + k] + d.conj() * self.mixed[b * self.terms + k];
+            }
+            sum += 0.5 * (c * inner).re;
+        }
+        sum
+    }
+}
+
+/// Fourier integrals `∫ g e^{-jντ} dτ` of the signals of one basis over one stretch of time, in closed form for exponentials.
+#[derive(Debug, Clone, Default)]
+pub struct FourierIntegrals {
+    nu: f64,
+    length: f64,
+    /// `∫ e_b e^{-jντ} dτ` and `∫ e_b* e^{-jντ} dτ` of the exponentials and the constant.
+    terms: Vec<(Complex64, Complex64)>,
+}
+
+impl FourierIntegrals {
+    /// Integrals over `[0, length]` at `nu` (rad/s); `at_end` are the basis functions at `length`.
+    pub fn new(basis: &Basis, at_end: &[Complex64], nu: f64, length: f64) -> Self {
+        let (sin, cos) = (nu * length).sin_cos();
+        let (rate, turn) = (Complex64::new(0.0, -nu), Complex64::new(cos, -sin));
+        let constant = (Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));
+        let terms = basis.exponents.iter().copied().zip(at_end.iter().copied()).chain([constant]).map(|(s, end)| {
+            let part = |s: Complex64, end: Complex64| phi1_of((s + rate) * length, end * turn) * length;
+            (part(s, end), part(s.conj(), end.conj()))
+        });
+        FourierIntegrals { nu, length, terms: terms.collect() }
+    }
+
+    /// `∫ g e^{-jντ} dτ`
+    pub fn integral(&self, basis: &Basis, g: &[Complex64]) -> Complex64 {
+        if !basis.is_exponential(g) {
+            let probe = Basis { exponents: vec![Complex64::new(0.0, self.nu)], ..Basis::default() };
+            let part = |turn: Complex64| {
+                let mut harmonic = [Complex64::new(0.0, 0.0); 1 + POLYNOMIALS];
+                harmonic[0] = turn;
+                quadrature((basis, g), (&probe, &harmonic), self.length)
+            };
+            // Re e^{jντ} = cos ντ, Re(-j e^{jντ}) = sin ντ
+            return Complex64::new(part(Complex64::new(1.0, 0.0)), -part(Complex64::new(0.0, -1.0)));
+        }
+        let constant = g[basis.constant()];
+        let coefficients = g[..basis.exponents.len()].iter().chain([&constant]);
+        // Re a = (a + a*) / 2
+        coefficients.zip(&self.terms).map(|(c, (plain, conjugate))| c * plain + c.conj() * conjugate).sum::<Complex64>()
+            * 0.5
+    }
 }
 
 /// Nodes and weights of the 8-point Gauss-Legendre rule on `[-1, 1]`, positive half. Abramowitz and Stegun, Table 25.4.
@@ -342,6 +466,29 @@ fn quadrature((g_basis, g): (&Basis, &[Complex64]), (h_basis, h): (&Basis, &[Com
     0.5 * width * sum
 }
 
+/// The first positive root of `g + slope h + curvature h²/2`, `g > 0`, in the form that does not cancel.
+#[inline]
+fn fall(g: f64, slope: f64, curvature: f64) -> f64 {
+    let square = slope * slope - 2.0 * curvature * g;
+    if square < 0.0 || (slope >= 0.0 && curvature >= 0.0) {
+        return f64::INFINITY;
+    }
+    let root = square.sqrt();
+    if slope < 0.0 { 2.0 * g / (root - slope) } else { (slope + root) / -curvature }
+}
+
+/// Bound of a signal from the sizes of its coefficients and those of the basis functions.
+#[inline]
+fn bounded_by(weights: &[f64], magnitudes: &[f64]) -> f64 {
+    weights.iter().zip(magnitudes).map(|(w, m)| w * m).sum()
+}
+
+/// Size of a coefficient; no overflow here, so that `hypot` would only cost.
+#[inline]
+pub fn size_of(c: &Complex64) -> f64 {
+    c.norm_sqr().sqrt()
+}
+
 /// `Re Σ c_b B_b`.
 #[inline]
 pub fn real_dot(coefficients: &[Complex64], values: &[Complex64]) -> f64 {
@@ -353,10 +500,13 @@ pub fn real_dot(coefficients: &[Complex64], values: &[Complex64]) -> f64 {
 pub struct Scratch {
     values: Vec<Complex64>,
     magnitudes: Vec<f64>,
+    speeds: Vec<f64>,
     first: Vec<Complex64>,
     second: Vec<Complex64>,
-    weights: Vec<f64>,
+    second_weights: Vec<f64>,
+    third_weights: Vec<f64>,
     clear_until: Vec<f64>,
+    rising: [Vec<Complex64>; 2],
 }
 
 impl Scratch {
@@ -364,9 +514,11 @@ impl Scratch {
         let zero = Complex64::new(0.0, 0.0);
         self.values.resize(nb, zero);
         self.magnitudes.resize(nb, 0.0);
+        self.speeds.resize(nb, 0.0);
         self.first.resize(nb * count, zero);
         self.second.resize(nb * count, zero);
-        self.weights.resize(nb * count, 0.0);
+        self.second_weights.resize(nb * count, 0.0);
+        self.third_weights.resize(nb * count, 0.0);
         self.clear_until.resize(count, 0.0);
     }
 }
@@ -422,9 +574,16 @@ mod tests {
             Basis { exponents: vec![s, s + delta, c(-30.0, 0.0)], resonant: vec![(s, delta)], driven_by: vec![1] };
         let zero = c(0.0, 0.0);
         let g = [c(1.0, 0.5), c(-0.3, 0.2), c(0.7, 0.0), zero, c(0.4, 0.0), zero, zero];
-        let exact = integral_of_product((&basis, &g), (&basis, &g), 3.0);
+        let mut end = vec![zero; basis.len()];
+        basis.evaluate(3.0, &mut end);
+        let exact = Products::new(&basis, &end, 3.0).integral(&basis, &g, &g);
         let numeric = quadrature((&basis, &g), (&basis, &g), 3.0);
         assert!((exact - numeric).abs() < 1e-13 * exact.abs(), "{exact} {numeric}");
+        let nu = 1.7;
+        let of = FourierIntegrals::new(&basis, &end, nu, 3.0).integral(&basis, &g);
+        let probe = Basis { exponents: vec![c(0.0, nu)], ..Basis::default() };
+        let part = |turn| quadrature((&basis, &g), (&probe, &[turn, zero, zero, zero]), 3.0);
+        assert!((of - c(part(c(1.0, 0.0)), -part(c(0.0, -1.0)))).norm() < 1e-13 * of.norm(), "{of}");
         // derivative of every basis function, by differences
         for b in 0..basis.len() {
             let mut unit = vec![zero; basis.len()];

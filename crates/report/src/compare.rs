@@ -5,7 +5,8 @@
 //! run is interpolated linearly to the abscissae of the first, which the table says. A relative difference is one relative to the largest size
 //! in that column of the first run, so that a zero of a curve is no infinity.
 
-use crate::output::{Outputs, ReportError, file_name, write_dataset};
+use crate::file::{ReportError, file_name};
+use crate::output::{Outputs, write_dataset};
 use crate::stored::{COMPARISON, Stored, StoredError};
 use crate::terminal;
 use serde_json::Value;
@@ -102,7 +103,8 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
 }
 
 /// The same comparison with differences in their units and in percent, and without what is the same in all runs.
-pub(crate) fn for_people(comparison: &Dataset) -> Dataset {
+#[must_use]
+pub fn for_people(comparison: &Dataset) -> Dataset {
     let mut people = comparison.clone();
     for table in &mut people.tables {
         let several = column(table, "run").is_some_and(|column| match &column.values {

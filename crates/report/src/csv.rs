@@ -3,7 +3,7 @@
 //! A number is written with the fewest digits that read back as the same 64-bit value; a number that does not exist
 //! (NaN) and an unknown flag are empty cells. Same dataset, same bytes.
 
-use crate::output::{File, Output, ReportError, file_name};
+use crate::file::{File, Output, ReportError, file_name};
 use stickslip_study::dataset::{Dataset, Table, Values};
 
 /// The output `csv`.

@@ -5,7 +5,7 @@
 //! there, the files that it lists are those of one run. A run that was interrupted does not replace one that was not: its
 //! results go beside, to `NAME.interrupted`.
 
-use crate::output::{File, ReportError, file_name};
+use crate::file::{File, ReportError, file_name};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;

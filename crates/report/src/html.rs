@@ -7,9 +7,9 @@
 
 use crate::axis::{self, Range};
 use crate::colour::Colour;
+use crate::file::{File, Output, ReportError};
 use crate::font;
 use crate::frame::{self, AREA, Axes, Entry, PALE, Shades};
-use crate::output::{File, Output, ReportError};
 use crate::svg::escape;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};

@@ -2,7 +2,7 @@
 //!
 //! The wall time is the only entry that differs between two runs of the same study.
 
-use crate::output::{File, Output, ReportError};
+use crate::file::{File, Output, ReportError};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use stickslip_study::dataset::{Dataset, Table, Values};
 

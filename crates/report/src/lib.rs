@@ -21,6 +21,7 @@ mod clip;
 mod colour;
 pub mod compare;
 pub mod csv;
+pub mod file;
 pub mod folder;
 mod font;
 mod frame;
@@ -36,7 +37,8 @@ pub mod terminal;
 #[cfg(test)]
 mod samples;
 
+pub use file::{Output, ReportError, write_file};
 pub use folder::check_writable;
-pub use output::{Output, Outputs, ReportError, write_dataset, write_file};
+pub use output::{Outputs, write_dataset};
 pub use page::{Claim, Page, PageTable, Section, Verdict};
 pub use stickslip_study::dataset::{Dataset, Figure};

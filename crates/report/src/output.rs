@@ -1,42 +1,9 @@
-//! The table of outputs, and how their files reach the disk: whole or not at all.
+//! The table of outputs, and the results of a study: all of its files or none.
 
+use crate::file::{File, Output, ReportError, file_name, write_once};
 use crate::folder;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::Dataset;
-
-/// One kind of output: what it is called and how its files are made.
-#[derive(Debug)]
-pub struct Output {
-    /// Name, for flags and lists.
-    pub name: &'static str,
-    /// What it writes, in one line.
-    pub summary: &'static str,
-    /// Makes the files: name inside the study's folder, and content.
-    pub make: fn(&Dataset) -> Result<Vec<File>, ReportError>,
-}
-
-/// A file before it is written.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct File {
-    /// Name inside its folder.
-    pub name: String,
-    /// The bytes.
-    pub content: Vec<u8>,
-    /// Whether its folder is the one that holds the studies' folders: the same file serves them all.
-    pub shared: bool,
-}
-
-impl File {
-    /// A file of this name and content in the study's folder.
-    pub fn new(name: impl Into<String>, content: impl Into<Vec<u8>>) -> File {
-        File { name: name.into(), content: content.into(), shared: false }
-    }
-    /// A file that all studies share, in the folder that holds theirs.
-    pub fn shared(name: impl Into<String>, content: impl Into<Vec<u8>>) -> File {
-        File { shared: true, ..File::new(name, content) }
-    }
-}
 
 /// All outputs, in the order in which they are written.
 pub static TABLE: &[Output] =
@@ -79,65 +46,6 @@ fn known() -> String {
     TABLE.iter().map(|output| output.name).collect::<Vec<_>>().join(", ")
 }
 
-/// Why a result could not be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// The file system refused.
-    #[error("cannot write {}: {cause}", path.display())]
-    Write {
-        /// The file or folder.
-        path: PathBuf,
-        /// The reason of the operating system.
-        #[source]
-        cause: std::io::Error,
-    },
-    /// A name that cannot be the name of a file.
-    #[error("`{name}` cannot name the file of a {what}: use letters, digits, `_`, `-` and `.`")]
-    Name {
-        /// The name.
-        name: String,
-        /// What has the name.
-        what: &'static str,
-    },
-    /// Two tables would be the same file.
-    #[error("two tables are named `{0}`; each needs a name of its own")]
-    SameName(String),
-    /// The columns of a table differ in length.
-    #[error("table `{table}`: column `{column}` has {rows} rows, the first column has {expected}")]
-    Uneven {
-        /// The table.
-        table: String,
-        /// The column that differs from the first.
-        column: String,
-        /// Its rows.
-        rows: usize,
-        /// The rows of the first column.
-        expected: usize,
-    },
-    /// There is no output of this name.
-    #[error("there is no output `{name}`; there are: {known}")]
-    UnknownOutput {
-        /// The name asked for.
-        name: String,
-        /// The names that exist.
-        known: String,
-    },
-    /// A library could not encode a file.
-    #[error("cannot make {file}: {reason}")]
-    Encode {
-        /// The file.
-        file: String,
-        /// The reason.
-        reason: String,
-    },
-}
-
-impl ReportError {
-    pub(crate) fn encode(file: impl Into<String>, reason: impl ToString) -> ReportError {
-        ReportError::Encode { file: file.into(), reason: reason.to_string() }
-    }
-}
-
 /// Writes the chosen outputs of a dataset into `out/NAME/` and returns the paths of the files, in that order. Files that
 /// studies share go into `out`, unless they are there already, and are not among the paths: they are no results.
 ///
@@ -166,53 +74,10 @@ pub fn write_dataset(dataset: &Dataset, out: &Path, outputs: &Outputs) -> Result
     folder::replace(&folder::of_run(out, name, dataset.record.interrupted), &files)
 }
 
-/// Writes a file unless it is there with this content.
-pub(crate) fn write_once(path: &Path, content: &[u8]) -> Result<(), ReportError> {
-    if std::fs::read(path).is_ok_and(|found| found == content) {
-        return Ok(());
-    }
-    write_file(path, content).map(|_| ())
-}
-
-/// Writes one file, whole or not at all: a temporary file in the same folder, renamed when complete. Makes the folder
-/// if need be. Returns the path.
-/// # Errors
-/// [`ReportError::Write`] with the path and the cause.
-pub fn write_file(path: &Path, content: &[u8]) -> Result<PathBuf, ReportError> {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    std::fs::create_dir_all(folder).map_err(|cause| ReportError::Write { path: folder.to_owned(), cause })?;
-    // the process id keeps two runs into the same folder apart
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.part", std::process::id()));
-    let part = folder.join(name);
-    let written = std::fs::File::create(&part)
-        .and_then(|mut file| file.write_all(content).and_then(|()| file.sync_all()))
-        .and_then(|()| std::fs::rename(&part, path));
-    match written {
-        Ok(()) => Ok(path.to_owned()),
-        Err(cause) => {
-            let _ = std::fs::remove_file(&part); // may not exist; the first cause is the one to tell
-            Err(ReportError::Write { path: path.to_owned(), cause })
-        }
-    }
-}
-
-/// The name itself if it can name a file in a folder on any system.
-pub(crate) fn file_name<'a>(name: &'a str, what: &'static str) -> Result<&'a str, ReportError> {
-    let forbidden = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);
-    if name.is_empty() || name.starts_with('.') || name.ends_with(['.', ' ']) || name.contains(forbidden) {
-        return Err(ReportError::Name { name: name.to_owned(), what });
-    }
-    Ok(name)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::file::write_file;
     use crate::samples;
 
     #[test]

@@ -2,8 +2,8 @@
 //!
 //! All figures share one script, a file beside the page; on paper and without it the static figures stand in their places.
 
+use crate::file::{ReportError, write_file, write_once};
 use crate::html::{document, fragment, script, script_name};
-use crate::output::{ReportError, write_file, write_once};
 use crate::svg::escape;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! The figure as pixels: the SVG drawn at twice its size with the embedded font and nothing else.
 
+use crate::file::{File, Output, ReportError};
 use crate::font::{self, Weight};
-use crate::output::{File, Output, ReportError};
 use resvg::{tiny_skia, usvg};
 use stickslip_study::dataset::{Dataset, Figure};
 

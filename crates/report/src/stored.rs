@@ -3,8 +3,9 @@
 //! Numbers are written with all their digits, so that what is read is what was computed, bit for bit. A table that does not fit its record,
 //! because somebody changed it by hand, is an error with its file and line.
 
+use crate::file::{File, ReportError, file_name, write_once};
 use crate::folder::{self, RECORD};
-use crate::output::{File, Outputs, ReportError, file_name, write_once};
+use crate::output::Outputs;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Column, Dataset, Record, Table, Values};

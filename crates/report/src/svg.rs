@@ -7,9 +7,9 @@
 use crate::axis::{self, Range, Ticks};
 use crate::clip::{self, Point, Window};
 use crate::colour::Colour;
+use crate::file::{File, Output, ReportError};
 use crate::font::{self, Weight};
 use crate::frame::{self, AREA, Axes, Entry, PALE, Shades};
-use crate::output::{File, Output, ReportError};
 use std::fmt::Write;
 use stickslip_study::dataset::{Axis, Dataset, Emphasis, Figure, Panel, Series, Style};
 

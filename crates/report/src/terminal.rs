@@ -1,6 +1,7 @@
 //! A dataset for the terminal: what was computed, the small tables, what failed, where the files are.
 
 use crate::stored::COMPARISON;
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Dataset, Table, Values};
@@ -26,20 +27,14 @@ const NARROWEST: usize = 40;
 const EVIDENCE: [&str; 4] = ["residual", "energy_gap", "iterations", "truncation"];
 /// Notes printed; of more than these only the number is told.
 const NOTES: usize = 8;
+/// Headings and words longer than this are cut in their middle where a table is too wide: more than any of Stickslip's own.
+const LONG: usize = 28;
 /// Failures named one by one; of more than these only the number is told.
 const FAILURES: usize = 5;
 
 impl Terminal {
     /// The text, with a final line feed. `files` are the paths that were written; none if nothing was.
     pub fn text(self, dataset: &Dataset, files: &[PathBuf]) -> String {
-        let comparison;
-        let dataset = match dataset.kind.as_str() {
-            COMPARISON => {
-                comparison = crate::compare::for_people(dataset);
-                &comparison
-            }
-            _ => dataset,
-        };
         let mut out = String::new();
         for line in self.wrapped(&clean(&dataset.title), "") {
             let _ = writeln!(out, "{}", self.paint("1", &line));
@@ -271,6 +266,9 @@ fn shown(table: &Table, limit: usize) -> String {
     let all = columns.len();
     // a line begins with two spaces, and two stand between columns
     let too_wide = |columns: &[Shown<'_>]| columns.iter().map(|c| c.width + 2).sum::<usize>() > limit;
+    if too_wide(&columns) {
+        shorten(&mut columns);
+    }
     while columns.len() > 1 && too_wide(&columns) {
         let evidence = EVIDENCE.iter().find_map(|name| columns.iter().position(|c| c.name == *name));
         columns.remove(evidence.unwrap_or(columns.len() - 1));
@@ -292,6 +290,32 @@ fn shown(table: &Table, limit: usize) -> String {
         let _ = writeln!(out, "  … and {} in {}.csv", more.join(", "), clean(&table.name));
     }
     out
+}
+
+/// Cuts long names in headings and cells; those that could not be told apart any more stay.
+fn shorten(columns: &mut [Shown<'_>]) {
+    let headings = cut(columns.iter().map(|column| column.heading.as_str()).collect());
+    for (column, heading) in columns.iter_mut().zip(headings) {
+        column.heading = heading;
+        if !column.right {
+            column.cells = cut(column.cells.iter().map(String::as_str).collect());
+        }
+        let texts = column.cells.iter().chain([&column.heading]);
+        column.width = texts.map(|text| text.chars().count()).max().unwrap_or(0);
+    }
+}
+
+/// The texts, each no longer than [`LONG`]: the middle gives way, as names differ at their ends and units stand there.
+fn cut(texts: Vec<&str>) -> Vec<String> {
+    let short = |text: &str| {
+        let all: Vec<char> = text.chars().collect();
+        let (Some(over), half) = (all.len().checked_sub(LONG + 1), LONG / 2) else { return text.to_owned() };
+        all[..half - 1].iter().chain(&['…']).chain(&all[half + over + 1..]).collect()
+    };
+    let all: Vec<String> = texts.iter().map(|text| short(text)).collect();
+    let distinct = |texts: &mut dyn Iterator<Item = &str>| texts.collect::<BTreeSet<_>>().len();
+    let same = distinct(&mut all.iter().map(String::as_str)) == distinct(&mut texts.iter().copied());
+    if same { all } else { texts.into_iter().map(str::to_owned).collect() }
 }
 
 /// The first values of a column.
@@ -331,6 +355,37 @@ fig02: 6 converged in 125 ms
 results/fig02/: loops_summary.csv, figure.svg
 ";
         assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn long_names_leave_room_for_the_other_columns() {
+        let name = |end: &str| format!("{}_{end}", "the_third_stage_of_the_low_pressure_turbine".repeat(2));
+        let mut dataset = samples::response();
+        let numbers = |name: String| Column { name, values: Values::Number(vec![1.25e-3, 2.5e-3]) };
+        let mass = Column { name: "mass".to_owned(), values: Values::Text(vec![name("left"), name("right")]) };
+        dataset.tables = vec![Table {
+            name: "peaks".to_owned(),
+            columns: vec![
+                mass,
+                numbers("frequency_Hz".to_owned()),
+                numbers(name("amplitude_m")),
+                numbers(name("mean_m")),
+            ],
+        }];
+        for width in [80, 120] {
+            let text = Terminal { width: Some(width), ..Terminal::default() }.text(&dataset, &[]);
+            let lines: Vec<&str> = text.lines().skip_while(|line| *line != "peaks").skip(1).take(3).collect();
+            assert!(lines.iter().all(|line| line.chars().count() <= width), "{text}");
+            assert!(lines[0].contains("frequency (Hz)") && lines[0].contains("… "), "{text}");
+            assert!(lines[1].contains("_left ") && lines[2].contains("_right "), "{text}");
+        }
+        // what could not be told apart stays as it is
+        let texts = [format!("{0}1{0}", "x".repeat(20)), format!("{0}2{0}", "x".repeat(20))];
+        assert_eq!(cut(texts.iter().map(String::as_str).collect()), texts);
+        let long = "abcdefghijklmnopqrstuvwxyz0123456789 (N/m)";
+        let [short] = &cut(vec![long])[..] else { panic!() };
+        assert_eq!((short.chars().count(), short.ends_with("456789 (N/m)")), (LONG, true), "{short}");
+        assert_eq!(cut(vec![&long[..LONG]]), [&long[..LONG]]);
     }
 
     #[test]

@@ -4,11 +4,12 @@
 
 use divan::Bencher;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 use std::time::Instant;
 use stickslip::curve::performance::Performance;
-use stickslip::law::{Jenkins, Law};
+use stickslip::law::{Coulomb, Jenkins};
 use stickslip::method::{Method, Solver, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
-use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, templates};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, example};
 
 /// Blades of the chains.
 const CHAINS: [usize; 4] = [10, 30, 100, 300];
@@ -83,7 +84,7 @@ fn curve(method: HarmonicBalance, system: &System, points: u32) {
 /// 100 points of the massless couple at 2 N, with error estimate and stability: divide by 100.
 #[divan::bench(args = [1, 3, 5, 9, 15])]
 fn massless_couple_100_points(bencher: Bencher, harmonics: usize) {
-    let system = templates::find("blade-couple-massless").unwrap().model().assemble().unwrap();
+    let system = example::blade_couple_massless().assemble().unwrap();
     bencher.bench_local(|| curve(balance(harmonics), &system, 100));
 }
 
@@ -92,10 +93,16 @@ fn massless_couple_100_points(bencher: Bencher, harmonics: usize) {
 fn figure_6_whole(bencher: Bencher) {
     bencher.bench_local(|| {
         for limit in [2.0, 4.0, 6.0, 8.0] {
-            let couple = templates::find("blade-couple").unwrap();
-            curve(balance(9), &couple.model_with(&[("Ft", limit)]).unwrap().assemble().unwrap(), 241);
+            curve(balance(9), &couple(limit).assemble().unwrap(), 241);
         }
     });
+}
+
+/// The couple with a contact mass and this slip limit, N.
+fn couple(limit: f64) -> Model {
+    let mut couple = example::blade_couple();
+    couple.joints[0].law = Arc::new(Coulomb { limit });
+    couple
 }
 
 fn chain(blades: usize) -> System {
@@ -125,11 +132,10 @@ fn chain_point(bencher: Bencher, blades: usize) {
 /// A performance curve of 50 slip limits with its optimum, by the exact method.
 #[divan::bench(sample_count = 3)]
 fn performance_curve_50_slip_limits(bencher: Bencher) {
-    let couple = templates::find("blade-couple").unwrap();
     let limits: Vec<f64> = (0..50).map(|i| 0.5 + 0.25 * f64::from(i)).collect();
     bencher.bench_local(|| {
         let curve = Performance {
-            system: &|limit| couple.model_with(&[("Ft", limit)]).unwrap().assemble(),
+            system: &|limit| couple(limit).assemble(),
             method: &EventDriven,
             range: (TAU * 120.0, TAU * 121.5),
             points: 31,

@@ -2,19 +2,21 @@
 
 use divan::Bencher;
 use std::f64::consts::TAU;
-use stickslip::law::{CoulombArctan, Law};
+use std::sync::Arc;
+use stickslip::law::{Coulomb, CoulombArctan};
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
-use stickslip::model::{System, templates};
+use stickslip::model::{System, example};
 
 fn main() {
     divan::main();
 }
 
 fn couple(ft: f64, alpha: Option<f64>) -> System {
-    let mut model = templates::find("blade-couple").unwrap().model_with(&[("Ft", ft)]).unwrap();
-    if let Some(alpha) = alpha {
-        model.joints[0].law = Arc::new(CoulombArctan { limit: ft, alpha });
-    }
+    let mut model = example::blade_couple();
+    model.joints[0].law = match alpha {
+        None => Arc::new(Coulomb { limit: ft }),
+        Some(alpha) => Arc::new(CoulombArctan { limit: ft, alpha }),
+    };
     model.assemble().unwrap()
 }
 

@@ -9,10 +9,11 @@ mod python;
 
 use python::{Peer, number};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 use std::time::Instant;
-use stickslip::law::{CoulombArctan, Law};
+use stickslip::law::{Coulomb, CoulombArctan};
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
-use stickslip::model::{System, templates};
+use stickslip::model::{System, example};
 
 const SCIPY: Peer = Peer { package: "scipy", version: "1.17.1", folder: "peers" };
 /// Slip limit (N) and frequency (Hz): slip only, stick-slip, stick-slip.
@@ -67,10 +68,12 @@ struct Ours {
 impl Ours {
     fn new((ft, hertz): (f64, f64)) -> Self {
         let couple = |smooth: bool| -> System {
-            let mut model = templates::find("blade-couple").unwrap().model_with(&[("Ft", ft)]).unwrap();
-            if smooth {
-                model.joints[0].law = Arc::new(CoulombArctan { limit: ft, alpha: ALPHA });
-            }
+            let mut model = example::blade_couple();
+            model.joints[0].law = if smooth {
+                Arc::new(CoulombArctan { limit: ft, alpha: ALPHA })
+            } else {
+                Arc::new(Coulomb { limit: ft })
+            };
             model.assemble().unwrap()
         };
         let (_, exact) = time(&EventDriven, &couple(false), hertz);

@@ -16,7 +16,7 @@ use python::{Peer, number};
 use std::f64::consts::TAU;
 use std::time::Instant;
 use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
-use stickslip::model::{System, templates};
+use stickslip::model::{System, example};
 
 const PYHARM: Peer = Peer { package: "pyharm-os", version: "1.2.2", folder: "peers-pyharm" };
 const HARMONICS: [usize; 5] = [1, 3, 5, 9, 15];
@@ -34,7 +34,7 @@ fn main() {
     if std::env::args().any(|a| a == "--test") {
         return;
     }
-    let system = templates::find("blade-couple-massless").unwrap().model().assemble().unwrap();
+    let system = example::blade_couple_massless().assemble().unwrap();
     let ours: Vec<f64> = HARMONICS.iter().map(|harmonics| seconds_per_point(*harmonics, &system)).collect();
     let theirs = pyharm().unwrap_or_else(|reason| {
         println!("pyHarm could not be measured: {reason}");

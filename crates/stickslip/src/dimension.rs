@@ -50,8 +50,33 @@ named! {
     INVERSE_VELOCITY = [0, -1, 1, 0] "inverse velocity" "s/m";
     FORCE = [1, 1, -2, 0] "force" "N";
     STIFFNESS = [1, 0, -2, 0] "stiffness" "N/m";
+    CUBIC_STIFFNESS = [1, -2, -2, 0] "cubic stiffness" "N/m^3";
+    INVERSE_LENGTH = [0, -1, 0, 0] "inverse length" "1/m";
     DAMPING = [1, 0, -1, 0] "damping" "kg/s";
     ENERGY = [1, 2, -2, 0] "energy" "J";
+}
+
+impl Dimension {
+    /// This dimension to a power; `None` if the power is not whole, or too high for the exponents.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip::dimension::Dimension;
+    /// assert_eq!(Dimension::LENGTH.to_the(2.0), Some(Dimension { kg: 0, m: 2, s: 0, rad: 0 }));
+    /// assert_eq!(Dimension::LENGTH.to_the(1.5), None);
+    /// ```
+    pub fn to_the(self, power: f64) -> Option<Dimension> {
+        if power.fract() != 0.0 || power.abs() > f64::from(i8::MAX) {
+            return None;
+        }
+        let power = power as i8; // whole and within its range
+        Some(Dimension {
+            kg: self.kg.checked_mul(power)?,
+            m: self.m.checked_mul(power)?,
+            s: self.s.checked_mul(power)?,
+            rad: self.rad.checked_mul(power)?,
+        })
+    }
 }
 
 impl fmt::Display for Dimension {

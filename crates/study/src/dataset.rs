@@ -3,6 +3,7 @@
 //! The writers in `stickslip-report` see nothing else.
 
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// The result of one study.
@@ -75,24 +76,29 @@ impl Values {
     }
 }
 
+/// The header of a column that is named after a place: a direction of a node, `node.direction`, is written with `_`.
+pub fn column_name(name: &str) -> Cow<'_, str> {
+    if name.contains('.') { Cow::Owned(name.replace('.', "_")) } else { Cow::Borrowed(name) }
+}
+
 impl Table {
     /// The numbers of a column.
     pub fn numbers(&self, column: &str) -> Option<&[f64]> {
-        self.columns.iter().find(|c| c.name == column).and_then(|c| match &c.values {
+        self.columns.iter().find(|c| c.name == column_name(column)).and_then(|c| match &c.values {
             Values::Number(v) => Some(v.as_slice()),
             _ => None,
         })
     }
     /// The words of a column.
     pub fn texts(&self, column: &str) -> Option<&[String]> {
-        self.columns.iter().find(|c| c.name == column).and_then(|c| match &c.values {
+        self.columns.iter().find(|c| c.name == column_name(column)).and_then(|c| match &c.values {
             Values::Text(v) => Some(v.as_slice()),
             _ => None,
         })
     }
     /// The flags of a column.
     pub fn flags(&self, column: &str) -> Option<&[Option<bool>]> {
-        self.columns.iter().find(|c| c.name == column).and_then(|c| match &c.values {
+        self.columns.iter().find(|c| c.name == column_name(column)).and_then(|c| match &c.values {
             Values::Flag(v) => Some(v.as_slice()),
             _ => None,
         })

@@ -1,12 +1,12 @@
 //! Figures from finished tables: what the kinds need to draw, whether the tables were computed just now or read from a disk.
 
 use crate::dataset::{Axis, Table, Values as Cells};
-use crate::kinds::{Complaint, Kind};
 use crate::study::{Study, VariedValue};
 use crate::units;
 use crate::values::Values;
+use crate::words::display_unit;
 use std::ops::Range;
-use stickslip::model::{Model, System};
+use stickslip::model::System;
 
 /// A study and its finished tables.
 #[derive(Debug, Clone, Copy)]
@@ -35,32 +35,6 @@ impl Stretch {
     }
 }
 
-/// What is wrong in `[figure]`.
-pub(crate) fn check(figure: &Values, kind: &Kind, model: &Model) -> Result<(), Complaint> {
-    let masses = model.masses.iter().map(|mass| mass.name.as_str());
-    let known: Vec<&str> = masses.chain(model.joints.iter().map(|joint| joint.name.as_str())).collect();
-    if let Some(name) = figure.names("only").unwrap_or_default().iter().find(|name| !known.contains(&name.as_str())) {
-        return Err(Complaint::unknown("only", "mass or joint", name, &known));
-    }
-    for (key, axis) in [("x_unit", kind.axes[0]), ("y_unit", kind.axes[1])] {
-        let Some(text) = figure.text(key) else { continue };
-        let Some(expected) = axis else {
-            let message = format!("the figure of the kind `{}` has no single unit on this axis", kind.name);
-            return Err(Complaint::new(key, message, "leave it out"));
-        };
-        let example = expected.name_and_unit().map_or("", |(_, unit)| unit);
-        match units::parse(text) {
-            Some(unit) if unit.dimension == expected => {}
-            found => {
-                let what = if found.is_some() { "a unit of another quantity" } else { "no unit that is known" };
-                let help = format!("write a unit such as {example}");
-                return Err(Complaint::new(key, format!("`{}` is {what}", crate::near::shown(text)), help));
-            }
-        }
-    }
-    Ok(())
-}
-
 /// More curves than this in a panel say nothing; they are thinned out evenly, and the panel says so.
 pub(crate) const MOST_CURVES: usize = 400;
 
@@ -81,7 +55,7 @@ impl<'a> Drawing<'a> {
 
     /// Whether the figure shows a mass or joint of this name.
     pub(crate) fn shows(&self, name: &str) -> bool {
-        self.options().names("only").is_none_or(|names| names.iter().any(|shown| shown == name))
+        self.options().names("only").is_none_or(|names| names.iter().any(|shown| shown == name || is_of(shown, name)))
     }
 
     /// How curves of so many masses and cases are laid out.
@@ -114,11 +88,11 @@ impl<'a> Drawing<'a> {
         (if options.text(scale_key) == Some("log") { axis.log() } else { axis }, factor)
     }
 
-    /// What the colours of curves mean whose last varied parameter differs; none if there is none, or it has no numbers to tell.
-    pub(crate) fn varied_axis(&self, stretches: &[Stretch]) -> Option<Axis> {
-        let last = stretches.first()?.varied.last()?;
+    /// What the colours of curves mean whose varied parameter number `which` differs; none if there is none, or it has no numbers to tell.
+    pub(crate) fn varied_axis(&self, stretches: &[Stretch], which: usize) -> Option<Axis> {
+        let last = stretches.first()?.varied.get(which)?;
         let values: Vec<f64> =
-            stretches.iter().filter_map(|stretch| Some(stretch.varied.last()?.on_axis().0)).collect();
+            stretches.iter().filter_map(|stretch| Some(stretch.varied.get(which)?.on_axis().0)).collect();
         let axis = Axis::new(&last.name, last.on_axis().1);
         // values that are spaced by ratios belong on a logarithmic scale
         let positive = values.iter().all(|value| *value > 0.0);
@@ -217,18 +191,7 @@ pub(crate) fn largest(table: &Table, columns: impl IntoIterator<Item = String>) 
     columns.flatten().map(|value| value.abs()).filter(|value| value.is_finite()).fold(0.0, f64::max)
 }
 
-/// A frequency in a title or legend, to a microhertz: `80 Hz`.
-pub(crate) fn shown_hertz(frequency: f64) -> String {
-    let text = format!("{frequency:.6}");
-    format!("{} Hz", text.trim_end_matches('0').trim_end_matches('.'))
-}
-
-/// The unit in which `largest` (SI) lies between 0.5 and 500: its name and the factor from SI.
-pub(crate) fn display_unit(largest: f64, si: &str) -> (String, f64) {
-    for (prefix, factor) in [("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)] {
-        if largest * factor >= 0.5 {
-            return (format!("{prefix}{si}"), factor);
-        }
-    }
-    (si.to_owned(), 1.0)
+/// Whether `name` is an axis or a direction of what `whole` names: `root.x` of `root`.
+fn is_of(whole: &str, name: &str) -> bool {
+    name.strip_prefix(whole).is_some_and(|rest| rest.starts_with('.'))
 }

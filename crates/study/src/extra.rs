@@ -26,8 +26,9 @@ pub(crate) const TABLE: &[Extra] = &[
         doc: "half of peak to peak of every joint's force",
         columns: |system| of_joints(system, "force_amplitude_N"),
         values: |prepared, _, samples| {
-            let joints = 0..prepared.system.joints().len();
-            joints.map(|j| half_range(samples.iter().map(|sample| sample.joints[j].force[0]))).collect()
+            let joints = prepared.system.joints().iter().enumerate();
+            let axes = joints.flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)));
+            axes.map(|(j, a)| half_range(samples.iter().map(|sample| sample.joints[j].force[a]))).collect()
         },
     },
     Extra {
@@ -35,7 +36,8 @@ pub(crate) const TABLE: &[Extra] = &[
         doc: "half of peak to peak of every joint's relative displacement",
         columns: |system| of_joints(system, "amplitude_m"),
         values: |_, orbit, _| {
-            orbit.joints.iter().map(|joint| 0.5 * (joint.displacement[0].1 - joint.displacement[0].0).abs()).collect()
+            let axes = orbit.joints.iter().flat_map(|joint| &joint.displacement);
+            axes.map(|(low, high)| 0.5 * (high - low).abs()).collect()
         },
     },
     Extra {
@@ -84,7 +86,7 @@ const HARMONICS: usize = 5;
 pub(crate) const INSTANTS: usize = 1024;
 
 fn of_joints(system: &System, quantity: &str) -> Vec<String> {
-    system.joints().iter().map(|joint| format!("{}_{quantity}", joint.name)).collect()
+    system.joints().iter().flat_map(|joint| joint.labels()).map(|label| format!("{label}_{quantity}")).collect()
 }
 
 fn of_places(system: &System, quantity: &str) -> Vec<String> {

@@ -13,7 +13,7 @@ use stickslip::model::{Element, GROUND, Model, ModelError};
 pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
     let mut stiffest: HashMap<&str, (f64, Element)> = HashMap::new();
     let springs = model.springs.iter().enumerate().map(|(i, s)| (&s.between, s.stiffness, Element::Spring(i)));
-    let joints = model.joints.iter().enumerate().map(|(i, j)| (&j.between, stiffness(&j.law), Element::Joint(i)));
+    let joints = model.joints.iter().enumerate().map(|(i, j)| (&j.between, stiffness(&*j.law), Element::Joint(i)));
     for (between, stiffness, element) in springs.chain(joints) {
         for place in between.iter().filter(|place| *place != GROUND) {
             let known = stiffest.entry(place).or_insert((stiffness, element));
@@ -43,7 +43,6 @@ pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
 }
 
 /// Stiffness of a law while it sticks, N/m; zero of a rigid one, and of one that holds nothing.
-fn stiffness(law: &Law) -> f64 {
-    let at = law.info().parameters.iter().position(|parameter| parameter.key == "stiffness");
-    at.filter(|_| !law.is_free()).map_or(0.0, |at| law.values()[at])
+fn stiffness(law: &dyn Law) -> f64 {
+    law.value("stiffness").filter(|_| !law.is_free()).unwrap_or(0.0)
 }

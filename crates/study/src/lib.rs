@@ -3,6 +3,8 @@
 //! [`read_study`] turns a text into a [`Study`]: tree ([`toml`]), statements (every expression compiled, every place known), then every
 //! case once, so that whatever is wrong is found before anything is written. [`schema`] describes all tables and keys as data.
 
+mod columns;
+pub mod cost;
 pub mod dataset;
 mod decay;
 mod document;
@@ -10,21 +12,31 @@ mod drawing;
 mod error;
 pub mod expression;
 mod extra;
+mod figure;
 mod immovable;
+mod info;
+mod key;
+mod kind;
 pub mod kinds;
+pub mod memory;
 mod near;
 mod note;
 mod point;
 mod read;
 mod repeat;
+pub mod results;
 mod rows;
 pub mod run;
 pub mod schema;
 mod statement;
 mod study;
 pub mod summary;
+mod survey;
+pub mod templates;
 pub mod units;
 mod values;
+mod warnings;
+mod words;
 pub mod work;
 
 pub use error::StudyError;

@@ -2,6 +2,9 @@
 
 use stickslip::orbit::{Accuracy, Orbit};
 
+/// How a note begins that is a warning.
+pub(crate) const WARNING: &str = "warning: ";
+
 /// A note.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Note {
@@ -25,13 +28,15 @@ pub enum Note {
 }
 
 impl Note {
-    /// What the accuracy of an orbit's series asks for.
-    pub(crate) fn of_accuracy(orbit: &Orbit) -> Option<Note> {
-        match orbit.evidence.accuracy {
+    /// What an orbit asks for: that it is unstable, if that is known (see [`Orbit::is_stable`]), and how accurate its series is.
+    pub(crate) fn of_orbit(orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
+        let unstable = (stable == Some(false)).then_some(Note::Unstable(1));
+        let accuracy = match orbit.evidence.accuracy {
             Accuracy::Truncated => Some(Note::Truncated(1, orbit.evidence.truncation.unwrap_or(0.0))),
             Accuracy::Unchecked => Some(Note::Unchecked(1)),
             Accuracy::Converged => None,
-        }
+        };
+        unstable.into_iter().chain(accuracy).collect()
     }
 
     /// Adds it to `notes`, to one of its sort if there is one.

@@ -1,5 +1,6 @@
 //! What a table keeps of one orbit, or of its failure.
 
+use crate::columns;
 use crate::extra;
 use crate::rows::Rows;
 use crate::study::Case;
@@ -35,24 +36,29 @@ pub(crate) struct Summary {
 impl Summary {
     pub fn new(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> Self {
         match outcome {
-            Ok(orbit) => Summary {
-                places: orbit.places.iter().map(|p| [p.amplitude(), p.mean, p.phase_deg()]).collect(),
-                joints: orbit.joints.iter().map(|j| [j.dissipation, j.slip_fraction]).collect(),
-                stable: orbit.is_stable(),
-                residual: orbit.evidence.residual,
-                energy_gap: orbit.evidence.energy_gap,
-                truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),
-                iterations: orbit.evidence.iterations as u64,
-                status: orbit.evidence.accuracy.status().to_owned(),
-                failure: None,
-                stuck: orbit.is_one_of_many(),
-                extra: extra::values(prepared, orbit),
-            },
+            Ok(orbit) => Summary::of(prepared, orbit, orbit.is_stable()),
             Err(error) => {
                 let mut row = Summary::missing(prepared, error.status());
                 row.failure = Some(error.to_string());
                 row
             }
+        }
+    }
+
+    /// Of an orbit whose stability was looked at before.
+    pub fn of(prepared: &Prepared, orbit: &Orbit, stable: Option<bool>) -> Self {
+        Summary {
+            places: orbit.places.iter().map(|p| [p.amplitude(), p.mean, p.phase_deg()]).collect(),
+            joints: orbit.joints.iter().map(|j| [j.dissipation, j.slip_fraction]).collect(),
+            stable,
+            residual: orbit.evidence.residual,
+            energy_gap: orbit.evidence.energy_gap,
+            truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),
+            iterations: orbit.evidence.iterations as u64,
+            status: orbit.evidence.accuracy.status().to_owned(),
+            failure: None,
+            stuck: orbit.is_one_of_many(),
+            extra: extra::values(prepared, orbit),
         }
     }
 
@@ -78,21 +84,21 @@ impl Summary {
     pub fn write(&self, prepared: &Prepared, rows: &mut Rows) {
         let system = &prepared.system;
         for (place, [amplitude, mean, phase]) in system.places().iter().zip(&self.places) {
-            rows.number(&format!("{place}_amplitude_m"), *amplitude);
+            rows.number(&columns::amplitude_of(place), *amplitude);
             rows.number(&format!("{place}_mean_m"), *mean);
             rows.number(&format!("{place}_phase_deg"), *phase);
         }
         for (joint, [dissipation, slip]) in system.joints().iter().zip(&self.joints) {
-            rows.number(&format!("{}_dissipation_J", joint.name), *dissipation);
-            rows.number(&format!("{}_slip_fraction", joint.name), *slip);
+            rows.number(&format!("{}_dissipation_J", joint.name()), *dissipation);
+            rows.number(&format!("{}_slip_fraction", joint.name()), *slip);
         }
         extra::columns(&prepared.case, &prepared.system)
             .iter()
             .zip(&self.extra)
             .for_each(|(column, value)| rows.number(column, *value));
         rows.flag("stable", self.stable);
-        rows.number("residual", self.residual);
-        rows.number("energy_gap", self.energy_gap);
+        rows.number(columns::RESIDUAL, self.residual);
+        rows.number(columns::ENERGY_GAP, self.energy_gap);
         rows.number("truncation", self.truncation);
         rows.integer("iterations", self.iterations);
         rows.text("status", &self.status);

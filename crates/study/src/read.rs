@@ -2,7 +2,8 @@
 
 use crate::document::{self, Content, Entry, Node, Table};
 use crate::error::{Place, Problem, Source, StudyError};
-use crate::expression::{Expression, Value, described, is_reserved};
+use crate::expression::{Expression, Value, is_reserved};
+use crate::info::KindInfo;
 use crate::kinds;
 use crate::near::{nearest, one_of, shown};
 use crate::repeat::{Index, Repetition, Turn};
@@ -10,16 +11,19 @@ use crate::schema::{
     self, FILE, Key, MOST_BYTES, MOST_ELEMENTS, MOST_MASSES, MOST_POINTS, Presence, STUDY, Takes, Within,
 };
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable};
-use crate::study::{Lists, Parameter, Replaced, Structure, Study, Varied, VariedPoints};
+use crate::study::{
+    Lists, NamedTemplate, Parameter, Replaced, Structure, Study, Varied, VariedPoints, evaluate, model_of,
+};
+use crate::templates::{self, Template};
 use crate::values::Given;
 use std::collections::HashMap;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
-use stickslip::model::is_identifier;
-use stickslip::model::templates::{self, Template};
-use stickslip::{law, method};
+use stickslip::law::{self, LawInfo};
+use stickslip::method;
+use stickslip::model::{Model, is_identifier};
 
 /// Most errors that are reported at once.
 const MOST_ERRORS: usize = 20;
@@ -98,8 +102,7 @@ fn too_big(name: &str, bytes: usize) -> Result<(), StudyError> {
 ///
 /// # Example
 /// ```
-/// use stickslip::model::templates;
-/// use stickslip_study::read_study;
+/// use stickslip_study::{read_study, templates};
 /// let text = templates::find("blade-couple").unwrap().study;
 /// let study = read_study("couple.toml", text, &[]).unwrap();
 /// assert_eq!((study.name(), study.cases()), ("couple", 4));
@@ -111,28 +114,70 @@ fn too_big(name: &str, bytes: usize) -> Result<(), StudyError> {
 /// ```
 pub fn read_study(name: &str, text: &str, overrides: &[(String, String)]) -> Result<Study, StudyError> {
     too_big(name, text.len())?;
-    let mut reader = Reader {
-        sources: vec![Arc::new(Source { name: name.to_owned(), text: text.to_owned() })],
-        problems: Vec::new(),
-        names: Vec::new(),
-        index: HashMap::new(),
-        repetition: Repetition::default(),
-        number: 0,
-    };
+    let mut reader = Reader::default();
+    reader.text(name.to_owned(), text.to_owned());
     let study = reader.study(name, text, overrides);
     match study {
         Some(study) if reader.problems.is_empty() => {
             study.check()?;
             Ok(study)
         }
-        _ => {
-            reader.problems.truncate(MOST_ERRORS);
-            let error = StudyError::all(&reader.sources, std::mem::take(&mut reader.problems));
-            Err(error.unwrap_or_else(|| StudyError::file(name, "the study could not be read", None)))
-        }
+        _ => Err(reader.error(name)),
     }
 }
 
+/// The model of a template with its parameters, compiled.
+pub(crate) struct CompiledTemplate {
+    pub names: Vec<String>,
+    /// Each has the dimension of its default, if that has any.
+    pub parameters: Vec<Parameter>,
+    order: Vec<usize>,
+    structure: Structure,
+    sources: Vec<Arc<Source>>,
+}
+
+impl CompiledTemplate {
+    /// The values of the parameters; those that are `fixed` have that value, SI.
+    pub fn values(&self, fixed: &[(usize, f64)]) -> Result<Vec<Value>, StudyError> {
+        let values = evaluate(&self.names, &self.parameters, &self.order, &HashMap::new(), fixed);
+        values.map_err(|problem| StudyError::at(&self.sources, problem))
+    }
+
+    /// The model; parameters that are `fixed` have that value, SI.
+    pub fn model(&self, fixed: &[(usize, f64)]) -> Result<Model, StudyError> {
+        let environment = Environment { names: &self.names, values: self.values(fixed)? };
+        let mut problems = Vec::new();
+        let model = model_of(&self.structure, &environment, &mut problems);
+        StudyError::all(&self.sources, problems).map_or(Ok(model), Err)
+    }
+}
+
+/// Compiles the model of a template's file.
+///
+/// # Errors
+/// [`StudyError`]: the file is wrong, which is none of a user's doing.
+pub(crate) fn compile_template(row: &Template) -> Result<CompiledTemplate, StudyError> {
+    let mut reader = Reader::default();
+    let stated = reader.template(row);
+    let order = stated.as_ref().and_then(|stated| reader.order(&stated.parameters, &[]));
+    match (stated, order) {
+        (Some(TemplateFile { parameters, lists, .. }), Some(order)) if reader.problems.is_empty() => {
+            let structure = Structure { lists, template: None };
+            Ok(CompiledTemplate { names: reader.names, parameters, order, structure, sources: reader.sources })
+        }
+        _ => Err(reader.error(row.name)),
+    }
+}
+
+/// What a template's file states, but for its study.
+struct TemplateFile {
+    parameters: Vec<Parameter>,
+    lists: Lists,
+    /// The file among the sources.
+    source: usize,
+}
+
+#[derive(Default)]
 struct Reader {
     sources: Vec<Arc<Source>>,
     problems: Vec<Problem>,
@@ -145,6 +190,13 @@ struct Reader {
 }
 
 impl Reader {
+    /// All problems as one error.
+    fn error(&mut self, file: &str) -> StudyError {
+        self.problems.truncate(MOST_ERRORS);
+        let error = StudyError::all(&self.sources, std::mem::take(&mut self.problems));
+        error.unwrap_or_else(|| StudyError::file(file, "the study could not be read", None))
+    }
+
     fn study(&mut self, file: &str, text: &str, overrides: &[(String, String)]) -> Option<Study> {
         let root = match document::parse(text, 0) {
             Ok(root) => root,
@@ -173,11 +225,16 @@ impl Reader {
         let title = words(self, "title");
         let source = words(self, "source");
 
-        let template = self.template(&root);
-        let parameters = self.parameters(&root, template.as_ref().map(|(row, _)| *row), overrides);
-        let structure = match template {
-            Some((row, table)) => self.with_template(&root, row, table),
-            None => self.lists(&root),
+        let (parameters, structure) = match named_template(&root) {
+            Some((row, table)) => {
+                let TemplateFile { parameters, lists, source } = self.template(row)?;
+                let parameters = self.parameters(&root, parameters, overrides);
+                (parameters, self.with_template(&root, row, lists, table, source))
+            }
+            None => {
+                let parameters = self.parameters(&root, Vec::new(), overrides);
+                (parameters, self.lists(&root).map(|lists| Structure { lists, template: None }))
+            }
         };
         let (kind, study, vary) = self.request(&root)?;
         let method = self.method(&root);
@@ -535,12 +592,12 @@ impl Reader {
     }
 
     fn law(&mut self, table: &Table) -> Option<Stated> {
-        let row = self.kind(table, ("the law", "coulomb"), law::TABLE, |row| row.name)?;
+        let row: &'static LawInfo = *self.kind(table, ("the law", "coulomb"), law::TABLE, |row| row.name)?;
         let mut keys = vec![schema::required("kind", Takes::Text, "law", "\"coulomb\"")];
         keys.extend(row.parameters.iter().map(|p| Key {
             name: p.key,
-            takes: Takes::Quantity(p.dimension, if p.may_be_zero { Within::AtLeastZero } else { Within::Positive }),
-            presence: Presence::Required,
+            takes: Takes::Quantity(p.dimension, crate::key::within(p.range)),
+            presence: if p.default.is_some() { Presence::Optional } else { Presence::Required },
             doc: p.doc,
             example: example_of(p.dimension),
         }));
@@ -578,14 +635,14 @@ impl Reader {
         Some(self.table(table, &keys, &format!("method `{}`", row.name)))
     }
 
-    fn request<'a>(&mut self, root: &'a Table) -> Option<(&'static kinds::Kind, StatedTable, Option<&'a Entry>)> {
+    fn request<'a>(&mut self, root: &'a Table) -> Option<(&'static KindInfo, StatedTable, Option<&'a Entry>)> {
         let node = &root.get("study")?.node;
         let Content::Table(table) = &node.value else {
             let message = format!("expected a table, found {}", node.value.described());
             self.problems.push(Problem::new(&node.place, "study", message).help("write [study] and below it its kind"));
             return None;
         };
-        let kind = self.kind(table, ("[study]", "response"), kinds::TABLE, |row| row.name)?;
+        let kind = &self.kind(table, ("[study]", "response"), kinds::TABLE, |row| row.info.name)?.info;
         let mut keys = STUDY.to_vec();
         keys.extend(kind.keys);
         // `vary` is not a value of the kind: it makes the cases
@@ -598,14 +655,31 @@ impl Reader {
 
     // ------------------------------------------------------------------------------------------ the model
 
-    /// The template of `[model]`, with its table.
-    fn template<'a>(&mut self, root: &'a Table) -> Option<(&'static Template, &'a Table)> {
-        let Content::Table(table) = &root.get("model")?.node.value else { return None };
-        let Content::Text { text, .. } = &table.get("template")?.node.value else { return None };
-        Some((templates::find(text)?, table))
+    /// Reads a template's file, first of all that has parameters: its texts know its own alone, whatever names a
+    /// study adds.
+    fn template(&mut self, row: &Template) -> Option<TemplateFile> {
+        let source = self.text(format!("template {}", row.name), row.study.to_owned()).source;
+        let root = match document::parse(row.study, source) {
+            Ok(root) => root,
+            Err(problem) => {
+                self.problems.push(problem);
+                return None;
+            }
+        };
+        let mut parameters = self.parameters(&root, Vec::new(), &[])?;
+        self.settle_dimensions(&mut parameters, &(0..self.names.len()).collect::<Vec<_>>())?;
+        Some(TemplateFile { parameters, lists: self.lists(&root)?, source })
     }
 
-    fn with_template(&mut self, root: &Table, row: &'static Template, table: &Table) -> Option<Structure> {
+    /// The model of a template, with the law that the study gives its joints.
+    fn with_template(
+        &mut self,
+        root: &Table,
+        row: &Template,
+        mut lists: Lists,
+        table: &Table,
+        source: usize,
+    ) -> Option<Structure> {
         for key in FILE.iter().filter(|key| matches!(key.takes, Takes::List(_))) {
             if let Some(entry) = root.get(key.name) {
                 let message =
@@ -621,10 +695,15 @@ impl Reader {
             return None;
         };
         let table = self.table(table, keys, "[model]");
-        Some(Structure::Template(row, table))
+        if let Some(law) = table.entry("law") {
+            for entry in lists.joint.iter_mut().flat_map(|joint| &mut joint.entries).filter(|e| e.key == law.key) {
+                entry.clone_from(law);
+            }
+        }
+        Some(Structure { lists, template: Some(NamedTemplate { table, source }) })
     }
 
-    fn lists(&mut self, root: &Table) -> Option<Structure> {
+    fn lists(&mut self, root: &Table) -> Option<Lists> {
         let mut lists = Lists::default();
         for key in FILE {
             let (node, name) = match root.get(key.name) {
@@ -679,7 +758,7 @@ impl Reader {
                     .push(Problem::new(&spring.place, "stiffness", message).help("add stiffness = \"105103 N/m\""));
             }
         }
-        Some(Structure::Lists(lists))
+        Some(lists)
     }
 
     /// The entries that one entry states, up to the first that is wrong.
@@ -790,26 +869,14 @@ impl Reader {
 
     // ------------------------------------------------------------------------------------------ parameters
 
+    /// The parameters: those `given` by a template, whose values the file may replace, and those that the file adds.
     fn parameters(
         &mut self,
         root: &Table,
-        template: Option<&'static Template>,
+        given: Vec<Parameter>,
         overrides: &[(String, String)],
     ) -> Option<Vec<Parameter>> {
-        struct Declared {
-            name: String,
-            node: Node,
-            dimension: Option<Dimension>,
-        }
-        let mut declared: Vec<Declared> = Vec::new();
-        for row in template.map_or(&[][..], |template| template.parameters) {
-            let place = self.text(format!("template parameter {}", row.key), row.default.to_owned());
-            let value = Content::Text { text: row.default.to_owned(), inner: Some(0) };
-            let node = Node { place, value };
-            declared.push(Declared { name: row.key.to_owned(), node, dimension: Some(row.dimension) });
-        }
-        let mut known: HashMap<String, usize> =
-            declared.iter().enumerate().map(|(i, parameter)| (parameter.name.clone(), i)).collect();
+        let mut stated: Vec<(usize, &Node)> = Vec::new();
         if let Some(entry) = root.get("parameters") {
             let Content::Table(table) = &entry.node.value else {
                 let message = format!("expected a table of quantities, found {}", entry.node.value.described());
@@ -823,22 +890,24 @@ impl Reader {
                     self.problems.push(problem(message.to_owned()));
                 } else if is_reserved(&entry.key) {
                     self.problems.push(problem(format!("`{}` has a meaning of its own in expressions", entry.key)));
-                } else if let Some(&i) = known.get(&entry.key) {
-                    declared[i].node = entry.node.clone();
+                } else if let Some(&index) = self.index.get(&entry.key) {
+                    stated.push((index, &entry.node));
                 } else {
-                    known.insert(entry.key.clone(), declared.len());
-                    let (name, node) = (entry.key.clone(), entry.node.clone());
-                    declared.push(Declared { name, node, dimension: None });
+                    stated.push((self.names.len(), &entry.node));
+                    self.index.insert(entry.key.clone(), self.names.len());
+                    self.names.push(entry.key.clone());
                 }
             }
         }
-        self.names = declared.iter().map(|parameter| parameter.name.clone()).collect();
-        self.index = known;
         let before = self.problems.len();
-        let mut parameters = Vec::with_capacity(declared.len());
-        for Declared { name, node, dimension } in declared {
-            let quantity = self.quantity(&name, &node);
-            parameters.extend(quantity.map(|quantity| Parameter { quantity, dimension }));
+        let mut parameters = given;
+        for (index, node) in stated {
+            let name = self.names[index].clone();
+            let Some(quantity) = self.quantity(&name, node) else { continue };
+            match parameters.get_mut(index) {
+                Some(parameter) => parameter.quantity = quantity,
+                None => parameters.push(Parameter { quantity, dimension: None }),
+            }
         }
         if self.problems.len() > before || parameters.len() < self.names.len() {
             return None;
@@ -885,7 +954,7 @@ impl Reader {
     /// Gives these parameters the dimension that they have in the file, so that other values must have it too.
     fn settle_dimensions(&mut self, parameters: &mut [Parameter], which: &[usize]) -> Option<()> {
         let order = self.order(parameters, &[])?;
-        let values = match crate::study::evaluate(&self.names, parameters, &order, &HashMap::new(), None) {
+        let values = match evaluate(&self.names, parameters, &order, &HashMap::new(), &[]) {
             Ok(values) => values,
             Err(problem) => {
                 self.problems.push(problem);
@@ -1003,6 +1072,13 @@ impl Reader {
     }
 }
 
+/// The template of `[model]`, with its table.
+fn named_template(root: &Table) -> Option<(&'static Template, &Table)> {
+    let Content::Table(table) = &root.get("model")?.node.value else { return None };
+    let Content::Text { text, .. } = &table.get("template")?.node.value else { return None };
+    Some((templates::find(text)?, table))
+}
+
 /// An example of a quantity, for messages.
 fn example_of(dimension: Dimension) -> &'static str {
     match dimension {
@@ -1065,30 +1141,4 @@ fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
         }
     }
     Ok(order)
-}
-
-/// The value of a parameter in the dimension that it must have.
-pub(crate) fn settled(
-    quantity: &Quantity,
-    name: &str,
-    dimension: Option<Dimension>,
-    environment: &Environment<'_>,
-) -> Result<Value, Problem> {
-    let value = quantity.value(name, environment)?;
-    in_dimension(quantity, value, name, dimension, environment)
-}
-
-pub(crate) fn in_dimension(
-    quantity: &Quantity,
-    value: Value,
-    name: &str,
-    dimension: Option<Dimension>,
-    environment: &Environment<'_>,
-) -> Result<Value, Problem> {
-    let Some(dimension) = dimension else { return Ok(value) };
-    let number = quantity.convert(value, dimension, name, "", environment).map_err(|problem| match problem.help {
-        None => problem.help(format!("the parameter `{name}` is {}", described(dimension))),
-        Some(_) => problem,
-    })?;
-    Ok(Value::of(number, dimension))
 }

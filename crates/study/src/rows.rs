@@ -1,6 +1,6 @@
 //! Tables that grow row by row.
 
-use crate::dataset::{Column, Table, Values as Cells};
+use crate::dataset::{Column, Table, Values as Cells, column_name};
 use crate::study::Case;
 
 /// Columns that grow row by row, in a fixed order.
@@ -12,8 +12,9 @@ pub struct Rows {
 
 impl Rows {
     fn cells(&mut self, name: &str, empty: Cells) -> &mut Cells {
+        let name = column_name(name);
         if self.next == self.columns.len() {
-            self.columns.push(Column { name: name.to_owned(), values: empty });
+            self.columns.push(Column { name: name.to_string(), values: empty });
         }
         let column = &mut self.columns[self.next];
         assert_eq!(column.name, name, "rows of one table have the same columns");

@@ -4,6 +4,7 @@
 use crate::dataset::{Dataset, Figure, Record, Table};
 use crate::drawing::Drawing;
 use crate::error::StudyError;
+use crate::kinds;
 use crate::note::Note;
 use crate::study::Study;
 use crate::summary::ModelSummary;
@@ -25,72 +26,131 @@ pub use crate::work::{CONVERGED, Context, NOT_REACHED, Prepared};
 /// # Example
 /// ```
 /// use stickslip_study::{read_study, run::{Context, run}};
-/// let text = stickslip::model::templates::find("element").unwrap().study;
+/// let text = stickslip_study::templates::find("element").unwrap().study;
 /// let study = read_study("element.toml", text, &[]).unwrap();
 /// let dataset = run(&study, &Context::unwatched(1)).unwrap();
 /// let loss = dataset.tables[1].numbers("dissipation_J").unwrap();
 /// assert!((loss[1] - 4e-6).abs() < 1e-15);   // 4 Ft (a - Ft/kt), a = 2 mm
 /// ```
 pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
+    check(study)?.run(context)
+}
+
+/// A study that can be run: it was surveyed, every case was prepared once, and it fits into memory.
+#[derive(Debug)]
+pub struct Checked {
+    study: Study,
+    summary: ModelSummary,
+    /// What finds the orbits of the cases, in words, each once.
+    methods: Vec<String>,
+    /// The first case, if it is kept: in many studies, large ones above all, it is the only one.
+    first: Option<Arc<Prepared>>,
+    /// What the check took.
+    time: Duration,
+}
+
+/// Prepares every case and computes nothing: whether the study can be run, and what is known of it before.
+///
+/// # Errors
+/// [`StudyError`]: the method cannot take the model of a case, or the study needs more memory than it may take.
+///
+/// # Example
+/// ```
+/// use stickslip_study::{read_study, run::{Context, check}};
+/// let text = stickslip::model::templates::find("element").unwrap().study;
+/// let checked = check(&read_study("element.toml", text, &[]).unwrap()).unwrap();
+/// assert_eq!(checked.summary().joints.len(), 1);
+/// assert_eq!(checked.run(&Context::unwatched(1)).unwrap().tables.len(), 2);
+/// ```
+pub fn check(study: &Study) -> Result<Checked, StudyError> {
     let start = Instant::now();
-    let summary = summarised(study)?;
-    let methods = methods(study)?;
-    let part = parts(study, context)?;
-    let kind = study.kind();
-    let interrupted = part.points.contains_key(NOT_REACHED);
-    let mut notes = summary.warnings.clone();
-    notes.extend(study.notes());
-    notes.extend(part.notes.iter().filter_map(Note::text));
-    if interrupted {
-        notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
+    let summary = ModelSummary::new(study)?;
+    if let Some(error) = summary.size.refusal(study) {
+        return Err(error);
     }
-    let tables = kind.tables.iter().zip(part.tables).map(|(name, rows)| rows.table(name));
-    // a table that nothing was ever written to has no columns either
-    let tables: Vec<_> = tables.filter(|table| !table.columns.is_empty()).collect();
-    let figure = redrawn(study, &tables);
-    Ok(Dataset {
-        name: study.name().to_owned(),
-        title: study.title().to_owned(),
-        source: study.source().map(str::to_owned),
-        kind: kind.name.to_owned(),
-        tables,
-        figure,
-        notes,
-        failures: part.failures,
-        record: Record {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            study: recorded(study, &summary),
-            methods,
-            seed: None,
-            threads: context.threads,
-            wall_time_s: start.elapsed().as_secs_f64(),
-            points: part.points,
-            interrupted,
-        },
-    })
+    let mut choices = BTreeSet::new();
+    let mut choose = |prepared: &Prepared| {
+        if study.kind().uses_method {
+            choices.insert(prepared.method.choice(&prepared.system));
+        }
+    };
+    let first = Arc::new(Prepared::new(study, 0)?);
+    choose(&first);
+    for index in 1..study.cases() {
+        choose(&Prepared::new(study, index)?);
+    }
+    let methods = choices.iter().map(Choice::to_string).collect();
+    Ok(Checked { study: study.clone(), summary, methods, first: Some(first), time: start.elapsed() })
+}
+
+impl Checked {
+    /// The study.
+    pub fn study(&self) -> &Study {
+        &self.study
+    }
+
+    /// What is known of it before it is run.
+    pub fn summary(&self) -> &ModelSummary {
+        &self.summary
+    }
+
+    /// The same without its first case, for who holds many studies: of 2000 masses it has 0.1 GB, and a run prepares it again.
+    #[must_use]
+    pub fn lean(self) -> Checked {
+        Checked { first: None, ..self }
+    }
+
+    /// Computes it.
+    ///
+    /// # Errors
+    /// [`StudyError`]: a search between the cases met a model that the method cannot take. Points that do not converge are no error: they
+    /// are in the dataset, as failures.
+    pub fn run(&self, context: &Context) -> Result<Dataset, StudyError> {
+        let start = Instant::now();
+        let Checked { study, summary, methods, .. } = self;
+        let first = match &self.first {
+            Some(first) => first.clone(),
+            None => Arc::new(Prepared::new(study, 0)?),
+        };
+        let part = parts(study, &first, context)?;
+        let kind = study.kind();
+        let interrupted = part.points.contains_key(NOT_REACHED);
+        let mut notes = summary.warnings.clone();
+        notes.extend(study.notes());
+        notes.extend(part.notes.iter().filter_map(Note::text));
+        if interrupted {
+            notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
+        }
+        let tables = kind.tables.iter().zip(part.tables).map(|(name, rows)| rows.table(name));
+        // a table that nothing was ever written to has no columns either
+        let tables: Vec<_> = tables.filter(|table| !table.columns.is_empty()).collect();
+        let figure = redrawn(study, &tables);
+        Ok(Dataset {
+            name: study.name().to_owned(),
+            title: study.title().to_owned(),
+            source: study.source().map(str::to_owned),
+            kind: kind.name.to_owned(),
+            tables,
+            figure,
+            notes,
+            failures: part.failures,
+            record: Record {
+                version: env!("CARGO_PKG_VERSION").to_owned(),
+                study: recorded(study, summary),
+                methods: methods.clone(),
+                seed: None,
+                threads: context.threads,
+                wall_time_s: (self.time + start.elapsed()).as_secs_f64(),
+                points: part.points,
+                interrupted,
+            },
+        })
+    }
 }
 
 /// The figure of finished tables, computed just now or read from a disk. Tables that are none of this study have an empty figure.
 pub fn redrawn(study: &Study, tables: &[Table]) -> Figure {
-    Figure { title: study.title().to_owned(), ..(study.kind().draw)(&Drawing { study, tables }) }
-}
-
-/// Prepares every case and computes nothing: whether [`run()`] would begin.
-///
-/// # Errors
-/// [`StudyError`]: the method cannot take the model of a case, or the study needs more memory than it may take.
-pub fn check(study: &Study) -> Result<(), StudyError> {
-    summarised(study)?;
-    methods(study).map(drop)
-}
-
-/// What is known of the study before it is run; a study that needs too much memory is refused.
-fn summarised(study: &Study) -> Result<ModelSummary, StudyError> {
-    let summary = ModelSummary::new(study)?;
-    match summary.size.refusal(study) {
-        Some(error) => Err(error),
-        None => Ok(summary),
-    }
+    Figure { title: study.title().to_owned(), ..(kinds::of(study).draw)(&Drawing { study, tables }) }
 }
 
 /// The study as it was understood, and its summary.
@@ -100,16 +160,9 @@ fn recorded(study: &Study, summary: &ModelSummary) -> serde_json::Value {
     record
 }
 
-/// What finds the orbits of the cases, in words, each once.
-fn methods(study: &Study) -> Result<Vec<String>, StudyError> {
-    let mut choices = BTreeSet::new();
-    for index in 0..study.cases() {
-        let prepared = Prepared::new(study, index)?;
-        if study.kind().uses_method {
-            choices.insert(prepared.method.choice(&prepared.system));
-        }
-    }
-    Ok(choices.iter().map(Choice::to_string).collect())
+/// The units of a study.
+fn units(study: &Study) -> Units {
+    Units::of(study, (kinds::of(study).grain)(study))
 }
 
 /// Units that may be under way or waiting for their turn, per thread: enough that none waits for a long one, few enough to keep little.
@@ -123,8 +176,8 @@ const GRACE: Duration = Duration::from_millis(500);
 /// Computes all units and joins their parts in order.
 ///
 /// Units run as tasks of the pool that own what they need, so that an interrupted run can leave behind one that does not end.
-fn parts(study: &Study, context: &Context) -> Result<Part, StudyError> {
-    let units = Units::of(study);
+fn parts(study: &Study, first: &Arc<Prepared>, context: &Context) -> Result<Part, StudyError> {
+    let units = units(study);
     let shared = Arc::new(study.clone());
     let (send, receive) = mpsc::channel();
     let mut whole = Part::default();
@@ -136,10 +189,11 @@ fn parts(study: &Study, context: &Context) -> Result<Part, StudyError> {
             deadline = Some(Instant::now() + GRACE);
         }
         while begun < units.len() && begun < joined + AHEAD * context.threads.max(1) && deadline.is_none() {
-            let (study, context, send, index) = (shared.clone(), context.clone(), send.clone(), begun);
+            let (study, first, context) = (shared.clone(), first.clone(), context.clone());
+            let (send, index) = (send.clone(), begun);
             rayon::spawn_fifo(move || {
                 // nobody listens any more if the run was left
-                let part = catch_unwind(AssertUnwindSafe(|| compute(&study, index, &context)));
+                let part = catch_unwind(AssertUnwindSafe(|| compute(&study, &first, index, &context)));
                 let _ = send.send((index, part));
             });
             begun += 1;
@@ -183,14 +237,18 @@ fn next(receive: &mpsc::Receiver<Finished>) -> Option<Finished> {
     None
 }
 
-fn compute(study: &Study, index: usize, context: &Context) -> Result<Part, StudyError> {
-    let unit = Units::of(study).get(index);
+fn compute(study: &Study, first: &Arc<Prepared>, index: usize, context: &Context) -> Result<Part, StudyError> {
+    let unit = units(study).get(index);
     if context.stopped() {
         return Ok(Part::not_reached(unit.len()));
     }
-    let cases = unit.cases.clone().map(|index| Prepared::new(study, index)).collect::<Result<Vec<_>, _>>()?;
+    let prepared = |index: usize| match index {
+        0 => Ok(first.clone()),
+        _ => Prepared::new(study, index).map(Arc::new),
+    };
+    let cases = unit.cases.clone().map(prepared).collect::<Result<Vec<_>, _>>()?;
     let work = Work { study, cases, points: unit.points, context };
-    let part = (study.kind().compute)(&work);
+    let part = (kinds::of(study).compute)(&work);
     part.map_err(|(index, error)| match work.cases.iter().find(|prepared| prepared.case.index == index) {
         Some(prepared) => refused(study, &prepared.case, &error),
         None => study.error_at("study", 0, "kind", error.to_string(), None),

@@ -3,16 +3,13 @@
 //! The reader checks files against this table, and the documentation and the JSON Schema for editors are generated from it. Laws and
 //! methods come from [`stickslip::law::TABLE`] and [`stickslip::method::TABLE`], study kinds from [`crate::kinds::TABLE`].
 
-use crate::kinds;
+use crate::kind::Kind;
+use crate::{kinds, templates};
 use serde_json::{Map, Value, json};
 use stickslip::dimension::Dimension;
-use stickslip::{law, method, model::templates};
+use stickslip::{law, method};
 
-/// The schema version that this program reads.
-pub const VERSION: i64 = 1;
-
-/// Most points of a study: cases times frequencies.
-pub const MOST_POINTS: usize = 1_000_000;
+pub use crate::key::{Key, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, required};
 
 /// Most elements in one list (`[[spring]]`, …), repetitions counted.
 pub const MOST_ELEMENTS: usize = 10_000;
@@ -22,126 +19,6 @@ pub const MOST_MASSES: usize = 2_000;
 
 /// Most bytes of a study file.
 pub const MOST_BYTES: u64 = 4 * 1024 * 1024;
-
-/// One key of a table.
-#[derive(Debug, Clone, Copy)]
-pub struct Key {
-    /// The key.
-    pub name: &'static str,
-    /// What it takes.
-    pub takes: Takes,
-    /// Whether it must stand there, or what happens without it.
-    pub presence: Presence,
-    /// One line of what it is.
-    pub doc: &'static str,
-    /// An example of the value, as TOML.
-    pub example: &'static str,
-}
-
-/// Whether a key must stand in its table.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Presence {
-    /// It must.
-    Required,
-    /// It may be absent, and then nothing stands for it.
-    Optional,
-    /// It may be absent, and this (as the content of a TOML string, or a bare value) stands for it.
-    Default(&'static str),
-}
-
-/// What a key takes.
-#[derive(Debug, Clone, Copy)]
-pub enum Takes {
-    /// Any text.
-    Text,
-    /// An identifier.
-    Name,
-    /// A name or a list of names.
-    Names,
-    /// Two names of places.
-    Pair,
-    /// A quantity of a dimension within a range.
-    Quantity(Dimension, Within),
-    /// A whole number within these bounds.
-    Count(i64, i64),
-    /// `true` or `false`.
-    Flag,
-    /// Frequencies: one, a list, or `{ from, to, points }`.
-    Frequencies,
-    /// A table from a name to a quantity: `{ blade1 = "1 mm" }`.
-    ByName(Dimension),
-    /// A table of its own with these keys.
-    Table(&'static [Key]),
-    /// A friction law: `{ kind = …, … }`.
-    Law,
-    /// One of the words that the function lists, each with a line of what it is.
-    Choice(fn() -> Vec<(&'static str, &'static str)>),
-    /// `[parameters]`: quantities by name.
-    Parameters,
-    /// `vary`: lists of quantities, or ranges, by parameter.
-    Vary,
-    /// `[method]`: `kind` and the options of that method.
-    Method,
-    /// `[study]`: `kind`, `vary` and the keys of that kind.
-    Study,
-    /// `repeat`: indices, each with how often, or from where to where.
-    Repeat,
-    /// A list of tables with these keys: `[[mass]]`.
-    List(&'static [Key]),
-}
-
-/// The range of a quantity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Within {
-    /// Any finite number.
-    Finite,
-    /// Zero or more.
-    AtLeastZero,
-    /// More than zero.
-    Positive,
-}
-
-impl Within {
-    /// Whether the number is in the range.
-    pub fn holds(self, value: f64) -> bool {
-        value.is_finite()
-            && match self {
-                Within::Finite => true,
-                Within::AtLeastZero => value >= 0.0,
-                Within::Positive => value > 0.0,
-            }
-    }
-
-    /// In words.
-    pub fn described(self) -> &'static str {
-        match self {
-            Within::Finite => "a finite number",
-            Within::AtLeastZero => "zero or more",
-            Within::Positive => "more than zero",
-        }
-    }
-}
-
-/// A key that must be there.
-pub const fn required(name: &'static str, takes: Takes, doc: &'static str, example: &'static str) -> Key {
-    Key { name, takes, presence: Presence::Required, doc, example }
-}
-
-/// A key that may be absent.
-pub const fn optional(name: &'static str, takes: Takes, doc: &'static str, example: &'static str) -> Key {
-    Key { name, takes, presence: Presence::Optional, doc, example }
-}
-
-/// A key that may be absent, and what then stands for it.
-pub const fn default(
-    name: &'static str,
-    takes: Takes,
-    value: &'static str,
-    doc: &'static str,
-    example: &'static str,
-) -> Key {
-    Key { name, takes, presence: Presence::Default(value), doc, example }
-}
 
 /// The keys at the top of the file.
 pub const FILE: &[Key] = &[
@@ -223,6 +100,12 @@ const REPEAT: Key = optional(
 const MASS: &[Key] = &[
     required("name", Takes::Name, "name of the place, for springs, joints and forces", "\"blade1\""),
     required("mass", Takes::Quantity(Dimension::MASS, Within::AtLeastZero), "mass", "\"182 g\""),
+    optional(
+        "directions",
+        Takes::Names,
+        "directions in which it moves, if more than one: each is a place `name.direction`; a normal is the last",
+        "[\"x\", \"z\"]",
+    ),
     REPEAT,
 ];
 
@@ -250,7 +133,12 @@ const SPRING: &[Key] = &[
 
 const JOINT: &[Key] = &[
     required("name", Takes::Name, "name, for results", "\"shroud\""),
-    required("between", Takes::Pair, "the two places that rub", "[\"blade1\", \"contact\"]"),
+    required(
+        "between",
+        Takes::Pair,
+        "the two places, or nodes with the law's directions, that rub or touch",
+        "[\"blade1\", \"contact\"]",
+    ),
     required("law", Takes::Law, "friction law", "{ kind = \"coulomb\", limit = \"2 N\" }"),
     REPEAT,
 ];
@@ -307,11 +195,11 @@ pub const ADAPTIVE: &[Key] = &[
 pub const METHOD: &[Key] = &[default("kind", Takes::Choice(method_names), "auto", "the method", "\"event-driven\"")];
 
 fn template_names() -> Vec<(&'static str, &'static str)> {
-    templates::TABLE.iter().map(|row| (row.name, row.summary)).collect()
+    templates::TABLE.iter().map(|row| (row.name, row.summary())).collect()
 }
 
 fn kind_names() -> Vec<(&'static str, &'static str)> {
-    kinds::TABLE.iter().map(|row| (row.name, row.summary)).collect()
+    kinds::TABLE.iter().map(|row| (row.info.name, row.info.summary)).collect()
 }
 
 fn method_names() -> Vec<(&'static str, &'static str)> {
@@ -425,7 +313,7 @@ fn takes_schema(takes: &Takes) -> Value {
             ] },
         }),
         Takes::Law => {
-            let one = |row: &law::LawInfo| {
+            let one = |row: &&law::LawInfo| {
                 let parameters = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc));
                 kind_object(row.name, row.summary, parameters, true)
             };
@@ -459,7 +347,7 @@ fn takes_schema(takes: &Takes) -> Value {
             json!({ "oneOf": all })
         }
         Takes::Study => {
-            let one = |row: &kinds::Kind| {
+            let one = |Kind { info: row, .. }: &Kind| {
                 let mut schema = object(&[STUDY, row.keys].concat());
                 schema["description"] = json!(row.summary);
                 schema["properties"]["kind"] = json!({ "const": row.name, "description": row.summary });
@@ -524,7 +412,7 @@ pub fn markdown() -> String {
         }
     }
     rows(&mut book, "`[study]`", "The keys of every kind; each kind adds its own.", STUDY);
-    for kind in kinds::TABLE {
+    for Kind { info: kind, .. } in kinds::TABLE {
         rows(&mut book, &format!("`[study]` with `kind = \"{}\"`", kind.name), kind.summary, kind.keys);
         for key in kind.keys {
             if let Takes::Table(keys) = key.takes {
@@ -550,8 +438,9 @@ pub fn markdown() -> String {
     }
     book.push_str("\n## Templates\n\n");
     for row in templates::TABLE {
-        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc)).collect();
-        named(&mut book, row.name, row.summary, &keys);
+        let parameters = row.parameters();
+        let keys: Vec<_> = parameters.iter().map(|p| (p.key.as_str(), p.dimension, p.doc.as_str())).collect();
+        named(&mut book, row.name, row.summary(), &keys);
     }
     book
 }

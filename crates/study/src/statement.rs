@@ -1,8 +1,8 @@
 //! What a file states, compiled: every expression parsed, every place known, nothing evaluated yet.
 
 use crate::error::{Place, Problem};
-use crate::expression::{Expression, Value, displayed};
-use crate::schema::Within;
+use crate::expression::{Expression, Value, described, displayed};
+use crate::key::Within;
 use crate::values::{Frequencies, Given, Values};
 use std::collections::BTreeMap;
 use stickslip::dimension::Dimension;
@@ -125,6 +125,33 @@ impl Quantity {
             return Ok(number);
         }
         Err(self.problem(key, "this is not a finite number"))
+    }
+
+    /// The value of the parameter `name` that this is, in the dimension that it must have.
+    pub fn settled(
+        &self,
+        name: &str,
+        dimension: Option<Dimension>,
+        environment: &Environment<'_>,
+    ) -> Result<Value, Problem> {
+        let value = self.value(name, environment)?;
+        self.in_dimension(value, name, dimension, environment)
+    }
+
+    /// `value`, which this quantity has, in the dimension that the parameter `name` must have.
+    pub fn in_dimension(
+        &self,
+        value: Value,
+        name: &str,
+        dimension: Option<Dimension>,
+        environment: &Environment<'_>,
+    ) -> Result<Value, Problem> {
+        let Some(dimension) = dimension else { return Ok(value) };
+        let number = self.convert(value, dimension, name, "", environment).map_err(|problem| match problem.help {
+            None => problem.help(format!("the parameter `{name}` is {}", described(dimension))),
+            Some(_) => problem,
+        })?;
+        Ok(Value::of(number, dimension))
     }
 
     pub fn problem(&self, key: &str, message: impl Into<String>) -> Problem {

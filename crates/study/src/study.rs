@@ -2,10 +2,12 @@
 
 use crate::error::{Place, Problem, Source, StudyError};
 use crate::expression::{Value, displayed};
+use crate::figure;
 use crate::immovable::immovable;
-use crate::kinds::{Complaint, Kind};
+use crate::info::{Complaint, KindInfo};
+use crate::key::VERSION;
+use crate::memory;
 use crate::near::{nearest, one_of, shown};
-use crate::read::{in_dimension, settled};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
 use crate::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
 use serde_json::{Value as Json, json};
@@ -13,7 +15,6 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
 use stickslip::method::{self, Options};
-use stickslip::model::templates::Template;
 use stickslip::model::{Element, Force, Joint, Mass, Model, ModelError, Motion, Spring};
 
 /// A study file, read and checked.
@@ -23,7 +24,7 @@ pub struct Study {
     pub(crate) title: String,
     pub(crate) source: Option<String>,
     pub(crate) text: String,
-    pub(crate) kind: &'static Kind,
+    pub(crate) kind: &'static KindInfo,
     pub(crate) overrides: Vec<(String, String)>,
     pub(crate) sources: Vec<Arc<Source>>,
     pub(crate) names: Vec<String>,
@@ -87,11 +88,35 @@ impl VariedPoints {
     }
 }
 
-/// How the model is stated.
+/// How the model is stated: in lists, of this file or of a template's.
 #[derive(Debug, Clone)]
-pub(crate) enum Structure {
-    Lists(Lists),
-    Template(&'static Template, StatedTable),
+pub(crate) struct Structure {
+    pub lists: Lists,
+    pub template: Option<NamedTemplate>,
+}
+
+/// The template that a study names.
+#[derive(Debug, Clone)]
+pub(crate) struct NamedTemplate {
+    /// `[model]`.
+    pub table: StatedTable,
+    /// Its file among the sources.
+    pub source: usize,
+}
+
+impl NamedTemplate {
+    /// Rewords a problem in the template's file for a user who has not written it: at the place where the template is
+    /// named.
+    fn reword(&self, element: Element, problem: &mut Problem) {
+        if problem.place.source == self.source {
+            problem.message = self.blame(element, &problem.key, &problem.message);
+            problem.place = self.table.place_of("template", None).clone();
+        }
+    }
+
+    fn blame(&self, element: Element, key: &str, message: &str) -> String {
+        format!("these parameters make {element} of the template wrong: `{key}` {message}")
+    }
 }
 
 #[derive(Debug, Clone, Default)]
@@ -242,7 +267,7 @@ impl Study {
     }
 
     /// The study kind.
-    pub fn kind(&self) -> &'static Kind {
+    pub fn kind(&self) -> &'static KindInfo {
         self.kind
     }
 
@@ -271,10 +296,10 @@ impl Study {
         self
     }
 
-    /// Memory that a run may take, bytes: what was said, or [`MEMORY_LIMIT`](crate::summary::MEMORY_LIMIT), or what the machine has
+    /// Memory that a run may take, bytes: what was said, or [`MEMORY_LIMIT`](memory::MEMORY_LIMIT), or what the machine has
     /// free if that is less.
     pub fn memory_limit(&self) -> u64 {
-        self.memory.unwrap_or_else(crate::summary::default_limit)
+        self.memory.unwrap_or_else(memory::default_limit)
     }
 
     /// Number of points: cases times frequencies.
@@ -296,7 +321,7 @@ impl Study {
     /// The varied parameters of the case with this number, without its model; `None` if there is no such case.
     pub(crate) fn varied_values(&self, index: usize) -> Option<Vec<VariedValue>> {
         let choice = self.choice(index);
-        let environment = evaluate(&self.names, &self.parameters, &self.order, &choice, None).ok()?;
+        let environment = evaluate(&self.names, &self.parameters, &self.order, &choice, &[]).ok()?;
         Some(self.varied_of(&environment, &choice))
     }
 
@@ -340,7 +365,7 @@ impl Study {
             return Err(StudyError::file(&self.sources[0].name, message, None));
         }
         let mut problems = Vec::new();
-        let parts = self.parts(index, fixed, &mut problems);
+        let parts = self.parts(index, Look::Again(fixed), &mut problems);
         let error = StudyError::all(&self.sources, problems);
         match (parts, error) {
             (Some(parts), None) => Ok(self.finished(index, parts)),
@@ -394,16 +419,16 @@ impl Study {
         message: impl Into<String>,
         help: Option<String>,
     ) -> StudyError {
-        let stated = match (table, &self.structure) {
+        let stated = match (table, &self.structure.template) {
             ("study", _) => Some(&self.study),
             ("method", _) => Some(&self.method),
             ("figure", _) => Some(&self.figure),
-            (_, Structure::Lists(lists)) => lists.get(table).get(index),
-            (_, Structure::Template(_, table)) => Some(table),
+            (_, Some(template)) => Some(&template.table),
+            (_, None) => self.structure.lists.get(table).get(index),
         };
         let whole = Place::default();
-        let place = stated.map_or(&whole, |table| match (table.entry(key), &self.structure) {
-            (None, Structure::Template(..)) => table.place_of("template", None),
+        let place = stated.map_or(&whole, |table| match (table.entry(key), &self.structure.template) {
+            (None, Some(_)) => table.place_of("template", None),
             _ => table.place_of(key, None),
         });
         StudyError::at(&self.sources, Problem::new(place, key, message).maybe_help(help))
@@ -426,7 +451,7 @@ impl Study {
             }
         }
         json!({
-            "schema": crate::schema::VERSION,
+            "schema": VERSION,
             "name": self.name,
             "title": self.title,
             "source": self.source,
@@ -451,7 +476,7 @@ impl Study {
         }
         for index in 0..self.cases() {
             let mut problems = Vec::new();
-            self.parts(index, None, &mut problems);
+            self.parts(index, Look::First, &mut problems);
             if let Some(error) = StudyError::all(&self.sources, problems) {
                 return Err(error);
             }
@@ -459,13 +484,13 @@ impl Study {
         Ok(())
     }
 
-    fn parts(&self, index: usize, fixed: Option<(usize, f64)>, problems: &mut Vec<Problem>) -> Option<Parts> {
-        let parts = self.resolve(index, fixed, problems);
+    fn parts(&self, index: usize, look: Look, problems: &mut Vec<Problem>) -> Option<Parts> {
+        let parts = self.resolve(index, look, problems);
         if !problems.is_empty() && self.cases() > 1 {
             // what is wrong in the first case and in the last is no matter of one case
             let mut others = Vec::new();
             if index == 0 {
-                self.resolve(self.cases() - 1, fixed, &mut others);
+                self.resolve(self.cases() - 1, look, &mut others);
             }
             for problem in problems.iter_mut().filter(|problem| !others.contains(problem)) {
                 problem.message = format!("{} ({})", problem.message, self.case_words(index));
@@ -477,7 +502,7 @@ impl Study {
     /// A case in words, with its number among all: `N = 0 N, case 1 of 8`.
     pub(crate) fn case_words(&self, index: usize) -> String {
         let choice = self.choice(index);
-        let words = match evaluate(&self.names, &self.parameters, &self.order, &choice, None) {
+        let words = match evaluate(&self.names, &self.parameters, &self.order, &choice, &[]) {
             Ok(environment) => varied_text(&self.varied_of(&environment, &choice)),
             // without values: as they stand in the file
             Err(_) => {
@@ -527,9 +552,13 @@ impl Study {
         values.collect()
     }
 
-    fn resolve(&self, index: usize, fixed: Option<(usize, f64)>, problems: &mut Vec<Problem>) -> Option<Parts> {
+    fn resolve(&self, index: usize, look: Look, problems: &mut Vec<Problem>) -> Option<Parts> {
+        let (first_look, fixed) = match look {
+            Look::First => (index == 0, None),
+            Look::Again(fixed) => (false, fixed),
+        };
         let choice = self.choice(index);
-        let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed) {
+        let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed.as_slice()) {
             Ok(values) => values,
             Err(problem) => {
                 problems.push(problem);
@@ -537,16 +566,13 @@ impl Study {
             }
         };
         let environment = Environment { names: &self.names, values };
-        let model = match &self.structure {
-            Structure::Lists(lists) => model_of(lists, &environment, problems),
-            Structure::Template(row, table) => self.template_model(row, table, &environment, problems),
-        };
+        let model = model_of(&self.structure, &environment, problems);
         let values = self.study.values(&environment, problems);
         let method = self.method.values(&environment, problems);
         if !problems.is_empty() {
             return None;
         }
-        if (index == 0 || !numbers_hold(&model))
+        if (first_look || !numbers_hold(&model))
             && let Err(error) = model.assemble()
         {
             problems.push(self.model_problem(&error, &model));
@@ -557,38 +583,16 @@ impl Study {
             problems.push(self.model_problem(&error, &model));
             return None;
         }
-        if let Err(complaint) = (self.kind.check)(&values, &model) {
+        if let Err(complaint) = (self.kind.check)(&values, &model, self.last_varied()) {
             problems.push(self.complaint(complaint));
             return None;
         }
-        if index == 0
-            && let Err(complaint) = crate::drawing::check(&self.figure_values(), self.kind, &model)
-        {
+        if first_look && let Err(complaint) = figure::check(&self.figure_values(), self.kind, &model) {
             let place = self.figure.place_of(complaint.key, complaint.name.as_deref());
             problems.push(Problem::new(place, complaint.key, complaint.message).maybe_help(complaint.help));
             return None;
         }
         Some(Parts { environment: environment.values, model, values, method })
-    }
-
-    fn template_model(
-        &self,
-        row: &'static Template,
-        table: &StatedTable,
-        environment: &Environment<'_>,
-        problems: &mut Vec<Problem>,
-    ) -> Model {
-        let changes: Vec<(&str, f64)> = row
-            .parameters
-            .iter()
-            .filter_map(|p| Some((p.key, environment.values[self.names.iter().position(|name| name == p.key)?].si)))
-            .collect();
-        let law = table.values(environment, problems).law("law");
-        let mut model = row.model_with(&changes).unwrap_or_default();
-        for joint in &mut model.joints {
-            joint.law = law.unwrap_or(joint.law);
-        }
-        model
     }
 
     fn finished(&self, index: usize, parts: Parts) -> Case {
@@ -621,26 +625,25 @@ impl Study {
             Element::Whole => ("", 0),
         };
         let whole = Place::default();
-        let (place, message) = match &self.structure {
-            Structure::Lists(lists) => {
-                let table = lists.get(list).get(index);
+        let (place, message) = match &self.structure.template {
+            None => {
+                let table = self.structure.lists.get(list).get(index);
                 let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
                 (place, table.map_or_else(|| error.message.clone(), |table| table.with_turn(&error.message)))
             }
-            Structure::Template(_, table) => {
-                let place = table.place_of(if error.key == "law" { "law" } else { "template" }, None);
-                let message = format!(
-                    "these parameters make {} of the template wrong: `{}` {}",
-                    error.element, error.key, error.message
-                );
-                (place, message)
+            Some(template) => {
+                let place = template.table.place_of(if error.key == "law" { "law" } else { "template" }, None);
+                (place, template.blame(error.element, error.key, &error.message))
             }
         };
         let places = model.place_names();
         let help = match &error.wrong_name {
-            Some(wrong) => Some(match nearest(wrong, places.iter().copied()) {
+            Some(wrong) => Some(match nearest(wrong, places.iter().map(String::as_str)) {
                 Some(near) => format!("did you mean `{near}`?"),
-                None => format!("the places are {}", one_of(places.into_iter().take(20)).replace(" or ", ", ")),
+                None => format!(
+                    "the places are {}",
+                    one_of(places.iter().take(20).map(String::as_str)).replace(" or ", ", ")
+                ),
             }),
             None if error.element == Element::Whole => Some("add a [[mass]] or a [[motion]]".to_owned()),
             None if error.key == "name" => Some("choose another name".to_owned()),
@@ -655,6 +658,15 @@ impl Study {
     }
 }
 
+/// How a case is looked at.
+#[derive(Debug, Clone, Copy)]
+enum Look {
+    /// For the first time: the first case is assembled, and the figure looked at. The other cases differ in numbers only.
+    First,
+    /// After that, with a parameter at another value or as it stands: numbers are enough.
+    Again(Option<(usize, f64)>),
+}
+
 struct Parts {
     environment: Vec<Value>,
     model: Model,
@@ -662,41 +674,51 @@ struct Parts {
     method: Values,
 }
 
-/// The values of all parameters, with the choices made for the varied ones.
+/// The values of all parameters, with the choices made for the varied ones; those that are `fixed` have that value,
+/// SI, whatever is stated.
 pub(crate) fn evaluate(
     names: &[String],
     parameters: &[Parameter],
     order: &[usize],
     choice: &HashMap<usize, (&Varied, usize)>,
-    fixed: Option<(usize, f64)>,
+    fixed: &[(usize, f64)],
 ) -> Result<Vec<Value>, Problem> {
     let mut environment = Environment { names, values: vec![Value::bare(f64::NAN); parameters.len()] };
     for &index in order {
         let (parameter, name) = (&parameters[index], &names[index]);
         let dimension = parameter.dimension;
         let value = match choice.get(&index).map(|(varied, point)| (&varied.points, *point)) {
-            None => settled(&parameter.quantity, name, dimension, &environment)?,
-            Some((VariedPoints::List(list), point)) => settled(&list[point], name, dimension, &environment)?,
+            None => parameter.quantity.settled(name, dimension, &environment)?,
+            Some((VariedPoints::List(list), point)) => list[point].settled(name, dimension, &environment)?,
             Some((VariedPoints::Range { from, to, points }, point)) => {
                 let start = from.value("from", &environment)?;
                 let end = to.value("to", &environment)?;
                 let dimension = dimension.or(start.dimension).or(end.dimension);
-                let start = in_dimension(from, start, name, dimension, &environment)?;
-                let end = in_dimension(to, end, name, dimension, &environment)?;
+                let start = from.in_dimension(start, name, dimension, &environment)?;
+                let end = to.in_dimension(end, name, dimension, &environment)?;
                 not_empty(start.si, end.si, to, dimension)?;
                 Value { si: between(start.si, end.si, dimension, point, *points), ..start }
             }
         };
-        environment.values[index] = match fixed {
-            Some((parameter, si)) if parameter == index => Value { si, ..value },
-            _ => value,
+        environment.values[index] = match fixed.iter().rfind(|(parameter, _)| *parameter == index) {
+            Some((_, si)) => Value { si: *si, ..value },
+            None => value,
         };
     }
     Ok(environment.values)
 }
 
-fn model_of(lists: &Lists, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Model {
+pub(crate) fn model_of(structure: &Structure, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Model {
+    let Structure { lists, template } = structure;
     let mut model = Model::default();
+    let mut resolve = |element: Element, table: &StatedTable| {
+        let before = problems.len();
+        let values = table.values(environment, problems);
+        if let Some(template) = template {
+            problems[before..].iter_mut().for_each(|problem| template.reword(element, problem));
+        }
+        values
+    };
     let text = |values: &Values, key: &str| values.text(key).unwrap_or_default().to_owned();
     let number = |values: &Values, key: &str| values.quantity(key).unwrap_or(0.0);
     let between = |values: &Values| match values.names("between") {
@@ -704,29 +726,33 @@ fn model_of(lists: &Lists, environment: &Environment<'_>, problems: &mut Vec<Pro
         _ => Default::default(),
     };
     let harmonic = |values: &Values| values.count("harmonic").and_then(|h| u32::try_from(h).ok()).unwrap_or(1);
-    for table in &lists.mass {
-        let values = table.values(environment, problems);
-        model.masses.push(Mass::new(text(&values, "name"), number(&values, "mass")));
+    for (i, table) in lists.mass.iter().enumerate() {
+        let values = resolve(Element::Mass(i), table);
+        model.masses.push(Mass {
+            name: text(&values, "name"),
+            mass: number(&values, "mass"),
+            directions: values.names("directions").unwrap_or_default().to_vec(),
+        });
     }
-    for table in &lists.spring {
-        let values = table.values(environment, problems);
+    for (i, table) in lists.spring.iter().enumerate() {
+        let values = resolve(Element::Spring(i), table);
         let (stiffness, damping) = (number(&values, "stiffness"), number(&values, "damping"));
         model.springs.push(Spring { between: between(&values), stiffness, damping });
     }
-    for table in &lists.joint {
-        let values = table.values(environment, problems);
+    for (i, table) in lists.joint.iter().enumerate() {
+        let values = resolve(Element::Joint(i), table);
         // without a law there is a problem, and the model is not used
         if let Some(law) = values.law("law") {
-            model.joints.push(Joint { name: text(&values, "name"), between: between(&values), law });
+            model.joints.push(Joint { name: text(&values, "name"), between: between(&values), law: law.clone() });
         }
     }
-    for table in &lists.force {
-        let values = table.values(environment, problems);
+    for (i, table) in lists.force.iter().enumerate() {
+        let values = resolve(Element::Force(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
         model.forces.push(Force { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }
-    for table in &lists.motion {
-        let values = table.values(environment, problems);
+    for (i, table) in lists.motion.iter().enumerate() {
+        let values = resolve(Element::Motion(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
         model.motions.push(Motion { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }

@@ -3,19 +3,18 @@
 //!
 //! Everything here comes from the linear structure and from counting; no orbit is computed.
 
-mod cost;
 mod text;
 mod warnings;
 
-pub(crate) use cost::default_limit;
-pub use cost::{Cost, Costing, MEMORY_LIMIT, Shape, Size, bytes_text};
-pub(crate) use warnings::{WARNING, driven, mode_sticks, moved, resonant};
-
+use crate::cost::{Costing, Size};
 use crate::error::StudyError;
-use crate::study::{Case, Study};
+use crate::kinds;
+use crate::study::Study;
+use crate::survey::{Surveyed, range};
+use crate::work::Units;
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
-use stickslip::model::{Modes, Onset, Survey};
+use stickslip::model::{Modes, Onset};
 
 /// What is known of a study before it is run.
 #[derive(Debug, Clone)]
@@ -64,13 +63,6 @@ const LOOKED_AT: usize = 9;
 /// Degrees of freedom beyond which only the first case is looked at, so that a summary takes no longer than a second.
 const LARGE: usize = 60;
 
-/// A case and what is known of its model.
-#[derive(Debug)]
-pub struct Surveyed {
-    case: Case,
-    survey: Survey,
-}
-
 impl ModelSummary {
     /// Summarises a study.
     ///
@@ -79,27 +71,25 @@ impl ModelSummary {
     ///
     /// # Example
     /// ```
-    /// use stickslip_study::{read_study, summary::ModelSummary};
-    /// let text = stickslip::model::templates::find("blade-couple").unwrap().study;
+    /// use stickslip_study::{read_study, summary::ModelSummary, templates};
+    /// let text = templates::find("blade-couple").unwrap().study;
     /// let summary = ModelSummary::new(&read_study("couple.toml", text, &[]).unwrap()).unwrap();
     /// assert_eq!((summary.dofs, summary.free.elastic.len(), summary.warnings.len()), (3, 3, 0));
     /// assert!(summary.to_string().contains("120.94"));   // a stuck mode, Hz
     /// ```
     pub fn new(study: &Study) -> Result<ModelSummary, StudyError> {
-        let surveyed = |index: usize| -> Result<Surveyed, StudyError> {
-            let case = study.case(index)?;
-            let survey = case.model.survey();
-            let survey = survey.map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
-            Ok(Surveyed { case, survey })
-        };
-        let mut cases = vec![surveyed(0)?];
+        let mut cases = vec![Surveyed::new(study, 0)?];
         let last = study.cases().saturating_sub(1);
         let others = if cases[0].survey.dofs() > LARGE { 0 } else { last.min(LOOKED_AT - 1) };
         for i in 1..=others {
-            cases.push(surveyed(last * i / others)?);
+            cases.push(Surveyed::new(study, last * i / others)?);
         }
-        let range = range(&cases[0].case);
-        let first = &cases[0].survey;
+        // a joint whose limit is zero tells nothing: the first case in which most of them hold
+        let holds = |one: &Surveyed| one.survey.first_slip().iter().filter(|slip| slip.limit > 0.0).count();
+        let most = cases.iter().map(holds).max().unwrap_or(0);
+        let shown = cases.iter().find(|one| holds(one) == most).unwrap_or(&cases[0]);
+        let range = range(&shown.case);
+        let first = &shown.survey;
         let onsets = range.and_then(|(from, to)| first.onset(from, to));
         let joints = first.first_slip().into_iter().enumerate().map(|(index, slip)| JointSummary {
             name: slip.joint,
@@ -108,9 +98,11 @@ impl ModelSummary {
             onset: onsets.as_ref().map(|onsets| onsets[index].clone()),
         });
         let joints = joints.collect();
-        let (size, seconds) = cost::cost(study, &cases[0]);
+        let kind = kinds::of(study);
+        let costing = Costing::new(study, &cases[0]);
+        let (size, seconds) = costing.total(&(kind.cost)(&costing), Units::of(study, (kind.grain)(study)).len());
         Ok(ModelSummary {
-            case: cases[0].case.label(),
+            case: shown.case.label(),
             cases: study.cases(),
             dofs: first.dofs(),
             too_large: first.is_too_large(),
@@ -118,7 +110,7 @@ impl ModelSummary {
             stuck: first.stuck().clone(),
             joints,
             range,
-            warnings: warnings::all(study, &cases),
+            warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
             size,
             seconds,
         })
@@ -157,15 +149,4 @@ impl ModelSummary {
             "estimated_time_s": self.seconds,
         })
     }
-}
-
-/// Lowest and highest drive frequency of a case, rad/s.
-fn range(case: &Case) -> Option<(f64, f64)> {
-    if let Some(run_up) = case.values.table("run_up") {
-        let (a, b) = (run_up.quantity("from")?, run_up.quantity("to")?);
-        return Some((a.min(b), a.max(b)));
-    }
-    let frequencies = case.frequencies.as_ref()?;
-    let ends = frequencies.iter().fold((f64::INFINITY, 0.0f64), |(a, b), w| (a.min(w), b.max(w)));
-    (ends.0 <= ends.1).then_some(ends)
 }

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 use stickslip::curve::adaptive;
 use stickslip::dimension::Dimension;
-use stickslip::law::Law;
+use stickslip::law::SharedLaw;
 
 /// The unit in which tables give quantities of this dimension: its name, as the end of a column's name, and the unit as it is written in a study
 /// file. SI, but hertz and degrees, which people type; `None` for a pure number.
@@ -193,7 +193,7 @@ pub(crate) enum Given {
     Flag(bool),
     Frequencies(Frequencies),
     ByName(BTreeMap<String, f64>, Dimension),
-    Law(Law),
+    Law(SharedLaw),
     Table(Values),
 }
 
@@ -232,7 +232,7 @@ accessors! {
     /// Quantities in SI by name.
     by_name -> &BTreeMap<String, f64> { Given::ByName(table, _) => table }
     /// A friction law.
-    law -> Law { Given::Law(law) => *law }
+    law -> &SharedLaw { Given::Law(law) => law }
     /// A table inside the table.
     table -> &Values { Given::Table(table) => table }
 }

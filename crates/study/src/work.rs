@@ -148,11 +148,11 @@ pub struct Units {
 }
 
 impl Units {
-    /// The units of `study`.
-    pub fn of(study: &Study) -> Self {
+    /// The units of `study`, cut in this way.
+    pub fn of(study: &Study, grain: Grain) -> Self {
         let cases = study.cases();
         let points = (study.points() / cases.max(1)).max(1);
-        Units { grain: (study.kind().grain)(study), cases, points, curve: study.last_varied().max(1) }
+        Units { grain, cases, points, curve: study.last_varied().max(1) }
     }
 
     /// Stretches of frequencies of one case.
@@ -193,7 +193,7 @@ pub struct Work<'a> {
     /// The study.
     pub study: &'a Study,
     /// Its cases.
-    pub cases: Vec<Prepared>,
+    pub cases: Vec<Arc<Prepared>>,
     /// Its frequencies by number.
     pub points: Range<usize>,
     /// How the study is run.

@@ -2,8 +2,7 @@
 
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use proptest::prelude::*;
-use stickslip::model::templates;
-use stickslip_study::{StudyError, read_bytes, read_file, read_study};
+use stickslip_study::{StudyError, read_bytes, read_file, read_study, templates};
 
 const EXAMPLE: &str = include_str!("design_example.toml");
 
@@ -197,6 +196,9 @@ fn templates_and_lists_exclude_each_other() {
     let error = read_study("bad.toml", &bad, &[]).unwrap_err();
     assert_eq!((error.line(), error.underlined()), (Some(6), Some("\"blade-couple\"")), "{error}");
     assert!(error.message().contains("mass 1"), "{error}");
+    let error = read_study("bad.toml", &bad.replace("m1 = \"1 kg\"", "Ft = \"-1 N\""), &[]).unwrap_err();
+    assert_eq!((error.line(), error.underlined()), (Some(6), Some("\"blade-couple\"")), "{error}");
+    assert!(error.message().contains("joint 1") && error.message().contains("`limit`"), "{error}");
 }
 
 /// What a method refuses in one case only names that case.

@@ -88,7 +88,7 @@ const BEGIN: &str = "<!-- begin generated: methods x laws -->\n";
 const END: &str = "<!-- end generated: methods x laws -->";
 
 /// A mass on a spring that rubs on the ground with this law.
-fn rubbing(law: law::Law) -> System {
+fn rubbing(law: law::SharedLaw) -> System {
     let between = || ["body".to_owned(), GROUND.to_owned()];
     Model {
         masses: vec![Mass::new("body", 1.0)],
@@ -110,7 +110,7 @@ fn methods_by_laws() -> String {
     for row in method::TABLE {
         table += &format!("\n| `{}` |", row.name);
         for law in law::TABLE {
-            let system = rubbing((law.sample)());
+            let system = rubbing(law.sample());
             let takes = |options: &method::Options| (row.build)(options).unwrap().solver(&system).is_ok();
             let width = row.options.iter().any(|option| option.key == "width");
             let word = if takes(&method::Options::new()) {

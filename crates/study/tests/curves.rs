@@ -17,7 +17,11 @@ fn table<'a>(dataset: &'a Dataset, name: &str) -> &'a Table {
 
 /// An oscillator of 1 kg and 1 N/m with a joint to the ground.
 fn oscillator(damping: &str, law: &str, study: &str) -> Dataset {
-    dataset(&format!(
+    dataset(&oscillating(damping, law, study))
+}
+
+fn oscillating(damping: &str, law: &str, study: &str) -> String {
+    format!(
         r#"
 schema = 1
 title = "Oscillator"
@@ -40,7 +44,7 @@ amplitude = "F0"
 [study]
 {study}
 "#
-    ))
+    )
 }
 
 /// Theory 6.6 in a study: the slip limit that makes the peak of blade 1 lowest.
@@ -163,6 +167,9 @@ tolerance = 0.3"#;
     assert_eq!((values[0], *values.last().unwrap()), (2.0, 0.5));
     let styles: Vec<Style> = found.figure.panels[0].series.iter().map(|series| series.style).collect();
     assert_eq!(styles, [Style::Solid, Style::Dashed, Style::Solid]);
+    let unstable = table(&found, "branch").flags("stable").unwrap().iter().filter(|stable| **stable == Some(false));
+    let warning = format!("warning: at {} points the orbit is unstable", unstable.count());
+    assert!(found.notes.iter().any(|note| note.starts_with(&warning)), "{warning}: {:?}", found.notes);
 }
 
 /// Along frequency a branch ends where its range does, and its peak is that of the response curve.
@@ -197,8 +204,51 @@ vary = { Ft = ["2 N", "4 N"] }
 #[test]
 fn a_branch_without_a_range_fails_with_words() {
     let law = r#"{ kind = "coulomb", limit = "1 N" }"#;
-    let found = oscillator("0.1 kg/s", law, "kind = \"branch\"\nfrequency = \"1 rad/s\"");
-    assert!(found.failures[0].reason.contains("a branch needs a range"), "{:?}", found.failures);
+    let refused = |frequency: &str| {
+        let study = format!("kind = \"branch\"\nfrequency = {frequency}");
+        let error = read_study("study.toml", &oscillating("0.1 kg/s", law, &study), &[]).unwrap_err();
+        assert_eq!((error.key(), error.line()), (Some("frequency"), Some(22)), "{error}");
+        assert!(error.to_string().contains("a branch needs a range"), "{error}");
+    };
+    refused("\"1 rad/s\"");
+    refused("[\"1 rad/s\", \"2 rad/s\", \"1 rad/s\"]");
+    refused("\"1 rad/s\"\nvary = { F0 = \"1 N\" }");
+    // with two values of a parameter, which are equal all the same
+    let same = oscillator("0.1 kg/s", law, "kind = \"branch\"\nfrequency = 0.1\nvary = { F0 = [\"2 N\", \"2 N\"] }");
+    assert!(same.failures[0].reason.contains("a branch needs a range"), "{:?}", same.failures);
+}
+
+/// Where the limit of every joint is zero the mode is the linear one: ω = √(k/m), and the damping ratio c/(2 √(k m)).
+#[test]
+fn a_mode_without_friction_is_linear() {
+    let study = r#"kind = "modes"
+amplitude = { from = "1 mm", to = "1 m", points = 5 }"#;
+    for law in [r#"{ kind = "coulomb", limit = 0 }"#, r#"{ kind = "jenkins", stiffness = "0.5 N/m", limit = 0 }"#] {
+        let found = oscillator("0.1 kg/s", law, study);
+        assert!(found.failures.is_empty(), "{law}: {:?}", found.failures);
+        let modes = table(&found, "modes");
+        let (frequencies, damping) = (modes.numbers("frequency_Hz").unwrap(), modes.numbers("damping_ratio").unwrap());
+        assert_eq!(frequencies.len(), 5);
+        for (frequency, damping) in frequencies.iter().zip(damping) {
+            assert!((frequency * std::f64::consts::TAU - 1.0).abs() < 1e-9, "{law}: {frequency}");
+            assert!((damping - 0.05).abs() < 1e-9, "{law}: {damping}");
+        }
+    }
+}
+
+/// Curves of a performance study tell the value of their outer parameter, so that many of them can have a colour bar.
+#[test]
+fn performance_curves_tell_their_parameter() {
+    let law = r#"{ kind = "coulomb", limit = "Ft" }"#;
+    let study = r#"kind = "performance"
+frequency = { from = "0.6 rad/s", to = "1.4 rad/s", points = 9 }
+vary = { F0 = ["1 N", "2 N"], Ft = ["0.2 N", "0.4 N", "0.6 N"] }"#;
+    let text = oscillating("0.1 kg/s", law, study).replace("[parameters]", "[parameters]\nFt = \"1 N\"");
+    let figure = dataset(&text).figure;
+    let axis = figure.varied.unwrap();
+    assert_eq!((axis.quantity.as_str(), axis.unit.as_str()), ("F0", "N"));
+    let curves = figure.panels[0].series.iter().filter(|series| series.style == Style::Solid);
+    assert_eq!(curves.map(|series| series.value).collect::<Vec<_>>(), [Some(1.0), Some(2.0)]);
 }
 
 /// Options that only the model shows to be wrong are shown where they stand.

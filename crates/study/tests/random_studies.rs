@@ -219,14 +219,14 @@ fn random_studies_end_in_time() {
     let done = done.lock().unwrap();
     assert!(done.len() * 100 >= ACCEPTED * count, "{} of {count} are accepted", done.len());
     for kind in stickslip_study::kinds::TABLE {
-        let of_kind: Vec<&Done> = done.iter().filter(|one| one.kind == kind.name).collect();
+        let of_kind: Vec<&Done> = done.iter().filter(|one| one.kind == kind.info.name).collect();
         let (time, estimate) = of_kind.iter().fold((0.0, 0.0), |(a, b), one| (a + one.seconds, b + one.estimate));
         let mut points: BTreeMap<&str, u64> = BTreeMap::new();
         for (status, count) in of_kind.iter().flat_map(|one| &one.points) {
             *points.entry(status).or_default() += count;
         }
-        println!("{}: {} studies, {time:.1} s, estimated {estimate:.1} s; {points:?}", kind.name, of_kind.len());
-        assert!(of_kind.len() * 30 >= count / 2, "{} of {count} are of the kind {}", of_kind.len(), kind.name);
+        println!("{}: {} studies, {time:.1} s, estimated {estimate:.1} s; {points:?}", kind.info.name, of_kind.len());
+        assert!(of_kind.len() * 30 >= count / 2, "{} of {count} are of the kind {}", of_kind.len(), kind.info.name);
     }
     if let Some(peak) = peak_memory() {
         println!("{} MB", peak / 1_000_000);

@@ -1,10 +1,9 @@
 //! What a study says of itself before it is run.
 
 use std::sync::Arc;
-use stickslip::model::templates;
 use stickslip_study::run::{Context, check, run};
 use stickslip_study::summary::ModelSummary;
-use stickslip_study::{Study, read_study};
+use stickslip_study::{Study, read_study, templates};
 
 fn study(text: &str) -> Study {
     read_study("study.toml", text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
@@ -115,7 +114,7 @@ fn parameters_that_nothing_uses() {
     let short = |law: &str| {
         format!(
             "schema = 1\n[parameters]\nFt = \"3 N\"\n[model]\ntemplate = \"blade-couple\"\n{law}\n[study]\nkind = \"response\"\n\
-             frequency = {{ from = \"119 Hz\", to = \"123 Hz\", points = 9 }}\nvary = {{ Ft = [\"1 N\", \"2 N\"] }}\n"
+             frequency = {{ from = \"119 Hz\", to = \"123 Hz\", points = 41 }}\nvary = {{ Ft = [\"1 N\", \"2 N\"] }}\n"
         )
     };
     silent(&short(""));
@@ -142,6 +141,27 @@ fn a_range_without_a_resonance() {
     silent(&template("blade-couple", &third));
     // one frequency is a point, not a range
     silent(&template("blade-couple", &[("{ from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }", "\"100 Hz\"")]));
+}
+
+/// The narrower resonance of the couple is that of a blade with half of the contact's mass, of the width b/(2π (m + m1/2)) = 0.174 Hz: 3 Hz
+/// hold 17.2 of them.
+#[test]
+fn frequencies_further_apart_than_a_resonance_is_wide() {
+    let points = |points: &str| template("blade-couple", &[("points = 241", points)]);
+    warns(&points("points = 9"), &["are 0.38 Hz apart", "0.17 Hz wide", "19 points would do"]);
+    silent(&points("points = 19"));
+    silent(&points("tolerance = \"1 %\""));
+    // no orbit is taken between the ends of a branch but those that it needs
+    let branch = [("kind = \"response\"", "kind = \"branch\""), ("points = 241", "points = 2")];
+    silent(&template("blade-couple-massless", &branch));
+}
+
+#[test]
+fn a_case_in_which_the_joints_hold_is_shown() {
+    let values = |values: &str| template("blade-couple", &[("\"2 N\", \"4 N\", \"6 N\", \"8 N\"", values)]);
+    let text = summary(&values("\"0 N\", \"2 N\", \"4 N\"")).to_string();
+    assert!(text.contains("shown for Ft = 2 N") && text.contains("slips at 2 N"), "{text}");
+    assert!(summary(&values("\"0 N\"")).to_string().contains("limit 0: free"));
 }
 
 #[test]

@@ -3,12 +3,16 @@
 //! The library part holds what several tests share: random models, templates with changes, and small numerics (search, quadrature)
 //! written apart from the library's own.
 
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
-use stickslip::law::{Coulomb, Jenkins, Law};
+use std::sync::Arc;
+use stickslip::law::{Coulomb, Jenkins, SharedLaw};
 use stickslip::method::{Method, event_driven::EventDriven};
-use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, templates};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Orbit, Sample};
+use stickslip::structure::{Structure, StructureError};
+use stickslip_study::templates;
 
 /// A small generator of uniform numbers, so that every test can name its models by a seed.
 /// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators" (2014), SplitMix64.
@@ -58,7 +62,7 @@ pub fn random_model(seed: u64) -> (Model, f64) {
         let a = 1 + random.below(count);
         let b = (a + 1 + random.below(count)) % (count + 1);
         let limit = 10f64.powf(random.between(-1.0, 1.0));
-        let law = if random.unit() < 0.5 {
+        let law: SharedLaw = if random.unit() < 0.5 {
             Arc::new(Coulomb { limit })
         } else {
             Arc::new(Jenkins { stiffness: 10f64.powf(random.between(2.0, 4.0)), limit })
@@ -82,18 +86,30 @@ pub fn random_model(seed: u64) -> (Model, f64) {
     (model, natural * factor)
 }
 
-/// A template of the library with some parameters changed, assembled.
+/// A template with some parameters changed, assembled.
 pub fn template(name: &str, changes: &[(&str, f64)]) -> System {
     let template = templates::find(name).unwrap_or_else(|| panic!("no template {name}"));
-    template.model_with(changes).unwrap_or_else(|key| panic!("no parameter {key}")).assemble().expect("well formed")
+    template.model_with(changes).unwrap_or_else(|error| panic!("{error}")).assemble().expect("well formed")
 }
 
-/// The same with the laws of all joints replaced by `law(limit)`, given the slip limit of each.
-pub fn template_with(name: &str, changes: &[(&str, f64)], law: impl Fn(f64) -> Law) -> System {
+/// The same system with another mass matrix, as it is; a mass matrix that is none is refused.
+///
+/// # Errors
+/// As [`Structure::new`].
+pub fn with_mass(system: &System, change: impl FnOnce(&mut DMatrix<f64>)) -> Result<System, StructureError> {
+    let old = system.structure();
+    let mut mass = old.mass().clone();
+    change(&mut mass);
+    let structure = Structure::new(old.places().to_vec(), mass, old.damping().clone(), old.stiffness().clone())?;
+    Ok(system.on(structure).expect("as many degrees of freedom"))
+}
+
+/// A template with the laws of all joints replaced by `law(limit)`, given the slip limit of each.
+pub fn template_with(name: &str, changes: &[(&str, f64)], law: impl Fn(f64) -> SharedLaw) -> System {
     let template = templates::find(name).unwrap_or_else(|| panic!("no template {name}"));
-    let mut model = template.model_with(changes).unwrap_or_else(|key| panic!("no parameter {key}"));
+    let mut model = template.model_with(changes).unwrap_or_else(|error| panic!("{error}"));
     for joint in &mut model.joints {
-        joint.law = law(joint.law.limit());
+        joint.law = law(joint.law.scale());
     }
     model.assemble().expect("well formed")
 }

@@ -3,7 +3,8 @@
 #![allow(clippy::print_stdout)] // tests say what they measured
 
 use std::f64::consts::{FRAC_PI_2, TAU};
-use stickslip::law::{Coulomb, Jenkins, JenkinsArctan, Law};
+use std::sync::Arc;
+use stickslip::law::{Coulomb, Jenkins, JenkinsArctan, SharedLaw};
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring};
 use stickslip::orbit::Orbit;
@@ -17,12 +18,12 @@ fn spring(a: &str, b: &str, stiffness: f64, damping: f64) -> Spring {
     Spring { between: [a.into(), b.into()], stiffness, damping }
 }
 
-fn joint(name: &str, a: &str, b: &str, law: Law) -> Joint {
+fn joint(name: &str, a: &str, b: &str, law: SharedLaw) -> Joint {
     Joint { name: name.into(), between: [a.into(), b.into()], law }
 }
 
 /// The chain of `data/smooth_orbits/chain8.py`: eight mistuned blades, a joint of another limit between any two neighbours.
-fn chain(forces: &[Force], law: impl Fn(f64) -> Law) -> Model {
+fn chain(forces: &[Force], law: impl Fn(f64) -> SharedLaw) -> Model {
     let blade = |i: usize| format!("blade{i}");
     Model {
         masses: (1..=8).map(|i| Mass::new(blade(i), 0.182)).collect(),
@@ -40,11 +41,11 @@ fn chain(forces: &[Force], law: impl Fn(f64) -> Law) -> Model {
 const KT: f64 = 1e4;
 const OMEGA: f64 = TAU * 121.3;
 
-fn smooth_law(alpha: f64) -> impl Fn(f64) -> Law {
+fn smooth_law(alpha: f64) -> impl Fn(f64) -> SharedLaw {
     move |limit| Arc::new(JenkinsArctan { stiffness: KT, limit, alpha })
 }
 
-fn exact_law(limit: f64) -> Law {
+fn exact_law(limit: f64) -> SharedLaw {
     Arc::new(Jenkins { stiffness: KT, limit })
 }
 
@@ -134,7 +135,7 @@ fn chain_of_eight_exact_against_smooth() {
 }
 
 /// A central mass driven, with two or more equal ones around it, each behind its own equal joint.
-fn star(count: usize, law: &dyn Fn() -> Law, order: &[usize], turned: &[usize]) -> Model {
+fn star(count: usize, law: &dyn Fn() -> SharedLaw, order: &[usize], turned: &[usize]) -> Model {
     let arm = |i: usize| format!("arm{i}");
     let mut model = Model {
         masses: vec![Mass::new("centre", 1.0)],
@@ -156,7 +157,7 @@ fn star(count: usize, law: &dyn Fn() -> Law, order: &[usize], turned: &[usize]) 
 /// Joints that are alike switch at the same instants: symmetry makes every switch a switch of all.
 #[test]
 fn joints_switch_together_by_symmetry() {
-    type Make = Box<dyn Fn() -> Law>;
+    type Make = Box<dyn Fn() -> SharedLaw>;
     let laws: [(&str, Make); 2] = [
         ("coulomb", Box::new(|| Arc::new(Coulomb { limit: 1.2 }))),
         ("jenkins", Box::new(|| Arc::new(Jenkins { stiffness: 800.0, limit: 1.2 }))),
@@ -206,7 +207,7 @@ fn joints_switch_together_by_symmetry() {
 /// The order in which joints are listed plays no part, with ties at every switch.
 #[test]
 fn order_of_listing_does_not_matter() {
-    let law = || Arc::new(Coulomb { limit: 1.2 });
+    let law = || -> SharedLaw { Arc::new(Coulomb { limit: 1.2 }) };
     for omega in [14.0, 20.0, 25.0, 28.0, 33.0, 40.0] {
         let orbits: Vec<Orbit> = [[0, 1, 2], [2, 1, 0], [1, 2, 0]]
             .iter()

@@ -5,7 +5,8 @@
 #![allow(clippy::print_stdout)] // tests say what they measured
 
 use std::f64::consts::{FRAC_PI_4, PI};
-use stickslip::law::{Coulomb, Law};
+use std::sync::Arc;
+use stickslip::law::Coulomb;
 use stickslip::method::transient::{Excitation, Transient};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
 use stickslip::orbit::{Orbit, Symmetry};

@@ -4,7 +4,8 @@
 
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, TAU};
-use stickslip::law::{CoulombArctan, FrictionLaw, Jenkins, JenkinsArctan, Law};
+use std::sync::Arc;
+use stickslip::law::{CoulombArctan, Jenkins, JenkinsArctan, Law, SharedLaw};
 use stickslip::method::{Method, shooting::Shooting};
 use stickslip::model::{GROUND, Joint, Model, Motion};
 use stickslip::orbit::Orbit;
@@ -27,7 +28,7 @@ fn smooth(system: &stickslip::model::System, omega: f64) -> Orbit {
 }
 
 fn smooth_element(kt: f64, a: f64, alpha: f64, omega: f64) -> Orbit {
-    let law = |limit| Arc::new(JenkinsArctan { stiffness: kt, limit, alpha });
+    let law = |limit| -> SharedLaw { Arc::new(JenkinsArctan { stiffness: kt, limit, alpha }) };
     smooth(&template_with("element", &[("kt", kt), ("Ft", FT), ("a", a)], law), omega)
 }
 
@@ -146,7 +147,8 @@ fn theory_3_1_smooth_element() {
         assert!(most <= bound * (1.0 + 1e-12), "{most} {bound}");
         // the same rho and beta at another speed, stiffness and limit
         let other = {
-            let law = |limit| Arc::new(JenkinsArctan { stiffness: 3.0 * kt, limit, alpha: alpha / 5.0 });
+            let law =
+                |limit| -> SharedLaw { Arc::new(JenkinsArctan { stiffness: 3.0 * kt, limit, alpha: alpha / 5.0 }) };
             smooth(&template_with("element", &[("kt", 3.0 * kt), ("Ft", 3.0 * FT), ("a", a)], law), 5.0 * omega)
         };
         close("similarity", other.joints[0].dissipation, 3.0 * orbit.joints[0].dissipation, 1e-8);
@@ -217,7 +219,7 @@ fn theory_3_2_and_3_4_loop_areas_of_the_arctan_elements() {
         let orbit = if row["element"] == "massless" {
             smooth_element(kt, a, 25e3, omega)
         } else {
-            let law = |limit| Arc::new(CoulombArctan { limit, alpha: 25e3 });
+            let law = |limit| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha: 25e3 }) };
             smooth(&template_with("element-with-mass", &[("kt", kt), ("Ft", FT), ("a", a)], law), omega)
         };
         let expected = number(&row, "W_J");
@@ -247,7 +249,7 @@ fn theory_3_2_and_3_4_printed_areas() {
         }
     }
     let with_mass = |kt: f64, a: f64, omega: f64| {
-        let law = |limit| Arc::new(CoulombArctan { limit, alpha: 25e3 });
+        let law = |limit| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha: 25e3 }) };
         smooth(&template_with("element-with-mass", &[("kt", kt), ("Ft", FT), ("a", a)], law), omega)
     };
     let printed = [1.6518, 4.5434, 7.4804, 4.2964, 7.2643, 10.2451];

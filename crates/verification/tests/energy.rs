@@ -4,7 +4,8 @@
 #![allow(clippy::print_stdout)] // tests say what they measured
 
 use std::f64::consts::{PI, TAU};
-use stickslip::law::{CoulombArctan, Law};
+use std::sync::Arc;
+use stickslip::law::{CoulombArctan, SharedLaw};
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
@@ -77,7 +78,7 @@ fn theory_9_energies_from_harmonics_and_loops() {
 #[test]
 fn theory_9_energies_of_the_smooth_law() {
     for (name, ft, hertz) in POINTS {
-        let law = |limit| Arc::new(CoulombArctan { limit, alpha: 25e3 });
+        let law = |limit| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha: 25e3 }) };
         let system = template_with(name, &[("Ft", ft)], law);
         let orbit =
             Shooting { tolerance: 1e-10, width: None }.solver(&system).unwrap().orbit(TAU * hertz, None).unwrap();

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use stickslip::law::{self, Law, LawInfo};
+use stickslip::law::{self, LawInfo, SharedLaw};
 use stickslip::method::{self, Method, Options};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
 use stickslip::orbit::{Contact, Orbit};
@@ -12,15 +12,15 @@ use stickslip::orbit::{Contact, Orbit};
 const NEAR: f64 = 1e-6;
 
 /// The law of this row with the slip limit zero.
-fn free(row: &LawInfo) -> Law {
-    let sample = (row.sample)();
+fn free(row: &LawInfo) -> SharedLaw {
+    let sample = row.sample();
     let mut values: BTreeMap<&str, f64> = row.parameters.iter().map(|p| p.key).zip(sample.values()).collect();
     values.insert("limit", 0.0);
     row.build(&values).unwrap()
 }
 
 /// A mass of 1 kg on 1e4 N/m and 20 kg/s with these joints to the ground, driven by 3 N.
-fn oscillator(laws: &[Law]) -> Model {
+fn oscillator(laws: &[SharedLaw]) -> Model {
     let between = || ["m".to_owned(), GROUND.to_owned()];
     Model {
         masses: vec![Mass::new("m", 1.0)],
@@ -28,7 +28,7 @@ fn oscillator(laws: &[Law]) -> Model {
         joints: laws
             .iter()
             .enumerate()
-            .map(|(i, law)| Joint { name: format!("joint{i}"), between: between(), law: *law })
+            .map(|(i, law)| Joint { name: format!("joint{i}"), between: between(), law: law.clone() })
             .collect(),
         forces: vec![Force { on: "m".into(), amplitude: 3.0, phase: 0.0, harmonic: 1 }],
         ..Model::default()
@@ -36,7 +36,7 @@ fn oscillator(laws: &[Law]) -> Model {
 }
 
 /// The methods that take this law, with a width where one is needed.
-fn methods(law: Law) -> Vec<(&'static str, Box<dyn Method>)> {
+fn methods(law: SharedLaw) -> Vec<(&'static str, Box<dyn Method>)> {
     let system = oscillator(&[law]).assemble().unwrap();
     let mut all = Vec::new();
     for row in method::TABLE {
@@ -86,9 +86,9 @@ fn every_method_gives_the_linear_motion() {
 #[test]
 fn beside_another_joint_it_is_not_there() {
     for row in law::TABLE {
-        let other = (row.sample)();
-        for (name, method) in methods(other) {
-            let with = orbit(&*method, &oscillator(&[free(row), other, free(row)]), 95.0);
+        let other = row.sample();
+        for (name, method) in methods(other.clone()) {
+            let with = orbit(&*method, &oscillator(&[free(row), other.clone(), free(row)]), 95.0);
             let without = orbit(&*method, &oscillator(&[other]), 95.0);
             let (a, b) = (with.places[0].amplitude(), without.places[0].amplitude());
             assert!((a / b - 1.0).abs() < NEAR, "{}, {name}: {a} {b}", row.name);
@@ -120,7 +120,7 @@ fn its_loop_has_no_area() {
 #[test]
 fn a_limit_that_nothing_reaches_makes_a_spring() {
     for limit in [1e3, 1e6, 1e12] {
-        let law = Arc::new(law::Jenkins { stiffness: 5e3, limit });
+        let law = std::sync::Arc::new(law::Jenkins { stiffness: 5e3, limit });
         let system = oscillator(&[law]).assemble().unwrap();
         let omega = (1.5e4f64).sqrt();
         // F/(c Ω) where k + kt = m Ω²

@@ -2,12 +2,14 @@
 
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 use stickslip::curve::modes::{ModeRequest, mode, self_excited};
 use stickslip::curve::performance::Performance;
-use stickslip::law::{Coulomb, CoulombArctan, Jenkins, Law};
+use stickslip::law::{Coulomb, CoulombArctan, Jenkins, SharedLaw};
 use stickslip::method::{Method, OrbitError, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
-use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System, templates};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System};
 use stickslip::orbit::{Accuracy, Orbit};
+use stickslip_study::templates;
 
 fn balance(harmonics: usize, samples: usize) -> HarmonicBalance {
     HarmonicBalance { harmonics: Some(harmonics), samples: Some(samples), tolerance: None }
@@ -18,7 +20,7 @@ fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
 }
 
 /// A law under the imposed motion `a cos t`.
-fn imposed(law: Law, a: f64) -> System {
+fn imposed(law: SharedLaw, a: f64) -> System {
     let joint = Joint { name: "contact".into(), between: ["mover".into(), GROUND.into()], law };
     let motion = Motion { on: "mover".into(), amplitude: a, phase: 0.0, harmonic: 1 };
     Model { joints: vec![joint], motions: vec![motion], ..Model::default() }.assemble().unwrap()
@@ -273,7 +275,7 @@ impl Dice {
             for k in 0..laws {
                 let limit = self.between(0.05, 0.6) / laws as f64;
                 // rigid friction beside rigid friction would leave the share of each open
-                let law = if k == 0 && self.between(0.0, 1.0) < rigid {
+                let law: SharedLaw = if k == 0 && self.between(0.0, 1.0) < rigid {
                     Arc::new(Coulomb { limit })
                 } else {
                     Arc::new(Jenkins { stiffness: self.between(0.5, 4.0), limit })
@@ -405,6 +407,7 @@ fn long_chains_take_the_banded_form() {
 /// The arctan laws against shooting on the same smooth equations, within three times the reported error.
 #[test]
 fn smooth_laws_against_shooting() {
+    use std::sync::Arc;
     use stickslip::law::JenkinsArctan;
     use stickslip::method::shooting::Shooting;
     let couple = templates::find("blade-couple-massless").unwrap();

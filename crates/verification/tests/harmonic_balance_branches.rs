@@ -2,13 +2,15 @@
 
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 use stickslip::curve::performance::Performance;
 use stickslip::curve::trace::Trace;
-use stickslip::law::{Coulomb, Jenkins, Law};
+use stickslip::law::{Coulomb, Jenkins};
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
-use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, templates};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring};
 use stickslip::orbit::Orbit;
 use stickslip_numerics::continuation::End;
+use stickslip_study::templates;
 
 fn balance(harmonics: usize) -> HarmonicBalance {
     HarmonicBalance { harmonics: Some(harmonics), ..HarmonicBalance::default() }

@@ -1,7 +1,8 @@
 //! Harmonic balance at the edges of what it can do: what it must find, and what it must refuse.
 
 use std::f64::consts::TAU;
-use stickslip::law::{Coulomb, Jenkins, JenkinsArctan, Law};
+use std::sync::Arc;
+use stickslip::law::{Coulomb, Jenkins, JenkinsArctan, SharedLaw};
 use stickslip::method::shooting::Shooting;
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System};
@@ -15,7 +16,7 @@ fn spring(a: &str, b: &str, stiffness: f64, damping: f64) -> Spring {
     Spring { between: [a.into(), b.into()], stiffness, damping }
 }
 
-fn joint(a: &str, b: &str, law: Law) -> Joint {
+fn joint(a: &str, b: &str, law: SharedLaw) -> Joint {
     Joint { name: "joint".into(), between: [a.into(), b.into()], law }
 }
 
@@ -107,7 +108,7 @@ fn a_free_body_drifts_or_sticks() {
 /// Without excitation there is rest.
 #[test]
 fn no_excitation_is_rest() {
-    for law in [Arc::new(Jenkins { stiffness: 2.0, limit: 0.5 }), Arc::new(Coulomb { limit: 0.5 })] {
+    for law in [Arc::new(Jenkins { stiffness: 2.0, limit: 0.5 }) as SharedLaw, Arc::new(Coulomb { limit: 0.5 })] {
         let model = Model {
             masses: vec![mass("a", 1.0)],
             springs: vec![spring("a", GROUND, 1.0, 0.05)],
@@ -144,7 +145,7 @@ fn multipliers_of_an_inner_slider() {
         let model = Model {
             masses: vec![mass("body", 1.0)],
             springs: vec![spring("body", GROUND, 1.0, 0.02)],
-            joints: vec![joint("body", GROUND, law)],
+            joints: vec![joint("body", GROUND, law.clone())],
             forces: vec![Force { phase, ..force("body", 1.0, 1) }],
             ..Model::default()
         };

@@ -4,7 +4,7 @@
 #![allow(clippy::print_stdout)] // tests say what they measured
 
 use std::f64::consts::TAU;
-use stickslip::law::{Law, RateLaw, Relative, TABLE};
+use stickslip::law::{RateLaw, Relative, SharedLaw, TABLE};
 use stickslip::method::auto::Auto;
 use stickslip::method::{Method, shooting::Shooting};
 use stickslip::model::{GROUND, Joint, Mass, Model, Motion, Spring};
@@ -28,7 +28,7 @@ fn history(seed: u64) -> Vec<Motion> {
 }
 
 /// The law alone between a place that is moved and the ground.
-fn moved(law: Law, motions: Vec<Motion>) -> Model {
+fn moved(law: SharedLaw, motions: Vec<Motion>) -> Model {
     Model {
         joints: vec![Joint { name: "joint".into(), between: ["mover".into(), GROUND.into()], law }],
         motions,
@@ -67,7 +67,7 @@ fn turning_points(motions: &[Motion]) -> Vec<f64> {
 #[test]
 fn no_energy_is_created_over_closed_histories() {
     for row in TABLE {
-        let law = (row.sample)();
+        let law = row.sample();
         let (mut least, mut most) = (f64::INFINITY, 0.0f64);
         for seed in 0..24 {
             for omega in [1.0, 300.0] {
@@ -76,15 +76,15 @@ fn no_energy_is_created_over_closed_histories() {
                 // the largest force times the whole way is the most that can be lost
                 let points = turning_points(&history(seed));
                 let way: f64 = (0..points.len()).map(|k| (points[(k + 1) % points.len()] - points[k]).abs()).sum();
-                assert!(friction >= -1e-12 * law.limit() * way, "{}, seed {seed}: {friction}", row.name);
-                assert!(friction <= law.limit() * way * (1.0 + 1e-9), "{}, seed {seed}: {friction}", row.name);
-                near(&format!("{}, seed {seed}: work in", row.name), work, friction, 1e-7 * law.limit() * way);
+                assert!(friction >= -1e-12 * law.scale() * way, "{}, seed {seed}: {friction}", row.name);
+                assert!(friction <= law.scale() * way * (1.0 + 1e-9), "{}, seed {seed}: {friction}", row.name);
+                near(&format!("{}, seed {seed}: work in", row.name), work, friction, 1e-7 * law.scale() * way);
                 for k in 0..200 {
                     let force = orbit.sample(orbit.period() * f64::from(k) / 200.0).joints[0].force[0];
-                    assert!(force.abs() <= law.limit() * (1.0 + 1e-9), "{}: {force}", row.name);
+                    assert!(force.abs() <= law.scale() * (1.0 + 1e-9), "{}: {force}", row.name);
                 }
-                least = least.min(friction / (law.limit() * way));
-                most = most.max(friction / (law.limit() * way));
+                least = least.min(friction / (law.scale() * way));
+                most = most.max(friction / (law.scale() * way));
             }
         }
         println!("{}: lost {least:.3} to {most:.3} of limit times way", row.name);
@@ -96,7 +96,7 @@ fn no_energy_is_created_over_closed_histories() {
 fn exact_laws_equal_the_replay_of_their_sliders() {
     let mut compared = 0;
     for row in TABLE {
-        let Some(branches) = (row.sample)().network() else { continue };
+        let Some(branches) = row.sample().sliders() else { continue };
         for seed in 0..40 {
             let points = turning_points(&history(seed));
             let mut loss = 0.0;
@@ -124,7 +124,7 @@ fn exact_laws_equal_the_replay_of_their_sliders() {
                     }
                 }
             }
-            let orbit = exact(&moved((row.sample)(), history(seed)).assemble().unwrap(), 10.0);
+            let orbit = exact(&moved(row.sample(), history(seed)).assemble().unwrap(), 10.0);
             near(&format!("{}, seed {seed}", row.name), orbit.energy.friction, loss, 1e-9 * loss.max(1e-9));
             compared += 1;
         }
@@ -138,7 +138,7 @@ fn rest_stays_at_rest() {
         let model = Model {
             masses: vec![Mass::new("m", 0.3)],
             springs: vec![Spring { between: ["m".into(), GROUND.into()], stiffness: 100.0, damping: 0.1 }],
-            joints: vec![Joint { name: "joint".into(), between: ["m".into(), GROUND.into()], law: (row.sample)() }],
+            joints: vec![Joint { name: "joint".into(), between: ["m".into(), GROUND.into()], law: row.sample() }],
             ..Model::default()
         };
         for omega in [0.1, 18.0, 500.0] {
@@ -154,7 +154,7 @@ fn rest_stays_at_rest() {
 #[test]
 fn loops_do_not_depend_on_speed() {
     for row in TABLE {
-        let law = (row.sample)();
+        let law = row.sample();
         let faster = match law {
             Arc::new(mut law) => {
                 law.alpha /= 10.0;
@@ -165,7 +165,7 @@ fn loops_do_not_depend_on_speed() {
                 Arc::new(law)
             }
             rate_independent => {
-                assert!(rate_independent.network().is_some());
+                assert!(rate_independent.sliders().is_some());
                 rate_independent
             }
         };
@@ -175,13 +175,13 @@ fn loops_do_not_depend_on_speed() {
                 row.name,
                 fast.energy.friction,
                 slow.energy.friction,
-                1e-9 * slow.energy.friction.max(1e-3 * law.limit()),
+                1e-9 * slow.energy.friction.max(1e-3 * law.scale()),
             );
             for k in 0..101 {
                 let [a, b] =
                     [&slow, &fast].map(|orbit| orbit.sample(orbit.period() * (f64::from(k) + 0.3) / 101.0).joints[0]);
                 near(row.name, b.displacement, a.displacement, 1e-15);
-                near(row.name, b.force, a.force, 1e-7 * law.limit());
+                near(row.name, b.force, a.force, 1e-7 * law.scale());
             }
         }
     }
@@ -191,13 +191,13 @@ fn loops_do_not_depend_on_speed() {
 #[test]
 fn regularised_tends_to_exact() {
     for row in TABLE {
-        let law = (row.sample)();
+        let law = row.sample();
         let Some(_) = law.regularised(1.0) else {
-            assert!(law.network().is_none(), "{} is exact and has no smooth neighbour", row.name);
+            assert!(law.sliders().is_none(), "{} is exact and has no smooth neighbour", row.name);
             continue;
         };
         let order =
-            if law.network().unwrap().iter().all(|branch| branch.stiffness.is_none()) { 1.0 } else { 2.0 / 3.0 };
+            if law.sliders().unwrap().iter().all(|branch| branch.stiffness.is_none()) { 1.0 } else { 2.0 / 3.0 };
         let motion = vec![Motion { on: "mover".into(), amplitude: 1e-3, phase: 0.0, harmonic: 1 }];
         let omega = 100.0;
         let reference = exact(&moved(law, motion.clone()).assemble().unwrap(), omega).energy.friction;
@@ -221,7 +221,7 @@ fn regularised_tends_to_exact() {
 fn tangents_are_those_of_dual_numbers() {
     let mut laws = 0;
     for row in TABLE {
-        let Some(law) = (row.sample)().rate() else { continue };
+        let Some(law) = row.sample().rate() else { continue };
         let mut random = Random::new(7);
         laws += 1;
         assert!(law.states() <= 1, "the variables below are u, u' and one state");
@@ -268,7 +268,7 @@ fn tangents_are_those_of_dual_numbers() {
 #[test]
 fn what_laws_say_of_themselves() {
     for row in TABLE {
-        let law = (row.sample)();
+        let law = row.sample();
         let smooth = law.regularised(1e-4);
         assert!(law.is_odd() && law.is_incrementally_passive(), "{}", row.name);
         assert!(smooth.is_none_or(|smooth| smooth.is_incrementally_passive()), "{}: its smooth neighbour", row.name);
@@ -280,7 +280,7 @@ fn what_laws_say_of_themselves() {
             for (k, (a, b)) in one.iter().zip(&two).enumerate() {
                 taken += (a.1 - b.1) * (a.0 - b.0);
                 (least, most) = (least.min(taken), most.max(taken));
-                assert!((mirrored[k].1 + a.1).abs() <= 1e-9 * law.limit(), "{}, seed {seed}", row.name);
+                assert!((mirrored[k].1 + a.1).abs() <= 1e-9 * law.scale(), "{}, seed {seed}", row.name);
             }
         }
         println!("{}: the difference of two motions took between {least:.2e} and {most:.2e} J", row.name);
@@ -289,11 +289,11 @@ fn what_laws_say_of_themselves() {
 }
 
 /// Relative motion in each step and force, from rest without force, over two periods of `sign` times the history.
-fn forces(law: Law, motions: &[Motion], sign: f64) -> Vec<(f64, f64)> {
+fn forces(law: SharedLaw, motions: &[Motion], sign: f64) -> Vec<(f64, f64)> {
     const STEPS: u32 = 2000;
     let omega = 10.0;
     let step = TAU / omega / f64::from(STEPS);
-    let branches = law.network();
+    let branches = law.sliders();
     let mut held = vec![0.0; branches.as_ref().map_or(0, Vec::len)];
     let mut z = 0.0;
     let place = |k: u32| sign * kinematics(motions, TAU * f64::from(k) / f64::from(STEPS)).0;

@@ -6,7 +6,8 @@
 
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
-use stickslip::law::{CoulombArctan, Law};
+use std::sync::Arc;
+use stickslip::law::{CoulombArctan, SharedLaw};
 use stickslip::method::{Method, Solver, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
@@ -149,7 +150,7 @@ fn theory_6_5_sensitivity_to_alpha() {
     let (sharp, _) = peak(&mut *EventDriven.solver(&template("blade-couple", &[("Ft", 2.0)])).unwrap(), 2);
     let mut highest = sharp;
     for (alpha, printed) in [(25_000.0, 1.0039), (250.0, 0.9959), (25.0, 0.9683), (2.5, 0.8648)] {
-        let law = |limit| Arc::new(CoulombArctan { limit, alpha });
+        let law = |limit| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha }) };
         let system = template_with("blade-couple", &[("Ft", 2.0)], law);
         let mut solver = Shooting { tolerance: 1e-8, width: None }.solver(&system).unwrap();
         let mut start: Option<Vec<f64>> = None;
@@ -432,7 +433,7 @@ fn theory_13_orbits_are_stable_and_shift_with_the_force() {
     for (ft, hertz) in [(2.0, 121.25), (4.0, 120.75), (8.0, 121.0), (4.0, 121.1)] {
         let plain = orbit("blade-couple", &[("Ft", ft)], hertz);
         assert_eq!(plain.is_stable(), Some(true), "{:?}", plain.multipliers());
-        let mut model = stickslip::model::templates::find("blade-couple").unwrap().model_with(&[("Ft", ft)]).unwrap();
+        let mut model = stickslip_study::templates::find("blade-couple").unwrap().model_with(&[("Ft", ft)]).unwrap();
         model.forces[0].phase = PI / 3.0;
         let shifted = exact(&model.assemble().unwrap(), TAU * hertz);
         for (a, b) in plain.places.iter().zip(&shifted.places) {

@@ -3,7 +3,8 @@
 #![allow(clippy::print_stdout)] // tests say what they measured
 
 use std::f64::consts::TAU;
-use stickslip::law::{CoulombArctan, JenkinsArctan, Law};
+use std::sync::Arc;
+use stickslip::law::{CoulombArctan, JenkinsArctan, SharedLaw};
 use stickslip::method::{Method, shooting::Shooting};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
@@ -60,7 +61,7 @@ fn theory_5_exact_law_needs_no_condition() {
 #[test]
 fn theory_5_smooth_law_needs_alpha_scaled() {
     let couple = |ft: f64, f0: f64, alpha: f64| {
-        let law = |limit| Arc::new(CoulombArctan { limit, alpha });
+        let law = |limit| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha }) };
         template_with("blade-couple", &[("Ft", ft), ("F0", f0)], law)
     };
     let (mut same, mut other) = (0.0f64, [0.0f64; 3]);
@@ -96,7 +97,7 @@ fn theory_5_groups_of_the_element() {
     let (q, p, l) = (7.0, 3.0, 0.4); // factors of frequency, stiffness, length
     let values = |kt: f64, ft: f64, a: f64| vec![("kt", kt), ("Ft", ft), ("a", a)];
     let massless = |kt: f64, ft: f64, a: f64, alpha: f64, w: f64| {
-        let law = |limit| Arc::new(JenkinsArctan { stiffness: kt, limit, alpha });
+        let law = |limit| -> SharedLaw { Arc::new(JenkinsArctan { stiffness: kt, limit, alpha }) };
         smooth(&template_with("element", &values(kt, ft, a), law), w).energy.friction
     };
     close(

@@ -4,8 +4,9 @@
 #![allow(clippy::print_stdout)] // tests say what they measured
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 use std::time::Instant;
-use stickslip::law::{CoulombArctan, Law};
+use stickslip::law::CoulombArctan;
 use stickslip::method::{Method, event_driven::EventDriven, settling::Settling, shooting::Shooting};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;

@@ -1,9 +1,11 @@
 //! What is known of a model before anything is computed, against closed forms and against SciPy.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
-use stickslip::law::{Coulomb, Jenkins, Law};
-use stickslip::model::{Force, GROUND, Joint, Mass, Model, Modes, Motion, Onset, Spring, Survey, templates};
+use stickslip::law::{Coulomb, Jenkins, SharedLaw};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Modes, Motion, Onset, Spring, Survey};
+use stickslip_study::templates;
 
 fn couple(template: &str, changes: &[(&str, f64)]) -> Survey {
     templates::find(template).unwrap().model_with(changes).unwrap().survey().unwrap()
@@ -17,7 +19,7 @@ fn spring(a: impl Into<String>, b: impl Into<String>, stiffness: f64, damping: f
     Spring { between: [a.into(), b.into()], stiffness, damping }
 }
 
-fn joint(name: impl Into<String>, a: impl Into<String>, b: impl Into<String>, law: Law) -> Joint {
+fn joint(name: impl Into<String>, a: impl Into<String>, b: impl Into<String>, law: SharedLaw) -> Joint {
     Joint { name: name.into(), between: [a.into(), b.into()], law }
 }
 
@@ -25,11 +27,11 @@ fn force(on: &str, amplitude: f64, phase: f64, harmonic: u32) -> Force {
     Force { on: on.to_owned(), amplitude, phase, harmonic }
 }
 
-fn jenkins(stiffness: f64, limit: f64) -> Law {
+fn jenkins(stiffness: f64, limit: f64) -> SharedLaw {
     Arc::new(Jenkins { stiffness, limit })
 }
 
-fn coulomb(limit: f64) -> Law {
+fn coulomb(limit: f64) -> SharedLaw {
     Arc::new(Coulomb { limit })
 }
 

@@ -6,7 +6,8 @@
 
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use stickslip::law::{CoulombArctan, Law};
+use std::sync::Arc;
+use stickslip::law::{CoulombArctan, SharedLaw};
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
@@ -78,7 +79,7 @@ fn theory_4_1_sum_of_the_blades_is_linear() {
 fn theory_4_1_sum_of_the_blades_is_linear_for_the_smooth_law() {
     for alpha in [250.0, 25e3] {
         for (ft, hertz) in [(2.0, 120.93), (4.0, 121.1), (1.0, 120.5)] {
-            let law = |limit| Arc::new(CoulombArctan { limit, alpha });
+            let law = |limit| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha }) };
             let system = template_with("symmetric-couple", &[("Ft", ft), ("mu", MU[0])], law);
             let method = Shooting { tolerance: 1e-10, width: None };
             let orbit = method.solver(&system).unwrap().orbit(TAU * hertz, None).unwrap();

@@ -91,7 +91,7 @@ impl Line {
     fn new(system: &System, rate: f64) -> Line {
         let n = system.dofs();
         assert_eq!(system.joints().len(), 1);
-        let w = system.joints()[0].direction;
+        let w = system.joints()[0].axes()[0].dense(system.dofs());
         let mut a = vec![vec![0.0; 2 * n]; 2 * n];
         let (mut g, mut h, mut c) = (vec![0.0; 2 * n], vec![0.0; 2 * n], vec![0.0; 2 * n]);
         let force = &system.excitation(rate)[0].1;
@@ -103,8 +103,8 @@ impl Line {
                 a[n + i][n + k] = -system.structure().damping()[(i, k)] / mass;
             }
             g[n + i] = force[i].re / mass;
-            h[n + i] = w[(i, 0)] * system.joints()[0].law.limit() / mass;
-            c[n + i] = w[(i, 0)];
+            h[n + i] = w[i] * system.joints()[0].law().scale() / mass;
+            c[n + i] = w[i];
         }
         Line { n, a, g, h, c }
     }
@@ -236,7 +236,7 @@ fn compare(system: &System, hertz: f64) -> bool {
         });
         b - a
     };
-    close("loss", orbit.joints[0].dissipation, 4.0 * system.joints()[0].law.limit() * slide, 1e-8);
+    close("loss", orbit.joints[0].dissipation, 4.0 * system.joints()[0].law().scale() * slide, 1e-8);
     true
 }
 
@@ -302,15 +302,18 @@ fn theory_8_4_fourier_form() {
             let s = Complex64::new(0.0, w);
             let dynamic: Matrix<Complex64> = (0..n)
                 .map(|i| {
-                    let entry =
-                        |k: usize| s * s * system.structure().mass()[(i, k)] + s * system.structure().damping()[(i, k)] + system.structure().stiffness()[(i, k)];
+                    let entry = |k: usize| {
+                        s * s * system.structure().mass()[(i, k)]
+                            + s * system.structure().damping()[(i, k)]
+                            + system.structure().stiffness()[(i, k)]
+                    };
                     (0..n).map(entry).collect()
                 })
                 .collect();
             let right = (0..n).map(|i| vec![Complex64::new(unit(i), 0.0)]).collect();
             solve(&dynamic, &right).into_iter().map(|row| row[0]).collect()
         };
-        let w = |i: usize| system.joints()[0].direction[(i, 0)];
+        let w = |i: usize| system.joints()[0].axes()[0].dense(system.dofs())[i];
         let slide = |x: &[Complex64]| -> Complex64 { (0..n).map(|i| x[i] * w(i)).sum() };
         let drive = slide(&response(omega, &|i| if i == 0 { 10.0 } else { 0.0 })) * Complex64::new(0.0, omega);
         // s(t) = (4/pi) sum over odd h of sin(h w (t - t0))/h: at t0 its part of the velocity is sum of Im(Y_h)/h, and the
@@ -327,8 +330,10 @@ fn theory_8_4_fourier_form() {
         sum += -inverse_mass / omega / (2.0 * f64::from(last + 1)); // tail of sum 1/h^2 over odd h
         let friction = -ft * 4.0 / PI * sum;
         // psi: Re(drive e^{j psi}) + friction = 0 at the reversal to positive sliding
-        let t0 =
-            orbit.switch_times().into_iter().find(|t| orbit.sample(t + 1e-3 * orbit.period()).joints[0].velocity[0] > 0.0);
+        let t0 = orbit
+            .switch_times()
+            .into_iter()
+            .find(|t| orbit.sample(t + 1e-3 * orbit.period()).joints[0].velocity[0] > 0.0);
         let psi = omega * t0.unwrap();
         let balance = (drive * Complex64::from_polar(1.0, psi)).re + friction;
         near("velocity at the reversal", balance, 0.0, 1e-8 * drive.norm());

@@ -40,7 +40,7 @@ impl Adaptive {
     /// ```
     /// use stickslip::curve::adaptive::Adaptive;
     /// use stickslip::method::event_driven::EventDriven;
-    /// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+    /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
     /// let range = (std::f64::consts::TAU * 110.0, std::f64::consts::TAU * 130.0);
     /// let curve = Adaptive { range, tolerance: 0.01 }
     ///     .curve(&EventDriven, &system, &|orbit| vec![orbit.places[0].amplitude()], &|_| (), &|| false)
@@ -166,8 +166,9 @@ mod tests {
     /// The polygon is as near to the curve as was asked, judged at frequencies that it has no points at.
     #[test]
     fn the_polygon_is_near_the_curve() {
-        let couple = crate::model::templates::find("blade-couple").unwrap();
-        let system = couple.model_with(&[("Ft", 4.0)]).unwrap().assemble().unwrap();
+        let mut couple = crate::model::example::blade_couple();
+        couple.joints[0].law = std::sync::Arc::new(crate::law::Coulomb { limit: 4.0 });
+        let system = couple.assemble().unwrap();
         let tolerance = 0.01;
         let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
         let curve = Adaptive { range: (TAU * 119.0, TAU * 123.0), tolerance }
@@ -191,7 +192,7 @@ mod tests {
 
     #[test]
     fn what_is_stopped_returns_what_is_there() {
-        let system = crate::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+        let system = crate::model::example::blade_couple().assemble().unwrap();
         let adaptive = Adaptive { range: (700.0, 800.0), tolerance: 0.01 };
         assert!(adaptive.curve(&EventDriven, &system, &|_| vec![0.0], &|_| (), &|| true).unwrap().is_empty());
     }

@@ -169,7 +169,7 @@ pub fn check(system: &System) -> Result<(), MethodError> {
 /// # Example
 /// ```
 /// use stickslip::curve::modes::{ModeRequest, mode};
-/// let system = stickslip::model::templates::find("blade-couple-massless").unwrap().model().assemble().unwrap();
+/// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
 /// // the mode in which the blades move against each other is the only one that friction knows
 /// let request = ModeRequest { mode: 1, range: (1e-6, 1.0), points: 25, harmonics: 5, samples: 512 };
 /// let mode = mode(&system, request).unwrap();
@@ -249,7 +249,9 @@ impl Path {
             Path { linear, arcs: Vec::new(), lost: Some(lost) }
         };
         let Some(linear) = modes.get(index).cloned() else { return none(None) };
-        let faint = equations.faint(&modes, index, FAINT, APART).max(f64::MIN_POSITIVE);
+        let faint = equations.faint(&modes, index, FAINT, APART);
+        // without friction any amplitude will do
+        let faint = if faint > 0.0 { faint } else { low };
         let start = OTHERS.iter().find_map(|factor| {
             let amplitude = factor * faint;
             let guess = equations.linear(&linear, amplitude)?;
@@ -455,8 +457,9 @@ fn point(equations: &ModeEquations<'_>, amplitude: f64, state: &ModeState) -> Mo
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::law::Coulomb;
     use crate::method::{Method, event_driven::EventDriven};
-    use crate::model::{Force, templates};
+    use crate::model::{Force, example};
     use num_complex::Complex64;
     use std::f64::consts::PI;
 
@@ -469,7 +472,8 @@ mod tests {
     /// only one.
     #[test]
     fn the_exact_orbit_under_the_forces_of_a_mode_is_the_mode() {
-        let couple = templates::find("blade-couple").unwrap().model_with(&[("Ft", 8.0)]).unwrap();
+        let mut couple = example::blade_couple();
+        couple.joints[0].law = std::sync::Arc::new(Coulomb { limit: 8.0 });
         let system = couple.assemble().unwrap();
         let mut equations = ModeEquations::new(&system, 31, 1024).unwrap();
         let mut slipping = 0;

@@ -90,8 +90,9 @@ const CANDIDATE: f64 = 0.8;
 /// ```
 /// use stickslip::curve::peak::highest;
 /// use stickslip::method::{Method, event_driven::EventDriven};
-/// let couple = stickslip::model::templates::find("blade-couple").unwrap();
-/// let system = couple.model_with(&[("Ft", 4.0)]).unwrap().assemble().unwrap();
+/// let mut couple = stickslip::model::example::blade_couple();
+/// couple.joints[0].law = stickslip::law::Law::Coulomb(stickslip::law::Coulomb { limit: 4.0 });
+/// let system = couple.assemble().unwrap();
 /// let mut solver = EventDriven.solver(&system).unwrap();
 /// let omegas: Vec<f64> = (0..9).map(|i| std::f64::consts::TAU * (120.9 + 0.1 * f64::from(i))).collect();
 /// let values: Vec<f64> = omegas.iter().map(|w| solver.orbit(*w, None).unwrap().places[0].amplitude()).collect();
@@ -145,7 +146,7 @@ pub struct PeakOf {
 /// use stickslip::curve::peak::{Point, all};
 /// use stickslip::method::{Method, event_driven::EventDriven};
 /// use stickslip::orbit::Orbit;
-/// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+/// let system = stickslip::model::example::blade_couple().assemble().unwrap();
 /// let amplitudes = |orbit: &Orbit| orbit.places.iter().map(|place| place.amplitude()).collect();
 /// let mut solver = EventDriven.solver(&system).unwrap();
 /// let points: Vec<Point> = (0..9)

@@ -9,6 +9,7 @@ use crate::method::{Method, MethodError};
 use crate::model::System;
 use crate::orbit::{Accuracy, Orbit};
 use rayon::prelude::*;
+use stickslip_numerics::maximum::maximum;
 
 /// What is computed.
 #[derive(Clone, Copy)]
@@ -65,8 +66,6 @@ pub enum PerformanceError<E> {
 
 /// Relative width at which the search for the optimum ends: the peak is known to 1e-10, and flat to second order or kinked there.
 const BRACKET: f64 = 1e-7;
-/// (√5 - 1)/2
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 impl<E: Send> Performance<'_, E> {
     /// The peak at one value of the parameter.
@@ -112,10 +111,14 @@ impl<E: Send> Performance<'_, E> {
     /// ```
     /// use stickslip::curve::performance::Performance;
     /// use stickslip::method::event_driven::EventDriven;
-    /// use stickslip::model::templates;
-    /// let couple = templates::find("blade-couple").unwrap();
+    /// use stickslip::law::{Coulomb, Law};
+    /// use stickslip::model::example;
     /// let curve = Performance {
-    ///     system: &|limit| couple.model_with(&[("Ft", limit)]).unwrap().assemble(),
+    ///     system: &|limit| {
+    ///         let mut couple = example::blade_couple();
+    ///         couple.joints[0].law = Law::Coulomb(Coulomb { limit });
+    ///         couple.assemble()
+    ///     },
     ///     method: &EventDriven,
     ///     range: (119.5 * std::f64::consts::TAU, 122.5 * std::f64::consts::TAU),
     ///     points: 31,
@@ -142,26 +145,15 @@ impl<E: Send> Performance<'_, E> {
     /// Golden-section search: the lowest of two rising branches is a kink as often as it is smooth.
     fn refine(&self, low: f64, middle: Row, high: f64) -> Result<Row, PerformanceError<E>> {
         let height = |row: &Row| row.peak.map_or(f64::INFINITY, |peak| peak.value);
-        let (mut a, mut b) = (low, high);
         let mut best = middle;
-        let mut left = self.peak(b - GOLDEN * (b - a))?;
-        let mut right = self.peak(a + GOLDEN * (b - a))?;
-        while b - a > BRACKET * (a.abs() + b.abs()) {
-            if height(&left) <= height(&right) {
-                b = right.value;
-                right = left;
-                left = self.peak(b - GOLDEN * (b - a))?;
-            } else {
-                a = left.value;
-                left = right;
-                right = self.peak(a + GOLDEN * (b - a))?;
+        let close = |a: f64, b: f64| b - a <= BRACKET * (a.abs() + b.abs());
+        maximum((low, high), close, |value| {
+            let row = self.peak(value)?;
+            if height(&row) < height(&best) {
+                best = row;
             }
-            for row in [&left, &right] {
-                if height(row) < height(&best) {
-                    best = *row;
-                }
-            }
-        }
+            Ok(-height(&row))
+        })?;
         Ok(best)
     }
 }

@@ -31,7 +31,7 @@ pub struct Watch<'a> {
 /// use std::sync::atomic::AtomicBool;
 /// use stickslip::curve::sweep::{Watch, sweep};
 /// use stickslip::method::event_driven::EventDriven;
-/// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+/// let system = stickslip::model::example::blade_couple().assemble().unwrap();
 /// let watch = Watch { finished: &|| (), stop: &AtomicBool::new(false) };
 /// let curve = sweep(&EventDriven, &system, 3, &|i| 760.0 + i as f64, watch, &|_, orbit| {
 ///     orbit.map(|orbit| orbit.places[0].amplitude()).ok()

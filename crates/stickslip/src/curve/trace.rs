@@ -7,7 +7,9 @@ use crate::method::harmonic_balance::{BranchEquations, HarmonicBalance};
 use crate::method::{MethodError, OrbitError};
 use crate::model::System;
 use crate::orbit::Orbit;
+use std::convert::Infallible;
 use stickslip_numerics::continuation::{self, Steps};
+use stickslip_numerics::maximum::maximum;
 
 pub use stickslip_numerics::continuation::End;
 
@@ -61,6 +63,8 @@ pub enum TraceError {
 
 /// Maxima below this share of the largest are those of rounding, where a joint holds all motion.
 const ROUNDING: f64 = 1e-9;
+/// Relative width at which the search for a peak ends: the height of a smooth one is then right to rounding, of a kink to about this share.
+const LOCATED: f64 = 1e-9;
 
 impl Trace<'_> {
     /// Follows the branch from the start of the range until it leaves it.
@@ -72,8 +76,7 @@ impl Trace<'_> {
     /// ```
     /// use stickslip::curve::trace::Trace;
     /// use stickslip::method::harmonic_balance::HarmonicBalance;
-    /// use stickslip::model::templates;
-    /// let system = templates::find("blade-couple-massless").unwrap().model().assemble().unwrap();
+    /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
     /// let branch = Trace {
     ///     at: &|omega| (system.clone(), omega),
     ///     method: HarmonicBalance { harmonics: Some(5), ..HarmonicBalance::default() },
@@ -113,35 +116,18 @@ impl Trace<'_> {
         Ok(Branch { points, peaks, turns, end })
     }
 
-    /// Golden-section search between three neighbours where the parameter is monotonic.
+    /// The highest place between three neighbours where the parameter is monotonic.
     fn refine(&self, equations: &mut BranchEquations<'_>, arc: &[(Vec<f64>, f64)], best: (f64, f64)) -> (f64, f64) {
-        let (mut a, mut b) = (arc[0].1, arc[2].1);
+        let (a, b) = (arc[0].1, arc[2].1);
         if (arc[1].1 - a) * (b - arc[1].1) <= 0.0 {
             return best;
         }
-        let mut best = best;
         let mut height = |value: f64| {
             let orbit = equations.near(&arc[1].0, value);
-            let height = orbit.map_or(f64::NEG_INFINITY, |orbit| (self.quantity)(&orbit));
-            if height > best.1 {
-                best = (value, height);
-            }
-            height
+            orbit.map_or(f64::NEG_INFINITY, |orbit| (self.quantity)(&orbit))
         };
-        let golden = 0.618_033_988_749_894_9;
-        let (mut left, mut right) = (b - golden * (b - a), a + golden * (b - a));
-        let (mut at_left, mut at_right) = (height(left), height(right));
-        while (b - a).abs() > 1e-9 * (a.abs() + b.abs()) {
-            if at_left >= at_right {
-                (b, right, at_right) = (right, left, at_left);
-                left = b - golden * (b - a);
-                at_left = height(left);
-            } else {
-                (a, left, at_left) = (left, right, at_right);
-                right = a + golden * (b - a);
-                at_right = height(right);
-            }
-        }
-        best
+        let close = |a: f64, b: f64| (b - a).abs() <= LOCATED * (a.abs() + b.abs());
+        let Ok(found) = maximum((a, b), close, |value| Ok::<_, Infallible>(height(value)));
+        if found.1 > best.1 { found } else { best }
     }
 }

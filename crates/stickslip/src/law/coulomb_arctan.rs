@@ -29,7 +29,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 /// use stickslip::law::{CoulombArctan, RateLaw, Relative};
 /// let law = CoulombArctan { limit: 2.0, alpha: 1.0 };
-/// let force = law.evaluate(&Relative::along(0.0, 1.0), &[], &mut []);
+/// let force = law.evaluate::<f64>(&Relative::along(0.0, 1.0), &[], &mut []);
 /// assert!((force[0] - 1.0).abs() < 1e-15);   // arctan 1 = π/4, half the limit
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]

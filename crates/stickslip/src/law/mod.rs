@@ -18,21 +18,30 @@
 //! To add a law: write its file, with its [`LawInfo`], then one line in [`TABLE`]. A law from another crate, or one that only a test needs,
 //! is put into a [`crate::model::Joint`] without any line.
 
+mod bouc_wen;
 mod contact;
 mod coulomb;
 mod coulomb_arctan;
+mod cubic;
+mod dahl;
 mod describing;
+mod gap;
 mod jenkins;
 mod jenkins_arctan;
+mod kink;
 mod parameter;
 mod prox;
 mod rate;
 mod step;
 
+pub use bouc_wen::BoucWen;
 pub use contact::Contact;
 pub(crate) use contact::SLIPS_ABOVE;
 pub use coulomb::Coulomb;
 pub use coulomb_arctan::CoulombArctan;
+pub use cubic::Cubic;
+pub use dahl::Dahl;
+pub use gap::Gap;
 pub use jenkins::Jenkins;
 pub use jenkins_arctan::JenkinsArctan;
 pub use parameter::{BuildError, LawError, LawInfo, Parameter, Range};
@@ -46,7 +55,16 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 /// Every law there is, in the order in which lists show them.
-pub const TABLE: &[&LawInfo] = &[&coulomb::INFO, &coulomb_arctan::INFO, &jenkins::INFO, &jenkins_arctan::INFO];
+pub const TABLE: &[&LawInfo] = &[
+    &coulomb::INFO,
+    &coulomb_arctan::INFO,
+    &jenkins::INFO,
+    &jenkins_arctan::INFO,
+    &dahl::INFO,
+    &bouc_wen::INFO,
+    &cubic::INFO,
+    &gap::INFO,
+];
 
 /// The row of [`TABLE`] with this name.
 pub fn find(name: &str) -> Option<&'static LawInfo> {
@@ -207,6 +225,8 @@ const STUCK: f64 = 1e15;
 
 /// The key of a slip limit.
 const LIMIT: &str = "limit";
+/// The key of the force up to which faces hold once they rest.
+const STATIC_LIMIT: &str = "static_limit";
 
 impl dyn Law + '_ {
     /// Name in study files.
@@ -234,6 +254,9 @@ impl dyn Law + '_ {
         let (info, mut values) = (self.info(), self.values());
         let at = info.parameters.iter().position(|p| p.key == LIMIT)?;
         values[at] = limit;
+        if let Some(at) = info.parameters.iter().position(|p| p.key == STATIC_LIMIT) {
+            values[at] = limit;
+        }
         Some((info.build)(&values))
     }
 
@@ -247,9 +270,9 @@ impl dyn Law + '_ {
         self.limited(STUCK)
     }
 
-    /// Whether the law can never carry a force: its slip limit is zero.
+    /// Whether the law can never carry a force: the size of its forces is zero.
     pub fn is_free(&self) -> bool {
-        self.value(LIMIT) == Some(0.0)
+        self.scale() == 0.0
     }
 
     /// Checks that every parameter is finite and in its range, and that they fit each other.

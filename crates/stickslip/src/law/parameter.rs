@@ -53,6 +53,8 @@ pub struct Parameter {
     pub key: &'static str,
     /// Physical dimension, for units and for error messages.
     pub dimension: Dimension,
+    /// The parameter to whose value the dimension is raised, see [`Parameter::dimension_under`].
+    pub power: Option<&'static str>,
     /// What it may be.
     pub range: Range,
     /// Its value when the key is absent, SI; `None` if it must be given.
@@ -64,7 +66,7 @@ pub struct Parameter {
 impl Parameter {
     /// A parameter within a range.
     pub const fn new(key: &'static str, dimension: Dimension, range: Range, doc: &'static str) -> Self {
-        Parameter { key, dimension, range, default: None, doc }
+        Parameter { key, dimension, power: None, range, default: None, doc }
     }
 
     /// A parameter that is more than zero.
@@ -75,6 +77,20 @@ impl Parameter {
     /// The slip limit, N; zero is a joint that carries no force: the free reference of a damper.
     pub const fn limit(doc: &'static str) -> Self {
         Parameter::new(super::LIMIT, Dimension::FORCE, Range::ZeroOrMore, doc)
+    }
+
+    /// The same parameter with its dimension raised to the value of another one.
+    pub const fn to_the(self, power: &'static str) -> Self {
+        Parameter { power: Some(power), ..self }
+    }
+
+    /// Its dimension where `value` gives the values of the other parameters: the power's value is what it is raised to. `None` if that is
+    /// no whole number; then it is stated by a plain number in SI, which no unit could be asked of.
+    pub fn dimension_under(&self, value: impl Fn(&str) -> Option<f64>) -> Option<Dimension> {
+        match self.power {
+            None => Some(self.dimension),
+            Some(power) => self.dimension.to_the(value(power)?),
+        }
     }
 
     /// The same parameter with a value for when its key is absent, SI.
@@ -118,8 +134,7 @@ impl LawInfo {
     /// ```
     pub fn build(&self, values: &BTreeMap<&str, f64>) -> Result<SharedLaw, BuildError> {
         let value = |p: &Parameter| values.get(p.key).copied().or(p.default);
-        let missing: Vec<&'static str> =
-            self.parameters.iter().filter(|p| value(p).is_none()).map(|p| p.key).collect();
+        let missing: Vec<&'static str> = self.parameters.iter().filter(|p| value(p).is_none()).map(|p| p.key).collect();
         if !missing.is_empty() {
             return Err(BuildError::Missing { law: self.name, keys: missing });
         }
@@ -136,7 +151,9 @@ impl LawInfo {
 pub(super) fn check(info: &LawInfo, values: &[f64]) -> Result<(), LawError> {
     for (parameter, &value) in info.parameters.iter().zip(values) {
         if !parameter.range.has(value) {
-            let Parameter { key, dimension, range, .. } = *parameter;
+            let Parameter { key, range, .. } = *parameter;
+            let of = |key: &str| Some(values[info.parameters.iter().position(|p| p.key == key)?]);
+            let dimension = parameter.dimension_under(of).unwrap_or(Dimension::NONE);
             return Err(LawError::Value { law: info.name, key, dimension, range, value });
         }
     }

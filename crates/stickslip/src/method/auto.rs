@@ -21,7 +21,7 @@ const FOLLOWED: usize = 12;
 /// # Example
 /// ```
 /// use stickslip::method::{Method, auto::Auto};
-/// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+/// let system = stickslip::model::example::blade_couple().assemble().unwrap();
 /// assert_eq!(Auto.choice(&system).to_string(), "event-driven (chosen by auto: every law is exact)");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -25,21 +25,20 @@ impl Drive {
         let n = system.dofs();
         let excitation = system.excitation(omega);
         let mut harmonics: Vec<u32> = excitation.iter().map(|(h, _)| *h).collect();
-        harmonics.extend(system.joints().iter().flat_map(|joint| joint.axes().iter().flat_map(|axis| axis.imposed()).map(|(h, _)| *h)));
+        harmonics.extend(
+            system
+                .joints()
+                .iter()
+                .flat_map(|joint| joint.axes().iter().flat_map(|axis| axis.imposed()).map(|(h, _)| *h)),
+        );
         harmonics.extend(system.moved().iter().flat_map(|place| place.motion.iter().map(|(h, _)| *h)));
         harmonics.sort_unstable();
         harmonics.dedup();
         harmonics.retain(|&h| h > 0);
         let force_at = |h: u32| excitation.iter().find(|(k, _)| *k == h).map(|(_, f)| f.clone());
         let zero = || DVector::from_element(n, Complex64::new(0.0, 0.0));
-        let imposed_at = |h: u32| {
-            contacts
-                .iter()
-                .map(|&joint| {
-                    system.joints()[joint].axes()[0].imposed_at(h)
-                })
-                .collect()
-        };
+        let imposed_at =
+            |h: u32| contacts.iter().map(|&joint| system.joints()[joint].axes()[0].imposed_at(h)).collect();
         Drive {
             omega,
             rates: harmonics.iter().map(|&h| f64::from(h) * omega).collect(),
@@ -89,7 +88,8 @@ impl Drive {
 
     /// The k-th time derivative of the imposed motion of a contact.
     pub fn imposed_at(&self, contact: usize, time: f64, derivative: u32) -> f64 {
-        self.rates.iter().zip(&self.imposed).map(|(rate, g)| (g[contact] * phasor(*rate, time, derivative)).re).sum()
+        let moving = self.rates.iter().zip(&self.imposed).filter(|(_, g)| g[contact] != Complex64::new(0.0, 0.0));
+        moving.map(|(rate, g)| (g[contact] * phasor(*rate, time, derivative)).re).sum()
     }
 }
 

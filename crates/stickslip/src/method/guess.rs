@@ -46,9 +46,8 @@ pub(crate) fn at_rest(law: &dyn Law, omega: f64) -> DMatrix<Complex64> {
     let s = Complex64::new(0.0, omega);
     let by_motion = |slope: &[f64], b: usize| s * slope[d + b] + slope[b];
     // s z = g_u u + g_v s u + g_z z
-    let matrix = DMatrix::from_fn(states, states, |i, k| {
-        (if i == k { s } else { zero }) - point.rate_slope(i)[2 * d + k]
-    });
+    let matrix =
+        DMatrix::from_fn(states, states, |i, k| (if i == k { s } else { zero }) - point.rate_slope(i)[2 * d + k]);
     let right = DMatrix::from_fn(states, d, |i, b| by_motion(point.rate_slope(i), b));
     let z = if states > 0 { matrix.lu().solve(&right) } else { None };
     DMatrix::from_fn(d, d, |a, b| {
@@ -73,9 +72,11 @@ impl Guess {
         for _ in 0..ROUNDS {
             let joints = system.joints().iter().zip(&amplitudes);
             guess.joints = joints
-                .map(|(joint, &a)| {
-                    if a.is_finite() { linearised(&**joint.law(), a, omega) } else { none(joint.axes().len()) }
-                })
+                .map(
+                    |(joint, &a)| {
+                        if a.is_finite() { linearised(&**joint.law(), a, omega) } else { none(joint.axes().len()) }
+                    },
+                )
                 .collect();
             guess.harmonics = harmonics
                 .iter()
@@ -116,7 +117,9 @@ impl Guess {
         }
         let s = Complex64::new(0.0, f64::from(h) * omega);
         let mut dynamic = DMatrix::from_fn(n, n, |i, k| {
-            s * s * system.structure().mass()[(i, k)] + s * system.structure().damping()[(i, k)] + system.structure().stiffness()[(i, k)]
+            s * s * system.structure().mass()[(i, k)]
+                + s * system.structure().damping()[(i, k)]
+                + system.structure().stiffness()[(i, k)]
         });
         for (joint, stiffness) in system.joints().iter().zip(&self.joints) {
             for (a, to) in joint.axes().iter().enumerate() {

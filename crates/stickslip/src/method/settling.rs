@@ -58,7 +58,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// # Example
 /// ```
 /// use stickslip::method::{Method, event_driven::EventDriven, settling::Settling};
-/// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+/// let system = stickslip::model::example::blade_couple().assemble().unwrap();
 /// let omega = std::f64::consts::TAU * 121.25;
 /// let waited = Settling::default().solver(&system).unwrap().orbit(omega, None).unwrap();
 /// let found = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();

@@ -66,9 +66,10 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{CoulombArctan, Law};
+/// use stickslip::law::CoulombArctan;
+/// use std::sync::Arc;
 /// use stickslip::method::{Method, shooting::Shooting};
-/// let mut model = stickslip::model::templates::find("blade-couple").unwrap().model();
+/// let mut model = stickslip::model::example::blade_couple();
 /// model.joints[0].law = Arc::new(CoulombArctan { limit: 2.0, alpha: 25e3 });
 /// let system = model.assemble().unwrap();
 /// let orbit = Shooting::default().solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25, None).unwrap();

@@ -12,6 +12,7 @@ use super::{Breakdown, MethodError};
 use crate::model::System;
 use crate::orbit::{Path, Sample, Symmetry};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 const NAME: &str = "transient";
 
@@ -88,6 +89,7 @@ impl Transient {
     /// A sliding oscillator loses `4 F/k` of amplitude per cycle.
     /// ```
     /// use stickslip::law::{Coulomb, Law};
+    /// use std::sync::Arc;
     /// use stickslip::method::transient::{Excitation, Transient};
     /// use stickslip::model::{GROUND, Joint, Mass, Model, Spring};
     /// let model = Model {
@@ -193,7 +195,7 @@ impl Runner {
             Runner::Exact(flow) => {
                 flow.set_drive(drive);
                 flow.run(state, 0.0, length, None)?;
-                Ok(Box::new(ExactPath::new(system, flow, Symmetry::FullPeriod, length)))
+                Ok(Box::new(ExactPath::new(Arc::new(system.clone()), flow, Symmetry::FullPeriod, length)))
             }
             Runner::Smooth(flow) => {
                 flow.drive = drive;

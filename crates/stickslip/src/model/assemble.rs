@@ -1,7 +1,7 @@
 //! From a model to a system: checks, and the matrices of `M x'' + C x' + K x + Σ W f = F(t)`.
 
 use super::system::{Axis, MovedPlace, System};
-use super::{GROUND, Mass, Model};
+use super::{GROUND, Joint, Mass, Model};
 use crate::structure::Structure;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -69,7 +69,8 @@ pub fn is_identifier(name: &str) -> bool {
 
 /// Whether `name` is an identifier, or a node and a direction of it, `node.direction`.
 fn is_place(name: &str) -> bool {
-    name.split_once('.').map_or_else(|| is_identifier(name), |(node, along)| is_identifier(node) && is_identifier(along))
+    name.split_once('.')
+        .map_or_else(|| is_identifier(name), |(node, along)| is_identifier(node) && is_identifier(along))
 }
 
 impl Mass {
@@ -116,13 +117,13 @@ impl Places {
         between: &[String; 2],
         count: usize,
         element: Element,
-    ) -> Result<Vec<[End; 2]>, ModelError> {
+    ) -> Result<Vec<(Option<&str>, [End; 2])>, ModelError> {
         let key = "between";
         let nodes: Vec<&Vec<String>> = between.iter().filter_map(|name| self.directions.get(name)).collect();
         let Some(directions) = nodes.first().copied() else {
             let [a, b] = [self.find(&between[0], element, key)?, self.find(&between[1], element, key)?];
             if count == 1 {
-                return Ok(vec![[a, b]]);
+                return Ok(vec![(None, [a, b])]);
             }
             let message = format!(
                 "the law acts along {count} directions, and `{}` and `{}` have one; join nodes with `directions`",
@@ -136,7 +137,11 @@ impl Places {
                 "the law acts along {count} direction{}, and the node `{node}` has {}: {}",
                 if count == 1 { "" } else { "s" },
                 directions.len(),
-                if count == 1 { format!("name one, such as `{node}.{}`", directions[0]) } else { directions.join(", ") }
+                if count == 1 {
+                    format!("name one, such as `{node}.{}`", directions[0])
+                } else {
+                    directions.join(", ")
+                }
             );
             return Err(ModelError::new(element, key, message));
         }
@@ -146,7 +151,7 @@ impl Places {
                 let end = |name: &String| {
                     if name == GROUND { Ok(End::Ground) } else { self.find(&format!("{name}.{along}"), element, key) }
                 };
-                Ok([end(&between[0])?, end(&between[1])?])
+                Ok((Some(along.as_str()), [end(&between[0])?, end(&between[1])?]))
             })
             .collect()
     }
@@ -165,6 +170,23 @@ impl Model {
         names
     }
 
+    /// The places that can move freely or are moved: all but the ground.
+    pub fn moving_names(&self) -> Vec<String> {
+        self.place_names().split_off(1)
+    }
+
+    /// What results call the axes of a joint: its name, or `joint.direction` where it joins nodes.
+    pub fn joint_labels(&self, joint: &Joint) -> Vec<String> {
+        let of_node = |name: &String| -> Vec<String> {
+            let places = self.place_names();
+            let along = |place: &String| place.strip_prefix(name.as_str())?.strip_prefix('.').map(str::to_owned);
+            places.iter().filter_map(along).collect()
+        };
+        let directions = joint.between.iter().map(of_node).find(|directions| directions.len() > 1);
+        let label = |along: &String| format!("{}.{along}", joint.name);
+        directions.map_or_else(|| vec![joint.name.clone()], |directions| directions.iter().map(label).collect())
+    }
+
     /// Checks the model and assembles its matrices.
     ///
     /// # Errors
@@ -174,9 +196,7 @@ impl Model {
     ///
     /// # Example
     /// ```
-    /// use stickslip::model::templates;
-    /// let model = templates::find("blade-couple").unwrap().model();
-    /// let system = model.assemble().unwrap();
+    /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
     /// assert_eq!(system.places(), ["blade1", "contact", "blade3"]);
     /// ```
     pub fn assemble(&self) -> Result<System, ModelError> {
@@ -263,7 +283,8 @@ impl Model {
             for (&harmonic, &amplitude) in motion {
                 for row in 0..n {
                     let at = (row, n + k);
-                    builder = builder.load(row, harmonic, zero - amplitude * stiffness[at], zero - amplitude * damping[at]);
+                    builder =
+                        builder.load(row, harmonic, zero - amplitude * stiffness[at], zero - amplitude * damping[at]);
                 }
             }
         }
@@ -274,7 +295,7 @@ impl Model {
             joint.law.check().map_err(|error| ModelError::new(element, "law", error.to_string()))?;
             differ(&joint.between, element)?;
             let mut axes = Vec::new();
-            for ends in places.axes(&joint.between, joint.law.directions(), element)? {
+            for (along, ends) in places.axes(&joint.between, joint.law.directions(), element)? {
                 signs.iter_mut().for_each(|signs| signs.push(0.0));
                 let mut rows = Vec::new();
                 let mut imposed = Vec::new();
@@ -286,11 +307,14 @@ impl Model {
                             if let Some(last) = signs[k].last_mut() {
                                 *last += sign;
                             }
-                            imposed.extend(motion_of[k].iter().map(|(&harmonic, &amplitude)| (harmonic, amplitude * sign)));
+                            imposed.extend(
+                                motion_of[k].iter().map(|(&harmonic, &amplitude)| (harmonic, amplitude * sign)),
+                            );
                         }
                     }
                 }
-                axes.push(Axis::new(rows).moved(imposed));
+                let axis = Axis::new(rows).moved(imposed);
+                axes.push(if let Some(along) = along { axis.named(along) } else { axis });
             }
             builder = builder.joint(joint.name.clone(), joint.law.clone(), axes);
         }

@@ -19,15 +19,19 @@ use stickslip_numerics::definite::semidefinite;
 
 impl System {
     /// Whether no two motions under the same drive ever separate: masses and springs are symmetric and positive semidefinite, dampers take no
-    /// less than nothing, and every law is incrementally passive ([`crate::law::FrictionLaw::is_incrementally_passive`]). Every orbit is
+    /// less than nothing, and every law is incrementally passive ([`crate::law::Law::is_incrementally_passive`]). Every orbit is
     /// then stable, whatever it is and however large the system.
     ///
     /// # Example
     /// ```
-    /// let mut system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+    /// use stickslip::structure::Structure;
+    /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
     /// assert!(system.contracts());
-    /// system.structure().damping()[(0, 0)] = -0.1;
-    /// assert!(!system.contracts());
+    /// let old = system.structure();
+    /// let mut damping = old.damping().clone();
+    /// damping[(0, 0)] = -0.1;
+    /// let driven = Structure::new(old.places().to_vec(), old.mass().clone(), damping, old.stiffness().clone()).unwrap();
+    /// assert!(!system.on(driven).unwrap().contracts());
     /// ```
     pub fn contracts(&self) -> bool {
         if !self.joints().iter().all(|joint| joint.law().is_incrementally_passive()) {
@@ -44,7 +48,8 @@ impl System {
         rank == n || {
             // each with its own unit: what one of them holds is held
             let share = |matrix: &nalgebra::DMatrix<f64>| matrix / matrix.amax().max(f64::MIN_POSITIVE);
-            semidefinite(&(share(self.structure().mass()) + share(&damping) + share(self.structure().stiffness()))) == Some(n)
+            semidefinite(&(share(self.structure().mass()) + share(&damping) + share(self.structure().stiffness())))
+                == Some(n)
         }
     }
 }
@@ -52,6 +57,8 @@ impl System {
 #[cfg(test)]
 mod tests {
     use crate::model::{GROUND, Mass, Model, Spring, System};
+    use crate::structure::Structure;
+    use nalgebra::DMatrix;
 
     /// Two masses, each on the ground, and a spring between them, each spring with its damper.
     fn system(masses: [f64; 2], springs: [f64; 3], dampers: [f64; 3]) -> System {
@@ -81,14 +88,16 @@ mod tests {
         assert!(!system([1.0, 0.0], [1.0, 0.0, 0.0], zero).contracts(), "a massless place that nothing holds");
         assert!(!system(one, two, [-0.1, 1.0, 0.05]).contracts(), "a damper that gives energy");
         assert!(system(one, two, [-0.1, 1.0, 1.0]).contracts(), "others take more: 0.9 · 2 > 1");
-        let mut circulatory = system(one, two, two);
-        circulatory.stiffness[(0, 1)] = 1.0;
-        assert!(!circulatory.contracts(), "springs that follow");
-        let mut gyroscopic = system(one, two, zero);
-        (gyroscopic.damping[(0, 1)], gyroscopic.damping[(1, 0)]) = (3.0, -3.0);
-        assert!(gyroscopic.contracts(), "turning takes no power");
-        let mut buckled = system(one, two, two);
-        buckled.stiffness[(0, 0)] = -1.0;
-        assert!(!buckled.contracts(), "negative stiffness");
+        // a system with other dampers and springs
+        let with = |system: System, damping: &dyn Fn(&mut DMatrix<f64>), stiffness: &dyn Fn(&mut DMatrix<f64>)| {
+            let old = system.structure();
+            let (mut c, mut k) = (old.damping().clone(), old.stiffness().clone());
+            (damping(&mut c), stiffness(&mut k));
+            system.on(Structure::new(old.places().to_vec(), old.mass().clone(), c, k).unwrap()).unwrap()
+        };
+        let turning = |c: &mut DMatrix<f64>| (c[(0, 1)], c[(1, 0)]) = (3.0, -3.0);
+        assert!(with(system(one, two, zero), &turning, &|_| ()).contracts(), "turning takes no power");
+        let buckled = |k: &mut DMatrix<f64>| k[(0, 0)] = -1.0;
+        assert!(!with(system(one, two, two), &|_| (), &buckled).contracts(), "negative stiffness");
     }
 }

@@ -4,9 +4,9 @@
 
 mod assemble;
 mod contraction;
+pub mod example;
 mod survey;
 mod system;
-pub mod templates;
 
 pub use assemble::{Element, ModelError, is_identifier};
 pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey};

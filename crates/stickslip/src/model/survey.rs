@@ -11,6 +11,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 use num_complex::Complex64;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
+use stickslip_numerics::maximum::maximum;
 
 /// A mode of the linear structure.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -171,7 +172,7 @@ impl Model {
     /// # Example
     /// ```
     /// use std::f64::consts::TAU;
-    /// let couple = stickslip::model::templates::find("blade-couple").unwrap().model();
+    /// let couple = stickslip::model::example::blade_couple();
     /// let survey = couple.survey().unwrap();
     /// // both blades on their springs, and the contact mass on the shroud's spring
     /// assert_eq!(survey.free().elastic.len(), 3);
@@ -565,10 +566,8 @@ const INSTANTS: usize = 64;
 const MOST_INSTANTS: usize = 4096;
 /// Halvings with which a border between stick and slip is found: a millionth of a millionth of the step.
 const HALVINGS: usize = 40;
-/// Steps of the golden section around the largest load: 1e-5 of the step, and the load is flat there.
-const GOLDEN_STEPS: usize = 24;
-/// (√5 - 1)/2
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
+/// Share of two steps to which the place of the largest load is found: the load is flat there.
+const LOCATED: f64 = 1e-5;
 /// Compliance of a rigid joint, as a share of that of the structure: joints that hold in a ring share the load by it.
 const COMPLIANCE: f64 = 1e-10;
 
@@ -642,7 +641,8 @@ impl Survey {
         let motion = |joint: &Stuck| joint.at.iter().map(|(i, w)| w * shape[*i]).sum::<f64>();
         let (n, rigid) = (self.dofs(), self.rigid());
         // the constraint forces balance what springs and inertia leave: W f = ω²Mφ - Kφ - W k u
-        let mut rest = self.system.structure().mass() * &shape * (omega * omega) - self.system.structure().stiffness() * &shape;
+        let mut rest =
+            self.system.structure().mass() * &shape * (omega * omega) - self.system.structure().stiffness() * &shape;
         for joint in &self.joints {
             if let Hold::Spring { stiffness, .. } = joint.hold {
                 let force = stiffness * motion(joint);
@@ -799,16 +799,11 @@ impl Survey {
         // a few joints are refined; of hundreds the samples are good enough
         let refined = (self.dofs() + self.joints.len()) <= REFINED;
         if refined && omegas.len() > 1 && best.1.is_finite() {
-            let (mut low, mut high) = (omegas[top.saturating_sub(1)], omegas[(top + 1).min(omegas.len() - 1)]);
-            for _ in 0..GOLDEN_STEPS {
-                let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
-                let (at_a, at_b) = (at(a)?, at(b)?);
-                for point in [(a, at_a), (b, at_b)] {
-                    if point.1 > best.1 {
-                        best = point;
-                    }
-                }
-                if at_a >= at_b { high = b } else { low = a }
+            let (low, high) = (omegas[top.saturating_sub(1)], omegas[(top + 1).min(omegas.len() - 1)]);
+            let close = |a: f64, b: f64| b - a <= LOCATED * (high - low);
+            let found = maximum((low, high), close, |omega| at(omega).ok_or(())).ok()?;
+            if found.1 > best.1 {
+                best = found;
             }
         }
         let border = |inside: f64, outside: f64| -> Option<f64> {
@@ -849,16 +844,13 @@ mod tests {
     #[test]
     fn laws_hold_as_they_do_in_small_motion() {
         let spring = Hold::Spring { stiffness: 1e4, limit: 2.0, displacement: 2e-4 };
-        assert_eq!(Hold::of(&Arc::new(Jenkins { stiffness: 1e4, limit: 2.0 })), spring);
-        assert_eq!(Hold::of(&Arc::new(JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 })), spring);
-        assert_eq!(Hold::of(&Arc::new(Coulomb { limit: 2.0 })), Hold::Rigid { limit: 2.0 });
-        assert_eq!(
-            Hold::of(&Arc::new(CoulombArctan { limit: 2.0, alpha: 25e3 })),
-            Hold::Rigid { limit: 2.0 }
-        );
+        assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 2.0 }), spring);
+        assert_eq!(Hold::of(&JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 }), spring);
+        assert_eq!(Hold::of(&Coulomb { limit: 2.0 }), Hold::Rigid { limit: 2.0 });
+        assert_eq!(Hold::of(&CoulombArctan { limit: 2.0, alpha: 25e3 }), Hold::Rigid { limit: 2.0 });
         // without a limit a joint is a free reference
-        assert_eq!(Hold::of(&Arc::new(Jenkins { stiffness: 1e4, limit: 0.0 })), Hold::Nothing);
-        assert_eq!(Hold::of(&Arc::new(Coulomb { limit: 0.0 })), Hold::Nothing);
+        assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 0.0 }), Hold::Nothing);
+        assert_eq!(Hold::of(&Coulomb { limit: 0.0 }), Hold::Nothing);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::law::{LawError, SharedLaw};
 use crate::structure::Structure;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
 
@@ -66,11 +66,22 @@ impl SystemJoint {
     pub fn axes(&self) -> &[Axis] {
         &self.axes
     }
+    /// What results call its axes: the joint's name, or `joint.direction` for each of several.
+    pub fn labels(&self) -> impl Iterator<Item = String> {
+        let several = self.axes.len() > 1;
+        self.axes.iter().enumerate().map(move |(a, axis)| match &axis.name {
+            Some(name) if several => format!("{}.{name}", self.name),
+            None if several => format!("{}.{}", self.name, a + 1),
+            _ => self.name.clone(),
+        })
+    }
 }
 
 /// One direction of a joint: `u = Σ w x + g(t)`, and its force acts on the structure as `-w f`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
+    /// The direction's name, if its joint has several.
+    name: Option<String>,
     rows: Vec<(usize, f64)>,
     imposed: Vec<(u32, Complex64)>,
 }
@@ -78,7 +89,14 @@ pub struct Axis {
 impl Axis {
     /// Along degrees of freedom with their weights.
     pub fn new(rows: Vec<(usize, f64)>) -> Self {
-        Axis { rows, imposed: Vec::new() }
+        Axis { name: None, rows, imposed: Vec::new() }
+    }
+
+    /// The same with a name, where a joint has several axes.
+    #[must_use]
+    pub fn named(mut self, name: impl Into<String>) -> Self {
+        self.name = Some(name.into());
+        self
     }
 
     /// The same with imposed relative motion `g(t) = Re Σ_h G_h e^{j h Ω t}`: (harmonic, complex amplitude in m).
@@ -363,12 +381,5 @@ impl System {
         let imposed = self.axes().flat_map(|(_, axis)| &axis.imposed);
         let moved = self.moved.iter().flat_map(|place| &place.motion);
         loads.chain(imposed.chain(moved).filter(|(_, z)| counts(*z)).map(|(h, _)| *h)).collect()
-    }
-
-    /// The matrix of all axes, n × axes.
-    pub(crate) fn directions(&self) -> DMatrix<f64> {
-        let n = self.dofs();
-        let columns: Vec<DVector<f64>> = self.axes().map(|(_, axis)| axis.dense(n)).collect();
-        if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) }
     }
 }

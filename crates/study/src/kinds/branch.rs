@@ -1,17 +1,20 @@
 //! Branches of orbits by arc length, along the drive frequency or along a design parameter, around turning points.
 
+use super::keys::{FREQUENCY, HARMONICS, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples};
+use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
-use super::{
-    Complaint, FREQUENCY, HARMONICS, Kind, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples, orbits,
-};
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Style, Table};
 use crate::drawing::{Drawing, largest, numbers};
+use crate::info::Complaint;
+use crate::info::KindInfo;
+use crate::key::{Takes, Within, default};
+use crate::kind::Kind;
 use crate::point::Summary;
 use crate::rows::Rows;
-use crate::schema::{Takes, Within, default};
 use crate::study::{Study, VariedValue, varied_text};
-use crate::summary::{Cost, Costing, Shape, resonant};
-use crate::values::{Values, hertz};
+use crate::values::{Frequencies, Values, hertz};
+use crate::warnings::resonant;
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::curve::trace::{Branch, End, Trace, TraceError};
@@ -21,37 +24,39 @@ use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::model::{Model, System};
 
 pub(super) const KIND: Kind = Kind {
-    name: "branch",
-    summary: "a branch of orbits by continuation, around turning points: along a range of `frequency`, or at one frequency along the last \
-              parameter of `vary`, from its first value to its last",
-    keys: &[
-        FREQUENCY,
-        default(
-            "steps",
-            Takes::Count(2, 100_000),
-            "100",
-            "steps over the range at least; they shorten where it bends",
-            "100",
-        ),
-        PEAK_OF,
-        OUTPUT,
-        default("harmonics", Takes::Count(1, 255), "15", "highest harmonic", "15"),
-        default("samples", Takes::Count(8, 1 << 16), "1024", "samples per period", "1024"),
-        default(
-            "tolerance",
-            Takes::Quantity(Dimension::NONE, Within::Positive),
-            "0.001",
-            "estimated error relative to the largest amplitude, beyond which a point is `truncated`",
-            "0.001",
-        ),
-    ],
-    check,
-    axes: [None, Some(Dimension::LENGTH)],
-    // harmonic balance is what branches are made of
-    uses_method: false,
-    needs: |values, system| method(values).solver(system).map(drop),
-    adapts: false,
-    tables: &["branch", "peaks", "turns"],
+    info: KindInfo {
+        name: "branch",
+        summary: "a branch of orbits by continuation, around turning points: along a range of `frequency`, or at one frequency along the last \
+                  parameter of `vary`, from its first value to its last",
+        keys: &[
+            FREQUENCY,
+            default(
+                "steps",
+                Takes::Count(2, 100_000),
+                "100",
+                "steps over the range at least; they shorten where it bends",
+                "100",
+            ),
+            PEAK_OF,
+            OUTPUT,
+            default("harmonics", Takes::Count(1, 255), "15", "highest harmonic", "15"),
+            default("samples", Takes::Count(8, 1 << 16), "1024", "samples per period", "1024"),
+            default(
+                "tolerance",
+                Takes::Quantity(Dimension::NONE, Within::Positive),
+                "0.001",
+                "estimated error relative to the largest amplitude, beyond which a point is `truncated`",
+                "0.001",
+            ),
+        ],
+        check,
+        axes: [None, Some(Dimension::LENGTH)],
+        // harmonic balance is what branches are made of
+        uses_method: false,
+        needs: |values, system| method(values).solver(system).map(drop),
+        adapts: false,
+        tables: &["branch", "peaks", "turns"],
+    },
     // along a parameter the cases of one branch differ in the last one only
     grain: |study| if along_parameter(study) { Grain::Curve } else { Grain::Case },
     cost,
@@ -82,8 +87,12 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, values_of_last: usize) -> Result<(), Complaint> {
     check_masses(model)?;
+    let none = |f: &Frequencies| f.get(0) == f.get(f.len() - 1) && (f.len() > 1 || values_of_last < 2);
+    if values.frequencies("frequency").is_some_and(none) {
+        return Err(Complaint::new("frequency", "a branch needs a range", RANGE));
+    }
     check_peak_of(values, model)?;
     check_output(values)?;
     if values.quantity("tolerance").is_some_and(|tolerance| tolerance >= 1.0) {
@@ -95,6 +104,10 @@ fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     }
     check_samples(values)
 }
+
+/// What a branch can run along.
+const RANGE: &str =
+    "write frequency = { from = …, to = …, points = 2 }, or vary = { Ft = [ … ] } with two different values";
 
 /// Why there is no branch.
 enum Missing {
@@ -135,8 +148,7 @@ fn compute(work: &Work<'_>) -> Computed {
             return Ok(part);
         }
         Err(Missing::NoRange) => {
-            let reason = "a branch needs a range: frequency = { from = …, to = …, points = 2 }, or vary = { Ft = [ … ] } with two values";
-            part.count(label, "no-range", Some(reason.to_owned()));
+            part.count(label, "no-range", Some(format!("a branch needs a range: {RANGE}")));
             return Ok(part);
         }
     };
@@ -152,9 +164,10 @@ fn compute(work: &Work<'_>) -> Computed {
     };
     let (mut rows, mut peaks, mut turns) = (Rows::default(), Rows::default(), Rows::default());
     for point in &branch.points {
-        orbits::count(&mut part, &prepared.case, &point.orbit);
+        let stable = point.orbit.is_stable();
+        orbits::count(&mut part, &prepared.case, &point.orbit, stable);
         begin(&mut rows, point.value);
-        Summary::new(prepared, Ok(&point.orbit)).write(prepared, &mut rows);
+        Summary::of(prepared, &point.orbit, stable).write(prepared, &mut rows);
         rows.end();
     }
     for (value, height) in &branch.peaks {
@@ -237,9 +250,10 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let y = if one { y } else { Axis { quantity: format!("amplitude of {}", names.join(", ")), ..y } };
     // of several branches the masses whose peaks count are shown, the largest amplitude of them
     let shown: Vec<Vec<usize>> = match one {
-        true => {
-            (0..system.dofs()).filter(|place| drawing.shows(system.places()[*place])).map(|place| vec![place]).collect()
-        }
+        true => (0..system.dofs())
+            .filter(|place| drawing.shows(&system.places()[*place]))
+            .map(|place| vec![place])
+            .collect(),
         false => vec![places],
     };
     let unstable = unstable(table);

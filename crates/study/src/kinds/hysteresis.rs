@@ -1,43 +1,57 @@
 //! Hysteresis loops: force over displacement of joints and moved places, over one period of the steady motion.
 
-use super::{Complaint, FREQUENCY, Kind, SAMPLES, anything, orbits};
+mod tables;
+
+pub use tables::{Loop, loops};
+
+use self::tables::{DAMPING, DISPLACEMENT, DISSIPATION, FORCE, JOINT, LOOPS, STIFFNESS, SUMMARY, TIME};
+use super::keys::{FREQUENCY, SAMPLES, anything};
+use super::orbits;
+use crate::columns::{ENERGY_GAP, FREQUENCY as DRIVE, RESIDUAL};
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Figure, Panel, Series};
-use crate::drawing::{Drawing, largest, numbers, shown_hertz, words};
+use crate::drawing::{Drawing, largest, numbers, words};
+use crate::info::Complaint;
+use crate::info::KindInfo;
+use crate::key::{Takes, default, optional};
+use crate::kind::Kind;
 use crate::rows::Rows;
-use crate::schema::{Takes, default, optional};
-use crate::summary::{Cost, Costing, Shape, driven};
 use crate::values::{Values, hertz};
+use crate::warnings::driven;
+use crate::words::shown_hertz;
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use stickslip::dimension::Dimension;
 use stickslip::model::Model;
 use stickslip::orbit::{Orbit, Sample};
 
 pub(super) const KIND: Kind = Kind {
-    name: "hysteresis",
-    summary: "force-displacement loops with dissipation, equivalent stiffness and damping",
-    keys: &[
-        FREQUENCY,
-        optional(
-            "loop",
-            Takes::Names,
-            "joints, or moved places (the force that moves them), whose loops are wanted; every joint when absent",
-            "\"shroud\"",
-        ),
-        optional(
-            "against",
-            Takes::Name,
-            "the mass whose displacement is the abscissa of the loops; absent: the relative displacement of the joint",
-            "\"blade1\"",
-        ),
-        default("sum", Takes::Flag, "false", "adds the forces of the joints up to one loop", "true"),
-        SAMPLES,
-    ],
-    check,
-    axes: [Some(Dimension::LENGTH), Some(Dimension::FORCE)],
-    uses_method: true,
-    needs: anything,
-    adapts: false,
-    tables: &["loops", "loops_summary"],
+    info: KindInfo {
+        name: tables::NAME,
+        summary: "force-displacement loops with dissipation, equivalent stiffness and damping",
+        keys: &[
+            FREQUENCY,
+            optional(
+                "loop",
+                Takes::Names,
+                "joints, or moved places (the force that moves them), whose loops are wanted; every joint when absent",
+                "\"shroud\"",
+            ),
+            optional(
+                "against",
+                Takes::Name,
+                "the mass whose displacement is the abscissa of the loops; absent: the relative displacement of the joint",
+                "\"blade1\"",
+            ),
+            default("sum", Takes::Flag, "false", "adds the forces of the joints up to one loop", "true"),
+            SAMPLES,
+        ],
+        check,
+        axes: [Some(Dimension::LENGTH), Some(Dimension::FORCE)],
+        uses_method: true,
+        needs: anything,
+        adapts: false,
+        tables: &[LOOPS, SUMMARY],
+    },
     grain: |_| Grain::Frequencies,
     cost,
     warnings: driven,
@@ -67,17 +81,19 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
-    let mut known: Vec<&str> = model.joints.iter().map(|joint| joint.name.as_str()).collect();
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
+    let labels: Vec<String> = model.joints.iter().flat_map(|joint| model.joint_labels(joint)).collect();
+    let mut known: Vec<&str> = labels.iter().map(String::as_str).collect();
     known.extend(model.motions.iter().map(|motion| motion.on.as_str()));
     for name in values.names("loop").unwrap_or_default() {
         if !known.contains(&name.as_str()) {
             return Err(Complaint::unknown("loop", "joint or moved place", name, &known));
         }
     }
-    let masses: Vec<&str> = model.masses.iter().map(|mass| mass.name.as_str()).collect();
-    if let Some(name) = values.text("against").filter(|name| !masses.contains(name)) {
-        return Err(Complaint::unknown("against", "mass", name, &masses));
+    let places: Vec<String> = model.masses.iter().flat_map(|mass| mass.places()).collect();
+    let places: Vec<&str> = places.iter().map(String::as_str).collect();
+    if let Some(name) = values.text("against").filter(|name| !places.contains(name)) {
+        return Err(Complaint::unknown("against", "mass", name, &places));
     }
     if values.flag("sum") == Some(true) && values.text("against").is_none() {
         let summed = |name: &str| values.names("loop").is_none_or(|names| names.iter().any(|n| n == name));
@@ -106,8 +122,8 @@ struct Source {
 
 #[derive(Debug, Clone, PartialEq)]
 enum Of {
-    /// The sum over these joints.
-    Joints(Vec<usize>),
+    /// The sum over these joints, each with one of its axes.
+    Joints(Vec<(usize, usize)>),
     Moved(usize),
 }
 
@@ -116,8 +132,9 @@ impl Source {
     fn read(&self, sample: &Sample) -> (f64, f64) {
         let (displacement, force) = match &self.force {
             Of::Joints(joints) => {
-                let force = joints.iter().map(|j| sample.joints[*j].force[0]).sum();
-                (sample.joints[joints[0]].displacement, force)
+                let force = joints.iter().map(|(j, axis)| sample.joints[*j].force[*axis]).sum();
+                let (first, axis) = joints[0];
+                (sample.joints[first].displacement[axis], force)
             }
             Of::Moved(m) => sample.moved[*m],
         };
@@ -131,7 +148,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
     let several = work.several_frequencies();
     let sources = sources(prepared);
-    for orbit in orbits::found(work, &mut part)? {
+    for (orbit, _) in orbits::found(work, &mut part)? {
         let omega = orbit.omega;
         let times = orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
         let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();
@@ -140,25 +157,25 @@ fn compute(work: &Work<'_>) -> Computed {
                 let (displacement, force) = source.read(sample);
                 table.varied(&prepared.case);
                 if several {
-                    table.number("frequency_Hz", hertz(omega));
+                    table.number(DRIVE, hertz(omega));
                 }
-                table.text("joint", name);
-                table.number("time_s", *time);
-                table.number("displacement_m", displacement);
-                table.number("force_N", force);
+                table.text(JOINT, name);
+                table.number(TIME, *time);
+                table.number(DISPLACEMENT, displacement);
+                table.number(FORCE, force);
                 table.end();
             }
             let first = First::new(&orbit, source);
             summary.varied(&prepared.case);
             if several {
-                summary.number("frequency_Hz", hertz(omega));
+                summary.number(DRIVE, hertz(omega));
             }
-            summary.text("joint", name);
-            summary.number("dissipation_J", exact_loss(prepared, &orbit, source).unwrap_or(first.loss));
-            summary.number("equivalent_stiffness_N_per_m", first.stiffness);
-            summary.number("equivalent_damping_kg_per_s", first.damping);
-            summary.number("residual", orbit.evidence.residual);
-            summary.number("energy_gap", orbit.evidence.energy_gap);
+            summary.text(JOINT, name);
+            summary.number(DISSIPATION, exact_loss(prepared, &orbit, source).unwrap_or(first.loss));
+            summary.number(STIFFNESS, first.stiffness);
+            summary.number(DAMPING, first.damping);
+            summary.number(RESIDUAL, orbit.evidence.residual);
+            summary.number(ENERGY_GAP, orbit.evidence.energy_gap);
             summary.text("status", orbit.evidence.accuracy.status());
             summary.end();
         }
@@ -171,15 +188,21 @@ fn compute(work: &Work<'_>) -> Computed {
 fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
     let (system, values) = (&prepared.system, &prepared.case.values);
     let against = values.text("against").and_then(|name| system.places().iter().position(|place| place == name));
-    let all = || system.joints().iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
+    let axes: Vec<(String, (usize, usize))> = system
+        .joints()
+        .iter()
+        .enumerate()
+        .flat_map(|(j, joint)| joint.labels().enumerate().map(move |(axis, label)| (label, (j, axis))))
+        .collect();
+    let all = || axes.iter().map(|(label, _)| label.clone()).collect::<Vec<_>>();
     let mut names = values.names("loop").map_or_else(all, <[String]>::to_vec);
     if names.is_empty() {
         names = system.moved().iter().map(|place| place.name.clone()).collect();
     }
-    let joint = |name: &String| system.joints().iter().position(|joint| joint.name == *name);
+    let joint = |name: &String| axes.iter().find(|(label, _)| label == name).map(|(_, at)| *at);
     if values.flag("sum") == Some(true) {
-        let joints: Vec<usize> = names.iter().filter_map(joint).collect();
-        let name = joints.iter().map(|j| system.joints()[*j].name.as_str()).collect::<Vec<_>>().join(" + ");
+        let joints: Vec<(usize, usize)> = names.iter().filter_map(joint).collect();
+        let name = names.iter().filter(|name| joint(name).is_some()).cloned().collect::<Vec<_>>().join(" + ");
         let sum = (name, Source { force: Of::Joints(joints.clone()), against });
         return if joints.is_empty() { Vec::new() } else { vec![sum] };
     }
@@ -194,7 +217,9 @@ fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
 fn exact_loss(prepared: &Prepared, orbit: &Orbit, source: &Source) -> Option<f64> {
     match &source.force {
         _ if source.against.is_some() => None,
-        Of::Joints(joints) => Some(joints.iter().map(|j| orbit.joints[*j].dissipation).sum()),
+        // what a joint loses along one of several directions is not told apart
+        Of::Joints(joints) if joints.iter().any(|(j, _)| prepared.system.joints()[*j].axes().len() > 1) => None,
+        Of::Joints(joints) => Some(joints.iter().map(|(j, _)| orbit.joints[*j].dissipation).sum()),
         Of::Moved(_) if prepared.system.moved().len() == 1 && prepared.case.model.forces.is_empty() => {
             Some(orbit.energy.work_in)
         }
@@ -255,23 +280,21 @@ impl First {
 
 /// The fastest varied parameter and the frequency tell the loops of one panel apart, the others the panels.
 fn draw(drawing: &Drawing<'_>) -> Figure {
-    let Some(table) = drawing.table("loops") else { return Figure::default() };
-    let (x_axis, x_factor) = drawing.axis(0, "displacement", largest(table, ["displacement_m".to_owned()]), "m");
-    let (y_axis, y_factor) = drawing.axis(1, "force", largest(table, ["force_N".to_owned()]), "N");
-    let joints = words(table, "joint");
+    let Some(table) = drawing.table(LOOPS) else { return Figure::default() };
+    let (x_axis, x_factor) = drawing.axis(0, "displacement", largest(table, [DISPLACEMENT.to_owned()]), "m");
+    let (y_axis, y_factor) = drawing.axis(1, "force", largest(table, [FORCE.to_owned()]), "N");
+    let joints = words(table, JOINT);
     // a table from elsewhere may lack columns
     if joints.len() != table.rows() {
         return Figure::default();
     }
-    let frequencies = table.numbers("frequency_Hz");
+    let frequencies = table.numbers(DRIVE);
     let several = joints.iter().any(|joint| *joint != joints[0]);
-    let same = |a: usize, b: usize| joints[a] == joints[b] && frequencies.is_none_or(|f| f[a] == f[b]);
     let mut panels: Vec<Panel> = Vec::new();
     for stretch in drawing.stretches(table) {
         let (outer, inner) = stretch.varied.split_at(stretch.varied.len().saturating_sub(1));
-        let mut from = stretch.rows.start;
-        while from < stretch.rows.end {
-            let to = (from + 1..stretch.rows.end).find(|row| !same(from, *row)).unwrap_or(stretch.rows.end);
+        for rows in tables::single(table, stretch.rows.clone()) {
+            let from = rows.start;
             let mut title: Vec<String> = outer.iter().map(|v| v.text.clone()).collect();
             if several {
                 title.push(joints[from].clone());
@@ -286,11 +309,10 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 panels.push(Panel { title, x: x_axis.clone(), y: y_axis.clone(), series: Vec::new() });
                 panels.len() - 1
             });
-            let x = numbers(table, "displacement_m", from..to).iter().map(|u| u * x_factor).collect();
-            let y = numbers(table, "force_N", from..to).iter().map(|f| f * y_factor).collect();
+            let x = numbers(table, DISPLACEMENT, rows.clone()).iter().map(|u| u * x_factor).collect();
+            let y = numbers(table, FORCE, rows).iter().map(|f| f * y_factor).collect();
             let colour = panels[at].series.len();
             panels[at].series.push(Series::line(label, x, y, colour));
-            from = to;
         }
     }
     Figure { panels, ..Figure::default() }

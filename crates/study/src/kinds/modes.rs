@@ -1,13 +1,18 @@
 //! Nonlinear modes: frequency and equivalent damping over amplitude.
 
-use super::{Complaint, HARMONICS, Kind, SERIES_SAMPLES, check_samples};
+use super::keys::{HARMONICS, SERIES_SAMPLES, check_samples};
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Values as Cells};
-use crate::drawing::{Drawing, display_unit, largest, numbers};
+use crate::drawing::{Drawing, largest, numbers};
+use crate::info::Complaint;
+use crate::info::KindInfo;
+use crate::key::{Key, Takes, Within, default, required};
+use crate::kind::Kind;
 use crate::note::Note;
 use crate::rows::Rows;
-use crate::schema::{Key, Takes, Within, default, required};
-use crate::summary::{Cost, Costing, Shape, mode_sticks};
 use crate::values::{Values, hertz};
+use crate::warnings::mode_sticks;
+use crate::words::display_unit;
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode};
 use stickslip::dimension::Dimension;
@@ -26,26 +31,28 @@ const AMPLITUDE: &[Key] = &[
 ];
 
 pub(super) const KIND: Kind = Kind {
-    name: "modes",
-    summary: "nonlinear modes: frequency and equivalent damping over the amplitude of free vibration",
-    keys: &[
-        required(
-            "amplitude",
-            Takes::Table(AMPLITUDE),
-            "amplitude of the place that moves most in the mode of the structure without joints",
-            "{ from = \"1 um\", to = \"10 mm\" }",
-        ),
-        default("mode", Takes::Count(1, 1000), "1", "number of the mode, by rising frequency", "2"),
-        default("harmonics", Takes::Count(1, 255), "15", "highest harmonic", "15"),
-        default("samples", Takes::Count(8, 1 << 16), "1024", "samples per period", "1024"),
-    ],
-    check,
-    axes: [Some(Dimension::LENGTH), None],
-    // free vibration has no drive frequency: harmonic balance with an unknown frequency and damping is solved
-    uses_method: false,
-    needs: |_, system| stickslip::curve::modes::check(system),
-    adapts: false,
-    tables: &["modes", "modes_summary"],
+    info: KindInfo {
+        name: "modes",
+        summary: "nonlinear modes: frequency and equivalent damping over the amplitude of free vibration",
+        keys: &[
+            required(
+                "amplitude",
+                Takes::Table(AMPLITUDE),
+                "amplitude of the place that moves most in the mode of the structure without joints",
+                "{ from = \"1 um\", to = \"10 mm\" }",
+            ),
+            default("mode", Takes::Count(1, 1000), "1", "number of the mode, by rising frequency", "2"),
+            default("harmonics", Takes::Count(1, 255), "15", "highest harmonic", "15"),
+            default("samples", Takes::Count(8, 1 << 16), "1024", "samples per period", "1024"),
+        ],
+        check,
+        axes: [Some(Dimension::LENGTH), None],
+        // free vibration has no drive frequency: harmonic balance with an unknown frequency and damping is solved
+        uses_method: false,
+        needs: |_, system| stickslip::curve::modes::check(system),
+        adapts: false,
+        tables: &["modes", "modes_summary"],
+    },
     grain: |_| Grain::Case,
     cost,
     warnings: mode_sticks,
@@ -72,7 +79,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     let range = values.table("amplitude");
     if let Some((from, to)) = range.and_then(|t| t.quantity("from").zip(t.quantity("to")))
         && from >= to

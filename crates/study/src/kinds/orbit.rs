@@ -1,39 +1,46 @@
 //! Orbits: the steady motion over one period, in time.
 
-use super::{FREQUENCY, Kind, OUTPUT, SAMPLES, anything, check_output, orbits};
+use super::keys::{FREQUENCY, OUTPUT, SAMPLES, anything, check_output};
+use super::orbits;
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, MOST_PANELS, display_unit, largest, numbers, shown_hertz};
+use crate::drawing::{Drawing, MOST_PANELS, largest, numbers};
+use crate::info::KindInfo;
+use crate::key::{Takes, default};
+use crate::kind::Kind;
 use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
-use crate::schema::{Takes, default};
-use crate::summary::{Cost, Costing, Shape, driven};
 use crate::values::hertz;
+use crate::warnings::driven;
+use crate::words::{display_unit, shown_hertz};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
 pub(super) const KIND: Kind = Kind {
-    name: "orbit",
-    summary: "the steady motion over one period: displacements, velocities, joint forces",
-    keys: &[
-        FREQUENCY,
-        SAMPLES,
-        OUTPUT,
-        default(
-            "multipliers",
-            Takes::Flag,
-            "false",
-            "whether all Floquet multipliers are computed, into `multipliers.csv`; `stable` needs no more than the largest, if any",
-            "true",
-        ),
-    ],
-    check: |values, _| check_output(values),
-    axes: [Some(Dimension::TIME), None],
-    uses_method: true,
-    needs: anything,
-    adapts: false,
-    tables: &["orbit", "orbits", "multipliers"],
+    info: KindInfo {
+        name: "orbit",
+        summary: "the steady motion over one period: displacements, velocities, joint forces",
+        keys: &[
+            FREQUENCY,
+            SAMPLES,
+            OUTPUT,
+            default(
+                "multipliers",
+                Takes::Flag,
+                "false",
+                "whether all Floquet multipliers are computed, into `multipliers.csv`; `stable` needs no more than the largest, if any",
+                "true",
+            ),
+        ],
+        check: |values, _, _| check_output(values),
+        axes: [Some(Dimension::TIME), None],
+        uses_method: true,
+        needs: anything,
+        adapts: false,
+        tables: &["orbit", "orbits", "multipliers"],
+    },
     grain: |_| Grain::Frequencies,
     cost,
     warnings: driven,
@@ -64,12 +71,12 @@ fn compute(work: &Work<'_>) -> Computed {
     let mut part = Part::default();
     let (mut motion, mut summary, mut multipliers) = (Rows::default(), Rows::default(), Rows::default());
     let prepared = work.case();
-    for orbit in orbits::found(work, &mut part)? {
+    for (orbit, stable) in orbits::found(work, &mut part)? {
         let omega = orbit.omega;
         part.notes.extend(one_of_many(prepared, &orbit));
         summary.varied(&prepared.case);
         summary.number("frequency_Hz", hertz(omega));
-        Summary::new(prepared, Ok(&orbit)).write(prepared, &mut summary);
+        Summary::of(prepared, &orbit, stable).write(prepared, &mut summary);
         summary.number("work_in_J", orbit.energy.work_in);
         summary.number("viscous_J", orbit.energy.viscous);
         summary.number("friction_J", orbit.energy.friction);
@@ -125,10 +132,12 @@ pub(super) fn write_sample(prepared: &Prepared, sample: &Sample, rows: &mut Rows
         rows.number(&format!("{place}_velocity_m_per_s"), sample.velocity[i]);
     }
     for (joint, state) in prepared.system.joints().iter().zip(&sample.joints) {
-        rows.number(&format!("{}_displacement_m", joint.name), state.displacement);
-        rows.number(&format!("{}_velocity_m_per_s", joint.name), state.velocity);
-        rows.number(&format!("{}_force_N", joint.name), state.force);
-        rows.text(&format!("{}_contact", joint.name), word(state.contact));
+        for (a, label) in joint.labels().enumerate() {
+            rows.number(&format!("{label}_displacement_m"), state.displacement[a]);
+            rows.number(&format!("{label}_velocity_m_per_s"), state.velocity[a]);
+            rows.number(&format!("{label}_force_N"), state.force[a]);
+        }
+        rows.text(&format!("{}_contact", joint.name()), word(state.contact));
     }
 }
 
@@ -137,6 +146,8 @@ fn word(contact: Contact) -> &'static str {
         Contact::Stick => "stick",
         Contact::SlipForward => "slip+",
         Contact::SlipBackward => "slip-",
+        Contact::Slip => "slip",
+        Contact::Open => "open",
     }
 }
 
@@ -175,7 +186,8 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 panels.push(panel("displacement", "m", names, "displacement_m", 0));
             }
             if !system.joints().is_empty() {
-                let names = system.joints().iter().map(|j| j.name.as_str()).filter(|name| drawing.shows(name)).collect();
+                let labels: Vec<String> = system.joints().iter().flat_map(|joint| joint.labels()).collect();
+                let names = labels.iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
                 panels.push(panel("joint force", "N", names, "force_N", system.dofs()));
             }
         }

@@ -29,15 +29,19 @@ fn all(work: &Work<'_>) -> Result<Vec<Point>, (usize, MethodError)> {
     Ok(points)
 }
 
+/// An orbit, and whether it is stable, if that is known.
+type Judged = (Orbit, Option<bool>);
+
 /// The orbits of a unit of one case that there are; all its points are counted, and what is missing is named.
-pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Orbit>, (usize, MethodError)> {
+pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Judged>, (usize, MethodError)> {
     let case = &work.case().case;
     let mut orbits = Vec::with_capacity(work.points.len());
     for (omega, point) in all(work)? {
         match point {
             Some(Ok(orbit)) => {
-                count(part, case, &orbit);
-                orbits.push(orbit);
+                let stable = orbit.is_stable();
+                count(part, case, &orbit, stable);
+                orbits.push((orbit, stable));
             }
             other => count_missing(part, case, omega, other.as_ref()),
         }
@@ -45,12 +49,10 @@ pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Orbit>, (usi
     Ok(orbits)
 }
 
-/// Counts an orbit and notes what its accuracy asks for.
-pub(super) fn count(part: &mut Part, case: &Case, orbit: &Orbit) {
+/// Counts an orbit and notes what its stability and its accuracy ask for.
+pub(super) fn count(part: &mut Part, case: &Case, orbit: &Orbit, stable: Option<bool>) {
     part.count(|| place_of(case, orbit.omega), orbit.evidence.accuracy.status(), None);
-    if let Some(note) = Note::of_accuracy(orbit) {
-        note.join(&mut part.notes);
-    }
+    Note::of_orbit(orbit, stable).into_iter().for_each(|note| note.join(&mut part.notes));
 }
 
 /// Counts a point that has no orbit.

@@ -1,7 +1,7 @@
 //! The key `peak_of` of the kinds that look for a resonance: which masses count. Of several the worst does, at every frequency anew.
 
-use super::Complaint;
-use crate::schema::{Key, Takes, optional};
+use crate::info::Complaint;
+use crate::key::{Key, Takes, optional};
 use crate::values::Values;
 use crate::work::Prepared;
 use stickslip::model::Model;

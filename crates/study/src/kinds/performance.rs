@@ -1,14 +1,24 @@
 //! Performance curves: the resonance peak as a function of a design parameter, and its best value.
 
+mod tables;
+
+pub use tables::{Curve, Optimum, Point, curves};
+
+use super::keys::{FREQUENCY, anything, check_masses};
 use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
-use super::{Complaint, FREQUENCY, Kind, anything, check_masses};
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE};
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series};
 use crate::drawing::{Drawing, largest, numbers};
+use crate::info::Complaint;
+use crate::info::KindInfo;
+use crate::kind::Kind;
 use crate::note::Note;
+use crate::note::WARNING;
 use crate::rows::Rows;
 use crate::study::{VariedValue, varied_text};
-use crate::summary::{Cost, Costing, Shape, WARNING, resonant};
 use crate::values::{Values, hertz};
+use crate::warnings::sampled;
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
 use stickslip::dimension::Dimension;
@@ -17,18 +27,20 @@ use stickslip::model::Model;
 use stickslip::orbit::Accuracy;
 
 pub(super) const KIND: Kind = Kind {
-    name: "performance",
-    summary: "the resonance peak over a design parameter (the last one of `vary`), with the optimum refined",
-    keys: &[FREQUENCY, PEAK_OF],
-    check,
-    axes: [None, Some(Dimension::LENGTH)],
-    uses_method: true,
-    needs: anything,
-    adapts: false,
-    tables: &["performance", "optimum"],
+    info: KindInfo {
+        name: tables::NAME,
+        summary: "the resonance peak over a design parameter (the last one of `vary`), with the optimum refined",
+        keys: &[FREQUENCY, PEAK_OF],
+        check,
+        axes: [None, Some(Dimension::LENGTH)],
+        uses_method: true,
+        needs: anything,
+        adapts: false,
+        tables: &[tables::PERFORMANCE, tables::OPTIMUM],
+    },
     grain: |_| Grain::Curve,
     cost,
-    warnings: resonant,
+    warnings: sampled,
     compute,
     draw,
 };
@@ -53,7 +65,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
 /// Values of the parameter that make a curve.
 const FEWEST_VALUES: usize = 3;
 
-fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     check_masses(model)?;
     check_peak_of(values, model)?;
     if values.frequencies("frequency").is_some_and(|f| f.len() < FEWEST_VALUES) {
@@ -84,10 +96,10 @@ fn compute(work: &Work<'_>) -> Computed {
             )));
         }
         rows.varied(&prepared.case);
-        rows.number("frequency_Hz", row.peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
-        rows.number("amplitude_m", row.peak.map_or(f64::NAN, |peak| peak.value));
-        rows.flag("at_range_end", row.peak.map(|peak| peak.at_end));
-        rows.integer("failed_orbits", row.failed as u64);
+        rows.number(DRIVE, row.peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
+        rows.number(AMPLITUDE, row.peak.map_or(f64::NAN, |peak| peak.value));
+        rows.flag(AT_RANGE_END, row.peak.map(|peak| peak.at_end));
+        rows.integer(tables::FAILED, row.failed as u64);
         rows.text("status", status);
         rows.end();
     }
@@ -97,8 +109,8 @@ fn compute(work: &Work<'_>) -> Computed {
         outer.iter().map(VariedValue::column).for_each(|(name, value)| optima.number(&name, value));
         let at_best = best.map(|row| VariedValue { si: row.value, ..inner.clone() });
         optima.number(&inner.column().0, at_best.map_or(f64::NAN, |value| value.column().1));
-        optima.number("frequency_Hz", peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
-        optima.number("amplitude_m", peak.map_or(f64::NAN, |peak| peak.value));
+        optima.number(DRIVE, peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
+        optima.number(AMPLITUDE, peak.map_or(f64::NAN, |peak| peak.value));
         optima.text("status", best.as_ref().map_or("none", status));
         optima.end();
         if best.is_none() {
@@ -157,22 +169,29 @@ fn curve(work: &Work<'_>) -> Result<PerformanceCurve, MethodError> {
 }
 
 fn draw(drawing: &Drawing<'_>) -> Figure {
-    let (Some(table), outer) = (drawing.table("performance"), drawing.study.varied().len().saturating_sub(1)) else {
+    let (Some(table), outer) = (drawing.table(tables::PERFORMANCE), drawing.study.varied().len().saturating_sub(1))
+    else {
         return Figure::default();
     };
     let stretches = drawing.stretches_of(table, outer);
     let Some(inner) = stretches.first().and_then(|stretch| stretch.varied.last()) else { return Figure::default() };
-    let (y_axis, factor) = drawing.axis(1, "resonance peak", largest(table, ["amplitude_m".to_owned()]), "m");
+    let (y_axis, factor) = drawing.axis(1, "resonance peak", largest(table, [AMPLITUDE.to_owned()]), "m");
     let column = inner.column().0;
     let parameter = |table: &crate::dataset::Table, rows| numbers(table, &column, rows);
-    let height = |table, rows| numbers(table, "amplitude_m", rows).iter().map(|y| y * factor).collect::<Vec<f64>>();
+    let height = |table, rows| numbers(table, AMPLITUDE, rows).iter().map(|y| y * factor).collect::<Vec<f64>>();
+    // of several outer parameters no single value tells a curve
+    let varied = if outer == 1 { drawing.varied_axis(&stretches, 0) } else { None };
+    let value = |curve: usize| {
+        let parameter = varied.as_ref().and(stretches.get(curve))?.varied.first();
+        parameter.map(|parameter| parameter.on_axis().0)
+    };
     let mut series = Vec::new();
     for (colour, stretch) in stretches.iter().enumerate() {
         let label = varied_text(&stretch.varied[..outer]);
         let label = if label.is_empty() { "peak".to_owned() } else { label };
         let (x, y) = (parameter(table, stretch.rows.clone()), height(table, stretch.rows.clone()));
         let mut points: Vec<(f64, f64)> = x.into_iter().zip(y).collect();
-        if let Some(optima) = drawing.table("optimum").filter(|optima| colour < optima.rows()) {
+        if let Some(optima) = drawing.table(tables::OPTIMUM).filter(|optima| colour < optima.rows()) {
             // one row for every curve; the refined optimum is a point of the line
             let best = (parameter(optima, colour..colour + 1)[0], height(optima, colour..colour + 1)[0]);
             let rising = points.is_sorted_by(|a, b| a.0 < b.0);
@@ -182,17 +201,17 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             }
         }
         let (x, y) = points.into_iter().unzip();
-        series.push(Series::line(label, x, y, colour));
+        series.push(Series { value: value(colour), ..Series::line(label, x, y, colour) });
     }
-    if let Some(optima) = drawing.table("optimum") {
+    if let Some(optima) = drawing.table(tables::OPTIMUM) {
         // one row for every curve
         for row in 0..optima.rows() {
             let (x, y) = (parameter(optima, row..row + 1), height(optima, row..row + 1));
             if x[0].is_finite() {
-                series.push(Series::marks("optimum", x, y, row));
+                series.push(Series { value: value(row), ..Series::marks("optimum", x, y, row) });
             }
         }
     }
     let panel = Panel { title: String::new(), x: Axis::new(&inner.name, inner.on_axis().1), y: y_axis, series };
-    Figure { panels: vec![panel], ..Figure::default() }
+    Figure { panels: vec![panel], varied, ..Figure::default() }
 }

@@ -1,56 +1,67 @@
 //! Response curves: amplitude over drive frequency.
 
+mod tables;
+
+pub use tables::{Curve, MassCurve, curves};
+
+use super::keys::{FREQUENCY, OUTPUT, anything, check_output};
+use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of, named_places, worst};
-use super::{FREQUENCY, Kind, OUTPUT, anything, check_output, orbits};
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, amplitude_of};
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Sharing, Style, Table};
-use crate::drawing::{
-    Drawing, Layout, MOST_CURVES, MOST_PANELS, Stretch, display_unit, largest, numbers, thinned, words,
-};
+use crate::drawing::{Drawing, Layout, MOST_CURVES, MOST_PANELS, Stretch, largest, numbers, thinned, words};
+use crate::info::KindInfo;
+use crate::key::{Key, Takes, default};
+use crate::kind::Kind;
 use crate::note::Note;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
-use crate::schema::{Key, Takes, default};
 use crate::study::varied_text;
-use crate::summary::{Cost, Costing, Shape, resonant};
 use crate::values::{Frequencies, hertz};
+use crate::warnings::sampled;
+use crate::words::display_unit;
 use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::peak::{self, Peak, Point};
 use stickslip::dimension::Dimension;
-use stickslip::law::Law;
+use stickslip::law::{Law, SharedLaw};
 use stickslip::method::{MethodError, OrbitError};
+use stickslip::model::System;
 use stickslip::orbit::Orbit;
 
 pub(super) const KIND: Kind = Kind {
-    name: "response",
-    summary: "response curves over the drive frequency, with refined peaks",
-    keys: &[
-        FREQUENCY,
-        default(
-            "peaks",
-            Takes::Flag,
-            "true",
-            "refines every peak of every mass between the points of the curve; with `peak_of` those of the worst mass",
-            "false",
-        ),
-        Key {
-            doc: "the masses of which the worst counts in peaks.csv, or \"all\"; absent: every mass for itself",
-            ..PEAK_OF
+    info: KindInfo {
+        name: tables::NAME,
+        summary: "response curves over the drive frequency, with refined peaks",
+        keys: &[
+            FREQUENCY,
+            default(
+                "peaks",
+                Takes::Flag,
+                "true",
+                "refines every peak of every mass between the points of the curve; with `peak_of` those of the worst mass",
+                "false",
+            ),
+            Key {
+                doc: "the masses of which the worst counts in peaks.csv, or \"all\"; absent: every mass for itself",
+                ..PEAK_OF
+            },
+            OUTPUT,
+        ],
+        check: |values, model, _| {
+            check_peak_of(values, model)?;
+            check_output(values)
         },
-        OUTPUT,
-    ],
-    check: |values, model| {
-        check_peak_of(values, model)?;
-        check_output(values)
+        axes: [Some(Dimension::FREQUENCY), Some(Dimension::LENGTH)],
+        uses_method: true,
+        needs: anything,
+        adapts: true,
+        tables: &[tables::CURVE, tables::PEAKS, tables::REFERENCES],
     },
-    axes: [Some(Dimension::FREQUENCY), Some(Dimension::LENGTH)],
-    uses_method: true,
-    needs: anything,
-    adapts: true,
-    tables: &["curve", "peaks", "references"],
     grain: |study| if study.is_adaptive() { Grain::Case } else { Grain::Frequencies },
     cost,
-    warnings: resonant,
+    warnings: sampled,
     compute,
     draw,
 };
@@ -115,17 +126,18 @@ fn compute(work: &Work<'_>) -> Computed {
         let mut peaks = Rows::default();
         for found in peaks_of(work, points).map_err(|error| (case.index, error))? {
             if found.peak.unsettled {
-                let at =
-                    || format!("peak of {}, {}", prepared.system.places()[found.mass], place_of(case, found.peak.omega));
+                let at = || {
+                    format!("peak of {}, {}", prepared.system.places()[found.mass], place_of(case, found.peak.omega))
+                };
                 let reason = "orbits beside this peak were not found, and the real one may be higher: much higher with little or \
                               no damping, or where friction cannot bound the motion; look closer with a finer range or another method";
                 part.count(at, "peak-unsettled", Some(reason.to_owned()));
             }
             peaks.varied(case);
-            peaks.text("mass", &prepared.system.places()[found.mass]);
-            peaks.number("frequency_Hz", hertz(found.peak.omega));
-            peaks.number("amplitude_m", found.peak.value);
-            peaks.flag("at_range_end", Some(found.peak.at_end));
+            peaks.text(tables::MASS, &prepared.system.places()[found.mass]);
+            peaks.number(DRIVE, hertz(found.peak.omega));
+            peaks.number(AMPLITUDE, found.peak.value);
+            peaks.flag(AT_RANGE_END, Some(found.peak.at_end));
             peaks.end();
         }
         part.tables.push(peaks);
@@ -153,30 +165,27 @@ impl<'a> Computing<'a> {
     }
 
     /// Takes in a point; `None` if the run was stopped before.
-    fn add(&mut self, omega: f64, point: Option<(Summary, Option<Note>)>) {
+    fn add(&mut self, omega: f64, point: Option<(Summary, Vec<Note>)>) {
         let case = &self.prepared.case;
-        let Some((summary, note)) = point else {
+        let Some((summary, notes)) = point else {
             return self.part.count(|| place_of(case, omega), NOT_REACHED, None);
         };
         self.part.count(|| place_of(case, omega), &summary.status, summary.failure.clone());
         self.stuck += usize::from(summary.stuck);
-        if summary.stable == Some(false) {
-            Note::Unstable(1).join(&mut self.part.notes);
-        }
-        if let Some(note) = note {
-            note.join(&mut self.part.notes);
-        }
+        notes.into_iter().for_each(|note| note.join(&mut self.part.notes));
         self.omegas.push(omega);
         self.rows.varied(case);
-        self.rows.number("frequency_Hz", hertz(omega));
+        self.rows.number(DRIVE, hertz(omega));
         summary.write(self.prepared, &mut self.rows);
         self.rows.end();
     }
 }
 
 /// What is kept of a point.
-fn kept(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> (Summary, Option<Note>) {
-    (Summary::new(prepared, outcome), outcome.ok().and_then(Note::of_accuracy))
+fn kept(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> (Summary, Vec<Note>) {
+    let summary = Summary::new(prepared, outcome);
+    let notes = outcome.map_or_else(|_| Vec::new(), |orbit| Note::of_orbit(orbit, summary.stable));
+    (summary, notes)
 }
 
 /// The points of the unit's frequencies; those among which peaks are sought, if they are.
@@ -319,9 +328,12 @@ fn references(work: &Work<'_>, omegas: &[f64]) -> Result<Rows, MethodError> {
         (0..REFERENCE_POINTS).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / REFERENCE_POINTS as f64)
     });
     let omegas: Vec<f64> = between.chain(omegas.last().copied()).collect();
-    let with = |change: &dyn Fn(Law) -> Law| {
+    // laws without a slip limit have neither reference
+    let with = |change: &dyn Fn(&dyn Law) -> Option<SharedLaw>| {
         let mut model = prepared.case.model.clone();
-        model.joints.iter_mut().for_each(|joint| joint.law = change(joint.law));
+        for joint in &mut model.joints {
+            joint.law = change(&*joint.law)?;
+        }
         model.assemble().ok()
     };
     let mut systems = [with(&|law| law.free()), with(&|law| law.stuck())].map(|system| (system, Vec::new()));
@@ -332,12 +344,12 @@ fn references(work: &Work<'_>, omegas: &[f64]) -> Result<Rows, MethodError> {
     }
     let mut rows = Rows::default();
     for (i, omega) in omegas.iter().enumerate() {
-        rows.number("frequency_Hz", hertz(*omega));
+        rows.number(DRIVE, hertz(*omega));
         for (what, (_, curve)) in ["free", "stuck"].iter().zip(&systems) {
             for (place, name) in prepared.system.places().iter().enumerate() {
                 let orbit = curve.get(i).and_then(|orbit| orbit.as_ref());
                 let amplitude = orbit.map_or(f64::NAN, |orbit| orbit.places[place].amplitude());
-                rows.number(&format!("{name}_{what}_amplitude_m"), amplitude);
+                rows.number(&amplitude_of(&format!("{name}_{what}")), amplitude);
             }
         }
         rows.end();
@@ -353,24 +365,32 @@ struct Drawn<'a> {
     shown: Vec<(String, usize)>,
     /// Case, and mass, frequency (Hz), amplitude (m) of the peaks inside the range.
     peaks: Vec<(usize, (String, f64, f64))>,
+    /// Names of the joints whose forces are shown.
+    joints: Vec<String>,
+    /// The first case's; the others differ in numbers only.
+    system: &'a System,
+    axes: (Axis, Axis),
+    force_axis: Axis,
+    /// From the values of tables to those on the axes.
     factor: (f64, f64),
+    force_factor: f64,
 }
 
 impl Drawn<'_> {
     fn column(&self, name: &str) -> String {
-        format!("{name}_amplitude_m")
+        amplitude_of(name)
     }
 
     /// The curve of one mass in one case, with its peaks among its points.
     fn line(&self, stretch: &Stretch, name: &str) -> (Vec<f64>, Vec<f64>) {
-        let x = numbers(self.curve, "frequency_Hz", stretch.rows.clone());
+        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
         let y = numbers(self.curve, &self.column(name), stretch.rows.clone());
         self.with_peaks(stretch, x.into_iter().zip(y).collect(), &|mass, _| mass == name)
     }
 
     /// The largest amplitude over the shown masses, and which mass has the largest of all in words.
     fn envelope(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>, String) {
-        let x = numbers(self.curve, "frequency_Hz", stretch.rows.clone());
+        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
         let all: Vec<Vec<f64>> =
             self.shown.iter().map(|(name, _)| numbers(self.curve, &self.column(name), stretch.rows.clone())).collect();
         let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -412,14 +432,14 @@ impl Drawn<'_> {
 
     /// Grey curves of the linear structures: of one mass, or the largest over the shown ones.
     fn references(&self, names: &[&str]) -> Vec<Series> {
-        let Some(table) = self.drawing.table("references") else { return Vec::new() };
-        let x: Vec<f64> = numbers(table, "frequency_Hz", 0..table.rows()).iter().map(|x| x * self.factor.0).collect();
+        let Some(table) = self.drawing.table(tables::REFERENCES) else { return Vec::new() };
+        let x: Vec<f64> = numbers(table, DRIVE, 0..table.rows()).iter().map(|x| x * self.factor.0).collect();
         [("free", Style::Solid), ("stuck", Style::Dotted)]
             .into_iter()
             .map(|(what, style)| {
                 let all: Vec<Vec<f64>> = names
                     .iter()
-                    .map(|name| numbers(table, &format!("{name}_{what}_amplitude_m"), 0..table.rows()))
+                    .map(|name| numbers(table, &amplitude_of(&format!("{name}_{what}")), 0..table.rows()))
                     .collect();
                 let y = (0..x.len()).map(|i| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max) * self.factor.1);
                 let of = if names.len() > 1 { ", largest" } else { "" };
@@ -436,144 +456,205 @@ fn join(parts: impl IntoIterator<Item = String>) -> String {
 }
 
 fn draw(drawing: &Drawing<'_>) -> Figure {
-    let (Some(curve), Some(system)) = (drawing.table("curve"), drawing.system()) else { return Figure::default() };
+    let (Some(curve), Some(system)) = (drawing.table(tables::CURVE), drawing.system()) else {
+        return Figure::default();
+    };
     let places = system.places().iter().cloned().zip(0..);
     let shown: Vec<(String, usize)> = places.filter(|(name, _)| drawing.shows(name)).collect();
-    let force = |joint: &str| format!("{joint}_force_amplitude_N");
     // with `output = "joint_force"` only
-    let names = system.joints().iter().map(|joint| joint.name.as_str());
-    let joints: Vec<&str> = names.filter(|name| drawing.shows(name) && curve.numbers(&force(name)).is_some()).collect();
+    let names = system.joints().iter().flat_map(|joint| joint.labels());
+    let joints: Vec<String> =
+        names.filter(|name| drawing.shows(name) && curve.numbers(&force(name)).is_some()).collect();
     if shown.is_empty() && joints.is_empty() {
         return Figure::default();
     }
-    let columns = || shown.iter().map(|(name, _)| format!("{name}_amplitude_m"));
-    let (x, x_factor) = drawing.axis(0, "frequency", largest(curve, ["frequency_Hz".to_owned()]), "Hz");
+    let columns = || shown.iter().map(|(name, _)| amplitude_of(name));
+    let (x, x_factor) = drawing.axis(0, "frequency", largest(curve, [DRIVE.to_owned()]), "Hz");
     let (y, y_factor) = drawing.axis(1, "amplitude", largest(curve, columns()), "m");
+    let (unit, force_factor) = display_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
     let stretches = drawing.stretches(curve);
     let layout = drawing.layout(shown.len(), stretches.len());
-    let drawn = Drawn { drawing, curve, peaks: peaks_by_case(drawing), factor: (x_factor, y_factor), shown };
-    let panel = |title: String| Panel { title, x: x.clone(), y: y.clone(), series: Vec::new() };
-    let (unit, force_factor) = display_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
-    // a force between nothing and its limit needs no decades
-    let force_panel = |title: String| Panel { y: Axis::new("joint force", unit.clone()), ..panel(title) };
-    let force_line = |stretch: &Stretch, joint: &str| -> (Vec<f64>, Vec<f64>) {
-        let of = |column: &str, factor: f64| {
-            numbers(curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
-        };
-        (of("frequency_Hz", x_factor), of(&force(joint), force_factor))
+    let drawn = Drawn {
+        drawing,
+        curve,
+        peaks: peaks_by_case(drawing),
+        factor: (x_factor, y_factor),
+        force_factor,
+        axes: (x, y),
+        // a force between nothing and its limit needs no decades
+        force_axis: Axis::new("joint force", unit),
+        system: &system,
+        shown,
+        joints,
     };
-    let heaviest = system.structure().mass().diagonal().max();
-    let light = |place: usize| system.structure().mass()[(place, place)] < LIGHT * heaviest;
-    let single = drawn.shown.len() <= SINGLE;
-    let mut panels = Vec::new();
-    if layout == Layout::Cases {
+    match layout {
+        Layout::Cases => Figure { panels: drawn.by_case(&stretches), ..Figure::default() },
+        Layout::Masses => Figure {
+            panels: drawn.by_mass(&stretches),
+            sharing: Sharing::Always,
+            varied: drawing.varied_axis(&stretches, drawing.study.varied().len().saturating_sub(1)),
+            ..Figure::default()
+        },
+    }
+}
+
+/// The column of a joint's force.
+fn force(joint: &str) -> String {
+    format!("{joint}_force_amplitude_N")
+}
+
+impl Drawn<'_> {
+    fn panel(&self, title: String) -> Panel {
+        Panel { title, x: self.axes.0.clone(), y: self.axes.1.clone(), series: Vec::new() }
+    }
+
+    fn force_panel(&self, title: String) -> Panel {
+        Panel { y: self.force_axis.clone(), ..self.panel(title) }
+    }
+
+    fn force_line(&self, stretch: &Stretch, joint: &str) -> (Vec<f64>, Vec<f64>) {
+        let of = |column: &str, factor: f64| {
+            numbers(self.curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
+        };
+        (of("frequency_Hz", self.factor.0), of(&force(joint), self.force_factor))
+    }
+
+    /// Whether the masses are drawn one by one.
+    fn single(&self) -> bool {
+        self.shown.len() <= SINGLE
+    }
+
+    fn names(&self) -> Vec<&str> {
+        self.shown.iter().map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// A panel for every case, with a curve for every mass, and one with the forces.
+    fn by_case(&self, stretches: &[Stretch]) -> Vec<Panel> {
+        let mut panels = Vec::new();
         for stretch in stretches.iter().take(MOST_PANELS) {
-            let mut panel = panel(stretch.label());
-            let names: Vec<&str> = drawn.shown.iter().map(|(name, _)| name.as_str()).collect();
-            panel.series.extend(drawn.references(&names));
-            if single {
-                for (name, place) in &drawn.shown {
-                    let (x, y) = drawn.line(stretch, name);
-                    let style = if light(*place) { Style::Dashed } else { Style::Solid };
-                    panel.series.push(Series { style, ..Series::line(name, x, y, *place) });
-                }
-                for (name, place) in &drawn.shown {
-                    panel.series.extend(drawn.marks(stretch, name, *place));
-                }
-            } else {
-                for (name, _) in &drawn.shown {
-                    let (x, y) = drawn.line(stretch, name);
-                    panel.series.push(Series::line(format!("each of {} masses", names.len()), x, y, 1).pale());
-                }
-                let (x, y, worst) = drawn.envelope(stretch);
-                panel.title = join([panel.title, worst]);
-                panel.series.push(Series::line(format!("largest of {} masses", names.len()), x, y, 0));
+            if !self.shown.is_empty() {
+                panels.push(self.masses_of(stretch));
             }
-            if !drawn.shown.is_empty() {
-                panels.push(panel);
-            }
-            if !joints.is_empty() {
-                let mut panel = force_panel(stretch.label());
-                for (i, joint) in joints.iter().enumerate() {
-                    let (x, y) = force_line(stretch, joint);
+            if !self.joints.is_empty() {
+                let mut panel = self.force_panel(stretch.label());
+                for (i, joint) in self.joints.iter().enumerate() {
+                    let (x, y) = self.force_line(stretch, joint);
                     // beside the colours of the masses
-                    panel.series.push(Series::line(*joint, x, y, drawn.shown.len() + i));
+                    panel.series.push(Series::line(joint, x, y, self.shown.len() + i));
                 }
                 panels.push(panel);
             }
         }
-        return Figure { panels, ..Figure::default() };
+        panels
     }
-    // the last varied parameter tells the curves of one panel apart, the others the panels
-    let outer = |stretch: &Stretch| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
-    let masses: Vec<Option<&str>> =
-        if single { drawn.shown.iter().map(|(name, _)| Some(name.as_str())).collect() } else { vec![None] };
-    for group in stretches.chunk_by(|a, b| outer(a) == outer(b)) {
-        for mass in &masses {
-            let named = mass.filter(|_| masses.len() > 1).map(str::to_owned);
-            let thinned_out = (group.len() > MOST_CURVES).then(|| format!("{MOST_CURVES} of {} cases", group.len()));
-            let mut panel = panel(join(named.into_iter().chain([outer(&group[0])]).chain(thinned_out)));
-            if mass.is_none() {
-                panel.y.quantity = format!("largest amplitude of {} masses", drawn.shown.len());
-            } else if masses.len() == 1 && system.dofs() > 1 {
-                panel.y.quantity = format!("amplitude of {}", drawn.shown[0].0);
+
+    /// The masses of one case: each, or the largest of them before all others.
+    fn masses_of(&self, stretch: &Stretch) -> Panel {
+        let (mut panel, names) = (self.panel(stretch.label()), self.names());
+        panel.series.extend(self.references(&names));
+        if self.single() {
+            let mass = self.system.structure().mass();
+            let heaviest = mass.diagonal().max();
+            for (name, place) in &self.shown {
+                let (x, y) = self.line(stretch, name);
+                let light = mass[(*place, *place)] < LIGHT * heaviest;
+                let style = if light { Style::Dashed } else { Style::Solid };
+                panel.series.push(Series { style, ..Series::line(name, x, y, *place) });
             }
-            let all: Vec<&str> = drawn.shown.iter().map(|(name, _)| name.as_str()).collect();
-            panel.series.extend(drawn.references(mass.as_ref().map_or(&all[..], std::slice::from_ref)));
-            for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
-                let (x, y) = match mass {
-                    Some(name) => drawn.line(stretch, name),
-                    None => {
-                        let (x, y, _) = drawn.envelope(stretch);
-                        (x, y)
-                    }
-                };
-                let label = stretch.varied.last().map_or_else(
-                    || mass.map_or_else(|| "largest".to_owned(), str::to_owned),
-                    |varied| varied.text.clone(),
-                );
-                let value = stretch.varied.last().map(|varied| varied.on_axis().0);
-                panel.series.push(Series { value, ..Series::line(label, x, y, colour) });
-                if let (Some(name), true) = (mass, group.len() <= SINGLE) {
-                    let marks = drawn.marks(stretch, name, colour);
-                    panel.series.extend(marks.map(|marks| Series { value, ..marks }));
+            for (name, place) in &self.shown {
+                panel.series.extend(self.marks(stretch, name, *place));
+            }
+            return panel;
+        }
+        for name in &names {
+            let (x, y) = self.line(stretch, name);
+            panel.series.push(Series::line(format!("each of {} masses", names.len()), x, y, 1).pale());
+        }
+        let (x, y, worst) = self.envelope(stretch);
+        panel.title = join([panel.title, worst]);
+        panel.series.push(Series::line(format!("largest of {} masses", names.len()), x, y, 0));
+        panel
+    }
+
+    /// A panel for every mass (or for the largest of them), with a curve for every case, and then for every joint the same. The last varied
+    /// parameter tells the curves of one panel apart, the others the panels.
+    fn by_mass(&self, stretches: &[Stretch]) -> Vec<Panel> {
+        let outer = |stretch: &Stretch| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
+        let groups: Vec<(&[Stretch], String)> =
+            stretches.chunk_by(|a, b| outer(a) == outer(b)).map(|group| (group, outer(&group[0]))).collect();
+        let masses: Vec<Option<&str>> =
+            if self.single() { self.names().into_iter().map(Some).collect() } else { vec![None] };
+        let of_masses = groups.iter().flat_map(|(group, outer)| {
+            masses.iter().map(|mass| self.cases_of_mass(*mass, group, outer, masses.len())).collect::<Vec<_>>()
+        });
+        let of_joints = groups
+            .iter()
+            .flat_map(|(group, outer)| self.joints.iter().map(|joint| self.cases_of_joint(joint, group, outer)));
+        of_masses.chain(of_joints).take(MOST_PANELS).collect()
+    }
+
+    /// The cases of a group, for one mass of so many panels, or for the largest amplitude of all.
+    fn cases_of_mass(&self, mass: Option<&str>, group: &[Stretch], outer: &str, panels: usize) -> Panel {
+        let named = mass.filter(|_| panels > 1).map(str::to_owned);
+        let thinned_out = (group.len() > MOST_CURVES).then(|| format!("{MOST_CURVES} of {} cases", group.len()));
+        let mut panel = self.panel(join(named.into_iter().chain([outer.to_owned()]).chain(thinned_out)));
+        if mass.is_none() {
+            panel.y.quantity = format!("largest amplitude of {} masses", self.shown.len());
+        } else if panels == 1 && self.system.dofs() > 1 {
+            panel.y.quantity = format!("amplitude of {}", self.shown[0].0);
+        }
+        panel.series.extend(self.references(&mass.map_or_else(|| self.names(), |mass| vec![mass])));
+        for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
+            let (x, y) = match mass {
+                Some(name) => self.line(stretch, name),
+                None => {
+                    let (x, y, _) = self.envelope(stretch);
+                    (x, y)
                 }
+            };
+            let line = of_case(stretch, mass.unwrap_or("largest"), x, y, colour);
+            let value = line.value;
+            panel.series.push(line);
+            if let (Some(name), true) = (mass, group.len() <= SINGLE) {
+                panel.series.extend(self.marks(stretch, name, colour).map(|marks| Series { value, ..marks }));
             }
-            panels.push(panel);
         }
+        panel
     }
-    for group in stretches.chunk_by(|a, b| outer(a) == outer(b)) {
-        for joint in &joints {
-            let named = Some((*joint).to_owned()).filter(|_| joints.len() > 1 || system.joints().len() > 1);
-            let mut panel = force_panel(join(named.into_iter().chain([outer(&group[0])])));
-            for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
-                let (x, y) = force_line(stretch, joint);
-                let label = stretch.varied.last().map_or_else(|| (*joint).to_owned(), |varied| varied.text.clone());
-                let value = stretch.varied.last().map(|varied| varied.on_axis().0);
-                // one curve has a colour of its own, beside those of the masses
-                let colour = if stretch.varied.is_empty() { system.dofs() } else { colour };
-                panel.series.push(Series { value, ..Series::line(label, x, y, colour) });
-            }
-            panels.push(panel);
+
+    /// The cases of a group, for the force of one joint.
+    fn cases_of_joint(&self, joint: &str, group: &[Stretch], outer: &str) -> Panel {
+        let named = Some(joint.to_owned()).filter(|_| self.joints.len() > 1 || self.system.joints().len() > 1);
+        let mut panel = self.force_panel(join(named.into_iter().chain([outer.to_owned()])));
+        for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
+            let (x, y) = self.force_line(stretch, joint);
+            // one curve has a colour of its own, beside those of the masses
+            let colour = if stretch.varied.is_empty() { self.system.dofs() } else { colour };
+            panel.series.push(of_case(stretch, joint, x, y, colour));
         }
+        panel
     }
-    panels.truncate(MOST_PANELS);
-    Figure { panels, sharing: Sharing::Always, varied: drawing.varied_axis(&stretches), ..Figure::default() }
+}
+
+/// The curve of a case among others, called by its last varied parameter, or `alone` where nothing is varied.
+fn of_case(stretch: &Stretch, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
+    let last = stretch.varied.last();
+    let label = last.map_or_else(|| alone.to_owned(), |varied| varied.text.clone());
+    Series { value: last.map(|varied| varied.on_axis().0), ..Series::line(label, x, y, colour) }
 }
 
 /// The peaks inside the range: case, and mass, frequency (Hz), amplitude (m).
 fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<(usize, (String, f64, f64))> {
-    let Some(table) = drawing.table("peaks") else { return Vec::new() };
-    let at_end = table.flags("at_range_end").unwrap_or_default();
-    let masses = words(table, "mass");
+    let Some(table) = drawing.table(tables::PEAKS) else { return Vec::new() };
+    let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
+    let masses = words(table, tables::MASS);
     // a table from elsewhere may lack columns
     if masses.len() != table.rows() {
         return Vec::new();
     }
     let mut peaks = Vec::new();
     for stretch in drawing.stretches(table) {
-        let (x, y) =
-            (numbers(table, "frequency_Hz", stretch.rows.clone()), numbers(table, "amplitude_m", stretch.rows.clone()));
+        let (x, y) = (numbers(table, DRIVE, stretch.rows.clone()), numbers(table, AMPLITUDE, stretch.rows.clone()));
         for (i, row) in stretch.rows.clone().enumerate() {
             if at_end.get(row) == Some(&Some(false)) {
                 peaks.push((stretch.case, (masses[row].clone(), x[i], y[i])));

@@ -1,16 +1,21 @@
 //! Transients: the motion in time from rest or from given displacements; free decay, switched-on drive, or run-up.
 
+use super::keys::{MOST_SAMPLES, anything};
 use super::orbit::write_sample;
-use super::{Complaint, Kind, MOST_SAMPLES, anything};
+use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Figure, Panel, Series};
 use crate::decay::Decay;
-use crate::drawing::{Drawing, MOST_PANELS, numbers, shown_hertz};
+use crate::drawing::{Drawing, MOST_PANELS, numbers};
+use crate::info::Complaint;
+use crate::info::KindInfo;
+use crate::key::{Key, Takes, Within, default, optional, required};
+use crate::kind::Kind;
 use crate::note::Note;
 use crate::point::place_of;
 use crate::rows::Rows;
-use crate::schema::{Key, Takes, Within, default, optional, required};
-use crate::summary::{Cost, Costing, Shape, moved};
 use crate::values::{Values, hertz};
+use crate::warnings::moved;
+use crate::words::shown_hertz;
 use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
@@ -30,51 +35,63 @@ const RUN_UP: &[Key] = &[
 ];
 
 pub(super) const KIND: Kind = Kind {
-    name: "transient",
-    summary: "motion in time from rest or given displacements: free decay, switched-on drive, run-up",
-    keys: &[
-        optional(
-            "frequency",
-            Takes::Frequencies,
-            "drive frequency; without it and without `run_up` the motion is a free decay",
-            "\"121 Hz\"",
-        ),
-        optional(
-            "run_up",
-            Takes::Table(RUN_UP),
-            "drive frequency that changes linearly in time",
-            "{ from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }",
-        ),
-        optional("duration", DURATION, "time that is computed; of a run-up its own duration when absent", "\"2 s\""),
-        optional("cycles", Takes::Count(1, 1_000_000), "the same in periods of `frequency`", "200"),
-        optional(
-            "start",
-            Takes::ByName(Dimension::LENGTH),
-            "displacements at the start; zero when absent",
-            "{ blade1 = \"1 mm\" }",
-        ),
-        optional(
-            "start_velocity",
-            Takes::ByName(Dimension::VELOCITY),
-            "velocities at the start; zero when absent",
-            "{ blade1 = \"0.1 m/s\" }",
-        ),
-        default(
-            "samples_per_cycle",
-            Takes::Count(8, MOST_SAMPLES),
-            "64",
-            "points of the table per period of the drive (of a run-up: of its highest frequency)",
-            "64",
-        ),
-        optional("time_step", DURATION, "distance of the points of the table; needed for a free decay", "\"0.1 ms\""),
-    ],
-    check,
-    axes: [Some(Dimension::TIME), Some(Dimension::LENGTH)],
-    // exact and smooth laws alike are followed in time; there is no orbit to be found
-    uses_method: false,
-    needs: anything,
-    adapts: false,
-    tables: &["motion", "motion_summary", "decay", "decay_summary"],
+    info: KindInfo {
+        name: "transient",
+        summary: "motion in time from rest or given displacements: free decay, switched-on drive, run-up",
+        keys: &[
+            optional(
+                "frequency",
+                Takes::Frequencies,
+                "drive frequency; without it and without `run_up` the motion is a free decay",
+                "\"121 Hz\"",
+            ),
+            optional(
+                "run_up",
+                Takes::Table(RUN_UP),
+                "drive frequency that changes linearly in time",
+                "{ from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }",
+            ),
+            optional(
+                "duration",
+                DURATION,
+                "time that is computed; of a run-up its own duration when absent",
+                "\"2 s\"",
+            ),
+            optional("cycles", Takes::Count(1, 1_000_000), "the same in periods of `frequency`", "200"),
+            optional(
+                "start",
+                Takes::ByName(Dimension::LENGTH),
+                "displacements at the start; zero when absent",
+                "{ blade1 = \"1 mm\" }",
+            ),
+            optional(
+                "start_velocity",
+                Takes::ByName(Dimension::VELOCITY),
+                "velocities at the start; zero when absent",
+                "{ blade1 = \"0.1 m/s\" }",
+            ),
+            default(
+                "samples_per_cycle",
+                Takes::Count(8, MOST_SAMPLES),
+                "64",
+                "points of the table per period of the drive (of a run-up: of its highest frequency)",
+                "64",
+            ),
+            optional(
+                "time_step",
+                DURATION,
+                "distance of the points of the table; needed for a free decay",
+                "\"0.1 ms\"",
+            ),
+        ],
+        check,
+        axes: [Some(Dimension::TIME), Some(Dimension::LENGTH)],
+        // exact and smooth laws alike are followed in time; there is no orbit to be found
+        uses_method: false,
+        needs: anything,
+        adapts: false,
+        tables: &["motion", "motion_summary", "decay", "decay_summary"],
+    },
     grain: |_| Grain::Case,
     cost,
     warnings: moved,
@@ -118,7 +135,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     let free: Vec<&str> = model
         .masses
         .iter()
@@ -327,7 +344,13 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 title,
                 x: x_axis,
                 y: y_axis,
-                series: system.places().iter().enumerate().filter(|(_, place)| drawing.shows(place)).map(line).collect(),
+                series: system
+                    .places()
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, place)| drawing.shows(place))
+                    .map(line)
+                    .collect(),
             });
             from = to;
         }

@@ -1,7 +1,7 @@
 //! The summary in words, for a terminal.
 
-use super::{JointSummary, ModelSummary, bytes_text};
-use crate::drawing::display_unit;
+use super::{JointSummary, ModelSummary};
+use crate::words::{about, bytes_text, plural, quantity, significant};
 use std::f64::consts::TAU;
 use std::fmt;
 use stickslip::model::{LinearMode, Modes};
@@ -12,43 +12,6 @@ const LISTED: usize = 10;
 const STRETCHES: usize = 3;
 /// Width of the first column.
 const WIDTH: usize = 14;
-
-fn plural(count: usize) -> &'static str {
-    if count == 1 { "" } else { "s" }
-}
-
-/// A number with so many significant digits, without zeros at its end.
-pub(super) fn significant(value: f64, digits: i32) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    if !(1e-9..1e7).contains(&value.abs()) {
-        return format!("{value:.*e}", (digits - 1).max(0) as usize);
-    }
-    let decimals = (digits - 1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
-/// A quantity with the prefix that suits its size.
-pub(super) fn quantity(value: f64, si: &str) -> String {
-    if value >= 1e4 {
-        return format!("{:.3e} {si}", value);
-    }
-    let (unit, factor) = display_unit(value.abs(), si);
-    format!("{} {unit}", significant(value * factor, 4))
-}
-
-/// A time for people, rounded as roughly as it is known.
-fn about(seconds: f64) -> String {
-    match seconds {
-        s if s < 1.0 => "below a second".to_owned(),
-        s if s < 100.0 => format!("about {} s", significant(s, 1)),
-        s if s < 2.0 * 3600.0 => format!("about {} minutes", significant(s / 60.0, 1)),
-        s if s < 48.0 * 3600.0 => format!("about {} hours", significant(s / 3600.0, 1)),
-        s => format!("about {} days", significant(s / 86_400.0, 1)),
-    }
-}
 
 impl ModelSummary {
     fn modes(&self, modes: &Modes) -> String {
@@ -162,22 +125,5 @@ impl fmt::Display for ModelSummary {
         let results =
             format!("{cases}, {rows}, {} of numbers, {} of memory", bytes_text(size.results), bytes_text(size.memory));
         line("results", &format!("{results}; {} on one thread", about(self.seconds)))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_have_as_many_digits_as_they_are_worth() {
-        assert_eq!([significant(121.2503, 5), significant(0.072_31, 2), significant(2.0, 4)], ["121.25", "0.072", "2"]);
-        assert_eq!([significant(12_345.6, 3), significant(1200.0, 3)], ["12346", "1200"]);
-        assert_eq!(significant(3.110_516e15, 3), "3.11e15");
-        assert_eq!(
-            [about(0.3), about(34.0), about(600.0), about(1e5), about(1e6)],
-            ["below a second", "about 34 s", "about 10 minutes", "about 28 hours", "about 12 days",]
-        );
-        assert_eq!([quantity(2e-4, "m"), quantity(2.0, "N"), quantity(4e4, "N")], ["200 µm", "2 N", "4.000e4 N"]);
     }
 }

@@ -1,26 +1,23 @@
 //! What looks like a mistake and is none to the reader: sentences that begin with `warning: `.
 
-use super::text::{quantity, significant};
-use super::{Surveyed, range};
 use crate::expression::displayed;
+use crate::note::WARNING;
 use crate::statement::{Environment, Quantity, Stated, StatedTable};
-use crate::study::{Structure, Study, evaluate};
-use crate::values::Values;
+use crate::study::{Study, evaluate};
+use crate::survey::Surveyed;
+use crate::words::significant;
 use std::collections::{BTreeSet, HashMap};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 use stickslip::dimension::Dimension;
-use stickslip::model::Modes;
-
-/// How a note begins that is a warning.
-pub(crate) const WARNING: &str = "warning: ";
 
 /// Names that a warning lists; of more it gives the number.
 const NAMED: usize = 6;
 
-pub(super) fn all(study: &Study, cases: &[Surveyed]) -> Vec<String> {
-    let mut warnings = (study.kind().warnings)(cases);
+/// All warnings: those of the study's kind, and of every study.
+pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[Surveyed]) -> Vec<String> {
+    let mut warnings = of_kind;
     warnings.extend(loose(cases));
-    warnings.extend(unused(study, &cases[0]));
+    warnings.extend(unused(study));
     warnings.extend(bare_angles(study));
     warnings.into_iter().map(|text| format!("{WARNING}{text}")).collect()
 }
@@ -32,45 +29,6 @@ fn listed(names: &[String]) -> String {
         None | Some(0) => shown.join(", "),
         Some(more) => format!("{} and {more} more", shown.join(", ")),
     }
-}
-
-/// Of a kind that needs something to drive the motion.
-pub(crate) fn driven(cases: &[Surveyed]) -> Vec<String> {
-    no_excitation(cases, false).into_iter().collect()
-}
-
-/// Of a kind that needs something to set the structure in motion: a drive, or a state to start from.
-pub(crate) fn moved(cases: &[Surveyed]) -> Vec<String> {
-    no_excitation(cases, true).into_iter().collect()
-}
-
-/// Of a kind that looks for resonances in a range of frequencies.
-pub(crate) fn resonant(cases: &[Surveyed]) -> Vec<String> {
-    no_excitation(cases, false).into_iter().chain(no_resonance(cases)).collect()
-}
-
-fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
-    if cases.iter().any(|one| !one.survey.harmonics().is_empty()) {
-        return None;
-    }
-    let starts = |values: &Values| {
-        ["start", "start_velocity"]
-            .iter()
-            .filter_map(|key| values.by_name(key))
-            .any(|table| table.values().any(|v| *v != 0.0))
-    };
-    let constant = |one: &Surveyed| {
-        let model = &one.case.model;
-        model.forces.iter().any(|force| force.amplitude != 0.0) || model.motions.iter().any(|m| m.amplitude != 0.0)
-    };
-    if starts_count && cases.iter().any(|one| starts(&one.case.values) || constant(one)) {
-        return None;
-    }
-    Some(if cases.iter().any(constant) {
-        "every force and motion is constant in time: nothing vibrates".to_owned()
-    } else {
-        "there is no force and no motion that is not zero: nothing vibrates; add a [[force]] or a [[motion]]".to_owned()
-    })
 }
 
 fn loose(cases: &[Surveyed]) -> Vec<String> {
@@ -87,11 +45,11 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
     cases[0].survey.loose().iter().take(NAMED).map(one).collect()
 }
 
-fn unused(study: &Study, first: &Surveyed) -> Option<String> {
-    let used = used_parameters(study, first);
+fn unused(study: &Study) -> Option<String> {
+    let used = used_parameters(study);
     let from_template = |index: usize| {
         let source = study.parameters[index].quantity.place.source;
-        study.sources.get(source).is_some_and(|source| source.name.starts_with("template parameter"))
+        study.structure.template.as_ref().is_some_and(|template| template.source == source)
     };
     let varied: BTreeSet<usize> = study.varied.iter().map(|varied| varied.index).collect();
     let idle = (0..study.names.len()).filter(|i| !used.contains(i) && (varied.contains(i) || !from_template(*i)));
@@ -112,42 +70,16 @@ fn unused(study: &Study, first: &Surveyed) -> Option<String> {
 }
 
 /// The parameters that a value of the model, of the study or of the method depends on.
-fn used_parameters(study: &Study, first: &Surveyed) -> BTreeSet<usize> {
+fn used_parameters(study: &Study) -> BTreeSet<usize> {
     let mut open: Vec<usize> = Vec::new();
     let mut from = |table: &StatedTable| {
         each_quantity(table, &mut |_, quantity, _| open.extend(quantity.expression.parameters()));
     };
     from(&study.study);
     from(&study.method);
-    match &study.structure {
-        Structure::Lists(lists) => {
-            for list in [&lists.mass, &lists.spring, &lists.joint, &lists.force, &lists.motion] {
-                list.iter().for_each(&mut from);
-            }
-        }
-        Structure::Template(row, table) => {
-            from(table);
-            // a parameter of a template is used if the model changes with it; a law that is replaced takes its
-            // parameters away
-            let replaced = table.entry("law").and(first.case.model.joints.first()).map(|joint| joint.law);
-            let values: Vec<(&str, f64)> =
-                row.parameters.iter().filter_map(|p| Some((p.key, first.case.parameters.get(p.key)?.0))).collect();
-            let model = |values: &[(&str, f64)]| {
-                let mut model = row.model_with(values).unwrap_or_default();
-                for joint in &mut model.joints {
-                    joint.law = replaced.unwrap_or(joint.law);
-                }
-                model
-            };
-            let before = model(&values);
-            for index in 0..values.len() {
-                let mut other = values.clone();
-                other[index].1 = 1.5 * other[index].1 + 1.0;
-                if model(&other) != before {
-                    open.extend(study.names.iter().position(|name| name == other[index].0));
-                }
-            }
-        }
+    let lists = &study.structure.lists;
+    for list in [&lists.mass, &lists.spring, &lists.joint, &lists.force, &lists.motion] {
+        list.iter().for_each(&mut from);
     }
     let mut used = BTreeSet::new();
     while let Some(index) = open.pop() {
@@ -182,51 +114,13 @@ fn each_quantity(table: &StatedTable, each: &mut dyn FnMut(&'static str, &Quanti
     }
 }
 
-fn no_resonance(cases: &[Surveyed]) -> Option<String> {
-    let (from, to) = range(&cases[0].case).filter(|(from, to)| from < to)?;
-    let mut nearest: Option<(f64, f64, &str)> = None;
-    for one in cases {
-        let harmonics = one.survey.harmonics();
-        if harmonics.is_empty() {
-            return None; // that is said elsewhere
-        }
-        let (free, stuck) = (one.survey.free(), one.survey.stuck());
-        if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
-            return None; // not known
-        }
-        // friction puts the resonance between the free frequency of a mode and its stuck one
-        let between = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
-        let between = between.map(|(a, b)| (a.omega.min(b.omega), a.omega.max(b.omega)));
-        let single = |modes: &Modes| modes.elastic.iter().map(|mode| (mode.omega, mode.omega)).collect::<Vec<_>>();
-        let intervals: Vec<(f64, f64)> = between.chain(single(free)).chain(single(stuck)).collect();
-        for h in harmonics.iter().map(|h| f64::from(*h)) {
-            if intervals.iter().any(|(a, b)| a / h <= to && b / h >= from) {
-                return None;
-            }
-            for (modes, name) in [(free, "free"), (stuck, "stuck")] {
-                for omega in modes.elastic.iter().map(|mode| mode.omega / h) {
-                    let distance = if omega < from { from / omega } else { omega / to };
-                    if nearest.is_none_or(|(least, _, _)| distance < least) {
-                        nearest = Some((distance, omega, name));
-                    }
-                }
-            }
-        }
-    }
-    let hertz = |omega: f64| significant(omega / TAU, 6);
-    // a model without any is one that no spring holds, which is said elsewhere, or has no mass
-    let (_, omega, name) = nearest?;
-    let (from, to, omega) = (hertz(from), hertz(to), hertz(omega));
-    Some(format!("no resonance lies between {from} and {to} Hz: the nearest is at {omega} Hz with all joints {name}"))
-}
-
 /// Bare numbers as angles: they count as radians, as bare frequencies count as Hz.
 fn bare_angles(study: &Study) -> Vec<String> {
     let choice: HashMap<_, _> = study.varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
-    let Ok(values) = evaluate(&study.names, &study.parameters, &study.order, &choice, None) else { return Vec::new() };
+    let Ok(values) = evaluate(&study.names, &study.parameters, &study.order, &choice, &[]) else { return Vec::new() };
     let environment = Environment { names: &study.names, values };
     let mut found: Vec<(String, String, usize)> = Vec::new();
-    let Structure::Lists(lists) = &study.structure else { return Vec::new() };
+    let lists = &study.structure.lists;
     for (list, tables) in [("force", &lists.force), ("motion", &lists.motion)] {
         for (index, table) in tables.iter().enumerate() {
             each_quantity(table, &mut |key, quantity, dimension| {
@@ -258,36 +152,4 @@ fn bare_angles(study: &Study) -> Vec<String> {
         more => format!("{sentence}; {more} more like it"),
     };
     found.into_iter().take(NAMED).map(sentence).collect()
-}
-
-/// A range of amplitudes that ends below this share of the first slip shows a linear mode only.
-const STICKS: f64 = 0.99;
-
-/// Of a nonlinear mode whose amplitudes end before any joint slips.
-pub(crate) fn mode_sticks(cases: &[Surveyed]) -> Vec<String> {
-    sticks(cases).into_iter().collect()
-}
-
-fn sticks(cases: &[Surveyed]) -> Option<String> {
-    let mut needed = f64::INFINITY;
-    let mut asked = 0.0;
-    for one in cases {
-        let values = &one.case.values;
-        let number = values.count("mode").unwrap_or(1) as usize - 1;
-        let to = values.table("amplitude")?.quantity("to")?;
-        // the range is of the place that moves most in the mode of the structure without its joints
-        let unit = one.survey.system().structure().modal_unit(number);
-        let slip = one.survey.slip_amplitude(number)? / unit;
-        if !(unit > 0.0 && slip * STICKS > to) {
-            return None;
-        }
-        if slip < needed {
-            (needed, asked) = (slip, to);
-        }
-    }
-    Some(format!(
-        "no joint slips in this mode: the amplitudes end at {}, and the first slip is at about {}",
-        quantity(asked, "m"),
-        quantity(needed, "m")
-    ))
 }

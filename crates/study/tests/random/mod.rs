@@ -2,8 +2,7 @@
 
 use std::fmt::Write;
 use stickslip::law;
-use stickslip::model::templates;
-use stickslip_study::kinds;
+use stickslip_study::{kinds, templates};
 
 /// Random numbers by splitmix64 (Steele, Lea, Flood 2014): the same for a seed on every machine.
 pub struct Chance(u64);
@@ -84,7 +83,7 @@ struct Names {
 pub fn study_text(chance: &mut Chance) -> String {
     let scales =
         Scales { mass: chance.decade(-3.0, 1.5), hertz: chance.decade(0.0, 3.0), force: chance.decade(-1.0, 3.0) };
-    let kind = chance.of(&kinds::TABLE.iter().map(|kind| kind.name).collect::<Vec<_>>());
+    let kind = chance.of(&kinds::TABLE.iter().map(|kind| kind.info.name).collect::<Vec<_>>());
     let mut model = String::new();
     let (names, scales) = if chance.one_in(8) {
         let (names, scales) = template(chance, &mut model);
@@ -122,7 +121,8 @@ fn template(chance: &mut Chance, text: &mut String) -> (Names, Scales) {
 
 /// A law with parameters of these scales; half of the limits are the parameter `limit`.
 fn law_text(chance: &mut Chance, scales: &Scales, smooth: bool) -> String {
-    let rows: Vec<&law::LawInfo> = law::TABLE.iter().filter(|row| row.name.ends_with("arctan") == smooth).collect();
+    let rows: Vec<&law::LawInfo> =
+        law::TABLE.iter().copied().filter(|row| row.name.ends_with("arctan") == smooth).collect();
     let row = chance.of(&rows);
     let mut text = format!("{{ kind = \"{}\"", row.name);
     for parameter in row.parameters {
@@ -236,7 +236,7 @@ fn lists(chance: &mut Chance, scales: &Scales, kind: &str, text: &mut String) ->
 fn frequencies(chance: &mut Chance, scales: &Scales, kind: &str) -> String {
     let ratio = |chance: &mut Chance| scales.hertz * chance.between(0.3, 2.0);
     let range = matches!(kind, "response" | "performance" | "branch");
-    let adapts = kinds::find(kind).is_some_and(|kind| kind.adapts);
+    let adapts = kinds::find(kind).is_some_and(|kind| kind.info.adapts);
     match chance.count(1, 8) {
         1 | 2 if !range => {
             let (a, b) = (ratio(chance), ratio(chance));

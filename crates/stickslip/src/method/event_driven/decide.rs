@@ -30,22 +30,76 @@ pub(crate) struct Decision {
     pub acceleration: DVector<f64>,
     /// Largest force on a mass without those of rigid sliders at rest, N.
     pushed: f64,
+    /// Accelerations that unit forces of the sliders cause, `M⁻¹ W`, n × sliders, and the relative ones, `Wᵀ M⁻¹ W`.
+    response: DMatrix<f64>,
+    delassus: DMatrix<f64>,
     free: DVector<f64>,
-    jerk: DVector<f64>,
     at_rest: Vec<usize>,
-    undecided: Vec<usize>,
+    /// Sliders that are not decided yet, with the sign of their force.
+    undecided: Vec<(usize, f64)>,
+    problem: Problem,
+    /// x, v, a, jerk, …: each is the derivative of the one before.
+    derivatives: Vec<DVector<f64>>,
+}
+
+/// The complementarity problem of the sliders at rest, with its solution.
+#[derive(Debug, Clone, Default)]
+struct Problem {
+    /// `Wᵀ M⁻¹ W`
+    delassus: DMatrix<f64>,
+    push: DVector<f64>,
+    low: DVector<f64>,
+    high: DVector<f64>,
+    lambda: DVector<f64>,
+    /// What the forces `lambda` leave of `push`.
+    relative: DVector<f64>,
+    /// What the forces `lambda` do.
+    held: DVector<f64>,
+}
+
+impl Problem {
+    fn resize(&mut self, count: usize) {
+        if self.push.len() != count {
+            self.delassus = DMatrix::zeros(count, count);
+            for vector in
+                [&mut self.push, &mut self.low, &mut self.high, &mut self.lambda, &mut self.relative, &mut self.held]
+            {
+                *vector = DVector::zeros(count);
+            }
+        }
+    }
+
+    fn solve(&mut self) -> bool {
+        if !complementarity::solve_into(&self.delassus, &self.push, &self.low, &self.high, &mut self.lambda) {
+            return false;
+        }
+        multiply(&self.delassus, &self.lambda, &mut self.held);
+        for ((relative, push), held) in self.relative.iter_mut().zip(&self.push).zip(&self.held) {
+            *relative = push - held;
+        }
+        true
+    }
 }
 
 impl Decision {
     pub fn new(mechanics: &Mechanics) -> Self {
+        let count = mechanics.sliders.len();
+        let mut response = DMatrix::zeros(mechanics.n, count);
+        for (i, slider) in mechanics.sliders.iter().enumerate() {
+            response.set_column(i, &(&mechanics.inverse_mass * &slider.direction));
+        }
+        let delassus = DMatrix::from_fn(count, count, |a, b| mechanics.sliders[a].direction.dot(&response.column(b)));
         Decision {
+            response,
+            delassus,
             contacts: vec![Contact::Stick; mechanics.sliders.len()],
             acceleration: DVector::zeros(mechanics.n),
             pushed: 0.0,
             free: DVector::zeros(mechanics.n),
-            jerk: DVector::zeros(mechanics.n),
             at_rest: Vec::new(),
             undecided: Vec::new(),
+            problem: Problem::default(),
+            derivatives: vec![DVector::zeros(mechanics.n); LEVELS as usize + 3],
         }
     }
 
@@ -118,33 +172,34 @@ impl Decision {
         if self.at_rest.is_empty() {
             return true;
         }
-        let limits =
-            DVector::from_iterator(self.at_rest.len(), self.at_rest.iter().map(|&i| mechanics.sliders[i].limit));
-        let delassus = delassus(mechanics, &self.at_rest);
-        let push = self.push(mechanics, drive, time, 2, &self.acceleration);
-        let Some(lambda) = complementarity::solve(&delassus, &push, &-&limits, &limits) else {
+        self.pose(mechanics, drive, time, 2, None);
+        let problem = &mut self.problem;
+        for (k, &i) in self.at_rest.iter().enumerate() {
+            let limit = mechanics.sliders[i].limit;
+            (problem.low[k], problem.high[k]) = (-limit, limit);
+        }
+        if !problem.solve() {
             return false;
-        };
-        let relative = &push - &delassus * &lambda;
-        let size = push.amax() + (&delassus * &limits).amax();
+        }
+        // what the limits can do to an acceleration
+        let most = (0..self.at_rest.len())
+            .map(|k| {
+                problem.delassus.column(k).iter().zip(&problem.high).map(|(d, limit)| d * limit).sum::<f64>().abs()
+            })
+            .fold(0.0, f64::max);
+        let size = problem.push.amax() + most;
         self.undecided.clear();
         for (k, &i) in self.at_rest.iter().enumerate() {
-            if relative[k].abs() > BALANCED * size {
-                self.contacts[i] = Contact::slip(relative[k]); // a joint that is only moved has no force here
-            } else if lambda[k].abs() >= limits[k] * (1.0 - AT_LIMIT) {
-                self.undecided.push(i);
+            let (relative, lambda) = (problem.relative[k], problem.lambda[k]);
+            if relative.abs() > BALANCED * size {
+                self.contacts[i] = Contact::slip(relative); // a joint that is only moved has no force here
+            } else if lambda.abs() >= problem.high[k] * (1.0 - AT_LIMIT) {
+                self.undecided.push((i, lambda.signum()));
             }
-            self.acceleration -= &mechanics.inverse_mass * &mechanics.sliders[i].direction * lambda[k];
+            self.acceleration.axpy(-lambda, &self.response.column(i), 1.0);
         }
         if !self.undecided.is_empty() {
-            let signs: Vec<(usize, f64)> = self
-                .at_rest
-                .iter()
-                .enumerate()
-                .filter(|(_, i)| self.undecided.contains(i))
-                .map(|(k, &i)| (i, lambda[k].signum()))
-                .collect();
-            self.settle_derivatives(mechanics, drive, time, state, signs);
+            self.settle_derivatives(mechanics, drive, time, state);
         }
         true
     }
@@ -162,84 +217,69 @@ impl Decision {
         acceleration * drive.omega.max(mechanics.fastest).powi(order as i32 - 2)
     }
 
-    /// Relative acceleration (order 2) or a higher derivative of the sliders at rest that `motion` gives, with imposed motion.
-    fn push(&self, mechanics: &Mechanics, drive: &Drive, time: f64, order: u32, motion: &DVector<f64>) -> DVector<f64> {
-        DVector::from_iterator(
-            self.at_rest.len(),
-            self.at_rest.iter().map(|&i| mechanics.sliders[i].direction.dot(motion) + drive.imposed_at(i, time, order)),
-        )
+    /// Poses the problem of the sliders at rest but for its bounds: their relative acceleration (`order` 2) or a higher derivative, that
+    /// of the motion at `derivative`, or the acceleration, with the imposed motion.
+    fn pose(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, order: u32, derivative: Option<usize>) {
+        let problem = &mut self.problem;
+        problem.resize(self.at_rest.len());
+        let motion = derivative.map_or(&self.acceleration, |at| &self.derivatives[at]);
+        for (a, &i) in self.at_rest.iter().enumerate() {
+            for (b, &j) in self.at_rest.iter().enumerate() {
+                problem.delassus[(a, b)] = self.delassus[(i, j)];
+            }
+            problem.push[a] = mechanics.sliders[i].direction.dot(motion) + drive.imposed_at(i, time, order);
+        }
     }
 
-    /// Sliders exactly at their limit with zero acceleration: `signs` holds them with the sign of their force.
-    fn settle_derivatives(
-        &mut self,
-        mechanics: &Mechanics,
-        drive: &Drive,
-        time: f64,
-        state: &[f64],
-        mut signs: Vec<(usize, f64)>,
-    ) {
-        let n = mechanics.n;
-        // x, v, a, jerk, …: each row is the derivative of the one before
-        let mut derivatives = vec![
-            DVector::from_column_slice(&state[..n]),
-            DVector::from_column_slice(&state[n..2 * n]),
-            self.acceleration.clone(),
-        ];
+    /// Displacement, velocity and acceleration into the list of derivatives.
+    fn begin_derivatives(&mut self, n: usize, state: &[f64]) {
+        self.derivatives[0].copy_from_slice(&state[..n]);
+        self.derivatives[1].copy_from_slice(&state[n..2 * n]);
+        self.derivatives[2].copy_from(&self.acceleration);
+    }
+
+    /// Sliders exactly at their limit with zero acceleration: `undecided` holds them with the sign of their force.
+    fn settle_derivatives(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64]) {
+        self.begin_derivatives(mechanics.n, state);
         for level in 1..LEVELS {
             self.at_rest.retain(|i| self.contacts[*i] == Contact::Stick);
-            let delassus = delassus(mechanics, &self.at_rest);
-            self.free_derivative(mechanics, drive, time, level, &derivatives);
-            let mut jerk = std::mem::replace(&mut self.jerk, DVector::zeros(0));
-            multiply(&mechanics.inverse_mass, &self.free, &mut jerk);
-            let push = self.push(mechanics, drive, time, level + 2, &jerk);
-            let infinite = f64::INFINITY;
-            let bound = |side: f64| {
-                DVector::from_iterator(
-                    self.at_rest.len(),
-                    self.at_rest.iter().map(|i| match signs.iter().find(|(s, _)| s == i) {
-                        // a force at its limit can only recede
-                        Some((_, sign)) if *sign == side => 0.0,
-                        _ => side * infinite,
-                    }),
-                )
-            };
-            let Some(rate) = complementarity::solve(&delassus, &push, &bound(-1.0), &bound(1.0)) else { break };
-            let relative = &push - &delassus * &rate;
-            let size = push.amax().max((&delassus * &rate).amax()).max(self.size(mechanics, drive, level + 2));
-            let mut left = Vec::new();
-            for (k, &i) in self.at_rest.iter().enumerate() {
-                if let Some(&(_, sign)) = signs.iter().find(|(s, _)| *s == i) {
-                    if relative[k] * sign > BALANCED * size && size > 0.0 {
-                        self.contacts[i] = Contact::slip(sign);
-                    } else if rate[k] * sign * delassus[(k, k)] > -BALANCED * size {
-                        left.push((i, sign));
-                    }
-                }
-                jerk -= &mechanics.inverse_mass * &mechanics.sliders[i].direction * rate[k];
+            self.free_derivative(mechanics, drive, time, level);
+            let next = level as usize + 2;
+            multiply(&mechanics.inverse_mass, &self.free, &mut self.derivatives[next]);
+            self.pose(mechanics, drive, time, level + 2, Some(next));
+            let least = self.size(mechanics, drive, level + 2);
+            let problem = &mut self.problem;
+            for (k, i) in self.at_rest.iter().enumerate() {
+                // a force at its limit can only recede
+                let sign = self.undecided.iter().find(|(s, _)| s == i).map_or(0.0, |(_, sign)| *sign);
+                problem.low[k] = if sign < 0.0 { 0.0 } else { f64::NEG_INFINITY };
+                problem.high[k] = if sign > 0.0 { 0.0 } else { f64::INFINITY };
             }
-            derivatives.push(jerk.clone());
-            self.jerk = jerk;
-            if left.is_empty() {
+            if !problem.solve() {
                 return;
             }
-            signs = left;
-        }
-        if self.jerk.len() != n {
-            self.jerk = DVector::zeros(n);
+            let size = problem.push.amax().max(problem.held.amax()).max(least);
+            let (contacts, at_rest) = (&mut self.contacts, &self.at_rest);
+            self.undecided.retain(|&(i, sign)| {
+                let Some(k) = at_rest.iter().position(|&rest| rest == i) else { return false };
+                if problem.relative[k] * sign > BALANCED * size && size > 0.0 {
+                    contacts[i] = Contact::slip(sign);
+                    return false;
+                }
+                problem.lambda[k] * sign * problem.delassus[(k, k)] > -BALANCED * size
+            });
+            for (k, &i) in self.at_rest.iter().enumerate() {
+                self.derivatives[next].axpy(-problem.lambda[k], &self.response.column(i), 1.0);
+            }
+            if self.undecided.is_empty() {
+                return;
+            }
         }
     }
 
     /// The `level`-th derivative of the forces other than those of rigid sliders at rest, into `self.free`.
-    fn free_derivative(
-        &mut self,
-        mechanics: &Mechanics,
-        drive: &Drive,
-        time: f64,
-        level: u32,
-        derivatives: &[DVector<f64>],
-    ) {
-        let l = level as usize;
+    fn free_derivative(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, level: u32) {
+        let (l, derivatives) = (level as usize, &self.derivatives);
         self.free.fill(0.0);
         drive.add_force(time, level, &mut self.free);
         subtract_product(&mechanics.damping, derivatives[l + 1].as_slice(), &mut self.free);
@@ -264,17 +304,13 @@ impl Decision {
                 at_limit.then_some((i, force.signum()))
             })
             .collect();
-        let mut derivatives = vec![
-            DVector::from_column_slice(&state[..n]),
-            DVector::from_column_slice(&state[n..2 * n]),
-            self.acceleration.clone(),
-        ];
+        self.begin_derivatives(n, state);
         for level in 1..=LEVELS {
             let order = level + 1;
             let size = self.size(mechanics, drive, order);
             undecided.retain(|&(i, sign)| {
-                let slope =
-                    mechanics.sliders[i].direction.dot(&derivatives[order as usize]) + drive.imposed_at(i, time, order);
+                let slope = mechanics.sliders[i].direction.dot(&self.derivatives[order as usize])
+                    + drive.imposed_at(i, time, order);
                 if slope.abs() <= BALANCED * size {
                     return true;
                 }
@@ -288,27 +324,22 @@ impl Decision {
             }
             // the next derivative with the contacts as they stand: rigid sliders at rest hold
             self.at_rest.retain(|i| self.contacts[*i] == Contact::Stick);
-            self.free_derivative(mechanics, drive, time, level, &derivatives);
-            let mut next = &mechanics.inverse_mass * &self.free;
+            self.free_derivative(mechanics, drive, time, level);
+            let next = level as usize + 2;
+            multiply(&mechanics.inverse_mass, &self.free, &mut self.derivatives[next]);
             if !self.at_rest.is_empty() {
-                let delassus = delassus(mechanics, &self.at_rest);
-                let push = self.push(mechanics, drive, time, level + 2, &next);
-                let infinite = DVector::from_element(self.at_rest.len(), f64::INFINITY);
-                let Some(rate) = complementarity::solve(&delassus, &push, &-&infinite, &infinite) else { return };
+                self.pose(mechanics, drive, time, level + 2, Some(next));
+                self.problem.low.fill(f64::NEG_INFINITY);
+                self.problem.high.fill(f64::INFINITY);
+                if !self.problem.solve() {
+                    return;
+                }
                 for (k, &i) in self.at_rest.iter().enumerate() {
-                    next -= &mechanics.inverse_mass * &mechanics.sliders[i].direction * rate[k];
+                    self.derivatives[next].axpy(-self.problem.lambda[k], &self.response.column(i), 1.0);
                 }
             }
-            derivatives.push(next);
         }
     }
-}
-
-fn delassus(mechanics: &Mechanics, sliders: &[usize]) -> DMatrix<f64> {
-    DMatrix::from_fn(sliders.len(), sliders.len(), |a, b| {
-        let (wa, wb) = (&mechanics.sliders[sliders[a]].direction, &mechanics.sliders[sliders[b]].direction);
-        wa.dot(&(&mechanics.inverse_mass * wb))
-    })
 }
 
 fn relative(slider: &super::mechanics::Slider, v: &[f64]) -> f64 {

@@ -2,9 +2,9 @@
 
 use super::decide::{AT_LIMIT, Decision, REST};
 use super::mechanics::Mechanics;
-use crate::law::Contact;
 use super::memory::Memory;
 use super::pattern::{Beginning, Driven, Pattern, Work};
+use crate::law::Contact;
 use crate::method::Breakdown;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
@@ -73,7 +73,6 @@ pub(crate) struct Flow {
     values: Vec<Complex64>,
     velocity: Vec<Complex64>,
     acceleration: Vec<Complex64>,
-    multipliers: Vec<Complex64>,
     signals: Vec<Complex64>,
     begins: Vec<Begin>,
     watched: Vec<usize>,
@@ -104,7 +103,6 @@ impl Flow {
             values: Vec::new(),
             velocity: Vec::new(),
             acceleration: Vec::new(),
-            multipliers: Vec::new(),
             signals: Vec::new(),
             begins: Vec::new(),
             watched: Vec::new(),
@@ -200,7 +198,7 @@ impl Flow {
 
     /// Changes the drive; patterns stay.
     pub fn set_drive(&mut self, drive: Drive) {
-        self.work = Work::new(&self.mechanics, drive.rates.len());
+        self.work.set_harmonics(drive.rates.len());
         let mechanics = &self.mechanics;
         let springs = mechanics.sliders.iter().filter_map(|slider| Some(slider.limit / slider.stiffness?.sqrt()));
         let loads = drive.energy_scale(&mechanics.mass, &mechanics.stiffness);
@@ -238,75 +236,52 @@ impl Flow {
 
     /// Forces of all sliders as signals.
     fn forces(&mut self, time: f64, shape: &Pattern, state: &[f64]) {
-        let segment = &mut self.segments[self.used];
-        let (n, basis) = (self.mechanics.n, &segment.driven.basis);
+        let Segment { force, displacement, contacts, driven, .. } = &mut self.segments[self.used];
+        let (n, basis) = (self.mechanics.n, &driven.basis);
         let (nb, constant, modes) = (basis.len(), basis.constant(), shape.lambda.len());
-        segment.force.fill(ZERO);
+        let turns = &self.work.turn;
+        force.fill(ZERO);
         for (i, slider) in self.mechanics.sliders.iter().enumerate() {
-            let row = &mut segment.force[i * nb..(i + 1) * nb];
-            match (segment.contacts[i], slider.stiffness) {
+            let row = &mut force[i * nb..(i + 1) * nb];
+            match (contacts[i], slider.stiffness) {
                 (Contact::Stick, None) => {}
                 (Contact::Stick, Some(kt)) => {
                     let state_index = 2 * n + slider.state.expect("a slider behind a spring has a state");
                     let stretch: f64 = (0..n).map(|k| slider.direction[k] * state[k]).sum();
                     row[constant].re = state[state_index] - kt * (stretch + self.drive.imposed_at(i, time, 0));
                     for k in 0..n {
-                        let w = kt * slider.direction[k];
-                        if w != 0.0 {
-                            for (f, x) in row.iter_mut().zip(&segment.displacement[k * nb..(k + 1) * nb]) {
-                                *f += x * w;
-                            }
-                        }
+                        add(row, &displacement[k * nb..(k + 1) * nb], kt * slider.direction[k]);
                     }
-                    for h in 0..self.drive.rates.len() {
-                        row[modes + h] += self.drive.imposed[h][i] * turn(self.drive.rates[h], time) * kt;
+                    for (h, turn) in turns.iter().enumerate() {
+                        row[modes + h] += self.drive.imposed[h][i] * turn * kt;
                     }
                 }
                 (slip, _) => row[constant].re = slip.sign() * slider.limit,
             }
         }
-        if shape.held.is_empty() {
-            return;
-        }
-        // λ = multiplier (F - C v - K x - other sliders) + inverse_delassus g''
-        for b in 0..nb {
-            for row in 0..n {
-                let mut push = ZERO;
-                if b >= modes && b < modes + self.drive.rates.len() {
-                    let h = b - modes;
-                    push += self.drive.forces[h][row] * turn(self.drive.rates[h], time);
-                } else if b == constant {
-                    push.re += self.drive.constant[row];
-                }
-                for k in 0..n {
-                    push -= self.velocity[k * nb + b] * self.mechanics.damping[(row, k)];
-                    push -= segment.displacement[k * nb + b] * self.mechanics.stiffness[(row, k)];
-                }
-                for (i, slider) in self.mechanics.sliders.iter().enumerate() {
-                    push -= segment.force[i * nb + b] * slider.direction[row];
-                }
-                self.values.resize(n.max(nb), ZERO);
-                self.values[row] = push;
+        // the held ones: λ = multiplier (F - C v - K x - other sliders) + inverse_delassus g''
+        for (s, &held) in shape.held.iter().enumerate() {
+            let (before, rest) = force.split_at_mut(held * nb);
+            let (row, after) = rest.split_at_mut(nb);
+            for (h, turn) in turns.iter().enumerate() {
+                row[modes + h] = driven.held[h][s] * turn;
             }
-            for s in 0..shape.held.len() {
-                // the rows of held sliders are filled last, so that they do not count among the others above
-                let mut force = ZERO;
-                for row in 0..n {
-                    force += self.values[row] * shape.multiplier[(s, row)];
-                }
-                if b >= modes && b < modes + self.drive.rates.len() {
-                    let h = b - modes;
-                    let rate = self.drive.rates[h];
-                    for (t, &j) in shape.held.iter().enumerate() {
-                        force -= self.drive.imposed[h][j]
-                            * turn(rate, time)
-                            * (rate * rate * shape.inverse_delassus[(s, t)]);
-                    }
-                }
-                self.multipliers.push(force);
+            row[constant].re = driven.held_constant[s];
+            for k in 0..n {
+                add(row, &self.velocity[k * nb..(k + 1) * nb], -shape.held_by_velocity[(s, k)]);
+                add(row, &displacement[k * nb..(k + 1) * nb], -shape.held_by_displacement[(s, k)]);
             }
-            for (force, &i) in self.multipliers.drain(..).zip(&shape.held) {
-                segment.force[i * nb + b] = force;
+            for (i, contact) in contacts.iter().enumerate() {
+                if shape.held.contains(&i) {
+                    continue; // the multipliers themselves
+                }
+                let (factor, elastic) = (-shape.held_by_sliders[(s, i)], *contact == Contact::Stick);
+                let other = if i < held { &before[i * nb..] } else { &after[(i - held - 1) * nb..] };
+                if elastic {
+                    add(row, &other[..nb], factor);
+                } else {
+                    row[constant].re += other[constant].re * factor;
+                }
             }
         }
     }
@@ -317,8 +292,8 @@ impl Flow {
         let driven = &segment.driven;
         let (n, nb) = (self.mechanics.n, driven.basis.len());
         let (constant, modes) = (driven.basis.constant(), shape.lambda.len());
-        self.values.resize(n.max(nb), ZERO);
-        driven.basis.evaluate(0.0, &mut self.values[..nb]);
+        self.values.resize(nb, ZERO);
+        driven.basis.evaluate(0.0, &mut self.values);
         self.signals.clear();
         self.begins.clear();
         self.watched.clear();
@@ -328,7 +303,7 @@ impl Flow {
                     continue; // its force is constant, whatever rounding says
                 }
                 let force = &segment.force[i * nb..(i + 1) * nb];
-                let now = real_dot(force, &self.values[..nb]);
+                let now = real_dot(force, &self.values);
                 for side in [1.0, -1.0] {
                     let at = self.signals.len();
                     self.signals.extend(force.iter().map(|f| f * -side));
@@ -341,19 +316,14 @@ impl Flow {
                 self.signals.resize(at + nb, ZERO);
                 let signal = &mut self.signals[at..];
                 for k in 0..n {
-                    let w = sign * slider.direction[k];
-                    if w != 0.0 {
-                        for (s, v) in signal.iter_mut().zip(&self.velocity[k * nb..(k + 1) * nb]) {
-                            *s += v * w;
-                        }
-                    }
+                    add(signal, &self.velocity[k * nb..(k + 1) * nb], sign * slider.direction[k]);
                 }
-                for h in 0..self.drive.rates.len() {
+                for (h, turn) in self.work.turn.iter().enumerate() {
                     let rate = self.drive.rates[h];
-                    let velocity = self.drive.imposed[h][i] * turn(rate, segment.start) * Complex64::new(0.0, rate);
+                    let velocity = self.drive.imposed[h][i] * turn * Complex64::new(0.0, rate);
                     signal[modes + h] += velocity * sign;
                 }
-                let now = real_dot(signal, &self.values[..nb]);
+                let now = real_dot(signal, &self.values);
                 self.begins.push(begin(now, REST * velocity_scale));
                 self.watched.push(i);
             }
@@ -373,9 +343,9 @@ impl Flow {
         self.used += 1;
         let basis = &segment.driven.basis;
         let (n, nb) = (self.mechanics.n, basis.len());
-        self.values.resize(n.max(nb), ZERO);
-        basis.evaluate(length, &mut self.values[..nb]);
-        let values = &self.values[..nb];
+        self.values.resize(nb, ZERO);
+        basis.evaluate(length, &mut self.values);
+        let values = &self.values[..];
         for row in 0..n {
             let range = row * nb..(row + 1) * nb;
             state[row] = real_dot(&segment.displacement[range.clone()], values);
@@ -447,9 +417,14 @@ impl Flow {
     }
 }
 
-fn turn(rate: f64, time: f64) -> Complex64 {
-    let (sin, cos) = (rate * time).sin_cos();
-    Complex64::new(cos, sin)
+/// Adds a multiple of a signal.
+#[inline]
+fn add(sum: &mut [Complex64], signal: &[Complex64], factor: f64) {
+    if factor != 0.0 {
+        for (s, x) in sum.iter_mut().zip(signal) {
+            *s += x * factor;
+        }
+    }
 }
 
 fn begin(value: f64, zero: f64) -> Begin {

@@ -77,7 +77,9 @@ impl Mechanics {
             .try_inverse()
             .filter(|inverse| positive && inverse.iter().all(|x| x.is_finite()))
             .ok_or(MethodError::NotPositive { method: super::NAME, matrix: "mass" })?;
-        let fastest = (0..n).map(|i| (system.structure().stiffness()[(i, i)] / system.structure().mass()[(i, i)]).sqrt()).fold(0.0, f64::max);
+        let fastest = (0..n)
+            .map(|i| (system.structure().stiffness()[(i, i)] / system.structure().mass()[(i, i)]).sqrt())
+            .fold(0.0, f64::max);
         Ok(Mechanics {
             n,
             fastest,

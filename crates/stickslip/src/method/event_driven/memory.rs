@@ -5,8 +5,8 @@
 //! but time depends on what was kept.
 
 use super::mechanics::Mechanics;
-use crate::law::Contact;
 use super::pattern::{Driven, Pattern};
+use crate::law::Contact;
 use crate::method::drive::Drive;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -31,11 +31,13 @@ pub(super) struct Memory {
     bytes: usize,
     limit: usize,
     uses: u64,
+    /// The pattern that is asked for.
+    stuck: Vec<bool>,
 }
 
 impl Default for Memory {
     fn default() -> Self {
-        Memory { slots: BTreeMap::new(), bytes: 0, limit: LIMIT, uses: 0 }
+        Memory { slots: BTreeMap::new(), bytes: 0, limit: LIMIT, uses: 0, stuck: Vec::new() }
     }
 }
 
@@ -47,12 +49,14 @@ impl Memory {
         drive: &Drive,
         contacts: &[Contact],
     ) -> Result<(Arc<Pattern>, Arc<Driven>), Defective> {
-        let stuck: Vec<bool> = contacts.iter().map(|contact| *contact == Contact::Stick).collect();
+        self.stuck.clear();
+        self.stuck.extend(contacts.iter().map(|contact| *contact == Contact::Stick));
         self.uses += 1;
-        if let Some(Slot { pattern, driven: Some(driven), used, .. }) = self.slots.get_mut(&stuck) {
+        if let Some(Slot { pattern, driven: Some(driven), used, .. }) = self.slots.get_mut(&self.stuck) {
             *used = self.uses;
             return Ok((pattern.clone(), driven.clone()));
         }
+        let stuck = self.stuck.clone();
         let pattern = match self.slots.remove(&stuck) {
             Some(slot) => {
                 self.bytes -= slot.bytes;
@@ -95,8 +99,9 @@ impl Memory {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Jenkins, Law};
+    use crate::law::Jenkins;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
+    use std::sync::Arc;
 
     /// A chain of masses, each with its slider.
     fn chain(n: usize) -> (Mechanics, Drive) {

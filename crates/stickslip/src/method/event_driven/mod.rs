@@ -28,6 +28,7 @@ use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, Solver};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
 use nalgebra::DMatrix;
+use std::sync::Arc;
 
 pub(crate) const NAME: &str = "event-driven";
 
@@ -54,7 +55,7 @@ const ENERGY_GAP: f64 = 1e-8;
 /// # Example
 /// ```
 /// use stickslip::method::{Method, event_driven::EventDriven};
-/// let system = stickslip::model::templates::find("blade-couple").unwrap().model().assemble().unwrap();
+/// let system = stickslip::model::example::blade_couple().assemble().unwrap();
 /// let orbit = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25, None).unwrap();
 /// assert!((orbit.place("blade1").unwrap().amplitude() - 0.0489246).abs() < 1e-6);
 /// assert!(orbit.evidence.energy_gap < 1e-9);
@@ -74,6 +75,8 @@ impl Method for EventDriven {
 /// Finds orbits by exact motion, with either search.
 pub(crate) struct Exact<'a> {
     system: &'a System,
+    /// The same, for the orbits to keep.
+    shared: Arc<System>,
     /// The method that it works for.
     name: &'static str,
     search: Search,
@@ -99,7 +102,16 @@ impl<'a> Exact<'a> {
         let mechanics = Mechanics::new(system)?;
         let weights = vec![1.0; mechanics.states()];
         let flow = Flow::new(mechanics, Drive::default());
-        Ok(Exact { system, name, search, flow, weights, duration: 0.0, contracts: system.contracts() })
+        Ok(Exact {
+            system,
+            shared: Arc::new(system.clone()),
+            name,
+            search,
+            flow,
+            weights,
+            duration: 0.0,
+            contracts: system.contracts(),
+        })
     }
 
     /// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia.
@@ -142,7 +154,7 @@ impl Solver for Exact<'_> {
         let aim = Aim { method: name, omega, residual: CLOSED, sign, rest: NEAR_REST * self.flow.energy_scale };
         let closed = search.find(self, start, |exact| exact.first_state(omega), aim)?;
         // the last run of the iteration was that of the closed state: its segments are the orbit
-        let mut orbit = path::orbit(self.system, self.contracts, &self.flow, omega, symmetry, closed)
+        let mut orbit = path::orbit(&self.shared, self.contracts, &self.flow, omega, symmetry, closed)
             .map_err(|cause| OrbitError::Breakdown { method: name, omega, cause })?;
         orbit.method = name;
         // a motion that has settled but for an estimated rest is out of balance by that rest

@@ -10,7 +10,7 @@ use crate::model::System;
 use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::signal::{Basis, Begin, FirstZero, Scratch, integral_of_product, real_dot};
+use stickslip_numerics::signal::{Basis, Begin, FirstZero, FourierIntegrals, Products, Scratch, real_dot, size_of};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -20,7 +20,7 @@ const NO_WORK: f64 = 1e-6;
 /// The closed-form segments of one return, with all that is needed to evaluate them.
 #[derive(Debug, Clone)]
 pub(crate) struct ExactPath {
-    system: System,
+    system: Arc<System>,
     pieces: Vec<Piece>,
     symmetry: Symmetry,
     period: f64,
@@ -31,23 +31,21 @@ pub(crate) struct ExactPath {
 #[derive(Debug, Clone)]
 struct Piece {
     segment: Segment,
-    basis: Basis,
-    modes: usize,
-    contacts: Vec<Contact>,
     velocity: Vec<Complex64>,
-    acceleration: Vec<Complex64>,
+    /// The basis functions at its end.
+    at_end: Vec<Complex64>,
 }
 
 /// Makes the orbit of the flow's last run.
 pub(super) fn orbit(
-    system: &System,
+    system: &Arc<System>,
     contracts: bool,
     flow: &Flow,
     omega: f64,
     symmetry: Symmetry,
     closed: Closed,
 ) -> Result<Orbit, Breakdown> {
-    let path = ExactPath::new(system, flow, symmetry, std::f64::consts::TAU / omega);
+    let path = ExactPath::new(system.clone(), flow, symmetry, std::f64::consts::TAU / omega);
     let places = path.places(omega)?;
     let joints = path.joints(flow)?;
     let energy = path.energy(flow, &joints);
@@ -84,34 +82,19 @@ pub(super) fn orbit(
 
 impl ExactPath {
     /// The segments of the flow's last run; `period` is the time after which they repeat (or, by symmetry, repeat mirrored twice).
-    pub fn new(system: &System, flow: &Flow, symmetry: Symmetry, period: f64) -> Self {
-        let n = system.dofs();
+    pub fn new(system: Arc<System>, flow: &Flow, symmetry: Symmetry, period: f64) -> Self {
         let pieces = flow
             .segments()
             .iter()
             .map(|segment| {
                 let basis = segment.basis();
-                let nb = basis.len();
-                let derivative = |of: &[Complex64]| {
-                    let mut out = vec![ZERO; n * nb];
-                    for row in 0..n {
-                        basis.differentiate(&of[row * nb..(row + 1) * nb], &mut out[row * nb..(row + 1) * nb]);
-                    }
-                    out
-                };
-                let velocity = derivative(&segment.displacement);
-                Piece {
-                    acceleration: derivative(&velocity),
-                    velocity,
-                    segment: segment.clone(),
-                    basis: basis.clone(),
-                    modes: segment.driven.modes,
-                    contacts: segment.contacts.clone(),
-                }
+                let mut at_end = vec![ZERO; basis.len()];
+                basis.evaluate(segment.length, &mut at_end);
+                Piece { velocity: derivative(basis, &segment.displacement), at_end, segment: segment.clone() }
             })
             .collect();
         let (rates, omega) = (flow.drive.rates.clone(), flow.drive.omega);
-        ExactPath { system: system.clone(), pieces, symmetry, period, rates, omega }
+        ExactPath { system, pieces, symmetry, period, rates, omega }
     }
 
     /// How often the segments are run through in a period.
@@ -121,23 +104,32 @@ impl ExactPath {
 
     fn places(&self, omega: f64) -> Result<Vec<PlaceMotion>, Breakdown> {
         let n = self.system.dofs();
-        let mut scratch = Scratch::default();
-        let mut values = Vec::new();
+        let mut memory = Memory::default();
+        let at = |piece: &Piece, nu| FourierIntegrals::new(piece.basis(), &piece.at_end, nu, piece.segment.length);
+        // of the drive frequency, what it has turned by the start of the piece, and of the mean where there is one
+        let integrals: Vec<_> = self
+            .pieces
+            .iter()
+            .map(|piece| {
+                let turn = Complex64::new(0.0, -omega * piece.segment.start).exp();
+                (at(piece, omega), turn, (self.symmetry == Symmetry::FullPeriod).then(|| at(piece, 0.0)))
+            })
+            .collect();
         (0..n)
             .map(|i| {
                 let (mut maximum, mut minimum) = (f64::NEG_INFINITY, f64::INFINITY);
-                let (mut integral, mut fourier) = (0.0, ZERO);
-                for piece in &self.pieces {
-                    let nb = piece.basis.len();
+                let (mut integral, mut first_harmonic) = (0.0, ZERO);
+                for (piece, (fourier, turn, mean)) in self.pieces.iter().zip(&integrals) {
+                    let basis = piece.basis();
+                    let nb = basis.len();
                     let (x, v) =
                         (&piece.segment.displacement[i * nb..(i + 1) * nb], &piece.velocity[i * nb..(i + 1) * nb]);
-                    let (low, high) = piece.extremes(x, v, &mut scratch, &mut values)?;
+                    let (low, high) = piece.extremes(x, v, &mut memory)?;
                     (maximum, minimum) = (maximum.max(high), minimum.min(low));
-                    if self.symmetry == Symmetry::FullPeriod {
-                        integral += piece.basis.integral(x, piece.segment.length);
+                    if let Some(mean) = mean {
+                        integral += mean.integral(basis, x).re;
                     }
-                    let turn = Complex64::new(0.0, -omega * piece.segment.start).exp();
-                    fourier += piece.basis.fourier_integral(x, omega, piece.segment.length) * turn;
+                    first_harmonic += fourier.integral(basis, x) * turn;
                 }
                 if self.symmetry == Symmetry::HalfPeriod {
                     maximum = maximum.max(-minimum);
@@ -148,7 +140,7 @@ impl ExactPath {
                     maximum,
                     minimum,
                     mean: integral / self.period,
-                    first_harmonic: fourier * (2.0 * self.times() / self.period),
+                    first_harmonic: first_harmonic * (2.0 * self.times() / self.period),
                 })
             })
             .collect()
@@ -156,8 +148,8 @@ impl ExactPath {
 
     fn joints(&self, flow: &Flow) -> Result<Vec<JointMotion>, Breakdown> {
         let n = self.system.dofs();
-        let mut scratch = Scratch::default();
-        let mut values = Vec::new();
+        let mut memory = Memory::default();
+        let (mut u, mut velocity) = (Vec::new(), Vec::new());
         self.system
             .joints()
             .iter()
@@ -169,8 +161,9 @@ impl ExactPath {
                 let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
                 let mut before: Option<&Piece> = None;
                 for piece in &self.pieces {
-                    let nb = piece.basis.len();
-                    let mut u = vec![ZERO; nb];
+                    let nb = piece.basis().len();
+                    u.clear();
+                    u.resize(nb, ZERO);
                     for i in 0..n {
                         let w = joint.axes()[0].dense(n)[i];
                         if w != 0.0 {
@@ -179,30 +172,31 @@ impl ExactPath {
                         }
                     }
                     self.add_imposed(piece, joint.axes()[0].imposed(), &mut u);
-                    let mut velocity = vec![ZERO; nb];
-                    piece.basis.differentiate(&u, &mut velocity);
-                    values.resize(nb, ZERO);
-                    piece.basis.evaluate(piece.segment.length, &mut values);
-                    let at_end = real_dot(&u, &values);
-                    piece.basis.evaluate(0.0, &mut values);
-                    let travel = at_end - real_dot(&u, &values);
-                    let (least, most) = piece.extremes(&u, &velocity, &mut scratch, &mut values)?;
+                    velocity.resize(nb, ZERO);
+                    piece.basis().differentiate(&u, &mut velocity);
+                    let travel = real_dot(&u, &piece.at_end) - piece.basis().beginning(&u);
+                    let (least, most) = piece.extremes(&u, &velocity, &mut memory)?;
                     (low, high) = (low.min(least), high.max(most));
                     for &s in &sliders {
-                        dissipation += piece.contacts[s].sign() * flow.mechanics.sliders[s].limit * travel;
+                        dissipation += piece.segment.contacts[s].sign() * flow.mechanics.sliders[s].limit * travel;
                     }
-                    if sliders.iter().any(|&s| piece.contacts[s] != Contact::Stick) {
+                    if sliders.iter().any(|&s| piece.segment.contacts[s] != Contact::Stick) {
                         slipping += piece.segment.length;
                     }
                     if let Some(before) = before {
-                        switches += sliders.iter().filter(|&&s| before.contacts[s] != piece.contacts[s]).count();
+                        switches += sliders
+                            .iter()
+                            .filter(|&&s| before.segment.contacts[s] != piece.segment.contacts[s])
+                            .count();
                     }
                     before = Some(piece);
                 }
                 if let (Some(first), Some(last)) = (self.pieces.first(), self.pieces.last()) {
                     let sign = if self.symmetry == Symmetry::HalfPeriod { -1.0 } else { 1.0 };
-                    switches +=
-                        sliders.iter().filter(|&&s| last.contacts[s].sign() != sign * first.contacts[s].sign()).count();
+                    switches += sliders
+                        .iter()
+                        .filter(|&&s| last.segment.contacts[s].sign() != sign * first.segment.contacts[s].sign())
+                        .count();
                 }
                 if self.symmetry == Symmetry::HalfPeriod {
                     high = high.max(-low);
@@ -225,14 +219,14 @@ impl ExactPath {
         let omega = self.omega;
         for &(harmonic, amplitude) in imposed {
             if harmonic == 0 {
-                signal[piece.basis.constant()].re += amplitude.re;
+                signal[piece.basis().constant()].re += amplitude.re;
                 continue;
             }
             let rate = f64::from(harmonic) * omega;
             let Some(h) = self.rates.iter().position(|r| (r - rate).abs() < 0.5 * omega) else {
                 continue; // without a drive nothing moves the place
             };
-            signal[piece.modes + h] += amplitude * Complex64::new(0.0, rate * piece.segment.start).exp();
+            signal[piece.segment.driven.modes + h] += amplitude * Complex64::new(0.0, rate * piece.segment.start).exp();
         }
     }
 
@@ -240,14 +234,15 @@ impl ExactPath {
     fn energy(&self, flow: &Flow, joints: &[JointMotion]) -> Energy {
         let n = self.system.dofs();
         let (mut work, mut viscous) = (0.0, 0.0);
+        let mut force = Vec::new();
         for piece in &self.pieces {
-            let (nb, length) = (piece.basis.len(), piece.segment.length);
-            let product =
-                |a: &[Complex64], b: &[Complex64]| integral_of_product((&piece.basis, a), (&piece.basis, b), length);
+            let basis = piece.basis();
+            let nb = basis.len();
+            let products = Products::new(basis, &piece.at_end, piece.segment.length);
+            let product = |a: &[Complex64], b: &[Complex64]| products.integral(basis, a, b);
             let velocity = |i: usize| &piece.velocity[i * nb..(i + 1) * nb];
             for i in 0..n {
-                let force = self.load(piece, &flow.drive, i);
-                if force.iter().any(|f| *f != ZERO) {
+                if self.load(piece, &flow.drive, i, &mut force) {
                     work += product(&force, velocity(i));
                 }
                 for k in 0..=i {
@@ -283,22 +278,27 @@ impl ExactPath {
         }
     }
 
-    /// Load on degree of freedom `i` as a signal.
-    fn load(&self, piece: &Piece, drive: &Drive, i: usize) -> Vec<Complex64> {
-        let mut force = vec![ZERO; piece.basis.len()];
-        force[piece.basis.constant()].re = drive.constant[i];
-        for (h, rate) in drive.rates.iter().enumerate() {
-            force[piece.modes + h] = drive.forces[h][i] * Complex64::new(0.0, rate * piece.segment.start).exp();
+    /// Load on degree of freedom `i` as a signal, into `force`; whether there is any.
+    fn load(&self, piece: &Piece, drive: &Drive, i: usize, force: &mut Vec<Complex64>) -> bool {
+        if drive.constant[i] == 0.0 && drive.forces.iter().all(|f| f[i] == ZERO) {
+            return false;
         }
-        force
+        force.clear();
+        force.resize(piece.basis().len(), ZERO);
+        force[piece.basis().constant()].re = drive.constant[i];
+        for (h, rate) in drive.rates.iter().enumerate() {
+            force[piece.segment.driven.modes + h] =
+                drive.forces[h][i] * Complex64::new(0.0, rate * piece.segment.start).exp();
+        }
+        true
     }
 
     /// Displacement and velocity of a moved place as signals.
     fn moved_motion(&self, piece: &Piece, m: usize) -> (Vec<Complex64>, Vec<Complex64>) {
-        let mut motion = vec![ZERO; piece.basis.len()];
+        let mut motion = vec![ZERO; piece.basis().len()];
         self.add_imposed(piece, &self.system.moved()[m].motion, &mut motion);
         let mut speed = motion.clone();
-        piece.basis.differentiate(&motion, &mut speed);
+        piece.basis().differentiate(&motion, &mut speed);
         (motion, speed)
     }
 
@@ -308,7 +308,7 @@ impl ExactPath {
     }
 
     fn reaction_of(&self, piece: &Piece, m: usize, owners: &[usize]) -> Vec<Complex64> {
-        let (n, nb, place) = (self.system.dofs(), piece.basis.len(), &self.system.moved()[m]);
+        let (n, nb, place) = (self.system.dofs(), piece.basis().len(), &self.system.moved()[m]);
         let mut force = vec![ZERO; nb];
         let add = |force: &mut [Complex64], signal: &[Complex64], factor: f64| {
             if factor != 0.0 {
@@ -321,7 +321,7 @@ impl ExactPath {
             add(&mut force, &speed, *c);
             if other == m {
                 let mut acceleration = vec![ZERO; nb];
-                piece.basis.differentiate(&speed, &mut acceleration);
+                piece.basis().differentiate(&speed, &mut acceleration);
                 add(&mut force, &acceleration, place.mass);
             }
         }
@@ -339,8 +339,8 @@ impl ExactPath {
     fn exchanged(&self, drive: &Drive) -> f64 {
         let fastest = |i: usize| {
             let sizes = self.pieces.iter().map(|piece| {
-                let nb = piece.basis.len();
-                piece.velocity[i * nb..(i + 1) * nb].iter().map(|c| c.norm()).sum::<f64>()
+                let nb = piece.basis().len();
+                piece.velocity[i * nb..(i + 1) * nb].iter().map(size_of).sum::<f64>()
             });
             sizes.fold(0.0, f64::max)
         };
@@ -352,7 +352,8 @@ impl ExactPath {
             .iter()
             .map(|joint| {
                 let limit: f64 = joint.law().sliders().unwrap_or_default().iter().map(|b| b.limit).sum();
-                limit * joint.axes()[0].imposed().iter().map(|(h, g)| f64::from(*h) * g.norm()).sum::<f64>() / self.period
+                limit * joint.axes()[0].imposed().iter().map(|(h, g)| f64::from(*h) * g.norm()).sum::<f64>()
+                    / self.period
             })
             .sum();
         self.period * (loads + joints)
@@ -366,7 +367,29 @@ impl ExactPath {
     }
 }
 
+/// Memory of [`Piece::extremes`], kept between calls.
+#[derive(Debug, Default)]
+struct Memory {
+    scratch: Scratch,
+    values: Vec<Complex64>,
+    slope: Vec<Complex64>,
+    shifted: Vec<Complex64>,
+}
+
+/// Derivatives of signals that follow each other.
+fn derivative(basis: &Basis, signals: &[Complex64]) -> Vec<Complex64> {
+    let mut out = vec![ZERO; signals.len()];
+    for (signal, out) in signals.chunks_exact(basis.len()).zip(out.chunks_exact_mut(basis.len())) {
+        basis.differentiate(signal, out);
+    }
+    out
+}
+
 impl Piece {
+    fn basis(&self) -> &Basis {
+        self.segment.basis()
+    }
+
     /// Least and largest value of `signal`, whose derivative is `slope`, over the piece.
     /// # Errors
     /// [`Breakdown::TooFast`] if it turns too often.
@@ -374,39 +397,36 @@ impl Piece {
         &self,
         signal: &[Complex64],
         slope: &[Complex64],
-        scratch: &mut Scratch,
-        values: &mut Vec<Complex64>,
+        memory: &mut Memory,
     ) -> Result<(f64, f64), Breakdown> {
-        let nb = self.basis.len();
+        let basis = self.basis();
+        let nb = basis.len();
+        let Memory { scratch, values, slope: turning, shifted } = memory;
         values.resize(nb, ZERO);
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        let mut visit = |time: f64, values: &mut [Complex64]| {
-            self.basis.evaluate(time, values);
-            let value = real_dot(signal, values);
-            (low, high) = (low.min(value), high.max(value));
-            real_dot(slope, values)
-        };
+        shifted.resize(nb, ZERO);
+        basis.evaluate(0.0, values);
+        let (first, last) = (real_dot(signal, values), real_dot(signal, &self.at_end));
+        let (mut low, mut high) = (first.min(last), first.max(last));
         let mut time = 0.0;
-        let mut now = visit(0.0, values);
-        visit(self.segment.length, values);
+        let mut now = real_dot(slope, values);
         // from turning point to turning point: shift the slope to the present time and look for its next zero
         // what is near the rounding of the signal moves no extreme, but turns millions of times where a mode is very fast
-        let rounding = NEGLIGIBLE * signal.iter().map(|c| c.norm()).sum::<f64>();
-        let mut slope = slope.to_vec();
-        for ((slope, c), exponent) in slope.iter_mut().zip(signal).zip(&self.basis.exponents) {
-            if c.norm() <= rounding && exponent.re <= 0.0 {
+        let rounding = NEGLIGIBLE * signal.iter().map(size_of).sum::<f64>();
+        turning.clear();
+        turning.extend_from_slice(slope);
+        for ((slope, c), exponent) in turning.iter_mut().zip(signal).zip(&basis.exponents) {
+            if size_of(c) <= rounding && exponent.re <= 0.0 {
                 *slope = ZERO;
             }
         }
-        let size: f64 = slope.iter().map(|c| c.norm()).sum();
+        let size: f64 = turning.iter().map(size_of).sum();
         let too_fast = Breakdown::TooFast { time: self.segment.start };
         let mut turns = 0;
         let mut sign = if now < 0.0 { -1.0 } else { 1.0 };
-        let mut shifted = vec![ZERO; nb];
         while size > 0.0 && time < self.segment.length {
-            self.basis.shift(&slope, time, sign, &mut shifted);
+            basis.shift(turning, time, values, sign, shifted);
             let begin = if now.abs() > FLAT * size { Begin::Positive } else { Begin::Zero };
-            match self.basis.first_zero(&shifted, &[begin], self.segment.length - time, scratch) {
+            match basis.first_zero(shifted, &[begin], self.segment.length - time, scratch) {
                 FirstZero::At { time: after, .. } => {
                     if after == 0.0 && begin == Begin::Positive {
                         break;
@@ -416,7 +436,9 @@ impl Piece {
                         return Err(too_fast);
                     }
                     time += after;
-                    visit(time, values);
+                    basis.evaluate(time, values);
+                    let value = real_dot(signal, values);
+                    (low, high) = (low.min(value), high.max(value));
                     now = 0.0;
                     sign = -sign;
                 }
@@ -444,12 +466,13 @@ impl Path for ExactPath {
             _ => (time, 1.0),
         };
         let (piece, since) = self.piece(time);
-        let (n, nb) = (self.system.dofs(), piece.basis.len());
+        let (n, nb) = (self.system.dofs(), piece.basis().len());
         let mut values = vec![ZERO; nb];
-        piece.basis.evaluate(since, &mut values);
+        piece.basis().evaluate(since, &mut values);
         let row = |coefficients: &[Complex64], i: usize| sign * real_dot(&coefficients[i * nb..(i + 1) * nb], &values);
         let rows = |coefficients: &[Complex64]| (0..n).map(|i| row(coefficients, i)).collect::<Vec<f64>>();
         let (displacement, velocity) = (rows(&piece.segment.displacement), rows(&piece.velocity));
+        let acceleration = rows(&derivative(piece.basis(), &piece.velocity));
         let owners = slider_owners(&self.system);
         let joints = self
             .system
@@ -460,11 +483,11 @@ impl Path for ExactPath {
                 let mut imposed = vec![ZERO; nb];
                 self.add_imposed(piece, joint.axes()[0].imposed(), &mut imposed);
                 let mut speed = vec![ZERO; nb];
-                piece.basis.differentiate(&imposed, &mut speed);
+                piece.basis().differentiate(&imposed, &mut speed);
                 let along = |v: &[f64]| joint.axes()[0].along(v);
                 let mine = || owners.iter().enumerate().filter(|(_, owner)| **owner == j).map(|(s, _)| s);
                 let contact =
-                    mine().map(|s| piece.contacts[s]).find(|c| *c != Contact::Stick).unwrap_or(Contact::Stick);
+                    mine().map(|s| piece.segment.contacts[s]).find(|c| *c != Contact::Stick).unwrap_or(Contact::Stick);
                 let joint_velocity = along(&velocity) + sign * real_dot(&speed, &values);
                 let contact = match contact {
                     Contact::Stick if mine().next().is_none() => Contact::slip(joint_velocity),
@@ -483,7 +506,7 @@ impl Path for ExactPath {
                 (sign * real_dot(&motion, &values), sign * real_dot(&reaction, &values))
             })
             .collect();
-        Sample { acceleration: rows(&piece.acceleration), displacement, velocity, joints, moved }
+        Sample { acceleration, displacement, velocity, joints, moved }
     }
 
     fn switch_times(&self) -> Vec<f64> {
@@ -491,7 +514,7 @@ impl Path for ExactPath {
         // a switch may also fall on the instant at which the return is cut
         let sign = if self.symmetry == Symmetry::HalfPeriod { -1.0 } else { 1.0 };
         let at_cut = self.pieces.first().zip(self.pieces.last()).is_some_and(|(first, last)| {
-            first.contacts.iter().zip(&last.contacts).any(|(f, l)| l.sign() != sign * f.sign())
+            first.segment.contacts.iter().zip(&last.segment.contacts).any(|(f, l)| l.sign() != sign * f.sign())
         });
         let first: Vec<f64> = at_cut.then_some(0.0).into_iter().chain(inner).collect();
         match self.symmetry {

@@ -24,6 +24,8 @@ const STILL: f64 = 1e-13;
 /// A harmonic this close to a mode (relative) is integrated as a resonant pair; nearer than this the plain particular solution
 /// would lose more than the last five digits.
 const RESONANT: f64 = 1e-5;
+/// States from which packing the factors of a product for the cache costs less than it saves.
+const LARGE: usize = 24;
 
 /// The closed-form motion of one pattern.
 #[derive(Debug, Clone)]
@@ -42,6 +44,12 @@ pub(crate) struct Pattern {
     pub shape: DMatrix<Complex64>,
     /// Modal coordinates of displacements and velocities, modes × 2n.
     coordinate: DMatrix<Complex64>,
+    /// Modal coordinates of a state, less those at which the forces that come with it would hold them, modes × states.
+    start: DMatrix<Complex64>,
+    /// Besides the modes a state moves on by `place + drift τ + fall τ²/2`, n × states each.
+    place: DMatrix<f64>,
+    drift: DMatrix<f64>,
+    fall: DMatrix<f64>,
     /// Modal force of a unit force, modes × n; a constant one moves the coordinate by `-1/λ` of it.
     input: DMatrix<Complex64>,
     /// Modes exactly at λ = 0: they drift under a constant force.
@@ -50,16 +58,17 @@ pub(crate) struct Pattern {
     free: DMatrix<f64>,
     free_coordinate: DMatrix<f64>,
     free_input: DMatrix<f64>,
-    /// Constant force on the structure from the state, n × states.
-    force_from_state: DMatrix<f64>,
-    /// S, n × held; S Wₛᵀ, n × n.
+    /// S, n × held.
     hold: DMatrix<f64>,
-    hold_projection: DMatrix<f64>,
     /// Stiffness with the springs of stuck sliders, n × n.
     pub stiffness: DMatrix<f64>,
-    /// λ = multiplier (forces) + inverse_delassus g'': held × n, held × held.
-    pub multiplier: DMatrix<f64>,
-    pub inverse_delassus: DMatrix<f64>,
+    /// Forces of the held sliders: `multiplier (F - C v - K x - other sliders) + inverse_delassus g''`. Held × n, held × held.
+    multiplier: DMatrix<f64>,
+    inverse_delassus: DMatrix<f64>,
+    /// `multiplier` times C, K, and the directions of the sliders: held × n, held × n, held × sliders.
+    pub held_by_velocity: DMatrix<f64>,
+    pub held_by_displacement: DMatrix<f64>,
+    pub held_by_sliders: DMatrix<f64>,
 }
 
 /// Where a stretch of motion begins.
@@ -83,6 +92,11 @@ pub(crate) struct Driven {
     pub modes: usize,
     /// Steady complex displacement per harmonic, n each.
     steady: Vec<DVector<Complex64>>,
+    /// Modal coordinates of the real steady motion, parts that turn with `e^{jhΩt}` and with `e^{-jhΩt}`: harmonic after harmonic.
+    steady_start: Vec<(Complex64, Complex64)>,
+    /// Forces of the held sliders that the drive causes by itself: complex per harmonic, and constant.
+    pub held: Vec<DVector<Complex64>>,
+    pub held_constant: DVector<f64>,
     /// Resonant pairs: mode, harmonic, modal force amplitude.
     resonant: Vec<(usize, usize, Complex64)>,
     /// Steady complex coordinate of the free directions per harmonic.
@@ -93,7 +107,10 @@ impl Driven {
     /// Memory that it takes, bytes.
     pub fn bytes(&self) -> usize {
         let steady = self.steady.iter().chain(&self.free_steady).map(|x| x.len()).sum::<usize>();
-        size_of::<Self>() + 16 * (steady + 3 * self.basis.len()) + 32 * self.resonant.len()
+        let held = self.held.iter().map(|x| x.len()).sum::<usize>() + self.held_constant.len();
+        size_of::<Self>()
+            + 16 * (steady + held + 3 * self.basis.len())
+            + 32 * (self.resonant.len() + self.steady_start.len())
     }
 }
 
@@ -160,29 +177,65 @@ impl Pattern {
             lambda[k] = ZERO;
         }
         let input = &modes.from_velocity * complex(&project);
+        let free: DMatrix<f64> = &basis * &modes.free;
+        let free_coordinate = modes.free.transpose() * &coordinates;
+        let free_input = modes.free.transpose() * &project;
+        let shape = complex(&basis) * &modes.shape;
         let mut coordinate = DMatrix::from_element(count, 2 * n, ZERO);
         coordinate.columns_mut(0, n).copy_from(&(&modes.from_displacement * complex(&coordinates)));
         coordinate.columns_mut(n, n).copy_from(&(&modes.from_velocity * complex(&coordinates)));
+        // what a state does by itself, with the constant forces that it brings
+        let pushed = &input * complex(&force_from_state);
+        let mut start = DMatrix::from_element(count, states, ZERO);
+        start.columns_mut(0, 2 * n).copy_from(&coordinate);
+        let mut fixed = DMatrix::from_element(count, states, ZERO);
+        let mut drifts = DMatrix::from_element(count, states, ZERO);
+        for k in 0..count {
+            if lambda[k] == ZERO {
+                drifts.set_row(k, &pushed.row(k));
+            } else {
+                fixed.set_row(k, &(pushed.row(k) / -lambda[k]));
+            }
+        }
+        start -= &fixed;
+        let real = |m: DMatrix<Complex64>| m.map(|z| z.re);
+        let (mut place, mut drift) = (real(&shape * fixed), real(&shape * drifts));
+        let mut block = place.columns_mut(0, n);
+        block += &hold_projection;
+        block += &free * &free_coordinate;
+        let mut block = drift.columns_mut(n, n);
+        block += &free * &free_coordinate;
+        let directions = DMatrix::from_fn(n, stuck.len(), |i, s| mechanics.sliders[s].direction[i]);
         Ok(Pattern {
             stuck: stuck.to_vec(),
             held,
             redundant,
             frozen,
             lambda,
-            shape: complex(&basis) * &modes.shape,
             coordinate,
+            start,
+            place,
+            drift,
+            fall: &free * &free_input * &force_from_state,
             input,
             drifting,
-            free: &basis * &modes.free,
-            free_coordinate: modes.free.transpose() * &coordinates,
-            free_input: modes.free.transpose() * &project,
-            force_from_state,
+            free,
+            free_coordinate,
+            free_input,
             hold,
-            hold_projection,
             stiffness,
+            held_by_velocity: &multiplier * &mechanics.damping,
+            held_by_displacement: &multiplier * &mechanics.stiffness,
+            held_by_sliders: &multiplier * directions,
             multiplier,
             inverse_delassus,
+            shape,
         })
+    }
+
+    /// Whether anything but modes moves.
+    fn drifts(&self) -> bool {
+        !self.drifting.is_empty() || self.free.ncols() > 0
     }
 
     /// Modal force of a force, length n.
@@ -195,23 +248,20 @@ impl Pattern {
         if self.lambda[k] == ZERO { ZERO } else { -self.push(k, force) / self.lambda[k] }
     }
 
-    /// Modal coordinate `k` of displacements and velocities, length 2n.
-    fn coordinate(&self, k: usize, state: &[f64]) -> Complex64 {
-        state.iter().enumerate().map(|(i, z)| self.coordinate[(k, i)] * z).sum()
-    }
-
     /// Memory that it takes, bytes: matrices of some multiples of n² numbers.
     pub fn bytes(&self) -> usize {
-        let complex = self.lambda.len() + self.shape.len() + self.coordinate.len() + self.input.len();
-        let real = self.free.len()
+        let complex =
+            self.lambda.len() + self.shape.len() + self.coordinate.len() + self.start.len() + self.input.len();
+        let real = 3 * self.place.len()
+            + self.free.len()
             + self.free_coordinate.len()
             + self.free_input.len()
-            + self.force_from_state.len()
             + self.hold.len()
-            + self.hold_projection.len()
             + self.stiffness.len()
             + self.multiplier.len()
-            + self.inverse_delassus.len();
+            + self.inverse_delassus.len()
+            + 2 * self.held_by_velocity.len()
+            + self.held_by_sliders.len();
         size_of::<Self>() + 16 * complex + 8 * real + 16 * self.stuck.len()
     }
 
@@ -251,9 +301,22 @@ impl Pattern {
             }
             let free: DVector<Complex64> = complex(&self.free_input) * &force / (s * s);
             steady += complex(&self.free) * &free;
+            for k in 0..self.lambda.len() {
+                let mut parts = (ZERO, ZERO);
+                for (i, &z) in steady.iter().enumerate() {
+                    let (place, speed) = (self.coordinate[(k, i)] * 0.5, self.coordinate[(k, n + i)] * 0.5);
+                    parts.0 += place * z + speed * (s * z);
+                    parts.1 += place * z.conj() + speed * (s * z).conj();
+                }
+                driven.steady_start.push(parts);
+            }
+            let inertia = DVector::from_fn(self.held.len(), |i, _| drive.imposed[h][self.held[i]] * (rate * rate));
+            let held = complex(&self.multiplier) * &drive.forces[h] - complex(&self.inverse_delassus) * inertia;
+            driven.held.push(held);
             driven.free_steady.push(free);
             driven.steady.push(steady);
         }
+        driven.held_constant = &self.multiplier * &drive.constant;
         driven
     }
 
@@ -285,10 +348,9 @@ impl Pattern {
             }
         }
         for row in 0..n {
-            // displacement S c with the part of c that imposed motion gives; the part from x0 is in hold_projection
+            // displacement S c with the part of c that imposed motion gives; the part from x0 is in `place`
             let shift: f64 = (0..self.held.len()).map(|s| self.hold[(row, s)] * work.held[s]).sum();
-            let carried: f64 = (0..n).map(|i| self.hold_projection[(row, i)] * state[i]).sum();
-            out[row * nb + constant].re += shift + carried;
+            out[row * nb + constant].re += shift;
             work.shift[row] = shift;
         }
         if work.held.iter().any(|&g| g != 0.0) {
@@ -305,16 +367,25 @@ impl Pattern {
                 out[row * nb + count + h] = driven.steady[h][row] * work.turn[h];
             }
         }
-        for (i, &z) in state.iter().enumerate() {
-            for row in 0..n {
-                work.force[row] += self.force_from_state[(row, i)] * z;
+        work.eta[..count].fill(ZERO);
+        for (j, &z) in state.iter().enumerate().filter(|(_, z)| **z != 0.0) {
+            for (eta, start) in work.eta.iter_mut().zip(&self.start.as_slice()[j * count..(j + 1) * count]) {
+                *eta += start * z;
+            }
+            for (row, place) in self.place.as_slice()[j * n..(j + 1) * n].iter().enumerate() {
+                out[row * nb + constant].re += place * z;
             }
         }
         for k in 0..count {
             work.fixed[k] = self.fixed(k, &work.force);
-            work.eta[k] = self.coordinate(k, &state[..2 * n]) - work.fixed[k];
+            work.eta[k] -= work.fixed[k];
         }
-        self.subtract_steady(mechanics, drive, driven, work);
+        for (h, turn) in work.turn.iter().enumerate() {
+            let parts = &driven.steady_start[h * count..(h + 1) * count];
+            for (eta, (forward, backward)) in work.eta.iter_mut().zip(parts) {
+                *eta -= forward * turn + backward * turn.conj();
+            }
+        }
         for row in 0..n {
             for k in 0..count {
                 out[row * nb + k] = self.shape[(row, k)] * work.eta[k];
@@ -327,22 +398,6 @@ impl Pattern {
         self.add_polynomials(mechanics, drive, driven, state, work, out);
     }
 
-    /// η of the steady response, taken off `work.eta`.
-    fn subtract_steady(&self, mechanics: &Mechanics, drive: &Drive, driven: &Driven, work: &mut Work) {
-        let n = mechanics.n;
-        for h in 0..drive.rates.len() {
-            let rate = Complex64::new(0.0, drive.rates[h]);
-            for i in 0..n {
-                let z = driven.steady[h][i] * work.turn[h];
-                work.steady[i] = z.re;
-                work.steady[n + i] = (z * rate).re;
-            }
-            for k in 0..self.lambda.len() {
-                work.eta[k] -= self.coordinate(k, &work.steady[..2 * n]);
-            }
-        }
-    }
-
     /// Free directions and drifting modes: 1, τ, τ²/2.
     fn add_polynomials(
         &self,
@@ -353,10 +408,16 @@ impl Pattern {
         work: &mut Work,
         out: &mut [Complex64],
     ) {
-        if self.drifting.is_empty() && self.free.ncols() == 0 {
+        if !self.drifts() {
             return;
         }
         let (n, nb, constant) = (mechanics.n, driven.basis.len(), driven.basis.constant());
+        for (j, &z) in state.iter().enumerate().filter(|(_, z)| **z != 0.0) {
+            for row in 0..n {
+                out[row * nb + constant + 1].re += self.drift[(row, j)] * z;
+                out[row * nb + constant + 2].re += self.fall[(row, j)] * z;
+            }
+        }
         for &k in &self.drifting {
             let drift = self.push(k, &work.force);
             for row in 0..n {
@@ -364,8 +425,7 @@ impl Pattern {
             }
         }
         for r in 0..self.free.ncols() {
-            let dot = |v: &[f64]| (0..n).map(|i| self.free_coordinate[(r, i)] * v[i]).sum::<f64>();
-            let (mut place, mut speed) = (dot(&state[..n]), dot(&state[n..2 * n]));
+            let (mut place, mut speed) = (0.0, 0.0);
             for h in 0..drive.rates.len() {
                 let z = driven.free_steady[h][r] * work.turn[h];
                 place -= z.re;
@@ -389,65 +449,63 @@ impl Pattern {
         sensitivity: &mut DMatrix<f64>,
         work: &mut Work,
     ) {
-        let (n, count) = (mechanics.n, self.lambda.len());
-        for mut column in sensitivity.column_iter_mut() {
-            work.column.copy_from_slice(column.as_slice());
-            let z = &work.column;
+        let (n, count, states) = (mechanics.n, self.lambda.len(), mechanics.states());
+        if states == 0 {
+            return;
+        }
+        let drifts = self.drifts();
+        for (k, value) in values[..count].iter().enumerate() {
+            let (real, imaginary) = work.moved[4 * n * k..4 * n * (k + 1)].split_at_mut(2 * n);
             for row in 0..n {
-                work.shift[row] = (0..n).map(|i| self.hold_projection[(row, i)] * z[i]).sum();
-                work.steady[row] = 0.0;
+                let now = self.shape[(row, k)] * value;
+                let rate = now * self.lambda[k];
+                (real[row], real[n + row]) = (now.re, rate.re);
+                (imaginary[row], imaginary[n + row]) = (now.im, rate.im);
             }
-            work.force.fill(0.0);
-            for (i, &z) in z.iter().enumerate().filter(|(_, z)| **z != 0.0) {
+        }
+        // one column of the derivative of the end state with respect to the initial one after the other
+        for (j, column) in work.transition.as_mut_slice().chunks_exact_mut(states).enumerate() {
+            let (motion, springs) = column.split_at_mut(2 * n);
+            motion[..n].copy_from_slice(&self.place.as_slice()[j * n..(j + 1) * n]);
+            motion[n..].fill(0.0);
+            if drifts {
                 for row in 0..n {
-                    work.force[row] += self.force_from_state[(row, i)] * z;
+                    let (drift, fall) = (self.drift[(row, j)], self.fall[(row, j)]);
+                    motion[row] += drift * length + 0.5 * fall * length * length;
+                    motion[n + row] += drift + fall * length;
                 }
             }
-            for k in 0..count {
-                let fixed = self.fixed(k, &work.force);
-                let decaying = self.coordinate(k, &z[..2 * n]) - fixed;
-                let (now, rate) = (decaying * values[k], decaying * values[k] * self.lambda[k]);
-                for row in 0..n {
-                    let shape = self.shape[(row, k)];
-                    work.shift[row] += (shape * (now + fixed)).re;
-                    work.steady[row] += (shape * rate).re;
-                }
-            }
-            if !self.drifting.is_empty() || self.free.ncols() > 0 {
-                for &k in &self.drifting {
-                    let drift = self.push(k, &work.force);
-                    for row in 0..n {
-                        let speed = (self.shape[(row, k)] * drift).re;
-                        work.shift[row] += speed * length;
-                        work.steady[row] += speed;
-                    }
-                }
-                for r in 0..self.free.ncols() {
-                    let dot = |v: &[f64]| (0..n).map(|i| self.free_coordinate[(r, i)] * v[i]).sum::<f64>();
-                    let (place, speed) = (dot(&z[..n]), dot(&z[n..2 * n]));
-                    let push: f64 = (0..n).map(|i| self.free_input[(r, i)] * work.force[i]).sum();
-                    for row in 0..n {
-                        work.shift[row] +=
-                            self.free[(row, r)] * (place + speed * length + 0.5 * push * length * length);
-                        work.steady[row] += self.free[(row, r)] * (speed + push * length);
-                    }
+            let starts = &self.start.as_slice()[j * count..(j + 1) * count];
+            for (start, moved) in starts.iter().zip(work.moved.chunks_exact(4 * n.max(1))) {
+                let (real, imaginary) = moved.split_at(2 * n);
+                for ((motion, re), im) in motion.iter_mut().zip(real).zip(imaginary) {
+                    *motion += re * start.re - im * start.im;
                 }
             }
             for (slider, stuck) in mechanics.sliders.iter().zip(&self.stuck) {
                 if let (Some(kt), Some(state)) = (slider.stiffness, slider.state) {
-                    column[2 * n + state] = if *stuck {
-                        let stretch: f64 = (0..n).map(|i| slider.direction[i] * (work.shift[i] - z[i])).sum();
-                        z[2 * n + state] + kt * stretch
+                    springs[state] = if *stuck {
+                        let moved: f64 = slider.direction.iter().zip(&*motion).map(|(w, x)| w * x).sum();
+                        let before = if j < n { slider.direction[j] } else { 0.0 };
+                        kt * (moved - before) + if j == 2 * n + state { 1.0 } else { 0.0 }
                     } else {
                         0.0
                     };
                 }
             }
-            for row in 0..n {
-                column[row] = work.shift[row];
-                column[n + row] = work.steady[row];
+        }
+        if states >= LARGE {
+            work.product.gemm(1.0, &work.transition, sensitivity, 0.0);
+        } else {
+            let columns = sensitivity.as_slice().chunks_exact(states);
+            for (to, from) in work.product.as_mut_slice().chunks_exact_mut(states).zip(columns) {
+                to.fill(0.0);
+                for (column, factor) in work.transition.as_slice().chunks_exact(states).zip(from) {
+                    to.iter_mut().zip(column).for_each(|(to, x)| *to += x * factor);
+                }
             }
         }
+        sensitivity.copy_from(&work.product);
     }
 }
 
@@ -457,26 +515,35 @@ pub(crate) struct Work {
     force: Vec<f64>,
     held: Vec<f64>,
     shift: Vec<f64>,
-    steady: Vec<f64>,
-    column: Vec<f64>,
-    turn: Vec<Complex64>,
+    /// `e^{jhΩt}` at the start of the last segment, per harmonic.
+    pub turn: Vec<Complex64>,
     eta: Vec<Complex64>,
     fixed: Vec<Complex64>,
+    /// Displacements and velocities at the end of a stretch per unit of a modal coordinate: 2n real parts and 2n imaginary parts of every mode.
+    moved: Vec<f64>,
+    transition: DMatrix<f64>,
+    product: DMatrix<f64>,
 }
 
 impl Work {
     pub fn new(mechanics: &Mechanics, harmonics: usize) -> Self {
-        let n = mechanics.n;
+        let (n, states) = (mechanics.n, mechanics.states());
         Work {
             force: vec![0.0; n],
             held: Vec::with_capacity(mechanics.sliders.len()),
             shift: vec![0.0; n],
-            steady: vec![0.0; 2 * n],
-            column: vec![0.0; mechanics.states()],
             turn: vec![ZERO; harmonics],
             eta: vec![ZERO; 2 * n],
             fixed: vec![ZERO; 2 * n],
+            moved: vec![0.0; 8 * n * n],
+            transition: DMatrix::zeros(states, states),
+            product: DMatrix::zeros(states, states),
         }
+    }
+
+    /// Another number of harmonics.
+    pub fn set_harmonics(&mut self, harmonics: usize) {
+        self.turn.resize(harmonics, ZERO);
     }
 }
 

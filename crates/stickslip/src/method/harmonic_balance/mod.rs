@@ -101,7 +101,7 @@ const SAMPLES_PER_HARMONIC: usize = 16;
 /// # Example
 /// ```
 /// use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
-/// let system = stickslip::model::templates::find("blade-couple-massless").unwrap().model().assemble().unwrap();
+/// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
 /// let method = HarmonicBalance { harmonics: Some(15), ..HarmonicBalance::default() };
 /// let orbit = method.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.0, None).unwrap();
 /// assert!(orbit.evidence.truncation.unwrap() < 1e-4);

@@ -285,8 +285,11 @@ impl<'a> ModeEquations<'a> {
                 let row = 2 * (k * n + i);
                 let (mut sum, mut by_omega, mut by_zeta) = (ZERO, ZERO, ZERO);
                 for l in 0..n {
-                    let (m, c, s) =
-                        (self.system.structure().mass()[(i, l)], self.system.structure().damping()[(i, l)], self.system.structure().stiffness()[(i, l)]);
+                    let (m, c, s) = (
+                        self.system.structure().mass()[(i, l)],
+                        self.system.structure().damping()[(i, l)],
+                        self.system.structure().stiffness()[(i, l)],
+                    );
                     if m == 0.0 && c == 0.0 && s == 0.0 {
                         continue;
                     }
@@ -431,7 +434,12 @@ impl<'a> ModeEquations<'a> {
 
     /// Units of the residual: elastic forces, slip limits; amplitude and phase are relative.
     pub(super) fn units(&self, start: &ModeState, a: f64) -> Vec<f64> {
-        let stiffness = self.system.structure().stiffness().amax().max(start.omega * start.omega * self.system.structure().mass().amax());
+        let stiffness = self
+            .system
+            .structure()
+            .stiffness()
+            .amax()
+            .max(start.omega * start.omega * self.system.structure().mass().amax());
         let mut scale = vec![(stiffness * a).max(f64::MIN_POSITIVE); 2 * start.x.len()];
         let width = 2 * self.alternation.harmonics.len();
         scale.extend(self.contacts.iter().flat_map(|placed| vec![placed.port.scale; width * placed.port.axes]));

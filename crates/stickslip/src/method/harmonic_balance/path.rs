@@ -56,7 +56,8 @@ pub(super) fn stays(context: &Context, level: &Level, motion: &Motion, x: &[DVec
     }
     let held = system.structure().stiffness() * x[0].map(|z| z.re);
     // positions far away have forces that are rounding
-    let rounding = f64::EPSILON * system.structure().stiffness().amax() * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+    let rounding =
+        f64::EPSILON * system.structure().stiffness().amax() * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
     (left.map(|z| z.re) - held).norm() <= UNHELD * size + 1e3 * rounding
 }
 
@@ -142,7 +143,8 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
             let velocity: Vec<Vec<f64>> = along
                 .iter()
                 .map(|u| {
-                    let velocity: Vec<_> = u.iter().map(|(h, c)| (*h, Complex64::new(0.0, *h as f64 * omega) * c)).collect();
+                    let velocity: Vec<_> =
+                        u.iter().map(|(h, c)| (*h, Complex64::new(0.0, *h as f64 * omega) * c)).collect();
                     level.alternation.fourier.synthesise(&velocity, &mut level.alternation.signal);
                     level.alternation.signal.clone()
                 })
@@ -255,7 +257,12 @@ fn energy(
         }
         for (m, place) in system.moved().iter().enumerate() {
             let g = moved(place, h);
-            let numbers: Vec<(usize, usize)> = system.joints().iter().enumerate().flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a))).collect();
+            let numbers: Vec<(usize, usize)> = system
+                .joints()
+                .iter()
+                .enumerate()
+                .flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)))
+                .collect();
             let joint_part: Complex64 = (0..ports.count())
                 .map(|q| {
                     let number = numbers.binary_search(&ports.place(q)).unwrap_or(0);
@@ -384,8 +391,11 @@ impl Path for Series {
                 sample
             })
             .collect();
-        let forces: Vec<f64> =
-            joints.iter().zip(self.system.joints()).flat_map(|(now, joint)| now.force[..joint.axes().len()].to_vec()).collect();
+        let forces: Vec<f64> = joints
+            .iter()
+            .zip(self.system.joints())
+            .flat_map(|(now, joint)| now.force[..joint.axes().len()].to_vec())
+            .collect();
         for (m, now) in moved_now.iter_mut().enumerate() {
             now.1 += forces.iter().zip(&self.system.moved()[m].joints).map(|(force, sign)| force * sign).sum::<f64>();
         }

@@ -177,7 +177,9 @@ fn modal(system: &System, direction: &DMatrix<f64>) -> Option<Modal> {
     let factor = system.structure().mass().clone().cholesky()?;
     let to = factor.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
     let back = to.transpose();
-    let modes = Modes::new(&(&to * system.structure().damping() * &back), &(&to * system.structure().stiffness() * &back)).ok()?;
+    let modes =
+        Modes::new(&(&to * system.structure().damping() * &back), &(&to * system.structure().stiffness() * &back))
+            .ok()?;
     let complex = |matrix: &DMatrix<f64>| matrix.map(|w| Complex64::new(w, 0.0));
     let shape = complex(&back) * modes.shape;
     let left = modes.from_velocity * complex(&to);

@@ -42,14 +42,7 @@ pub(super) struct Lost {
 impl Level {
     /// Newton's method: the longest of the halved steps that comes closer, and where none does the whole one, which may lead out of a
     /// set of slipping samples that repeats.
-    fn newton(
-        &mut self,
-        ports: &Ports,
-        omega: f64,
-        motion: &mut Motion,
-        ease: Ease,
-        most: usize,
-    ) -> Result<(), Lost> {
+    fn newton(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, ease: Ease, most: usize) -> Result<(), Lost> {
         let mut length = self.length(motion);
         let mut residual = self.evaluate(ports, omega, motion, ease, length, true);
         let mut least = f64::INFINITY;
@@ -151,11 +144,8 @@ impl Level {
         let nh = self.harmonics().len();
         for port in ports.iter() {
             let range = port.first * nh..(port.first + port.axes) * nh;
-            let (values, before) = if port.is_force() {
-                (&mut motion.force, &self.before.force)
-            } else {
-                (&mut motion.c, &self.before.c)
-            };
+            let (values, before) =
+                if port.is_force() { (&mut motion.force, &self.before.force) } else { (&mut motion.c, &self.before.c) };
             for i in range {
                 let d = Complex64::new(self.step[2 * i], self.step[2 * i + 1]);
                 values[i] = before[i] - d * (fraction * unit(port, length));
@@ -164,13 +154,7 @@ impl Level {
     }
 
     /// The solution that Newton's method finds from `motion`, which is nearby.
-    pub fn polish(
-        &mut self,
-        ports: &Ports,
-        omega: f64,
-        motion: &mut Motion,
-        most: usize,
-    ) -> Result<(), Lost> {
+    pub fn polish(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, most: usize) -> Result<(), Lost> {
         self.assembled = 0;
         self.newton(ports, omega, motion, GIVEN, most)
     }

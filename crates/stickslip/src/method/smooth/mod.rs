@@ -21,8 +21,12 @@ impl Structure {
         if let Some(i) = (0..n).find(|&i| system.structure().mass()[(i, i)] <= 0.0) {
             return Err(MethodError::NeedsMass { method, place: system.places()[i].clone() });
         }
-        let inverse_mass =
-            system.structure().mass().clone().try_inverse().ok_or(MethodError::NotPositive { method, matrix: "mass" })?;
+        let inverse_mass = system
+            .structure()
+            .mass()
+            .clone()
+            .try_inverse()
+            .ok_or(MethodError::NotPositive { method, matrix: "mass" })?;
         let mut internal = 0;
         let mut joints = Vec::new();
         for joint in system.joints() {

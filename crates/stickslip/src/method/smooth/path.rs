@@ -302,7 +302,12 @@ impl Path for SteppedPath {
                 };
                 let slips = force.abs() >= SLIPS_ABOVE * joint.limit;
                 let along_force = if joint.limit > 0.0 { force } else { velocity };
-                JointSample::along(sign * u, sign * velocity, sign * force, if slips { Contact::slip(sign * along_force) } else { Contact::Stick })
+                JointSample::along(
+                    sign * u,
+                    sign * velocity,
+                    sign * force,
+                    if slips { Contact::slip(sign * along_force) } else { Contact::Stick },
+                )
             })
             .collect();
         let at = MovedAt::new(&self.system, self.drive.omega, time);

@@ -75,7 +75,9 @@ impl LawPoint {
             force: point.force[0],
             force_slope: slopes(point.force_slope(0)),
             rate: std::array::from_fn(|s| point.rate.get(s).copied().unwrap_or(0.0)),
-            rate_slope: std::array::from_fn(|s| if s < z.len() { slopes(point.rate_slope(s)) } else { [0.0; ARGUMENTS] }),
+            rate_slope: std::array::from_fn(
+                |s| if s < z.len() { slopes(point.rate_slope(s)) } else { [0.0; ARGUMENTS] },
+            ),
         }
     }
 }

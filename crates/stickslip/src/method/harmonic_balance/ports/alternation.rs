@@ -1,7 +1,7 @@
 //! The alternation between frequency and time: the signals of a port over a period, and what its kernels have in common.
 
-use num_complex::Complex64;
 use crate::law::MOST_DIRECTIONS;
+use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip_numerics::fourier::Fourier;
 
@@ -115,7 +115,13 @@ impl Alternation {
 
     /// Adds `δf_h = Σ_k (G_{h-k} δy_k + G_{h+k} δy_k*)`, `δy_k = factor(k) δU_k`, from axis `b` of the motion to axis `a` of the force, with the
     /// spectrum `G` of the slope in the first of the spectra.
-    pub(super) fn add_slope(&self, tangent: &mut [f64], (a, b): (usize, usize), axes: usize, factor: impl Fn(usize) -> Complex64) {
+    pub(super) fn add_slope(
+        &self,
+        tangent: &mut [f64],
+        (a, b): (usize, usize),
+        axes: usize,
+        factor: impl Fn(usize) -> Complex64,
+    ) {
         let nh = self.harmonics.len();
         for (i, &h) in self.harmonics.iter().enumerate() {
             for (l, &k) in self.harmonics.iter().enumerate() {
@@ -155,14 +161,26 @@ pub(super) fn pair(spectrum: &[Complex64], h: usize, k: usize) -> (Complex64, Co
 
 /// Adds a 2 × 2 block; the mean has half the weight of the others and no imaginary part.
 #[inline]
-pub(super) fn add_block(tangent: &mut [f64], size: usize, row: (usize, usize), column: (usize, usize), block: [f64; 4]) {
+pub(super) fn add_block(
+    tangent: &mut [f64],
+    size: usize,
+    row: (usize, usize),
+    column: (usize, usize),
+    block: [f64; 4],
+) {
     let weight = if row.1 == 0 { 0.5 } else { 1.0 };
     add_entries(tangent, size, row, column, block.map(|x| weight * x));
 }
 
 /// The same without the weight. `row` and `column` are numbers of unknown pairs and their harmonics.
 #[inline]
-pub(super) fn add_entries(tangent: &mut [f64], size: usize, (a, h): (usize, usize), (b, k): (usize, usize), block: [f64; 4]) {
+pub(super) fn add_entries(
+    tangent: &mut [f64],
+    size: usize,
+    (a, h): (usize, usize),
+    (b, k): (usize, usize),
+    block: [f64; 4],
+) {
     let at = 2 * a * size + 2 * b;
     tangent[at] += block[0];
     if k > 0 {

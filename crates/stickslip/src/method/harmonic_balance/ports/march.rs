@@ -119,7 +119,12 @@ impl Alternation {
     }
 
     /// A period from the states `z`.
-    fn period(&mut self, march: &mut dyn March, z: &DVector<f64>, mut rows: Option<&mut Vec<f64>>) -> Option<DVector<f64>> {
+    fn period(
+        &mut self,
+        march: &mut dyn March,
+        z: &DVector<f64>,
+        mut rows: Option<&mut Vec<f64>>,
+    ) -> Option<DVector<f64>> {
         let n = self.samples();
         let (m, d) = (march.states(), march.axes());
         let size = (m + d) * (march.inputs() * d + m);
@@ -231,14 +236,19 @@ impl Alternation {
                     let i = step % n;
                     let waves = march.waves(h, angle, self.turns[i * h % n]);
                     let rows = &memory.rows[i * (m + d) * width..(i + 1) * (m + d) * width];
-                    advance(&rows[m * width..], (width, kinds, d, b), &waves, &s, &mut memory.columns[i * d..(i + 1) * d]);
+                    advance(
+                        &rows[m * width..],
+                        (width, kinds, d, b),
+                        &waves,
+                        &s,
+                        &mut memory.columns[i * d..(i + 1) * d],
+                    );
                     advance(&rows[..m * width], (width, kinds, d, b), &waves, &s, &mut next);
                     std::mem::swap(&mut s, &mut next);
                 }
                 // the states at t = 0 follow so that they repeat
-                let shift: Vec<Complex64> = (0..m)
-                    .map(|r| (0..m).map(|t| (s[t] - start[t]) * inverse[(r, t)]).sum())
-                    .collect();
+                let shift: Vec<Complex64> =
+                    (0..m).map(|r| (0..m).map(|t| (s[t] - start[t]) * inverse[(r, t)]).sum()).collect();
                 for a in 0..d {
                     for i in 0..n {
                         let by_state = &memory.by_state[(i * d + a) * m..(i * d + a + 1) * m];

@@ -91,7 +91,13 @@ impl Port {
     pub fn stiffness(&self) -> f64 {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(Part::stiffness).sum(),
-            Kernel::Rigid(_) | Kernel::Prox(_) => if self.series > 0.0 { 1.0 / self.series } else { 0.0 },
+            Kernel::Rigid(_) | Kernel::Prox(_) => {
+                if self.series > 0.0 {
+                    1.0 / self.series
+                } else {
+                    0.0
+                }
+            }
             Kernel::Step(law) | Kernel::Rate(law) => {
                 // a rate law at a frequency at which its states follow
                 let at_rest = crate::method::guess::at_rest(&**law, 1.0);
@@ -149,7 +155,9 @@ impl Ports {
                 continue;
             }
             let axes = joint.axes().len();
-            if axes == 1 && let Some(pieces) = law.pieces() {
+            if axes == 1
+                && let Some(pieces) = law.pieces()
+            {
                 let holds_more = |piece: &Piece| matches!(piece, Piece::Slider(s) if s.static_limit > s.limit);
                 if pieces.iter().any(holds_more) {
                     return Err(unsupported("method `event-driven`: its limit jumps when slip begins"));

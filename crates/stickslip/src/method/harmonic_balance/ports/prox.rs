@@ -57,7 +57,14 @@ impl Alternation {
     }
 
     /// The same of the velocities `v` themselves, where the force does not change them; rigid friction changes its sign over `width` (m/s).
-    pub(super) fn velocity(&mut self, prox: &dyn Prox, port: &Port, width: f64, v: &mut [Complex64], image: &mut [Complex64]) {
+    pub(super) fn velocity(
+        &mut self,
+        prox: &dyn Prox,
+        port: &Port,
+        width: f64,
+        v: &mut [Complex64],
+        image: &mut [Complex64],
+    ) {
         if port.axes == 1
             && let Some((_, slope)) = prox.at_velocity(0.0)
         {

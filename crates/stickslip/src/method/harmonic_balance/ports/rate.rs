@@ -100,7 +100,8 @@ impl Alternation {
         for a in 0..axes {
             let c = &c[a * nh..(a + 1) * nh];
             for (kind, stage) in stages.iter_mut().enumerate() {
-                let power = |h: usize| if kind == 0 { Complex64::new(1.0, 0.0) } else { Complex64::new(0.0, h as f64 * omega) };
+                let power =
+                    |h: usize| if kind == 0 { Complex64::new(1.0, 0.0) } else { Complex64::new(0.0, h as f64 * omega) };
                 self.synthesise(c, |h| power(h) * Complex64::cis(-LEFT * angle * h as f64));
                 stage[a] = self.signal.clone();
             }
@@ -216,7 +217,8 @@ impl RateMarch<'_> {
                     Some(at) if column < inputs => slope[at],
                     _ => 0.0,
                 };
-                rows[(m + a) * width + column] = own + (0..m).map(|s| slope[2 * d + s] * by[(m + s, column)]).sum::<f64>();
+                rows[(m + a) * width + column] =
+                    own + (0..m).map(|s| slope[2 * d + s] * by[(m + s, column)]).sum::<f64>();
             }
         }
         true

@@ -25,7 +25,13 @@ impl Part {
     pub fn stiffness(&self) -> f64 {
         match *self {
             Part::Slider { stiffness, .. } => stiffness,
-            Part::Stop { gap, stiffness } => if gap < 0.0 { stiffness } else { 0.0 },
+            Part::Stop { gap, stiffness } => {
+                if gap < 0.0 {
+                    stiffness
+                } else {
+                    0.0
+                }
+            }
         }
     }
 
@@ -98,11 +104,22 @@ impl Series<'_> {
     }
 
     /// The zero of a function between two phases at whose ends its signs differ, with `sign` its sign at the end: `f` gives it and its slope.
-    fn zero(&self, (mut low, mut high): (f64, f64), start: f64, sign: f64, tolerance: f64, f: impl Fn(&Self, f64) -> (f64, f64)) -> f64 {
+    fn zero(
+        &self,
+        (mut low, mut high): (f64, f64),
+        start: f64,
+        sign: f64,
+        tolerance: f64,
+        f: impl Fn(&Self, f64) -> (f64, f64),
+    ) -> f64 {
         let mut at = start.clamp(low, high);
         for _ in 0..ITERATIONS {
             let (value, slope) = f(self, at);
-            if value * sign > 0.0 { high = at } else { low = at }
+            if value * sign > 0.0 {
+                high = at
+            } else {
+                low = at
+            }
             let mut next = at - value / slope;
             if !(next >= low && next <= high) {
                 next = 0.5 * (low + high);
@@ -119,7 +136,13 @@ impl Series<'_> {
 
 impl Alternation {
     /// Adds the harmonics of the force of the parts in the motion `c` to `force`, and their derivative to `tangent`.
-    pub(super) fn slide(&mut self, parts: &[Part], c: &[Complex64], force: &mut [Complex64], mut tangent: Option<&mut [f64]>) {
+    pub(super) fn slide(
+        &mut self,
+        parts: &[Part],
+        c: &[Complex64],
+        force: &mut [Complex64],
+        mut tangent: Option<&mut [f64]>,
+    ) {
         self.find(c);
         self.state.clear();
         let harmonics = std::mem::take(&mut self.harmonics);
@@ -175,10 +198,16 @@ impl Alternation {
             if step * rising < 0.0 {
                 let middle = i as f64 * angle;
                 // where the slope falls, it is below zero at the end
-                let at = series.zero((middle - angle, middle + angle), middle, step.signum(), PLACED * angle, |series, theta| {
-                    let (_, slope, bend) = series.at(theta);
-                    (slope, bend)
-                });
+                let at = series.zero(
+                    (middle - angle, middle + angle),
+                    middle,
+                    step.signum(),
+                    PLACED * angle,
+                    |series, theta| {
+                        let (_, slope, bend) = series.at(theta);
+                        (slope, bend)
+                    },
+                );
                 // neighbours in time stay so
                 let at = self.extremes.last().map_or(at, |last| at.max(last.at));
                 self.extremes.push(Extreme { at, value: series.at(at).0 });

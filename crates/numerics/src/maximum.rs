@@ -1,0 +1,103 @@
+//! The maximum of a function between two ends, by golden-section search.
+//!
+//! Every step costs one value and keeps the share (√5 - 1)/2 of the interval, smooth function or kinked; a value may be expensive, and may fail.
+//! Source: Kiefer, Sequential minimax search for a maximum, Proc. AMS 4 (1953) 502-506.
+
+/// (√5 - 1)/2
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// The largest of the values that the search meets, and where: inside `ends`, which may stand in either order, until `close` says that the
+/// two ends that are left are near enough. Of equal values the first that was met counts. Where there is no value, give negative infinity.
+///
+/// Of a function with one maximum between the ends it is that one; of another a local one.
+///
+/// # Errors
+/// That of `value`, at once.
+///
+/// # Example
+/// ```
+/// use stickslip_numerics::maximum::maximum;
+/// let close = |a: f64, b: f64| (b - a).abs() < 1e-6;
+/// let (at, height) = maximum((0.0, 3.0), close, |x| Ok::<_, ()>(1.0 - (x - 2.0).abs())).unwrap();
+/// assert!((at - 2.0).abs() < 1e-6 && (height - 1.0).abs() < 1e-6);
+/// ```
+pub fn maximum<E>(
+    ends: (f64, f64),
+    close: impl Fn(f64, f64) -> bool,
+    mut value: impl FnMut(f64) -> Result<f64, E>,
+) -> Result<(f64, f64), E> {
+    let (mut a, mut b) = ends;
+    let (mut left, mut right) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
+    let (mut at_left, mut at_right) = (value(left)?, value(right)?);
+    let mut best = if at_right > at_left { (right, at_right) } else { (left, at_left) };
+    while !close(a, b) {
+        let met = if at_left >= at_right {
+            (b, right, at_right) = (right, left, at_left);
+            left = b - GOLDEN * (b - a);
+            at_left = value(left)?;
+            (left, at_left)
+        } else {
+            (a, left, at_left) = (left, right, at_right);
+            right = a + GOLDEN * (b - a);
+            at_right = value(right)?;
+            (right, at_right)
+        };
+        if met.1 > best.1 {
+            best = met;
+        }
+    }
+    Ok(best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where the values of a smooth maximum differ by rounding only: the square root of it.
+    const FLAT: f64 = 1e-7;
+
+    fn found(ends: (f64, f64), f: impl Fn(f64) -> f64) -> (f64, f64) {
+        maximum(ends, |a, b| (b - a).abs() < 1e-9, |x| Ok::<_, ()>(f(x))).unwrap()
+    }
+
+    #[test]
+    fn smooth_maxima_and_kinks_are_met_from_either_end() {
+        for ends in [(0.0, 3.0), (3.0, 0.0)] {
+            let (at, height) = found(ends, f64::sin);
+            assert!((at - std::f64::consts::FRAC_PI_2).abs() < FLAT && (height - 1.0).abs() < 1e-14, "{at} {height}");
+            let (at, _) = found(ends, |x| if x < 1.25 { x } else { 2.5 - x });
+            assert!((at - 1.25).abs() < 1e-9, "{at}");
+        }
+    }
+
+    #[test]
+    fn a_maximum_at_an_end_is_approached() {
+        let (at, _) = found((0.0, 1.0), |x| x);
+        assert!(1.0 - at < 1e-9, "{at}");
+    }
+
+    #[test]
+    fn a_step_costs_one_value_and_keeps_the_golden_share() {
+        let mut places = Vec::new();
+        let value = |x: f64| {
+            places.push(x);
+            Ok::<_, ()>(-x * x)
+        };
+        // 1/φ^20 = 6.6e-5, 1/φ^21 = 4.1e-5 of the interval
+        maximum((-1.0, 1.0), |a, b| b - a < 2.0 * 5e-5, value).unwrap();
+        assert_eq!(places.len(), 2 + 21);
+        assert!((places[1] - (5f64.sqrt() - 2.0)).abs() < 1e-15 && places[0] == -places[1], "{places:?}");
+    }
+
+    #[test]
+    fn missing_values_are_avoided_and_errors_end_it() {
+        let (at, _) = found((0.0, 2.0), |x| if x > 1.0 { f64::NEG_INFINITY } else { x });
+        assert!((at - 1.0).abs() < 1e-8, "{at}");
+        let mut left = 3;
+        let fails = |x: f64| {
+            left -= 1;
+            if left == 0 { Err("three are enough") } else { Ok(x) }
+        };
+        assert_eq!(maximum((0.0, 1.0), |_, _| false, fails), Err("three are enough"));
+    }
+}

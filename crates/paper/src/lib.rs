@@ -1,0 +1,226 @@
+//! Every figure of the paper, and its claims beside measured numbers: what `stickslip paper` does.
+//!
+//! The study files under `studies/paper/` are run as any other; a file per group of figures measures what they yield against what the text
+//! says, and the rules that decide stand in one file.
+//!
+//! Source: Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and Computational Mechanics 9 (2015) 31-40.
+
+mod couple;
+mod elements;
+mod evidence;
+mod further;
+mod measure;
+mod optimum;
+mod part;
+mod studies;
+mod text;
+mod verdict;
+
+use further::Further;
+use part::{Finding, Part};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use stickslip_report::{Outputs, Page, ReportError, Section, Verdict, write_dataset};
+use stickslip_study::StudyError;
+use stickslip_study::run::{Context, run};
+use studies::{FILES, Results, read};
+
+/// How the job ended.
+#[derive(Debug)]
+pub struct Outcome {
+    /// What the terminal shows.
+    pub summary: String,
+    /// Points without a result.
+    pub failed: u64,
+    /// The page of figures and claims.
+    pub report: PathBuf,
+}
+
+/// Why the figures cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum PaperError {
+    /// A study cannot be run here, for example because it needs more memory than there is.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+}
+
+/// How much is computed; tests take less.
+struct Extent {
+    points: Option<usize>,
+    outputs: Outputs,
+}
+
+/// Computes all figures of the paper and writes, under `out`, a folder of results per figure and `report.html`: each figure beside what
+/// the paper's text claims of it, the measured number and a verdict. `say` gets a line per figure.
+///
+/// An interrupted run writes what is finished and measures what is complete.
+///
+/// # Errors
+/// [`PaperError`]: a file cannot be written, or a study cannot be run here. The figures finished before stay.
+///
+/// # Example
+/// ```no_run
+/// use stickslip_study::run::Context;
+/// let outcome = stickslip_paper::paper("out".as_ref(), &Context::unwatched(1), &|line| eprintln!("{line}"))?;
+/// print!("{}", outcome.summary);
+/// # Ok::<(), stickslip_paper::PaperError>(())
+/// ```
+pub fn paper(out: &Path, context: &Context, say: &dyn Fn(&str)) -> Result<Outcome, PaperError> {
+    produce(out, context, say, &Extent { points: None, outputs: Outputs::all() })
+}
+
+fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -> Result<Outcome, PaperError> {
+    let mut results = Results::default();
+    for (name, _) in FILES {
+        if context.stopped() {
+            break;
+        }
+        let study = read(name, extent.points, &[])?;
+        let dataset = run(&study, context)?;
+        write_dataset(&dataset, out, &extent.outputs)?;
+        let points: u64 = dataset.record.points.values().sum();
+        let failed = dataset.failures.len();
+        let failed = if failed > 0 { format!(", {failed} failed") } else { String::new() };
+        say(&format!("{}: {points} points{failed}, {:.2} s", dataset.title, dataset.record.wall_time_s));
+        results.insert(study, dataset);
+    }
+    say("Further cases that the claims ask for: other slip limits, contact stiffnesses, frequencies");
+    let further = Further::new(context, extent.points);
+    let parts: Vec<Part> = [
+        elements::exact(&results),
+        elements::approximate(&results, &further),
+        elements::coulomb(&results),
+        couple::figure6(&results, &further),
+        couple::figure7(&results, &further),
+        couple::dependence(&results, &further),
+        couple::figure8(&results),
+        couple::figure10(&results),
+        couple::optimum(&further),
+        couple::laws(&results),
+        Some(evidence::open(&further)),
+        Some(evidence::record(&results)),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    // what an interrupted run has does not replace a whole report
+    let whole = out.join("report.html");
+    let cut_short = context.stopped() && whole.exists();
+    let report = if cut_short { out.join("report.interrupted.html") } else { whole };
+    let summary = summary(&report, &parts, &results);
+    page(parts).write(&report)?;
+    Ok(Outcome { summary, failed: results.failed(), report })
+}
+
+fn page(parts: Vec<Part>) -> Page {
+    Page {
+        title: "Blade couple with dry friction connection: figures and claims".to_owned(),
+        introduction: vec![
+            "Every figure of Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and Computational Mechanics 9 \
+             (2015) 31-40, computed anew, beside what its text claims of it."
+                .to_owned(),
+            format!(
+                "Every verdict follows from the measured number by a fixed rule: two quantities are similar up to {:.0} %, \
+                 approximately the same up to {:.0} %, and nobody would call them similar beyond {:.0} %; a frequency is met within {} Hz, half \
+                 the step in which the paper prints it; a claim about several cases needs all of them, and is qualified if \
+                 only some agree. Unless said otherwise friction is exact Coulomb friction; the last sections compare the paper's arctangent law, \
+                 and list what the paper leaves open and had to be inferred.",
+                100.0 * verdict::SIMILAR,
+                100.0 * verdict::APPROXIMATE,
+                100.0 * verdict::DIFFERENT,
+                verdict::PRINTED
+            ),
+        ],
+        sections: parts
+            .into_iter()
+            .map(|part| Section { claims: part.findings.into_iter().map(|f| f.claim).collect(), ..part.section })
+            .collect(),
+    }
+}
+
+/// The claims for the terminal.
+fn summary(report: &Path, parts: &[Part], results: &Results) -> String {
+    let mut text = String::new();
+    for part in parts.iter().filter(|part| !part.findings.is_empty()) {
+        let _ = writeln!(text, "{}", part.section.heading);
+        for Finding { name, claim } in &part.findings {
+            let _ = writeln!(text, "  {name:<64} {}", claim.verdict.words());
+        }
+    }
+    let claims: Vec<Verdict> = parts.iter().flat_map(|part| &part.findings).map(|f| f.claim.verdict).collect();
+    let count = |verdict| claims.iter().filter(|v| **v == verdict).count();
+    let _ = writeln!(
+        text,
+        "{} claims: {} hold, {} hold with a qualification, {} do not hold",
+        claims.len(),
+        count(Verdict::Holds),
+        count(Verdict::HoldsWithQualification),
+        count(Verdict::DoesNotHold)
+    );
+    for dataset in results.all().filter(|dataset| !dataset.failures.is_empty()) {
+        let _ = writeln!(text, "{}: {} points failed, see record.json", dataset.name, dataset.failures.len());
+    }
+    let _ = writeln!(text, "{}", report.display());
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::{Arc, atomic::AtomicBool};
+
+    fn reduced(stop: bool) -> (tempfile::TempDir, Outcome) {
+        let out = tempfile::tempdir().unwrap();
+        let context = Context { stop: Arc::new(AtomicBool::new(stop)), ..Context::unwatched(1) };
+        let extent = Extent { points: Some(25), outputs: Outputs::only(&["csv", "json", "svg"]).unwrap() };
+        let outcome = produce(out.path(), &context, &|_| (), &extent).unwrap();
+        (out, outcome)
+    }
+
+    #[test]
+    fn the_job_writes_every_figure_and_the_report() {
+        let (out, outcome) = reduced(false);
+        assert_eq!(outcome.failed, 0, "{}", outcome.summary);
+        for (name, _) in FILES {
+            for file in ["record.json", "figure.svg"] {
+                assert!(out.path().join(name).join(file).is_file(), "{name}/{file}");
+            }
+        }
+        let report = std::fs::read_to_string(out.path().join("report.html")).unwrap();
+        for heading in
+            ["Fig. 2", "Figs. 3 and 4", "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 10", "What the paper leaves open"]
+        {
+            assert!(report.contains(&format!("<h2>{heading}")), "{heading}");
+        }
+        // a claim whose numbers cannot be read would be absent
+        assert!(
+            outcome.summary.contains("28 claims:") && outcome.summary.contains("report.html"),
+            "{}",
+            outcome.summary
+        );
+    }
+
+    #[test]
+    fn a_job_stopped_at_once_leaves_a_report_without_claims() {
+        let (out, outcome) = reduced(true);
+        assert!(outcome.summary.contains("0 claims"), "{}", outcome.summary);
+        assert!(out.path().join("report.html").is_file());
+    }
+
+    /// What an interrupted job has goes beside a report that is there.
+    #[test]
+    fn an_interrupted_job_does_not_replace_a_report() {
+        let out = tempfile::tempdir().unwrap();
+        let whole = out.path().join("report.html");
+        std::fs::write(&whole, "whole").unwrap();
+        let context = Context { stop: Arc::new(AtomicBool::new(true)), ..Context::unwatched(1) };
+        let extent = Extent { points: Some(25), outputs: Outputs::only(&["json"]).unwrap() };
+        let outcome = produce(out.path(), &context, &|_| (), &extent).unwrap();
+        assert_eq!(std::fs::read_to_string(&whole).unwrap(), "whole");
+        assert!(outcome.report.ends_with("report.interrupted.html") && outcome.report.is_file());
+        assert!(outcome.summary.contains("report.interrupted.html"), "{}", outcome.summary);
+    }
+}

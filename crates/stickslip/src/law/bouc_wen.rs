@@ -1,0 +1,124 @@
+//! Smooth hysteresis of Bouc and Wen.
+//!
+//! `f = k z`, `z' = u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n`. In long motion to one side z tends to `(beta + gamma)^(-1/n)`, with the sharper
+//! a knee the larger n; beta alone makes the loop (with `beta = 0` it is a spring), gamma shapes it. It is the same at every speed.
+//! Source: Bouc (1967); Wen, "Method for random vibration of hysteretic systems" (1976).
+//!
+//! It gives no energy in a closed motion for any `beta >= 0`: at the same z, loading has a slope not above that of unloading.
+
+use super::kink::{power, size};
+use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
+use crate::dimension::Dimension;
+use std::sync::Arc;
+use stickslip_numerics::dual::Real;
+
+/// The key of the exponent, to which the dimensions of beta and gamma are raised.
+const EXPONENT: &str = "exponent";
+
+/// The highest exponent: the knee is then a corner, within a thousandth of the force.
+const SHARPEST: f64 = 1000.0;
+
+/// The row of this law in [`super::TABLE`].
+pub(super) static INFO: LawInfo = LawInfo {
+    name: "bouc-wen",
+    summary: "smooth hysteresis, f = stiffness z, z' = u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n with n = exponent",
+    parameters: &[
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness at rest"),
+        Parameter::new("beta", Dimension::INVERSE_LENGTH, Range::ZeroOrMore, "makes the loop; to the power `exponent`")
+            .to_the(EXPONENT),
+        Parameter::new("gamma", Dimension::INVERSE_LENGTH, Range::Any, "shapes the loop; beta + gamma > 0")
+            .to_the(EXPONENT),
+        Parameter::new(EXPONENT, Dimension::NONE, Range::Within(1.0, SHARPEST), "sharpness of the knee").or(1.0),
+    ],
+    sample: &[10_000.0, 1.5e7, 1e7, 2.0],
+    build: |values| Arc::new(BoucWen { stiffness: values[0], beta: values[1], gamma: values[2], exponent: values[3] }),
+};
+
+/// Smooth hysteresis. The internal state is z over the value that it tends to, a pure number between -1 and 1.
+///
+/// # Example
+/// ```
+/// use stickslip::law::{BoucWen, Law};
+/// let law = BoucWen { stiffness: 1e4, beta: 3e3, gamma: 2e3, exponent: 1.0 };
+/// assert_eq!(law.scale(), 2.0); // stiffness / (beta + gamma)
+/// assert!(BoucWen { gamma: -4e3, ..law }.consistent().is_err()); // nothing would bound it
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoucWen {
+    /// Stiffness at rest, N/m.
+    pub stiffness: f64,
+    /// What makes the loop, 1/m to the power `exponent`.
+    pub beta: f64,
+    /// What shapes the loop, 1/m to the power `exponent`.
+    pub gamma: f64,
+    /// Sharpness of the knee, 1 or more.
+    pub exponent: f64,
+}
+
+impl BoucWen {
+    /// The value that z tends to, m.
+    fn bound(&self) -> f64 {
+        (self.beta + self.gamma).powf(-1.0 / self.exponent)
+    }
+}
+
+impl Law for BoucWen {
+    fn info(&self) -> &'static LawInfo {
+        &INFO
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![self.stiffness, self.beta, self.gamma, self.exponent]
+    }
+    fn scale(&self) -> f64 {
+        self.stiffness * self.bound()
+    }
+    fn rate(&self) -> Option<&dyn Rate> {
+        Some(self)
+    }
+    fn consistent(&self) -> Result<(), String> {
+        if self.beta + self.gamma > 0.0 {
+            return Ok(());
+        }
+        Err(format!(
+            "`beta + gamma` must be more than zero, or nothing bounds the force; found {}",
+            self.beta + self.gamma
+        ))
+    }
+}
+
+impl RateLaw for BoucWen {
+    fn states(&self) -> usize {
+        1
+    }
+    fn state_under(&self, force: f64, z: &mut [f64]) -> bool {
+        z.fill((force / self.scale()).clamp(-1.0, 1.0));
+        true
+    }
+    #[inline]
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+        let (zero, v, z) = (S::from(0.0), motion.velocity[0], z[0]);
+        let sum = self.beta + self.gamma;
+        // |z|^(n-1) z |u'| = |z|^n sgn z |u'|
+        let loop_making = size(v) * super::kink::sign(z.re()) * (self.beta / sum);
+        rate[0] = (v - power(z, self.exponent) * (loop_making + v * (self.gamma / sum))) / self.bound();
+        [z * self.scale(), zero, zero]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_are_those_of_the_equation() {
+        let law = BoucWen { stiffness: 3.0, beta: 0.5, gamma: -0.2, exponent: 1.7 };
+        for z in [-1.1, -0.4, 0.0, 0.9] {
+            for v in [-2.0, 0.7] {
+                let mut rate = [0.0];
+                let force = law.evaluate(&Relative::along(0.0, v), &[z / law.bound()], &mut rate)[0];
+                let expected = v - 0.5 * f64::abs(v) * f64::abs(z).powf(0.7) * z + 0.2 * v * f64::abs(z).powf(1.7);
+                assert!((rate[0] * law.bound() - expected).abs() < 1e-14 && (force - 3.0 * z).abs() < 1e-14);
+            }
+        }
+    }
+}

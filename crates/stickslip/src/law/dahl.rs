@@ -1,0 +1,74 @@
+//! Presliding friction of Dahl: a spring that gives way the more the nearer its force is to the slip limit.
+//!
+//! `f' = k u' (1 - (f / limit) sgn u')`. It is the same at every speed, creeps to the limit without reaching it, and is Bouc and Wen's
+//! law with `n = 1`, `gamma = 0`, `beta = k / limit`.
+//! Source: Dahl, "A solid friction model" (1968), exponent 1.
+
+use super::kink::size;
+use super::{Law, LawInfo, Parameter, Rate, RateLaw, Relative};
+use crate::dimension::Dimension;
+use std::sync::Arc;
+use stickslip_numerics::dual::Real;
+
+/// The row of this law in [`super::TABLE`].
+pub(super) static INFO: LawInfo = LawInfo {
+    name: "dahl",
+    summary: "presliding friction, f' = stiffness u' (1 - (f/limit) sgn u')",
+    parameters: &[
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness at rest"),
+        Parameter::limit("slip limit, which long motion to one side tends to"),
+    ],
+    sample: &[10_000.0, 2.0],
+    build: |values| Arc::new(Dahl { stiffness: values[0], limit: values[1] }),
+};
+
+/// Presliding friction. The internal state is the force over its limit.
+///
+/// # Example
+/// ```
+/// use stickslip::law::{Dahl, RateLaw, Relative};
+/// let law = Dahl { stiffness: 1e4, limit: 2.0 };
+/// let mut rate = [0.0];
+/// let force = law.evaluate(&Relative::along(0.0, 1e-3), &[0.5], &mut rate);
+/// assert_eq!((force[0], rate[0]), (1.0, 2.5)); // at half the limit, half the stiffness
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dahl {
+    /// Stiffness at rest, N/m.
+    pub stiffness: f64,
+    /// Slip limit, N.
+    pub limit: f64,
+}
+
+impl Law for Dahl {
+    fn info(&self) -> &'static LawInfo {
+        &INFO
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![self.stiffness, self.limit]
+    }
+    fn scale(&self) -> f64 {
+        self.limit
+    }
+    fn rate(&self) -> Option<&dyn Rate> {
+        Some(self)
+    }
+}
+
+impl RateLaw for Dahl {
+    fn states(&self) -> usize {
+        usize::from(self.limit > 0.0) // what holds nothing carries no force
+    }
+    fn state_under(&self, force: f64, z: &mut [f64]) -> bool {
+        z.fill((force / self.limit).clamp(-1.0, 1.0));
+        true
+    }
+    #[inline]
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+        let zero = S::from(0.0);
+        let Some(&share) = z.first() else { return [zero; 3] };
+        let v = motion.velocity[0];
+        rate[0] = (v - size(v) * share) * (self.stiffness / self.limit);
+        [share * self.limit, zero, zero]
+    }
+}

@@ -1,0 +1,94 @@
+//! A stop behind a gap: a spring that acts only beyond it.
+//!
+//! `f = k max(u - gap, 0)`. A negative gap is a spring that is compressed at rest: it presses with `-k gap` and lets go at `u = gap`.
+//! The force has a kink where the faces meet, and no more than one value anywhere: no impact law is needed.
+//! Source: den Hartog, "Mechanical Vibrations" (1956), Sec. 8.11; Shaw and Holmes, "A periodically forced piecewise linear oscillator" (1983).
+
+use super::{Contact, Law, LawInfo, Parameter, Piece, Range, Rate, RateLaw, Relative};
+use crate::dimension::Dimension;
+use std::sync::Arc;
+use stickslip_numerics::dual::Real;
+
+/// The row of this law in [`super::TABLE`].
+pub(super) static INFO: LawInfo = LawInfo {
+    name: "gap",
+    summary: "elastic stop behind a gap, f = stiffness max(u - gap, 0), exact",
+    parameters: &[
+        Parameter::new(
+            "gap",
+            Dimension::LENGTH,
+            Range::Any,
+            "where the faces meet; negative: they are pressed together at rest",
+        ),
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness of the stop"),
+    ],
+    sample: &[2e-4, 10_000.0],
+    build: |values| Arc::new(Gap { gap: values[0], stiffness: values[1] }),
+};
+
+/// An elastic stop behind a gap.
+///
+/// # Example
+/// ```
+/// use stickslip::law::{Gap, Law};
+/// let law = Gap { gap: 0.0, stiffness: 1e4 };
+/// // in touch for half of the time: half the stiffness
+/// assert!((law.linearised(1e-3, 1.0).re - 5e3).abs() < 1e-9);
+/// assert!(!law.is_odd());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Displacement at which the faces meet, m.
+    pub gap: f64,
+    /// Stiffness of the stop, N/m.
+    pub stiffness: f64,
+}
+
+impl Law for Gap {
+    fn info(&self) -> &'static LawInfo {
+        &INFO
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![self.gap, self.stiffness]
+    }
+    fn pieces(&self) -> Option<Vec<Piece>> {
+        Some(vec![Piece::Stop { gap: self.gap, stiffness: self.stiffness }])
+    }
+    fn rate(&self) -> Option<&dyn Rate> {
+        Some(self)
+    }
+    fn is_odd(&self) -> bool {
+        false
+    }
+    fn contact(&self, _velocity: &[f64], force: &[f64]) -> Contact {
+        if force[0] > 0.0 { Contact::Stick } else { Contact::Open }
+    }
+}
+
+impl RateLaw for Gap {
+    #[inline]
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+        let zero = S::from(0.0);
+        let depth = motion.displacement[0] - self.gap;
+        [if depth.re() > 0.0 { depth * self.stiffness } else { zero }, zero, zero]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::Rate;
+
+    #[test]
+    fn it_is_open_before_the_gap_and_presses_at_rest_where_the_gap_is_negative() {
+        let at = |gap: f64, u: f64| {
+            let law = Gap { gap, stiffness: 1e3 };
+            let force = Rate::value(&law, &Relative::along(u, 0.0), &[], &mut [])[0];
+            (force, law.contact(&[0.0], &[force]))
+        };
+        assert_eq!(at(0.5, 0.25), (0.0, Contact::Open));
+        assert_eq!(at(0.5, 0.75), (250.0, Contact::Stick));
+        assert_eq!(at(-0.5, 0.0), (500.0, Contact::Stick));
+        assert_eq!(at(-0.5, -1.0), (0.0, Contact::Open));
+    }
+}

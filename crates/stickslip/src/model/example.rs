@@ -1,0 +1,71 @@
+//! Two models to try things on, built by calls: blade couples of Pust, Pesek, Radolfova (2015), Sec. 4.
+//!
+//! Values in SI: blades of 0.182 kg on springs of 105103 N/m with dampers of 0.2 kg/s, a contact stiffness of 1e4
+//! N/m, a slip limit of 2 N, a force of 10 N on blade 1. Alone, a blade has its resonance at 121.25 Hz.
+
+use super::{Force, GROUND, Joint, Mass, Model, Spring};
+use crate::law::{Coulomb, Jenkins, SharedLaw};
+use std::sync::Arc;
+
+/// Mass of a blade, kg.
+const BLADE: f64 = 0.182;
+/// Mass of the part that deforms at the contact, kg.
+const CONTACT: f64 = 0.001_82;
+/// Tangential contact stiffness, N/m.
+const STIFFNESS: f64 = 1e4;
+/// Slip limit, N.
+const LIMIT: f64 = 2.0;
+
+/// Two blades with friction between the first and a small contact mass, which a spring ties to the other: Fig. 5b,
+/// Eqs. (3)-(4).
+///
+/// # Example
+/// ```
+/// use std::sync::Arc;
+/// use stickslip::law::Coulomb;
+/// use stickslip::model::example;
+/// let mut model = example::blade_couple();
+/// model.joints[0].law = Arc::new(Coulomb { limit: 4.0 });   // N
+/// assert_eq!(model.assemble().unwrap().places(), ["blade1", "contact", "blade3"]);
+/// ```
+pub fn blade_couple() -> Model {
+    let mut model = blades(BLADE - CONTACT / 2.0); // m* of Eq. (3)
+    model.masses.insert(1, Mass::new("contact", CONTACT));
+    model.springs.push(Spring { between: between("contact", "blade3"), stiffness: STIFFNESS, damping: 0.0 });
+    model.joints.push(shroud("contact", Arc::new(Coulomb { limit: LIMIT })));
+    model
+}
+
+/// The same without the contact mass: a spring in series with a slider joins the blades.
+///
+/// # Example
+/// ```
+/// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
+/// assert_eq!(system.places, ["blade1", "blade3"]);
+/// ```
+pub fn blade_couple_massless() -> Model {
+    let mut model = blades(BLADE);
+    model.joints.push(shroud("blade3", Arc::new(Jenkins { stiffness: STIFFNESS, limit: LIMIT })));
+    model
+}
+
+fn between(a: &str, b: &str) -> [String; 2] {
+    [a.to_owned(), b.to_owned()]
+}
+
+fn shroud(other: &str, law: SharedLaw) -> Joint {
+    Joint { name: "shroud".to_owned(), between: between("blade1", other), law }
+}
+
+/// Two blades that do not touch, the first of them driven.
+fn blades(mass: f64) -> Model {
+    let names = ["blade1", "blade3"];
+    Model {
+        masses: names.map(|name| Mass::new(name, mass)).to_vec(),
+        springs: names
+            .map(|name| Spring { between: between(name, GROUND), stiffness: 105_103.0, damping: 0.2 })
+            .to_vec(),
+        forces: vec![Force { on: "blade1".to_owned(), amplitude: 10.0, phase: 0.0, harmonic: 1 }],
+        ..Model::default()
+    }
+}

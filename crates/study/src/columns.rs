@@ -1,0 +1,17 @@
+//! Names of the columns that several kinds write, each said once; those of one kind stand beside it.
+
+/// Drive frequency, Hz.
+pub(crate) const FREQUENCY: &str = "frequency_Hz";
+/// Amplitude of a peak, m.
+pub(crate) const AMPLITUDE: &str = "amplitude_m";
+/// Whether a peak is only the end of the range.
+pub(crate) const AT_RANGE_END: &str = "at_range_end";
+/// Defect of the return map.
+pub(crate) const RESIDUAL: &str = "residual";
+/// Relative gap between work put in and energy lost.
+pub(crate) const ENERGY_GAP: &str = "energy_gap";
+
+/// The amplitude of a place, m.
+pub(crate) fn amplitude_of(place: &str) -> String {
+    format!("{place}_amplitude_m")
+}

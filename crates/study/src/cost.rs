@@ -1,0 +1,346 @@
+//! How much a study will hold and how long it will take, by counting: rows, columns, orbits; and by what each method was
+//! measured to need. How many of these a study has, its kind says.
+
+use crate::error::{Problem, StudyError};
+use crate::extra;
+use crate::study::{Case, Study};
+use crate::survey::{Surveyed, range};
+use crate::words::bytes_text;
+use std::f64::consts::TAU;
+use stickslip::curve::sweep::BLOCK;
+use stickslip::law::SharedLaw;
+
+/// What a study will hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Size {
+    /// Rows of its tables.
+    pub rows: u64,
+    /// Its tables as numbers of eight bytes.
+    pub results: u64,
+    /// Most memory at one time, bytes: rough.
+    pub memory: u64,
+}
+
+/// Bytes of a number in a table.
+const NUMBER: f64 = 8.0;
+/// Bytes of a word in a table: its handle, and its own piece of memory.
+const WORD: f64 = 56.0;
+/// Bytes of a cell as text of a CSV file. Measured: 85 for three numbers and a word.
+const WRITTEN: f64 = 20.0;
+/// Bytes of a point of a figure, in the dataset and drawn in all formats. Measured: 220 in HTML.
+const DRAWN: f64 = 240.0;
+/// Bytes of an orbit of an exact law, per entry of its state and per switch; and of a smooth law per entry. Measured:
+/// exact 8 kB for the couple and 170 kB for 8 masses and joints, smooth 80 kB and 600 kB.
+const ORBIT_ENTRY: f64 = 500.0;
+const SMOOTH_ENTRY: f64 = 24_000.0;
+/// Bytes of an orbit that is a series, per harmonic coefficient of a place or joint. Measured: 15 kB for the couple,
+/// 130 kB for 8 masses and joints, at 15 harmonics.
+const SERIES_ENTRY: f64 = 80.0;
+/// Bytes of the motion at one instant, per mass and joint.
+const SAMPLE: f64 = 64.0;
+/// Points that a curve with adaptive frequencies takes, per case. Measured: 100 to 600 at tolerances of 1 %.
+const ADAPTIVE: f64 = 300.0;
+/// Points per period, per joint, that are there beside those that were asked for: the switches.
+const SWITCHES: f64 = 4.0;
+
+/// A table to be: rows and columns.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Shape {
+    /// Rows.
+    pub rows: f64,
+    /// Columns of numbers and flags.
+    pub numbers: f64,
+    /// Columns of words.
+    pub words: f64,
+}
+
+/// What a study of a kind costs; the kind says it.
+#[derive(Debug, Default)]
+pub struct Cost {
+    /// Its tables.
+    pub tables: Vec<Shape>,
+    /// Points of figures.
+    pub drawn: f64,
+    /// What one unit of work keeps while it is computed, beside its tables, bytes. Of the units only as many are computed at a time as
+    /// there are threads; the tables of those that wait are counted with the tables.
+    pub unit: f64,
+    /// Time of the methods on one thread, s.
+    pub work: f64,
+}
+
+/// What is known of a study when its cost is asked: counts, and what one orbit takes. The first case stands for all.
+#[derive(Debug)]
+pub struct Costing<'a> {
+    /// The study.
+    pub study: &'a Study,
+    /// Its first case.
+    pub case: &'a Case,
+    /// Cases.
+    pub cases: f64,
+    /// Frequencies of a case; of adaptive ones how many they are likely to be.
+    pub frequencies: f64,
+    /// Varied parameters, a column each.
+    pub varied: f64,
+    /// Masses.
+    pub masses: f64,
+    /// Joints.
+    pub joints: f64,
+    surveyed: &'a Surveyed,
+    /// Whether a law is smooth, or made so, and whether one has internal states, which makes the flow stiff.
+    smooth: bool,
+    has_states: bool,
+}
+
+impl<'a> Costing<'a> {
+    pub(crate) fn new(study: &'a Study, surveyed: &'a Surveyed) -> Self {
+        let (case, system) = (&surveyed.case, surveyed.survey.system());
+        // a width makes exact laws smooth
+        let width = case.method.options.get("width");
+        let followed = |law: &SharedLaw| width.and_then(|width| law.regularised(*width)).unwrap_or_else(|| law.clone());
+        let laws: Vec<SharedLaw> = system.joints().iter().map(|joint| followed(joint.law())).collect();
+        let given = case.frequencies.as_ref().map_or(1, |f| f.len()) as f64;
+        Costing {
+            study,
+            case,
+            cases: study.cases() as f64,
+            frequencies: if study.is_adaptive() { ADAPTIVE } else { given },
+            varied: case.varied.len() as f64,
+            masses: system.dofs() as f64,
+            joints: system.joints().len() as f64,
+            surveyed,
+            smooth: laws.iter().any(|law| law.pieces().is_none()),
+            has_states: laws.iter().any(|law| law.rate().is_some_and(|rate| rate.states() > 0)),
+        }
+    }
+
+    /// Cases times frequencies.
+    pub fn points(&self) -> f64 {
+        self.cases * self.frequencies
+    }
+
+    /// Groups of cases that differ in the last parameter of `vary` only.
+    pub fn curves(&self) -> f64 {
+        self.cases / self.study.last_varied().max(1) as f64
+    }
+
+    /// The column of the frequency, where a table has it for several frequencies only.
+    pub fn several(&self) -> f64 {
+        if self.frequencies > 1.0 { 1.0 } else { 0.0 }
+    }
+
+    /// A table with a row for each of `rows` orbits: frequency, amplitude, mean and phase of each mass, dissipation and slip of each joint,
+    /// what `output` asks for, evidence, status.
+    pub fn orbits(&self, rows: f64) -> Shape {
+        let extra = extra::columns(self.case, self.surveyed.survey.system()).len() as f64;
+        let numbers = self.varied + 3.0 * self.masses + 2.0 * self.joints + extra + 6.0;
+        Shape { rows, numbers, words: 1.0 }
+    }
+
+    /// A table with a row for each of `rows` instants: time and frequency, displacement and velocity of each mass, three of each joint and
+    /// its contact.
+    pub fn motion(&self, rows: f64) -> Shape {
+        Shape { rows, numbers: self.varied + 2.0 + 2.0 * self.masses + 3.0 * self.joints, words: self.joints }
+    }
+
+    /// Instants of a period in a table: `samples` steps, both ends, and the switches.
+    pub fn instants(&self) -> f64 {
+        self.case.values.count("samples").unwrap_or(720) as f64 + 1.0 + SWITCHES * self.joints
+    }
+
+    /// Lowest and highest drive frequency, rad/s.
+    pub fn range(&self) -> Option<(f64, f64)> {
+        range(self.case)
+    }
+
+    /// Lowest natural frequency with all joints stuck, rad/s; zero if there is none.
+    pub fn slowest_mode(&self) -> f64 {
+        self.surveyed.survey.stuck().elastic.first().map_or(0.0, |mode| mode.omega)
+    }
+
+    /// Bytes of the orbits that a unit of frequencies keeps at a time.
+    pub fn kept_orbits(&self) -> f64 {
+        self.frequencies.min(BLOCK as f64) * self.orbit_bytes()
+    }
+
+    /// Bytes of an orbit in memory.
+    pub fn orbit_bytes(&self) -> f64 {
+        let state = 2.0 * self.masses + self.joints + 1.0;
+        if self.smooth { SMOOTH_ENTRY * state } else { ORBIT_ENTRY * state * (2.0 + SWITCHES * self.joints) }
+    }
+
+    /// Bytes of the motion at the instants of one period.
+    pub fn samples_bytes(&self) -> f64 {
+        self.instants() * SAMPLE * (2.0 + self.masses + self.joints)
+    }
+
+    /// Bytes of an orbit in memory that is a series of so many harmonics.
+    pub fn series_bytes(&self, harmonics: f64) -> f64 {
+        SERIES_ENTRY * (2.0 * harmonics + 1.0) * (2.0 * self.masses + 4.0 * self.joints)
+    }
+}
+
+impl Cost {
+    fn rows(&self) -> f64 {
+        self.tables.iter().map(|table| table.rows).sum()
+    }
+
+    fn cells(&self, number: f64, word: f64) -> f64 {
+        self.tables.iter().map(|table| table.rows * (number * table.numbers + word * table.words)).sum()
+    }
+}
+
+impl Costing<'_> {
+    /// Size, and rough time on one thread (s), of a study of this cost whose work is cut into so many units.
+    pub(crate) fn total(&self, cost: &Cost, units: usize) -> (Size, f64) {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let units = units.min(threads) as f64;
+        // a float that is too large for the type becomes its largest value
+        let whole = |value: f64| value as u64;
+        let size = Size {
+            rows: whole(cost.rows()),
+            results: whole(cost.cells(NUMBER, NUMBER)),
+            memory: whole(cost.cells(NUMBER + WRITTEN, WORD + WRITTEN) + DRAWN * cost.drawn + units * cost.unit),
+        };
+        let preparing = self.cases * PREPARING * (1.0 + (self.masses + self.joints).powi(3) / PREPARED);
+        let tables = CELL * cost.cells(1.0, 1.0);
+        (size, OVERHEAD + GENEROUS * (cost.work + preparing + tables + POINT * cost.drawn))
+    }
+}
+
+// ------------------------------------------------------------------------------------------ the limit
+
+impl Size {
+    /// Why a study is not run, if it would take more memory than it may.
+    pub(crate) fn refusal(&self, study: &Study) -> Option<StudyError> {
+        let limit = study.memory_limit();
+        if self.memory <= limit {
+            return None;
+        }
+        let message = format!(
+            "this would need about {} of memory for {} rows of results; the limit is {}",
+            bytes_text(self.memory),
+            self.rows,
+            bytes_text(limit)
+        );
+        let lengths = ["samples", "samples_per_cycle", "cycles", "duration", "steps"].into_iter();
+        let given: Vec<String> =
+            lengths.filter(|key| study.study.entry(key).is_some()).map(|key| format!("lower `{key}`, ")).collect();
+        let fewer = if study.points() > study.cases() { "take fewer frequencies, " } else { "" };
+        let split = if study.cases() > 1 { "split `vary` over several files, " } else { "" };
+        let help = format!("{}{fewer}{split}or allow more with --memory", given.concat());
+        // at what makes most of it
+        let place = match (study.varied.first(), study.points() / study.cases().max(1)) {
+            (Some(varied), frequencies) if study.cases() >= frequencies => &varied.place,
+            _ => study.study.place_of("frequency", None),
+        };
+        Some(StudyError::at(&study.sources, Problem::new(place, "memory", message).help(help)))
+    }
+}
+
+// ------------------------------------------------------------------------------------------ time
+
+/// The estimates are of one core of 2020 and are doubled: too long rather than too short.
+const GENEROUS: f64 = 2.0;
+/// Reading, drawing and writing, s.
+const OVERHEAD: f64 = 0.2;
+/// Work on a row of a table and its text, per cell, s. Measured: 0.4 s for 200,000 rows of ten.
+const CELL: f64 = 3e-7;
+/// Work on a point of a figure, s. Measured: 1 s for 800,000 in HTML, as much for SVG.
+const POINT: f64 = 3e-6;
+/// Event-driven: a closed form per segment, and a decomposition for each new pattern of stick and slip, whose number
+/// grows with the joints. Measured: 3 ms at 8 masses and joints, 40 ms at 16, 0.23 s at 24.
+const EVENT_DRIVEN: (f64, f64) = (2e-4, 3e-3);
+/// Masses and joints of the second number.
+const EVENT_DRIVEN_SIZE: f64 = 16.0;
+/// Harmonic balance per mass and joint at 15 harmonics. Measured with springs before the sliders: 0.3 ms for the
+/// couple, 21 ms at 32 blades.
+const SERIES: f64 = 5e-4;
+/// Rigid sliders and smooth laws need more harmonics and more steps: measured 20 ms at 4 blades, 0.9 s at 32. Where
+/// the harmonics are given they need more steps only.
+const HARD: f64 = 40.0;
+const HARD_RIGID: f64 = 3.0;
+const HARD_SMOOTH: f64 = 10.0;
+/// Harmonics of [`SERIES`].
+const SERIES_HARMONICS: f64 = 15.0;
+/// Shooting, times the square of masses and joints; more where the sliders have springs. Measured: 25 ms for two
+/// masses, 0.6 s for four.
+const SHOOTING: (f64, f64) = (1e-3, 1.5e-2);
+/// Method `transient`: the periods in which a mode with the least damping loses a digit, times a share of these.
+/// Measured at a damping ratio of 7e-4: exact laws 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses; smooth laws 0.9 s and 8 s
+/// for 2 and 4.
+const SETTLING: (f64, f64) = (0.1, 1.0);
+/// Fewest and most periods of it.
+const SETTLING_PERIODS: (f64, f64) = (20.0, 50_000.0);
+/// A period of a transient: events, per mass and joint; integration, times their square.
+const PERIOD: (f64, f64, f64) = (3e-4, 2.5e-4, 1.3e-3);
+/// Resolving and assembling a case, s, and the number of masses and joints (cubed) that doubles it.
+const PREPARING: f64 = 2e-4;
+const PREPARED: f64 = 1e4;
+/// Reading the motion at one instant, per mass and joint, s.
+const INSTANT: f64 = 5e-7;
+/// Joints up to which `auto` takes events.
+const AUTO: f64 = 12.0;
+
+impl Costing<'_> {
+    /// Time of one orbit by the method of the study, s.
+    pub fn orbit(&self) -> f64 {
+        let case = self.case;
+        let size = self.masses + self.joints;
+        let events = EVENT_DRIVEN.0 + EVENT_DRIVEN.1 * (size / EVENT_DRIVEN_SIZE).powi(4);
+        let shooting = size * size * if self.has_states { SHOOTING.1 } else { SHOOTING.0 };
+        let series = self.series(case.method.options.get("harmonics").copied());
+        match case.method.name.as_str() {
+            "harmonic-balance" => series,
+            "transient" => {
+                let modes = &self.surveyed.survey.free().elastic;
+                let damping = modes.iter().map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE);
+                let digit = std::f64::consts::LN_10 / (TAU * damping);
+                let share = if self.smooth { SETTLING.1 } else { SETTLING.0 };
+                let most = case.method.options.get("periods").copied().unwrap_or(SETTLING_PERIODS.1);
+                (share * digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1)).min(most) * self.period()
+            }
+            _ if self.smooth => shooting,
+            "auto" if self.joints > AUTO => series,
+            _ => events,
+        }
+    }
+
+    /// Time of one series of harmonics, s; of as many as it needs if `None`.
+    pub fn series(&self, harmonics: Option<f64>) -> f64 {
+        let system = self.surveyed.survey.system();
+        let rigid =
+            |law: &SharedLaw| law.sliders().is_some_and(|all| all.iter().any(|branch| branch.stiffness.is_none()));
+        let any_rigid = system.joints().iter().any(|joint| rigid(joint.law()));
+        let factor = match (self.smooth, any_rigid, harmonics) {
+            (false, false, _) => 1.0,
+            (_, _, None) => HARD,
+            (true, _, Some(_)) => HARD_SMOOTH,
+            (false, true, Some(_)) => HARD_RIGID,
+        };
+        let length = (harmonics.unwrap_or(SERIES_HARMONICS) / SERIES_HARMONICS).max(1.0);
+        SERIES * (self.masses + self.joints).max(1.0) * factor * length * length
+    }
+
+    /// Time of a period of a transient, s.
+    pub fn period(&self) -> f64 {
+        let size = self.masses + self.joints;
+        match (self.smooth, self.has_states) {
+            (false, _) => PERIOD.0 * size,
+            (true, false) => PERIOD.1 * size * size,
+            (true, true) => PERIOD.2 * size * size,
+        }
+    }
+
+    /// Time to read the motion at so many instants, s.
+    pub fn reading(&self, instants: f64) -> f64 {
+        INSTANT * instants * (self.masses + self.joints)
+    }
+
+    /// Time to read what `output` asks of one orbit, s.
+    pub fn extra(&self) -> f64 {
+        match self.case.values.names("output").unwrap_or_default().len() {
+            0 => 0.0,
+            some => self.reading(some as f64 * extra::INSTANTS as f64),
+        }
+    }
+}

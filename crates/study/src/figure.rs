@@ -1,0 +1,34 @@
+//! The table `[figure]`: what in it can only be judged with a model and a kind.
+
+use crate::info::{Complaint, KindInfo};
+use crate::near;
+use crate::units;
+use crate::values::Values;
+use stickslip::model::Model;
+
+/// What is wrong in `[figure]`.
+pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(), Complaint> {
+    let places: Vec<String> = model.masses.iter().flat_map(|mass| mass.places()).collect();
+    let masses = places.iter().map(String::as_str);
+    let known: Vec<&str> = masses.chain(model.joints.iter().map(|joint| joint.name.as_str())).collect();
+    if let Some(name) = figure.names("only").unwrap_or_default().iter().find(|name| !known.contains(&name.as_str())) {
+        return Err(Complaint::unknown("only", "mass or joint", name, &known));
+    }
+    for (key, axis) in [("x_unit", kind.axes[0]), ("y_unit", kind.axes[1])] {
+        let Some(text) = figure.text(key) else { continue };
+        let Some(expected) = axis else {
+            let message = format!("the figure of the kind `{}` has no single unit on this axis", kind.name);
+            return Err(Complaint::new(key, message, "leave it out"));
+        };
+        let example = expected.name_and_unit().map_or("", |(_, unit)| unit);
+        match units::parse(text) {
+            Some(unit) if unit.dimension == expected => {}
+            found => {
+                let what = if found.is_some() { "a unit of another quantity" } else { "no unit that is known" };
+                let help = format!("write a unit such as {example}");
+                return Err(Complaint::new(key, format!("`{}` is {what}", near::shown(text)), help));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,139 @@
+//! Keys of the tables of a study file: what one takes, whether it must stand there, and what stands for it if not.
+
+use stickslip::dimension::Dimension;
+use stickslip::law;
+
+/// The schema version that this program reads.
+pub const VERSION: i64 = 1;
+
+/// Most points of a study: cases times frequencies.
+pub const MOST_POINTS: usize = 1_000_000;
+
+/// One key of a table.
+#[derive(Debug, Clone, Copy)]
+pub struct Key {
+    /// The key.
+    pub name: &'static str,
+    /// What it takes.
+    pub takes: Takes,
+    /// Whether it must stand there, or what happens without it.
+    pub presence: Presence,
+    /// One line of what it is.
+    pub doc: &'static str,
+    /// An example of the value, as TOML.
+    pub example: &'static str,
+}
+
+/// Whether a key must stand in its table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Presence {
+    /// It must.
+    Required,
+    /// It may be absent, and then nothing stands for it.
+    Optional,
+    /// It may be absent, and this (as the content of a TOML string, or a bare value) stands for it.
+    Default(&'static str),
+}
+
+/// What a key takes.
+#[derive(Debug, Clone, Copy)]
+pub enum Takes {
+    /// Any text.
+    Text,
+    /// An identifier.
+    Name,
+    /// A name or a list of names.
+    Names,
+    /// Two names of places.
+    Pair,
+    /// A quantity of a dimension within a range.
+    Quantity(Dimension, Within),
+    /// A whole number within these bounds.
+    Count(i64, i64),
+    /// `true` or `false`.
+    Flag,
+    /// Frequencies: one, a list, or `{ from, to, points }`.
+    Frequencies,
+    /// A table from a name to a quantity: `{ blade1 = "1 mm" }`.
+    ByName(Dimension),
+    /// A table of its own with these keys.
+    Table(&'static [Key]),
+    /// A friction law: `{ kind = …, … }`.
+    Law,
+    /// One of the words that the function lists, each with a line of what it is.
+    Choice(fn() -> Vec<(&'static str, &'static str)>),
+    /// `[parameters]`: quantities by name.
+    Parameters,
+    /// `vary`: lists of quantities, or ranges, by parameter.
+    Vary,
+    /// `[method]`: `kind` and the options of that method.
+    Method,
+    /// `[study]`: `kind`, `vary` and the keys of that kind.
+    Study,
+    /// `repeat`: indices, each with how often, or from where to where.
+    Repeat,
+    /// A list of tables with these keys: `[[mass]]`.
+    List(&'static [Key]),
+}
+
+/// The range of a quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Within {
+    /// Any finite number.
+    Finite,
+    /// Zero or more.
+    AtLeastZero,
+    /// More than zero.
+    Positive,
+}
+
+/// The range of a law's parameter as far as a reader can tell without the law, which checks the rest itself.
+pub(crate) fn within(range: law::Range) -> Within {
+    match range {
+        law::Range::Positive | law::Range::Count => Within::Positive,
+        law::Range::ZeroOrMore => Within::AtLeastZero,
+        law::Range::Any | law::Range::Within(..) => Within::Finite,
+    }
+}
+
+impl Within {
+    /// Whether the number is in the range.
+    pub fn holds(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Within::Finite => true,
+                Within::AtLeastZero => value >= 0.0,
+                Within::Positive => value > 0.0,
+            }
+    }
+
+    /// In words.
+    pub fn described(self) -> &'static str {
+        match self {
+            Within::Finite => "a finite number",
+            Within::AtLeastZero => "zero or more",
+            Within::Positive => "more than zero",
+        }
+    }
+}
+
+/// A key that must be there.
+pub const fn required(name: &'static str, takes: Takes, doc: &'static str, example: &'static str) -> Key {
+    Key { name, takes, presence: Presence::Required, doc, example }
+}
+
+/// A key that may be absent.
+pub const fn optional(name: &'static str, takes: Takes, doc: &'static str, example: &'static str) -> Key {
+    Key { name, takes, presence: Presence::Optional, doc, example }
+}
+
+/// A key that may be absent, and what then stands for it.
+pub const fn default(
+    name: &'static str,
+    takes: Takes,
+    value: &'static str,
+    doc: &'static str,
+    example: &'static str,
+) -> Key {
+    Key { name, takes, presence: Presence::Default(value), doc, example }
+}

@@ -1,0 +1,68 @@
+//! Keys of `[study]` that several kinds have, and what must hold for their values.
+
+use crate::extra;
+use crate::info::Complaint;
+use crate::key::{Key, Takes, default, optional, required};
+use crate::values::Values;
+use stickslip::method::MethodError;
+use stickslip::model::{Model, System};
+
+/// Whether there is a mass whose peak could count.
+pub(super) fn check_masses(model: &Model) -> Result<(), Complaint> {
+    if model.masses.is_empty() {
+        let help = "add a [[mass]], or ask for kind = \"hysteresis\"";
+        return Err(Complaint::new("kind", "the model has no mass, so no amplitude has a peak", help));
+    }
+    Ok(())
+}
+
+/// Of a kind that needs nothing of a system beside what its method needs.
+pub(super) fn anything(_: &Values, _: &System) -> Result<(), MethodError> {
+    Ok(())
+}
+
+/// Most samples per period.
+pub(super) const MOST_SAMPLES: i64 = 100_000;
+
+/// Harmonics and samples of the kinds that solve series of their own, when none are given.
+pub(super) const HARMONICS: u64 = 15;
+pub(super) const SERIES_SAMPLES: u64 = 1024;
+
+/// Whether such a kind has enough samples for its harmonics.
+pub(super) fn check_samples(values: &Values) -> Result<(), Complaint> {
+    let harmonics = values.count("harmonics").unwrap_or(HARMONICS);
+    let samples = values.count("samples").unwrap_or(SERIES_SAMPLES);
+    if samples >= 4 * (harmonics + 1) && samples.is_multiple_of(2) {
+        return Ok(());
+    }
+    let message = format!("{samples} samples are too few or odd for {harmonics} harmonics");
+    Err(Complaint::new("samples", message, "write an even number, at least 4 (harmonics + 1)"))
+}
+
+/// The key `frequency` of the kinds that need a drive.
+pub(super) const FREQUENCY: Key = required(
+    "frequency",
+    Takes::Frequencies,
+    "drive frequency: one, a list, or a range with both ends",
+    "{ from = \"119 Hz\", to = \"123 Hz\", points = 241 }",
+);
+
+/// The key `output` of the kinds that have one row per orbit.
+pub(super) const OUTPUT: Key = optional(
+    "output",
+    Takes::Names,
+    "further columns: joint_force, joint_motion, velocity, acceleration, harmonics, receptance",
+    "[\"joint_force\", \"harmonics\"]",
+);
+
+/// Whether it names what there is.
+pub(super) fn check_output(values: &Values) -> Result<(), Complaint> {
+    let known: Vec<&str> = extra::TABLE.iter().map(|extra| extra.name).collect();
+    match values.names("output").unwrap_or_default().iter().find(|name| !known.contains(&name.as_str())) {
+        Some(name) => Err(Complaint::unknown("output", "output", name, &known)),
+        None => Ok(()),
+    }
+}
+
+/// The key `samples` of the kinds that show a motion over one period.
+pub(super) const SAMPLES: Key = default("samples", Takes::Count(8, MOST_SAMPLES), "720", "points per period", "720");

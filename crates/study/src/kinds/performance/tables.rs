@@ -1,0 +1,99 @@
+//! The tables of performance curves: their names and columns, said once, and what they hold as typed values.
+
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
+use crate::dataset::Dataset;
+use crate::results::{Peak, Results, ResultsError};
+use crate::study::{Study, VariedValue};
+
+/// The kind.
+pub(super) const NAME: &str = "performance";
+/// One row per value of the parameter.
+pub(super) const PERFORMANCE: &str = "performance";
+/// One row per curve.
+pub(super) const OPTIMUM: &str = "optimum";
+/// Orbits on the grid of frequencies that were not found.
+pub(super) const FAILED: &str = "failed_orbits";
+
+/// The resonance peak over a parameter, the last one of `vary`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// The peak at each value of the parameter.
+    pub points: Vec<Point>,
+    /// Its lowest point, refined between the values; `None` if that stands at an end of them.
+    pub optimum: Option<Optimum>,
+}
+
+/// The resonance peak at one value of the parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// The varied parameters of the case; the last one is that of the curve.
+    pub varied: Vec<VariedValue>,
+    /// The peak; `None` if no orbit was found.
+    pub peak: Option<Peak>,
+    /// Orbits on the grid of frequencies that were not found.
+    pub failed_orbits: u64,
+}
+
+/// The value of the parameter that makes the peak lowest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Optimum {
+    /// The value in the unit of its column: SI, but hertz and degrees, as in [`VariedValue::column`].
+    pub value: f64,
+    /// Where the peak stands, Hz.
+    pub frequency: f64,
+    /// The peak, m.
+    pub amplitude: f64,
+}
+
+/// The curves of a performance study, one for each combination of the outer parameters. Curves that an interrupted run did not reach are
+/// absent.
+///
+/// # Errors
+/// [`ResultsError`]: the dataset is of another kind, or not what [`run`](crate::run::run()) returned for this study.
+///
+/// # Example
+/// ```
+/// use stickslip_study::{kinds::performance, read_study, run::{Context, run}};
+/// let text = r#"
+/// schema = 1
+/// title = "Best slip limit"
+/// [model]
+/// template = "blade-couple"
+/// [study]
+/// kind = "performance"
+/// frequency = { from = "120 Hz", to = "121.5 Hz", points = 31 }
+/// vary = { Ft = ["5.5 N", "6.5 N", "7.5 N"] }
+/// "#;
+/// let study = read_study("couple.toml", text, &[]).unwrap();
+/// let curves = performance::curves(&study, &run(&study, &Context::unwatched(1)).unwrap()).unwrap();
+/// assert!((curves[0].optimum.unwrap().value - 6.684).abs() < 0.01);
+/// ```
+pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<Curve>, ResultsError> {
+    let results = Results::of(NAME, study, dataset)?;
+    let Some(table) = results.table(PERFORMANCE)? else { return Ok(Vec::new()) };
+    let (frequency, amplitude) = (table.numbers(FREQUENCY)?, table.numbers(AMPLITUDE)?);
+    let (at_range_end, failed) = (table.flags(AT_RANGE_END)?, table.integers(FAILED)?);
+    let varied = study.varied();
+    let mut curves = Vec::new();
+    for stretch in results.stretches(&table, varied.len().saturating_sub(1))? {
+        let point = |row: usize| {
+            let of_case = study.varied_values(stretch.case + row - stretch.rows.start);
+            let peak = |at_range_end| Peak { frequency: frequency[row], amplitude: amplitude[row], at_range_end };
+            Some(Point { varied: of_case?, peak: at_range_end[row].map(peak), failed_orbits: failed[row] })
+        };
+        let points: Option<Vec<Point>> = stretch.rows.clone().map(point).collect();
+        curves.push(Curve { points: points.ok_or_else(|| table.other_rows())?, optimum: None });
+    }
+    let (Some(optima), true) = (results.table(OPTIMUM)?, !varied.is_empty()) else { return Ok(curves) };
+    if optima.table.rows() != curves.len() {
+        return Err(optima.other_rows());
+    }
+    let (frequency, amplitude) = (optima.numbers(FREQUENCY)?, optima.numbers(AMPLITUDE)?);
+    for (row, curve) in curves.iter_mut().enumerate() {
+        let parameter = curve.points.first().and_then(|point| point.varied.last());
+        let column = parameter.ok_or_else(|| table.other_rows())?.column().0;
+        let (value, frequency, amplitude) = (optima.numbers(&column)?[row], frequency[row], amplitude[row]);
+        curve.optimum = value.is_finite().then_some(Optimum { value, frequency, amplitude });
+    }
+    Ok(curves)
+}

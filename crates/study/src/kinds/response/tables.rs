@@ -1,0 +1,119 @@
+//! The tables of a response: their names and columns, said once, and what they hold as typed values.
+
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY, amplitude_of};
+use crate::dataset::Dataset;
+use crate::results::{Peak, Results, ResultsError};
+use crate::study::{Study, VariedValue};
+
+/// The kind.
+pub(super) const NAME: &str = "response";
+/// One row per orbit.
+pub(super) const CURVE: &str = "curve";
+/// One row per peak.
+pub(super) const PEAKS: &str = "peaks";
+/// All joints free, and all joints stuck.
+pub(super) const REFERENCES: &str = "references";
+/// The mass that has a peak.
+pub(super) const MASS: &str = "mass";
+
+/// The response of one case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// The varied parameters of the case.
+    pub varied: Vec<VariedValue>,
+    /// Drive frequencies, Hz, in the order of the table.
+    pub frequency: Vec<f64>,
+    /// What every mass does, in the order of the model.
+    pub masses: Vec<MassCurve>,
+}
+
+/// The response of one mass.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MassCurve {
+    /// Name of the mass.
+    pub mass: String,
+    /// Half of peak to peak at every frequency, m; NaN where no orbit was found.
+    pub amplitude: Vec<f64>,
+    /// Its refined peaks by frequency; with `peak_of` only those where it is the worst mass, none if peaks were not asked for.
+    pub peaks: Vec<Peak>,
+}
+
+impl MassCurve {
+    /// The highest of its peaks; of equal ones the last.
+    pub fn highest_peak(&self) -> Option<Peak> {
+        self.peaks.iter().copied().max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))
+    }
+}
+
+/// The curves of a response study, case by case. Cases that an interrupted run did not reach are absent.
+///
+/// # Errors
+/// [`ResultsError`]: the dataset is of another kind, or not what [`run`](crate::run::run()) returned for this study.
+///
+/// # Example
+/// ```
+/// use stickslip_study::{kinds::response, read_study, run::{Context, run}};
+/// let text = r#"
+/// schema = 1
+/// title = "Oscillator"
+/// [[mass]]
+/// name = "m"
+/// mass = "1 kg"
+/// [[spring]]
+/// between = ["m", "ground"]
+/// stiffness = "1 N/m"
+/// damping = "1 kg/s"
+/// [[force]]
+/// on = "m"
+/// amplitude = "1 N"
+/// [study]
+/// kind = "response"
+/// frequency = { from = "0.5 rad/s", to = "1.5 rad/s", points = 3 }
+/// "#;
+/// let study = read_study("oscillator.toml", text, &[]).unwrap();
+/// let dataset = run(&study, &Context::unwatched(1)).unwrap();
+/// let curves = response::curves(&study, &dataset).unwrap();
+/// assert!((curves[0].masses[0].amplitude[1] - 1.0).abs() < 1e-12);   // F/(c ω) at ω = √(k/m)
+/// ```
+pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<Curve>, ResultsError> {
+    let results = Results::of(NAME, study, dataset)?;
+    let Some(curve) = results.table(CURVE)? else { return Ok(Vec::new()) };
+    let keys = study.varied().len();
+    let frequency = curve.numbers(FREQUENCY)?;
+    let system = study.case(0).ok().and_then(|case| case.model.assemble().ok());
+    let places = system.ok_or_else(|| curve.other_rows())?.places().to_vec();
+    let amplitudes =
+        places.iter().map(|place| curve.numbers(&amplitude_of(place))).collect::<Result<Vec<&[f64]>, _>>()?;
+    let stretches = results.stretches(&curve, keys)?;
+    let mut curves: Vec<Curve> = stretches
+        .iter()
+        .map(|stretch| Curve {
+            varied: stretch.varied.clone(),
+            frequency: frequency[stretch.rows.clone()].to_vec(),
+            masses: places
+                .iter()
+                .zip(&amplitudes)
+                .map(|(place, amplitude)| MassCurve {
+                    mass: place.clone(),
+                    amplitude: amplitude[stretch.rows.clone()].to_vec(),
+                    peaks: Vec::new(),
+                })
+                .collect(),
+        })
+        .collect();
+    let Some(peaks) = results.table(PEAKS)? else { return Ok(curves) };
+    let (masses, frequency) = (peaks.texts(MASS)?, peaks.numbers(FREQUENCY)?);
+    let (amplitude, at_range_end) = (peaks.numbers(AMPLITUDE)?, peaks.flags(AT_RANGE_END)?);
+    for stretch in results.stretches(&peaks, keys)? {
+        let case = stretches.iter().position(|of_curve| of_curve.case == stretch.case);
+        for row in stretch.rows {
+            let mass = places.iter().position(|place| *place == masses[row]);
+            let (Some(case), Some(mass), Some(at_range_end)) = (case, mass, at_range_end[row]) else {
+                return Err(peaks.other_rows());
+            };
+            let peak = Peak { frequency: frequency[row], amplitude: amplitude[row], at_range_end };
+            curves[case].masses[mass].peaks.push(peak);
+        }
+    }
+    Ok(curves)
+}

@@ -1,0 +1,33 @@
+//! A case and what its linear structure tells, before anything is computed.
+
+use crate::error::StudyError;
+use crate::study::{Case, Study};
+use stickslip::model::Survey;
+
+/// A case and what is known of its model.
+#[derive(Debug)]
+pub struct Surveyed {
+    pub(crate) case: Case,
+    pub(crate) survey: Survey,
+}
+
+impl Surveyed {
+    /// Case `index` of a study.
+    pub(crate) fn new(study: &Study, index: usize) -> Result<Self, StudyError> {
+        let case = study.case(index)?;
+        let survey = case.model.survey();
+        let survey = survey.map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
+        Ok(Surveyed { case, survey })
+    }
+}
+
+/// Lowest and highest drive frequency of a case, rad/s.
+pub(crate) fn range(case: &Case) -> Option<(f64, f64)> {
+    if let Some(run_up) = case.values.table("run_up") {
+        let (a, b) = (run_up.quantity("from")?, run_up.quantity("to")?);
+        return Some((a.min(b), a.max(b)));
+    }
+    let frequencies = case.frequencies.as_ref()?;
+    let ends = frequencies.iter().fold((f64::INFINITY, 0.0f64), |(a, b), w| (a.min(w), b.max(w)));
+    (ends.0 <= ends.1).then_some(ends)
+}

@@ -1,0 +1,181 @@
+//! What looks like a mistake in the studies of some kinds: each names those that concern it.
+
+use crate::key::MOST_POINTS;
+use crate::survey::{Surveyed, range};
+use crate::values::{Frequencies, Values};
+use crate::words::{quantity, significant};
+use std::f64::consts::TAU;
+use stickslip::model::{LinearMode, Modes};
+
+/// Of a kind that needs something to drive the motion.
+pub(crate) fn driven(cases: &[Surveyed]) -> Vec<String> {
+    no_excitation(cases, false).into_iter().collect()
+}
+
+/// Of a kind that needs something to set the structure in motion: a drive, or a state to start from.
+pub(crate) fn moved(cases: &[Surveyed]) -> Vec<String> {
+    no_excitation(cases, true).into_iter().collect()
+}
+
+/// Of a kind that looks for resonances in a range of frequencies.
+pub(crate) fn resonant(cases: &[Surveyed]) -> Vec<String> {
+    no_excitation(cases, false).into_iter().chain(no_resonance(cases)).collect()
+}
+
+/// Of a kind that takes its frequencies as they are: the same, and whether they lie close enough for the resonances.
+pub(crate) fn sampled(cases: &[Surveyed]) -> Vec<String> {
+    resonant(cases).into_iter().chain(coarse(cases)).collect()
+}
+
+fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
+    if cases.iter().any(|one| !one.survey.harmonics().is_empty()) {
+        return None;
+    }
+    let starts = |values: &Values| {
+        ["start", "start_velocity"]
+            .iter()
+            .filter_map(|key| values.by_name(key))
+            .any(|table| table.values().any(|v| *v != 0.0))
+    };
+    let constant = |one: &Surveyed| {
+        let model = &one.case.model;
+        model.forces.iter().any(|force| force.amplitude != 0.0) || model.motions.iter().any(|m| m.amplitude != 0.0)
+    };
+    if starts_count && cases.iter().any(|one| starts(&one.case.values) || constant(one)) {
+        return None;
+    }
+    Some(if cases.iter().any(constant) {
+        "every force and motion is constant in time: nothing vibrates".to_owned()
+    } else {
+        "there is no force and no motion that is not zero: nothing vibrates; add a [[force]] or a [[motion]]".to_owned()
+    })
+}
+
+fn no_resonance(cases: &[Surveyed]) -> Option<String> {
+    let (from, to) = range(&cases[0].case).filter(|(from, to)| from < to)?;
+    let mut nearest: Option<(f64, f64, &str)> = None;
+    for one in cases {
+        let harmonics = one.survey.harmonics();
+        if harmonics.is_empty() {
+            return None; // that is said elsewhere
+        }
+        let (free, stuck) = (one.survey.free(), one.survey.stuck());
+        if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
+            return None; // not known
+        }
+        // friction puts the resonance between the free frequency of a mode and its stuck one
+        let between = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
+        let between = between.map(|(a, b)| (a.omega.min(b.omega), a.omega.max(b.omega)));
+        let single = |modes: &Modes| modes.elastic.iter().map(|mode| (mode.omega, mode.omega)).collect::<Vec<_>>();
+        let intervals: Vec<(f64, f64)> = between.chain(single(free)).chain(single(stuck)).collect();
+        for h in harmonics.iter().map(|h| f64::from(*h)) {
+            if intervals.iter().any(|(a, b)| a / h <= to && b / h >= from) {
+                return None;
+            }
+            for (modes, name) in [(free, "free"), (stuck, "stuck")] {
+                for omega in modes.elastic.iter().map(|mode| mode.omega / h) {
+                    let distance = if omega < from { from / omega } else { omega / to };
+                    if nearest.is_none_or(|(least, _, _)| distance < least) {
+                        nearest = Some((distance, omega, name));
+                    }
+                }
+            }
+        }
+    }
+    let hertz = |omega: f64| significant(omega / TAU, 6);
+    // a model without any is one that no spring holds, which is said elsewhere, or has no mass
+    let (_, omega, name) = nearest?;
+    let (from, to, omega) = (hertz(from), hertz(to), hertz(omega));
+    Some(format!("no resonance lies between {from} and {to} Hz: the nearest is at {omega} Hz with all joints {name}"))
+}
+
+/// A resonance of the linear structure that is narrower than the steps of a range of frequencies.
+struct Narrow {
+    /// Drive frequency and width of the resonance, rad/s.
+    at: f64,
+    width: f64,
+    /// Points of the range whose steps are no wider.
+    points: f64,
+}
+
+/// Of frequencies that lie further apart than a resonance is wide. The width is that at half of the power, twice damping times frequency, and
+/// of joints free or stuck the larger one: friction only adds to it.
+fn coarse(cases: &[Surveyed]) -> Option<String> {
+    let Some(Frequencies::Range { points, .. }) = cases[0].case.frequencies else { return None };
+    // what is said holds for every case
+    let narrow = cases.iter().map(narrowest).collect::<Option<Vec<Narrow>>>()?;
+    let Narrow { at, width, points: enough } = narrow.into_iter().max_by(|a, b| a.points.total_cmp(&b.points))?;
+    let (from, to) = range(&cases[0].case)?;
+    let hertz = |omega: f64, digits: i32| significant(omega / TAU, digits);
+    let step = (to - from) / (points - 1) as f64;
+    let several = if enough <= MOST_POINTS as f64 {
+        format!("{enough} points would do")
+    } else {
+        "take a narrower range".to_owned()
+    };
+    Some(format!(
+        "the frequencies are {} Hz apart, and the resonance at {} Hz is only {} Hz wide where friction does not damp it: the curve may step over it; {several}",
+        hertz(step, 2),
+        hertz(at, 5),
+        hertz(width, 2)
+    ))
+}
+
+/// The narrowest resonance between two frequencies of a case, if it is narrower than their distance.
+fn narrowest(one: &Surveyed) -> Option<Narrow> {
+    let Some(Frequencies::Range { from, to, points }) = one.case.frequencies else { return None };
+    let (free, stuck) = (one.survey.free(), one.survey.stuck());
+    if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
+        return None; // not known
+    }
+    let width = |mode: &LinearMode| 2.0 * mode.damping * mode.omega;
+    let paired = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
+    let harmonics = one.survey.harmonics();
+    let all = paired.flat_map(|(free, stuck)| {
+        let width = width(free).max(width(stuck));
+        harmonics.iter().map(|h| f64::from(*h)).map(move |h| {
+            let (low, high) = (free.omega.min(stuck.omega) / h, free.omega.max(stuck.omega) / h);
+            (low, high, width / h)
+        })
+    });
+    // without damping there is no width, and where friction bounds the motion it is that of friction
+    let inside = all.filter(|(low, high, width)| *low >= from && *high <= to && *width > 0.0);
+    let (at, _, width) = inside.min_by(|a, b| a.2.total_cmp(&b.2))?;
+    ((to - from) / (points - 1) as f64 > width).then(|| Narrow {
+        at,
+        width,
+        points: ((to - from) / width).ceil() + 1.0,
+    })
+}
+
+/// A range of amplitudes that ends below this share of the first slip shows a linear mode only.
+const STICKS: f64 = 0.99;
+
+/// Of a nonlinear mode whose amplitudes end before any joint slips.
+pub(crate) fn mode_sticks(cases: &[Surveyed]) -> Vec<String> {
+    sticks(cases).into_iter().collect()
+}
+
+fn sticks(cases: &[Surveyed]) -> Option<String> {
+    let mut needed = f64::INFINITY;
+    let mut asked = 0.0;
+    for one in cases {
+        let values = &one.case.values;
+        let number = values.count("mode").unwrap_or(1) as usize - 1;
+        let to = values.table("amplitude")?.quantity("to")?;
+        // the range is of the place that moves most in the mode of the structure without its joints
+        let unit = one.survey.system().structure().modal_unit(number);
+        let slip = one.survey.slip_amplitude(number)? / unit;
+        if !(unit > 0.0 && slip * STICKS > to) {
+            return None;
+        }
+        if slip < needed {
+            (needed, asked) = (slip, to);
+        }
+    }
+    Some(format!(
+        "no joint slips in this mode: the amplitudes end at {}, and the first slip is at about {}",
+        quantity(asked, "m"),
+        quantity(needed, "m")
+    ))
+}

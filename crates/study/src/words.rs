@@ -1,0 +1,84 @@
+//! Numbers, quantities and times for people.
+
+/// The end of a noun that is counted.
+pub(crate) fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
+/// A number with so many significant digits, without zeros at its end.
+pub(crate) fn significant(value: f64, digits: i32) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    if !(1e-9..1e7).contains(&value.abs()) {
+        return format!("{value:.*e}", (digits - 1).max(0) as usize);
+    }
+    let decimals = (digits - 1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// A quantity with the prefix that suits its size.
+pub(crate) fn quantity(value: f64, si: &str) -> String {
+    if value >= 1e4 {
+        return format!("{:.3e} {si}", value);
+    }
+    let (unit, factor) = display_unit(value.abs(), si);
+    format!("{} {unit}", significant(value * factor, 4))
+}
+
+/// A frequency in a title or legend, to a microhertz: `80 Hz`.
+pub(crate) fn shown_hertz(frequency: f64) -> String {
+    let text = format!("{frequency:.6}");
+    format!("{} Hz", text.trim_end_matches('0').trim_end_matches('.'))
+}
+
+/// The unit in which `largest` (SI) lies between 0.5 and 500: its name and the factor from SI.
+pub(crate) fn display_unit(largest: f64, si: &str) -> (String, f64) {
+    for (prefix, factor) in [("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)] {
+        if largest * factor >= 0.5 {
+            return (format!("{prefix}{si}"), factor);
+        }
+    }
+    (si.to_owned(), 1.0)
+}
+
+/// A number of bytes for people: `4.2 GB`.
+pub fn bytes_text(bytes: u64) -> String {
+    let value = bytes as f64;
+    for (size, unit) in [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")] {
+        if value >= size {
+            let scaled = value / size;
+            return if scaled < 10.0 { format!("{scaled:.1} {unit}") } else { format!("{scaled:.0} {unit}") };
+        }
+    }
+    format!("{bytes} B")
+}
+
+/// A time for people, rounded as roughly as it is known.
+pub(crate) fn about(seconds: f64) -> String {
+    match seconds {
+        s if s < 1.0 => "below a second".to_owned(),
+        s if s < 100.0 => format!("about {} s", significant(s, 1)),
+        s if s < 2.0 * 3600.0 => format!("about {} minutes", significant(s / 60.0, 1)),
+        s if s < 48.0 * 3600.0 => format!("about {} hours", significant(s / 3600.0, 1)),
+        s => format!("about {} days", significant(s / 86_400.0, 1)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_as_many_digits_as_they_are_worth() {
+        assert_eq!([significant(121.2503, 5), significant(0.072_31, 2), significant(2.0, 4)], ["121.25", "0.072", "2"]);
+        assert_eq!([significant(12_345.6, 3), significant(1200.0, 3)], ["12346", "1200"]);
+        assert_eq!(significant(3.110_516e15, 3), "3.11e15");
+        assert_eq!(
+            [about(0.3), about(34.0), about(600.0), about(1e5), about(1e6)],
+            ["below a second", "about 34 s", "about 10 minutes", "about 28 hours", "about 12 days",]
+        );
+        assert_eq!([quantity(2e-4, "m"), quantity(2.0, "N"), quantity(4e4, "N")], ["200 µm", "2 N", "4.000e4 N"]);
+    }
+}

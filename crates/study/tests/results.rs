@@ -1,0 +1,290 @@
+//! Results as typed values: what is read back from a dataset is what closed forms and other kinds say.
+
+use std::f64::consts::TAU;
+use std::sync::{Arc, atomic::AtomicBool};
+use stickslip_study::dataset::{Dataset, Values};
+use stickslip_study::kinds::{hysteresis, performance, response};
+use stickslip_study::results::{ResultsError, worst_evidence};
+use stickslip_study::run::{Context, run};
+use stickslip_study::{Study, read_study};
+
+fn of(text: &str) -> (Study, Dataset) {
+    let study = read_study("study.toml", text, &[]).unwrap();
+    let dataset = run(&study, &Context::unwatched(1)).unwrap();
+    (study, dataset)
+}
+
+/// Two oscillators of 1 kg that know nothing of each other, of 1 N/m and `k` N/m, each moved by 1 N.
+fn oscillators(study: &str) -> (Study, Dataset) {
+    of(&format!(
+        r#"
+schema = 1
+title = "Two oscillators"
+[parameters]
+c = "0.2 kg/s"
+k = "4 N/m"
+[[mass]]
+name = "slow"
+mass = "1 kg"
+[[mass]]
+name = "fast"
+mass = "1 kg"
+[[spring]]
+between = ["slow", "ground"]
+stiffness = "1 N/m"
+damping = "c"
+[[spring]]
+between = ["fast", "ground"]
+stiffness = "k"
+damping = "c"
+[[force]]
+on = "slow"
+amplitude = "1 N"
+[[force]]
+on = "fast"
+amplitude = "1 N"
+[study]
+{study}
+"#
+    ))
+}
+
+const SWEEP: &str = r#"
+kind = "response"
+frequency = { from = "0.4 rad/s", to = "3 rad/s", points = 27 }
+vary = { k = ["4 N/m", "6 N/m"], c = ["0.2 kg/s", "0.4 kg/s"] }
+"#;
+
+/// Relative rounding of a linear orbit and of hertz to rad/s and back.
+const ROUNDING: f64 = 1e-9;
+/// Relative error of the frequency of a refined peak, around which the amplitude is flat.
+const PLACE: f64 = 1e-3;
+
+/// Every amplitude is `F/√((k - m ω²)² + (c ω)²)` of its own mass, case and frequency; every peak stands at `√(k/m - c²/(2 m²))`, and is
+/// `F/(c √(k/m - c²/(4 m²)))`.
+#[test]
+fn response_curves_are_those_of_their_case_and_mass() {
+    let (study, dataset) = oscillators(SWEEP);
+    let curves = response::curves(&study, &dataset).unwrap();
+    let expected = [(4.0, 0.2), (4.0, 0.4), (6.0, 0.2), (6.0, 0.4)];
+    assert_eq!(curves.len(), expected.len());
+    for (curve, (stiff, c)) in curves.iter().zip(expected) {
+        let varied: Vec<(&str, f64)> = curve.varied.iter().map(|v| (v.name.as_str(), v.si)).collect();
+        assert_eq!(varied, [("k", stiff), ("c", c)]);
+        assert_eq!(curve.frequency.len(), 27);
+        assert_eq!(curve.masses.len(), 2);
+        for (mass, (name, k)) in curve.masses.iter().zip([("slow", 1.0), ("fast", stiff)]) {
+            assert_eq!(mass.mass, name);
+            for (frequency, amplitude) in curve.frequency.iter().zip(&mass.amplitude) {
+                let w = TAU * frequency;
+                let exact = 1.0 / (k - w * w).hypot(c * w);
+                assert!((amplitude / exact - 1.0).abs() < ROUNDING, "{name} at {w} rad/s: {amplitude}, not {exact}");
+            }
+            let peak = mass.highest_peak().unwrap();
+            let exact = ((k - 0.5 * c * c).sqrt(), 1.0 / (c * (k - 0.25 * c * c).sqrt()));
+            assert!((TAU * peak.frequency / exact.0 - 1.0).abs() < PLACE, "{name}: {peak:?}, not at {}", exact.0);
+            assert!((peak.amplitude / exact.1 - 1.0).abs() < PLACE * PLACE, "{name}: {peak:?}, not {}", exact.1);
+            assert!(!peak.at_range_end);
+        }
+    }
+}
+
+#[test]
+fn curves_without_peaks_have_none() {
+    let (study, dataset) = oscillators(&format!("{SWEEP}peaks = false\n"));
+    let curves = response::curves(&study, &dataset).unwrap();
+    assert!(curves.iter().flat_map(|curve| &curve.masses).all(|mass| mass.peaks.is_empty()));
+    assert_eq!(curves.len(), 4);
+}
+
+/// Each loop loses `4 Ft (a - Ft/kt)` with the numbers of its own joint and case, whatever the frequency.
+#[test]
+fn loops_are_those_of_their_case_frequency_and_joint() {
+    let (study, dataset) = of(r#"
+schema = 1
+title = "Two joints"
+[parameters]
+a = "2 m"
+[[motion]]
+on = "mover"
+amplitude = "a"
+[[joint]]
+name = "weak"
+between = ["mover", "ground"]
+law = { kind = "jenkins", stiffness = "2 N/m", limit = "1 N" }
+[[joint]]
+name = "strong"
+between = ["mover", "ground"]
+law = { kind = "jenkins", stiffness = "4 N/m", limit = "3 N" }
+[study]
+kind = "hysteresis"
+frequency = ["1 Hz", "2 Hz"]
+vary = { a = ["2 m", "3 m"] }
+samples = 40
+"#);
+    let loops = hysteresis::loops(&study, &dataset).unwrap();
+    let mut expected = Vec::new();
+    for a in [2.0, 3.0] {
+        for frequency in [1.0, 2.0] {
+            expected.extend([("weak", 2.0, 1.0), ("strong", 4.0, 3.0)].map(|joint| (a, frequency, joint)));
+        }
+    }
+    assert_eq!(loops.len(), expected.len());
+    for (found, (a, frequency, (joint, kt, limit))) in loops.iter().zip(expected) {
+        assert_eq!((found.varied[0].name.as_str(), found.varied[0].si), ("a", a));
+        assert_eq!((found.frequency, found.joint.as_str()), (frequency, joint));
+        let loss = 4.0 * limit * (a - limit / kt);
+        assert!((found.dissipation / loss - 1.0).abs() < ROUNDING, "{joint}: {} J, not {loss} J", found.dissipation);
+        // ceq = loss/(π ω a²)
+        let damping = loss / (0.5 * TAU * TAU * frequency * a * a);
+        assert!((found.equivalent_damping / damping - 1.0).abs() < ROUNDING, "{joint}: {}", found.equivalent_damping);
+        assert!(found.equivalent_stiffness > 0.0 && found.equivalent_stiffness < kt);
+        let highest = |values: &[f64]| values.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
+        assert!((highest(&found.displacement) / a - 1.0).abs() < ROUNDING);
+        assert!((highest(&found.force) / limit - 1.0).abs() < ROUNDING);
+        let period = found.time[found.time.len() - 1];
+        assert!(found.time[0] == 0.0 && (period * frequency - 1.0).abs() < ROUNDING && found.time.is_sorted());
+        assert_eq!((found.displacement.len(), found.force.len()), (found.time.len(), found.time.len()));
+    }
+}
+
+/// A study of one frequency has no column of it.
+#[test]
+fn a_loop_knows_the_only_frequency() {
+    let (study, dataset) = of(stickslip_study::templates::find("element").unwrap().study);
+    let loops = hysteresis::loops(&study, &dataset).unwrap();
+    for found in &loops {
+        let period = found.time[found.time.len() - 1];
+        assert!((period * found.frequency - 1.0).abs() < ROUNDING, "{} Hz, {period} s", found.frequency);
+    }
+    assert_eq!(loops.len(), study.cases());
+}
+
+fn couple(kind: &str, vary: &str) -> Study {
+    let text = format!(
+        r#"
+schema = 1
+title = "Couple"
+[model]
+template = "blade-couple"
+[study]
+kind = "{kind}"
+frequency = {{ from = "120 Hz", to = "121.5 Hz", points = 31 }}
+vary = {{ {vary} }}
+"#
+    );
+    read_study("couple.toml", &text, &[]).unwrap()
+}
+
+/// Two refinements of one peak end within this of each other.
+const REFINED: f64 = 1e-9;
+
+/// A point of a performance curve is the peak of the response with the same parameters, and so is the optimum.
+#[test]
+fn performance_curves_are_made_of_the_peaks_of_responses() {
+    let study = couple("performance", r#"kt = ["8000 N/m", "10000 N/m"], Ft = ["4 N", "6.5 N", "9 N"]"#);
+    let dataset = run(&study, &Context::unwatched(1)).unwrap();
+    let curves = performance::curves(&study, &dataset).unwrap();
+    let peak_of_response = |kt: f64, limit: f64| {
+        let study = couple("response", &format!(r#"kt = ["{kt} N/m"], Ft = ["{limit} N"]"#));
+        let dataset = run(&study, &Context::unwatched(1)).unwrap();
+        response::curves(&study, &dataset).unwrap()[0].masses[0].highest_peak().unwrap()
+    };
+    assert_eq!(curves.len(), 2);
+    for (curve, kt) in curves.iter().zip([8000.0, 10000.0]) {
+        assert_eq!(curve.points.len(), 3);
+        for (point, limit) in curve.points.iter().zip([4.0, 6.5, 9.0]) {
+            let varied: Vec<(&str, f64)> = point.varied.iter().map(|v| (v.name.as_str(), v.si)).collect();
+            assert_eq!(varied, [("kt", kt), ("Ft", limit)]);
+            let (peak, expected) = (point.peak.unwrap(), peak_of_response(kt, limit));
+            assert!((peak.amplitude / expected.amplitude - 1.0).abs() < REFINED, "{peak:?}, not {expected:?}");
+            assert!((peak.frequency / expected.frequency - 1.0).abs() < PLACE, "{peak:?}, not {expected:?}");
+            assert!(!peak.at_range_end);
+            assert_eq!(point.failed_orbits, 0);
+        }
+        // with the soft contact the peak still falls at the highest limit, so that the curves are told apart
+        let Some(optimum) = curve.optimum else {
+            assert_eq!(kt, 8000.0);
+            continue;
+        };
+        assert_eq!(kt, 10000.0);
+        let expected = peak_of_response(kt, optimum.value);
+        assert!((optimum.amplitude / expected.amplitude - 1.0).abs() < REFINED, "{optimum:?}, not {expected:?}");
+        assert!((optimum.frequency / expected.frequency - 1.0).abs() < PLACE, "{optimum:?}, not {expected:?}");
+        assert!(curve.points.iter().all(|point| point.peak.unwrap().amplitude >= optimum.amplitude));
+    }
+}
+
+/// The peak of a damped oscillator falls with its damping alone: no optimum.
+#[test]
+fn a_curve_that_only_falls_has_no_optimum() {
+    let (study, dataset) = oscillators(
+        r#"
+kind = "performance"
+frequency = { from = "0.4 rad/s", to = "3 rad/s", points = 27 }
+vary = { c = ["0.1 kg/s", "0.2 kg/s", "0.3 kg/s"] }
+"#,
+    );
+    let curves = performance::curves(&study, &dataset).unwrap();
+    assert_eq!((curves.len(), curves[0].points.len()), (1, 3));
+    assert_eq!(curves[0].optimum, None);
+}
+
+/// A run that was stopped before it began has no results, and that is no error.
+#[test]
+fn an_interrupted_run_has_what_was_finished() {
+    let stopped = |kind: &str| {
+        let study = couple(kind, r#"Ft = ["4 N", "6 N", "8 N"]"#);
+        let context = Context { stop: Arc::new(AtomicBool::new(true)), ..Context::unwatched(1) };
+        let dataset = run(&study, &context).unwrap();
+        assert!(dataset.record.interrupted);
+        (study, dataset)
+    };
+    let (study, dataset) = stopped("response");
+    assert_eq!(response::curves(&study, &dataset), Ok(Vec::new()));
+    let (study, dataset) = stopped("performance");
+    assert_eq!(performance::curves(&study, &dataset), Ok(Vec::new()));
+    let (study, dataset) = stopped("hysteresis");
+    assert_eq!(hysteresis::loops(&study, &dataset), Ok(Vec::new()));
+}
+
+#[test]
+fn what_is_not_the_result_of_the_study_is_refused() {
+    let (study, dataset) = oscillators(SWEEP);
+    let wrong_kind = hysteresis::loops(&study, &dataset).unwrap_err();
+    assert!(wrong_kind.to_string().contains("`study` is of the kind `response`"), "{wrong_kind}");
+    // without a column, or with one cut short
+    let mut broken = dataset.clone();
+    broken.tables[0].columns.retain(|column| column.name != "fast_amplitude_m");
+    let column = response::curves(&study, &broken).unwrap_err();
+    assert!(column.to_string().contains("`curve` of `study` has no whole column `fast_amplitude_m`"), "{column}");
+    let mut broken = dataset.clone();
+    let Values::Number(values) = &mut broken.tables[1].columns[3].values else {
+        panic!("k, c, mass, then the frequency")
+    };
+    values.pop();
+    assert!(matches!(response::curves(&study, &broken), Err(ResultsError::Column { .. })));
+    // of other cases
+    let (other, _) = oscillators(&SWEEP.replace("6 N/m", "7 N/m"));
+    let rows = response::curves(&other, &dataset).unwrap_err();
+    assert!(matches!(rows, ResultsError::Rows { .. }), "{rows}");
+}
+
+/// The largest number of a column over all tables, NaN apart.
+#[test]
+fn the_worst_evidence_is_the_largest() {
+    let (_, mut dataset) = oscillators(SWEEP);
+    let (mut largest, mut least) = (0.0f64, f64::INFINITY);
+    for column in dataset.tables[0].columns.iter_mut().filter(|column| column.name == "energy_gap") {
+        let Values::Number(values) = &mut column.values else { panic!("a gap is a number") };
+        values[3] = 0.5;
+        values[4] = f64::NAN;
+        values.iter().for_each(|value| (largest, least) = (largest.max(*value), least.min(*value)));
+    }
+    assert!(least < 0.5);
+    let evidence = worst_evidence(&dataset);
+    assert_eq!(evidence.energy_gap, Some(largest));
+    assert!(evidence.residual.unwrap() < 1e-6);
+    dataset.tables.clear();
+    assert_eq!(worst_evidence(&dataset).residual, None);
+}
