@@ -5,6 +5,7 @@ use crate::law::{Law, MOST_DIRECTIONS, RatePoint, Relative, StepPoint};
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use std::f64::consts::PI;
 
 /// Rounds of the fixed-point iteration; it only has to come near.
 const ROUNDS: usize = 60;
@@ -22,10 +23,15 @@ pub(crate) struct Guess {
 /// Complex stiffness at amplitude `a`, directions × directions, N/m.
 fn linearised(law: &dyn Law, a: f64, omega: f64) -> DMatrix<Complex64> {
     let d = law.directions();
-    if d > 1 && law.prox().is_none() {
-        return at_rest(law, omega);
-    }
-    DMatrix::from_diagonal_element(d, d, law.linearised(a, omega))
+    let along = match law.prox() {
+        _ if d == 1 => law.linearised(a, omega),
+        None => return at_rest(law, omega),
+        Some(prox) => {
+            let rigid = Complex64::new(0.0, 4.0 * law.scale() / (PI * a));
+            rigid / (1.0 + rigid * prox.compliance())
+        }
+    };
+    DMatrix::from_diagonal_element(d, d, along)
 }
 
 /// Complex stiffness of small motions about rest, directions × directions, N/m; zero of a law that tells none.

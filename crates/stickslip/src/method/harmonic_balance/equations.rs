@@ -55,6 +55,10 @@ pub(super) struct Level {
     pub(super) penalty: Vec<f64>,
     /// Motion of the axes without friction, [axis][harmonic].
     pub linear: Vec<Complex64>,
+    /// Mean of the imposed motion along the axes, m.
+    imposed: Vec<f64>,
+    /// Compliances in series with the axes, m/N.
+    series: Vec<f64>,
     /// Motion of all places without friction, per harmonic.
     pub free: Vec<DVector<Complex64>>,
     /// In place of receptance and Jacobian, for large systems.
@@ -137,6 +141,8 @@ impl Level {
             receptance: Vec::new(),
             penalty: vec![0.0; ports.len()],
             linear: vec![ZERO; nh * axes],
+            imposed: vec![0.0; axes],
+            series: ports.iter().flat_map(|port| vec![port.series; port.axes]).collect(),
             free: Vec::new(),
             tangents: vec![0.0; tangents],
             blocks,
@@ -193,6 +199,12 @@ impl Level {
                 self.linear[q * nh + k] = axis.along_complex(&free) + axis.imposed_at(h as u32);
             }
             self.free.push(free);
+        }
+        for (q, imposed) in self.imposed.iter_mut().enumerate() {
+            *imposed = ports.axis(system, q).imposed_at(0).re;
+        }
+        for port in ports.iter() {
+            self.series[port.range()].fill(port.series);
         }
         if !ports.has_forces() {
             return;
@@ -485,6 +497,12 @@ impl Level {
         if let Some(jacobian) = jacobian {
             jacobian.copy_from_slice(&self.jacobian);
         }
+    }
+
+    /// Mean of the joint's motion by the degrees of freedom alone, along an axis, m.
+    pub fn mean(&self, q: usize, motion: &Motion) -> f64 {
+        let at = q * self.harmonics().len();
+        motion.c[at].re + self.series[q] * motion.force[at].re - self.imposed[q]
     }
 
     /// The unknowns of a motion, see [`Level::residual_at`].

@@ -21,7 +21,12 @@ pub(super) fn places(level: &mut Level, rest: &Rest, omega: f64, motion: &Motion
         .map(|k| {
             let forces = rest.spread(|q| motion.force[q * nh + k]);
             let Some(sparse) = &mut level.sparse else {
-                return &level.free[k] - rest.respond(level.harmonics()[k], omega, &forces);
+                let h = level.harmonics()[k];
+                let mut x = &level.free[k] - rest.respond(h, omega, &forces);
+                if h == 0 {
+                    rest.settle(omega, &mut x, |q| level.mean(q, motion));
+                }
+                return x;
             };
             let mut x = level.free[k].clone();
             let mut moved = x.clone();

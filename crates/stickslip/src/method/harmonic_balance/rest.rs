@@ -16,6 +16,9 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// frequency: its mean is arbitrary otherwise. The motion changes by the square of it.
 pub(super) const HOLD: f64 = 1e-5;
 
+/// Share of the largest static receptance below which springs hold a direction, if any is held by [`HOLD`] alone.
+const HELD: f64 = 1e-5;
+
 /// Harmonics that nobody samples.
 const HIGHEST: f64 = 1e6;
 
@@ -123,6 +126,21 @@ impl Rest {
             }
         }
         x
+    }
+
+    /// Moves the mean positions `x` (length n) so that they are `along` the axes what the ports know. Where only laws hold a direction, positions
+    /// are the small difference of large ones, and rounding of the forces would move them.
+    pub fn settle(&self, omega: f64, x: &mut DVector<Complex64>, along: impl Fn(usize) -> f64) {
+        let q = self.direction.ncols();
+        let off = DVector::from_fn(q, |a, _| {
+            along(a) - self.direction.column(a).iter().zip(x.iter()).map(|(w, x)| w * x.re).sum::<f64>()
+        });
+        let receptance = self.receptance(0, omega).map(|r| r.re);
+        let largest = receptance.amax();
+        // only along what nothing else holds
+        let Ok(inverse) = receptance.pseudo_inverse(HELD * largest) else { return };
+        let force = (inverse * off).map(|f| Complex64::new(f, 0.0));
+        *x += self.respond(0, omega, &self.spread(|a| force[a]));
     }
 
     /// The harmonics next to the resonances above harmonic `top`.

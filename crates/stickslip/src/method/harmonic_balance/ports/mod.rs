@@ -13,6 +13,8 @@ mod prox;
 mod rate;
 mod sliders;
 mod step;
+#[cfg(test)]
+mod tests;
 
 pub(super) use alternation::Alternation;
 use prox::Rigid;
@@ -73,7 +75,11 @@ impl Port {
 
     /// Whether the kernel itself tells slip from stick, sample by sample ([`Alternation::slips`]).
     pub fn tells_slip(&self) -> bool {
-        matches!(self.kernel, Kernel::Sliders(_) | Kernel::Rigid(_))
+        match &self.kernel {
+            Kernel::Sliders(parts) => parts.iter().all(|part| matches!(part, Part::Slider { .. })),
+            Kernel::Rigid(_) => true,
+            _ => false,
+        }
     }
 
     /// Numbers of its axes among those of all ports.
