@@ -162,6 +162,7 @@ impl<'a> BranchEquations<'a> {
             judge: Some(&mut self.judge),
         };
         path::orbit(context, &mut self.level, &self.motion, places)
+            .filter(|orbit| orbit.evidence.energy_gap <= super::UNBALANCED)
     }
 
     /// The orbit at `value` that Newton's method finds from the point `x` nearby.

@@ -137,6 +137,9 @@ impl Rest {
         });
         let receptance = self.receptance(0, omega).map(|r| r.re);
         let largest = receptance.amax();
+        if largest == 0.0 {
+            return; // every axis is moved
+        }
         // only along what nothing else holds
         let Ok(inverse) = receptance.pseudo_inverse(HELD * largest) else { return };
         let force = (inverse * off).map(|f| Complex64::new(f, 0.0));

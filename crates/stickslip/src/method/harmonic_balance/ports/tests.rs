@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::law::{BoucWen, Cubic, Dahl, Gap, Jenkins, Law, LawInfo, Rate, RateLaw, Relative, Step, StepLaw};
+use crate::method::Method;
 use crate::method::harmonic_balance::HarmonicBalance;
 use crate::method::shooting::Shooting;
-use crate::method::Method;
 use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
 use crate::orbit::Orbit;
 use crate::structure::Structure;
