@@ -1,10 +1,10 @@
 //! The equations of harmonic balance with a parameter, for continuation.
 
 use super::equations::{Level, Motion, transfer};
-use super::judge::Judge;
 use super::ports::Ports;
 use super::rest::Rest;
 use super::{Compared, HarmonicBalance, Kept, LARGEST, TOLERANCE, estimate, path};
+use crate::method::evidence::Judge;
 use crate::method::guess::Guess;
 use crate::method::{MethodError, OrbitError};
 use crate::model::System;
