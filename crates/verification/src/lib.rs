@@ -4,6 +4,7 @@
 //! written apart from the library's own.
 
 pub mod reference;
+pub mod replay;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
