@@ -251,7 +251,8 @@ impl<'a> Shooter<'a> {
             let closed = closed?;
             iterations += closed.iterations;
             let moved: Vec<f64> = closed.state.iter().zip(&state).map(|(a, b)| a - b).collect();
-            if norm(&self.weights, &moved) <= SETTLED * self.tolerance * self.size(&closed.state, aim) || mesh == MESHES {
+            if norm(&self.weights, &moved) <= SETTLED * self.tolerance * self.size(&closed.state, aim) || mesh == MESHES
+            {
                 // the last run of the iteration was that of the closed state
                 return Ok(Closed { iterations, ..closed });
             }

@@ -307,7 +307,8 @@ impl Orbit {
         }
         let Ok(measured) = measure::measure(system, &sampled, omega, (Symmetry::FullPeriod, period));
         let size = measured.places.iter().map(|place| place.maximum.abs().max(place.minimum.abs())).fold(0.0, f64::max);
-        let apart = |a: &[f64], sign: f64, b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - sign * b).abs() > CLOSES * size);
+        let apart =
+            |a: &[f64], sign: f64, b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - sign * b).abs() > CLOSES * size);
         let rated = |sample: Sample| -> Vec<f64> {
             sample.displacement.into_iter().chain(sample.velocity.into_iter().map(|v| v / omega)).collect()
         };

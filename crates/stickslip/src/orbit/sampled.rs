@@ -7,11 +7,8 @@ use num_complex::Complex64;
 use std::convert::Infallible;
 
 /// Nodes and weights of Gauss and Legendre on [0, 1], exact to degree 5.
-const GAUSS: [(f64, f64); 3] = [
-    (0.112_701_665_379_258_31, 5.0 / 18.0),
-    (0.5, 8.0 / 18.0),
-    (0.887_298_334_620_741_7, 5.0 / 18.0),
-];
+const GAUSS: [(f64, f64); 3] =
+    [(0.112_701_665_379_258_31, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 /// Intervals of a period, and at least two between switches: harmonics up to the twentieth are then integrated to 1e-9.
 const INTERVALS: f64 = 512.0;
 
