@@ -130,7 +130,8 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
             match joint.law().rate() {
                 Some(rate) if port.is_force() => {
                     let mut z = vec![0.0; rate.states()];
-                    rate.state_under((0..nh).map(|k| motion.force[port.first * nh + k].re).sum(), &mut z);
+                    // the sampled force is within the law's bounds, which that of the series may pass
+                    rate.state_under(alternation.force[0][0], &mut z);
                     states.extend(z);
                 }
                 _ if port.is_force() => {}
