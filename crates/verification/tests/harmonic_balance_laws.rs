@@ -125,9 +125,11 @@ fn every_law_has_small_and_large_orbits() {
             continue;
         };
         let orbit = solver.orbit(OMEGA, None).unwrap_or_else(|error| panic!("{} {share}: {error}", info.name));
-        assert!(
-            orbit.evidence.energy_gap < 1e-6
-                && orbit.joints[0].dissipation > -1e-12 * orbit.energy.work_in.abs().max(1e-12)
-        );
+        // what is left where rigid friction holds all is rounding
+        let unit = FORCE * FORCE * share * share / STIFFNESS;
+        let energy = orbit.energy;
+        let gap = (energy.work_in - energy.viscous - energy.friction).abs();
+        assert!(gap < 1e-6 * energy.work_in.abs() + 1e-12 * unit, "{} {share}: {energy:?}", info.name);
+        assert!(energy.friction > -1e-9 * unit, "{} {share}: {energy:?}", info.name);
     }
 }

@@ -161,8 +161,7 @@ impl<'a> BranchEquations<'a> {
             tolerance: self.tolerance,
             judge: Some(&mut self.judge),
         };
-        path::orbit(context, &mut self.level, &self.motion, places)
-            .filter(|orbit| orbit.evidence.energy_gap <= super::UNBALANCED)
+        path::orbit(context, &mut self.level, &self.motion, places).filter(|orbit| path::balances(&self.system, orbit))
     }
 
     /// The orbit at `value` that Newton's method finds from the point `x` nearby.

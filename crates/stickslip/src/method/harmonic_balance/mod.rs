@@ -91,9 +91,6 @@ const COLD: usize = 15;
 /// doubling leaves four tenths of the error, between order 1 (one half) and 3/2 (a third): both are observed. Without rigid friction
 /// it leaves next to nothing.
 const RIGID_SHARE: f64 = 1.7;
-/// Energy gap beyond which a solution is no orbit: where the equations hold, energies balance to the residual, but for a resonance without
-/// damping, whose receptance has no number.
-const UNBALANCED: f64 = 1e-2;
 /// Samples per period, at least, and per harmonic. Sliders and stops need them to tell turning points apart only; sampled laws have errors of
 /// about 1e-6 of their force.
 const SAMPLES: usize = 1024;
@@ -393,7 +390,7 @@ impl Balance<'_> {
         };
         let level = self.levels.get_mut(&top).expect("solved");
         let orbit = path::orbit(context, level, &motion, x).ok_or(OrbitError::Drift { method: NAME, omega })?;
-        if orbit.evidence.energy_gap > UNBALANCED {
+        if !path::balances(self.system, &orbit) {
             let lost = Lost { iterations: motion.iterations, residual: orbit.evidence.energy_gap };
             return Err(self.lost(omega, lost));
         }

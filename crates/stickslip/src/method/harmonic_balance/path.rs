@@ -222,6 +222,22 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     })
 }
 
+/// Energy gap beyond which a solution is no orbit: where the equations hold, energies balance to the residual, but for a resonance without
+/// damping, whose receptance has no number.
+const UNBALANCED: f64 = 1e-2;
+/// Energies below this fraction of what the loads could store in the structure are those of rounding: all is stuck.
+const STILL: f64 = 1e-9;
+
+/// Whether the energies of an orbit balance, or are none.
+pub(super) fn balances(system: &System, orbit: &Orbit) -> bool {
+    let structure = system.structure();
+    let stiff = structure.stiffness().amax().max(orbit.omega * orbit.omega * structure.mass().amax());
+    let loads: f64 = system.excitation(orbit.omega).iter().map(|(_, load)| load.norm_squared()).sum();
+    let Energy { work_in, viscous, friction } = orbit.energy;
+    let balance = (work_in - viscous - friction).abs();
+    orbit.evidence.energy_gap <= UNBALANCED || balance <= STILL * loads / stiff.max(f64::MIN_POSITIVE)
+}
+
 /// Work below this fraction of what the loads could do is no yardstick for the energy gap: the motion is conservative.
 const NO_WORK: f64 = 1e-6;
 

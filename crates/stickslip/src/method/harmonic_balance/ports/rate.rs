@@ -14,7 +14,9 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 /// Newton iterations of one step; three are usual.
-const ITERATIONS: usize = 20;
+const ITERATIONS: usize = 60;
+/// Longest change in an iteration, relative to the size of states: some states are logarithms of what they stand for.
+const LONGEST: f64 = 2.0;
 /// Change of the stages, relative to the size of states, at which a step is solved: its square is rounding.
 const SOLVED: f64 = 1e-9;
 /// Coefficients of Radau IIA of order 3; its stages lie at a third of the step and at its end.
@@ -177,13 +179,16 @@ impl RateMarch<'_> {
                 before[s] + length * pull - self.stage[row]
             });
             let lu = matrix.lu();
-            let Some(change) = lu.solve(&right) else { return false };
-            self.stage += &change;
-            factor = Some(lu);
+            let Some(mut change) = lu.solve(&right) else { return false };
             let size = change.amax();
             if !size.is_finite() {
                 return false;
             }
+            if size > LONGEST * scale {
+                change *= LONGEST * scale / size;
+            }
+            self.stage += &change;
+            factor = Some(lu);
             if size <= SOLVED * scale {
                 break;
             }

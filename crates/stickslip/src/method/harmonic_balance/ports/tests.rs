@@ -65,7 +65,7 @@ impl StepLaw for Plane {
     }
     fn advance<S: Real>(&self, from: &[S; 3], to: &[S; 3], z: &mut [S]) -> [S; 3] {
         for a in 0..2 {
-            z[a] = z[a] + (to[a] - from[a]) * STIFFNESS;
+            z[a] += (to[a] - from[a]) * STIFFNESS;
         }
         let size = (z[0] * z[0] + z[1] * z[1]).sqrt();
         if size.re() > LIMIT {
