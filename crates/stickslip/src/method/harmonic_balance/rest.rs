@@ -137,8 +137,9 @@ impl Rest {
         });
         let receptance = self.receptance(0, omega).map(|r| r.re);
         let largest = receptance.amax();
-        if largest == 0.0 {
-            return; // every axis is moved
+        let unheld = free_fraction(ZERO, omega).re / self.mass.amax();
+        if largest == 0.0 || largest < HELD * unheld {
+            return; // springs hold all that moves, or nothing does
         }
         // only along what nothing else holds
         let Ok(inverse) = receptance.pseudo_inverse(HELD * largest) else { return };

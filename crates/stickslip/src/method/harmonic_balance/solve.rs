@@ -13,9 +13,9 @@ const ITERATIONS: usize = 60;
 const MOST_RAISING: usize = 200;
 /// Newton iterations in all while they are lowered; a few hundred are usual.
 const MOST_ITERATIONS: usize = 3000;
-/// Residual at which a search that comes no closer has found all that there is: the force of a sampled slider behind a spring moves in
-/// steps when a switch passes a sample, by 1e-8 to 1e-7 of the forces, far below what the series leaves out.
-const STEPS: f64 = 1e-7;
+/// Residual at which a search that comes no closer has found all that there is: forces are differentiable functions of the harmonics, and what is
+/// left is the rounding of structures whose springs are far apart.
+const ROUNDED: f64 = 1e-8;
 /// Iterations without half of the least residual after which a search comes no closer.
 const PATIENCE: usize = 8;
 /// Halvings of a step.
@@ -49,7 +49,7 @@ impl Level {
         // the residual that is to be halved, and for how long it was not
         let (mut mark, mut waited) = (residual, 0);
         for _ in 0..most {
-            if self.is_exhausted() || residual <= SOLVED || (waited > PATIENCE && least <= STEPS) {
+            if self.is_exhausted() || residual <= SOLVED || (waited > PATIENCE && least <= ROUNDED) {
                 break;
             }
             if !self.newton_step(ports, ease, length) {
@@ -95,7 +95,7 @@ impl Level {
             residual = self.evaluate(ports, omega, motion, ease, length, false);
         }
         motion.residual = residual;
-        if residual <= SOLVED || (waited > PATIENCE && residual <= STEPS) {
+        if residual <= SOLVED || (waited > PATIENCE && residual <= ROUNDED) {
             Ok(())
         } else {
             Err(Lost { iterations: motion.iterations, residual })

@@ -35,6 +35,7 @@ pub(in super::super) struct Alternation {
     pub(super) moment: Vec<f64>,
     pub(super) intervals: Vec<super::sliders::Interval>,
     pub(super) extremes: Vec<super::sliders::Extreme>,
+    pub(super) grid: super::sliders::Grid,
     pub(super) march: super::march::Memory,
 }
 
@@ -62,6 +63,7 @@ impl Alternation {
             row: vec![ZERO; harmonics.len()],
             intervals: Vec::new(),
             extremes: Vec::new(),
+            grid: super::sliders::Grid::new(top),
             march: super::march::Memory::default(),
             harmonics,
         }

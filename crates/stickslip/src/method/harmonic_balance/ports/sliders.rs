@@ -10,6 +10,7 @@
 use super::alternation::{Alternation, ZERO, add_block, add_entries, as_block, pair};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
+use stickslip_numerics::fourier::Fourier;
 
 /// One of the parts that stand side by side.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,6 +74,26 @@ pub(in super::super) struct Extreme {
     value: f64,
 }
 
+/// Where a motion is looked at to tell its turning points apart.
+#[derive(Debug, Clone)]
+pub(in super::super) struct Grid {
+    fourier: Fourier,
+    pairs: Vec<(usize, Complex64)>,
+    value: Vec<f64>,
+    slope: Vec<f64>,
+}
+
+/// Points of the grid for every harmonic, at least: between two of them the motion is a cubic but for a thousandth of the highest harmonic.
+const POINTS: usize = 8;
+
+impl Grid {
+    /// For harmonics up to `top`.
+    pub fn new(top: usize) -> Self {
+        let points = (POINTS * (top + 1)).next_power_of_two();
+        Grid { fourier: Fourier::new(points), pairs: Vec::new(), value: vec![0.0; points], slope: vec![0.0; points] }
+    }
+}
+
 /// Newton iterations for an event; three are usual, and where they lead astray the middle between bounds is taken.
 const ITERATIONS: usize = 60;
 /// Distance of an event from its last iterate, in samples, that is rounding.
@@ -87,10 +108,7 @@ struct Series<'a> {
 
 impl Series<'_> {
     fn at(&self, theta: f64) -> (f64, f64, f64) {
-        let first = self.harmonics[0];
-        let gap = self.harmonics.get(1).map_or(0, |h| h - first);
-        let mut turn = Complex64::cis(first as f64 * theta);
-        let step = Complex64::cis(gap as f64 * theta);
+        let (mut turn, step) = turns(self.harmonics, theta);
         let (mut value, mut slope, mut bend) = (0.0, 0.0, 0.0);
         for (&h, c) in self.harmonics.iter().zip(self.c) {
             let h = h as f64;
@@ -156,6 +174,7 @@ impl Alternation {
     /// Samples of the force, of slip, and the forces of the sliders at t = 0.
     pub(super) fn sample_slides(&mut self, parts: &[Part], c: &[Complex64]) {
         self.find(c);
+        self.synthesise(c, |_| Complex64::new(1.0, 0.0));
         self.state.clear();
         self.force[0].fill(0.0);
         self.slips.fill(false);
@@ -179,41 +198,51 @@ impl Alternation {
         self.harmonics = harmonics;
     }
 
-    /// The motion's samples, and its turning points.
+    /// The motion on the grid that tells its turning points apart, and these.
     fn find(&mut self, c: &[Complex64]) {
-        self.synthesise(c, |_| Complex64::new(1.0, 0.0));
-        let n = self.samples();
+        let Grid { fourier, pairs, value, slope } = &mut self.grid;
+        pairs.clear();
+        pairs.extend(self.harmonics.iter().copied().zip(c.iter().copied()));
+        fourier.synthesise(pairs, value);
+        for pair in pairs.iter_mut() {
+            pair.1 *= Complex64::new(0.0, pair.0 as f64);
+        }
+        fourier.synthesise(pairs, slope);
         let series = Series { harmonics: &self.harmonics, c };
-        let u = &self.signal;
+        let n = value.len();
         let angle = TAU / n as f64;
         self.extremes.clear();
-        // the direction of the motion that leads to sample 0
-        let step_to = |i: usize| u[i % n] - u[i - 1];
-        let mut rising = (1..=n).rev().map(step_to).find(|step| *step != 0.0).unwrap_or(0.0);
-        if rising == 0.0 || !rising.is_finite() {
-            return;
-        }
+        let extremes = &mut self.extremes;
+        let mut add = |(low, high): (f64, f64), start: f64, sign: f64| {
+            let at = series.zero((low, high), start, sign, PLACED * angle, |series, theta| {
+                let (_, slope, bend) = series.at(theta);
+                (slope, bend)
+            });
+            extremes.push(Extreme { at, value: series.at(at).0 });
+        };
         for i in 0..n {
-            let step = step_to(i + 1);
-            if step * rising < 0.0 {
-                let middle = i as f64 * angle;
-                // where the slope falls, it is below zero at the end
-                let at = series.zero(
-                    (middle - angle, middle + angle),
-                    middle,
-                    step.signum(),
-                    PLACED * angle,
-                    |series, theta| {
-                        let (_, slope, bend) = series.at(theta);
-                        (slope, bend)
-                    },
-                );
-                // neighbours in time stay so
-                let at = self.extremes.last().map_or(at, |last| at.max(last.at));
-                self.extremes.push(Extreme { at, value: series.at(at).0 });
-                rising = step;
-            } else if step != 0.0 {
-                rising = step;
+            let (u, v) = (value[i], slope[i] * angle);
+            let next = if i + 1 == n { 0 } else { i + 1 };
+            let (w, z) = (value[next], slope[next] * angle);
+            let low = i as f64 * angle;
+            if (v > 0.0) != (z > 0.0) {
+                add((low, low + angle), low + angle * v / (v - z), if z > 0.0 { 1.0 } else { -1.0 });
+                continue;
+            }
+            // a pair between two samples: the slope of Hermite's cubic is v + 2 p s + 3 q s², 0 < s < 1
+            let (p, q) = (3.0 * (w - u) - 2.0 * v - z, v + z - 2.0 * (w - u));
+            let under = p * p - 3.0 * q * v;
+            if q == 0.0 || under <= 0.0 || p * q >= 0.0 {
+                continue;
+            }
+            // the slope has its own extreme, on the other side of zero, between them
+            let middle = -p / (3.0 * q);
+            let theta = low + angle * middle;
+            if middle < 1.0 && (series.at(theta).1 > 0.0) != (v > 0.0) {
+                let spread = angle * under.sqrt() / (3.0 * q.abs());
+                let sign = if v > 0.0 { -1.0 } else { 1.0 };
+                add((low, theta), theta - spread, sign);
+                add((theta, low + angle), theta + spread, -sign);
             }
         }
     }
@@ -304,7 +333,7 @@ impl Alternation {
             }
         }
         let Some((first, mut begin)) = opened else {
-            if self.signal[0] > gap {
+            if self.grid.value[0] > gap {
                 self.intervals.push(closed(0.0, TAU));
             }
             return;
@@ -327,9 +356,9 @@ impl Alternation {
 
     /// The phase between two neighbouring turning points at which the motion passes `value`, upwards or downwards.
     fn passage(&self, series: Series, (before, after): (f64, f64), value: f64, upwards: f64) -> f64 {
-        let n = self.samples() as isize;
+        let n = self.grid.value.len() as isize;
         let angle = TAU / n as f64;
-        let u = |i: isize| self.signal[i.rem_euclid(n) as usize];
+        let u = |i: isize| self.grid.value[i.rem_euclid(n) as usize];
         // samples strictly between, by halving
         let (mut low, mut high) = ((before / angle).floor() as isize, (after / angle).ceil() as isize);
         while high - low > 1 {
@@ -369,16 +398,22 @@ impl Alternation {
                 *force += integral * interval.offset;
             }
             let Some(tangent) = tangent.as_deref_mut() else { continue };
-            let anchor = |h: usize| match interval.anchor {
-                Anchor::At(phase) => Complex64::cis(h as f64 * phase),
-                Anchor::Mean if h == 0 => Complex64::new(1.0, 0.0),
-                _ => ZERO,
-            };
-            if matches!(interval.anchor, Anchor::Nothing) {
-                continue;
-            }
-            for (value, &h) in self.row.iter_mut().zip(harmonics) {
-                *value = anchor(h) * -interval.stiffness;
+            let by = Complex64::new(-interval.stiffness, 0.0);
+            match interval.anchor {
+                Anchor::Nothing => continue,
+                Anchor::Mean => {
+                    self.row.fill(ZERO);
+                    if harmonics[0] == 0 {
+                        self.row[0] = by;
+                    }
+                }
+                Anchor::At(phase) => {
+                    let (mut turn, step) = turns(harmonics, phase);
+                    for value in &mut self.row {
+                        *value = turn * by;
+                        turn *= step;
+                    }
+                }
             }
             // δu* = Re(row δU) = row.re x - row.im y
             for (a, (&h, f)) in harmonics.iter().zip(&self.column).enumerate() {
@@ -399,6 +434,23 @@ impl Alternation {
             }
             force[a] += if h == 0 { Complex64::new(0.5 * sum.re, 0.0) } else { sum };
         }
+    }
+}
+
+/// `e^{jhθ}` of the first harmonic, and what leads from each to the next.
+#[inline]
+fn turns(harmonics: &[usize], theta: f64) -> (Complex64, Complex64) {
+    let first = harmonics[0];
+    let gap = harmonics.get(1).map_or(0, |h| h - first);
+    let step = Complex64::cis(gap as f64 * theta);
+    // 0, 1, … and 1, 3, … need one rotation alone
+    match (first, gap) {
+        (0, _) => (Complex64::new(1.0, 0.0), step),
+        (1, 2) => {
+            let turn = Complex64::cis(theta);
+            (turn, turn * turn)
+        }
+        _ => (Complex64::cis(first as f64 * theta), step),
     }
 }
 
