@@ -61,6 +61,11 @@ pub(crate) fn of(
     }
 }
 
+/// Whether all that a law has are sliders without a limit.
+pub(crate) fn carries_nothing(law: &crate::law::SharedLaw) -> bool {
+    law.sliders().is_some_and(|sliders| sliders.is_empty())
+}
+
 /// Which flow a system is followed by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
@@ -77,7 +82,10 @@ impl Kind {
             return Kind::Exact;
         }
         let regular = |law: &crate::law::SharedLaw| width.and_then(|width| law.regularised(width));
-        if all(&|law| regular(law).as_ref().unwrap_or(law).rate().is_some()) { Kind::Smooth } else { Kind::Incremental }
+        // a law that carries nothing has a rate without saying so
+        let smooth =
+            |law: &crate::law::SharedLaw| regular(law).as_ref().unwrap_or(law).rate().is_some() || carries_nothing(law);
+        if all(&smooth) { Kind::Smooth } else { Kind::Incremental }
     }
 }
 
@@ -360,6 +368,14 @@ mod tests {
         let along = |row: usize| vec![Axis::new(vec![(row, 1.0)])];
         let rigid: SharedLaw = Arc::new(Coulomb { limit: 0.3 });
         let system = system(&[(rigid, along(0)), (Arc::new(Sample::Relaxing), along(1))]);
+        // a joint that carries nothing is in nobody's way
+        let idle: SharedLaw = Arc::new(Coulomb { limit: 0.0 });
+        let beside = self::system(&[(idle, along(0)), (Arc::new(Sample::Relaxing), along(1))]);
+        assert_eq!(Kind::of(&beside, None), Kind::Smooth);
+        let alone = shoot(&self::system(&[(Arc::new(Sample::Relaxing), along(1))]), 1.3);
+        let orbit = shoot(&beside, 1.3);
+        near(orbit.places[0].amplitude(), alone.places[0].amplitude(), 1e-12);
+        assert_eq!((orbit.joints[0].dissipation, orbit.joints[0].slip_fraction), (0.0, 1.0));
         let refused = Shooting::default().solver(&system).map(|_| ()).unwrap_err().to_string();
         assert!(refused.contains("`coulomb` of joint `j0`") && refused.contains("width"), "{refused}");
         let smoothed = Shooting { width: Some(1e-3), ..Shooting::default() };

@@ -315,7 +315,16 @@ impl<'a> Shooter<'a> {
         let search = self.search;
         let mut count = FIRST * self.periods;
         self.set_count(count);
-        let mut coarse = search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
+        // steps that are too long for a law's states are no reason to give up
+        let mut coarse = loop {
+            match search.find(self, start, |shooter| shooter.first_state(aim.omega), aim) {
+                Err(OrbitError::Breakdown { cause: Breakdown::Stalled { .. }, .. }) if count < MOST => {
+                    count *= 2;
+                    self.set_count(count);
+                }
+                found => break found?,
+            }
+        };
         let mut earlier = None;
         loop {
             count *= 2;

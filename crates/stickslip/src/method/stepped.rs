@@ -280,9 +280,12 @@ impl Signals for SteppedPath {
         Ok(self.range_of(|step| self.relative_ends(step, axis)))
     }
     fn slip(&self, joint: usize) -> (f64, usize) {
-        let slips = |(i, node): (usize, &Node)| {
-            if node.contact[joint].slips() { self.steps.node(i).1 } else { 0.0 }
+        // both sums run in one order, so that a joint that always slips has a share of exactly one
+        let time = |counts: &dyn Fn(&Node) -> bool| -> f64 {
+            let nodes = self.steps.values.iter().enumerate();
+            nodes.map(|(i, node)| if counts(node) { self.steps.node(i).1 } else { 0.0 }).sum()
         };
+        let share = time(&|node| node.contact[joint].slips()) / time(&|_| true);
         let count = self.steps.nodes.len();
         let at_end = |step: usize| self.steps.values[(step + 1) * count - 1].contact[joint];
         let steps = self.steps.spans.len();
@@ -292,6 +295,6 @@ impl Signals for SteppedPath {
             let before = if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last };
             switches += usize::from(before != at_end(0));
         }
-        (self.steps.values.iter().enumerate().map(slips).sum(), switches)
+        (share, switches)
     }
 }

@@ -36,7 +36,7 @@ pub(crate) trait Signals {
     fn range(&self, row: usize) -> Result<(f64, f64), Self::Error>;
     /// Least and largest relative displacement along an axis, m.
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Self::Error>;
-    /// How long a joint slips in the return, s, and how often that, or its direction, changes.
+    /// In which share of the return a joint slips, and how often that, or its direction, changes.
     fn slip(&self, joint: usize) -> (f64, usize);
 }
 
@@ -93,7 +93,7 @@ pub(crate) fn measure<S: Signals>(
         joints.push(JointMotion {
             name: joint.name().to_owned(),
             dissipation: times * dissipation,
-            slip_fraction: times * slipping / period,
+            slip_fraction: slipping,
             displacement,
             switches: switches * if half { 2 } else { 1 },
         });

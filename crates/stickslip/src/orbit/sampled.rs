@@ -120,8 +120,12 @@ impl Signals for Sampled<'_> {
     }
     fn slip(&self, joint: usize) -> (f64, usize) {
         let contact = |i: usize| self.samples[i % self.nodes.len()].joints[joint].contact;
-        let slipping = (0..self.nodes.len()).filter(|&i| contact(i).slips()).map(|i| self.nodes[i].1).sum();
-        (slipping, (0..self.nodes.len()).filter(|&i| contact(i) != contact(i + 1)).count())
+        // both sums run in one order, so that a joint that always slips has a share of exactly one
+        let time = |counts: &dyn Fn(usize) -> bool| -> f64 {
+            (0..self.nodes.len()).map(|i| if counts(i) { self.nodes[i].1 } else { 0.0 }).sum()
+        };
+        let share = time(&|i| contact(i).slips()) / time(&|_| true);
+        (share, (0..self.nodes.len()).filter(|&i| contact(i) != contact(i + 1)).count())
     }
 }
 

@@ -89,6 +89,8 @@ const ITERATIONS: usize = 60;
 const STRIDE: f64 = 2.0;
 /// A change below this fraction of the size of the states ends the iteration.
 const SMALL: f64 = 1e-13;
+/// One below this is good enough where rounding keeps the iteration from coming closer.
+const ENOUGH: f64 = 1e-9;
 
 impl Follower {
     /// Of a law that has [`states`].
@@ -278,7 +280,7 @@ impl Follower {
         let (directions, states, width) = (self.directions, self.states, self.arguments());
         let Some(rate) = law.rate() else { return false };
         let half = 0.5 * h;
-        let mut found = states == 0;
+        let (mut found, mut previous) = (states == 0, f64::INFINITY);
         for _ in 0..ITERATIONS {
             rate.linearise(directions, to, &self.state, &mut self.after);
             let matrix = self.lu.zeros(states);
@@ -304,7 +306,8 @@ impl Follower {
                 return false;
             }
             let largest = self.state.iter().fold(self.state_scale, |size, z| size.max(z.abs())) / self.state_scale;
-            found = size <= SMALL * largest;
+            found = size <= SMALL * largest || (size <= ENOUGH && size >= previous);
+            previous = size;
         }
         if !found {
             return false;

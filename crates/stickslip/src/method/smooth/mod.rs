@@ -8,6 +8,7 @@ pub(crate) mod step;
 
 use super::MethodError;
 use super::assembly::Assembly;
+use super::flow::carries_nothing;
 use crate::model::System;
 
 /// A system as this integration sees it; `width` (m/s) smooths laws that can be smoothed.
@@ -20,6 +21,7 @@ pub(crate) fn assembly(system: &System, width: Option<f64>, method: &'static str
         let (states, scale) = law
             .rate()
             .map(|rate| (rate.states(), rate.state_scale()))
+            .or_else(|| carries_nothing(&law).then_some((0, 1.0)))
             .ok_or("a law with a rate view, or give the method a `width` (m/s) over which friction changes its sign")?;
         Ok((law, states, scale))
     })
