@@ -5,6 +5,8 @@
 //! (letting the transient die) always comes closer, and Newton goes on from there.
 
 use super::{Breakdown, OrbitError};
+use crate::model::System;
+use crate::orbit::Symmetry;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::eigen;
 
@@ -58,6 +60,14 @@ pub(crate) enum Search {
 }
 
 impl Search {
+    /// The return that is closed. A stuck contact keeps its offset, which half a period would mirror for ever: who waits, waits for whole periods.
+    pub fn symmetry(self, system: &System, periods: usize) -> Symmetry {
+        match self {
+            Search::Newton => Symmetry::of(system, periods),
+            Search::Settle { .. } => Symmetry::FullPeriod,
+        }
+    }
+
     /// From the state of a neighbouring orbit if there is one of the right length and it leads anywhere, else from a first guess.
     pub fn find<M: ReturnMap>(
         self,

@@ -90,8 +90,7 @@ impl Method for Settling {
         NAME
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        // an odd system returns twice a period
-        let returns = if system.is_odd() { 2 * self.periods } else { self.periods }.div_ceil(self.period);
+        let returns = self.periods.div_ceil(self.period);
         let search = Search::Settle { tolerance: self.tolerance, returns };
         if Kind::of(system, self.width) == Kind::Exact {
             return Ok(Box::new(Exact::new(system, NAME, search, self.period)?));

@@ -391,7 +391,7 @@ impl Solver for Shooter<'_> {
         self.weights = flow.weights();
         let rest = NEAR_REST * flow.energy_scale();
         flow.keep(false);
-        let symmetry = Symmetry::of(self.system, self.periods);
+        let symmetry = self.search.symmetry(self.system, self.periods);
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
         self.omega = omega;
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;

@@ -170,7 +170,7 @@ impl Solver for Exact<'_> {
         let drive = Drive::new(self.system, &self.flow.mechanics.owners(), omega);
         self.flow.set_drive(drive);
         self.weights = weights(&self.flow.mechanics, omega);
-        let symmetry = Symmetry::of(self.system, self.periods);
+        let symmetry = self.search.symmetry(self.system, self.periods);
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
         let (name, search) = (self.name, self.search);
