@@ -17,6 +17,10 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Work below this fraction of (force times velocity) of the period is no yardstick for the energy gap: the motion is conservative.
 const NO_WORK: f64 = 1e-6;
 
+/// Work below this fraction of the stored energy is none either: an orbit that is closed to `CLOSED` of its state may have gained or lost that
+/// much, and the gap that this makes must stay below what is allowed.
+const STORED: f64 = super::CLOSED / super::ENERGY_GAP;
+
 /// The closed-form segments of one return, with all that is needed to evaluate them.
 #[derive(Debug, Clone)]
 pub(crate) struct ExactPath {
@@ -36,14 +40,14 @@ struct Piece {
     at_end: Vec<Complex64>,
 }
 
-/// Makes the orbit of the flow's last run.
+/// Makes the orbit of the flow's last run, which began at the state `closed` with the energy `stored`, J.
 pub(super) fn orbit(
     system: &Arc<System>,
     contracts: bool,
     flow: &Flow,
     omega: f64,
     symmetry: Symmetry,
-    closed: Closed,
+    (closed, stored): (Closed, f64),
 ) -> Result<Orbit, Breakdown> {
     let path = ExactPath::new(system.clone(), flow, symmetry, std::f64::consts::TAU / omega);
     let places = path.places(omega)?;
@@ -55,7 +59,8 @@ pub(super) fn orbit(
         .filter(|(motion, _)| motion.slip_fraction == 0.0)
         .map(|(_, j)| j.name().to_owned());
     let rest = super::NEAR_REST * flow.energy_scale;
-    let reference = energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive)).max(NO_WORK * rest * rest);
+    let reference =
+        energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive)).max(NO_WORK * rest * rest).max(STORED * stored);
     let balance = energy.work_in - energy.viscous - energy.friction;
     Ok(Orbit {
         method: NAME,
