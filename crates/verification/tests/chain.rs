@@ -51,7 +51,7 @@ fn exact_law(limit: f64) -> SharedLaw {
 
 fn shoot(model: &Model, tolerance: f64) -> Orbit {
     let system = model.assemble().unwrap();
-    Shooting { tolerance, width: None }.solver(&system).unwrap().orbit(OMEGA, None).unwrap()
+    Shooting { tolerance, width: None, ..Shooting::default() }.solver(&system).unwrap().orbit(OMEGA, None).unwrap()
 }
 
 /// Excitation under which several joints slip: all blades, each with its own phase (an engine order).
@@ -115,7 +115,7 @@ fn chain_of_eight_exact_against_smooth() {
         let size = reference.places.iter().map(|place| place.first_harmonic.norm()).fold(0.0, f64::max);
         let distance = |alpha: f64| {
             let system = chain(&forces, smooth_law(alpha)).assemble().unwrap();
-            let mut solver = Shooting { tolerance: 1e-8, width: None }.solver(&system).unwrap();
+            let mut solver = Shooting { tolerance: 1e-8, width: None, ..Shooting::default() }.solver(&system).unwrap();
             let orbit = solver.orbit(OMEGA, Some(&start_near(&reference, alpha))).unwrap();
             assert!(orbit.evidence.energy_gap < 1e-7 && orbit.evidence.residual < 1e-9, "{:?}", orbit.evidence);
             let pairs = orbit.places.iter().zip(&reference.places);

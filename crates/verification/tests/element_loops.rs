@@ -23,7 +23,7 @@ fn element(kt: f64, a: f64, omega: f64) -> Orbit {
 
 /// A smooth orbit, with errors per step of 1e-11.
 fn smooth(system: &stickslip::model::System, omega: f64) -> Orbit {
-    let method = Shooting { tolerance: 1e-11, width: None };
+    let method = Shooting { tolerance: 1e-11, width: None, ..Shooting::default() };
     method.solver(system).unwrap().orbit(omega, None).unwrap()
 }
 

@@ -205,7 +205,7 @@ fn regularised_tends_to_exact() {
             .iter()
             .map(|width| {
                 let system = moved(law.regularised(*width).unwrap(), motion.clone()).assemble().unwrap();
-                let method = Shooting { tolerance: 1e-11, width: None };
+                let method = Shooting { tolerance: 1e-11, width: None, ..Shooting::default() };
                 let loss = method.solver(&system).unwrap().orbit(omega, None).unwrap().energy.friction;
                 (loss / reference - 1.0).abs()
             })

@@ -152,7 +152,7 @@ fn theory_6_5_sensitivity_to_alpha() {
     for (alpha, printed) in [(25_000.0, 1.0039), (250.0, 0.9959), (25.0, 0.9683), (2.5, 0.8648)] {
         let law = |limit| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha }) };
         let system = template_with("blade-couple", &[("Ft", 2.0)], law);
-        let mut solver = Shooting { tolerance: 1e-8, width: None }.solver(&system).unwrap();
+        let mut solver = Shooting { tolerance: 1e-8, width: None, ..Shooting::default() }.solver(&system).unwrap();
         let mut start: Option<Vec<f64>> = None;
         let amplitude = |hertz: f64| {
             let orbit = solver.orbit(TAU * hertz, start.as_deref()).unwrap();

@@ -17,7 +17,7 @@ fn couple(ft: f64, alpha: f64) -> System {
 }
 
 fn shoot(system: &System, omega: f64, tolerance: f64) -> Orbit {
-    Shooting { tolerance, width: None }.solver(system).unwrap().orbit(omega, None).unwrap()
+    Shooting { tolerance, width: None, ..Shooting::default() }.solver(system).unwrap().orbit(omega, None).unwrap()
 }
 
 /// Amplitudes, phases, energies and the state at t = 0 of three orbits, one of them in stick-slip.
@@ -148,7 +148,7 @@ fn smooth_orbit_tends_to_the_exact_one() {
 #[test]
 fn width_is_one_over_alpha() {
     let system = template("blade-couple", &[("Ft", 4.0)]);
-    let method = Shooting { tolerance: 1e-9, width: Some(1.0 / 25e3) };
+    let method = Shooting { tolerance: 1e-9, width: Some(1.0 / 25e3), ..Shooting::default() };
     let smoothed = method.solver(&system).unwrap().orbit(TAU * 120.75, None).unwrap();
     let smooth = shoot(&couple(4.0, 25e3), TAU * 120.75, 1e-9);
     for (a, b) in smoothed.places.iter().zip(&smooth.places) {

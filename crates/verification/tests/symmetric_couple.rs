@@ -81,7 +81,7 @@ fn theory_4_1_sum_of_the_blades_is_linear_for_the_smooth_law() {
         for (ft, hertz) in [(2.0, 120.93), (4.0, 121.1), (1.0, 120.5)] {
             let law = |limit| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha }) };
             let system = template_with("symmetric-couple", &[("Ft", ft), ("mu", MU[0])], law);
-            let method = Shooting { tolerance: 1e-10, width: None };
+            let method = Shooting { tolerance: 1e-10, width: None, ..Shooting::default() };
             let orbit = method.solver(&system).unwrap().orbit(TAU * hertz, None).unwrap();
             check_sum(&orbit, MU[0], hertz, 1e-7);
         }

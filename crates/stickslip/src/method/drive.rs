@@ -1,6 +1,6 @@
 //! The excitation at one drive frequency, as functions of time.
 
-use crate::model::System;
+use crate::model::{Axis, System};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
@@ -15,41 +15,44 @@ pub(crate) struct Drive {
     pub forces: Vec<DVector<Complex64>>,
     /// Constant force, N.
     pub constant: DVector<f64>,
-    /// Imposed relative motion per harmonic and contact, m (without its constant part, which changes nothing).
+    /// Imposed relative motion per harmonic and contact, m (without its constant part).
     pub imposed: Vec<Vec<Complex64>>,
+    /// The constant part, m: it changes nothing for friction, only for laws that know a position.
+    pub offset: Vec<f64>,
 }
 
 impl Drive {
-    /// `contacts` lists the joint that each contact (slider, or joint itself) belongs to.
+    /// `contacts` lists the axis that each contact (slider, or axis itself) acts along, among the axes of all joints.
     pub fn new(system: &System, contacts: &[usize], omega: f64) -> Self {
         let n = system.dofs();
         let excitation = system.excitation(omega);
         let mut harmonics: Vec<u32> = excitation.iter().map(|(h, _)| *h).collect();
-        harmonics.extend(
-            system
-                .joints()
-                .iter()
-                .flat_map(|joint| joint.axes().iter().flat_map(|axis| axis.imposed()).map(|(h, _)| *h)),
-        );
+        harmonics.extend(system.axes().flat_map(|(_, axis)| axis.imposed()).map(|(h, _)| *h));
         harmonics.extend(system.moved().iter().flat_map(|place| place.motion.iter().map(|(h, _)| *h)));
         harmonics.sort_unstable();
         harmonics.dedup();
         harmonics.retain(|&h| h > 0);
         let force_at = |h: u32| excitation.iter().find(|(k, _)| *k == h).map(|(_, f)| f.clone());
         let zero = || DVector::from_element(n, Complex64::new(0.0, 0.0));
-        let imposed_at =
-            |h: u32| contacts.iter().map(|&joint| system.joints()[joint].axes()[0].imposed_at(h)).collect();
+        let axes: Vec<&Axis> = system.axes().map(|(_, axis)| axis).collect();
+        let imposed_at = |h: u32| -> Vec<Complex64> { contacts.iter().map(|&axis| axes[axis].imposed_at(h)).collect() };
         Drive {
             omega,
             rates: harmonics.iter().map(|&h| f64::from(h) * omega).collect(),
             forces: harmonics.iter().map(|&h| force_at(h).unwrap_or_else(zero)).collect(),
             constant: force_at(0).map_or_else(|| DVector::zeros(n), |f| f.map(|z| z.re)),
             imposed: harmonics.iter().map(|&h| imposed_at(h)).collect(),
+            offset: imposed_at(0).iter().map(|g| g.re).collect(),
         }
     }
 
+    /// At this frequency, or without a drive if it is zero.
+    pub fn at(system: &System, contacts: &[usize], omega: f64) -> Self {
+        if omega > 0.0 { Drive::new(system, contacts, omega) } else { Drive::without_harmonics(system, contacts) }
+    }
+
     /// No drive: only the constant forces are left.
-    pub fn without_harmonics(system: &System, contacts: &[usize]) -> Self {
+    fn without_harmonics(system: &System, contacts: &[usize]) -> Self {
         let mut drive = Drive::new(system, contacts, 0.0);
         drive.rates.clear();
         drive.forces.clear();
@@ -86,7 +89,30 @@ impl Drive {
         }
     }
 
-    /// The k-th time derivative of the imposed motion of a contact.
+    /// Relative displacement, with its constant part, and velocity that are imposed on a contact.
+    pub fn relative_at(&self, contact: usize, time: f64) -> (f64, f64) {
+        let mut out = (self.offset[contact], 0.0);
+        for (rate, imposed) in self.rates.iter().zip(&self.imposed) {
+            let g = imposed[contact];
+            if g != Complex64::ZERO {
+                let (sin, cos) = (rate * time).sin_cos();
+                out.0 += g.re * cos - g.im * sin;
+                out.1 -= rate * (g.re * sin + g.im * cos);
+            }
+        }
+        out
+    }
+
+    /// Loads at `time` into `out`, length n.
+    pub fn load(&self, time: f64, out: &mut [f64]) {
+        out.copy_from_slice(self.constant.as_slice());
+        for (rate, force) in self.rates.iter().zip(&self.forces) {
+            let (sin, cos) = (rate * time).sin_cos();
+            out.iter_mut().zip(force.iter()).for_each(|(o, f)| *o += f.re * cos - f.im * sin);
+        }
+    }
+
+    /// The k-th time derivative of the imposed motion of a contact, without its constant part.
     pub fn imposed_at(&self, contact: usize, time: f64, derivative: u32) -> f64 {
         let moving = self.rates.iter().zip(&self.imposed).filter(|(_, g)| g[contact] != Complex64::new(0.0, 0.0));
         moving.map(|(rate, g)| (g[contact] * phasor(*rate, time, derivative)).re).sum()

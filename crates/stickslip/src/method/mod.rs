@@ -3,15 +3,21 @@
 //! A method is named with options in a study file; [`TABLE`] lists them. To add one: write its file, then one line in [`TABLE`].
 //! Of a [`Method`], [`Method::solver`] makes a [`Solver`] for one system, which keeps what can be reused from orbit to orbit.
 
+mod assembly;
 pub mod auto;
 mod drive;
 pub mod event_driven;
+mod evidence;
+mod exact_flow;
+mod flow;
 mod guess;
 pub mod harmonic_balance;
+mod incremental;
 mod periodic;
 pub mod settling;
 pub mod shooting;
 mod smooth;
+mod stepped;
 pub mod transient;
 
 use crate::dimension::Dimension;
@@ -167,6 +173,19 @@ pub enum Breakdown {
         /// The step, s.
         step: f64,
     },
+    /// Equal steps, however short, do not reach the tolerance.
+    #[error(
+        "{steps} steps leave an estimated error of {estimate:.1e} where {tolerance:.1e} is wanted; \
+         raise the tolerance, or soften what is far stiffer than the rest"
+    )]
+    Unresolved {
+        /// Steps of the finest attempt.
+        steps: usize,
+        /// Its error relative to the motion, estimated.
+        estimate: f64,
+        /// The error that was allowed.
+        tolerance: f64,
+    },
     /// Numbers leave the range of floating point, or what they need to be solved with.
     #[error("masses, springs and dampers are too far apart to compute with at t = {time:.6e} s; check their units")]
     OutOfRange {
@@ -280,6 +299,19 @@ pub struct MethodOption {
     pub count: bool,
     /// One line, with what happens when it is absent.
     pub doc: &'static str,
+}
+
+/// How many periods of the drive an orbit takes.
+const PERIOD: MethodOption = MethodOption {
+    key: "period",
+    dimension: Dimension::NONE,
+    count: true,
+    doc: "periods of the drive after which the motion repeats; motions that repeat earlier are found too; 1 when absent",
+};
+
+/// The option [`PERIOD`].
+fn periods(options: &Options) -> usize {
+    options.get(PERIOD.key).map_or(1, |periods| *periods as usize)
 }
 
 /// Options of a method that were given, by key, SI.

@@ -1,13 +1,14 @@
 //! Brute force: the motion is followed until its transient has died.
 //!
-//! Exact laws are followed by events, smooth ones by stiff integration. What is still missing when the search stops is estimated from the
+//! Exact laws are followed by events, smooth ones by stiff integration, others and mixtures in equal steps. What is still missing when the search stops is estimated from the
 //! measured decay and reported as the orbit's truncation: a lightly damped structure needs hundreds of periods per digit, and a smooth law
 //! creeps for seconds. It needs no derivative and no luck, so it is an independent check of the other methods.
 
 use super::event_driven::Exact;
+use super::flow::Kind;
 use super::periodic::Search;
-use super::shooting::{Shooting, Smooth};
-use super::{Method, MethodError, MethodInfo, MethodOption, Solver};
+use super::shooting::{Shooter, Shooting};
+use super::{Method, MethodError, MethodInfo, MethodOption, PERIOD, Solver, periods};
 use crate::dimension::Dimension;
 use crate::model::System;
 
@@ -41,6 +42,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             count: false,
             doc: "replaces exact laws by smooth ones that change sign over this velocity; exact laws are followed exactly when absent",
         },
+        PERIOD,
     ],
     build: |options| {
         let tolerance = options.get("tolerance").copied().unwrap_or(TOLERANCE);
@@ -48,8 +50,9 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             let message = format!("must lie between 1e-12 and 1e-2, found {tolerance}");
             return Err(MethodError::Option { method: NAME, key: "tolerance", message });
         }
-        let periods = options.get("periods").map_or(PERIODS, |periods| *periods as usize);
-        Ok(Box::new(Settling { tolerance, periods, width: options.get("width").copied() }))
+        let most = options.get("periods").map_or(PERIODS, |periods| *periods as usize);
+        let (width, period) = (options.get("width").copied(), periods(options));
+        Ok(Box::new(Settling { tolerance, periods: most, width, period }))
     },
 };
 
@@ -72,11 +75,13 @@ pub struct Settling {
     pub periods: usize,
     /// Velocity over which exact laws are smoothed, m/s; they are followed exactly without it.
     pub width: Option<f64>,
+    /// Periods of the drive after which the motion repeats.
+    pub period: usize,
 }
 
 impl Default for Settling {
     fn default() -> Self {
-        Settling { tolerance: TOLERANCE, periods: PERIODS, width: None }
+        Settling { tolerance: TOLERANCE, periods: PERIODS, width: None, period: 1 }
     }
 }
 
@@ -86,13 +91,12 @@ impl Method for Settling {
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         // an odd system returns twice a period
-        let returns = if system.is_odd() { 2 * self.periods } else { self.periods };
+        let returns = if system.is_odd() { 2 * self.periods } else { self.periods }.div_ceil(self.period);
         let search = Search::Settle { tolerance: self.tolerance, returns };
-        let exact = self.width.is_none() && system.joints().iter().all(|joint| joint.law().sliders().is_some());
-        if exact {
-            return Ok(Box::new(Exact::new(system, NAME, search)?));
+        if Kind::of(system, self.width) == Kind::Exact {
+            return Ok(Box::new(Exact::new(system, NAME, search, self.period)?));
         }
-        let options = Shooting { width: self.width, ..Shooting::default() };
-        Ok(Box::new(Smooth::new(system, options, NAME, search)?))
+        let options = Shooting { width: self.width, period: self.period, ..Shooting::default() };
+        Ok(Box::new(Shooter::new(system, options, NAME, search)?))
     }
 }

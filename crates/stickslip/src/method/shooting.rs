@@ -1,20 +1,24 @@
-//! Newton's method on the period of a stiff integration, for smooth laws.
+//! Newton's method on the period of an integration: stiff and of high order for smooth laws, in equal steps for laws that know only steps and for
+//! mixtures.
 //!
 //! The arctan law creeps in stick with time constants of seconds, so that waiting for a transient to die proves nothing; the
 //! return map of the integrator with its exact derivative is closed by Newton's method instead.
 
-use super::drive::Drive;
+use super::assembly::{Assembly, NEAR_REST};
 use super::event_driven::MISSING_WORK;
+use super::flow::{Flow, Kind};
 use super::guess::Guess;
+use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
 use super::periodic::{Aim, Closed, ReturnMap, Search, close, norm};
 use super::smooth::flow::SmoothFlow;
-use super::smooth::path;
-use super::smooth::step::Structure;
-use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver};
+use super::stepped::SteppedPath;
+use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, periods};
 use crate::dimension::Dimension;
 use crate::model::System;
-use crate::orbit::{Orbit, Symmetry};
+use crate::orbit::measure::measure;
+use crate::orbit::{Accuracy, Evidence, Orbit, Symmetry};
 use nalgebra::DMatrix;
+use std::sync::Arc;
 
 const NAME: &str = "shooting";
 
@@ -31,19 +35,24 @@ const MESHES: usize = 6;
 const SETTLED: f64 = 100.0;
 /// Energy gap above which an orbit is not reported as converged.
 const ENERGY_GAP: f64 = 1e-5;
-/// A state counts as rest below this fraction of what the loads could cause.
-const NEAR_REST: f64 = 1e-3;
+/// Error of an orbit in equal steps, in errors per step of the stiff integration: 1e-5 of the motion when no tolerance is given.
+const EQUAL_STEPS: f64 = 1e3;
+/// Residual at which an orbit in equal steps is closed.
+const CLOSED_STEPS: f64 = 1e-10;
+/// Returns by which a motion comes near an orbit that repeats after several periods, before Newton's method begins: it would find one that
+/// repeats after one period first.
+const APPROACH: usize = 60;
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
-    summary: "smooth laws: Newton on the period of a stiff integration, exact sensitivities",
+    summary: "smooth laws and laws of steps: Newton on the period of an implicit integration, exact sensitivities",
     options: &[
         MethodOption {
             key: "tolerance",
             dimension: Dimension::NONE,
             count: false,
-            doc: "relative error per step of the integration; 1e-8 when absent",
+            doc: "relative error per step of the integration, a thousandth of that of orbits in equal steps; 1e-8 when absent",
         },
         MethodOption {
             key: "width",
@@ -51,6 +60,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             count: false,
             doc: "replaces exact laws by smooth ones that change sign over this velocity; exact laws are refused when absent",
         },
+        PERIOD,
     ],
     build: |options| {
         let tolerance = options.get("tolerance").copied().unwrap_or(TOLERANCE);
@@ -58,7 +68,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             let message = format!("must lie between 1e-13 and 1e-3, found {tolerance}");
             return Err(MethodError::Option { method: NAME, key: "tolerance", message });
         }
-        Ok(Box::new(Shooting { tolerance, width: options.get("width").copied() }))
+        Ok(Box::new(Shooting { tolerance, width: options.get("width").copied(), period: periods(options) }))
     },
 };
 
@@ -81,11 +91,13 @@ pub struct Shooting {
     pub tolerance: f64,
     /// Velocity over which exact laws are smoothed, m/s; without it exact laws are refused.
     pub width: Option<f64>,
+    /// Periods of the drive after which the motion repeats.
+    pub period: usize,
 }
 
 impl Default for Shooting {
     fn default() -> Self {
-        Shooting { tolerance: TOLERANCE, width: None }
+        Shooting { tolerance: TOLERANCE, width: None, period: 1 }
     }
 }
 
@@ -94,107 +106,250 @@ impl Method for Shooting {
         NAME
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Ok(Box::new(Smooth::new(system, *self, NAME, Search::Newton)?))
+        Ok(Box::new(Shooter::new(system, *self, NAME, Search::Newton)?))
     }
 }
 
-/// Finds orbits by stiff integration, with either search.
-pub(super) struct Smooth<'a> {
+/// How the motion is integrated.
+enum Stepping {
+    Smooth(Box<SmoothFlow>),
+    Incremental(Box<IncrementalFlow>),
+}
+
+impl Stepping {
+    fn flow(&mut self) -> &mut dyn Flow {
+        match self {
+            Stepping::Smooth(flow) => flow.as_mut(),
+            Stepping::Incremental(flow) => flow.as_mut(),
+        }
+    }
+
+    fn assembly(&self) -> &Assembly {
+        match self {
+            Stepping::Smooth(flow) => &flow.assembly,
+            Stepping::Incremental(flow) => &flow.assembly,
+        }
+    }
+
+    fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
+        match self {
+            Stepping::Smooth(flow) => flow.stepped(system, symmetry, period),
+            Stepping::Incremental(flow) => flow.stepped(system, symmetry, period),
+        }
+    }
+}
+
+/// Finds orbits by integration, with either search.
+pub(super) struct Shooter<'a> {
     system: &'a System,
+    shared: Arc<System>,
     /// The method that it works for.
     name: &'static str,
     search: Search,
-    flow: SmoothFlow,
-    owners: Vec<usize>,
+    periods: usize,
+    tolerance: f64,
+    stepping: Stepping,
     weights: Vec<f64>,
     duration: f64,
     contracts: bool,
 }
 
-impl ReturnMap for Smooth<'_> {
+impl ReturnMap for Shooter<'_> {
     fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), Breakdown> {
-        self.flow.run(state, 0.0, self.duration, derivative)
+        let duration = self.duration;
+        self.stepping.flow().run(state, duration, derivative)
     }
     fn weights(&self) -> &[f64] {
         &self.weights
     }
 }
 
-impl<'a> Smooth<'a> {
+impl<'a> Shooter<'a> {
     /// # Errors
-    /// See [`Structure::new`].
+    /// A law that no integration takes, a place without mass.
     pub fn new(system: &'a System, options: Shooting, name: &'static str, search: Search) -> Result<Self, MethodError> {
-        let structure = Structure::new(system, options.width, name)?;
-        let weights = vec![1.0; structure.states()];
-        let owners = (0..system.joints().len()).collect();
-        let flow = SmoothFlow::new(structure, options.tolerance);
-        // smooth neighbours are passive where the exact laws are
-        let contracts = system.contracts();
-        Ok(Smooth { system, name, search, flow, owners, weights, duration: 0.0, contracts })
-    }
-
-    /// Weights of the energy norm; internal states count with the scale of the motion.
-    fn set_weights(&mut self, omega: f64) {
-        let structure = &self.flow.structure;
-        let n = structure.n;
-        for i in 0..n {
-            let inertia = omega * omega * structure.mass[(i, i)];
-            self.weights[i] = structure.stiffness[(i, i)].max(inertia).sqrt();
-            self.weights[n + i] = structure.mass[(i, i)].sqrt();
-        }
-        let energy = self.flow.drive.energy_scale(&structure.mass, &structure.stiffness);
-        self.weights[2 * n..].fill(if energy > 0.0 { NEAR_REST * energy } else { 1.0 });
+        let stepping = match Kind::of(system, options.width) {
+            Kind::Incremental => Stepping::Incremental(Box::new(IncrementalFlow::new(system, options.width, name)?)),
+            // exact laws, if they are meant to be smoothed, are told so by the assembly
+            Kind::Smooth | Kind::Exact => {
+                let assembly = super::smooth::assembly(system, options.width, name)?;
+                Stepping::Smooth(Box::new(SmoothFlow::new(assembly, options.tolerance)))
+            }
+        };
+        Ok(Shooter {
+            system,
+            shared: Arc::new(system.clone()),
+            name,
+            search,
+            periods: options.period,
+            tolerance: options.tolerance,
+            weights: vec![1.0; stepping.assembly().states()],
+            stepping,
+            duration: 0.0,
+            // smooth neighbours are passive where the exact laws are
+            contracts: system.contracts(),
+        })
     }
 
     fn first_state(&self, omega: f64) -> Vec<f64> {
-        let structure = &self.flow.structure;
-        let mut state = Guess::new(self.system, omega).state(structure.n);
-        state.resize(structure.states(), 0.0);
+        let assembly = self.stepping.assembly();
+        let mut state = Guess::new(self.system, omega).state(assembly.n);
+        state.resize(assembly.states(), 0.0);
         state
     }
-}
 
-impl Solver for Smooth<'_> {
-    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        if !(omega.is_finite() && omega > 0.0) {
-            return Err(OrbitError::Frequency { omega });
+    /// A state near a motion of several periods: that to which the first guess comes by itself.
+    fn approached(&mut self, omega: f64, sign: f64) -> Vec<f64> {
+        let mut state = self.first_state(omega);
+        for _ in 0..APPROACH {
+            let mut next = state.clone();
+            if self.returned(&mut next, None).is_err() || next.iter().any(|z| !z.is_finite()) {
+                break;
+            }
+            state = next.iter().map(|z| sign * z).collect();
         }
-        self.flow.drive = Drive::new(self.system, &self.owners, omega);
-        self.set_weights(omega);
-        let (symmetry, sign, share) =
-            if self.system.is_odd() { (Symmetry::HalfPeriod, -1.0, 0.5) } else { (Symmetry::FullPeriod, 1.0, 1.0) };
-        self.duration = share * std::f64::consts::TAU / omega;
-        let structure = &self.flow.structure;
-        let rest = NEAR_REST * self.flow.drive.energy_scale(&structure.mass, &structure.stiffness);
-        let (name, search) = (self.name, self.search);
-        let aim = Aim { method: name, omega, residual: NEAR, sign, rest };
-        (self.flow.record, self.flow.frozen) = (false, false);
-        let near = search.find(self, start, |smooth| smooth.first_state(omega), aim)?;
-        let broke = |cause| OrbitError::Breakdown { method: name, omega, cause };
-        // steps made for a state close the orbit only as well as they fit it: make them anew until that moves it no more
-        let mut closed = near;
+        state
+    }
+
+    fn broke(&self, omega: f64) -> impl Fn(Breakdown) -> OrbitError {
+        let method = self.name;
+        move |cause| OrbitError::Breakdown { method, omega, cause }
+    }
+
+    /// The orbit of the stiff integration: searched with steps that every run chooses anew, then closed on the steps of one run.
+    fn smooth_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
+        self.freeze(false);
+        let search = self.search;
+        let mut closed = search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
+        // steps made for a state close the orbit only as well as they fit it: make them anew until that moves it no more;
         // a settled motion is left as it is: nothing but time has found it
-        let meshes = if search == Search::Newton { MESHES } else { 0 };
+        let meshes = if self.search == Search::Newton { MESHES } else { 0 };
         for _ in 0..meshes {
-            self.flow.frozen = false;
-            self.flow.run(&mut closed.state.clone(), 0.0, self.duration, None).map_err(broke)?;
-            self.flow.frozen = true;
+            self.freeze(false);
+            self.returned(&mut closed.state.clone(), None).map_err(self.broke(aim.omega))?;
+            self.freeze(true);
             let again = close(self, &closed.state, Aim { residual: CLOSED, ..aim })?;
             let moved: Vec<f64> = again.state.iter().zip(&closed.state).map(|(a, b)| a - b).collect();
-            let size = norm(&self.weights, &again.state).max(rest).max(f64::MIN_POSITIVE);
-            let settled = norm(&self.weights, &moved) <= SETTLED * self.flow.tolerance * size;
+            let size = norm(&self.weights, &again.state).max(aim.rest).max(f64::MIN_POSITIVE);
+            let settled = norm(&self.weights, &moved) <= SETTLED * self.tolerance * size;
             closed = Closed { iterations: closed.iterations + again.iterations, ..again };
             if settled {
                 break;
             }
         }
-        self.flow.record = true;
-        let mut end = closed.state.clone();
-        self.flow.run(&mut end, 0.0, self.duration, None).map_err(broke)?;
-        let orbit = path::orbit((self.system, self.contracts), &self.flow, name, omega, symmetry, closed);
+        Ok(closed)
+    }
+
+    fn freeze(&mut self, frozen: bool) {
+        if let Stepping::Smooth(flow) = &mut self.stepping {
+            flow.frozen = frozen;
+        }
+    }
+
+    fn set_count(&mut self, count: usize) {
+        if let Stepping::Incremental(flow) = &mut self.stepping {
+            flow.count = count;
+        }
+    }
+
+    /// The orbit in equal steps, which are halved until that changes it by less than the tolerance.
+    fn stepped_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
+        let tolerance = EQUAL_STEPS * self.tolerance;
+        let aim = Aim { residual: CLOSED_STEPS, ..aim };
+        let search = self.search;
+        let mut count = FIRST * self.periods;
+        self.set_count(count);
+        let mut coarse = search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
+        let mut earlier = None;
+        loop {
+            count *= 2;
+            self.set_count(count);
+            let state = coarse.state.clone();
+            let fine = search.find(self, Some(&state), |shooter| shooter.first_state(aim.omega), aim)?;
+            let change: Vec<f64> = fine.state.iter().zip(&coarse.state).map(|(a, b)| a - b).collect();
+            let size = norm(&self.weights, &fine.state).max(aim.rest).max(f64::MIN_POSITIVE);
+            let last = norm(&self.weights, &change) / size;
+            let error = estimate(earlier, last);
+            let iterations = coarse.iterations + fine.iterations;
+            if error <= tolerance {
+                let missing = Some(error.max(fine.missing.unwrap_or(0.0)));
+                return Ok(Closed { iterations, missing, ..fine });
+            }
+            if count >= MOST {
+                let cause = Breakdown::Unresolved { steps: count, estimate: error, tolerance };
+                return Err(OrbitError::Breakdown { method: self.name, omega: aim.omega, cause });
+            }
+            (earlier, coarse) = (Some(last), Closed { iterations, ..fine });
+        }
+    }
+
+    /// Puts the orbit together from its last, kept run.
+    fn orbit_of(&self, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
+        let period = self.periods as f64 * std::f64::consts::TAU / omega;
+        let path = self.stepping.path(&self.shared, symmetry, period);
+        let Ok(measured) = measure(self.system, &path, omega, (symmetry, period));
+        Orbit {
+            method: self.name,
+            omega,
+            periods: self.periods,
+            symmetry,
+            start: closed.state,
+            evidence: Evidence {
+                residual: closed.residual,
+                energy_gap: measured.energy_gap(),
+                switches: measured.joints.iter().map(|joint| joint.switches).sum(),
+                iterations: closed.iterations,
+                truncation: closed.missing,
+                accuracy: Accuracy::Converged,
+                return_defect: Some(closed.residual),
+                stuck: measured.stuck,
+            },
+            places: measured.places,
+            joints: measured.joints,
+            energy: measured.energy,
+            return_map: closed.derivative,
+            contracts: self.contracts,
+            path: Arc::new(path),
+        }
+    }
+}
+
+impl Solver for Shooter<'_> {
+    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        if !(omega.is_finite() && omega > 0.0) {
+            return Err(OrbitError::Frequency { omega });
+        }
+        let flow = self.stepping.flow();
+        flow.set_drive(self.system, omega);
+        self.weights = flow.weights();
+        let rest = NEAR_REST * flow.energy_scale();
+        flow.keep(false);
+        let symmetry = Symmetry::of(self.system, self.periods);
+        let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
+        self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
+        let aim = Aim { method: self.name, omega, residual: NEAR, sign, rest };
+        let approached;
+        let known = start.filter(|state| state.len() == self.weights.len());
+        let start = if self.periods > 1 && known.is_none() {
+            self.freeze(false);
+            self.set_count(FIRST * self.periods);
+            approached = self.approached(omega, sign);
+            Some(approached.as_slice())
+        } else {
+            known
+        };
+        let closed = match self.stepping {
+            Stepping::Smooth(_) => self.smooth_orbit(start, aim)?,
+            Stepping::Incremental(_) => self.stepped_orbit(start, aim)?,
+        };
+        self.stepping.flow().keep(true);
+        let kept = self.returned(&mut closed.state.clone(), None);
+        self.stepping.flow().keep(false);
+        kept.map_err(self.broke(omega))?;
+        let orbit = self.orbit_of(omega, symmetry, closed);
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
-            return Err(OrbitError::Evidence { method: name, omega, energy_gap: orbit.evidence.energy_gap });
+            return Err(OrbitError::Evidence { method: self.name, omega, energy_gap: orbit.evidence.energy_gap });
         }
         Ok(orbit)
     }

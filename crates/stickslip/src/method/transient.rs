@@ -1,16 +1,11 @@
 //! Motion in time from given displacements: free decay, switched-on drive, run-up.
 //!
-//! Exact laws are followed by events, smooth laws by stiff integration, both in stretches of one drive period. In a run-up every
-//! cycle has its own frequency, constant over the cycle and continuous in phase, as in a stepped-sine test.
+//! Exact laws are followed by events, smooth laws by stiff integration, others and mixtures in equal steps, all in stretches of one drive
+//! period. In a run-up every cycle has its own frequency, constant over the cycle and continuous in phase, as in a stepped-sine test.
 
-use super::drive::Drive;
-use super::event_driven::{ExactPath, Flow, Mechanics};
-use super::smooth::flow::SmoothFlow;
-use super::smooth::path::SteppedPath;
-use super::smooth::step::Structure;
-use super::{Breakdown, MethodError};
+use super::{Breakdown, MethodError, flow};
 use crate::model::System;
-use crate::orbit::{Path, Sample, Symmetry};
+use crate::orbit::{Sample, Symmetry};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -72,12 +67,6 @@ pub enum TransientError {
     },
 }
 
-/// Either way to follow a motion.
-enum Runner {
-    Exact(Box<Flow>),
-    Smooth(Box<SmoothFlow>),
-}
-
 impl Transient {
     /// Computes the motion; `sample` receives time (s), drive frequency (rad/s, zero if free) and state, and stops the motion by
     /// returning false.
@@ -109,33 +98,20 @@ impl Transient {
         system: &System,
         sample: &mut dyn FnMut(f64, f64, &Sample) -> bool,
     ) -> Result<(), TransientError> {
-        let exact = self.width.is_none() && system.joints().iter().all(|joint| joint.law().sliders().is_some());
-        let (mut runner, contacts) = if exact {
-            let mechanics = Mechanics::new(system)?;
-            let owners = mechanics.owners();
-            (Runner::Exact(Box::new(Flow::new(mechanics, Drive::default()))), owners)
-        } else {
-            let structure = Structure::new(system, self.width, NAME)?;
-            let mut flow = SmoothFlow::new(structure, TOLERANCE);
-            flow.record = true;
-            (Runner::Smooth(Box::new(flow)), (0..system.joints().len()).collect())
-        };
+        let shared = Arc::new(system.clone());
+        let mut flow = flow::of(system, self.width, TOLERANCE, NAME)?;
+        flow.keep(true);
         let mut state = [self.displacement.as_slice(), &self.velocity].concat();
-        state.resize(runner.states(), 0.0);
+        state.resize(flow.states(), 0.0);
         let mut begin = 0.0;
         let mut next = 0usize; // index of the next sample
         let samples = (self.duration / self.step * (1.0 + f64::EPSILON)).floor() as usize;
         while next <= samples {
             let omega = self.frequency(begin);
             let length = if omega > 0.0 { TAU / omega } else { STRETCH as f64 * self.step };
-            let drive = if omega > 0.0 {
-                Drive::new(system, &contacts, omega)
-            } else {
-                Drive::without_harmonics(system, &contacts)
-            };
-            let path = runner
-                .stretch(system, drive, &mut state, length)
-                .map_err(|cause| TransientError::Breakdown { time: begin, cause })?;
+            flow.set_drive(system, omega);
+            flow.follow(&mut state, length).map_err(|cause| TransientError::Breakdown { time: begin, cause })?;
+            let path = flow.path(&shared, Symmetry::FullPeriod, length);
             let end = begin + length;
             while next <= samples && next as f64 * self.step < end {
                 let time = next as f64 * self.step;
@@ -170,37 +146,6 @@ impl Transient {
                 // the rest of the cycle has the last frequency
                 let turned = begin * left + 0.5 * rate * left * left;
                 TAU / (left + (TAU - turned) / to)
-            }
-        }
-    }
-}
-
-impl Runner {
-    fn states(&self) -> usize {
-        match self {
-            Runner::Exact(flow) => flow.mechanics.states(),
-            Runner::Smooth(flow) => flow.structure.states(),
-        }
-    }
-
-    /// Runs over one stretch from local time zero, where the drive has phase zero.
-    fn stretch(
-        &mut self,
-        system: &System,
-        drive: Drive,
-        state: &mut [f64],
-        length: f64,
-    ) -> Result<Box<dyn Path>, Breakdown> {
-        match self {
-            Runner::Exact(flow) => {
-                flow.set_drive(drive);
-                flow.run(state, 0.0, length, None)?;
-                Ok(Box::new(ExactPath::new(Arc::new(system.clone()), flow, Symmetry::FullPeriod, length)))
-            }
-            Runner::Smooth(flow) => {
-                flow.drive = drive;
-                flow.run(state, 0.0, length, None)?;
-                Ok(Box::new(SteppedPath::new(system, flow, Symmetry::FullPeriod, length)))
             }
         }
     }

@@ -3,10 +3,12 @@
 //! All methods return the same [`Orbit`]. Its numbers (amplitudes, energies, slip) are computed by the method that found it, in
 //! closed form where it can; [`Orbit::sample`] gives the motion at any time.
 
+pub(crate) mod measure;
 mod stability;
 
 pub use crate::law::Contact;
 use crate::law::MOST_DIRECTIONS;
+use crate::model::System;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 pub use stability::Stability;
@@ -20,6 +22,8 @@ pub struct Orbit {
     pub method: &'static str,
     /// Drive frequency Ω, rad/s.
     pub omega: f64,
+    /// Periods of the drive after which the motion repeats.
+    pub periods: usize,
     /// Whether the orbit was found as one with `x(t + T/2) = -x(t)` or over the full period.
     pub symmetry: Symmetry,
     /// State at t = 0: displacements (m), velocities (m/s), then the states of the joints. A start for neighbouring orbits.
@@ -49,7 +53,14 @@ pub enum Symmetry {
     FullPeriod,
 }
 
-/// Motion of one place over a period.
+impl Symmetry {
+    /// Of orbits that repeat after so many periods of the drive: an odd number of them has a half after which an odd excitation is mirrored.
+    pub(crate) fn of(system: &System, periods: usize) -> Symmetry {
+        if system.is_odd() && periods % 2 == 1 { Symmetry::HalfPeriod } else { Symmetry::FullPeriod }
+    }
+}
+
+/// Motion of one place over a period of the orbit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlaceMotion {
     /// Name.
@@ -90,7 +101,7 @@ pub struct JointMotion {
     pub switches: usize,
 }
 
-/// Energies per period, J.
+/// Energies per period of the orbit, J.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Energy {
     /// Work of the forces and of imposed motion.
@@ -138,6 +149,9 @@ pub struct Evidence {
     pub truncation: Option<f64>,
     /// Whether that is as little as was asked for.
     pub accuracy: Accuracy,
+    /// Distance between the state at t = 0 and where an independent flow brings it after a return, relative to the state, in the energy norm;
+    /// the residual itself where the orbit was found by a flow, `None` where no flow follows the system, or where it is too large.
+    pub return_defect: Option<f64>,
     /// Names of joints that stick for the whole period: their offset is not unique, the orbit is one of a continuum
     /// (the symmetric one, with [`Symmetry::HalfPeriod`]).
     pub stuck: Vec<String>,
@@ -197,9 +211,9 @@ pub(crate) trait Path: Send + Sync {
 }
 
 impl Orbit {
-    /// Period `T = 2π/Ω`, s.
+    /// Period of the motion: as many periods `2π/Ω` of the drive as [`Orbit::periods`] says, s.
     pub fn period(&self) -> f64 {
-        std::f64::consts::TAU / self.omega
+        self.periods as f64 * std::f64::consts::TAU / self.omega
     }
 
     /// The state at any time (s).
@@ -233,6 +247,7 @@ impl fmt::Debug for Orbit {
         f.debug_struct("Orbit")
             .field("method", &self.method)
             .field("omega", &self.omega)
+            .field("periods", &self.periods)
             .field("symmetry", &self.symmetry)
             .field("places", &self.places)
             .field("joints", &self.joints)

@@ -24,7 +24,7 @@ pub(crate) use path::ExactPath;
 use super::drive::Drive;
 use super::guess::Guess;
 use super::periodic::{Aim, ReturnMap, Search, norm};
-use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, Solver};
+use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, PERIOD, Solver, periods};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
 use nalgebra::DMatrix;
@@ -36,8 +36,11 @@ pub(crate) const NAME: &str = "event-driven";
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
     summary: "exact: closed-form motion between switches, Newton on the period",
-    options: &[],
-    build: |_| Ok(Box::new(EventDriven)),
+    options: &[PERIOD],
+    build: |options| match periods(options) {
+        1 => Ok(Box::new(EventDriven)),
+        period => Ok(Box::new(Subharmonic { period })),
+    },
 };
 
 /// Residual at which an orbit is closed, relative to its state: a hundred times the rounding of one period.
@@ -68,8 +71,41 @@ impl Method for EventDriven {
         NAME
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Ok(Box::new(Exact::new(system, NAME, Search::Newton)?))
+        Ok(Box::new(Exact::new(system, NAME, Search::Newton, 1)?))
     }
+}
+
+/// The exact method for motions that repeat after several periods of the drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Subharmonic {
+    /// Periods of the drive after which the motion repeats.
+    pub period: usize,
+}
+
+impl Method for Subharmonic {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        Ok(Box::new(Exact::new(system, NAME, Search::Newton, self.period)?))
+    }
+}
+
+/// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia.
+pub(crate) fn weights(mechanics: &Mechanics, omega: f64) -> Vec<f64> {
+    let n = mechanics.n;
+    let mut weights = vec![1.0; mechanics.states()];
+    for i in 0..n {
+        let inertia = omega * omega * mechanics.mass[(i, i)];
+        weights[i] = mechanics.stiffness[(i, i)].max(inertia).sqrt();
+        weights[n + i] = mechanics.mass[(i, i)].sqrt();
+    }
+    for slider in &mechanics.sliders {
+        if let (Some(s), Some(kt)) = (slider.state, slider.stiffness) {
+            weights[2 * n + s] = 1.0 / kt.sqrt();
+        }
+    }
+    weights
 }
 
 /// Finds orbits by exact motion, with either search.
@@ -83,6 +119,8 @@ pub(crate) struct Exact<'a> {
     flow: Flow,
     weights: Vec<f64>,
     duration: f64,
+    /// Periods of the drive after which the motion repeats.
+    periods: usize,
     contracts: bool,
 }
 
@@ -98,7 +136,12 @@ impl ReturnMap for Exact<'_> {
 impl<'a> Exact<'a> {
     /// # Errors
     /// See [`Mechanics::new`].
-    pub fn new(system: &'a System, name: &'static str, search: Search) -> Result<Self, MethodError> {
+    pub fn new(
+        system: &'a System,
+        name: &'static str,
+        search: Search,
+        periods: usize,
+    ) -> Result<Self, MethodError> {
         let mechanics = Mechanics::new(system)?;
         let weights = vec![1.0; mechanics.states()];
         let flow = Flow::new(mechanics, Drive::default());
@@ -110,24 +153,9 @@ impl<'a> Exact<'a> {
             flow,
             weights,
             duration: 0.0,
+            periods,
             contracts: system.contracts(),
         })
-    }
-
-    /// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia.
-    fn set_weights(&mut self, omega: f64) {
-        let mechanics = &self.flow.mechanics;
-        let n = mechanics.n;
-        for i in 0..n {
-            let inertia = omega * omega * mechanics.mass[(i, i)];
-            self.weights[i] = mechanics.stiffness[(i, i)].max(inertia).sqrt();
-            self.weights[n + i] = mechanics.mass[(i, i)].sqrt();
-        }
-        for slider in &mechanics.sliders {
-            if let (Some(s), Some(kt)) = (slider.state, slider.stiffness) {
-                self.weights[2 * n + s] = 1.0 / kt.sqrt();
-            }
-        }
     }
 
     fn first_state(&self, omega: f64) -> Vec<f64> {
@@ -146,17 +174,17 @@ impl Solver for Exact<'_> {
         }
         let drive = Drive::new(self.system, &self.flow.mechanics.owners(), omega);
         self.flow.set_drive(drive);
-        self.set_weights(omega);
-        let (symmetry, sign, share) =
-            if self.system.is_odd() { (Symmetry::HalfPeriod, -1.0, 0.5) } else { (Symmetry::FullPeriod, 1.0, 1.0) };
-        self.duration = share * std::f64::consts::TAU / omega;
+        self.weights = weights(&self.flow.mechanics, omega);
+        let symmetry = Symmetry::of(self.system, self.periods);
+        let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
+        self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
         let (name, search) = (self.name, self.search);
         let aim = Aim { method: name, omega, residual: CLOSED, sign, rest: NEAR_REST * self.flow.energy_scale };
         let closed = search.find(self, start, |exact| exact.first_state(omega), aim)?;
         let size = norm(&self.weights, &closed.state);
         let closed = (closed, size * size);
         // the last run of the iteration was that of the closed state: its segments are the orbit
-        let mut orbit = path::orbit(&self.shared, self.contracts, &self.flow, omega, symmetry, closed)
+        let mut orbit = path::orbit(&self.shared, self.contracts, &self.flow, (omega, self.periods), symmetry, closed)
             .map_err(|cause| OrbitError::Breakdown { method: name, omega, cause })?;
         orbit.method = name;
         // a motion that has settled but for an estimated rest is out of balance by that rest
@@ -179,7 +207,7 @@ mod tests {
     fn orbits_without_any_loss_balance() {
         let (mass, stiffness, amplitude) = (0.182, 105_103.0, 10.0);
         let model = Model {
-            masses: vec![Mass { name: "m".into(), mass }],
+            masses: vec![Mass::new("m", mass)],
             springs: vec![Spring { between: ["m".into(), GROUND.into()], stiffness, damping: 0.0 }],
             forces: vec![Force { on: "m".into(), amplitude, phase: 0.3, harmonic: 1 }],
             ..Model::default()

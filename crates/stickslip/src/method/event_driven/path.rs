@@ -45,11 +45,11 @@ pub(super) fn orbit(
     system: &Arc<System>,
     contracts: bool,
     flow: &Flow,
-    omega: f64,
+    (omega, periods): (f64, usize),
     symmetry: Symmetry,
     (closed, stored): (Closed, f64),
 ) -> Result<Orbit, Breakdown> {
-    let path = ExactPath::new(system.clone(), flow, symmetry, std::f64::consts::TAU / omega);
+    let path = ExactPath::new(system.clone(), flow, symmetry, periods as f64 * std::f64::consts::TAU / omega);
     let places = path.places(omega)?;
     let joints = path.joints(flow)?;
     let energy = path.energy(flow, &joints);
@@ -65,6 +65,7 @@ pub(super) fn orbit(
     Ok(Orbit {
         method: NAME,
         omega,
+        periods,
         symmetry,
         start: closed.state,
         evidence: Evidence {
@@ -73,6 +74,7 @@ pub(super) fn orbit(
             switches: joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
             truncation: closed.missing,
+            return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,
             stuck: stuck.collect(),
         },

@@ -2,7 +2,7 @@
 
 use super::equations::{Level, Motion, transfer};
 use super::joints::Coordinate;
-use super::judge::Judge;
+use crate::method::evidence::Judge;
 use super::rest::Rest;
 use super::{Compared, HarmonicBalance, Kept, LARGEST, TOLERANCE, estimate, path};
 use crate::method::guess::Guess;

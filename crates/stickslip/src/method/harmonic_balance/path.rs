@@ -2,9 +2,9 @@
 
 use super::equations::{Level, Motion};
 use super::joints::{Alternation, Coordinate, Element};
-use super::judge::Judge;
 use super::rest::Rest;
 use crate::law::Contact;
+use crate::method::evidence::{Judge, Judged};
 use crate::model::{MovedPlace, System};
 use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
 use nalgebra::{DMatrix, DVector};
@@ -177,12 +177,13 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
     start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
     start.extend(elastic_states);
-    let contracts = judge.as_ref().is_some_and(|judge| matches!(judge, Judge::Proven));
-    let return_map =
-        judge.and_then(|judge| judge.derivative(system, omega, odd, &start)).unwrap_or_else(|| DMatrix::zeros(0, 0));
+    let contracts = judge.as_ref().is_some_and(|judge| judge.proves());
+    let Judged { derivative, defect } =
+        judge.map_or_else(Judged::default, |judge| judge.judge(system, omega, odd, &start));
     Some(Orbit {
         method: super::NAME,
         omega,
+        periods: 1,
         symmetry: if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod },
         start,
         places,
@@ -192,6 +193,7 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
             switches: joints.iter().map(|j| j.switches).sum(),
             iterations: motion.iterations,
             truncation,
+            return_defect: defect,
             accuracy: match truncation {
                 Some(error) if error <= tolerance => Accuracy::Converged,
                 Some(_) => Accuracy::Truncated,
@@ -201,7 +203,7 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
         },
         joints,
         energy,
-        return_map,
+        return_map: derivative.unwrap_or_else(|| DMatrix::zeros(0, 0)),
         contracts,
         path: Arc::new(Series { system: system.clone(), omega, harmonics, x, force, contact }),
     })
@@ -406,6 +408,6 @@ impl Path for Series {
 
     fn return_map(&self, start: &[f64], symmetry: Symmetry) -> Option<DMatrix<f64>> {
         let odd = symmetry == Symmetry::HalfPeriod;
-        Judge::of_any_size(&self.system).derivative(&self.system, self.omega, odd, start)
+        Judge::of_any_size(&self.system).judge(&self.system, self.omega, odd, start).derivative
     }
 }

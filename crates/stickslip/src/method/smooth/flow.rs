@@ -3,10 +3,17 @@
 //! Step lengths are powers of two of a tick and start at multiples of themselves, so that every step of one length shares one
 //! elimination of the structure and every run over the same stretch ends exactly at its end.
 
-use super::step::{Eliminated, LawPoint, StageLoads, Step, Structure};
+use super::step::{Eliminated, StageLoads, Step, points};
+use crate::law::{RatePoint, Relative};
 use crate::method::Breakdown;
+use crate::method::assembly::{Assembly, NEAR_REST};
 use crate::method::drive::Drive;
-use nalgebra::{DMatrix, DVector};
+use crate::method::flow::Flow;
+use crate::method::stepped::{Instant, Node, SteppedPath, Steps};
+use crate::model::System;
+use crate::orbit::{Path, Symmetry};
+use nalgebra::DMatrix;
+use std::sync::Arc;
 use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES};
 
 /// A stretch has `2^LEVELS` ticks; the finest layers of the arctan law need about `2^20` of half a period.
@@ -23,72 +30,329 @@ const SAFETY: f64 = 0.8;
 /// Order of the error estimate plus one.
 const ORDER: f64 = 4.0;
 
-/// What is kept of an accepted step.
-#[derive(Debug, Clone)]
-pub(crate) struct StepRecord {
-    pub start: f64,
-    pub length: f64,
-    /// State at the start, then at the end: (x, v, internal).
-    pub from: Vec<f64>,
-    pub to: Vec<f64>,
-    /// Accelerations at the start and at the end.
-    pub accelerations: (Vec<f64>, Vec<f64>),
-    /// Stage displacements and velocities, 6n.
-    pub stages: Vec<f64>,
-    /// Relative velocity and force of the joints at the stages, stage after stage.
-    pub joints: Vec<(f64, f64)>,
-}
-
-/// Runs the motion of a smooth structure.
+/// Runs the motion of a structure with smooth laws.
 pub(crate) struct SmoothFlow {
-    pub structure: Structure,
+    pub assembly: Assembly,
     pub drive: Drive,
     /// Relative error per step.
     pub tolerance: f64,
-    /// Whether accepted steps are kept.
-    pub record: bool,
-    pub steps: Vec<StepRecord>,
+    keep: bool,
+    steps: Steps,
     /// Whether runs repeat the step lengths of the last free run: the end state is then a smooth function of the start.
     pub frozen: bool,
     /// Levels of the accepted steps of the last free run, in order.
     mesh: Vec<usize>,
-    /// Accepted steps of the last run.
-    pub accepted: usize,
-    /// Rejected steps of the last run.
-    pub rejected: usize,
+    /// Accepted and rejected steps of the last run.
+    accepted: usize,
+    rejected: usize,
     stretch: f64,
     eliminated: Vec<Option<Eliminated>>,
     step: Step,
     loads: StageLoads,
     level: usize,
+    /// The laws and the time derivative of the state at the start of the step.
+    laws: Vec<RatePoint>,
+    slope: Vec<f64>,
+    next: Vec<f64>,
+    next_slope: Vec<f64>,
+    /// Memory: the unknowns of the last step; an error estimate and a second one; loads and forces at an instant.
+    previous: Vec<f64>,
+    error: Vec<f64>,
+    second: Vec<f64>,
+    load: Vec<f64>,
+    force: Vec<f64>,
 }
 
 impl SmoothFlow {
-    pub fn new(structure: Structure, tolerance: f64) -> Self {
-        let step = Step::new(&structure);
+    pub fn new(assembly: Assembly, tolerance: f64) -> Self {
+        let (states, n, j) = (assembly.states(), assembly.n, assembly.axes.len());
+        let nodes = C.into_iter().zip(A[STAGES - 1]).collect();
         SmoothFlow {
-            structure,
             drive: Drive::default(),
             tolerance,
-            record: false,
-            steps: Vec::new(),
+            keep: false,
+            steps: Steps { nodes, ..Steps::default() },
             frozen: false,
             mesh: Vec::new(),
             accepted: 0,
             rejected: 0,
             stretch: 0.0,
             eliminated: vec![None; LEVELS + 1],
-            step,
+            step: Step::new(&assembly),
             loads: StageLoads::default(),
             level: FIRST_LEVEL,
+            laws: points(&assembly),
+            slope: vec![0.0; states],
+            next: vec![0.0; states],
+            next_slope: vec![0.0; states],
+            previous: Vec::new(),
+            error: vec![0.0; states],
+            second: vec![0.0; states],
+            load: vec![0.0; n],
+            force: vec![0.0; j],
+            assembly,
         }
     }
 
-    /// Runs from `state` (changed to the end state) over `[start, start + duration]`; see `Flow::run` of the exact method.
-    pub fn run(
+    /// Scales of displacement and velocity for the error norm.
+    fn scales(&self, state: &[f64]) -> (f64, f64) {
+        self.assembly.scales(state, &self.drive)
+    }
+
+    fn set_loads(&mut self, time: f64, h: f64) {
+        let (n, j) = (self.assembly.n, self.assembly.axes.len());
+        if self.loads.force.len() != STAGES * n {
+            self.loads.force.resize_vertically_mut(STAGES * n, 0.0);
+        }
+        self.loads.stage.clear();
+        for (i, c) in C.iter().enumerate() {
+            let at = time + c * h;
+            self.drive.load(at, &mut self.loads.force.as_mut_slice()[i * n..(i + 1) * n]);
+            for axis in 0..j {
+                self.loads.stage.push(self.drive.relative_at(axis, at));
+            }
+        }
+    }
+
+    /// First guess of the step's unknowns: the last step's collocation polynomial continued, or the state held.
+    fn predict(&mut self, state: &[f64], h: f64, length: Option<f64>, time: f64) {
+        let (n, j, internal) = (self.assembly.n, self.assembly.axes.len(), self.assembly.internal);
+        let unknown = &mut self.step.unknown;
+        let Some(length) = length else {
+            for i in 0..STAGES {
+                for axis in 0..j {
+                    unknown[i * j + axis] = self.assembly.relative(axis, state, &self.drive, time).1;
+                }
+                let first = STAGES * j + i * internal;
+                unknown[first..first + internal].copy_from_slice(&state[2 * n..]);
+            }
+            return;
+        };
+        for (i, c) in C.iter().enumerate() {
+            let s = 1.0 + c * h / length;
+            // Lagrange polynomial through the three stages
+            let weights = [
+                (s - C[1]) * (s - C[2]) / ((C[0] - C[1]) * (C[0] - C[2])),
+                (s - C[0]) * (s - C[2]) / ((C[1] - C[0]) * (C[1] - C[2])),
+                (s - C[0]) * (s - C[1]) / ((C[2] - C[0]) * (C[2] - C[1])),
+            ];
+            for (offset, count) in [(0, j), (STAGES * j, internal)] {
+                for k in 0..count {
+                    let at = |stage: usize| offset + stage * count + k;
+                    unknown[at(i)] = (0..STAGES).map(|q| weights[q] * self.previous[at(q)]).sum();
+                }
+            }
+        }
+    }
+
+    /// The laws at a state, into `laws`.
+    fn set_laws(&mut self, state: &[f64], time: f64) {
+        let n = self.assembly.n;
+        for (joint, point) in self.assembly.joints.iter().zip(&mut self.laws) {
+            let mut motion = Relative::along(0.0, 0.0);
+            for (d, axis) in joint.axes().enumerate() {
+                (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
+            }
+            let first = 2 * n + joint.first_state;
+            if let Some(rate) = joint.law.rate() {
+                rate.linearise(joint.directions, &motion, &state[first..first + joint.states], point);
+            }
+        }
+    }
+
+    /// Error of the step relative to the tolerance: the embedded estimate, filtered so that stiff components do not dominate it.
+    fn error(&mut self, state: &[f64], time: f64, scale: (f64, f64)) -> f64 {
+        if self.assembly.states() == 0 {
+            return self.error_of_work(time, scale.0);
+        }
+        let Some(eliminated) = &self.eliminated[self.level] else { return f64::INFINITY };
+        let assembly = &self.assembly;
+        if !self.step.prepare_filter(assembly, eliminated, &self.laws) {
+            return f64::INFINITY;
+        }
+        self.step.raw_error(assembly, eliminated, &self.loads, (state, &self.slope), &mut self.error);
+        // what the second filter begins with
+        for ((second, raw), slope) in self.second.iter_mut().zip(&self.error).zip(&self.slope) {
+            *second = raw - slope;
+        }
+        self.step.filter(assembly, eliminated, &self.laws, &mut self.error);
+        let size = self.size(&self.error, state, scale);
+        if size < 1.0 {
+            return size;
+        }
+        // Hairer and Wanner's second filter, for steps across a layer
+        for (shifted, (z, error)) in self.next.iter_mut().zip(state.iter().zip(&self.error)) {
+            *shifted = z + error;
+        }
+        let mut shifted = std::mem::take(&mut self.next);
+        let laws = self.laws.clone();
+        self.set_laws(&shifted, time);
+        slope(&self.assembly, (&shifted, &mut self.load, &mut self.force), &self.laws, &self.drive, time, &mut self.error);
+        self.laws = laws;
+        std::mem::swap(&mut self.next, &mut shifted);
+        self.second.iter_mut().zip(&self.error).for_each(|(second, again)| *second += again);
+        let Some(eliminated) = &self.eliminated[self.level] else { return size };
+        self.step.filter(&self.assembly, eliminated, &self.laws, &mut self.second);
+        self.size(&self.second, state, scale).min(size)
+    }
+
+    /// Size of an error estimate relative to the tolerance.
+    fn size(&self, error: &[f64], state: &[f64], scale: (f64, f64)) -> f64 {
+        let n = self.assembly.n;
+        let mut largest = 0.0f64;
+        for i in 0..n {
+            largest = largest.max(error[i].abs() / scale.0).max(error[n + i].abs() / scale.1);
+        }
+        for joint in &self.assembly.joints {
+            for s in joint.internal() {
+                largest = largest.max(error[2 * n + s].abs() / (joint.state_scale + state[2 * n + s].abs()));
+            }
+        }
+        if error.iter().all(|e| e.is_finite()) { largest / self.tolerance } else { f64::INFINITY }
+    }
+
+    /// The same for joints that are only moved: nothing is integrated there but their work, so its estimate chooses the steps.
+    fn error_of_work(&self, time: f64, travel: f64) -> f64 {
+        let j = self.assembly.axes.len();
+        let h = self.eliminated[self.level].as_ref().map_or(0.0, |eliminated| eliminated.length);
+        let mut largest = 0.0f64;
+        for (joint, point) in self.assembly.joints.iter().zip(&self.laws) {
+            for (d, axis) in joint.axes().enumerate() {
+                let power = |k: usize| self.step.unknown[k * j + axis] * self.step.force[k * j + axis];
+                let mut raw = point.force[d] * self.drive.relative_at(axis, time).1;
+                for (weight, row) in ERROR.iter().zip(A) {
+                    raw += weight * row.iter().enumerate().map(|(k, a)| a * power(k)).sum::<f64>();
+                }
+                // a law that nothing bounds is compared with the force that it has
+                let limit = joint.law.scale();
+                let force = if limit.is_finite() { limit } else { self.step.force.amax().max(point.force[d].abs()) };
+                if raw != 0.0 {
+                    largest = largest.max((raw * h / REAL).abs() / (force * travel * self.tolerance));
+                }
+            }
+        }
+        largest
+    }
+
+    fn keep_instant(&mut self, state: &[f64], time: f64) {
+        let n = self.assembly.n;
+        self.set_force();
+        self.drive.load(time, &mut self.load);
+        let mut acceleration = vec![0.0; n];
+        self.assembly.accelerate(state, &self.load, &self.force, &mut acceleration);
+        let instant = Instant { state: state[..2 * n].to_vec(), acceleration, force: self.force.clone() };
+        self.steps.instants.push(instant);
+    }
+
+    fn set_force(&mut self) {
+        forces(&self.assembly, &self.laws, &mut self.force);
+    }
+
+    fn keep_step(&mut self, time: f64, h: f64) {
+        let (n, j) = (self.assembly.n, self.assembly.axes.len());
+        let Some(eliminated) = &self.eliminated[self.level] else { return };
+        let stages = self.step.stages(eliminated, &self.loads);
+        self.steps.spans.push((time, h));
+        for i in 0..STAGES {
+            let velocity = self.step.unknown[i * j..(i + 1) * j].to_vec();
+            let force = self.step.force.as_slice()[i * j..(i + 1) * j].to_vec();
+            let contact = self
+                .assembly
+                .joints
+                .iter()
+                .map(|joint| joint.law.contact(&velocity[joint.axes()], &force[joint.axes()]))
+                .collect();
+            let mut state = stages.as_slice()[i * n..(i + 1) * n].to_vec();
+            state.extend_from_slice(&stages.as_slice()[(STAGES + i) * n..(STAGES + i + 1) * n]);
+            self.steps.values.push(Node { state, velocity, force, contact });
+        }
+    }
+
+    /// Whether the next attempt may be made; chooses the level where the mesh is given.
+    fn attempt(&mut self, frozen: bool, time: f64, tick: f64) -> Result<f64, Breakdown> {
+        if frozen {
+            // the mesh covers the stretch exactly
+            self.level = self.mesh[self.accepted];
+        }
+        let h = (1u64 << (LEVELS - self.level)) as f64 * tick;
+        if self.accepted + self.rejected >= STEP_LIMIT {
+            return Err(Breakdown::Stalled { time, step: h });
+        }
+        if self.eliminated[self.level].is_none() {
+            self.eliminated[self.level] = Some(Eliminated::new(&self.assembly, h));
+        }
+        Ok(h)
+    }
+
+    /// Shortens the step after a failed one.
+    fn shorten(&mut self, frozen: bool, error: f64) -> bool {
+        self.rejected += 1;
+        if frozen {
+            // a layer has moved out of its fine steps: from now on the mesh has two halves here
+            if self.level == LEVELS {
+                return false;
+            }
+            self.mesh[self.accepted] += 1;
+            self.mesh.insert(self.accepted, self.level + 1);
+            return true;
+        }
+        // an estimate of order 4 in h: how many halvings bring it below one
+        let halvings =
+            if error.is_finite() { ((error / SAFETY).log2() / ORDER).ceil().clamp(1.0, 4.0) as usize } else { 2 };
+        self.level += halvings;
+        self.level <= LEVELS
+    }
+}
+
+/// Forces along the axes.
+fn forces(assembly: &Assembly, laws: &[RatePoint], force: &mut [f64]) {
+    for (joint, point) in assembly.joints.iter().zip(laws) {
+        force[joint.axes()].copy_from_slice(&point.force[..joint.directions]);
+    }
+}
+
+/// Time derivative of a state, where the laws are these.
+fn slope(
+    assembly: &Assembly,
+    (state, load, force): (&[f64], &mut [f64], &mut [f64]),
+    laws: &[RatePoint],
+    drive: &Drive,
+    time: f64,
+    out: &mut [f64],
+) {
+    let n = assembly.n;
+    drive.load(time, load);
+    forces(assembly, laws, force);
+    let (x, rest) = out.split_at_mut(n);
+    let (v, internal) = rest.split_at_mut(n);
+    x.copy_from_slice(&state[n..2 * n]);
+    assembly.accelerate(state, load, force, v);
+    for (joint, point) in assembly.joints.iter().zip(laws) {
+        internal[joint.internal()].copy_from_slice(&point.rate);
+    }
+}
+
+impl Flow for SmoothFlow {
+    fn states(&self) -> usize {
+        self.assembly.states()
+    }
+
+    fn set_drive(&mut self, system: &System, omega: f64) {
+        let axes: Vec<usize> = (0..self.assembly.axes.len()).collect();
+        self.drive = Drive::at(system, &axes, omega);
+    }
+
+    fn weights(&self) -> Vec<f64> {
+        self.assembly.weights(self.drive.omega, NEAR_REST * self.energy_scale())
+    }
+
+    fn energy_scale(&self) -> f64 {
+        self.drive.energy_scale(&self.assembly.mass, &self.assembly.stiffness)
+    }
+
+    fn run(
         &mut self,
         state: &mut [f64],
-        start: f64,
         duration: f64,
         mut sensitivity: Option<&mut DMatrix<f64>>,
     ) -> Result<(), Breakdown> {
@@ -108,75 +372,60 @@ impl SmoothFlow {
         if !frozen {
             self.mesh.clear();
         }
-        let (n, j) = (self.structure.n, self.structure.joints.len());
-        let mut slope = self.slope(state, start);
-        let mut previous: Option<(f64, Vec<f64>)> = None;
+        let joints = self.assembly.joints.len();
+        self.set_laws(state, 0.0);
+        slope(&self.assembly, (state, &mut self.load, &mut self.force), &self.laws, &self.drive, 0.0, &mut self.slope);
+        if self.keep {
+            self.keep_instant(state, 0.0);
+        }
+        let mut length = None;
         while position < total {
-            if frozen {
-                // the mesh covers the stretch exactly
-                self.level = self.mesh[self.accepted];
-            }
+            let time = position as f64 * tick;
+            let h = self.attempt(frozen, time, tick)?;
             let ticks = 1u64 << (LEVELS - self.level);
-            let time = start + position as f64 * tick;
-            let h = ticks as f64 * tick;
-            if self.accepted + self.rejected >= STEP_LIMIT {
-                return Err(Breakdown::Stalled { time, step: h });
-            }
-            if self.eliminated[self.level].is_none() {
-                self.eliminated[self.level] = Some(Eliminated::new(&self.structure, h));
-            }
             self.set_loads(time, h);
-            self.predict(state, h, previous.as_ref(), time);
-            let eliminated = self.eliminated[self.level].as_ref().expect("just made");
-            let solved = self.step.solve(&self.structure, eliminated, &self.loads, state, scale.1);
+            self.predict(state, h, length, time);
+            let Some(eliminated) = &self.eliminated[self.level] else {
+                return Err(Breakdown::Stalled { time, step: h });
+            };
+            let how = (scale.1, sensitivity.is_some());
+            let solved = self.step.solve(&self.assembly, eliminated, &self.loads, state, how);
             let error = match (solved, frozen) {
                 (true, true) => 0.0,
-                (true, false) => self.error(state, &slope, time, h, scale),
-                (false, true) => {
-                    // a layer has moved out of its fine steps: from now on the mesh has two halves here
-                    if self.level == LEVELS {
-                        return Err(Breakdown::Stalled { time, step: h });
-                    }
-                    self.rejected += 1;
-                    self.mesh[self.accepted] += 1;
-                    self.mesh.insert(self.accepted, self.level + 1);
-                    continue;
-                }
-                (false, false) => f64::INFINITY,
+                (true, false) => self.error(state, time, scale),
+                (false, _) => f64::INFINITY,
             };
             if !error.is_finite() || error > 1.0 {
-                self.rejected += 1;
-                // an estimate of order 4 in h: how many halvings bring it below one
-                let halvings = if error.is_finite() {
-                    ((error / SAFETY).log2() / ORDER).ceil().clamp(1.0, 4.0) as usize
-                } else {
-                    2
-                };
-                self.level += halvings;
-                if self.level > LEVELS {
+                if !self.shorten(frozen, error) {
                     return Err(Breakdown::Stalled { time, step: h });
                 }
                 continue;
             }
-            let mut next = vec![0.0; state.len()];
-            next[..n].copy_from_slice(&self.step.stages.as_slice()[(STAGES - 1) * n..STAGES * n]);
-            next[n..2 * n].copy_from_slice(&self.step.stages.as_slice()[(2 * STAGES - 1) * n..]);
-            let internal = self.structure.internal;
-            let last = STAGES * j + (STAGES - 1) * internal;
-            next[2 * n..].copy_from_slice(&self.step.unknown.as_slice()[last..last + internal]);
-            if next.iter().any(|z| !z.is_finite()) {
+            let Some(eliminated) = &self.eliminated[self.level] else {
+                return Err(Breakdown::Stalled { time, step: h });
+            };
+            self.step.end(&self.assembly, eliminated, &self.loads, &mut self.next);
+            if self.next.iter().any(|z| !z.is_finite()) {
                 return Err(Breakdown::Unbounded { time });
             }
             if let Some(sensitivity) = sensitivity.as_deref_mut() {
-                self.step.carry(&self.structure, eliminated, sensitivity);
+                self.step.carry(&self.assembly, eliminated, sensitivity);
             }
-            let next_slope = self.slope(&next, time + h);
-            if self.record {
-                self.keep(time, h, state, &next, &slope, &next_slope);
+            // the last stage is the end
+            self.laws.swap_with_slice(&mut self.step.points[(STAGES - 1) * joints..]);
+            if !frozen {
+                let work = (self.next.as_slice(), self.load.as_mut_slice(), self.force.as_mut_slice());
+                slope(&self.assembly, work, &self.laws, &self.drive, time + h, &mut self.next_slope);
+                std::mem::swap(&mut self.slope, &mut self.next_slope);
             }
-            previous = Some((h, self.step.unknown.as_slice().to_vec()));
-            state.copy_from_slice(&next);
-            slope = next_slope;
+            state.copy_from_slice(&self.next);
+            if self.keep {
+                self.keep_step(time, h);
+                self.keep_instant(state, time + h);
+            }
+            length = Some(h);
+            std::mem::swap(&mut self.previous, &mut self.step.unknown);
+            self.step.unknown.resize(self.previous.len(), 0.0);
             self.accepted += 1;
             if !frozen {
                 self.mesh.push(self.level);
@@ -193,220 +442,18 @@ impl SmoothFlow {
         Ok(())
     }
 
-    /// Scales of displacement and velocity for the error norm.
-    fn scales(&self, state: &[f64]) -> (f64, f64) {
-        let n = self.structure.n;
-        let natural = (0..n).map(|i| (self.structure.stiffness[(i, i)] / self.structure.mass[(i, i)]).sqrt());
-        // without a drive the structure's own frequencies set the time scale
-        let rate = if self.drive.omega > 0.0 { self.drive.omega } else { natural.fold(f64::MIN_POSITIVE, f64::max) };
-        let x = state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs()));
-        let v = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
-        let mobility = if n == 0 { 0.0 } else { self.structure.inverse_mass.amax().sqrt() };
-        let loads = self.drive.energy_scale(&self.structure.mass, &self.structure.stiffness) * mobility;
-        let velocity = v.max(x * rate).max(self.drive.imposed_velocity()).max(1e-3 * loads).max(f64::MIN_POSITIVE);
-        (velocity / rate, velocity)
+    fn keep(&mut self, keep: bool) {
+        self.keep = keep;
     }
 
-    fn set_loads(&mut self, time: f64, h: f64) {
-        let (n, j) = (self.structure.n, self.structure.joints.len());
-        self.loads.force.resize_vertically_mut(STAGES * n, 0.0);
-        self.loads.stage.clear();
-        let mut force = DVector::zeros(n);
-        for (i, c) in C.iter().enumerate() {
-            let at = time + c * h;
-            force.fill(0.0);
-            self.drive.add_force(at, 0, &mut force);
-            self.loads.force.rows_mut(i * n, n).copy_from(&force);
-            for q in 0..j {
-                self.loads.stage.push((self.drive.imposed_at(q, at, 0), self.drive.imposed_at(q, at, 1)));
-            }
-        }
+    fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Arc<dyn Path> {
+        Arc::new(self.stepped(system, symmetry, period))
     }
+}
 
-    /// First guess of the step's unknowns: the last step's collocation polynomial continued, or the state held.
-    fn predict(&mut self, state: &[f64], h: f64, previous: Option<&(f64, Vec<f64>)>, time: f64) {
-        let (n, j, internal) = (self.structure.n, self.structure.joints.len(), self.structure.internal);
-        let unknown = &mut self.step.unknown;
-        match previous {
-            Some((length, values)) => {
-                let count = j + internal;
-                let at = |stage: usize, k: usize| {
-                    if k < j { values[stage * j + k] } else { values[STAGES * j + stage * internal + k - j] }
-                };
-                for (i, c) in C.iter().enumerate() {
-                    let s = 1.0 + c * h / length;
-                    // Lagrange polynomial through the three stages
-                    let weights = [
-                        (s - C[1]) * (s - C[2]) / ((C[0] - C[1]) * (C[0] - C[2])),
-                        (s - C[0]) * (s - C[2]) / ((C[1] - C[0]) * (C[1] - C[2])),
-                        (s - C[0]) * (s - C[1]) / ((C[2] - C[0]) * (C[2] - C[1])),
-                    ];
-                    for k in 0..count {
-                        let value: f64 = (0..STAGES).map(|q| weights[q] * at(q, k)).sum();
-                        let index = if k < j { i * j + k } else { STAGES * j + i * internal + k - j };
-                        unknown[index] = value;
-                    }
-                }
-            }
-            None => {
-                for i in 0..STAGES {
-                    for (q, joint) in self.structure.joints.iter().enumerate() {
-                        let structural: f64 = (0..n).map(|k| joint.direction[k] * state[n + k]).sum();
-                        unknown[i * j + q] = structural + self.drive.imposed_at(q, time, 1);
-                    }
-                    for s in 0..internal {
-                        unknown[STAGES * j + i * internal + s] = state[2 * n + s];
-                    }
-                }
-            }
-        }
-    }
-
-    /// Time derivative of the state.
-    pub fn slope(&self, state: &[f64], time: f64) -> Vec<f64> {
-        let n = self.structure.n;
-        let mut force = DVector::zeros(n);
-        self.drive.add_force(time, 0, &mut force);
-        let mut slope = vec![0.0; state.len()];
-        for i in 0..n {
-            slope[n + i] = (0..n)
-                .map(|k| {
-                    self.structure.inverse_mass[(i, k)] * force[k]
-                        - self.structure.stiffness_rate[(i, k)] * state[k]
-                        - self.structure.damping_rate[(i, k)] * state[n + k]
-                })
-                .sum();
-        }
-        for (q, joint) in self.structure.joints.iter().enumerate() {
-            let point = self.law_point(q, state, time);
-            for i in 0..n {
-                slope[n + i] -= joint.mobility[i] * point.force;
-            }
-            for s in 0..joint.states {
-                slope[2 * n + joint.first_state + s] = point.rate[s];
-            }
-        }
-        slope[..n].copy_from_slice(&state[n..2 * n]);
-        slope
-    }
-
-    /// The law of joint `q` at a state.
-    pub fn law_point(&self, q: usize, state: &[f64], time: f64) -> LawPoint {
-        let (n, joint) = (self.structure.n, &self.structure.joints[q]);
-        let along = |v: &[f64]| (0..n).map(|i| joint.direction[i] * v[i]).sum::<f64>();
-        let u = along(&state[..n]) + self.drive.imposed_at(q, time, 0);
-        let velocity = along(&state[n..2 * n]) + self.drive.imposed_at(q, time, 1);
-        let first = 2 * n + joint.first_state;
-        LawPoint::new(&*joint.law, u, velocity, &state[first..first + joint.states])
-    }
-
-    /// Error of the step relative to the tolerance: the embedded estimate, filtered so that stiff components do not dominate it.
-    fn error(&self, state: &[f64], slope: &[f64], time: f64, h: f64, scale: (f64, f64)) -> f64 {
-        let (n, j, internal, states) =
-            (self.structure.n, self.structure.joints.len(), self.structure.internal, self.structure.states());
-        if states == 0 {
-            return self.error_of_work(time, h, scale.0);
-        }
-        let mut raw = DVector::from_column_slice(slope);
-        for (i, weight) in ERROR.iter().enumerate() {
-            for k in 0..n {
-                raw[k] += weight / h * (self.step.stages[i * n + k] - state[k]);
-                raw[n + k] += weight / h * (self.step.stages[(STAGES + i) * n + k] - state[n + k]);
-            }
-            for s in 0..internal {
-                let stage = self.step.unknown[STAGES * j + i * internal + s];
-                raw[2 * n + s] += weight / h * (stage - state[2 * n + s]);
-            }
-        }
-        let mut filter = DMatrix::from_diagonal_element(states, states, REAL / h);
-        for i in 0..n {
-            filter[(i, n + i)] -= 1.0;
-            for k in 0..n {
-                filter[(n + i, k)] += self.structure.stiffness_rate[(i, k)];
-                filter[(n + i, n + k)] += self.structure.damping_rate[(i, k)];
-            }
-        }
-        for q in 0..j {
-            let point = self.law_point(q, state, time);
-            let joint = &self.structure.joints[q];
-            for i in 0..n {
-                for k in 0..n {
-                    let outer = joint.mobility[i] * joint.direction[k];
-                    filter[(n + i, k)] += outer * point.force_slope[0];
-                    filter[(n + i, n + k)] += outer * point.force_slope[1];
-                }
-            }
-            for s in 0..joint.states {
-                let own = 2 * n + joint.first_state + s;
-                for k in 0..n {
-                    filter[(own, k)] -= point.rate_slope[s][0] * joint.direction[k];
-                    filter[(own, n + k)] -= point.rate_slope[s][1] * joint.direction[k];
-                    filter[(n + k, own)] += joint.mobility[k] * point.force_slope[2 + s];
-                }
-                for t in 0..joint.states {
-                    filter[(own, 2 * n + joint.first_state + t)] -= point.rate_slope[s][2 + t];
-                }
-            }
-        }
-        let factor = filter.lu();
-        let norm = |error: &DVector<f64>| {
-            let mut largest = 0.0f64;
-            for i in 0..n {
-                largest = largest.max(error[i].abs() / scale.0).max(error[n + i].abs() / scale.1);
-            }
-            for s in 0..internal {
-                largest = largest.max(error[2 * n + s].abs() / (1.0 + state[2 * n + s].abs()));
-            }
-            largest / self.tolerance
-        };
-        let Some(error) = factor.solve(&raw) else { return f64::INFINITY };
-        let mut size = norm(&error);
-        if size >= 1.0 {
-            // Hairer and Wanner's second filter, for steps across a layer
-            let shifted: Vec<f64> = state.iter().zip(error.iter()).map(|(z, e)| z + e).collect();
-            let again = self.slope(&shifted, time);
-            let second = DVector::from_fn(states, |i, _| raw[i] - slope[i] + again[i]);
-            if let Some(error) = factor.solve(&second) {
-                size = norm(&error).min(size);
-            }
-        }
-        size
-    }
-
-    /// The same for joints that are only moved: nothing is integrated there but their work, so its estimate chooses the steps.
-    fn error_of_work(&self, time: f64, h: f64, travel: f64) -> f64 {
-        let j = self.structure.joints.len();
-        let mut largest = 0.0f64;
-        for (q, joint) in self.structure.joints.iter().enumerate() {
-            let power = |k: usize| self.step.unknown[k * j + q] * self.step.force[k * j + q];
-            let mut raw = self.law_point(q, &[], time).force * self.drive.imposed_at(q, time, 1);
-            for (weight, row) in ERROR.iter().zip(A) {
-                raw += weight * row.iter().enumerate().map(|(k, a)| a * power(k)).sum::<f64>();
-            }
-            largest = largest.max((raw * h / REAL).abs() / (joint.limit * travel * self.tolerance));
-        }
-        largest
-    }
-
-    fn keep(&mut self, start: f64, length: f64, from: &[f64], to: &[f64], slope: &[f64], next: &[f64]) {
-        let n = self.structure.n;
-        let j = self.structure.joints.len();
-        self.steps.push(StepRecord {
-            start,
-            length,
-            from: from.to_vec(),
-            to: to.to_vec(),
-            accelerations: (slope[n..2 * n].to_vec(), next[n..2 * n].to_vec()),
-            stages: self.step.stages.as_slice().to_vec(),
-            joints: (0..STAGES * j).map(|i| (self.step.unknown[i], self.step.force[i])).collect(),
-        });
-    }
-
-    /// Integrates a function of (stage in 0..3, step) over the recorded steps with the method's own quadrature.
-    pub fn integral(&self, mut at: impl FnMut(&StepRecord, usize) -> f64) -> f64 {
-        self.steps
-            .iter()
-            .map(|step| step.length * (0..STAGES).map(|i| A[STAGES - 1][i] * at(step, i)).sum::<f64>())
-            .sum()
+impl SmoothFlow {
+    /// The motion of the last kept run, which repeats after `period`.
+    pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
+        SteppedPath::new((system, &self.assembly), &self.drive, &self.steps, (symmetry, period))
     }
 }

@@ -1,106 +1,39 @@
 //! One step of Radau IIA-5 for a linear structure with smooth joints.
 //!
-//! Only the joints are non-linear, so the structure is eliminated once per step length: the stage velocities of the joints are
-//! `u'ᵢ = (linear in the state and the loads) + Σ G fₖ`, and Newton's method runs on 3 unknowns per joint (and per internal
+//! Only the joints are non-linear, so the structure is eliminated once per step length: the stage velocities along the joints' axes are
+//! `u'ᵢ = (linear in the state and the loads) + Σ G fₖ`, and Newton's method runs on 3 unknowns per axis (and per internal
 //! state of a law), however many masses there are. Step lengths are powers of two times a tick, so that a few eliminations serve
-//! a whole orbit.
+//! a whole orbit. The filter of the error estimate is eliminated in the same way.
 
-use crate::law::{Law, RatePoint, Relative, SharedLaw};
-use nalgebra::{DMatrix, DVector, Dim, Dyn, LU, Matrix, StorageMut};
-use stickslip_numerics::radau::{A, C, STAGES, squared};
-
-/// The structure and its joints as the smooth methods see them.
-#[derive(Debug, Clone)]
-pub(crate) struct Structure {
-    pub n: usize,
-    pub mass: DMatrix<f64>,
-    pub inverse_mass: DMatrix<f64>,
-    pub damping: DMatrix<f64>,
-    pub stiffness: DMatrix<f64>,
-    /// `M⁻¹C` and `M⁻¹K`.
-    pub damping_rate: DMatrix<f64>,
-    pub stiffness_rate: DMatrix<f64>,
-    pub joints: Vec<SmoothJoint>,
-    /// Internal states of all laws.
-    pub internal: usize,
-}
-
-#[derive(Debug, Clone)]
-pub(crate) struct SmoothJoint {
-    pub direction: DVector<f64>,
-    /// `M⁻¹` times the direction: accelerations that a unit force takes away.
-    pub mobility: DVector<f64>,
-    pub law: SharedLaw,
-    /// Index of its first internal state.
-    pub first_state: usize,
-    pub states: usize,
-    /// Slip limit, for the report of stick and slip.
-    pub limit: f64,
-}
-
-impl Structure {
-    /// Length of the state `(x, v, internal states)`.
-    pub fn states(&self) -> usize {
-        2 * self.n + self.internal
-    }
-    /// Unknowns of a step: a velocity per joint and the internal states, for every stage.
-    fn unknowns(&self) -> usize {
-        STAGES * (self.joints.len() + self.internal)
-    }
-}
-
-/// Most internal states that a law may have here.
-pub(crate) const MOST_STATES: usize = 1;
-/// Arguments of a law: u, u', internal states.
-const ARGUMENTS: usize = 2 + MOST_STATES;
-
-/// Force and rates of a law at one instant, with derivatives with respect to (u, u', z).
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct LawPoint {
-    pub force: f64,
-    pub force_slope: [f64; ARGUMENTS],
-    pub rate: [f64; MOST_STATES],
-    pub rate_slope: [[f64; ARGUMENTS]; MOST_STATES],
-}
-
-impl LawPoint {
-    #[inline]
-    pub fn new(law: &dyn Law, u: f64, velocity: f64, z: &[f64]) -> Self {
-        let mut point = RatePoint::new(1, z.len());
-        if let Some(rate) = law.rate() {
-            rate.linearise(1, &Relative::along(u, velocity), z, &mut point);
-        }
-        let slopes = |row: &[f64]| std::array::from_fn(|i| row.get(i).copied().unwrap_or(0.0));
-        LawPoint {
-            force: point.force[0],
-            force_slope: slopes(point.force_slope(0)),
-            rate: std::array::from_fn(|s| point.rate.get(s).copied().unwrap_or(0.0)),
-            rate_slope: std::array::from_fn(
-                |s| if s < z.len() { slopes(point.rate_slope(s)) } else { [0.0; ARGUMENTS] },
-            ),
-        }
-    }
-}
+use crate::law::{RatePoint, Relative};
+use crate::method::assembly::Assembly;
+use nalgebra::{DMatrix, DVector};
+use stickslip_numerics::lu::Lu;
+use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES, squared};
 
 /// The eliminated structure for one step length.
 #[derive(Debug, Clone)]
 pub(crate) struct Eliminated {
     pub length: f64,
-    /// Joint stage velocities from the state: (3 joints) × 2n.
+    /// Stage velocities of the axes from the state, stage loads, stage forces: (3 axes) × 2n, 3n, 3 axes.
     velocity_from_state: DMatrix<f64>,
-    /// Joint stage velocities from stage loads: (3 joints) × 3n.
     velocity_from_load: DMatrix<f64>,
-    /// Joint stage velocities from stage joint forces: (3 joints) × (3 joints).
     velocity_from_force: DMatrix<f64>,
-    /// All stage displacements and velocities (6n: X₁X₂X₃V₁V₂V₃) from the state, stage loads, stage joint forces.
+    /// All stage displacements and velocities (6n: X₁X₂X₃V₁V₂V₃) from the state, stage loads, stage forces.
     stage_from_state: DMatrix<f64>,
     stage_from_load: DMatrix<f64>,
     stage_from_force: DMatrix<f64>,
+    /// The same for the state at the end, 2n.
+    end: [DMatrix<f64>; 3],
+    /// The same for the weighted increments of the error estimate, 2n.
+    increments: [DMatrix<f64>; 3],
+    /// `P = (γM + C + K/γ)⁻¹` of the filter, with `γ = REAL/h`; `P W` and `Wᵀ P W`.
+    filter: [DMatrix<f64>; 3],
 }
 
 impl Eliminated {
-    pub fn new(structure: &Structure, h: f64) -> Self {
-        let (n, j) = (structure.n, structure.joints.len());
+    pub fn new(assembly: &Assembly, h: f64) -> Self {
+        let (n, j) = (assembly.n, assembly.axes.len());
         let a2 = squared();
         // (M + h C A + h² K A²) acc = load - W f - C v - K (x + c h v)
         let mut left = DMatrix::zeros(STAGES * n, STAGES * n);
@@ -108,23 +41,20 @@ impl Eliminated {
         for i in 0..STAGES {
             for k in 0..STAGES {
                 let mut block = left.view_mut((i * n, k * n), (n, n));
-                block += &structure.damping * (h * A[i][k]) + &structure.stiffness * (h * h * a2[i][k]);
+                block += &assembly.damping * (h * A[i][k]) + &assembly.stiffness * (h * h * a2[i][k]);
                 if i == k {
-                    block += &structure.mass;
+                    block += &assembly.mass;
                 }
             }
-            from_state.view_mut((i * n, 0), (n, n)).copy_from(&(-&structure.stiffness));
-            let v = -(&structure.damping + &structure.stiffness * (C[i] * h));
+            from_state.view_mut((i * n, 0), (n, n)).copy_from(&(-&assembly.stiffness));
+            let v = -(&assembly.damping + &assembly.stiffness * (C[i] * h));
             from_state.view_mut((i * n, n), (n, n)).copy_from(&v);
         }
-        let inverse =
-            if n == 0 { left } else { left.try_inverse().unwrap_or_else(|| DMatrix::zeros(STAGES * n, STAGES * n)) };
+        let inverse = inverted(left);
         let acceleration_from_state = &inverse * from_state;
         let mut directions = DMatrix::zeros(STAGES * n, STAGES * j);
-        for (q, joint) in structure.joints.iter().enumerate() {
-            for i in 0..STAGES {
-                directions.view_mut((i * n, i * j + q), (n, 1)).copy_from(&joint.direction);
-            }
+        for i in 0..STAGES {
+            directions.view_mut((i * n, i * j), (n, j)).copy_from(&assembly.directions);
         }
         let acceleration_from_force = -&inverse * &directions;
         // X = x + c h v + h² A² acc, V = v + h A acc
@@ -152,11 +82,32 @@ impl Eliminated {
         let (stage_from_load, stage_from_force) = (stages(&inverse), stages(&acceleration_from_force));
         let along = directions.transpose();
         let velocity = |stage: &DMatrix<f64>| &along * stage.rows(STAGES * n, STAGES * n);
+        let all = [&stage_from_state, &stage_from_load, &stage_from_force];
+        let weighted = |stage: &DMatrix<f64>, weights: [f64; STAGES]| {
+            let mut out = DMatrix::zeros(2 * n, stage.ncols());
+            for (i, weight) in weights.into_iter().enumerate() {
+                let mut x = out.rows_mut(0, n);
+                x += stage.rows(i * n, n) * weight;
+                let mut v = out.rows_mut(n, n);
+                v += stage.rows((STAGES + i) * n, n) * weight;
+            }
+            out
+        };
+        let mut increments = all.map(|stage| weighted(stage, ERROR.map(|weight| weight / h)));
+        for row in 0..2 * n {
+            increments[0][(row, row)] -= ERROR.iter().sum::<f64>() / h;
+        }
+        let rate = REAL / h;
+        let p = inverted(&assembly.mass * rate + &assembly.damping + &assembly.stiffness / rate);
+        let pw = &p * &assembly.directions;
         Eliminated {
             length: h,
             velocity_from_state: velocity(&stage_from_state),
             velocity_from_load: velocity(&stage_from_load),
             velocity_from_force: velocity(&stage_from_force),
+            end: all.map(|stage| weighted(stage, [0.0, 0.0, 1.0])),
+            increments,
+            filter: [p, pw.clone(), assembly.directions.transpose() * pw],
             stage_from_state,
             stage_from_load,
             stage_from_force,
@@ -164,93 +115,125 @@ impl Eliminated {
     }
 }
 
-/// The loads on one step: forces on the masses and imposed relative motion of the joints, at its stages.
+/// The inverse; a structure without masses has no rows, and one out of range is found by the numbers that come out.
+fn inverted(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let n = matrix.nrows();
+    if n == 0 { matrix } else { matrix.try_inverse().unwrap_or_else(|| DMatrix::from_element(n, n, f64::NAN)) }
+}
+
+/// The loads on one step: forces on the masses and imposed relative motion along the axes, at its stages.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct StageLoads {
     /// 3n.
     pub force: DVector<f64>,
-    /// Imposed relative displacement and velocity of the joints, stage after stage.
+    /// Imposed relative displacement and velocity along the axes, stage after stage.
     pub stage: Vec<(f64, f64)>,
 }
 
 /// Memory and result of a step.
 #[derive(Debug, Clone)]
 pub(crate) struct Step {
-    /// Unknowns: stage velocities of the joints (stage after stage), then internal states (stage after stage).
-    pub unknown: DVector<f64>,
-    /// Stage displacements and velocities, 6n.
-    pub stages: DVector<f64>,
-    /// Stage forces of the joints.
+    /// Unknowns: stage velocities along the axes (stage after stage), then internal states (stage after stage).
+    pub unknown: Vec<f64>,
+    /// Stage forces along the axes.
     pub force: DVector<f64>,
+    /// The laws at the stages, stage after stage; those of the last stage are those of the end.
+    pub points: Vec<RatePoint>,
+    /// Displacements and velocities at the start.
+    linear: DVector<f64>,
     free: DVector<f64>,
-    points: Vec<LawPoint>,
-    residual: DVector<f64>,
-    jacobian: DMatrix<f64>,
-    factor: Option<LU<f64, Dyn, Dyn>>,
-    structural: DVector<f64>,
+    structural: Vec<f64>,
+    residual: Vec<f64>,
+    lu: Lu,
+    right: DMatrix<f64>,
+    direct: DMatrix<f64>,
+    filter: Filter,
 }
 
 /// Newton iterations per step; from the extrapolated start 2 to 4 are usual, a step that needs more is halved.
 const ITERATIONS: usize = 12;
 /// A correction of the unknowns below this fraction of their scale ends the iteration: the next one would be at rounding.
 const SMALL: f64 = 1e-9;
+/// So does a larger one, if the next is expected to be below this.
+const NEGLIGIBLE: f64 = 1e-12;
+
+/// Index of a stage's internal state among the unknowns.
+fn at_state(assembly: &Assembly, stage: usize, s: usize) -> usize {
+    STAGES * assembly.axes.len() + stage * assembly.internal + s
+}
 
 impl Step {
-    pub fn new(structure: &Structure) -> Self {
-        let (j, unknowns) = (structure.joints.len(), structure.unknowns());
-        let zero = LawPoint { force: 0.0, force_slope: [0.0; 3], rate: [0.0; 1], rate_slope: [[0.0; 3]; 1] };
+    pub fn new(assembly: &Assembly) -> Self {
+        let (j, unknowns) = (assembly.axes.len(), STAGES * (assembly.axes.len() + assembly.internal));
         Step {
-            unknown: DVector::zeros(unknowns),
-            stages: DVector::zeros(2 * STAGES * structure.n),
+            unknown: vec![0.0; unknowns],
             force: DVector::zeros(STAGES * j),
+            points: (0..STAGES).flat_map(|_| points(assembly)).collect(),
+            linear: DVector::zeros(2 * assembly.n),
             free: DVector::zeros(STAGES * j),
-            points: vec![zero; STAGES * j],
-            residual: DVector::zeros(unknowns),
-            jacobian: DMatrix::zeros(unknowns, unknowns),
-            factor: None,
-            structural: DVector::zeros(j),
+            structural: vec![0.0; j],
+            residual: vec![0.0; unknowns],
+            lu: Lu::default(),
+            right: DMatrix::zeros(0, 0),
+            direct: DMatrix::zeros(0, 0),
+            filter: Filter::new(assembly),
         }
     }
 
-    /// Solves the step from `state`, with `self.unknown` as the start of the iteration. Returns false if it does not converge.
+    /// Solves the step from `state`, with `self.unknown` as the start of the iteration; with derivatives at the end for [`Step::carry`] if
+    /// `derivatives`. Returns false if it does not converge.
     pub fn solve(
         &mut self,
-        structure: &Structure,
+        assembly: &Assembly,
         eliminated: &Eliminated,
         loads: &StageLoads,
         state: &[f64],
-        velocity_scale: f64,
+        (velocity_scale, derivatives): (f64, bool),
     ) -> bool {
-        let (n, j, internal) = (structure.n, structure.joints.len(), structure.internal);
-        let linear = DVector::from_column_slice(&state[..2 * n]);
-        self.free.gemv(1.0, &eliminated.velocity_from_state, &linear, 0.0);
+        let (n, j, internal) = (assembly.n, assembly.axes.len(), assembly.internal);
+        self.linear.copy_from_slice(&state[..2 * n]);
+        self.free.gemv(1.0, &eliminated.velocity_from_state, &self.linear, 0.0);
         self.free.gemv(1.0, &eliminated.velocity_from_load, &loads.force, 1.0);
         for (free, (_, velocity)) in self.free.iter_mut().zip(&loads.stage) {
             *free += velocity;
         }
-        for (q, joint) in structure.joints.iter().enumerate() {
-            self.structural[q] = (0..n).map(|i| joint.direction[i] * state[i]).sum();
+        for (structural, axis) in self.structural.iter_mut().zip(&assembly.axes) {
+            *structural = axis.along(&state[..n]);
         }
         let mut previous = f64::INFINITY;
         for iteration in 0..ITERATIONS {
-            self.evaluate(structure, eliminated, loads, state);
-            let Some(factor) = factorised(&self.jacobian) else { return false };
-            let mut step = -&self.residual;
-            if !solved(&factor, &mut step) || step.iter().any(|s| !s.is_finite()) {
+            self.evaluate(assembly, eliminated, loads);
+            self.linearise(assembly, eliminated, state);
+            if !self.lu.factorise() {
                 return false;
             }
-            self.unknown += &step;
-            self.factor = Some(factor);
+            self.lu.solve(&mut self.residual);
             let mut size = 0.0f64;
-            for i in 0..STAGES * j {
-                size = size.max(step[i].abs() / velocity_scale);
+            for (unknown, step) in self.unknown[..STAGES * j].iter_mut().zip(&self.residual) {
+                *unknown -= step;
+                size = size.max(step.abs() / velocity_scale);
             }
-            for i in STAGES * j..STAGES * (j + internal) {
-                size = size.max(step[i].abs());
+            for joint in &assembly.joints {
+                for stage in 0..STAGES {
+                    for s in joint.internal() {
+                        let at = STAGES * j + stage * internal + s;
+                        self.unknown[at] -= self.residual[at];
+                        size = size.max(self.residual[at].abs() / joint.state_scale);
+                    }
+                }
             }
-            if size <= SMALL {
-                self.evaluate(structure, eliminated, loads, state);
-                self.finish(eliminated, loads, &linear);
+            // maximum skips what is no number
+            if !size.is_finite() || self.residual.iter().any(|r| !r.is_finite()) {
+                return false;
+            }
+            // Newton's steps square: the next one would be this one's square times the factor that the last two show
+            let next = if previous.is_finite() { size * (size / previous).powi(2) } else { f64::INFINITY };
+            if size <= SMALL || next <= NEGLIGIBLE {
+                self.evaluate(assembly, eliminated, loads);
+                if derivatives {
+                    self.linearise(assembly, eliminated, state);
+                    return self.lu.factorise();
+                }
                 return true;
             }
             if iteration > 5 && size > previous {
@@ -261,69 +244,98 @@ impl Step {
         false
     }
 
-    /// Residual and Jacobian at the present unknowns.
-    fn evaluate(&mut self, structure: &Structure, eliminated: &Eliminated, loads: &StageLoads, state: &[f64]) {
-        let (n, j, internal, h) = (structure.n, structure.joints.len(), structure.internal, eliminated.length);
-        let z_at = |stage: usize, s: usize| STAGES * j + stage * internal + s;
+    /// The laws at the present unknowns.
+    fn evaluate(&mut self, assembly: &Assembly, eliminated: &Eliminated, loads: &StageLoads) {
+        let (j, h) = (assembly.axes.len(), eliminated.length);
         for stage in 0..STAGES {
-            for (q, joint) in structure.joints.iter().enumerate() {
-                let row = stage * j + q;
-                // structural displacement from the collocation of structural velocities, imposed motion apart
-                let mut u = self.structural[q] + loads.stage[row].0;
-                for k in 0..STAGES {
-                    u += h * A[stage][k] * (self.unknown[k * j + q] - loads.stage[k * j + q].1);
+            for (q, joint) in assembly.joints.iter().enumerate() {
+                let mut motion = Relative::along(0.0, 0.0);
+                for (d, axis) in joint.axes().enumerate() {
+                    // structural displacement from the collocation of structural velocities, imposed motion apart
+                    let mut u = self.structural[axis] + loads.stage[stage * j + axis].0;
+                    for k in 0..STAGES {
+                        u += h * A[stage][k] * (self.unknown[k * j + axis] - loads.stage[k * j + axis].1);
+                    }
+                    motion.displacement[d] = u;
+                    motion.velocity[d] = self.unknown[stage * j + axis];
                 }
-                let first = z_at(stage, joint.first_state);
-                let z = &self.unknown.as_slice()[first..first + joint.states];
-                let point = LawPoint::new(&*joint.law, u, self.unknown[row], z);
-                self.force[row] = point.force;
-                self.points[row] = point;
+                let first = at_state(assembly, stage, joint.first_state);
+                let z = &self.unknown[first..first + joint.states];
+                let point = &mut self.points[stage * assembly.joints.len() + q];
+                if let Some(rate) = joint.law.rate() {
+                    rate.linearise(joint.directions, &motion, z, point);
+                }
+                let row = stage * j + joint.first_axis;
+                self.force.as_mut_slice()[row..row + joint.directions].copy_from_slice(&point.force[..joint.directions]);
             }
         }
+    }
+
+    /// Residual and Jacobian from the laws at the present unknowns.
+    fn linearise(&mut self, assembly: &Assembly, eliminated: &Eliminated, state: &[f64]) {
+        let (n, j, h) = (assembly.n, assembly.axes.len(), eliminated.length);
+        let (unknowns, joints) = (self.unknown.len(), assembly.joints.len());
+        let jacobian = self.lu.zeros(unknowns);
+        for at in 0..unknowns {
+            jacobian[at * unknowns + at] = 1.0;
+        }
         // velocities
-        self.residual.fill(0.0);
-        self.jacobian.fill(0.0);
-        let g = &eliminated.velocity_from_force;
+        let g = eliminated.velocity_from_force.as_slice(); // column after column
         for row in 0..STAGES * j {
             self.residual[row] = self.unknown[row] - self.free[row];
-            self.jacobian[(row, row)] += 1.0;
-            for column in 0..STAGES * j {
-                let gain = g[(row, column)];
-                if gain == 0.0 {
-                    continue;
-                }
-                let (stage, q) = (column / j, column % j);
-                let point = &self.points[column];
-                self.residual[row] -= gain * point.force;
-                self.jacobian[(row, column)] -= gain * point.force_slope[1];
-                if point.force_slope[0] != 0.0 {
-                    for k in 0..STAGES {
-                        self.jacobian[(row, k * j + q)] -= gain * point.force_slope[0] * h * A[stage][k];
+        }
+        for stage in 0..STAGES {
+            for (q, joint) in assembly.joints.iter().enumerate() {
+                let point = &self.points[stage * joints + q];
+                let directions = joint.directions;
+                for (d, axis) in joint.axes().enumerate() {
+                    let column = stage * j + axis;
+                    let gains = &g[column * STAGES * j..(column + 1) * STAGES * j];
+                    let slope = point.force_slope(d);
+                    let force = point.force[d];
+                    for (row, gain) in gains.iter().enumerate() {
+                        self.residual[row] -= gain * force;
+                        let entries = &mut jacobian[row * unknowns..(row + 1) * unknowns];
+                        for e in 0..directions {
+                            entries[stage * j + joint.first_axis + e] -= gain * slope[directions + e];
+                            if slope[e] != 0.0 {
+                                for k in 0..STAGES {
+                                    entries[k * j + joint.first_axis + e] -= gain * slope[e] * h * A[stage][k];
+                                }
+                            }
+                        }
+                        let first = at_state(assembly, stage, joint.first_state);
+                        for s in 0..joint.states {
+                            entries[first + s] -= gain * slope[2 * directions + s];
+                        }
                     }
-                }
-                let joint = &structure.joints[q];
-                for s in 0..joint.states {
-                    self.jacobian[(row, z_at(stage, joint.first_state + s))] -= gain * point.force_slope[2 + s];
                 }
             }
         }
         // internal states
-        for (q, joint) in structure.joints.iter().enumerate() {
+        for (q, joint) in assembly.joints.iter().enumerate() {
+            let directions = joint.directions;
             for s in 0..joint.states {
                 for stage in 0..STAGES {
-                    let row = z_at(stage, joint.first_state + s);
+                    let row = at_state(assembly, stage, joint.first_state + s);
                     self.residual[row] = self.unknown[row] - state[2 * n + joint.first_state + s];
-                    self.jacobian[(row, row)] += 1.0;
+                    let entries = &mut jacobian[row * unknowns..(row + 1) * unknowns];
                     for k in 0..STAGES {
                         let weight = h * A[stage][k];
-                        let point = &self.points[k * j + q];
+                        let point = &self.points[k * joints + q];
+                        let slope = point.rate_slope(s);
                         self.residual[row] -= weight * point.rate[s];
-                        self.jacobian[(row, k * j + q)] -= weight * point.rate_slope[s][1];
-                        for l in 0..STAGES {
-                            self.jacobian[(row, l * j + q)] -= weight * point.rate_slope[s][0] * h * A[k][l];
+                        for e in 0..directions {
+                            entries[k * j + joint.first_axis + e] -= weight * slope[directions + e];
+                            if slope[e] != 0.0 {
+                                for l in 0..STAGES {
+                                    entries[l * j + joint.first_axis + e] -= weight * slope[e] * h * A[k][l];
+                                }
+                            }
                         }
+                        let first = at_state(assembly, k, joint.first_state);
                         for t in 0..joint.states {
-                            self.jacobian[(row, z_at(k, joint.first_state + t))] -= weight * point.rate_slope[s][2 + t];
+                            entries[first + t] -= weight * slope[2 * directions + t];
                         }
                     }
                 }
@@ -331,85 +343,256 @@ impl Step {
         }
     }
 
-    fn finish(&mut self, eliminated: &Eliminated, loads: &StageLoads, linear: &DVector<f64>) {
-        self.stages.gemv(1.0, &eliminated.stage_from_state, linear, 0.0);
-        self.stages.gemv(1.0, &eliminated.stage_from_load, &loads.force, 1.0);
-        self.stages.gemv(1.0, &eliminated.stage_from_force, &self.force, 1.0);
-        self.factor = factorised(&self.jacobian);
+    /// The state at the end of the step that was solved last.
+    pub fn end(&self, assembly: &Assembly, eliminated: &Eliminated, loads: &StageLoads, out: &mut [f64]) {
+        let n = assembly.n;
+        self.combine(&eliminated.end, loads, &mut out[..2 * n]);
+        let last = at_state(assembly, STAGES - 1, 0);
+        out[2 * n..].copy_from_slice(&self.unknown[last..last + assembly.internal]);
+    }
+
+    /// All stage displacements and velocities of it, X₁X₂X₃V₁V₂V₃.
+    pub fn stages(&self, eliminated: &Eliminated, loads: &StageLoads) -> DVector<f64> {
+        let mut out = &eliminated.stage_from_state * &self.linear;
+        out.gemv(1.0, &eliminated.stage_from_load, &loads.force, 1.0);
+        out.gemv(1.0, &eliminated.stage_from_force, &self.force, 1.0);
+        out
+    }
+
+    fn combine(&self, [state, load, force]: &[DMatrix<f64>; 3], loads: &StageLoads, out: &mut [f64]) {
+        let mut out = nalgebra::DVectorViewMut::from_slice(out, state.nrows());
+        out.gemv(1.0, state, &self.linear, 0.0);
+        out.gemv(1.0, load, &loads.force, 1.0);
+        out.gemv(1.0, force, &self.force, 1.0);
     }
 
     /// Carries the columns of `sensitivity` over the step that was solved last.
-    pub fn carry(&self, structure: &Structure, eliminated: &Eliminated, sensitivity: &mut DMatrix<f64>) {
-        let (n, j, internal, h) = (structure.n, structure.joints.len(), structure.internal, eliminated.length);
-        let Some(factor) = &self.factor else { return };
-        let columns = sensitivity.ncols();
-        let linear = sensitivity.rows(0, 2 * n).into_owned();
-        let mut right = DMatrix::zeros(structure.unknowns(), columns);
-        right.rows_mut(0, STAGES * j).gemm(1.0, &eliminated.velocity_from_state, &linear, 0.0);
+    pub fn carry(&mut self, assembly: &Assembly, eliminated: &Eliminated, sensitivity: &mut DMatrix<f64>) {
+        let (n, j, internal, h) = (assembly.n, assembly.axes.len(), assembly.internal, eliminated.length);
+        let (columns, joints) = (sensitivity.ncols(), assembly.joints.len());
+        if self.right.ncols() != columns {
+            self.right = DMatrix::zeros(self.unknown.len(), columns);
+            self.direct = DMatrix::zeros(STAGES * j, columns);
+        }
+        let linear = sensitivity.rows(0, 2 * n);
+        self.right.rows_mut(0, STAGES * j).gemm(1.0, &eliminated.velocity_from_state, &linear, 0.0);
         // what the displacement at the start does through the laws
-        let mut direct = DMatrix::zeros(STAGES * j, columns);
-        for (q, joint) in structure.joints.iter().enumerate() {
-            let u = joint.direction.transpose() * sensitivity.rows(0, n);
-            for stage in 0..STAGES {
-                let slope = self.points[stage * j + q].force_slope[0];
-                if slope != 0.0 {
-                    direct.row_mut(stage * j + q).copy_from(&(&u * slope));
-                }
-            }
-            for s in 0..joint.states {
+        for c in 0..columns {
+            let column = sensitivity.column(c);
+            let column = column.as_slice();
+            for (q, joint) in assembly.joints.iter().enumerate() {
+                let mut u = [0.0; crate::law::MOST_DIRECTIONS];
+                joint.axes().enumerate().for_each(|(d, axis)| u[d] = assembly.axes[axis].along(&column[..n]));
+                let along = |slope: &[f64]| -> f64 { (0..joint.directions).map(|e| slope[e] * u[e]).sum() };
                 for stage in 0..STAGES {
-                    let row = STAGES * j + stage * internal + joint.first_state + s;
-                    let own = sensitivity.row(2 * n + joint.first_state + s).into_owned();
-                    let through: f64 =
-                        (0..STAGES).map(|k| h * A[stage][k] * self.points[k * j + q].rate_slope[s][0]).sum();
-                    right.row_mut(row).copy_from(&(own + &u * through));
-                }
-            }
-        }
-        right.rows_mut(0, STAGES * j).gemm(1.0, &eliminated.velocity_from_force, &direct, 1.0);
-        if !solved(factor, &mut right) {
-            return;
-        }
-        let mut force = direct;
-        for stage in 0..STAGES {
-            for (q, joint) in structure.joints.iter().enumerate() {
-                let row = stage * j + q;
-                let point = &self.points[row];
-                for c in 0..columns {
-                    let mut value = point.force_slope[1] * right[(row, c)];
-                    for k in 0..STAGES {
-                        value += point.force_slope[0] * h * A[stage][k] * right[(k * j + q, c)];
+                    let point = &self.points[stage * joints + q];
+                    for (d, axis) in joint.axes().enumerate() {
+                        self.direct[(stage * j + axis, c)] = along(point.force_slope(d));
                     }
                     for s in 0..joint.states {
-                        value += point.force_slope[2 + s]
-                            * right[(STAGES * j + stage * internal + joint.first_state + s, c)];
+                        let through: f64 = (0..STAGES)
+                            .map(|k| h * A[stage][k] * along(self.points[k * joints + q].rate_slope(s)))
+                            .sum();
+                        let row = at_state(assembly, stage, joint.first_state + s);
+                        self.right[(row, c)] = column[2 * n + joint.first_state + s] + through;
                     }
-                    force[(row, c)] += value;
                 }
             }
         }
-        let last = |m: &DMatrix<f64>| {
-            let mut out = DMatrix::zeros(2 * n, m.ncols());
-            out.rows_mut(0, n).copy_from(&m.rows((STAGES - 1) * n, n));
-            out.rows_mut(n, n).copy_from(&m.rows((2 * STAGES - 1) * n, n));
-            out
-        };
-        let mut end = last(&eliminated.stage_from_state) * linear;
-        end += last(&eliminated.stage_from_force) * force;
-        sensitivity.rows_mut(0, 2 * n).copy_from(&end);
-        for s in 0..internal {
-            let row = STAGES * j + (STAGES - 1) * internal + s;
-            sensitivity.row_mut(2 * n + s).copy_from(&right.row(row));
+        self.right.rows_mut(0, STAGES * j).gemm(1.0, &eliminated.velocity_from_force, &self.direct, 1.0);
+        for mut column in self.right.column_iter_mut() {
+            self.lu.solve(column.as_mut_slice());
         }
+        for c in 0..columns {
+            let right = self.right.column(c);
+            for stage in 0..STAGES {
+                for (q, joint) in assembly.joints.iter().enumerate() {
+                    let point = &self.points[stage * joints + q];
+                    let first = at_state(assembly, stage, joint.first_state);
+                    for (d, axis) in joint.axes().enumerate() {
+                        let slope = point.force_slope(d);
+                        let mut value = 0.0;
+                        for (e, other) in joint.axes().enumerate() {
+                            value += slope[joint.directions + e] * right[stage * j + other];
+                            for k in 0..STAGES {
+                                value += slope[e] * h * A[stage][k] * right[k * j + other];
+                            }
+                        }
+                        for s in 0..joint.states {
+                            value += slope[2 * joint.directions + s] * right[first + s];
+                        }
+                        self.direct[(stage * j + axis, c)] += value;
+                    }
+                }
+            }
+        }
+        let mut end = &eliminated.end[0] * sensitivity.rows(0, 2 * n);
+        end.gemm(1.0, &eliminated.end[2], &self.direct, 1.0);
+        sensitivity.rows_mut(0, 2 * n).copy_from(&end);
+        let last = at_state(assembly, STAGES - 1, 0);
+        sensitivity.rows_mut(2 * n, internal).copy_from(&self.right.rows(last, internal));
+    }
+
+    /// The embedded estimate of the error of the step that was solved last, before its filter: `slope` is the time derivative of the state at
+    /// its start.
+    pub fn raw_error(
+        &self,
+        assembly: &Assembly,
+        eliminated: &Eliminated,
+        loads: &StageLoads,
+        (state, slope): (&[f64], &[f64]),
+        out: &mut [f64],
+    ) {
+        let n = assembly.n;
+        self.combine(&eliminated.increments, loads, &mut out[..2 * n]);
+        for s in 0..assembly.internal {
+            let increments = ERROR.iter().enumerate().map(|(i, weight)| {
+                weight / eliminated.length * (self.unknown[at_state(assembly, i, s)] - state[2 * n + s])
+            });
+            out[2 * n + s] = increments.sum();
+        }
+        out.iter_mut().zip(slope).for_each(|(o, s)| *o += s);
+    }
+
+    /// Makes the filter for the laws `at` the start of the step; false if it is singular.
+    pub fn prepare_filter(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint]) -> bool {
+        self.filter.prepare(assembly, eliminated, at)
+    }
+
+    /// Replaces an error estimate by the filtered one, so that stiff components do not dominate it.
+    pub fn filter(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint], error: &mut [f64]) {
+        self.filter.apply(assembly, eliminated, at, error);
     }
 }
 
-fn factorised(jacobian: &DMatrix<f64>) -> Option<LU<f64, Dyn, Dyn>> {
-    let factor = jacobian.clone().lu();
-    factor.is_invertible().then_some(factor)
+/// A point for every law.
+pub(crate) fn points(assembly: &Assembly) -> Vec<RatePoint> {
+    assembly.joints.iter().map(|joint| RatePoint::new(joint.directions, joint.states)).collect()
 }
 
-/// Solves for `right`. A structure without joints has no unknowns, and `nalgebra` counts from one less.
-fn solved<C: Dim, S: StorageMut<f64, Dyn, C>>(factor: &LU<f64, Dyn, Dyn>, right: &mut Matrix<f64, Dyn, C, S>) -> bool {
-    right.nrows() == 0 || factor.solve_mut(right)
+/// `(γ - J)⁻¹` with the Jacobian `J` of the motion, eliminated onto the axes: their velocities `w` satisfy `(1 + G T) w = Wᵀ P b - G t`, with
+/// the forces `T w + t` that the laws answer.
+#[derive(Debug, Clone)]
+struct Filter {
+    /// Of every law: the elimination of its internal states.
+    states: Vec<Lu>,
+    /// Of every law: `T`, directions × directions.
+    answers: Vec<Vec<f64>>,
+    axes: Lu,
+    rate: f64,
+    z: Vec<f64>,
+    b: DVector<f64>,
+    v: DVector<f64>,
+    w: Vec<f64>,
+    force: DVector<f64>,
+}
+
+impl Filter {
+    fn new(assembly: &Assembly) -> Self {
+        let most = assembly.joints.iter().map(|joint| joint.states).max().unwrap_or(0);
+        Filter {
+            states: vec![Lu::default(); assembly.joints.len()],
+            answers: assembly.joints.iter().map(|joint| vec![0.0; joint.directions * joint.directions]).collect(),
+            axes: Lu::default(),
+            rate: 1.0,
+            z: vec![0.0; most],
+            b: DVector::zeros(assembly.n),
+            v: DVector::zeros(assembly.n),
+            w: vec![0.0; assembly.axes.len()],
+            force: DVector::zeros(assembly.axes.len()),
+        }
+    }
+
+    fn prepare(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint]) -> bool {
+        let (rate, j) = (REAL / eliminated.length, assembly.axes.len());
+        self.rate = rate;
+        for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {
+            let (directions, states) = (joint.directions, joint.states);
+            let matrix = self.states[q].zeros(states);
+            for s in 0..states {
+                let slope = point.rate_slope(s);
+                for t in 0..states {
+                    matrix[s * states + t] = f64::from(u8::from(s == t)) * rate - slope[2 * directions + t];
+                }
+            }
+            if !self.states[q].factorise() {
+                return false;
+            }
+            for e in 0..directions {
+                for s in 0..states {
+                    let slope = point.rate_slope(s);
+                    self.z[s] = slope[e] / rate + slope[directions + e];
+                }
+                self.states[q].solve(&mut self.z[..states]);
+                for d in 0..directions {
+                    let slope = point.force_slope(d);
+                    let through: f64 = (0..states).map(|s| slope[2 * directions + s] * self.z[s]).sum();
+                    self.answers[q][d * directions + e] = slope[e] / rate + slope[directions + e] + through;
+                }
+            }
+        }
+        let g = &eliminated.filter[2];
+        let matrix = self.axes.zeros(j);
+        for row in 0..j {
+            matrix[row * j + row] = 1.0;
+            for (joint, answer) in assembly.joints.iter().zip(&self.answers) {
+                for (e, column) in joint.axes().enumerate() {
+                    let gains = joint.axes().enumerate().map(|(d, a)| g[(row, a)] * answer[d * joint.directions + e]);
+                    matrix[row * j + column] += gains.sum::<f64>();
+                }
+            }
+        }
+        self.axes.factorise()
+    }
+
+    fn apply(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint], error: &mut [f64]) {
+        let (n, rate) = (assembly.n, self.rate);
+        let [p, pw, g] = &eliminated.filter;
+        let (linear, internal) = error.split_at_mut(2 * n);
+        let (x, v) = linear.split_at_mut(n);
+        for i in 0..n {
+            self.b[i] = (0..n).map(|k| assembly.mass[(i, k)] * v[k] - assembly.stiffness[(i, k)] * x[k] / rate).sum();
+        }
+        self.v.gemv(1.0, p, &self.b, 0.0);
+        // the forces that the laws answer while the axes do not move: t
+        for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {
+            let (directions, states) = (joint.directions, joint.states);
+            let mut u = [0.0; crate::law::MOST_DIRECTIONS];
+            joint.axes().enumerate().for_each(|(d, axis)| u[d] = assembly.axes[axis].along(x) / rate);
+            for (s, own) in joint.internal().enumerate() {
+                let slope = point.rate_slope(s);
+                self.z[s] = internal[own] + (0..directions).map(|e| slope[e] * u[e]).sum::<f64>();
+            }
+            self.states[q].solve(&mut self.z[..states]);
+            internal[joint.internal()].copy_from_slice(&self.z[..states]);
+            for (d, axis) in joint.axes().enumerate() {
+                let slope = point.force_slope(d);
+                let direct: f64 = (0..directions).map(|e| slope[e] * u[e]).sum();
+                let through: f64 = (0..states).map(|s| slope[2 * directions + s] * self.z[s]).sum();
+                self.force[axis] = direct + through;
+            }
+        }
+        for (row, (w, axis)) in self.w.iter_mut().zip(&assembly.axes).enumerate() {
+            *w = axis.along(self.v.as_slice()) - g.row(row).iter().zip(&self.force).map(|(g, t)| g * t).sum::<f64>();
+        }
+        self.axes.solve(&mut self.w);
+        for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {
+            let (directions, states) = (joint.directions, joint.states);
+            let w = &self.w[joint.axes()];
+            for (d, axis) in joint.axes().enumerate() {
+                self.force[axis] += (0..directions).map(|e| self.answers[q][d * directions + e] * w[e]).sum::<f64>();
+            }
+            for s in 0..states {
+                let slope = point.rate_slope(s);
+                self.z[s] = (0..directions).map(|e| (slope[e] / rate + slope[directions + e]) * w[e]).sum();
+            }
+            self.states[q].solve(&mut self.z[..states]);
+            internal[joint.internal()].iter_mut().zip(&self.z).for_each(|(error, z)| *error += z);
+        }
+        self.v.gemv(-1.0, pw, &self.force, 1.0);
+        for i in 0..n {
+            v[i] = self.v[i];
+            x[i] = (x[i] + v[i]) / rate;
+        }
+    }
 }

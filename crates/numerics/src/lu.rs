@@ -1,0 +1,112 @@
+//! A factor of a small dense matrix, in memory that is kept from one matrix to the next.
+
+/// `P A = L U` with row exchanges.
+///
+/// Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 3.4.
+///
+/// # Example
+/// ```
+/// use stickslip_numerics::lu::Lu;
+/// let mut lu = Lu::default();
+/// lu.zeros(2).copy_from_slice(&[0.0, 2.0, 4.0, 1.0]);
+/// assert!(lu.factorise());
+/// let mut x = [2.0, 9.0];
+/// lu.solve(&mut x);
+/// assert_eq!(x, [2.0, 1.0]);
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct Lu {
+    n: usize,
+    entries: Vec<f64>,
+    /// The row that came to this place when it was eliminated.
+    exchanged: Vec<usize>,
+}
+
+impl Lu {
+    /// The matrix, row after row, all zero, to be filled before [`Lu::factorise`].
+    pub fn zeros(&mut self, n: usize) -> &mut [f64] {
+        self.n = n;
+        self.entries.clear();
+        self.entries.resize(n * n, 0.0);
+        &mut self.entries
+    }
+
+    /// The matrix as it was filled so far.
+    pub fn entries(&mut self) -> &mut [f64] {
+        &mut self.entries
+    }
+
+    /// Factorises what the matrix was filled with; false if a pivot vanishes or is not finite.
+    pub fn factorise(&mut self) -> bool {
+        let n = self.n;
+        self.exchanged.clear();
+        for k in 0..n {
+            let mut pivot = k;
+            for i in k + 1..n {
+                if self.entries[i * n + k].abs() > self.entries[pivot * n + k].abs() {
+                    pivot = i;
+                }
+            }
+            let largest = self.entries[pivot * n + k];
+            if largest == 0.0 || !largest.is_finite() {
+                return false;
+            }
+            self.exchanged.push(pivot);
+            let (top, bottom) = self.entries.split_at_mut((k + 1) * n);
+            let row = &mut top[k * n..];
+            if pivot != k {
+                let at = (pivot - k - 1) * n;
+                row.swap_with_slice(&mut bottom[at..at + n]);
+            }
+            for below in bottom.chunks_exact_mut(n) {
+                let factor = below[k] / largest;
+                below[k] = factor;
+                if factor != 0.0 {
+                    below[k + 1..].iter_mut().zip(&row[k + 1..]).for_each(|(x, p)| *x -= factor * p);
+                }
+            }
+        }
+        true
+    }
+
+    /// Replaces the right side by the solution.
+    pub fn solve(&self, right: &mut [f64]) {
+        let n = self.n;
+        for k in 0..n {
+            right.swap(k, self.exchanged[k]);
+        }
+        for i in 1..n {
+            let row = &self.entries[i * n..i * n + i];
+            right[i] -= row.iter().zip(&*right).map(|(l, x)| l * x).sum::<f64>();
+        }
+        for i in (0..n).rev() {
+            let row = &self.entries[i * n..(i + 1) * n];
+            let sum: f64 = row[i + 1..].iter().zip(&right[i + 1..n]).map(|(u, x)| u * x).sum();
+            right[i] = (right[i] - sum) / row[i];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The solution is the one that the matrix was multiplied with, for one matrix after the other in the same memory.
+    #[test]
+    fn solutions_come_back() {
+        let mut lu = Lu::default();
+        for n in [0, 1, 2, 5, 23, 4] {
+            let entry = |i: usize, k: usize| if i == k && n > 1 { 0.0 } else { ((i * 7919 + k * 104_729 + 1) as f64).sin() };
+            let matrix = lu.zeros(n);
+            (0..n * n).for_each(|at| matrix[at] = entry(at / n, at % n));
+            assert!(lu.factorise());
+            let mut right: Vec<f64> = (0..n).map(|i| (0..n).map(|k| entry(i, k) * (1.0 + k as f64)).sum()).collect();
+            lu.solve(&mut right);
+            for (i, x) in right.iter().enumerate() {
+                assert!((x - 1.0 - i as f64).abs() < 1e-10, "{n}: {x}");
+            }
+        }
+        lu.zeros(2).fill(1.0);
+        assert!(!lu.factorise());
+    }
+}

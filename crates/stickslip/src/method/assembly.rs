@@ -1,0 +1,160 @@
+//! A system as flows in steps see it: full matrices, axes side by side, laws with the numbers of their axes and states.
+
+use super::MethodError;
+use super::drive::Drive;
+use crate::law::SharedLaw;
+use crate::model::{Axis, System};
+use nalgebra::DMatrix;
+
+/// Matrices, axes and laws; independent of the drive.
+#[derive(Debug, Clone)]
+pub(crate) struct Assembly {
+    /// Degrees of freedom.
+    pub n: usize,
+    pub mass: DMatrix<f64>,
+    pub inverse_mass: DMatrix<f64>,
+    pub damping: DMatrix<f64>,
+    pub stiffness: DMatrix<f64>,
+    /// The axes of all joints, in their order.
+    pub axes: Vec<Axis>,
+    /// The same as columns, n × axes.
+    pub directions: DMatrix<f64>,
+    pub joints: Vec<PlacedLaw>,
+    /// Internal states of all laws.
+    pub internal: usize,
+}
+
+/// A law with its place among axes and states.
+#[derive(Debug, Clone)]
+pub(crate) struct PlacedLaw {
+    pub law: SharedLaw,
+    pub first_axis: usize,
+    pub directions: usize,
+    /// Index of its first internal state.
+    pub first_state: usize,
+    pub states: usize,
+    /// Size of its states in motion.
+    pub state_scale: f64,
+}
+
+impl PlacedLaw {
+    /// Its axes.
+    pub fn axes(&self) -> std::ops::Range<usize> {
+        self.first_axis..self.first_axis + self.directions
+    }
+    /// Its internal states.
+    pub fn internal(&self) -> std::ops::Range<usize> {
+        self.first_state..self.first_state + self.states
+    }
+}
+
+impl Assembly {
+    /// `states` tells the law that a joint is followed with, the number of its states and their size; or what to use instead.
+    ///
+    /// # Errors
+    /// A joint that is refused by `states`; a place without mass; a mass matrix that has no inverse.
+    pub fn new(
+        system: &System,
+        method: &'static str,
+        mut states: impl FnMut(&SharedLaw) -> Result<(SharedLaw, usize, f64), &'static str>,
+    ) -> Result<Self, MethodError> {
+        let (structure, n) = (system.structure(), system.dofs());
+        if let Some(i) = (0..n).find(|&i| structure.mass()[(i, i)] <= 0.0) {
+            return Err(MethodError::NeedsMass { method, place: system.places()[i].clone() });
+        }
+        let inverse_mass =
+            structure.mass().clone().try_inverse().ok_or(MethodError::NotPositive { method, matrix: "mass" })?;
+        let (mut joints, mut first_axis, mut internal) = (Vec::new(), 0, 0);
+        for joint in system.joints() {
+            let (law, count, state_scale) = states(joint.law()).map_err(|instead| MethodError::Law {
+                method,
+                joint: joint.name().to_owned(),
+                law: joint.law().name(),
+                instead,
+            })?;
+            let directions = joint.axes().len();
+            joints.push(PlacedLaw { law, first_axis, directions, first_state: internal, states: count, state_scale });
+            first_axis += directions;
+            internal += count;
+        }
+        let axes: Vec<_> = system.axes().map(|(_, axis)| axis.dense(n)).collect();
+        Ok(Assembly {
+            n,
+            mass: structure.mass().clone(),
+            inverse_mass,
+            damping: structure.damping().clone(),
+            stiffness: structure.stiffness().clone(),
+            axes: system.axes().map(|(_, axis)| axis.clone()).collect(),
+            directions: DMatrix::from_fn(n, first_axis, |row, axis| axes[axis][row]),
+            joints,
+            internal,
+        })
+    }
+
+    /// Length of the state `(x, v, internal states)`.
+    pub fn states(&self) -> usize {
+        2 * self.n + self.internal
+    }
+
+    /// Relative displacement and velocity along an axis.
+    pub fn relative(&self, axis: usize, state: &[f64], drive: &Drive, time: f64) -> (f64, f64) {
+        let (g, speed) = drive.relative_at(axis, time);
+        let (x, v) = state.split_at(self.n);
+        (self.axes[axis].along(x) + g, self.axes[axis].along(v) + speed)
+    }
+
+    /// Acceleration of a state (length n) under joint forces.
+    pub fn accelerate(&self, state: &[f64], load: &[f64], force: &[f64], out: &mut [f64]) {
+        let n = self.n;
+        let (x, v) = state.split_at(n);
+        let mut left = vec![0.0; n];
+        for i in 0..n {
+            left[i] = load[i];
+            for k in 0..n {
+                left[i] -= self.stiffness[(i, k)] * x[k] + self.damping[(i, k)] * v[k];
+            }
+        }
+        for (axis, force) in self.axes.iter().zip(force) {
+            for &(i, w) in axis.rows() {
+                left[i] -= w * force;
+            }
+        }
+        for i in 0..n {
+            out[i] = (0..n).map(|k| self.inverse_mass[(i, k)] * left[k]).sum();
+        }
+    }
+
+    /// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia, internal states with the scale of the
+    /// motion, `rest` (√J).
+    pub fn weights(&self, omega: f64, rest: f64) -> Vec<f64> {
+        let n = self.n;
+        let mut weights = vec![1.0; self.states()];
+        for i in 0..n {
+            let inertia = omega * omega * self.mass[(i, i)];
+            weights[i] = self.stiffness[(i, i)].max(inertia).sqrt();
+            weights[n + i] = self.mass[(i, i)].sqrt();
+        }
+        for joint in &self.joints {
+            let weight = if rest > 0.0 { rest } else { 1.0 } / joint.state_scale;
+            joint.internal().for_each(|s| weights[2 * n + s] = weight);
+        }
+        weights
+    }
+
+    /// Scales of displacement and velocity for error norms: of the state, of the imposed motion, and of what the loads can do.
+    pub fn scales(&self, state: &[f64], drive: &Drive) -> (f64, f64) {
+        let n = self.n;
+        let natural = (0..n).map(|i| (self.stiffness[(i, i)] / self.mass[(i, i)]).sqrt());
+        // without a drive the structure's own frequencies set the time scale
+        let rate = if drive.omega > 0.0 { drive.omega } else { natural.fold(f64::MIN_POSITIVE, f64::max) };
+        let x = state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs()));
+        let v = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
+        let mobility = if n == 0 { 0.0 } else { self.inverse_mass.amax().sqrt() };
+        let loads = drive.energy_scale(&self.mass, &self.stiffness) * mobility;
+        let velocity = v.max(x * rate).max(drive.imposed_velocity()).max(NEAR_REST * loads).max(f64::MIN_POSITIVE);
+        (velocity / rate, velocity)
+    }
+}
+
+/// A state counts as rest below this fraction of what the loads could cause.
+pub(crate) const NEAR_REST: f64 = 1e-3;

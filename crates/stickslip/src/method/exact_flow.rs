@@ -1,0 +1,49 @@
+//! The motion between switches as one of the flows.
+
+use super::drive::Drive;
+use super::event_driven::{ExactPath, Flow as Segments, Mechanics, weights};
+use super::flow::Flow;
+use super::Breakdown;
+use crate::model::System;
+use crate::orbit::{Path, Symmetry};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Follows systems of ideal sliders by events.
+pub(crate) struct ExactFlow {
+    segments: Segments,
+}
+
+impl ExactFlow {
+    pub fn new(mechanics: Mechanics) -> Self {
+        ExactFlow { segments: Segments::new(mechanics, Drive::default()) }
+    }
+}
+
+impl Flow for ExactFlow {
+    fn states(&self) -> usize {
+        self.segments.mechanics.states()
+    }
+    fn set_drive(&mut self, system: &System, omega: f64) {
+        let owners = self.segments.mechanics.owners();
+        self.segments.set_drive(Drive::at(system, &owners, omega));
+    }
+    fn weights(&self) -> Vec<f64> {
+        weights(&self.segments.mechanics, self.segments.drive.omega)
+    }
+    fn energy_scale(&self) -> f64 {
+        self.segments.energy_scale
+    }
+    fn run(
+        &mut self,
+        state: &mut [f64],
+        duration: f64,
+        sensitivity: Option<&mut DMatrix<f64>>,
+    ) -> Result<(), Breakdown> {
+        self.segments.run(state, 0.0, duration, sensitivity)
+    }
+    fn keep(&mut self, _keep: bool) {} // segments are always kept: they are what it computes with
+    fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Arc<dyn Path> {
+        Arc::new(ExactPath::new(system.clone(), &self.segments, symmetry, period))
+    }
+}

@@ -1,0 +1,192 @@
+//! Equal steps over a stretch of time, as many as the estimated error asks for.
+
+use super::law;
+use super::step::{Eliminated, Step};
+use crate::law::Contact;
+use crate::method::assembly::{Assembly, NEAR_REST};
+use crate::method::drive::Drive;
+use crate::method::flow::Flow;
+use crate::method::periodic::norm;
+use crate::method::stepped::{Instant, Node, SteppedPath, Steps};
+use crate::method::{Breakdown, MethodError};
+use crate::model::System;
+use crate::orbit::{Path, Symmetry};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Steps of a stretch at first.
+pub(crate) const FIRST: usize = 256;
+/// Steps of a stretch at most: linear motion is then within 1e-9 of the truth, and a run takes about 0.1 s for one joint.
+pub(crate) const MOST: usize = 1 << 16;
+/// Error of a stretch of a transient, relative to its motion.
+const TOLERANCE: f64 = 1e-6;
+/// Steps are doubled only where they must be: the next stretch tries half as many when the error is below this share of the tolerance.
+const EASY: f64 = 0.1;
+
+/// Runs the motion of a structure with any laws but rigid sliders.
+pub(crate) struct IncrementalFlow {
+    pub assembly: Assembly,
+    pub drive: Drive,
+    /// Steps of a run.
+    pub count: usize,
+    keep: bool,
+    steps: Steps,
+    step: Step,
+    eliminated: Option<Eliminated>,
+}
+
+/// Estimated error of the finer of two solutions that differ by `last`, where the coarser one and the one before it differ by `earlier`:
+/// what all further halvings will do if the differences fall on as they fell. Never less than a third of the difference, as at second order.
+pub(crate) fn estimate(earlier: Option<f64>, last: f64) -> f64 {
+    let ratio = earlier.map_or(2.0, |earlier| earlier / last.max(f64::MIN_POSITIVE)).clamp(1.25, 4.0);
+    last / (ratio - 1.0)
+}
+
+impl IncrementalFlow {
+    /// # Errors
+    /// A law that knows neither steps nor rates, or a rigid slider; a place without mass.
+    pub fn new(system: &System, width: Option<f64>, method: &'static str) -> Result<Self, MethodError> {
+        let assembly = Assembly::new(system, method, |joint| {
+            let regular = width.and_then(|width| joint.regularised(width));
+            let chosen = regular.unwrap_or_else(|| joint.clone());
+            match law::states(&chosen) {
+                Some((states, scale)) => Ok((chosen, states, scale)),
+                None if joint.pieces().is_some() => {
+                    Err("a law with a spring before its slider, or give the method a `width` (m/s), beside laws that are not exact")
+                }
+                None => Err("a law with a step or rate view"),
+            }
+        })?;
+        Ok(IncrementalFlow {
+            drive: Drive::default(),
+            count: FIRST,
+            keep: false,
+            steps: Steps { nodes: vec![(1.0, 1.0)], ..Steps::default() },
+            step: Step::new(&assembly),
+            eliminated: None,
+            assembly,
+        })
+    }
+
+    fn keep_instant(&mut self, state: &[f64], time: f64) {
+        let n = self.assembly.n;
+        let (mut load, mut acceleration) = (vec![0.0; n], vec![0.0; n]);
+        self.drive.load(time, &mut load);
+        self.assembly.accelerate(state, &load, self.step.force.as_slice(), &mut acceleration);
+        let force = self.step.force.as_slice().to_vec();
+        self.steps.instants.push(Instant { state: state[..2 * n].to_vec(), acceleration, force });
+    }
+
+    fn keep_step(&mut self, state: &[f64], (time, h): (f64, f64)) {
+        let n = self.assembly.n;
+        let velocity: Vec<f64> = (0..self.assembly.axes.len())
+            .map(|axis| self.assembly.relative(axis, state, &self.drive, time + h).1)
+            .collect();
+        let contact: Vec<Contact> = self
+            .assembly
+            .joints
+            .iter()
+            .zip(&self.step.laws)
+            .map(|(joint, law)| law.contact(&joint.law, &velocity[joint.axes()]))
+            .collect();
+        self.steps.spans.push((time, h));
+        let force = self.step.force.as_slice().to_vec();
+        self.steps.values.push(Node { state: state[..2 * n].to_vec(), velocity, force, contact });
+        self.keep_instant(state, time + h);
+    }
+
+    /// The motion of the last kept run, which repeats after `period`.
+    pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
+        SteppedPath::new((system, &self.assembly), &self.drive, &self.steps, (symmetry, period))
+    }
+}
+
+impl Flow for IncrementalFlow {
+    fn states(&self) -> usize {
+        self.assembly.states()
+    }
+
+    fn set_drive(&mut self, system: &System, omega: f64) {
+        let axes: Vec<usize> = (0..self.assembly.axes.len()).collect();
+        self.drive = Drive::at(system, &axes, omega);
+    }
+
+    fn weights(&self) -> Vec<f64> {
+        self.assembly.weights(self.drive.omega, NEAR_REST * self.energy_scale())
+    }
+
+    fn energy_scale(&self) -> f64 {
+        self.drive.energy_scale(&self.assembly.mass, &self.assembly.stiffness)
+    }
+
+    fn run(
+        &mut self,
+        state: &mut [f64],
+        duration: f64,
+        mut sensitivity: Option<&mut DMatrix<f64>>,
+    ) -> Result<(), Breakdown> {
+        let h = duration / self.count as f64;
+        if self.eliminated.as_ref().is_none_or(|eliminated| eliminated.length != h) {
+            self.eliminated = Eliminated::new(&self.assembly, h);
+        }
+        let eliminated = self.eliminated.take().ok_or(Breakdown::OutOfRange { time: 0.0 })?;
+        let (_, scale) = self.assembly.scales(state, &self.drive);
+        self.steps.clear();
+        self.step.start(&self.assembly, state, &self.drive, sensitivity.as_deref());
+        if self.keep {
+            self.keep_instant(state, 0.0);
+        }
+        for i in 0..self.count {
+            let time = i as f64 * h;
+            if !self.step.advance(&self.assembly, &eliminated, &self.drive, (time, state), scale) {
+                return Err(Breakdown::Stalled { time, step: h });
+            }
+            if state.iter().any(|z| !z.is_finite()) {
+                return Err(Breakdown::Unbounded { time });
+            }
+            if let Some(sensitivity) = sensitivity.as_deref_mut() {
+                self.step.carry(&self.assembly, &eliminated, sensitivity);
+            }
+            if self.keep {
+                self.keep_step(state, (time, h));
+            }
+        }
+        self.eliminated = Some(eliminated);
+        Ok(())
+    }
+
+    fn follow(&mut self, state: &mut [f64], duration: f64) -> Result<(), Breakdown> {
+        let weights = self.weights();
+        let rest = NEAR_REST * self.energy_scale();
+        let mut coarse = state.to_vec();
+        self.run(&mut coarse, duration, None)?;
+        let mut earlier = None;
+        loop {
+            self.count *= 2;
+            let mut fine = state.to_vec();
+            self.run(&mut fine, duration, None)?;
+            let change: Vec<f64> = fine.iter().zip(&coarse).map(|(a, b)| a - b).collect();
+            let size = norm(&weights, &fine).max(norm(&weights, state)).max(rest).max(f64::MIN_POSITIVE);
+            let last = norm(&weights, &change) / size;
+            let error = estimate(earlier, last);
+            if error <= TOLERANCE {
+                state.copy_from_slice(&fine);
+                // the next stretch begins with half as many again
+                self.count = (self.count / if error < EASY * TOLERANCE { 4 } else { 2 }).max(FIRST);
+                return Ok(());
+            }
+            if self.count >= MOST {
+                return Err(Breakdown::Unresolved { steps: self.count, estimate: error, tolerance: TOLERANCE });
+            }
+            (earlier, coarse) = (Some(last), fine);
+        }
+    }
+
+    fn keep(&mut self, keep: bool) {
+        self.keep = keep;
+    }
+
+    fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Arc<dyn Path> {
+        Arc::new(self.stepped(system, symmetry, period))
+    }
+}

@@ -1,0 +1,339 @@
+//! What a law answers to a step: the force and its states at the end, with derivatives by everything before and after.
+//!
+//! Laws with a step view answer by it. In a plane a step knows the direction of slip to first order only, so that there two halves of it are
+//! taken, and the answer is extrapolated: `2 (two halves) - (whole)`. Ideal sliders behind springs move their force with the displacement up to their limit, and stops know
+//! where they are. Laws with a rate view are integrated by the trapezoidal rule, `z₁ = z₀ + h/2 (g₀ + g₁)`.
+
+use crate::law::{Contact, MOST_DIRECTIONS, Piece, RatePoint, Relative, SharedLaw, StepPoint};
+use crate::method::assembly::PlacedLaw;
+use stickslip_numerics::lu::Lu;
+
+/// The view by which a law is asked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum View {
+    Pieces,
+    Step,
+    Rate,
+}
+
+/// The view, if there is one: pieces without rigid sliders, a step, a rate.
+fn view(law: &SharedLaw) -> Option<View> {
+    let steps = |piece: &Piece| match piece {
+        Piece::Slider(slider) => {
+            slider.static_limit == 0.0 || (slider.stiffness.is_some() && slider.static_limit == slider.limit)
+        }
+        Piece::Stop { .. } => true,
+    };
+    if law.pieces().is_some_and(|pieces| pieces.iter().all(steps)) {
+        return Some(View::Pieces);
+    }
+    match (law.step(), law.rate()) {
+        (Some(_), _) => Some(View::Step),
+        (None, Some(_)) => Some(View::Rate),
+        (None, None) => None,
+    }
+}
+
+/// The pieces that carry a force.
+fn pieces(law: &SharedLaw) -> Vec<Piece> {
+    let carries = |piece: &Piece| !matches!(piece, Piece::Slider(slider) if slider.static_limit == 0.0);
+    law.pieces().unwrap_or_default().into_iter().filter(carries).collect()
+}
+
+/// States that a law has here, and their size.
+pub(super) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
+    match view(law)? {
+        View::Pieces => {
+            let sliders = pieces(law).iter().filter(|piece| matches!(piece, Piece::Slider(_))).count();
+            let scale = law.scale();
+            Some((sliders, if scale.is_finite() && scale > 0.0 { scale } else { 1.0 }))
+        }
+        View::Step => law.step().map(|step| (step.states(), step.state_scale())),
+        View::Rate => law.rate().map(|rate| (rate.states(), rate.state_scale())),
+    }
+}
+
+/// A law at one instant.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct At<'a> {
+    pub motion: Relative<f64>,
+    pub z: &'a [f64],
+}
+
+/// Follows one law, in memory of its own.
+#[derive(Debug, Clone)]
+pub(super) struct Follower {
+    view: View,
+    pieces: Vec<Piece>,
+    directions: usize,
+    states: usize,
+    state_scale: f64,
+    /// Force (N) and states at the end of the step.
+    pub force: [f64; MOST_DIRECTIONS],
+    pub state: Vec<f64>,
+    /// Derivatives of the forces, then of the states, by (u₀, u₀', z₀, u₁, u₁').
+    slopes: Vec<f64>,
+    slipping: Option<f64>,
+    /// The whole step, and its halves.
+    step: StepPoint,
+    halves: [StepPoint; 2],
+    before: RatePoint,
+    after: RatePoint,
+    lu: Lu,
+    change: Vec<f64>,
+}
+
+/// Newton iterations for the states at the end of a step.
+const ITERATIONS: usize = 60;
+/// The most that an iteration may change a state, in sizes of states: laws that are exponential in them would be thrown far away.
+const STRIDE: f64 = 2.0;
+/// A change below this fraction of the size of the states ends the iteration.
+const SMALL: f64 = 1e-13;
+
+impl Follower {
+    /// Of a law that has [`states`].
+    pub fn new(joint: &PlacedLaw) -> Self {
+        let (directions, states) = (joint.directions, joint.states);
+        Follower {
+            view: view(&joint.law).unwrap_or(View::Rate),
+            pieces: pieces(&joint.law),
+            directions,
+            states,
+            state_scale: joint.state_scale,
+            force: [0.0; MOST_DIRECTIONS],
+            state: vec![0.0; states],
+            slopes: vec![0.0; (directions + states) * (4 * directions + states)],
+            slipping: None,
+            step: StepPoint::new(directions, states),
+            halves: std::array::from_fn(|_| StepPoint::new(directions, states)),
+            before: RatePoint::new(directions, states),
+            after: RatePoint::new(directions, states),
+            lu: Lu::default(),
+            change: vec![0.0; states],
+        }
+    }
+
+    /// Number of arguments of an answer.
+    fn arguments(&self) -> usize {
+        4 * self.directions + self.states
+    }
+
+    /// Derivatives of force `d`, in the order u₀, u₀', z₀, u₁, u₁'.
+    pub fn force_slope(&self, d: usize) -> &[f64] {
+        let width = self.arguments();
+        &self.slopes[d * width..(d + 1) * width]
+    }
+
+    /// Derivatives of state `s`.
+    pub fn state_slope(&self, s: usize) -> &[f64] {
+        self.force_slope(self.directions + s)
+    }
+
+    /// What the faces do at the end of the step.
+    pub fn contact(&self, law: &SharedLaw, velocity: &[f64]) -> Contact {
+        match self.slipping {
+            Some(sign) => Contact::slip(sign),
+            // below its limit a slider holds
+            None if self.view == View::Pieces && self.states > 0 => Contact::Stick,
+            None => law.contact(velocity, &self.force[..self.directions]),
+        }
+    }
+
+    /// The force of a state, as the answer to a step that goes nowhere; derivatives by its motion stand with u₁ and u₁'.
+    pub fn rest(&mut self, law: &SharedLaw, at: At) {
+        if self.view == View::Rate {
+            self.slopes.fill(0.0);
+            let (directions, states, width) = (self.directions, self.states, self.arguments());
+            if let Some(rate) = law.rate() {
+                rate.linearise(directions, &at.motion, at.z, &mut self.after);
+            }
+            self.force = self.after.force;
+            self.state.copy_from_slice(at.z);
+            for d in 0..directions {
+                let slope = self.after.force_slope(d);
+                let row = &mut self.slopes[d * width..(d + 1) * width];
+                row[2 * directions..2 * directions + states].copy_from_slice(&slope[2 * directions..]);
+                row[2 * directions + states..].copy_from_slice(&slope[..2 * directions]);
+            }
+            return;
+        }
+        self.begin(law, at);
+        self.advance(law, at, &at.motion, 0.0);
+    }
+
+    /// Prepares for a step from here.
+    pub fn begin(&mut self, law: &SharedLaw, from: At) {
+        self.state.copy_from_slice(from.z);
+        if let (View::Rate, Some(rate)) = (self.view, law.rate()) {
+            rate.linearise(self.directions, &from.motion, from.z, &mut self.before);
+        }
+    }
+
+    /// Answers the step of length `h` (s) `from` where it began `to` its end; false if the states at its end are not found.
+    pub fn advance(&mut self, law: &SharedLaw, from: At, to: &Relative<f64>, h: f64) -> bool {
+        self.slopes.fill(0.0);
+        match self.view {
+            View::Pieces => {
+                self.slide(from, to);
+                true
+            }
+            View::Step => {
+                self.step_over(law, from, to);
+                true
+            }
+            View::Rate => self.integrate(law, from, to, h),
+        }
+    }
+
+    /// One step of a law that knows steps; in a plane also in two halves.
+    fn step_over(&mut self, law: &SharedLaw, from: At, to: &Relative<f64>) {
+        let (directions, states, width) = (self.directions, self.states, self.arguments());
+        let Some(step) = law.step() else { return };
+        let (start, end) = (&from.motion.displacement, &to.displacement);
+        step.linearise(directions, start, end, from.z, &mut self.step);
+        let (z, after) = (2 * directions, 2 * directions + states);
+        let row_of = |point: &StepPoint, row: usize, argument: usize| {
+            let slope = if row < directions { point.force_slope(row) } else { point.state_slope(row - directions) };
+            slope[argument]
+        };
+        if directions == 1 {
+            self.force = self.step.force;
+            self.state.copy_from_slice(&self.step.state);
+            for row in 0..directions + states {
+                let out = &mut self.slopes[row * width..(row + 1) * width];
+                out[0] = row_of(&self.step, row, 0);
+                (0..states).for_each(|s| out[z + s] = row_of(&self.step, row, 2 + s));
+                out[after] = row_of(&self.step, row, 1);
+            }
+            return;
+        }
+        let middle = std::array::from_fn(|d| 0.5 * (start[d] + end[d]));
+        let [first, second] = &mut self.halves;
+        step.linearise(directions, start, &middle, from.z, first);
+        step.linearise(directions, &middle, end, &first.state, second);
+        for d in 0..directions {
+            self.force[d] = 2.0 * second.force[d] - self.step.force[d];
+        }
+        for s in 0..states {
+            self.state[s] = 2.0 * second.state[s] - self.step.state[s];
+        }
+        for row in 0..directions + states {
+            let out = &mut self.slopes[row * width..(row + 1) * width];
+            // through the state in the middle
+            let through = |argument: usize| -> f64 {
+                (0..states).map(|s| row_of(second, row, z + s) * first.state_slope(s)[argument]).sum()
+            };
+            for d in 0..directions {
+                let half = 0.5 * (row_of(second, row, d) + through(directions + d));
+                out[d] = 2.0 * (half + through(d)) - row_of(&self.step, row, d);
+                let ended = row_of(second, row, directions + d);
+                out[after + d] = 2.0 * (half + ended) - row_of(&self.step, row, directions + d);
+            }
+            for s in 0..states {
+                out[z + s] = 2.0 * through(z + s) - row_of(&self.step, row, z + s);
+            }
+        }
+    }
+
+    /// Ideal sliders behind springs, whose forces are the states, and stops.
+    fn slide(&mut self, from: At, to: &Relative<f64>) {
+        let (states, width) = (self.states, self.arguments());
+        let (u0, u1) = (from.motion.displacement[0], to.displacement[0]);
+        let (z, after) = (2, 2 + states); // arguments: u₀, u₀', z₀, u₁, u₁'
+        self.force = [0.0; MOST_DIRECTIONS];
+        self.slipping = None;
+        let mut s = 0;
+        for piece in &self.pieces {
+            match *piece {
+                Piece::Slider(slider) => {
+                    let stiffness = slider.stiffness.unwrap_or(0.0);
+                    let stuck = from.z[s] + stiffness * (u1 - u0);
+                    let force = stuck.clamp(-slider.limit, slider.limit);
+                    if force == stuck {
+                        for row in [0, 1 + s] {
+                            let slope = &mut self.slopes[row * width..(row + 1) * width];
+                            slope[0] -= stiffness;
+                            slope[z + s] += 1.0;
+                            slope[after] += stiffness;
+                        }
+                    } else {
+                        self.slipping = Some(force);
+                    }
+                    self.force[0] += force;
+                    self.state[s] = force;
+                    s += 1;
+                }
+                Piece::Stop { gap, stiffness } => {
+                    if u1 > gap {
+                        self.force[0] += stiffness * (u1 - gap);
+                        self.slopes[after] += stiffness;
+                    }
+                }
+            }
+        }
+    }
+
+    /// `z₁ = z₀ + h/2 (g₀ + g₁)` by Newton's method, and its derivatives.
+    fn integrate(&mut self, law: &SharedLaw, from: At, to: &Relative<f64>, h: f64) -> bool {
+        let (directions, states, width) = (self.directions, self.states, self.arguments());
+        let Some(rate) = law.rate() else { return false };
+        let half = 0.5 * h;
+        let mut found = states == 0;
+        for _ in 0..ITERATIONS {
+            rate.linearise(directions, to, &self.state, &mut self.after);
+            let matrix = self.lu.zeros(states);
+            for s in 0..states {
+                let slope = &self.after.rate_slope(s)[2 * directions..];
+                for t in 0..states {
+                    matrix[s * states + t] = f64::from(u8::from(s == t)) - half * slope[t];
+                }
+                self.change[s] = from.z[s] + half * (self.before.rate[s] + self.after.rate[s]) - self.state[s];
+            }
+            if !self.lu.factorise() {
+                return false;
+            }
+            if found {
+                break;
+            }
+            self.lu.solve(&mut self.change);
+            let size = self.change.iter().fold(0.0f64, |size, c| size.max(c.abs() / self.state_scale));
+            let share = if size > STRIDE { STRIDE / size } else { 1.0 };
+            self.state.iter_mut().zip(&self.change).for_each(|(z, change)| *z += share * change);
+            if !self.state.iter().all(|z| z.is_finite()) {
+                self.state.copy_from_slice(from.z);
+                return false;
+            }
+            let largest = self.state.iter().fold(self.state_scale, |size, z| size.max(z.abs())) / self.state_scale;
+            found = size <= SMALL * largest;
+        }
+        if !found {
+            return false;
+        }
+        self.force = self.after.force;
+        let (z, after) = (2 * directions, 2 * directions + states);
+        for argument in 0..width {
+            for s in 0..states {
+                let (before, now) = (self.before.rate_slope(s), self.after.rate_slope(s));
+                self.change[s] = if argument < z {
+                    half * before[argument]
+                } else if argument < after {
+                    let own = if argument - z == s { 1.0 } else { 0.0 };
+                    own + half * before[argument]
+                } else {
+                    half * now[argument - after]
+                };
+            }
+            self.lu.solve(&mut self.change);
+            for s in 0..states {
+                self.slopes[(directions + s) * width + argument] = self.change[s];
+            }
+            for d in 0..directions {
+                let slope = self.after.force_slope(d);
+                let direct = if argument >= after { slope[argument - after] } else { 0.0 };
+                let through: f64 = (0..states).map(|s| slope[2 * directions + s] * self.change[s]).sum();
+                self.slopes[d * width + argument] = direct + through;
+            }
+        }
+        true
+    }
+}

@@ -1,0 +1,315 @@
+//! A motion that was integrated in steps: its record, what it is at any time, and its numbers.
+
+use super::assembly::Assembly;
+use super::drive::Drive;
+use crate::law::{Contact, Relative};
+use crate::model::System;
+use crate::orbit::measure::Signals;
+use crate::orbit::{JointSample, Path, Sample, Symmetry};
+use num_complex::Complex64;
+use std::convert::Infallible;
+use std::sync::Arc;
+use stickslip_numerics::radau::quintic;
+
+/// Turning points are refined until the step in time is below this fraction of the integration step.
+const REFINED: f64 = 1e-12;
+
+/// The record of a run: the state at instants, and values at the nodes of a quadrature between them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Steps {
+    /// Nodes and weights of the quadrature within a step, over its length; the last node is its end.
+    pub nodes: Vec<(f64, f64)>,
+    /// Start and length of every step, s.
+    pub spans: Vec<(f64, f64)>,
+    /// At the instants, one more than there are steps.
+    pub instants: Vec<Instant>,
+    /// At the nodes, step after step.
+    pub values: Vec<Node>,
+}
+
+/// The motion at an instant.
+#[derive(Debug, Clone)]
+pub(crate) struct Instant {
+    /// Displacements, then velocities.
+    pub state: Vec<f64>,
+    pub acceleration: Vec<f64>,
+    /// Forces along the axes.
+    pub force: Vec<f64>,
+}
+
+/// The motion at a node.
+#[derive(Debug, Clone)]
+pub(crate) struct Node {
+    /// Displacements, then velocities.
+    pub state: Vec<f64>,
+    /// Relative velocity and force along the axes.
+    pub velocity: Vec<f64>,
+    pub force: Vec<f64>,
+    /// What the joints do.
+    pub contact: Vec<Contact>,
+}
+
+impl Steps {
+    pub fn clear(&mut self) {
+        self.spans.clear();
+        self.instants.clear();
+        self.values.clear();
+    }
+
+    /// Time and weight of a node, s.
+    fn node(&self, at: usize) -> (f64, f64) {
+        let ((start, length), (node, weight)) = (self.spans[at / self.nodes.len()], self.nodes[at % self.nodes.len()]);
+        (start + node * length, weight * length)
+    }
+}
+
+pub(crate) struct SteppedPath {
+    steps: Steps,
+    assembly: Assembly,
+    drive: Drive,
+    system: Arc<System>,
+    symmetry: Symmetry,
+    period: f64,
+}
+
+impl SteppedPath {
+    /// Of the record of a run that repeats after `period`.
+    pub fn new(
+        (system, assembly): (&Arc<System>, &Assembly),
+        drive: &Drive,
+        steps: &Steps,
+        (symmetry, period): (Symmetry, f64),
+    ) -> Self {
+        SteppedPath {
+            steps: steps.clone(),
+            assembly: assembly.clone(),
+            drive: drive.clone(),
+            system: system.clone(),
+            symmetry,
+            period,
+        }
+    }
+
+    /// Value, slope and curvature of a degree of freedom at both ends of a step.
+    fn ends(&self, step: usize, row: usize) -> [[f64; 3]; 2] {
+        let end = |instant: &Instant| {
+            [instant.state[row], instant.state[self.assembly.n + row], instant.acceleration[row]]
+        };
+        [end(&self.steps.instants[step]), end(&self.steps.instants[step + 1])]
+    }
+
+    /// The same along an axis.
+    fn relative_ends(&self, step: usize, axis: usize) -> [[f64; 3]; 2] {
+        let (start, length) = self.steps.spans[step];
+        let end = |instant: &Instant, time: f64| {
+            let (x, v) = instant.state.split_at(self.assembly.n);
+            let (g, speed) = self.drive.relative_at(axis, time);
+            let along = &self.assembly.axes[axis];
+            let acceleration = along.along(&instant.acceleration) + self.drive.imposed_at(axis, time, 2);
+            [along.along(x) + g, along.along(v) + speed, acceleration]
+        };
+        let instants = &self.steps.instants;
+        [end(&instants[step], start), end(&instants[step + 1], start + length)]
+    }
+
+    /// Least and largest value over all steps, each a quintic between its ends.
+    fn extremes(&self, ends: impl Fn(usize) -> [[f64; 3]; 2]) -> (f64, f64) {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (step, (_, length)) in self.steps.spans.iter().enumerate() {
+            let [from, to] = ends(step);
+            let mut take = |value: f64| (low, high) = (low.min(value), high.max(value));
+            take(from[0]);
+            take(to[0]);
+            if from[1] * to[1] < 0.0 {
+                // one turning point inside: bisection on the velocity
+                let (mut left, mut right) = (0.0, 1.0);
+                while right - left > REFINED {
+                    let middle = 0.5 * (left + right);
+                    if quintic(middle, *length, from, to).1 * from[1] > 0.0 { left = middle } else { right = middle }
+                }
+                take(quintic(0.5 * (left + right), *length, from, to).0);
+            }
+        }
+        (low, high)
+    }
+
+    /// Force along an axis at `s` in [0, 1] of a step: the polynomial through its values at the step's start and at the nodes.
+    fn force_between(&self, step: usize, axis: usize, s: f64, limit: f64) -> f64 {
+        let count = self.steps.nodes.len();
+        let node = |i: usize| if i == 0 { 0.0 } else { self.steps.nodes[i - 1].0 };
+        let value = |i: usize| match i {
+            0 => self.steps.instants[step].force[axis],
+            _ => self.steps.values[step * count + i - 1].force[axis],
+        };
+        let sum = (0..=count).map(|i| {
+            let others = (0..=count).filter(|k| *k != i);
+            value(i) * others.map(|k| (s - node(k)) / (node(i) - node(k))).product::<f64>()
+        });
+        sum.sum::<f64>().clamp(-limit, limit) // the polynomial may overshoot at a layer, the law never does
+    }
+
+    /// The joints at `s` in [0, 1] of a step, at `time`, where the structure has this state; mirrored if `sign` is -1.
+    fn joints(&self, (step, s): (usize, f64), time: f64, state: &[f64], sign: f64) -> Vec<JointSample> {
+        let count = self.steps.nodes.len();
+        let sample = |(q, joint): (usize, &super::assembly::PlacedLaw)| {
+            let mut motion = Relative::along(0.0, 0.0);
+            for (d, axis) in joint.axes().enumerate() {
+                (motion.displacement[d], motion.velocity[d]) =
+                    self.assembly.relative(axis, state, &self.drive, time);
+            }
+            let mut force = [0.0; crate::law::MOST_DIRECTIONS];
+            let smooth = joint.law.rate().filter(|_| joint.states == 0 && count > 1);
+            if let Some(rate) = smooth {
+                force = rate.value(&motion, &[], &mut []);
+            } else {
+                // a limit bounds the force of one direction; of several it bounds their sum of squares or less
+                let limit = if joint.directions == 1 { joint.law.scale() } else { f64::INFINITY };
+                joint.axes().enumerate().for_each(|(d, axis)| force[d] = self.force_between(step, axis, s, limit));
+            }
+            for values in [&mut motion.displacement, &mut motion.velocity, &mut force] {
+                values.iter_mut().for_each(|value| *value *= sign);
+            }
+            let contact = if count > 1 {
+                joint.law.contact(&motion.velocity[..joint.directions], &force[..joint.directions])
+            } else {
+                let contact = self.steps.values[step].contact[q];
+                if sign < 0.0 { contact.mirrored() } else { contact }
+            };
+            JointSample { displacement: motion.displacement, velocity: motion.velocity, force, contact }
+        };
+        self.assembly.joints.iter().enumerate().map(sample).collect()
+    }
+}
+
+impl Path for SteppedPath {
+    fn sample(&self, time: f64) -> Sample {
+        let half = 0.5 * self.period;
+        let (time, sign) = match self.symmetry {
+            Symmetry::HalfPeriod if time >= half => (time - half, -1.0),
+            _ => (time, 1.0),
+        };
+        let n = self.assembly.n;
+        let step = self.steps.spans.partition_point(|(start, _)| *start <= time).max(1) - 1;
+        let (start, length) = self.steps.spans[step];
+        let s = ((time - start) / length).clamp(0.0, 1.0);
+        let mut state = vec![0.0; 2 * n];
+        let mut acceleration = vec![0.0; n];
+        for row in 0..n {
+            let [from, to] = self.ends(step, row);
+            (state[row], state[n + row], acceleration[row]) = quintic(s, length, from, to);
+        }
+        let joints = self.joints((step, s), time, &state, sign);
+        let forces: Vec<f64> = joints
+            .iter()
+            .zip(&self.assembly.joints)
+            .flat_map(|(sample, joint)| sample.force[..joint.directions].iter().map(|f| sign * f))
+            .collect();
+        let (x, v) = state.split_at(n);
+        let moved = reactions(&self.system, self.drive.omega, time, (x, v, &forces));
+        let signed = |values: &[f64]| values.iter().map(|value| sign * value).collect();
+        Sample {
+            displacement: signed(x),
+            velocity: signed(v),
+            acceleration: signed(&acceleration),
+            joints,
+            moved: moved.into_iter().map(|(motion, force)| (sign * motion, sign * force)).collect(),
+        }
+    }
+
+    fn switch_times(&self) -> Vec<f64> {
+        let count = self.steps.nodes.len();
+        let at_end = |step: usize| &self.steps.values[(step + 1) * count - 1].contact;
+        let mut times: Vec<f64> = (1..self.steps.spans.len())
+            .filter(|&step| at_end(step - 1) != at_end(step))
+            .map(|step| self.steps.spans[step].0)
+            .collect();
+        if self.symmetry == Symmetry::HalfPeriod {
+            let second: Vec<f64> = times.iter().map(|t| t + 0.5 * self.period).collect();
+            times.extend(second);
+        }
+        times
+    }
+}
+
+/// Displacement of the moved places at one instant, and the forces that move them.
+fn reactions(system: &System, omega: f64, time: f64, (x, v, forces): (&[f64], &[f64], &[f64])) -> Vec<(f64, f64)> {
+    let motion: Vec<[f64; 3]> = system
+        .moved()
+        .iter()
+        .map(|place| {
+            place.motion.iter().fold([0.0; 3], |sum, &(h, amplitude)| {
+                let rate = f64::from(h) * omega;
+                let z = amplitude * Complex64::cis(rate * time);
+                [sum[0] + z.re, sum[1] - z.im * rate, sum[2] - z.re * rate * rate]
+            })
+        })
+        .collect();
+    let reaction = |(m, place): (usize, &crate::model::MovedPlace)| {
+        let mut force = place.mass * motion[m][2];
+        for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
+            force += k * motion[other][0] + c * motion[other][1];
+        }
+        for i in 0..x.len() {
+            force += place.stiffness.0[i] * x[i] + place.damping.0[i] * v[i];
+        }
+        (motion[m][0], force + place.joints.iter().zip(forces).map(|(sign, f)| sign * f).sum::<f64>())
+    };
+    system.moved().iter().enumerate().map(reaction).collect()
+}
+
+/// Signals are their values at the nodes.
+impl Signals for SteppedPath {
+    type Signal = Vec<f64>;
+    type Error = Infallible;
+
+    fn displacement(&self, row: usize) -> Vec<f64> {
+        self.steps.values.iter().map(|node| node.state[row]).collect()
+    }
+    fn velocity(&self, row: usize) -> Vec<f64> {
+        self.steps.values.iter().map(|node| node.state[self.assembly.n + row]).collect()
+    }
+    fn relative_velocity(&self, axis: usize) -> Vec<f64> {
+        self.steps.values.iter().map(|node| node.velocity[axis]).collect()
+    }
+    fn force(&self, axis: usize) -> Vec<f64> {
+        self.steps.values.iter().map(|node| node.force[axis]).collect()
+    }
+    fn harmonics(&self, parts: &[(f64, Complex64)]) -> Vec<f64> {
+        let at = |time: f64| parts.iter().map(|(rate, a)| (a * Complex64::cis(rate * time)).re).sum();
+        (0..self.steps.values.len()).map(|i| at(self.steps.node(i).0)).collect()
+    }
+    fn add(&self, to: &mut Vec<f64>, signal: &Vec<f64>, factor: f64) {
+        to.iter_mut().zip(signal).for_each(|(to, value)| *to += factor * value);
+    }
+    fn product(&self, a: &Vec<f64>, b: &Vec<f64>) -> f64 {
+        a.iter().zip(b).enumerate().map(|(i, (a, b))| self.steps.node(i).1 * a * b).sum()
+    }
+    fn fourier(&self, signal: &Vec<f64>, omega: f64) -> Complex64 {
+        let term = |(i, value): (usize, &f64)| {
+            let (time, weight) = self.steps.node(i);
+            Complex64::cis(-omega * time) * (weight * value)
+        };
+        signal.iter().enumerate().map(term).sum()
+    }
+    fn range(&self, row: usize) -> Result<(f64, f64), Infallible> {
+        Ok(self.extremes(|step| self.ends(step, row)))
+    }
+    fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
+        Ok(self.extremes(|step| self.relative_ends(step, axis)))
+    }
+    fn slip(&self, joint: usize) -> (f64, usize) {
+        let slips = |(i, node): (usize, &Node)| {
+            if node.contact[joint].slips() { self.steps.node(i).1 } else { 0.0 }
+        };
+        let count = self.steps.nodes.len();
+        let at_end = |step: usize| self.steps.values[(step + 1) * count - 1].contact[joint];
+        let steps = self.steps.spans.len();
+        let mut switches = (1..steps).filter(|&step| at_end(step - 1) != at_end(step)).count();
+        if steps > 0 {
+            let last = at_end(steps - 1);
+            let before = if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last };
+            switches += usize::from(before != at_end(0));
+        }
+        (self.steps.values.iter().enumerate().map(slips).sum(), switches)
+    }
+}

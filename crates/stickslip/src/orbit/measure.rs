@@ -1,0 +1,197 @@
+//! The numbers of a periodic motion: amplitudes, first harmonics, means, energies, slip; from any path whose signals can be integrated.
+//!
+//! A method says what its signals are ([`Signals`]): closed forms, values at the nodes of a quadrature, samples. What is asked of them is
+//! written once, here, and is independent of how the motion was found.
+
+use super::{Energy, JointMotion, PlaceMotion, Symmetry};
+use crate::model::System;
+use num_complex::Complex64;
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// The signals of a motion over one return: half a period or a whole one.
+pub(crate) trait Signals {
+    /// A function of time over the return.
+    type Signal: Clone;
+    /// Why a number could not be had.
+    type Error;
+    /// Displacement of a degree of freedom, m.
+    fn displacement(&self, row: usize) -> Self::Signal;
+    /// Velocity of a degree of freedom, m/s.
+    fn velocity(&self, row: usize) -> Self::Signal;
+    /// Relative velocity along an axis, m/s; axes count over all joints.
+    fn relative_velocity(&self, axis: usize) -> Self::Signal;
+    /// Force along an axis, N.
+    fn force(&self, axis: usize) -> Self::Signal;
+    /// `Re Σ a e^{jωt}` of (ω in rad/s, a).
+    fn harmonics(&self, parts: &[(f64, Complex64)]) -> Self::Signal;
+    /// Adds a multiple.
+    fn add(&self, to: &mut Self::Signal, signal: &Self::Signal, factor: f64);
+    /// Integral of a product over the return.
+    fn product(&self, a: &Self::Signal, b: &Self::Signal) -> f64;
+    /// `∫ signal e^{-jωt} dt` over the return.
+    fn fourier(&self, signal: &Self::Signal, omega: f64) -> Complex64;
+    /// Least and largest displacement of a degree of freedom, m.
+    fn range(&self, row: usize) -> Result<(f64, f64), Self::Error>;
+    /// Least and largest relative displacement along an axis, m.
+    fn relative_range(&self, axis: usize) -> Result<(f64, f64), Self::Error>;
+    /// How long a joint slips in the return, s, and how often that, or its direction, changes.
+    fn slip(&self, joint: usize) -> (f64, usize);
+}
+
+/// The numbers of a periodic motion.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Measured {
+    pub places: Vec<PlaceMotion>,
+    pub joints: Vec<JointMotion>,
+    pub energy: Energy,
+    /// Force amplitudes times velocity amplitudes times period, J: the work that could be exchanged.
+    pub possible: f64,
+    /// Names of joints that stick for the whole period.
+    pub stuck: Vec<String>,
+}
+
+/// Measures a motion under a drive of `omega` (rad/s) that repeats after `period` (s).
+pub(crate) fn measure<S: Signals>(
+    system: &System,
+    signals: &S,
+    omega: f64,
+    (symmetry, period): (Symmetry, f64),
+) -> Result<Measured, S::Error> {
+    let half = symmetry == Symmetry::HalfPeriod;
+    let times = if half { 2.0 } else { 1.0 };
+    let mirrored = |(low, high): (f64, f64)| {
+        let most = high.max(-low);
+        if half { (-most, most) } else { (low, high) }
+    };
+    let mut places = Vec::with_capacity(system.dofs());
+    for (row, name) in system.places().iter().enumerate() {
+        let (minimum, maximum) = mirrored(signals.range(row)?);
+        let x = signals.displacement(row);
+        places.push(PlaceMotion {
+            name: name.clone(),
+            maximum,
+            minimum,
+            mean: if half { 0.0 } else { signals.fourier(&x, 0.0).re / period },
+            first_harmonic: signals.fourier(&x, omega) * (2.0 * times / period),
+        });
+    }
+    let forces: Vec<S::Signal> = system.axes().enumerate().map(|(axis, _)| signals.force(axis)).collect();
+    let (mut joints, mut stuck, mut first) = (Vec::with_capacity(system.joints().len()), Vec::new(), 0);
+    for (j, joint) in system.joints().iter().enumerate() {
+        let axes = first..first + joint.axes().len();
+        first = axes.end;
+        let dissipation: f64 =
+            axes.clone().map(|axis| signals.product(&forces[axis], &signals.relative_velocity(axis))).sum();
+        let displacement = axes.map(|axis| signals.relative_range(axis).map(mirrored)).collect::<Result<_, _>>()?;
+        let (slipping, switches) = signals.slip(j);
+        // a law without a limit never slips: it is not stuck, and its orbit is none of many
+        if slipping == 0.0 && joint.law().scale().is_finite() {
+            stuck.push(joint.name().to_owned());
+        }
+        joints.push(JointMotion {
+            name: joint.name().to_owned(),
+            dissipation: times * dissipation,
+            slip_fraction: times * slipping / period,
+            displacement,
+            switches: switches * if half { 2 } else { 1 },
+        });
+    }
+    let (energy, possible) = energy(system, signals, omega, &forces);
+    let friction = joints.iter().map(|joint| joint.dissipation).sum();
+    let energy = Energy { work_in: times * energy.0, viscous: times * energy.1, friction };
+    Ok(Measured { places, joints, energy, possible: times * possible, stuck })
+}
+
+/// Work of the loads and of imposed motion, loss in dampers, and the work that could be exchanged, over the return.
+fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Signal]) -> ((f64, f64), f64) {
+    let n = system.dofs();
+    let velocity: Vec<S::Signal> = (0..n).map(|row| signals.velocity(row)).collect();
+    let excitation = system.excitation(omega);
+    let (mut work, mut viscous, mut possible) = (0.0, 0.0, 0.0);
+    for row in 0..n {
+        let parts: Vec<(f64, Complex64)> = excitation
+            .iter()
+            .filter(|(_, load)| load[row] != ZERO)
+            .map(|(h, load)| (f64::from(*h) * omega, load[row]))
+            .collect();
+        if !parts.is_empty() {
+            let load = signals.harmonics(&parts);
+            work += signals.product(&load, &velocity[row]);
+            // ∫|f v| is at most this, by Cauchy and Schwarz
+            possible += (signals.product(&load, &load) * signals.product(&velocity[row], &velocity[row])).sqrt();
+        }
+    }
+    for (row, column, [_, damping, _]) in system.structure().entries() {
+        if damping != 0.0 {
+            viscous += damping * signals.product(&velocity[row], &velocity[column]);
+        }
+    }
+    let moved: Vec<[S::Signal; 3]> = system
+        .moved()
+        .iter()
+        .map(|place| {
+            let derivative = |order: u32| {
+                let parts: Vec<(f64, Complex64)> = place
+                    .motion
+                    .iter()
+                    .map(|&(h, g)| {
+                        let rate = f64::from(h) * omega;
+                        (rate, g * Complex64::new(0.0, rate).powu(order))
+                    })
+                    .collect();
+                signals.harmonics(&parts)
+            };
+            [derivative(0), derivative(1), derivative(2)]
+        })
+        .collect();
+    for (m, place) in system.moved().iter().enumerate() {
+        let [motion, speed, acceleration] = &moved[m];
+        let mut reaction = signals.harmonics(&[]);
+        signals.add(&mut reaction, acceleration, place.mass);
+        for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
+            signals.add(&mut reaction, &moved[other][0], *k);
+            signals.add(&mut reaction, &moved[other][1], *c);
+            viscous += c * signals.product(speed, &moved[other][1]);
+        }
+        for row in 0..n {
+            let (k, c) = (place.stiffness.0[row], place.damping.0[row]);
+            if k == 0.0 && c == 0.0 {
+                continue;
+            }
+            signals.add(&mut reaction, &signals.displacement(row), k);
+            signals.add(&mut reaction, &velocity[row], c);
+            // the load on the masses contains what the moved place does to them: that is no work from outside
+            work += k * signals.product(motion, &velocity[row]) + c * signals.product(speed, &velocity[row]);
+            viscous += 2.0 * c * signals.product(speed, &velocity[row]);
+        }
+        work += signals.product(&reaction, speed);
+        possible += (signals.product(&reaction, &reaction) * signals.product(speed, speed)).sqrt();
+    }
+    // what joints take from imposed motion
+    for ((_, axis), force) in system.axes().zip(forces) {
+        let parts: Vec<(f64, Complex64)> = axis
+            .imposed()
+            .iter()
+            .map(|&(h, g)| (f64::from(h) * omega, g * Complex64::new(0.0, f64::from(h) * omega)))
+            .collect();
+        if !parts.is_empty() {
+            let speed = signals.harmonics(&parts);
+            work += signals.product(force, &speed);
+            possible += (signals.product(force, force) * signals.product(&speed, &speed)).sqrt();
+        }
+    }
+    ((work, viscous), possible)
+}
+
+/// Work below this fraction of what the loads could do is no yardstick for the energy gap: the motion is conservative.
+const NO_WORK: f64 = 1e-6;
+
+impl Measured {
+    /// `|work in - viscous - friction|` relative to the work.
+    pub fn energy_gap(&self) -> f64 {
+        let balance = (self.energy.work_in - self.energy.viscous - self.energy.friction).abs();
+        let reference = self.energy.work_in.abs().max(NO_WORK * (self.possible + self.energy.friction.abs()));
+        if reference > 0.0 { balance / reference } else { balance }
+    }
+}
