@@ -1,7 +1,7 @@
 //! The exact method: between switches the motion is a closed form, and switches are zeros of analytic signals.
 //!
-//! - `mechanics`: the system as masses, springs and ideal sliders;
-//! - `pattern`: the linear motion while a pattern of stick and slip lasts;
+//! - `mechanics`: the system as masses, springs, ideal sliders and stops;
+//! - `pattern`: the linear motion while a pattern of stick and slip, open and closed lasts;
 //! - `memory`: the patterns that were met, up to a number of bytes;
 //! - `decide`: which pattern begins at an instant;
 //! - `flow`: segments joined at the switches, with the exact derivative of the motion;
@@ -18,7 +18,7 @@ mod path;
 mod pattern;
 
 pub(crate) use flow::Flow;
-pub(crate) use mechanics::Mechanics;
+pub(crate) use mechanics::{Mechanics, takes};
 pub(crate) use path::ExactPath;
 
 use super::drive::Drive;
@@ -100,8 +100,8 @@ pub(crate) fn weights(mechanics: &Mechanics, omega: f64) -> Vec<f64> {
         weights[i] = mechanics.stiffness[(i, i)].max(inertia).sqrt();
         weights[n + i] = mechanics.mass[(i, i)].sqrt();
     }
-    for slider in &mechanics.sliders {
-        if let (Some(s), Some(kt)) = (slider.state, slider.stiffness) {
+    for part in &mechanics.parts {
+        if let (Some(s), Some(kt)) = (part.state(), part.stiffness()) {
             weights[2 * n + s] = 1.0 / kt.sqrt();
         }
     }
