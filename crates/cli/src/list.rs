@@ -25,7 +25,7 @@ fn one(what: What) -> String {
         What::Laws => {
             for row in law::TABLE {
                 let keys: Vec<_> =
-                    row.parameters.iter().map(|p| (p.key.to_owned(), format!("{}: {}", p.dimension, p.doc))).collect();
+                    row.parameters.iter().map(|p| (p.key.to_owned(), format!("{}: {}", p.doc, p.takes()))).collect();
                 entry(row.name, row.summary, &keys);
             }
         }

@@ -90,7 +90,7 @@ pub enum Within {
 /// The range of a law's parameter as far as a reader can tell without the law, which checks the rest itself.
 pub(crate) fn within(range: law::Range) -> Within {
     match range {
-        law::Range::Positive | law::Range::Count => Within::Positive,
+        law::Range::Positive | law::Range::Count(_) => Within::Positive,
         law::Range::ZeroOrMore => Within::AtLeastZero,
         law::Range::Any | law::Range::Within(..) => Within::Finite,
     }

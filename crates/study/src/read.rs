@@ -1092,6 +1092,7 @@ fn example_of(dimension: Dimension) -> &'static str {
         Dimension::LENGTH => "\"1 mm\"",
         Dimension::MASS => "\"182 g\"",
         Dimension::DAMPING => "\"0.2 kg/s\"",
+        Dimension::CUBIC_STIFFNESS => "\"4e9 N/m^3\"",
         _ => "",
     }
 }

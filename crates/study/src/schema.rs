@@ -314,8 +314,8 @@ fn takes_schema(takes: &Takes) -> Value {
         }),
         Takes::Law => {
             let one = |row: &&law::LawInfo| {
-                let parameters = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc));
-                kind_object(row.name, row.summary, parameters, true)
+                let parameters = row.parameters.iter().map(|p| (p.key, p.takes(), p.doc, p.default.is_none()));
+                kind_object(row.name, row.summary, parameters)
             };
             json!({ "oneOf": law::TABLE.iter().map(one).collect::<Vec<_>>() })
         }
@@ -331,8 +331,9 @@ fn takes_schema(takes: &Takes) -> Value {
         }),
         Takes::Method => {
             let one = |row: &method::MethodInfo| {
-                let mut schema =
-                    kind_object(row.name, row.summary, row.options.iter().map(|o| (o.key, o.dimension, o.doc)), false);
+                let takes = crate::expression::described;
+                let options = row.options.iter().map(|o| (o.key, takes(o.dimension), o.doc, false));
+                let mut schema = kind_object(row.name, row.summary, options);
                 for option in row.options.iter().filter(|option| option.count) {
                     schema["properties"][option.key] =
                         json!({ "type": "integer", "minimum": 1, "description": option.doc });
@@ -361,16 +362,15 @@ fn takes_schema(takes: &Takes) -> Value {
 fn kind_object(
     name: &str,
     summary: &str,
-    parameters: impl Iterator<Item = (&'static str, Dimension, &'static str)>,
-    all_required: bool,
+    parameters: impl Iterator<Item = (&'static str, String, &'static str, bool)>,
 ) -> Value {
     let mut properties = Map::new();
     let mut required = vec!["kind"];
     properties.insert("kind".to_owned(), json!({ "const": name }));
-    for (key, dimension, doc) in parameters {
-        let doc = format!("{doc}: {}", crate::expression::described(dimension));
+    for (key, takes, doc, must) in parameters {
+        let doc = format!("{doc}: {takes}");
         properties.insert(key.to_owned(), json!({ "$ref": "#/$defs/quantity", "description": doc }));
-        if all_required {
+        if must {
             required.push(key);
         }
     }
@@ -420,26 +420,27 @@ pub fn markdown() -> String {
             }
         }
     }
-    let named = |book: &mut String, name: &str, summary: &str, keys: &[(&str, Dimension, &str)]| {
+    let named = |book: &mut String, name: &str, summary: &str, keys: &[(&str, String, &str)]| {
         book.push_str(&format!("- `{name}`: {summary}\n"));
-        for (key, dimension, doc) in keys {
-            book.push_str(&format!("  - `{key}` ({}): {doc}\n", crate::expression::described(*dimension)));
+        for (key, takes, doc) in keys {
+            book.push_str(&format!("  - `{key}` ({takes}): {doc}\n"));
         }
     };
+    let described = crate::expression::described;
     book.push_str("## Laws\n\n");
     for row in law::TABLE {
-        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.dimension, p.doc)).collect();
+        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.takes(), p.doc)).collect();
         named(&mut book, row.name, row.summary, &keys);
     }
     book.push_str("\n## Methods\n\n");
     for row in method::TABLE {
-        let keys: Vec<_> = row.options.iter().map(|o| (o.key, o.dimension, o.doc)).collect();
+        let keys: Vec<_> = row.options.iter().map(|o| (o.key, described(o.dimension), o.doc)).collect();
         named(&mut book, row.name, row.summary, &keys);
     }
     book.push_str("\n## Templates\n\n");
     for row in templates::TABLE {
         let parameters = row.parameters();
-        let keys: Vec<_> = parameters.iter().map(|p| (p.key.as_str(), p.dimension, p.doc.as_str())).collect();
+        let keys: Vec<_> = parameters.iter().map(|p| (p.key.as_str(), described(p.dimension), p.doc.as_str())).collect();
         named(&mut book, row.name, row.summary(), &keys);
     }
     book

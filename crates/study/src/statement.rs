@@ -6,7 +6,7 @@ use crate::key::Within;
 use crate::values::{Frequencies, Given, Values};
 use std::collections::BTreeMap;
 use stickslip::dimension::Dimension;
-use stickslip::law::LawInfo;
+use stickslip::law::{BuildError, LawInfo, Parameter, SharedLaw};
 
 /// A quantity as it stands in a text.
 #[derive(Debug, Clone, PartialEq)]
@@ -227,20 +227,51 @@ impl Stated {
                 }
                 Given::ByName(table, *dimension)
             }
-            Stated::Law(row, table) => {
-                let before = problems.len();
-                let values = table.values(environment, problems);
-                if problems.len() > before {
-                    // already said; the caller only needs to know that there is no law
-                    return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.place, key, "")));
-                }
-                let numbers = row.parameters.iter().filter_map(|p| Some((p.key, values.quantity(p.key)?))).collect();
-                let law = row.build(&numbers).map_err(|error| Problem::new(&table.place, key, error.to_string()))?;
-                Given::Law(law)
-            }
+            Stated::Law(row, table) => Given::Law(law(row, table, key, environment, problems)?),
             Stated::Table(table) => Given::Table(table.values(environment, problems)),
         })
     }
+}
+
+/// A law by the values of its table. A parameter whose dimension is raised to the value of another one is read after that.
+fn law(
+    row: &'static LawInfo,
+    table: &StatedTable,
+    key: &'static str,
+    environment: &Environment<'_>,
+    problems: &mut Vec<Problem>,
+) -> Result<SharedLaw, Problem> {
+    let before = problems.len();
+    let mut numbers: BTreeMap<&str, f64> = BTreeMap::new();
+    let (raised, plain): (Vec<&Parameter>, Vec<&Parameter>) = row.parameters.iter().partition(|p| p.power.is_some());
+    for parameter in plain.into_iter().chain(raised) {
+        let Some(entry) = table.entry(parameter.key) else { continue };
+        let Stated::Quantity { quantity, within, example, .. } = &entry.value else { continue };
+        let value = |key: &str| {
+            let default = || row.parameters.iter().find(|p| p.key == key)?.default;
+            numbers.get(key).copied().or_else(default)
+        };
+        // to a power that is not whole: a plain number in SI
+        let dimension = parameter.dimension_under(value).unwrap_or(Dimension::NONE);
+        match quantity.number(parameter.key, (dimension, *within), example, environment) {
+            Ok(number) => {
+                numbers.insert(parameter.key, number);
+            }
+            Err(problem) => problems.push(problem),
+        }
+    }
+    if problems.len() > before {
+        // already said; the caller only needs to know that there is no law
+        return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.place, key, "")));
+    }
+    row.build(&numbers).map_err(|error| {
+        let wrong = match &error {
+            BuildError::Value(error) => error.key(),
+            BuildError::Missing { .. } => None,
+        };
+        let place = wrong.map_or(&table.place, |wrong| table.place_of(wrong, None));
+        Problem::new(place, wrong.unwrap_or(key), error.to_string())
+    })
 }
 
 /// Tolerances of adaptive frequencies: finer ones take more points than they are worth, coarser ones show nothing.

@@ -14,6 +14,7 @@ use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
+use stickslip::law::{SharedLaw, TANGENTS};
 use stickslip::method::{self, Options};
 use stickslip::model::{Element, Force, Joint, Mass, Model, ModelError, Motion, Spring};
 
@@ -743,7 +744,9 @@ pub(crate) fn model_of(structure: &Structure, environment: &Environment<'_>, pro
         let values = resolve(Element::Joint(i), table);
         // without a law there is a problem, and the model is not used
         if let Some(law) = values.law("law") {
-            model.joints.push(Joint { name: text(&values, "name"), between: between(&values), law: law.clone() });
+            let between = between(&values);
+            let law = for_nodes(law, table, &between, &model.masses);
+            model.joints.push(Joint { name: text(&values, "name"), between, law });
         }
     }
     for (i, table) in lists.force.iter().enumerate() {
@@ -757,6 +760,20 @@ pub(crate) fn model_of(structure: &Structure, environment: &Environment<'_>, pro
         model.motions.push(Motion { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }
     model
+}
+
+/// A law that leaves its number of tangents open, where the file does too, has those of the nodes that it joins: all their directions but the
+/// normal.
+fn for_nodes(law: &SharedLaw, joint: &StatedTable, between: &[String; 2], masses: &[Mass]) -> SharedLaw {
+    let stated = match joint.entry("law").map(|entry| &entry.value) {
+        Some(Stated::Law(_, table)) => table.entry(TANGENTS).is_some(),
+        _ => true,
+    };
+    let directions = masses.iter().filter(|mass| between.contains(&mass.name)).map(|mass| mass.directions.len()).max();
+    match (stated, directions) {
+        (false, Some(directions @ 2..)) => law.with(TANGENTS, (directions - 1) as f64).unwrap_or_else(|| law.clone()),
+        _ => law.clone(),
+    }
 }
 
 /// Whether the numbers of a model are in their ranges; its names are the same in every case.

@@ -3,6 +3,9 @@
 //! The library part holds what several tests share: random models, templates with changes, and small numerics (search, quadrature)
 //! written apart from the library's own.
 
+pub mod reference;
+pub mod replay;
+
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::collections::BTreeMap;

@@ -1,139 +1,146 @@
-//! What every law of the table must do, whatever it is: give no energy, stay at rest, be the same at any speed if it claims to be
-//! rate-independent, tend to its exact neighbour, and have the tangent that its dual numbers say.
+//! What every law of the table must do, whatever it is, through each view that it offers: give no energy, stay at rest, have the derivatives that
+//! differences have, be what it says of itself, be the same in all views, tend to itself from its smooth neighbour, refuse wrong parameters.
 
 #![allow(clippy::print_stdout)] // tests say what they measured
 
+use num_complex::Complex64;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
-use stickslip::law::{RateLaw, Relative, SharedLaw, TABLE};
+use stickslip::law::{
+    BuildError, LawError, LawInfo, MOST_DIRECTIONS, Range, RatePoint, Relative, SharedLaw, StepPoint, TABLE, find,
+};
+use stickslip::method::Method;
 use stickslip::method::auto::Auto;
-use stickslip::method::{Method, shooting::Shooting};
 use stickslip::model::{GROUND, Joint, Mass, Model, Motion, Spring};
-use stickslip::orbit::Orbit;
-use stickslip_numerics::dual::Dual;
+use stickslip_verification::replay::{Instant, View, forces, lost, random_motion, steps, views};
 use stickslip_verification::{Random, exact, near};
 
-/// A displacement history of up to four harmonics, closed over a period; half of them have even harmonics too.
-fn history(seed: u64) -> Vec<Motion> {
-    let mut random = Random::new(seed);
-    let harmonics: &[u32] = if seed.is_multiple_of(2) { &[1, 3, 5] } else { &[1, 2, 3, 4] };
-    harmonics
-        .iter()
-        .map(|&harmonic| Motion {
-            on: "mover".into(),
-            amplitude: random.between(1e-4, 1e-3) / f64::from(harmonic),
-            phase: random.between(0.0, TAU),
-            harmonic,
-        })
-        .collect()
+/// Samples of a period; fine enough for the smooth laws, whose steepest slope is a thousandth of their fastest motion.
+const SAMPLES: usize = 4000;
+
+/// Largest size of the forces.
+fn largest(forces: &[[f64; MOST_DIRECTIONS]]) -> f64 {
+    forces.iter().flatten().fold(0.0, |most, force| most.max(force.abs()))
 }
 
-/// The law alone between a place that is moved and the ground.
-fn moved(law: SharedLaw, motions: Vec<Motion>) -> Model {
-    Model {
-        joints: vec![Joint { name: "joint".into(), between: ["mover".into(), GROUND.into()], law }],
-        motions,
-        ..Model::default()
+/// The length of the way in the last period.
+fn way(motion: &dyn Fn(f64) -> Instant, times: &[f64]) -> f64 {
+    let places: Vec<_> = times.iter().map(|&time| motion(time).0).collect();
+    let each = |pair: &[[f64; MOST_DIRECTIONS]]| {
+        (0..MOST_DIRECTIONS).map(|a| (pair[1][a] - pair[0][a]).powi(2)).sum::<f64>().sqrt()
+    };
+    places.windows(2).map(each).sum()
+}
+
+#[test]
+fn rows_are_whole() {
+    let mut names = BTreeSet::new();
+    for row in TABLE {
+        let law = row.sample();
+        assert!(names.insert(row.name), "{} stands twice", row.name);
+        assert!(std::ptr::eq(find(row.name).unwrap(), *row));
+        assert!((1..=MOST_DIRECTIONS).contains(&law.directions()), "{}", row.name);
+        assert!(!views(&*law).is_empty(), "{} offers no view", row.name);
+        assert_eq!(law.values(), row.sample, "{}: values come back as they were given", row.name);
+        assert!(law.check().is_ok() && law.scale() > 0.0, "{}", row.name);
+        assert!(std::ptr::eq(law.info(), *row));
+        let keys: BTreeSet<_> = row.parameters.iter().map(|p| p.key).collect();
+        assert_eq!(keys.len(), row.parameters.len(), "{}: a key stands twice", row.name);
+        for parameter in row.parameters {
+            assert!(parameter.power.is_none_or(|power| keys.contains(power)), "{}: {}", row.name, parameter.key);
+            assert!(
+                parameter.default.is_none_or(|value| parameter.range.has(value)),
+                "{}: {}",
+                row.name,
+                parameter.key
+            );
+        }
     }
 }
 
-fn orbit(model: &Model, omega: f64) -> Orbit {
-    Auto.solver(&model.assemble().unwrap()).unwrap().orbit(omega, None).unwrap()
+fn sample(row: &'static LawInfo) -> BTreeMap<&'static str, f64> {
+    row.parameters.iter().map(|p| p.key).zip(row.sample.iter().copied()).collect()
 }
 
-/// The displacement and its velocity at a phase, and the phases at which it turns.
-fn kinematics(motions: &[Motion], theta: f64) -> (f64, f64) {
-    let mut out = (0.0, 0.0);
-    for motion in motions {
-        let (sin, cos) = (f64::from(motion.harmonic) * theta + motion.phase).sin_cos();
-        out.0 += motion.amplitude * cos;
-        out.1 -= motion.amplitude * f64::from(motion.harmonic) * sin;
+#[test]
+fn parameters_out_of_range_are_refused_with_their_key() {
+    for row in TABLE {
+        assert!(row.build(&sample(row)).unwrap() == row.sample(), "{}", row.name);
+        for parameter in row.parameters {
+            let mut wrong = vec![f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+            match parameter.range {
+                Range::Positive => wrong.extend([0.0, -1.0]),
+                Range::ZeroOrMore => wrong.push(-1e-9),
+                Range::Any => {}
+                Range::Within(least, most) => wrong.extend([least - 1e-9, most + 1e-9]),
+                Range::Count(most) => wrong.extend([0.0, -1.0, 1.5, f64::from(most) + 1.0]),
+            }
+            for value in wrong {
+                let mut values = sample(row);
+                values.insert(parameter.key, value);
+                match row.build(&values) {
+                    Err(BuildError::Value(LawError::Value { key, law, .. })) => {
+                        assert_eq!((key, law), (parameter.key, row.name));
+                    }
+                    other => panic!("{}: `{}` = {value} gave {other:?}", row.name, parameter.key),
+                }
+            }
+            let mut values = sample(row);
+            values.remove(parameter.key);
+            match (row.build(&values), parameter.default) {
+                (Ok(law), Some(default)) => assert_eq!(law.value(parameter.key), Some(default), "{}", row.name),
+                (Err(BuildError::Missing { keys, .. }), None) => assert_eq!(keys, [parameter.key]),
+                // a default may need another value beside it
+                (Err(BuildError::Value(LawError::Inconsistent { .. })), Some(_)) => {}
+                (other, _) => panic!("{}: without `{}` {other:?}", row.name, parameter.key),
+            }
+        }
     }
-    out
 }
 
-/// Displacements at the turning points over a period, in order.
-fn turning_points(motions: &[Motion]) -> Vec<f64> {
-    let velocity = |theta: f64| kinematics(motions, theta).1;
-    let steps = 4000;
-    (0..steps)
-        .filter_map(|k| {
-            let [a, b] = [k, k + 1].map(|k| TAU * f64::from(k) / f64::from(steps));
-            (velocity(a) * velocity(b) < 0.0)
-                .then(|| kinematics(motions, stickslip_verification::zero(velocity, [a, b])).0)
-        })
-        .collect()
-}
-
+/// In the sixth of equal periods the state repeats, and what is lost over it is never negative.
 #[test]
 fn no_energy_is_created_over_closed_histories() {
     for row in TABLE {
         let law = row.sample();
         let (mut least, mut most) = (f64::INFINITY, 0.0f64);
-        for seed in 0..24 {
-            for omega in [1.0, 300.0] {
-                let orbit = orbit(&moved(law, history(seed)), omega);
-                let (friction, work) = (orbit.energy.friction, orbit.energy.work_in);
-                // the largest force times the whole way is the most that can be lost
-                let points = turning_points(&history(seed));
-                let way: f64 = (0..points.len()).map(|k| (points[(k + 1) % points.len()] - points[k]).abs()).sum();
-                assert!(friction >= -1e-12 * law.scale() * way, "{}, seed {seed}: {friction}", row.name);
-                assert!(friction <= law.scale() * way * (1.0 + 1e-9), "{}, seed {seed}: {friction}", row.name);
-                near(&format!("{}, seed {seed}: work in", row.name), work, friction, 1e-7 * law.scale() * way);
-                for k in 0..200 {
-                    let force = orbit.sample(orbit.period() * f64::from(k) / 200.0).joints[0].force[0];
-                    assert!(force.abs() <= law.scale() * (1.0 + 1e-9), "{}: {force}", row.name);
+        for view in views(&*law) {
+            for seed in 0..4 {
+                for speed in [0.1, 20.0] {
+                    let motion = random_motion(seed, law.directions(), speed);
+                    let times = steps(1.0 / speed, 6, SAMPLES);
+                    let found = forces(&*law, view, &motion, &times);
+                    let (times, found) = (&times[5 * SAMPLES..], &found[5 * SAMPLES..]);
+                    let share =
+                        lost(&motion, times, found) / (largest(found) * way(&motion, times)).max(f64::MIN_POSITIVE);
+                    assert!((-1e-6..=1.0).contains(&share), "{} by {view:?}, seed {seed}: {share}", row.name);
+                    (least, most) = (least.min(share), most.max(share));
                 }
-                least = least.min(friction / (law.scale() * way));
-                most = most.max(friction / (law.scale() * way));
             }
         }
-        println!("{}: lost {least:.3} to {most:.3} of limit times way", row.name);
+        println!("{}: lost {least:.1e} to {most:.3} of largest force times way", row.name);
     }
 }
 
-/// Exact laws against a replay from turning point to turning point: all that a rate-independent law can see.
-#[test]
-fn exact_laws_equal_the_replay_of_their_sliders() {
-    let mut compared = 0;
-    for row in TABLE {
-        let Some(branches) = row.sample().sliders() else { continue };
-        for seed in 0..40 {
-            let points = turning_points(&history(seed));
-            let mut loss = 0.0;
-            for branch in &branches {
-                match branch.stiffness {
-                    // a rigid slider loses its limit over the whole way
-                    None => {
-                        let way: f64 =
-                            (0..points.len()).map(|k| (points[(k + 1) % points.len()] - points[k]).abs()).sum();
-                        loss += branch.limit * way;
-                    }
-                    // behind a spring: the force follows until it meets the limit; the second round is periodic
-                    Some(stiffness) => {
-                        let (mut force, mut at) = (0.0, points[points.len() - 1]);
-                        for round in 0..3 {
-                            for &to in &points {
-                                let trial: f64 = force + stiffness * (to - at);
-                                let clamped = trial.clamp(-branch.limit, branch.limit);
-                                if round == 2 {
-                                    loss += branch.limit * (trial - clamped).abs() / stiffness;
-                                }
-                                (force, at) = (clamped, to);
-                            }
-                        }
-                    }
-                }
-            }
-            let orbit = exact(&moved(row.sample(), history(seed)).assemble().unwrap(), 10.0);
-            near(&format!("{}, seed {seed}", row.name), orbit.energy.friction, loss, 1e-9 * loss.max(1e-9));
-            compared += 1;
-        }
-    }
-    assert_eq!(compared, 80, "coulomb and jenkins");
-}
-
+/// Without motion there is no force, but for what presses at rest along a normal, and that stays as it is.
 #[test]
 fn rest_stays_at_rest() {
+    for row in TABLE {
+        let law = row.sample();
+        for view in views(&*law) {
+            let found = forces(&*law, view, &|_| ([0.0; 3], [0.0; 3]), &steps(1.0, 1, 100));
+            for force in &found {
+                assert_eq!(force, &found[0], "{} by {view:?}", row.name);
+                let pressed = if law.is_odd() { law.directions() } else { law.directions() - 1 };
+                assert!(force[..pressed].iter().all(|force| *force == 0.0), "{} by {view:?}: {force:?}", row.name);
+            }
+        }
+    }
+}
+
+/// A body at rest stays so in every law that `auto` takes along one direction.
+#[test]
+fn bodies_without_a_force_stay_at_rest() {
     for row in TABLE {
         let model = Model {
             masses: vec![Mass::new("m", 0.3)],
@@ -141,196 +148,373 @@ fn rest_stays_at_rest() {
             joints: vec![Joint { name: "joint".into(), between: ["m".into(), GROUND.into()], law: row.sample() }],
             ..Model::default()
         };
+        if row.sample().directions() > 1 {
+            continue;
+        }
+        let system = model.assemble().unwrap();
+        let Ok(mut solver) = Auto.solver(&system) else { continue };
         for omega in [0.1, 18.0, 500.0] {
-            let orbit = orbit(&model, omega);
+            let orbit = solver.orbit(omega, None).unwrap();
             assert_eq!(orbit.places[0].amplitude(), 0.0, "{}", row.name);
             assert_eq!((orbit.energy.work_in, orbit.energy.friction), (0.0, 0.0), "{}", row.name);
         }
     }
 }
 
-/// Ten times faster: the same loop, for laws that are networks of ideal sliders. The smooth ones depend on speed, and their
-/// group `alpha w` brings the loop back.
+/// Laws that are sliders, in an orbit of the exact method, against a replay.
 #[test]
-fn loops_do_not_depend_on_speed() {
+fn exact_orbits_equal_the_replay_of_their_sliders() {
     for row in TABLE {
         let law = row.sample();
-        let faster = match law {
-            Arc::new(mut law) => {
-                law.alpha /= 10.0;
-                Arc::new(law)
-            }
-            Arc::new(mut law) => {
-                law.alpha /= 10.0;
-                Arc::new(law)
-            }
-            rate_independent => {
-                assert!(rate_independent.sliders().is_some());
-                rate_independent
-            }
-        };
+        let Some(sliders) = law.sliders() else { continue };
         for seed in 0..10 {
-            let (slow, fast) = (orbit(&moved(law, history(seed)), 20.0), orbit(&moved(faster, history(seed)), 200.0));
-            near(
-                row.name,
-                fast.energy.friction,
-                slow.energy.friction,
-                1e-9 * slow.energy.friction.max(1e-3 * law.scale()),
-            );
-            for k in 0..101 {
-                let [a, b] =
-                    [&slow, &fast].map(|orbit| orbit.sample(orbit.period() * (f64::from(k) + 0.3) / 101.0).joints[0]);
-                near(row.name, b.displacement, a.displacement, 1e-15);
-                near(row.name, b.force, a.force, 1e-7 * law.scale());
+            let mut random = Random::new(seed);
+            let motions: Vec<Motion> = [1u32, 2 + u32::from(seed % 2 == 0)]
+                .map(|harmonic| Motion {
+                    on: "mover".into(),
+                    amplitude: random.between(1e-4, 1e-3) / f64::from(harmonic),
+                    phase: random.between(0.0, TAU),
+                    harmonic,
+                })
+                .into();
+            let place = |theta: f64| -> f64 {
+                motions.iter().map(|m| m.amplitude * (f64::from(m.harmonic) * theta + m.phase).cos()).sum()
+            };
+            // from sample to sample, the second round being periodic; turning points between samples cost the square of the step
+            let count = 200_000;
+            let mut held = vec![0.0; sliders.len()];
+            let (mut loss, mut before) = (0.0, place(0.0));
+            for k in 1..=2 * count {
+                let to = place(TAU * f64::from(k) / f64::from(count));
+                for (slider, held) in sliders.iter().zip(&mut held) {
+                    let slipped = match slider.stiffness {
+                        None => (to - before).abs(),
+                        Some(stiffness) => {
+                            let trial: f64 = *held + stiffness * (to - before);
+                            *held = trial.clamp(-slider.limit, slider.limit);
+                            (trial - *held).abs() / stiffness
+                        }
+                    };
+                    loss += if k > count { slider.limit * slipped } else { 0.0 };
+                }
+                before = to;
             }
+            let model = Model {
+                joints: vec![Joint {
+                    name: "joint".into(),
+                    between: ["mover".into(), GROUND.into()],
+                    law: law.clone(),
+                }],
+                motions,
+                ..Model::default()
+            };
+            let orbit = exact(&model.assemble().unwrap(), 10.0);
+            near(&format!("{}, seed {seed}", row.name), orbit.energy.friction, loss, 1e-8 * loss.max(1e-6));
         }
     }
 }
 
-/// The regularised law tends to the exact one: the loss as width for a rigid slider, as width^(2/3) behind a spring.
+/// All views of a law tell the same force. A law with pieces or a step has no clock: its other views are the same at ten times the speed.
 #[test]
-fn regularised_tends_to_exact() {
+fn views_agree_at_any_speed_that_they_know() {
     for row in TABLE {
         let law = row.sample();
-        let Some(_) = law.regularised(1.0) else {
-            assert!(law.sliders().is_none(), "{} is exact and has no smooth neighbour", row.name);
-            continue;
-        };
-        let order =
-            if law.sliders().unwrap().iter().all(|branch| branch.stiffness.is_none()) { 1.0 } else { 2.0 / 3.0 };
-        let motion = vec![Motion { on: "mover".into(), amplitude: 1e-3, phase: 0.0, harmonic: 1 }];
-        let omega = 100.0;
-        let reference = exact(&moved(law, motion.clone()).assemble().unwrap(), omega).energy.friction;
-        let errors: Vec<f64> = [1e-5, 1e-6, 1e-7]
-            .iter()
-            .map(|width| {
-                let system = moved(law.regularised(*width).unwrap(), motion.clone()).assemble().unwrap();
-                let method = Shooting { tolerance: 1e-11, width: None, ..Shooting::default() };
-                let loss = method.solver(&system).unwrap().orbit(omega, None).unwrap().energy.friction;
-                (loss / reference - 1.0).abs()
-            })
-            .collect();
-        let orders: Vec<f64> = errors.windows(2).map(|pair| (pair[0] / pair[1]).log10()).collect();
-        println!("{}: widths 1e-5 to 1e-7 m/s: errors {errors:?}, orders {orders:?}", row.name);
-        near(&format!("{}: order", row.name), orders[1], order, 0.05);
-    }
-}
-
-/// Dual numbers against central differences, for every smooth law at random motions and states.
-#[test]
-fn tangents_are_those_of_dual_numbers() {
-    let mut laws = 0;
-    for row in TABLE {
-        let Some(law) = row.sample().rate() else { continue };
-        let mut random = Random::new(7);
-        laws += 1;
-        assert!(law.states() <= 1, "the variables below are u, u' and one state");
-        for _ in 0..200 {
-            // velocities from creep to fast slip
-            let point = [
-                random.between(-1e-3, 1e-3),
-                10f64.powf(random.between(-7.0, 0.0)) * if random.unit() < 0.5 { 1.0 } else { -1.0 },
-                random.between(-8.0, 8.0),
-            ];
-            let plain = |x: [f64; 3]| {
-                let (states, mut rate) = ([x[2]], [0.0]);
-                let n = law.states();
-                let force = law.evaluate(&Relative::along(x[0], x[1]), &states[..n], &mut rate[..n]);
-                [force[0], rate[0]]
+        let views = views(&*law);
+        let timeless = views.iter().any(|view| matches!(view, View::Pieces | View::Step));
+        for seed in 0..3 {
+            let run = |view: View, speed: f64| {
+                let motion = random_motion(seed, law.directions(), speed);
+                forces(&*law, view, &motion, &steps(1.0 / speed, 2, 4 * SAMPLES))
             };
-            let zero = Dual::<3> { value: 0.0, partials: [0.0; 3] };
-            let (states, mut rate, n) = ([Dual::variable(point[2], 2)], [zero], law.states());
-            let contact = Relative::along(Dual::variable(point[0], 0), Dual::variable(point[1], 1));
-            let force = law.evaluate(&contact, &states[..n], &mut rate[..n]);
-            assert_eq!([force[0].value, rate[0].value], plain(point), "{}", row.name);
-            let scales = [1e-3, point[1].abs(), 1.0];
-            for k in 0..3 {
-                let h = 1e-5 * scales[k];
-                let (mut up, mut down) = (point, point);
-                up[k] += h;
-                down[k] -= h;
-                let (up, down) = (plain(up), plain(down));
-                for (i, exact) in [force[0].partials[k], rate[0].partials[k]].into_iter().enumerate() {
-                    let difference = (up[i] - down[i]) / (2.0 * h);
-                    // rounding of the values over the step, and the step squared
-                    let digits = 1e-14 * plain(point)[i].abs().max(up[i].abs()) / h + 1e-8 * exact.abs();
-                    near(&format!("{} at {point:?}, {i} by {k}", row.name), difference, exact, digits);
+            let reference = run(views[0], 0.5);
+            let speeds: &[f64] = if timeless { &[0.5, 5.0] } else { &[0.5] };
+            for &view in &views {
+                for &speed in speeds {
+                    let other = run(view, speed);
+                    let differences = reference.iter().zip(&other).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
+                    // single samples at a reversal of rigid faces may differ; the mean may not
+                    let mean = differences.sum::<f64>() / reference.len() as f64;
+                    assert!(mean <= 1e-3 * largest(&reference), "{}: {view:?} differs by {mean}", row.name);
                 }
             }
         }
     }
-    assert_eq!(laws, 2, "coulomb-arctan and jenkins-arctan");
 }
 
-/// What each law says of itself. Odd: forces change their sign with the motion. Incrementally passive: from rest, the difference of two motions
-/// never gives back more than it took, `∫ δf δu' dt ≥ 0`. By orbits of two different drives that begin with equal states it cannot be tested, so
-/// smooth laws are integrated here (implicit midpoint rule, which keeps monotonicity), and exact ones replayed.
+/// Derivatives against differences at random points, with a tolerance of the difference between both sides, which is large at a kink only.
+fn derivative_is_difference(what: &str, value: impl Fn(f64) -> f64, derivative: f64, h: f64) {
+    let [down, here, up] = [-h, 0.0, h].map(&value);
+    let central = (up - down) / (2.0 * h);
+    let one_sided = ((up - here) / h - (here - down) / h).abs();
+    let rounding = 1e-14 * (up.abs() + down.abs() + here.abs()) / h;
+    near(what, derivative, central, one_sided + rounding + 1e-8 * derivative.abs());
+}
+
+#[test]
+fn derivatives_of_rates_are_differences() {
+    for row in TABLE {
+        let law = row.sample();
+        let Some(rate) = law.rate() else { continue };
+        let (n, states) = (law.directions(), rate.states());
+        let mut random = Random::new(7);
+        for _ in 0..300 {
+            // velocities from creep to fast slip
+            let mut x: Vec<f64> = (0..n).map(|_| random.between(-1e-3, 1e-3)).collect();
+            x.extend(
+                (0..n).map(|_| 10f64.powf(random.between(-7.0, 0.0)) * if random.unit() < 0.5 { 1.0 } else { -1.0 }),
+            );
+            x.extend((0..states).map(|_| rate.state_scale() * random.between(-1.2, 1.2)));
+            let value = |x: &[f64], row: usize| {
+                let mut motion = Relative::along(0.0, 0.0);
+                motion.displacement[..n].copy_from_slice(&x[..n]);
+                motion.velocity[..n].copy_from_slice(&x[n..2 * n]);
+                let mut rates = vec![0.0; states];
+                let force = rate.value(&motion, &x[2 * n..], &mut rates);
+                if row < n { force[row] } else { rates[row - n] }
+            };
+            let mut point = RatePoint::new(n, states);
+            let mut motion = Relative::along(0.0, 0.0);
+            motion.displacement[..n].copy_from_slice(&x[..n]);
+            motion.velocity[..n].copy_from_slice(&x[n..2 * n]);
+            rate.linearise(n, &motion, &x[2 * n..], &mut point);
+            for out in 0..n + states {
+                let slopes = if out < n { point.force_slope(out) } else { point.rate_slope(out - n) };
+                for k in 0..x.len() {
+                    let scale = if k < n {
+                        1e-3
+                    } else if k < 2 * n {
+                        x[k].abs()
+                    } else {
+                        rate.state_scale()
+                    };
+                    let moved = |d: f64| {
+                        let mut x = x.clone();
+                        x[k] += d;
+                        value(&x, out)
+                    };
+                    derivative_is_difference(
+                        &format!("{}: {out} by {k} at {x:?}", row.name),
+                        moved,
+                        slopes[k],
+                        1e-6 * scale,
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn derivatives_of_steps_are_differences() {
+    for row in TABLE {
+        let law = row.sample();
+        let Some(step) = law.step() else { continue };
+        let (n, states) = (law.directions(), step.states());
+        let mut random = Random::new(8);
+        for _ in 0..300 {
+            let mut x: Vec<f64> = (0..2 * n).map(|_| random.between(-1e-3, 1e-3)).collect();
+            // within the limit that the contact has before the step, whatever it is: reached by a step from nothing
+            let places = |x: &[f64]| {
+                let (mut from, mut to) = ([0.0; 3], [0.0; 3]);
+                from[..n].copy_from_slice(&x[..n]);
+                to[..n].copy_from_slice(&x[n..2 * n]);
+                (from, to)
+            };
+            let mut z = vec![0.0; states];
+            let mut start = places(&x).0;
+            start[0] += random.between(-1e-4, 1e-4);
+            step.value(&start, &places(&x).0, &mut z);
+            x.extend(z.iter().map(|z| 0.99 * z));
+            let value = |x: &[f64], row: usize| {
+                let (from, to) = places(x);
+                let mut z = x[2 * n..].to_vec();
+                let force = step.value(&from, &to, &mut z);
+                if row < n { force[row] } else { z[row - n] }
+            };
+            let mut point = StepPoint::new(n, states);
+            let (from, to) = places(&x);
+            step.linearise(n, &from, &to, &x[2 * n..], &mut point);
+            for out in 0..n + states {
+                let slopes = if out < n { point.force_slope(out) } else { point.state_slope(out - n) };
+                for k in 0..x.len() {
+                    let scale = if k < 2 * n { 1e-3 } else { step.state_scale() };
+                    let moved = |d: f64| {
+                        let mut x = x.clone();
+                        x[k] += d;
+                        value(&x, out)
+                    };
+                    derivative_is_difference(
+                        &format!("{}: {out} by {k} at {x:?}", row.name),
+                        moved,
+                        slopes[k],
+                        1e-6 * scale,
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn resolvents_solve_their_equation_and_have_its_slope() {
+    for row in TABLE {
+        let law = row.sample();
+        let Some(prox) = law.prox() else { continue };
+        let n = law.directions();
+        let mut random = Random::new(9);
+        for _ in 0..300 {
+            let penalty = 2.0 * prox.least_penalty() + 10f64.powf(random.between(-3.0, 5.0));
+            let y: Vec<f64> = (0..n).map(|_| law.scale() * random.between(-3.0, 3.0)).collect();
+            let resolve = |y: &[f64]| {
+                let (mut force, mut slope) = (vec![0.0; n], vec![0.0; n * n]);
+                prox.resolve(y, penalty, &mut force, &mut slope);
+                (force, slope)
+            };
+            let (force, slope) = resolve(&y);
+            // the law at the velocity that the resolvent says
+            if n == 1
+                && let Some((at, _)) = prox.at_velocity((y[0] - force[0]) / penalty)
+            {
+                near(row.name, at, force[0], 1e-9 * law.scale());
+            }
+            for out in 0..n {
+                for k in 0..n {
+                    let moved = |d: f64| {
+                        let mut y = y.clone();
+                        y[k] += d;
+                        resolve(&y).0[out]
+                    };
+                    let what = format!("{}: {out} by {k} at {y:?}, penalty {penalty}", row.name);
+                    derivative_is_difference(&what, moved, slope[out * n + k], 1e-6 * law.scale());
+                }
+            }
+        }
+    }
+}
+
+/// What each law says of itself. Odd: forces change their sign with the motion, and where they do not, a motion shows it. Incrementally passive: from
+/// rest, the difference of two motions never gives back more than it took, `∫ δf · δu' dt ≥ 0`.
 #[test]
 fn what_laws_say_of_themselves() {
     for row in TABLE {
-        let law = row.sample();
-        let smooth = law.regularised(1e-4);
-        assert!(law.is_odd() && law.is_incrementally_passive(), "{}", row.name);
-        assert!(smooth.is_none_or(|smooth| smooth.is_incrementally_passive()), "{}: its smooth neighbour", row.name);
-        let (mut least, mut most) = (0.0f64, 0.0f64);
-        for seed in 0..20 {
-            let (one, two) = (forces(law, &history(seed), 1.0), forces(law, &history(seed + 100), 1.0));
-            let mirrored = forces(law, &history(seed), -1.0);
-            let mut taken = 0.0;
-            for (k, (a, b)) in one.iter().zip(&two).enumerate() {
-                taken += (a.1 - b.1) * (a.0 - b.0);
-                (least, most) = (least.min(taken), most.max(taken));
-                assert!((mirrored[k].1 + a.1).abs() <= 1e-9 * law.scale(), "{}, seed {seed}", row.name);
+        let sample = row.sample();
+        for law in [Some(sample.clone()), sample.regularised(1e-4)].into_iter().flatten() {
+            let (mut least, mut most, mut oddest) = (0.0f64, 0.0f64, 0.0f64);
+            for view in views(&*law) {
+                for seed in 0..5 {
+                    let times = steps(2.0, 2, SAMPLES);
+                    let one = random_motion(seed, law.directions(), 0.5);
+                    let two = random_motion(seed + 100, law.directions(), 0.5);
+                    let mirrored = |time: f64| {
+                        let (u, v) = one(time);
+                        (u.map(|u| -u), v.map(|v| -v))
+                    };
+                    let [f, g, m] = [&one as &dyn Fn(f64) -> Instant, &two, &mirrored]
+                        .map(|motion| forces(&*law, view, motion, &times));
+                    let odd =
+                        f.iter().zip(&m).flat_map(|(f, m)| (0..3).map(|a| (f[a] + m[a]).abs())).fold(0.0, f64::max);
+                    oddest = oddest.max(odd / largest(&f).max(1e-12));
+                    if !law.is_incrementally_passive() {
+                        continue;
+                    }
+                    let mut taken = 0.0;
+                    for k in 0..times.len() - 1 {
+                        let way = |motion: &dyn Fn(f64) -> Instant, a: usize| {
+                            motion(times[k + 1]).0[a] - motion(times[k]).0[a]
+                        };
+                        // forces after the step, as implicit steps have it: that keeps monotonicity
+                        taken +=
+                            (0..3).map(|a| (f[k + 1][a] - g[k + 1][a]) * (way(&one, a) - way(&two, a))).sum::<f64>();
+                        (least, most) = (least.min(taken), most.max(taken));
+                    }
+                }
+            }
+            if law.is_odd() {
+                assert!(oddest <= 1e-9, "{} is not odd: {oddest}", law.name());
+            } else {
+                assert!(oddest > 1e-3, "{} is odd", law.name());
+            }
+            if law.is_incrementally_passive() {
+                println!("{}: the difference of two motions took between {least:.2e} and {most:.2e} J", law.name());
+                assert!(least >= -1e-4 * most && most > 0.0, "{}: {least} {most}", law.name());
             }
         }
-        println!("{}: the difference of two motions took between {least:.2e} and {most:.2e} J", row.name);
-        assert!(least >= -1e-9 * most && most > 0.0, "{}: {least} {most}", row.name);
     }
 }
 
-/// Relative motion in each step and force, from rest without force, over two periods of `sign` times the history.
-fn forces(law: SharedLaw, motions: &[Motion], sign: f64) -> Vec<(f64, f64)> {
-    const STEPS: u32 = 2000;
-    let omega = 10.0;
-    let step = TAU / omega / f64::from(STEPS);
-    let branches = law.sliders();
-    let mut held = vec![0.0; branches.as_ref().map_or(0, Vec::len)];
-    let mut z = 0.0;
-    let place = |k: u32| sign * kinematics(motions, TAU * f64::from(k) / f64::from(STEPS)).0;
-    (0..2 * STEPS)
-        .map(|k| {
-            let way = place(k + 1) - place(k);
-            let force = match (&branches, law.rate()) {
-                (Some(branches), _) => branches
-                    .iter()
-                    .zip(&mut held)
-                    .map(|(branch, held)| {
-                        *held = match branch.stiffness {
-                            Some(kt) => (*held + kt * way).clamp(-branch.limit, branch.limit),
-                            None => branch.limit * way.signum(),
-                        };
-                        *held
-                    })
-                    .sum(),
-                (None, Some(smooth)) => {
-                    let contact = Relative::along(0.0, way / step);
-                    let mut rate = [0.0];
-                    let states = smooth.states();
-                    if states == 1 {
-                        // z - z₀ = h g(z) by bisection: g falls where the state has gone too far
-                        let before = z;
-                        let (mut low, mut high) = (before - 40.0, before + 40.0);
-                        for _ in 0..100 {
-                            z = 0.5 * (low + high);
-                            smooth.evaluate(&contact, &[z], &mut rate);
-                            if z - before - step * rate[0] > 0.0 { high = z } else { low = z }
-                        }
-                    }
-                    smooth.evaluate(&contact, &[z][..states], &mut rate[..states])[0]
-                }
-                (None, None) => panic!("{} has no view", law.name()),
+/// The smooth neighbour tends to the law as its width goes to zero: the mean difference of forces falls, by a third at least for a tenth of the width.
+#[test]
+fn smooth_neighbours_tend_to_the_law() {
+    for row in TABLE {
+        let law = row.sample();
+        if law.regularised(1.0).is_none() {
+            continue;
+        }
+        let motion = random_motion(3, law.directions(), 1.0);
+        let times = steps(1.0, 2, 4 * SAMPLES);
+        let reference = forces(&*law, views(&*law)[0], &motion, &times);
+        let errors: Vec<f64> = [1e-3, 1e-4, 1e-5]
+            .iter()
+            .map(|&width| {
+                let smooth = law.regularised(width).unwrap();
+                let found = forces(&*smooth, View::Rate, &motion, &times);
+                let differences = reference.iter().zip(&found).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
+                differences.sum::<f64>() / reference.len() as f64 / law.scale()
+            })
+            .collect();
+        println!("{}: widths 1e-3 to 1e-5 m/s: mean differences {errors:?} of its scale", row.name);
+        assert!(errors[2] < 0.02 && errors.windows(2).all(|pair| pair[1] < pair[0] / 3.0), "{}: {errors:?}", row.name);
+    }
+}
+
+/// A law without a slip limit carries nothing.
+#[test]
+fn free_laws_carry_no_force() {
+    for row in TABLE {
+        let Some(law) = row.sample().free() else { continue };
+        let motion = random_motion(1, law.directions(), 1.0);
+        for view in views(&*law) {
+            let found = forces(&*law, view, &motion, &steps(1.0, 1, 100));
+            assert!(!law.is_free() || largest(&found) == 0.0, "{} by {view:?}", row.name);
+        }
+    }
+}
+
+/// The describing function, in closed form or not, against the first harmonic of each view.
+#[test]
+fn describing_functions_are_first_harmonics() {
+    for row in TABLE {
+        let law = row.sample();
+        for amplitude in [1e-4, 1e-3] {
+            // fast beside the width of the smooth laws, whose start is that of their exact neighbour
+            let omega = 300.0;
+            let motion = |time: f64| {
+                let (sin, cos) = (omega * time).sin_cos();
+                ([amplitude * cos, 0.0, 0.0], [-amplitude * omega * sin, 0.0, 0.0])
             };
-            (way, force)
-        })
-        .collect()
+            let linear = law.linearised(amplitude, omega);
+            for view in views(&*law) {
+                let times = steps(TAU / omega, 4, SAMPLES);
+                let found = forces(&*law, view, &motion, &times);
+                let mut sum = Complex64::new(0.0, 0.0);
+                for k in 3 * SAMPLES..4 * SAMPLES {
+                    sum += Complex64::cis(-omega * times[k]) * found[k][0];
+                }
+                let first = sum * (2.0 / (SAMPLES as f64 * amplitude));
+                let error = (first - linear).norm() / first.norm().max(1e-3 * largest(&found) / amplitude).max(1e-300);
+                assert!(error < 0.05, "{} by {view:?} at {amplitude}: {linear} instead of {first}", row.name);
+            }
+        }
+    }
+}
+
+/// A law as methods share it between threads.
+#[test]
+fn laws_are_shared() {
+    fn shared<T: Send + Sync>(_: &T) {}
+    for row in TABLE {
+        let law: SharedLaw = row.sample();
+        shared(&law);
+        assert!(*law == *row.sample(), "{}", row.name);
+    }
 }

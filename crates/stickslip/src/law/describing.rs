@@ -21,7 +21,7 @@ pub(super) fn stiffness(
     pieces: Option<Vec<Piece>>,
     rate: Option<&dyn Rate>,
     step: Option<&dyn Step>,
-    prox: Option<&dyn Prox>,
+    (prox, directions): (Option<&dyn Prox>, usize),
     (amplitude, omega): (f64, f64),
 ) -> Complex64 {
     // without motion: that of a motion so small that it changes nothing would need a law's own scale of length
@@ -47,7 +47,7 @@ pub(super) fn stiffness(
     let rigid = first_harmonic(a, |theta| {
         let y = -penalty * a * omega * theta.sin();
         let (mut force, mut slope) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS * MOST_DIRECTIONS]);
-        prox.resolve(&[y], penalty, &mut force, &mut slope);
+        prox.resolve(&[y, 0.0, 0.0][..directions], penalty, &mut force, &mut slope);
         force[0]
     });
     // a spring in series

@@ -21,33 +21,54 @@
 mod bouc_wen;
 mod contact;
 mod coulomb;
+mod coulomb_2d;
+mod coulomb_2d_arctan;
 mod coulomb_arctan;
 mod cubic;
 mod dahl;
 mod describing;
+mod friction_contact;
 mod gap;
+mod iwan;
 mod jenkins;
+mod jenkins_2d;
+mod jenkins_2d_arctan;
 mod jenkins_arctan;
 mod kink;
+mod lugre;
 mod parameter;
+mod plane;
 mod prox;
 mod rate;
 mod step;
+mod stribeck;
+mod stribeck_arctan;
+mod valanis;
 
 pub use bouc_wen::BoucWen;
 pub use contact::Contact;
 pub(crate) use contact::SLIPS_ABOVE;
 pub use coulomb::Coulomb;
+pub use coulomb_2d::Coulomb2d;
+pub use coulomb_2d_arctan::Coulomb2dArctan;
 pub use coulomb_arctan::CoulombArctan;
 pub use cubic::Cubic;
 pub use dahl::Dahl;
+pub use friction_contact::FrictionContact;
 pub use gap::Gap;
+pub use iwan::Iwan;
 pub use jenkins::Jenkins;
+pub use jenkins_2d::Jenkins2d;
+pub use jenkins_2d_arctan::Jenkins2dArctan;
 pub use jenkins_arctan::JenkinsArctan;
+pub use lugre::LuGre;
 pub use parameter::{BuildError, LawError, LawInfo, Parameter, Range};
 pub use prox::{Mean, Prox};
 pub use rate::{Rate, RateLaw, RatePoint, Relative};
 pub use step::{Step, StepLaw, StepPoint};
+pub use stribeck::Stribeck;
+pub use stribeck_arctan::StribeckArctan;
+pub use valanis::Valanis;
 
 use num_complex::Complex64;
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -58,12 +79,22 @@ use std::sync::Arc;
 pub const TABLE: &[&LawInfo] = &[
     &coulomb::INFO,
     &coulomb_arctan::INFO,
+    &stribeck::INFO,
+    &stribeck_arctan::INFO,
     &jenkins::INFO,
     &jenkins_arctan::INFO,
+    &iwan::INFO,
     &dahl::INFO,
     &bouc_wen::INFO,
-    &cubic::INFO,
+    &valanis::INFO,
+    &lugre::INFO,
+    &coulomb_2d::INFO,
+    &coulomb_2d_arctan::INFO,
+    &jenkins_2d::INFO,
+    &jenkins_2d_arctan::INFO,
+    &friction_contact::INFO,
     &gap::INFO,
+    &cubic::INFO,
 ];
 
 /// The row of [`TABLE`] with this name.
@@ -165,7 +196,8 @@ pub trait Law: Debug + Send + Sync {
     }
     /// Complex stiffness of the first harmonic under `u = amplitude cos Ωt` along the first direction (N/m): where methods begin to search.
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
-        describing::stiffness(self.pieces(), self.rate(), self.step(), self.prox(), (amplitude, omega))
+        let directions = self.directions();
+        describing::stiffness(self.pieces(), self.rate(), self.step(), (self.prox(), directions), (amplitude, omega))
     }
     /// The smooth law that tends to this one as `width` (m/s, the velocity over which friction changes its sign) goes to zero.
     fn regularised(&self, _width: f64) -> Option<SharedLaw> {
@@ -227,6 +259,8 @@ const STUCK: f64 = 1e15;
 const LIMIT: &str = "limit";
 /// The key of the force up to which faces hold once they rest.
 const STATIC_LIMIT: &str = "static_limit";
+/// The key of the number of tangential directions, of laws that leave it open.
+pub const TANGENTS: &str = "tangents";
 
 impl dyn Law + '_ {
     /// Name in study files.
@@ -249,15 +283,25 @@ impl dyn Law + '_ {
         self.values().get(at).copied()
     }
 
-    /// The same law with another slip limit, N; `None` if it has none.
-    fn limited(&self, limit: f64) -> Option<SharedLaw> {
+    /// The same law with another value of one parameter, SI, unchecked; `None` if it has no such parameter.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip::law::{Dahl, Law};
+    /// let law: &dyn Law = &Dahl { stiffness: 1e4, limit: 2.0 };
+    /// assert_eq!(law.with("limit", 3.0).unwrap().values(), [1e4, 3.0]);
+    /// ```
+    pub fn with(&self, key: &str, value: f64) -> Option<SharedLaw> {
         let (info, mut values) = (self.info(), self.values());
-        let at = info.parameters.iter().position(|p| p.key == LIMIT)?;
-        values[at] = limit;
-        if let Some(at) = info.parameters.iter().position(|p| p.key == STATIC_LIMIT) {
-            values[at] = limit;
-        }
+        let at = info.parameters.iter().position(|p| p.key == key)?;
+        values[at] = value;
         Some((info.build)(&values))
+    }
+
+    /// The same law with another slip limit, N, static or not; `None` if it has none.
+    fn limited(&self, limit: f64) -> Option<SharedLaw> {
+        let law = self.with(LIMIT, limit)?;
+        Some(law.with(STATIC_LIMIT, limit).unwrap_or(law))
     }
 
     /// The same joint free of friction, a linear reference: its slip limit is zero. `None` if the law has no limit.

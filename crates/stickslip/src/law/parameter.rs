@@ -16,8 +16,8 @@ pub enum Range {
     Any,
     /// From the first number on, up to the second.
     Within(f64, f64),
-    /// A whole number from 1.
-    Count,
+    /// A whole number from 1 up to this.
+    Count(u32),
 }
 
 impl Range {
@@ -29,7 +29,7 @@ impl Range {
                 Range::ZeroOrMore => value >= 0.0,
                 Range::Any => true,
                 Range::Within(least, most) => (least..=most).contains(&value),
-                Range::Count => value >= 1.0 && value.fract() == 0.0,
+                Range::Count(most) => value >= 1.0 && value <= f64::from(most) && value.fract() == 0.0,
             }
     }
 }
@@ -41,7 +41,7 @@ impl fmt::Display for Range {
             Range::ZeroOrMore => write!(f, "zero or more"),
             Range::Any => write!(f, "of either sign"),
             Range::Within(least, most) => write!(f, "from {least} to {most}"),
-            Range::Count => write!(f, "a whole number from 1"),
+            Range::Count(most) => write!(f, "a whole number from 1 to {most}"),
         }
     }
 }
@@ -91,6 +91,28 @@ impl Parameter {
             None => Some(self.dimension),
             Some(power) => self.dimension.to_the(value(power)?),
         }
+    }
+
+    /// What it takes, in words: dimension, range, and what holds without it.
+    ///
+    /// # Example
+    /// ```
+    /// let parameter = |law, key| {
+    ///     let row = stickslip::law::find(law).unwrap();
+    ///     row.parameters.iter().find(|p| p.key == key).unwrap().takes()
+    /// };
+    /// assert_eq!(parameter("dahl", "limit"), "force (N), zero or more");
+    /// assert_eq!(parameter("bouc-wen", "gamma"), "inverse length (1/m) to the power `exponent`, of either sign");
+    /// assert_eq!(parameter("friction-contact", "tangents"), "a whole number from 1 to 2; 2 if absent");
+    /// ```
+    pub fn takes(&self) -> String {
+        let power = self.power.map(|power| format!(" to the power `{power}`")).unwrap_or_default();
+        let what = match (self.range, self.dimension) {
+            (Range::Count(_), _) => self.range.to_string(),
+            (range, Dimension::NONE) => format!("pure number{power}, {range}"),
+            (range, dimension) => format!("{dimension}{power}, {range}"),
+        };
+        what + &self.default.map(|value| format!("; {value} if absent")).unwrap_or_default()
     }
 
     /// The same parameter with a value for when its key is absent, SI.

@@ -49,9 +49,7 @@ struct Modal {
 impl Rest {
     pub fn new(system: &System, coordinates: &[Coordinate]) -> Self {
         let n = system.dofs();
-        let direction = DMatrix::from_columns(
-            &coordinates.iter().map(|c| system.joints()[c.joint].axes()[0].dense(n)).collect::<Vec<_>>(),
-        );
+        let direction = DMatrix::from_fn(n, coordinates.len(), |i, q| system.joints()[coordinates[q].joint].axes()[0].dense(n)[i]);
         Rest {
             n,
             // where the banded form takes over, the modes are not needed

@@ -238,6 +238,9 @@ impl Step {
     pub fn carry(&mut self, assembly: &Assembly, eliminated: &Eliminated, sensitivity: &mut DMatrix<f64>) {
         let (n, j, h) = (assembly.n, assembly.axes.len(), eliminated.length);
         let columns = sensitivity.ncols();
+        if columns == 0 {
+            return; // a joint that is only moved, without states
+        }
         let mut velocity = &eliminated.from_state * sensitivity.rows(0, 2 * n);
         velocity.gemm(1.0, &eliminated.from_force, &self.carried, 1.0);
         let mut w = vec![0.0; j];

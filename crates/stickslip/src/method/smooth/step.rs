@@ -154,8 +154,6 @@ pub(crate) struct Step {
 const ITERATIONS: usize = 12;
 /// A correction of the unknowns below this fraction of their scale ends the iteration: the next one would be at rounding.
 const SMALL: f64 = 1e-9;
-/// So does a larger one, if the next is expected to be below this.
-const NEGLIGIBLE: f64 = 1e-12;
 
 /// Index of a stage's internal state among the unknowns.
 fn at_state(assembly: &Assembly, stage: usize, s: usize) -> usize {
@@ -226,9 +224,7 @@ impl Step {
             if !size.is_finite() || self.residual.iter().any(|r| !r.is_finite()) {
                 return false;
             }
-            // Newton's steps square: the next one would be this one's square times the factor that the last two show
-            let next = if previous.is_finite() { size * (size / previous).powi(2) } else { f64::INFINITY };
-            if size <= SMALL || next <= NEGLIGIBLE {
+            if size <= SMALL {
                 self.evaluate(assembly, eliminated, loads);
                 if derivatives {
                     self.linearise(assembly, eliminated, state);
@@ -370,6 +366,9 @@ impl Step {
     pub fn carry(&mut self, assembly: &Assembly, eliminated: &Eliminated, sensitivity: &mut DMatrix<f64>) {
         let (n, j, internal, h) = (assembly.n, assembly.axes.len(), assembly.internal, eliminated.length);
         let (columns, joints) = (sensitivity.ncols(), assembly.joints.len());
+        if columns == 0 {
+            return; // a joint that is only moved, without states
+        }
         if self.right.ncols() != columns {
             self.right = DMatrix::zeros(self.unknown.len(), columns);
             self.direct = DMatrix::zeros(STAGES * j, columns);

@@ -1,0 +1,215 @@
+//! A contact that presses, sticks, slips and separates: an elastic normal, and elastic friction along one or two tangents.
+//!
+//! Normal: `N = max(preload + kn un, 0)` with `un > 0` closing. Tangents: `T = kt (u - s)`, `|T| <= mu N`, slip along T; two tangents are coupled by the
+//! friction disk. Where N is zero the faces are apart, and T is zero; faces that meet again begin without T.
+//! All of `T` and `N` acts on the structure, the preload too: it pushes the places apart, and the springs of the structure carry it.
+//! Source: Yang, Chu, Menq, "Stick-slip-separation analysis and non-linear stiffness and damping characterization of friction contacts having variable
+//! normal load" (1998), and for three directions Yang and Menq (1998).
+//!
+//! A step is exact where its way is straight: the normal load then changes linearly along it, the step in which contact closes counts only
+//! its closed part, and slip in a plane is integrated in closed form. No smooth neighbour is offered: a tangential spring
+//! with an arctangent slider has no limit for its rate as the load goes to zero.
+
+use super::plane;
+use super::{Contact, Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Step, StepLaw, TANGENTS};
+use crate::dimension::Dimension;
+use std::sync::Arc;
+use stickslip_numerics::dual::Real;
+
+/// The row of this law in [`super::TABLE`].
+pub(super) static INFO: LawInfo = LawInfo {
+    name: "friction-contact",
+    summary: "contact with separation, N = max(preload + kn un, 0), elastic friction |T| <= friction N along one or two tangents",
+    parameters: &[
+        Parameter::positive("tangential", Dimension::STIFFNESS, "tangential contact stiffness, kt"),
+        Parameter::positive("normal", Dimension::STIFFNESS, "normal contact stiffness, kn"),
+        Parameter::new("friction", Dimension::NONE, Range::ZeroOrMore, "coefficient of friction"),
+        Parameter::new(
+            "preload",
+            Dimension::FORCE,
+            Range::Any,
+            "normal load at rest; negative: a gap of -preload/normal",
+        )
+        .or(0.0),
+        Parameter::new(
+            TANGENTS,
+            Dimension::NONE,
+            Range::Count(2),
+            "tangential directions before the normal; by default those of the nodes",
+        )
+        .or(2.0),
+    ],
+    sample: &[10_000.0, 15_000.0, 0.3, 6.0, 2.0],
+    build: |values| {
+        Arc::new(FrictionContact {
+            tangential: values[0],
+            normal: values[1],
+            friction: values[2],
+            preload: values[3],
+            tangents: values[4] as usize,
+        })
+    },
+};
+
+/// A contact that presses, sticks, slips and separates. Its directions are the tangents and, last, the normal; the internal states are the
+/// tangential force, N.
+///
+/// # Example
+/// ```
+/// use stickslip::law::{FrictionContact, StepLaw};
+/// let law = FrictionContact { tangential: 1.0, normal: 2.0, friction: 0.5, preload: 4.0, tangents: 1 };
+/// let mut z = [0.0];
+/// // pressed with 4 N + 2 N/m · 1 m, slipping with half of that
+/// assert_eq!(law.advance(&[0.0; 3], &[9.0, 1.0, 0.0], &mut z)[..2], [3.0, 6.0]);
+/// // apart
+/// assert_eq!(law.advance(&[9.0, 1.0, 0.0], &[9.0, -2.0, 0.0], &mut z)[..2], [0.0, 0.0]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrictionContact {
+    /// Tangential stiffness `kt`, N/m.
+    pub tangential: f64,
+    /// Normal stiffness `kn`, N/m.
+    pub normal: f64,
+    /// Coefficient of friction `mu`.
+    pub friction: f64,
+    /// Normal load at rest, N; negative if the faces are apart.
+    pub preload: f64,
+    /// Tangential directions, 1 or 2.
+    pub tangents: usize,
+}
+
+impl Law for FrictionContact {
+    fn info(&self) -> &'static LawInfo {
+        &INFO
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![self.tangential, self.normal, self.friction, self.preload, self.tangents as f64]
+    }
+    fn directions(&self) -> usize {
+        self.tangents + 1
+    }
+    /// The slip limit at rest; infinite if there is none.
+    fn scale(&self) -> f64 {
+        let limit = self.friction * self.preload;
+        if limit > 0.0 { limit } else { f64::INFINITY }
+    }
+    fn step(&self) -> Option<&dyn Step> {
+        Some(self)
+    }
+    /// Closing and opening differ.
+    fn is_odd(&self) -> bool {
+        false
+    }
+    fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
+        let normal = force[self.tangents];
+        if normal <= 0.0 {
+            return Contact::Open;
+        }
+        Contact::by_limit(self.friction * normal, &velocity[..self.tangents], &force[..self.tangents])
+    }
+}
+
+impl StepLaw for FrictionContact {
+    fn states(&self) -> usize {
+        self.tangents
+    }
+    fn state_scale(&self) -> f64 {
+        if self.scale().is_finite() { self.scale() } else { 1.0 }
+    }
+    #[inline]
+    fn advance<S: Real>(
+        &self,
+        from: &[S; MOST_DIRECTIONS],
+        to: &[S; MOST_DIRECTIONS],
+        z: &mut [S],
+    ) -> [S; MOST_DIRECTIONS] {
+        let zero = S::from(0.0);
+        let load = |u: &[S; MOST_DIRECTIONS]| u[self.tangents] * self.normal + self.preload;
+        let (before, after) = (load(from), load(to));
+        let mut out = [zero; MOST_DIRECTIONS];
+        if after.re() <= 0.0 {
+            z.fill(zero);
+            return out;
+        }
+        // the part of the way on which the faces touch
+        let (first, closed) = if before.re() < 0.0 {
+            z.fill(zero);
+            (zero, after / (after - before))
+        } else {
+            (before * self.friction, S::from(1.0))
+        };
+        let last = after * self.friction;
+        match z {
+            [force] => {
+                // along a line both ends of the disk move linearly: where the step ends decides
+                let trial = *force + (to[0] - from[0]) * closed * self.tangential;
+                *force = if trial.re() > last.re() {
+                    last
+                } else if trial.re() < -last.re() {
+                    -last
+                } else {
+                    trial
+                };
+            }
+            _ => {
+                let way = [0, 1].map(|a| (to[a] - from[a]) * closed);
+                let force = plane::step([z[0], z[1]], way, self.tangential, [first, last]);
+                z.copy_from_slice(&force);
+            }
+        }
+        out[..self.tangents].copy_from_slice(z);
+        out[self.tangents] = after;
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A step that closes the contact counts its closed part only: in two steps, with the instant of closing between, it is the same.
+    #[test]
+    fn a_step_that_closes_is_two_steps_with_the_closing_between() {
+        for tangents in [1, 2] {
+            let law = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.9, preload: -1.0, tangents };
+            let at = |t: f64| {
+                let mut u = [0.0; 3];
+                (u[0], u[1]) = (0.8 * t, -0.5 * t);
+                u[tangents] = -1.0 + 3.0 * t;
+                u
+            };
+            let (mut once, mut twice) = (vec![0.7; tangents], vec![0.7; tangents]);
+            let one = law.advance(&at(0.0), &at(1.0), &mut once);
+            law.advance(&at(0.0), &at(0.5), &mut twice); // N = 0 at t = 0.5
+            let two = law.advance(&at(0.5), &at(1.0), &mut twice);
+            for a in 0..=tangents {
+                assert!((one[a] - two[a]).abs() < 1e-14, "{one:?} {two:?}");
+            }
+            assert!(one[tangents] > 0.0 && one[0] > 0.0);
+        }
+    }
+
+    #[test]
+    fn one_tangent_is_two_with_a_second_that_rests() {
+        let one = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.4, preload: 1.0, tangents: 1 };
+        let two = FrictionContact { tangents: 2, ..one };
+        let (mut z, mut w) = ([0.0; 1], [0.0; 2]);
+        let (mut before, mut wide) = ([0.0; 3], [0.0; 3]);
+        for k in 1..400 {
+            let t = 0.05 * f64::from(k);
+            let u = [t.sin() + 0.4 * (2.3 * t).cos(), 0.9 * (1.3 * t).sin()];
+            let (to, to_wide) = ([u[0], u[1], 0.0], [u[0], 0.0, u[1]]);
+            let (a, b) = (one.advance(&before, &to, &mut z), two.advance(&wide, &to_wide, &mut w));
+            assert!((a[0] - b[0]).abs() < 1e-13 && a[1] == b[2] && b[1] == 0.0, "{k}: {a:?} {b:?}");
+            (before, wide) = (to, to_wide);
+        }
+    }
+
+    #[test]
+    fn faces_say_what_they_do() {
+        let law = FrictionContact { tangential: 1.0, normal: 1.0, friction: 0.5, preload: 1.0, tangents: 2 };
+        assert_eq!(law.contact(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0]), Contact::Open);
+        assert_eq!(law.contact(&[1.0, 0.0, 0.0], &[0.3, 0.4, 1.0]), Contact::Slip);
+        assert_eq!(law.contact(&[0.0, 0.0, 0.0], &[0.1, 0.1, 1.0]), Contact::Stick);
+    }
+}

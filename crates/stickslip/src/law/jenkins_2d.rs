@@ -1,0 +1,92 @@
+//! Elastic dry friction in a plane: a spring in series with a slider, the same in all directions, coupled by the friction disk.
+//!
+//! `f = k (u - s)`; the slider rests while `|f| < limit` and moves along f with `|f| = limit`.
+//! Source: Menq and Yang, "Non-linear spring resistance and friction damping of frictional constraint having two-dimensional motion" (1998);
+//! step by Krieg and Key (1977), exact for straight steps.
+
+use super::plane;
+use super::{Jenkins, Jenkins2dArctan, Law, LawInfo, MOST_DIRECTIONS, Parameter, SharedLaw, Step, StepLaw};
+use crate::dimension::Dimension;
+use num_complex::Complex64;
+use std::sync::Arc;
+use stickslip_numerics::dual::Real;
+
+/// The row of this law in [`super::TABLE`].
+pub(super) static INFO: LawInfo = LawInfo {
+    name: "jenkins-2d",
+    summary: "spring and slider in series in a plane, f = kt (u - s), |f| <= limit",
+    parameters: &[
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "tangential contact stiffness"),
+        Parameter::limit("slip limit: size of the force while the slider moves"),
+    ],
+    sample: &[10_000.0, 2.0],
+    build: |values| Arc::new(Jenkins2d { stiffness: values[0], limit: values[1] }),
+};
+
+/// Spring and slider along two directions. The internal states are the force, N.
+///
+/// # Example
+/// ```
+/// use stickslip::law::{Jenkins2d, StepLaw};
+/// let law = Jenkins2d { stiffness: 1.0, limit: 2.0 };
+/// let mut z = [0.0; 2];
+/// assert_eq!(law.advance(&[0.0; 3], &[0.6, 0.8, 0.0], &mut z)[..2], [0.6, 0.8]);
+/// let slipping = law.advance(&[0.6, 0.8, 0.0], &[6.0, 8.0, 0.0], &mut z);
+/// assert!((slipping[0] - 1.2).abs() < 1e-15 && (slipping[1] - 1.6).abs() < 1e-15);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jenkins2d {
+    /// Stiffness of the spring `kt`, N/m.
+    pub stiffness: f64,
+    /// Slip limit, N.
+    pub limit: f64,
+}
+
+impl Law for Jenkins2d {
+    fn info(&self) -> &'static LawInfo {
+        &INFO
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![self.stiffness, self.limit]
+    }
+    fn directions(&self) -> usize {
+        2
+    }
+    fn scale(&self) -> f64 {
+        self.limit
+    }
+    fn step(&self) -> Option<&dyn Step> {
+        Some(self)
+    }
+    fn regularised(&self, width: f64) -> Option<SharedLaw> {
+        Some(Arc::new(Jenkins2dArctan { stiffness: self.stiffness, limit: self.limit, alpha: 1.0 / width }))
+    }
+    fn is_incrementally_passive(&self) -> bool {
+        true // the spring keeps |δf|²/(2 kt), and the slider moves along the normal of a convex disk
+    }
+    /// Motion along one direction is that of the Jenkins element.
+    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+        Jenkins { stiffness: self.stiffness, limit: self.limit }.linearised(amplitude, omega)
+    }
+}
+
+impl StepLaw for Jenkins2d {
+    fn states(&self) -> usize {
+        2
+    }
+    fn state_scale(&self) -> f64 {
+        if self.limit > 0.0 { self.limit } else { 1.0 }
+    }
+    #[inline]
+    fn advance<S: Real>(
+        &self,
+        from: &[S; MOST_DIRECTIONS],
+        to: &[S; MOST_DIRECTIONS],
+        z: &mut [S],
+    ) -> [S; MOST_DIRECTIONS] {
+        let way = [to[0] - from[0], to[1] - from[1]];
+        let force = plane::step([z[0], z[1]], way, self.stiffness, [S::from(self.limit); 2]);
+        z.copy_from_slice(&force);
+        [force[0], force[1], S::from(0.0)]
+    }
+}

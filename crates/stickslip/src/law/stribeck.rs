@@ -1,0 +1,225 @@
+//! Rigid dry friction that falls with velocity: Stribeck's curve, or a static and a dynamic limit.
+//!
+//! `|f| <= Fs` at rest, `f = sgn(u') g(u')`, `g(v) = Fc + (Fs - Fc) exp(-(v/vs)²)` in slip. With `vs = 0` the force drops from Fs to Fc as soon
+//! as the faces slide.
+//! Source: Stribeck (1902); in this form Bo and Pavelescu, "The friction-speed relation and its influence on the critical velocity of
+//! stick-slip motion" (1982).
+
+use super::{
+    Contact, CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, Range, STATIC_LIMIT, SharedLaw, Slider,
+    StribeckArctan,
+};
+use crate::dimension::Dimension;
+use std::f64::consts::E;
+use std::sync::Arc;
+use stickslip_numerics::dual::Real;
+
+/// The row of this law in [`super::TABLE`].
+pub(super) static INFO: LawInfo = LawInfo {
+    name: "stribeck",
+    summary: "rigid friction that falls with velocity, |f| <= Fs at rest, f = sgn(u') (Fc + (Fs - Fc) exp(-(u'/vs)^2)) in slip",
+    parameters: &[
+        Parameter::limit("friction force at high velocity, Fc"),
+        Parameter::new(
+            STATIC_LIMIT,
+            Dimension::FORCE,
+            Range::ZeroOrMore,
+            "force at which slip begins, Fs; not below `limit`",
+        ),
+        Parameter::new(
+            "velocity",
+            Dimension::VELOCITY,
+            Range::ZeroOrMore,
+            "velocity over which friction falls, vs; 0: at once",
+        )
+        .or(0.0),
+    ],
+    sample: &[2.0, 2.5, 0.01],
+    build: |values| Arc::new(Stribeck { limit: values[0], static_limit: values[1], velocity: values[2] }),
+};
+
+/// Rigid friction that falls with velocity.
+///
+/// # Example
+/// ```
+/// use stickslip::law::{Law, Prox, Stribeck};
+/// let law = Stribeck { limit: 2.0, static_limit: 2.5, velocity: 0.01 };
+/// let (mut force, mut slope) = ([0.0], [0.0]);
+/// law.resolve(&[2.4], 1e3, &mut force, &mut slope);
+/// assert_eq!((force[0], slope[0]), (2.4, 1.0)); // it holds
+/// law.resolve(&[1002.0], 1e3, &mut force, &mut slope);
+/// assert_eq!(force[0], 2.0); // it slides at 1 m/s
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stribeck {
+    /// Friction force at high velocity `Fc`, N.
+    pub limit: f64,
+    /// Force at which slip begins `Fs`, N.
+    pub static_limit: f64,
+    /// Velocity `vs` over which friction falls, m/s.
+    pub velocity: f64,
+}
+
+/// `Fc + (Fs - Fc) exp(-(v/vs)²)`, N.
+pub(super) fn falling<S: Real>(v: S, limit: f64, static_limit: f64, velocity: f64) -> S {
+    let share = v / velocity;
+    (-(share * share)).exp() * (static_limit - limit) + limit
+}
+
+/// Whether the static limit is not below the dynamic one.
+pub(super) fn limits_fit(limit: f64, static_limit: f64) -> Result<(), String> {
+    if static_limit >= limit {
+        return Ok(());
+    }
+    Err(format!("`static_limit` must not be below `limit`, found {static_limit} N and {limit} N"))
+}
+
+impl Stribeck {
+    /// Whether friction does not fall at all.
+    fn is_constant(&self) -> bool {
+        self.static_limit == self.limit
+    }
+
+    /// Friction at a velocity that is not zero, and its derivative there, N and N s/m.
+    fn sliding(&self, velocity: f64) -> (f64, f64) {
+        if self.velocity == 0.0 || self.is_constant() {
+            return (self.limit, 0.0);
+        }
+        let share = velocity / self.velocity;
+        let excess = (self.static_limit - self.limit) * (-share * share).exp();
+        (self.limit + excess, -2.0 * share / self.velocity * excess)
+    }
+}
+
+impl Law for Stribeck {
+    fn info(&self) -> &'static LawInfo {
+        &INFO
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![self.limit, self.static_limit, self.velocity]
+    }
+    fn scale(&self) -> f64 {
+        self.static_limit
+    }
+    /// Without a velocity: a slider with two limits.
+    fn pieces(&self) -> Option<Vec<Piece>> {
+        let slider = Slider { stiffness: None, limit: self.limit, static_limit: self.static_limit };
+        (self.velocity == 0.0 || self.is_constant()).then(|| vec![Piece::Slider(slider)])
+    }
+    /// With a velocity: without one no penalty makes the resolvent single-valued.
+    fn prox(&self) -> Option<&dyn Prox> {
+        if self.velocity > 0.0 || self.is_constant() { Some(self) } else { None }
+    }
+    /// With a velocity: no smooth law of one width has both a static and a dynamic limit.
+    fn regularised(&self, width: f64) -> Option<SharedLaw> {
+        let Stribeck { limit, static_limit, velocity } = *self;
+        if self.is_constant() {
+            Some(Arc::new(CoulombArctan { limit, alpha: 1.0 / width }))
+        } else if velocity > 0.0 {
+            Some(Arc::new(StribeckArctan { limit, static_limit, velocity, alpha: 1.0 / width }))
+        } else {
+            None
+        }
+    }
+    /// Where friction does not fall it is Coulomb's, a monotone function of velocity.
+    fn is_incrementally_passive(&self) -> bool {
+        self.is_constant()
+    }
+    fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
+        let limit = if velocity[0] == 0.0 { self.static_limit } else { self.sliding(velocity[0]).0 };
+        Contact::by_limit(limit, velocity, force)
+    }
+    fn consistent(&self) -> Result<(), String> {
+        limits_fit(self.limit, self.static_limit)
+    }
+}
+
+/// Iterations of the search for the velocity; bisection alone needs as many as a number has bits.
+const SEARCHED: usize = 100;
+
+impl Prox for Stribeck {
+    fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
+        let target = y[0].abs();
+        if target <= self.static_limit {
+            (force[0], slope[0]) = (y[0], 1.0);
+            return;
+        }
+        // the velocity v with g(v) + penalty v = target, by Newton's method within a bracket
+        let (mut low, mut high) = (0.0, (target - self.limit) / penalty);
+        let mut v = high;
+        for _ in 0..SEARCHED {
+            let (friction, fall) = self.sliding(v);
+            let excess = friction + penalty * v - target;
+            if excess > 0.0 {
+                high = v
+            } else {
+                low = v
+            }
+            let next = v - excess / (penalty + fall);
+            let next = if next >= low && next <= high { next } else { 0.5 * (low + high) };
+            let step = (next - v).abs();
+            v = next;
+            if step <= f64::EPSILON * v {
+                break;
+            }
+        }
+        let (friction, fall) = self.sliding(v);
+        (force[0], slope[0]) = (friction.copysign(y[0]), fall / (fall + penalty));
+    }
+    /// The steepest fall of friction, at `v = vs / √2`.
+    fn least_penalty(&self) -> f64 {
+        if self.is_constant() {
+            return 0.0;
+        }
+        (2.0 / E).sqrt() * (self.static_limit - self.limit) / self.velocity
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAW: Stribeck = Stribeck { limit: 2.0, static_limit: 2.5, velocity: 0.01 };
+
+    #[test]
+    fn the_resolvent_solves_its_equation_and_has_its_slope() {
+        let penalty = 1.5 * LAW.least_penalty();
+        let resolve = |y: f64| {
+            let (mut force, mut slope) = ([0.0], [0.0]);
+            LAW.resolve(&[y], penalty, &mut force, &mut slope);
+            (force[0], slope[0])
+        };
+        for k in 0..200 {
+            let y = -4.0 + 0.04 * f64::from(k);
+            let (force, slope) = resolve(y);
+            let velocity = (y - force) / penalty;
+            let friction: f64 = falling(velocity, 2.0, 2.5, 0.01);
+            if velocity == 0.0 {
+                assert!(force.abs() <= 2.5);
+            } else {
+                assert!((force - friction.copysign(velocity)).abs() < 1e-13, "{y}: {force} {friction}");
+            }
+            let h = 1e-7;
+            let difference = (resolve(y + h).0 - resolve(y - h).0) / (2.0 * h);
+            if (y.abs() - 2.5).abs() > 2.0 * h {
+                assert!((slope - difference).abs() < 1e-5 * (1.0 + slope.abs()), "{y}: {slope} {difference}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_least_penalty_is_the_steepest_fall() {
+        let steepest = (1..4000).map(|k| -LAW.sliding(f64::from(k) * 1e-5).1).fold(0.0, f64::max);
+        assert!((LAW.least_penalty() / steepest - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn without_a_velocity_it_is_a_slider_with_two_limits() {
+        let law = Stribeck { velocity: 0.0, ..LAW };
+        let slider = Slider { stiffness: None, limit: 2.0, static_limit: 2.5 };
+        assert_eq!(law.pieces(), Some(vec![Piece::Slider(slider)]));
+        assert!(law.prox().is_none() && law.regularised(1e-5).is_none());
+        let coulomb = Stribeck { static_limit: 2.0, ..law };
+        assert!(coulomb.prox().is_some() && coulomb.regularised(1e-5).is_some() && coulomb.is_incrementally_passive());
+    }
+}

@@ -1,0 +1,124 @@
+//! Hysteresis of Valanis's endochronic theory, as used for bolted joints: stiff at rest, softer in slip, with a knee between.
+//!
+//! `f' = E0 u' (1 + q) / (1 + kappa q)`, `q = (lambda / E0) sgn(u') (Et u - f)`. In long motion to one side f tends to a line of slope Et;
+//! kappa between 0 and 1 makes the knee sharper. It is the same at every speed.
+//! Source: Valanis (1971); for joints Gaul and Lenz, "Nonlinear dynamics of structures assembled by bolted joints" (1997); Gaul and Nitsche,
+//! "The role of friction in mechanical joints" (2001).
+//!
+//! It gives no energy in a closed motion: beyond the spring Et, its slope at a given force in loading is never above that in unloading.
+
+use super::kink::{sign, size};
+use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
+use crate::dimension::Dimension;
+use std::sync::Arc;
+use stickslip_numerics::dual::Real;
+
+/// The row of this law in [`super::TABLE`].
+pub(super) static INFO: LawInfo = LawInfo {
+    name: "valanis",
+    summary: "joint with stick and slip stiffness, f' = E0 u' (1 + q)/(1 + kappa q), q = (lambda/E0) sgn(u') (Et u - f)",
+    parameters: &[
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness at rest, E0"),
+        Parameter::new(
+            "slip_stiffness",
+            Dimension::STIFFNESS,
+            Range::ZeroOrMore,
+            "stiffness in slip, Et; below `stiffness`",
+        ),
+        Parameter::positive("lambda", Dimension::INVERSE_LENGTH, "how soon it slips"),
+        Parameter::new("kappa", Dimension::NONE, Range::Within(0.0, 1.0), "sharpness of the knee, below 1"),
+    ],
+    sample: &[10_000.0, 1000.0, 5000.0, 0.6],
+    build: |values| {
+        Arc::new(Valanis { stiffness: values[0], slip_stiffness: values[1], lambda: values[2], kappa: values[3] })
+    },
+};
+
+/// A joint with a stiffness in stick and another in slip. The internal state is `y = (lambda / E0) (f - Et u)`, a pure number between -1 and 1.
+///
+/// # Example
+/// ```
+/// use stickslip::law::{RateLaw, Relative, Valanis};
+/// let law = Valanis { stiffness: 1e4, slip_stiffness: 1e3, lambda: 5e3, kappa: 0.0 };
+/// // without kappa the slope falls linearly with the force
+/// let mut rate = [0.0];
+/// law.evaluate(&Relative::along(0.0, 1.0), &[0.5], &mut rate);
+/// assert!((rate[0] - 5e3 * (0.5 - 0.1)).abs() < 1e-9);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Valanis {
+    /// Stiffness at rest `E0`, N/m.
+    pub stiffness: f64,
+    /// Stiffness in slip `Et`, N/m.
+    pub slip_stiffness: f64,
+    /// How soon it slips, 1/m.
+    pub lambda: f64,
+    /// Sharpness of the knee, from 0 to below 1.
+    pub kappa: f64,
+}
+
+impl Law for Valanis {
+    fn info(&self) -> &'static LawInfo {
+        &INFO
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![self.stiffness, self.slip_stiffness, self.lambda, self.kappa]
+    }
+    /// What the force beyond the spring Et tends to in slip.
+    fn scale(&self) -> f64 {
+        let (stick, slip) = (self.stiffness, self.slip_stiffness);
+        stick / self.lambda * (stick - slip) / (stick - self.kappa * slip)
+    }
+    fn rate(&self) -> Option<&dyn Rate> {
+        Some(self)
+    }
+    fn consistent(&self) -> Result<(), String> {
+        if self.slip_stiffness >= self.stiffness {
+            return Err("`slip_stiffness` must be below `stiffness`, or the joint does not slip".to_owned());
+        }
+        if self.kappa >= 1.0 {
+            return Err("`kappa` must be below 1, where the joint is a spring".to_owned());
+        }
+        Ok(())
+    }
+}
+
+impl RateLaw for Valanis {
+    fn states(&self) -> usize {
+        1
+    }
+    #[inline]
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+        let (u, v, y) = (motion.displacement[0], motion.velocity[0], z[0]);
+        let knee = S::from(1.0) - y * (self.kappa * sign(v.re()));
+        rate[0] = ((v - size(v) * y) / knee - v * (self.slip_stiffness / self.stiffness)) * self.lambda;
+        [u * self.slip_stiffness + y * (self.stiffness / self.lambda), S::from(0.0), S::from(0.0)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_force_has_the_slope_of_its_equation() {
+        let law = Valanis { stiffness: 10.0, slip_stiffness: 2.0, lambda: 3.0, kappa: 0.7 };
+        for (u, force, v) in [(0.3, 1.1, 0.5), (0.3, 1.1, -0.5), (-2.0, -5.0, 1.0), (0.0, 0.0, -3.0)] {
+            let y = law.lambda / law.stiffness * (force - law.slip_stiffness * u);
+            let mut rate = [0.0];
+            let found = law.evaluate(&Relative::along(u, v), &[y], &mut rate)[0];
+            let slope = law.slip_stiffness * v + rate[0] * law.stiffness / law.lambda; // f' by the state's rate
+            let q = law.lambda / law.stiffness * v.signum() * (law.slip_stiffness * u - force);
+            let expected = law.stiffness * v * (1.0 + q) / (1.0 + law.kappa * q);
+            assert!((found - force).abs() < 1e-14 && (slope - expected).abs() < 1e-12, "{u} {force} {v}");
+        }
+    }
+
+    #[test]
+    fn slip_goes_on_along_the_line_that_the_scale_says() {
+        let law = Valanis { stiffness: 10.0, slip_stiffness: 2.0, lambda: 3.0, kappa: 0.7 };
+        let mut rate = [1.0];
+        law.evaluate(&Relative::along(0.0, 1.0), &[law.scale() * law.lambda / law.stiffness], &mut rate);
+        assert!(rate[0].abs() < 1e-14);
+    }
+}

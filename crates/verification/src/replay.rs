@@ -1,0 +1,214 @@
+//! A law alone under a given motion, through each of its views: what no method has touched.
+
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
+use stickslip::law::{Law, MOST_DIRECTIONS, Piece, Prox, Rate, RatePoint, Relative, Step};
+
+use crate::Random;
+
+/// Displacement (m) and velocity (m/s) along all directions.
+pub type Instant = ([f64; MOST_DIRECTIONS], [f64; MOST_DIRECTIONS]);
+
+/// A motion in time, for times from zero on.
+pub type Motion<'a> = &'a dyn Fn(f64) -> Instant;
+
+/// A view of a law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum View {
+    Pieces,
+    Step,
+    Rate,
+    Prox,
+}
+
+/// The views that a law offers.
+pub fn views(law: &dyn Law) -> Vec<View> {
+    let offered = [
+        (View::Pieces, law.pieces().is_some()),
+        (View::Step, law.step().is_some()),
+        (View::Rate, law.rate().is_some()),
+        (View::Prox, law.prox().is_some()),
+    ];
+    offered.into_iter().filter(|(_, has)| *has).map(|(view, _)| view).collect()
+}
+
+/// Forces of a law (N) at the `times`, from a contact that nothing has moved; the times rise from zero.
+///
+/// Pieces and steps go straight from sample to sample. Rates are integrated from one to the next by the two-stage Radau IIA method, of order 3.
+/// Resolvents behind a spring are implicit Euler steps, of order 1.
+///
+/// # Panics
+/// If the law does not offer the view.
+pub fn forces(law: &dyn Law, view: View, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+    match view {
+        View::Pieces => pieces(&law.pieces().expect("pieces"), motion, times),
+        View::Step => step(law.step().expect("a step"), motion, times),
+        View::Rate => rate(law.directions(), law.rate().expect("a rate"), motion, times),
+        View::Prox => prox(law.directions(), law.prox().expect("a resolvent"), motion, times),
+    }
+}
+
+fn pieces(pieces: &[Piece], motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+    let mut held = vec![0.0; pieces.len()];
+    let mut before = motion(times[0]).0[0];
+    times
+        .iter()
+        .map(|&time| {
+            let (u, v) = motion(time);
+            let (u, v, way) = (u[0], v[0], u[0] - before);
+            before = u;
+            let each = pieces.iter().zip(&mut held).map(|(piece, held)| match *piece {
+                Piece::Slider(slider) => {
+                    *held = match slider.stiffness {
+                        Some(stiffness) => (*held + stiffness * way).clamp(-slider.limit, slider.limit),
+                        None if v != 0.0 => slider.limit * v.signum(),
+                        None => *held,
+                    };
+                    *held
+                }
+                Piece::Stop { gap, stiffness } => stiffness * (u - gap).max(0.0),
+            });
+            [each.sum(), 0.0, 0.0]
+        })
+        .collect()
+}
+
+fn step(step: &dyn Step, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+    let mut z = vec![0.0; step.states()];
+    let mut before = motion(times[0]).0;
+    times
+        .iter()
+        .map(|&time| {
+            let to = motion(time).0;
+            let force = step.value(&before, &to, &mut z);
+            before = to;
+            force
+        })
+        .collect()
+}
+
+/// Newton iterations for the stages of a step.
+const ITERATIONS: usize = 30;
+
+fn rate(directions: usize, law: &dyn Rate, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+    // nodes and matrix of the two-stage Radau IIA method
+    const C: [f64; 2] = [1.0 / 3.0, 1.0];
+    const A: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
+    let n = law.states();
+    let mut z = vec![0.0; n];
+    let mut point = RatePoint::new(directions, n);
+    let relative = |time: f64| {
+        let (displacement, velocity) = motion(time);
+        Relative { displacement, velocity }
+    };
+    let mut last = times[0];
+    times
+        .iter()
+        .map(|&time| {
+            let h = time - last;
+            let mut stages = DVector::from_fn(2 * n, |i, _| z[i % n]);
+            for _ in 0..if n == 0 || h == 0.0 { 0 } else { ITERATIONS } {
+                let mut rates = vec![0.0; 2 * n];
+                let mut slopes = DMatrix::zeros(2 * n, n);
+                for s in 0..2 {
+                    let at: Vec<f64> = stages.rows(s * n, n).iter().copied().collect();
+                    law.linearise(directions, &relative(last + C[s] * h), &at, &mut point);
+                    rates[s * n..(s + 1) * n].copy_from_slice(&point.rate);
+                    for i in 0..n {
+                        for j in 0..n {
+                            slopes[(s * n + i, j)] = point.rate_slope(i)[2 * directions + j];
+                        }
+                    }
+                }
+                let residual = DVector::from_fn(2 * n, |i, _| {
+                    stages[i] - z[i % n] - h * (0..2).map(|t| A[i / n][t] * rates[t * n + i % n]).sum::<f64>()
+                });
+                let jacobian = DMatrix::from_fn(2 * n, 2 * n, |i, j| {
+                    f64::from(u8::from(i == j)) - h * A[i / n][j / n] * slopes[(j / n * n + i % n, j % n)]
+                });
+                let mut change = jacobian.lu().solve(&residual).expect("a regular step");
+                // states in a logarithm of the velocity: a long step of Newton's method would leave it
+                let longest = change.amax();
+                if longest > 2.0 {
+                    change *= 2.0 / longest;
+                }
+                stages -= &change;
+                if longest < 1e-14 * (1.0 + stages.amax()) {
+                    break;
+                }
+            }
+            z.copy_from_slice(stages.rows(n, n).as_slice());
+            last = time;
+            law.value(&relative(time), &z, &mut vec![0.0; n])
+        })
+        .collect()
+}
+
+fn prox(directions: usize, law: &dyn Prox, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+    let resolve = |y: &[f64], penalty: f64| {
+        let (mut force, mut slope) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS * MOST_DIRECTIONS]);
+        law.resolve(y, penalty, &mut force[..directions], &mut slope[..directions * directions]);
+        force
+    };
+    let mut force = [0.0; MOST_DIRECTIONS];
+    let mut before = motion(times[0]).0;
+    let mut last = times[0];
+    times
+        .iter()
+        .map(|&time| {
+            let (u, v) = motion(time);
+            if law.compliance() > 0.0 && time > last {
+                // f = f₀ + k (way - h s'), f = φ(s'): with the penalty k h that is one resolvent
+                let stiffness = 1.0 / law.compliance();
+                let y: Vec<f64> = (0..directions).map(|a| force[a] + stiffness * (u[a] - before[a])).collect();
+                force = resolve(&y, stiffness * (time - last));
+            } else if law.compliance() == 0.0 {
+                // λ = J(λ + ε v): the larger the penalty, the faster this settles
+                let penalty = 1e6 + 1e3 * law.least_penalty();
+                for _ in 0..100 {
+                    let y: Vec<f64> = (0..directions).map(|a| force[a] + penalty * v[a]).collect();
+                    force = resolve(&y, penalty);
+                }
+            }
+            (before, last) = (u, time);
+            force
+        })
+        .collect()
+}
+
+/// Energy lost between the samples, `∫ f · du` by the trapezoidal rule, J.
+pub fn lost(motion: Motion<'_>, times: &[f64], forces: &[[f64; MOST_DIRECTIONS]]) -> f64 {
+    let places: Vec<_> = times.iter().map(|&time| motion(time).0).collect();
+    let each = |k: usize| -> f64 {
+        let along = |a: usize| 0.5 * (forces[k][a] + forces[k + 1][a]) * (places[k + 1][a] - places[k][a]);
+        (0..MOST_DIRECTIONS).map(along).sum()
+    };
+    (0..times.len() - 1).map(each).sum()
+}
+
+/// A closed motion along all directions, of three or four harmonics, half of them with even ones; period 1 s over `speed`. It begins at zero.
+pub fn random_motion(seed: u64, directions: usize, speed: f64) -> impl Fn(f64) -> Instant {
+    let mut random = Random::new(seed);
+    let harmonics: &[f64] = if seed.is_multiple_of(2) { &[1.0, 3.0, 5.0] } else { &[1.0, 2.0, 3.0, 4.0] };
+    let mut terms = Vec::new();
+    for direction in 0..directions {
+        for &harmonic in harmonics {
+            terms.push((direction, harmonic, random.between(1e-4, 1e-3) / harmonic, random.between(0.0, TAU)));
+        }
+    }
+    move |time| {
+        let (mut u, mut v) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS]);
+        for &(direction, harmonic, amplitude, phase) in &terms {
+            let omega = TAU * harmonic * speed;
+            u[direction] += amplitude * ((omega * time + phase).sin() - phase.sin());
+            v[direction] += amplitude * omega * (omega * time + phase).cos();
+        }
+        (u, v)
+    }
+}
+
+/// So many equal steps over so many periods of length `period`, with both ends.
+pub fn steps(period: f64, periods: usize, count: usize) -> Vec<f64> {
+    (0..=periods * count).map(|k| period * k as f64 / count as f64).collect()
+}

@@ -1,0 +1,402 @@
+//! Laws alone under given motions, through their views, against closed forms.
+
+use num_complex::Complex64;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+use stickslip::law::{
+    BoucWen, Cubic, Dahl, FrictionContact, Gap, Iwan, Jenkins, Jenkins2d, Law, LawInfo, LuGre, Piece, Stribeck, Valanis,
+};
+use stickslip_verification::replay::{Instant, View, forces, lost, steps};
+use stickslip_verification::{close, integral, near};
+
+/// A motion through points, straight and at constant speed between them, a second from one to the next.
+fn through(points: Vec<[f64; 3]>) -> impl Fn(f64) -> Instant {
+    move |time| {
+        // a corner belongs to what comes before it
+        let k = ((time.ceil() as usize).max(1) - 1).min(points.len() - 2);
+        let share = time - k as f64;
+        let way = [0, 1, 2].map(|a| points[k + 1][a] - points[k][a]);
+        ([0, 1, 2].map(|a| points[k][a] + way[a] * share), way)
+    }
+}
+
+/// Along one direction.
+fn along(places: &[f64]) -> impl Fn(f64) -> Instant + use<> {
+    through(places.iter().map(|&u| [u, 0.0, 0.0]).collect())
+}
+
+/// Samples between two points, a power of two: times are then exact.
+const FINE: usize = 1 << 14;
+
+/// Force along the first direction at the samples of a motion through places.
+fn first(law: &dyn Law, view: View, places: &[f64], samples: usize) -> Vec<f64> {
+    let times = steps(1.0, places.len() - 1, samples);
+    forces(law, view, &along(places), &times).iter().map(|force| force[0]).collect()
+}
+
+/// Energy lost over the last two of the ways.
+fn loop_loss(law: &dyn Law, view: View, places: &[f64], samples: usize) -> f64 {
+    let times = steps(1.0, places.len() - 1, samples);
+    let found = forces(law, view, &along(places), &times);
+    let from = times.len() - 1 - 2 * samples;
+    lost(&along(places), &times[from..], &found[from..])
+}
+
+/// From zero, three times to and fro.
+fn cycles(a: f64) -> [f64; 8] {
+    [0.0, a, -a, a, -a, a, -a, a]
+}
+
+#[test]
+fn jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form() {
+    // kt a, kt, loss, stiffness, damping for a slip limit of 1
+    for (stiffness, a, loss, keq, ceq) in [
+        (1.0, 1.25, 1.0, 0.857_622, 0.203_718),
+        (1.0, 2.00, 4.0, 0.5, 0.318_310),
+        (1.0, 2.75, 7.0, 0.328_553, 0.294_634),
+        (5.0, 1.25, 4.2, 0.516_377, 0.855_617),
+        (5.0, 2.00, 7.2, 0.260_220, 0.572_958),
+        (5.0, 2.75, 10.2, 0.162_800, 0.429_324),
+    ] {
+        let law = Jenkins { stiffness, limit: 1.0 };
+        // with the places where slip begins as corners
+        let slip = a - 2.0 / stiffness;
+        let places = [0.0, a, slip, -a, -slip, a];
+        let times = steps(1.0, 5, 1);
+        let found = forces(&law, View::Pieces, &along(&places), &times);
+        near("loss", lost(&along(&places), &times[1..], &found[1..]), loss, 1e-12);
+        let linear = law.linearised(a, 3.0);
+        near("stiffness", linear.re, keq, 5e-7);
+        near("damping", linear.im, ceq, 5e-7);
+    }
+}
+
+#[test]
+fn circular_motion_slips_all_the_time() {
+    let (stiffness, limit, a) = (3.0, 1.0, 0.8);
+    let law = Jenkins2d { stiffness, limit };
+    let motion = |time: f64| {
+        let (sin, cos) = (TAU * time).sin_cos();
+        ([a * cos, a * sin, 0.0], [-a * TAU * sin, a * TAU * cos, 0.0])
+    };
+    const COUNT: usize = 8192;
+    let times = steps(1.0, 5, COUNT);
+    let found = forces(&law, View::Step, &motion, &times);
+    let (last, from) = (&times[4 * COUNT..], &found[4 * COUNT..]);
+    let d = limit / stiffness;
+    close("loss", lost(&motion, last, from), TAU * limit * (a * a - d * d).sqrt(), 1e-6);
+    let mut sum = Complex64::new(0.0, 0.0);
+    for (time, force) in last[1..].iter().zip(&from[1..]) {
+        sum += Complex64::cis(-TAU * time) * force[0];
+    }
+    let stiffness = sum * (2.0 / (COUNT as f64 * a));
+    near("stiffness", stiffness.re, 0.520_833_3, 1e-6);
+    near("damping", stiffness.im, 1.136_324_2, 1e-6);
+}
+
+#[test]
+fn a_normal_load_in_phase_makes_a_polygon() {
+    let (mu, preload, kt, nu, a) = (0.4, 10.0, 20.0, 6.0, 1.0);
+    for tangents in [1, 2] {
+        let law = FrictionContact { tangential: kt, normal: nu, friction: mu, preload, tangents };
+        let (u1, u2) = (0.428_571_428_571_428_6, -0.818_181_818_181_818_2);
+        near("u1", ((kt - mu * nu) * a - 2.0 * mu * preload) / (kt + mu * nu), u1, 1e-12);
+        near("u2", (2.0 * mu * preload - (kt + mu * nu) * a) / (kt - mu * nu), u2, 1e-12);
+        // the normal moves with the tangent, and the places where slip begins are corners
+        let points = |u: f64| if tangents == 1 { [u, u, 0.0] } else { [u, 0.0, u] };
+        let motion = through([0.0, a, u1, -a, u2, a, u1, -a, u2, a].map(points).to_vec());
+        for samples in [1, 8] {
+            let times = steps(1.0, 9, samples);
+            let found = forces(&law, View::Step, &motion, &times);
+            let at = |corner: usize| found[corner * samples][0];
+            near("at a", at(9), mu * (preload + nu * a), 1e-12);
+            near("slip back begins", at(6), -mu * (preload + nu * u1), 1e-12);
+            near("at -a", at(7), -mu * (preload - nu * a), 1e-12);
+            near("slip forward begins", at(8), mu * (preload + nu * u2), 1e-12);
+            let tangential: Vec<_> = found[5 * samples..].iter().map(|force| [force[0], 0.0, 0.0]).collect();
+            near("loss", lost(&motion, &times[5 * samples..], &tangential), 12.051_948_051_948_05, 1e-7);
+            near("normal", found[9 * samples][tangents], preload + nu * a, 1e-12);
+        }
+    }
+}
+
+#[test]
+fn iwan_has_segalmans_backbone_and_loss() {
+    let law = |elements: u32| Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements };
+    let far = law(1).slips_at();
+    close("phi_max", far, 1.3 / (10.0 * (0.3 + 0.5 / 1.5)), 1e-14);
+    let u = 0.4 * far;
+    for elements in [32, 62, 250, 1000] {
+        let loss = loop_loss(&law(elements), View::Pieces, &cycles(u), FINE);
+        close("loss", loss, 0.017_491_512_6, 0.024 * 32.0 / f64::from(elements)); // as the law promises
+    }
+    // first loading: R u^(χ+2) / (χ+2) + u (R (φ^(χ+1) - u^(χ+1)) / (χ+1) + S)
+    let d = 0.3 + 0.5 / 1.5;
+    let (r, s) = (0.5 / (far.powf(1.5) * d), 1.0 / far * 0.3 / d);
+    for share in [0.05, 0.4, 0.9, 1.0] {
+        let u = share * far;
+        let expected = r * u.powf(1.5) / 1.5 + u * (r * (far.sqrt() - u.sqrt()) / 0.5 + s);
+        let force = first(&law(1000), View::Pieces, &[0.0, u], 1);
+        close("backbone", force[1], expected, 5e-4);
+    }
+    near("all slips", first(&law(1000), View::Pieces, &[0.0, 2.0 * far], 1)[1], 1.0, 1e-12);
+    close("at rest", law(1000).linearised(1e-12, 1.0).re, 10.0, 1e-12);
+}
+
+#[test]
+fn dahls_loop_is_a_hyperbolic_tangent() {
+    let law = Dahl { stiffness: 5.0, limit: 1.0 };
+    let places = cycles(0.7);
+    near("largest force", *first(&law, View::Rate, &places, FINE).last().unwrap(), 0.998_177_897_6, 1e-10);
+    close("loss", loop_loss(&law, View::Rate, &places, FINE), 2.001_457_681_9, 1e-8);
+}
+
+#[test]
+fn bouc_wen_and_lugre_contain_dahl() {
+    let dahl = Dahl { stiffness: 5.0, limit: 2.0 };
+    let bouc_wen = BoucWen { stiffness: 5.0, beta: 2.5, gamma: 0.0, exponent: 1.0 };
+    let lugre = LuGre { stiffness: 5.0, damping: 0.0, viscous: 0.0, limit: 2.0, static_limit: 2.0, velocity: 0.3 };
+    let places = [0.0, 0.7, -0.2, 0.4, -1.5, 0.1];
+    let reference = first(&dahl, View::Rate, &places, 256);
+    for law in [&bouc_wen as &dyn Law, &lugre] {
+        for (found, expected) in first(law, View::Rate, &places, 256).iter().zip(&reference) {
+            near(law.name(), *found, *expected, 1e-12);
+        }
+    }
+    near("bound", bouc_wen.scale(), 2.0, 1e-14);
+}
+
+/// A long way to one side ends at the bound whatever gamma and the exponent are; without `beta + gamma > 0` there is none, and the law is refused.
+#[test]
+fn bouc_wen_is_bounded_if_beta_and_gamma_are_positive_together() {
+    for (beta, gamma, exponent) in [(1.0, 0.5, 1.0), (1.0, -0.6, 2.0), (0.5, 3.0, 1.5), (2.0, 0.0, 6.0)] {
+        let law = BoucWen { stiffness: 3.0, beta, gamma, exponent };
+        let bound = 3.0 * (beta + gamma).powf(-1.0 / exponent);
+        let force = first(&law, View::Rate, &[0.0, 40.0, -40.0], FINE);
+        near("forward", force[FINE], bound, 1e-9);
+        near("backward", force[2 * FINE], -bound, 1e-9);
+        assert!(force.iter().all(|force| force.abs() <= bound * (1.0 + 1e-6)));
+    }
+    for gamma in [-1.0, -2.0] {
+        let law = BoucWen { stiffness: 3.0, beta: 1.0, gamma, exponent: 1.0 };
+        let law: &dyn Law = &law;
+        assert!(law.check().unwrap_err().to_string().contains("`beta + gamma`"));
+    }
+}
+
+#[test]
+fn lugre_slides_steadily_with_its_curve_and_holds_like_a_spring() {
+    let law = LuGre { stiffness: 1e4, damping: 30.0, viscous: 0.4, limit: 2.0, static_limit: 2.5, velocity: 0.01 };
+    for v in [-0.5, 0.005, 0.02, 1.0] {
+        // a second at this velocity
+        let force = *first(&law, View::Rate, &[0.0, v], FINE).last().unwrap();
+        let share: f64 = v / 0.01;
+        near("sliding", force, (2.0 + 0.5 * (-share * share).exp()).copysign(v) + 0.4 * v, 1e-6);
+    }
+    // so slow that dampers carry nothing, so short that bristles do not slip
+    let force = *first(&law, View::Rate, &[0.0, 1e-9], 64).last().unwrap();
+    close("stiction", force, 1e4 * 1e-9, 0.01);
+}
+
+/// Parallel sliders with a given force of first loading: straight between its corners.
+#[derive(Debug)]
+struct Graded(Vec<Piece>);
+
+static GRADED: LawInfo = LawInfo {
+    name: "graded",
+    summary: "sliders whose force of first loading is a polygon",
+    parameters: &[],
+    sample: &[],
+    build: |_| Arc::new(Graded(Vec::new())),
+};
+
+impl Law for Graded {
+    fn info(&self) -> &'static LawInfo {
+        &GRADED
+    }
+    fn values(&self) -> Vec<f64> {
+        Vec::new()
+    }
+    fn pieces(&self) -> Option<Vec<Piece>> {
+        Some(self.0.clone())
+    }
+}
+
+impl Graded {
+    /// Corners at these displacements; beyond the last one all slips.
+    fn new(corners: &[f64], backbone: impl Fn(f64) -> f64) -> Self {
+        let mut edges = vec![0.0];
+        edges.extend(corners);
+        let mut slopes: Vec<f64> =
+            edges.windows(2).map(|pair| (backbone(pair[1]) - backbone(pair[0])) / (pair[1] - pair[0])).collect();
+        slopes.push(0.0);
+        // a slider that gives way at a corner takes the change of slope there
+        let piece = |k: usize| Piece::slider(Some(slopes[k] - slopes[k + 1]), (slopes[k] - slopes[k + 1]) * corners[k]);
+        Graded((0..corners.len()).map(piece).collect())
+    }
+}
+
+/// An elastic bar on rigid-plastic shear: Goodman and Klumpp's micro-slip in its limit of many sliders.
+#[test]
+fn micro_slip_of_a_bar_loses_with_the_cube_of_the_force() {
+    let (ea, tau, length) = (7.0, 0.4, 2.0);
+    let far = tau * length * length / (2.0 * ea);
+    let corners: Vec<f64> = (1..=1000).map(|k| far * (f64::from(k) / 1000.0).powi(2)).collect();
+    let law = Graded::new(&corners, |u| (2.0 * ea * tau * u).sqrt());
+    for share in [0.2, 0.64, 1.0] {
+        let u = share * far;
+        let force = (2.0 * ea * tau * u).sqrt();
+        let loss = loop_loss(&law, View::Pieces, &cycles(u), FINE);
+        close("by force and displacement", loss, 4.0 / 3.0 * force * u, 1e-4);
+        close("by force", loss, 2.0 / 3.0 * force.powi(3) / (ea * tau), 1e-4);
+    }
+    near("all slips", first(&law, View::Pieces, &[0.0, 2.0 * far], 1)[1], tau * length, 1e-12);
+}
+
+#[test]
+fn spheres_of_cattaneo_and_mindlin() {
+    let (limit, far) = (1.3, 0.02);
+    let backbone = |u: f64| limit * (1.0 - (1.0 - (u / far).min(1.0)).powf(1.5));
+    let corners: Vec<f64> = (1..=1000).map(|k| far * f64::from(k) / 1000.0).collect();
+    let law = Graded::new(&corners, backbone);
+    for share in [0.3, 0.7, 1.0] {
+        let u = share * far;
+        let rest: f64 = 1.0 - share;
+        let expected =
+            8.0 * limit * (u - 0.4 * far * (1.0 - rest.powf(2.5))) - 4.0 * u * limit * (1.0 - rest.powf(1.5));
+        close("loss", loop_loss(&law, View::Pieces, &cycles(u), FINE), expected, 1e-4);
+    }
+}
+
+/// Masing's rule: after a turning point the force is the first loading at twice the scale, and the loss follows from the first loading alone.
+#[test]
+fn sliders_obey_masings_rule() {
+    let iwan = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.3, beta: 0.2, elements: 12 };
+    let jenkins = Jenkins { stiffness: 10.0, limit: 1.0 };
+    for law in [&iwan as &dyn Law, &jenkins] {
+        let u = 0.13;
+        let backbone = first(law, View::Pieces, &[0.0, u], FINE);
+        let loop_force = first(law, View::Pieces, &[0.0, u, -u], FINE);
+        for k in (0..=FINE).step_by(512) {
+            // u - u_r over two goes from nothing to u
+            near(law.name(), loop_force[FINE + k], backbone[FINE] - 2.0 * backbone[k], 1e-12);
+        }
+        let under: f64 = backbone.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]) * u / FINE as f64).sum();
+        let expected = 8.0 * under - 4.0 * u * backbone[FINE];
+        close(law.name(), loop_loss(law, View::Pieces, &cycles(u), FINE), expected, 1e-6);
+    }
+}
+
+/// Along straight ways a step of any length is exact: the same forces at the corners, whatever lies between them.
+#[test]
+fn steps_do_not_depend_on_their_length() {
+    let plane = Jenkins2d { stiffness: 3.0, limit: 1.0 };
+    let contact = |tangents| FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.6, preload: 0.5, tangents };
+    let points: Vec<[f64; 3]> = (0..40)
+        .map(|k| {
+            let t = f64::from(k);
+            [0.8 * (1.1 * t).sin(), 0.7 * (1.7 * t).cos() - 0.7, 0.9 * (2.3 * t).sin()]
+        })
+        .collect();
+    for law in [&plane as &dyn Law, &contact(1), &contact(2)] {
+        let run = |samples: usize| forces(law, View::Step, &through(points.clone()), &steps(1.0, 39, samples));
+        let (long, short) = (run(1), run(64));
+        for (k, force) in long.iter().enumerate() {
+            for a in 0..3 {
+                near(law.name(), force[a], short[64 * k][a], 1e-11);
+            }
+        }
+    }
+}
+
+/// A contact that opens and closes under harmonic motion, in the plane: the error of its steps is of second order.
+#[test]
+fn separation_costs_no_order_of_accuracy() {
+    let law = FrictionContact { tangential: 20.0, normal: 15.0, friction: 0.4, preload: 2.0, tangents: 2 };
+    let motion = |time: f64| {
+        let theta = TAU * time;
+        let u = [0.5 * theta.cos(), 0.4 * (theta + 1.0).sin(), 0.3 * (theta - 0.4).cos()];
+        (u, [0.0; 3])
+    };
+    let run = |count: usize| {
+        let times = steps(1.0, 3, count);
+        let found = forces(&law, View::Step, &motion, &times);
+        let open = found[2 * count..].iter().filter(|force| force[2] == 0.0).count();
+        assert!(open > count / 4 && open < count * 3 / 4, "it is apart for {open} of {count} samples");
+        lost(&motion, &times[2 * count..], &found[2 * count..])
+    };
+    let reference = run(1 << 17);
+    let errors = [512, 2048, 8192].map(|count| (run(count) / reference - 1.0).abs());
+    assert!(errors[1] < errors[0] / 10.0 && errors[2] < errors[1] / 10.0, "of second order: {errors:?}");
+}
+
+/// Below full slip the mean force of Iwan's model tells its history; amplitude and loss do not.
+#[test]
+fn iwan_remembers_in_its_mean_alone() {
+    let law = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements: 64 };
+    let (a, far) = (0.4 * law.slips_at(), law.slips_at());
+    let measured = [vec![0.0], vec![0.0, 0.9 * far], vec![0.0, -0.7 * far, 0.5 * far]].map(|mut places| {
+        places.extend([a, -a, a, -a, a, -a, a]);
+        let force = first(&law, View::Pieces, &places, 64);
+        let (up, down) = (force[force.len() - 1], force[force.len() - 1 - 64]);
+        (0.5 * (up + down), 0.5 * (up - down), loop_loss(&law, View::Pieces, &places, FINE))
+    });
+    near("the untouched joint", measured[0].0, 0.0, 1e-14);
+    for (mean, amplitude, loss) in &measured[1..] {
+        assert!(mean.abs() > 1e-3, "{mean}");
+        near("amplitude", *amplitude, measured[0].1, 1e-12);
+        near("loss", *loss, measured[0].2, 1e-7);
+    }
+}
+
+/// Between turning points `du = dy (1 - kappa y) / (lambda ((1 - y) - (Et/E0) (1 - kappa y)))`, whose integral is a logarithm.
+#[test]
+fn valanis_turns_along_a_logarithm() {
+    let law = Valanis { stiffness: 10.0, slip_stiffness: 2.0, lambda: 3.0, kappa: 0.7 };
+    let (ratio, kappa, lambda) = (0.2, 0.7, 3.0);
+    // (1 - κ y) / (A - B y)
+    let (a, b) = (1.0 - ratio, 1.0 - ratio * kappa);
+    let place = |y: f64| (kappa / b * y - (1.0 - kappa * a / b) / b * (1.0 - b / a * y).ln()) / lambda;
+    for y in [0.1, 0.5, 0.85] {
+        let u = place(y);
+        let force = first(&law, View::Rate, &[0.0, u], 1024)[1024];
+        near("first loading", force, 2.0 * u + 10.0 / 3.0 * y, 1e-9);
+        // back by as much as from -y to y: the same curve turned around
+        let way = place(y) - place(-y);
+        let back = first(&law, View::Rate, &[0.0, u, u - way], 1024)[2048];
+        near("turned", back, 2.0 * (u - way) - 10.0 / 3.0 * y, 1e-9);
+    }
+    let far = first(&law, View::Rate, &[0.0, 30.0], FINE)[FINE];
+    near("slip", far, 2.0 * 30.0 + law.scale(), 1e-9);
+}
+
+#[test]
+fn springs_of_any_shape_lose_nothing() {
+    let cubic = Cubic { stiffness: 3.0 };
+    let gap = Gap { gap: 0.2, stiffness: 5.0 };
+    for law in [&cubic as &dyn Law, &gap] {
+        let loss = loop_loss(law, View::Rate, &cycles(0.8), FINE);
+        near(law.name(), loss, 0.0, 1e-12);
+    }
+    near("cubic", first(&cubic, View::Rate, &[0.0, 0.5], 1)[1], 0.375, 1e-15);
+    // closed while cos θ > gap / a: (k/π) (θ - sin θ cos θ)
+    let closed = (0.2f64 / 0.8).acos();
+    let expected = 5.0 / PI * (closed - closed.sin() * closed.cos());
+    close("gap", gap.linearised(0.8, 1.0).re, expected, 1e-14);
+}
+
+#[test]
+fn stribecks_describing_function_is_a_mean_of_its_curve() {
+    let law = Stribeck { limit: 2.0, static_limit: 2.5, velocity: 0.01 };
+    for (a, omega) in [(1e-4, 30.0), (1e-3, 10.0), (1e-3, 100.0)] {
+        // (4 / (π a)) ∫₀^{π/2} g(a Ω sin θ) sin θ dθ
+        let friction = |theta: f64| {
+            let share: f64 = a * omega * theta.sin() / 0.01;
+            (2.0 + 0.5 * (-share * share).exp()) * theta.sin()
+        };
+        let expected = 4.0 / (PI * a) * integral(friction, PI / 2.0, &[]);
+        let found = law.linearised(a, omega);
+        close("damping", found.im, expected, 1e-3);
+        near("stiffness", found.re, 0.0, 1e-3 * expected);
+    }
+}
