@@ -96,7 +96,8 @@ mod tests {
     fn solutions_come_back() {
         let mut lu = Lu::default();
         for n in [0, 1, 2, 5, 23, 4] {
-            let entry = |i: usize, k: usize| if i == k && n > 1 { 0.0 } else { ((i * 7919 + k * 104_729 + 1) as f64).sin() };
+            let entry =
+                |i: usize, k: usize| if i == k && n > 1 { 0.0 } else { ((i * 7919 + k * 104_729 + 1) as f64).sin() };
             let matrix = lu.zeros(n);
             (0..n * n).for_each(|at| matrix[at] = entry(at / n, at % n));
             assert!(lu.factorise());

@@ -440,7 +440,8 @@ pub fn markdown() -> String {
     book.push_str("\n## Templates\n\n");
     for row in templates::TABLE {
         let parameters = row.parameters();
-        let keys: Vec<_> = parameters.iter().map(|p| (p.key.as_str(), described(p.dimension), p.doc.as_str())).collect();
+        let keys: Vec<_> =
+            parameters.iter().map(|p| (p.key.as_str(), described(p.dimension), p.doc.as_str())).collect();
         named(&mut book, row.name, row.summary(), &keys);
     }
     book

@@ -203,8 +203,7 @@ impl Contact {
                 let mut point = RatePoint::new(directions, s);
                 for _ in 0..ITERATIONS {
                     rate.linearise(directions, &motion, &z, &mut point);
-                    let residual =
-                        DVector::from_fn(s, |i, _| z[i] - self.z[i] - 0.5 * h * (point.rate[i] + first[i]));
+                    let residual = DVector::from_fn(s, |i, _| z[i] - self.z[i] - 0.5 * h * (point.rate[i] + first[i]));
                     let jacobian = DMatrix::from_fn(s, s, |i, l| {
                         f64::from(u8::from(i == l)) - 0.5 * h * point.rate_slope(i)[2 * directions + l]
                     });

@@ -80,8 +80,11 @@ fn theory_9_energies_of_the_smooth_law() {
     for (name, ft, hertz) in POINTS {
         let law = |limit| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha: 25e3 }) };
         let system = template_with(name, &[("Ft", ft)], law);
-        let orbit =
-            Shooting { tolerance: 1e-10, width: None, ..Shooting::default() }.solver(&system).unwrap().orbit(TAU * hertz, None).unwrap();
+        let orbit = Shooting { tolerance: 1e-10, width: None, ..Shooting::default() }
+            .solver(&system)
+            .unwrap()
+            .orbit(TAU * hertz, None)
+            .unwrap();
         let what = format!("{name}, {ft} N, {hertz} Hz");
         let last = orbit.places.len() - 1;
         assert!(orbit.evidence.energy_gap < 1e-9, "{what}: {:?}", orbit.evidence);

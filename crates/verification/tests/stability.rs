@@ -150,7 +150,8 @@ fn theorem_against_multipliers() {
         let system = random_system(seed, smooth);
         assert!(system.contracts());
         let omega = Random::new(seed + 1000).between(0.3, 2.5);
-        let exact: &dyn Method = if smooth { &Shooting { tolerance: 1e-8, width: None, ..Shooting::default() } } else { &EventDriven };
+        let exact: &dyn Method =
+            if smooth { &Shooting { tolerance: 1e-8, width: None, ..Shooting::default() } } else { &EventDriven };
         let Ok(orbit) = find(exact, &system, omega) else { continue };
         assert_eq!(orbit.is_stable(), Some(true));
         let computed = orbit.multipliers().unwrap()[0].norm();

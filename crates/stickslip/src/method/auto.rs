@@ -1,8 +1,8 @@
 //! Picks a method: event-driven for exact laws, shooting for smooth ones, harmonic balance for many joints.
 
+use super::event_driven::takes;
 use super::harmonic_balance::HarmonicBalance;
 use super::{Choice, Method, MethodError, MethodInfo, Solver, event_driven::EventDriven, shooting::Shooting};
-use super::event_driven::takes;
 use crate::model::System;
 
 /// The row of this method in [`super::TABLE`].

@@ -1,9 +1,9 @@
 //! The motion between switches as one of the flows.
 
+use super::Breakdown;
 use super::drive::Drive;
 use super::event_driven::{ExactPath, Flow as Segments, Mechanics, weights};
 use super::flow::Flow;
-use super::Breakdown;
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;

@@ -317,7 +317,11 @@ mod tests {
         let estimate = orbit.evidence.truncation.unwrap();
         assert!(estimate <= 1e-5, "{estimate}");
         for (place, x) in orbit.places.iter().zip(x.iter()) {
-            assert!((place.first_harmonic - x).norm() < 3.0 * estimate * x.norm(), "{} {x} {estimate}", place.first_harmonic);
+            assert!(
+                (place.first_harmonic - x).norm() < 3.0 * estimate * x.norm(),
+                "{} {x} {estimate}",
+                place.first_harmonic
+            );
         }
     }
 

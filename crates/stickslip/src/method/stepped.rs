@@ -92,9 +92,8 @@ impl SteppedPath {
 
     /// Value, slope and curvature of a degree of freedom at both ends of a step.
     fn ends(&self, step: usize, row: usize) -> [[f64; 3]; 2] {
-        let end = |instant: &Instant| {
-            [instant.state[row], instant.state[self.assembly.n + row], instant.acceleration[row]]
-        };
+        let end =
+            |instant: &Instant| [instant.state[row], instant.state[self.assembly.n + row], instant.acceleration[row]];
         [end(&self.steps.instants[step]), end(&self.steps.instants[step + 1])]
     }
 
@@ -154,8 +153,7 @@ impl SteppedPath {
         let sample = |(q, joint): (usize, &super::assembly::PlacedLaw)| {
             let mut motion = Relative::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
-                (motion.displacement[d], motion.velocity[d]) =
-                    self.assembly.relative(axis, state, &self.drive, time);
+                (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
             }
             let mut force = [0.0; crate::law::MOST_DIRECTIONS];
             let smooth = joint.law.rate().filter(|_| joint.states == 0 && count > 1);

@@ -391,8 +391,7 @@ impl Decision {
             let size = self.size(mechanics, drive, order);
             undecided.retain(|&(i, sign)| {
                 let part = &mechanics.parts[i];
-                let slope = part.direction.dot(&self.derivatives[order as usize])
-                    + drive.imposed_at(i, time, order);
+                let slope = part.direction.dot(&self.derivatives[order as usize]) + drive.imposed_at(i, time, order);
                 if slope.abs() <= BALANCED * size {
                     return true;
                 }

@@ -475,3 +475,88 @@ fn add(sum: &mut [Complex64], signal: &[Complex64], factor: f64) {
 fn begin(value: f64, zero: f64) -> Begin {
     if value > zero { Begin::Positive } else { Begin::Zero }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Coulomb, Gap, Jenkins, SharedLaw, Stribeck};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
+    use std::sync::Arc;
+
+    /// Two masses with a law each to the ground and one between them, driven by the first and third harmonic.
+    fn flow(laws: [SharedLaw; 3]) -> Flow {
+        let between = [["a", GROUND], ["b", GROUND], ["a", "b"]].map(|pair| pair.map(str::to_owned));
+        let joints = between.iter().zip(laws).enumerate();
+        let model = Model {
+            masses: vec![Mass::new("a", 1.0), Mass::new("b", 1.3)],
+            springs: between
+                .iter()
+                .map(|between| Spring { between: between.clone(), stiffness: 0.9, damping: 0.05 })
+                .collect(),
+            joints: joints
+                .map(|(i, (between, law))| Joint { name: format!("j{i}"), between: between.clone(), law })
+                .collect(),
+            forces: [(1, 1.2), (3, 0.4)]
+                .map(|(harmonic, amplitude)| Force { on: "a".into(), amplitude, phase: 0.2, harmonic })
+                .to_vec(),
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let mechanics = Mechanics::new(&system).unwrap();
+        let drive = Drive::new(&system, &mechanics.owners(), 0.7);
+        let mut flow = Flow::new(mechanics, Drive::default());
+        flow.set_drive(drive);
+        flow
+    }
+
+    /// The derivative of the motion through stops that open and close and through sliders that drop their force, behind held ones, springs and
+    /// stops, is what a small change of the start does to the end.
+    #[test]
+    fn sensitivities_pass_stops_and_drops() {
+        let stop: SharedLaw = Arc::new(Gap { gap: 0.1, stiffness: 3.0 });
+        let pressed: SharedLaw = Arc::new(Gap { gap: -0.2, stiffness: 1.5 });
+        let dropping: SharedLaw = Arc::new(Stribeck { limit: 0.3, static_limit: 0.5, velocity: 0.0 });
+        let weak: SharedLaw = Arc::new(Stribeck { limit: 0.1, static_limit: 0.2, velocity: 0.0 });
+        let spring: SharedLaw = Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 });
+        let rigid: SharedLaw = Arc::new(Coulomb { limit: 0.15 });
+        let cases = [
+            [stop.clone(), pressed.clone(), spring.clone()],
+            [dropping.clone(), stop.clone(), spring.clone()],
+            [dropping.clone(), weak.clone(), stop.clone()],
+            [dropping.clone(), rigid.clone(), weak.clone()],
+            [rigid, dropping, pressed],
+        ];
+        let mut drops = 0;
+        for (case, laws) in cases.into_iter().enumerate() {
+            let mut flow = flow(laws);
+            let states = flow.mechanics.states();
+            for duration in [5.0, 9.0, 14.0] {
+                let start: Vec<f64> = (0..states).map(|i| [0.5, -0.3, 0.4, -0.6, 0.05][i]).collect();
+                let mut derivative = DMatrix::identity(states, states);
+                flow.run(&mut start.clone(), 0.0, duration, Some(&mut derivative)).unwrap();
+                for pair in flow.segments().windows(2) {
+                    let let_go = |s: &usize| pair[0].contacts[*s] == Contact::Stick && pair[1].contacts[*s].slips();
+                    drops += (0..flow.mechanics.parts.len())
+                        .filter(|s| flow.mechanics.parts[*s].drops() && let_go(s))
+                        .count();
+                }
+                let step = 1e-6;
+                for column in 0..states {
+                    let mut ends = [start.clone(), start.clone()];
+                    ends[0][column] += step;
+                    ends[1][column] -= step;
+                    for end in &mut ends {
+                        flow.run(end, 0.0, duration, None).unwrap();
+                    }
+                    for row in 0..states {
+                        let slope = (ends[0][row] - ends[1][row]) / (2.0 * step);
+                        let exact = derivative[(row, column)];
+                        let what = format!("case {case}, {duration} s, {row} by {column}: {exact} and {slope}");
+                        assert!((slope - exact).abs() < 1e-6 * (1.0 + exact.abs()), "{what}");
+                    }
+                }
+            }
+        }
+        assert!(drops > 5, "{drops} drops");
+    }
+}

@@ -136,12 +136,7 @@ impl ReturnMap for Exact<'_> {
 impl<'a> Exact<'a> {
     /// # Errors
     /// See [`Mechanics::new`].
-    pub fn new(
-        system: &'a System,
-        name: &'static str,
-        search: Search,
-        periods: usize,
-    ) -> Result<Self, MethodError> {
+    pub fn new(system: &'a System, name: &'static str, search: Search, periods: usize) -> Result<Self, MethodError> {
         let mechanics = Mechanics::new(system)?;
         let weights = vec![1.0; mechanics.states()];
         let flow = Flow::new(mechanics, Drive::default());

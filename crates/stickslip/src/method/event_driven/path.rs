@@ -204,10 +204,8 @@ impl ExactPath {
                         slipping += piece.segment.length;
                     }
                     if let Some(before) = before {
-                        switches += parts
-                            .iter()
-                            .filter(|&&s| before.segment.contacts[s] != piece.segment.contacts[s])
-                            .count();
+                        switches +=
+                            parts.iter().filter(|&&s| before.segment.contacts[s] != piece.segment.contacts[s]).count();
                     }
                     before = Some(piece);
                 }

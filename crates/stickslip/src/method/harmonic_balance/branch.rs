@@ -2,9 +2,9 @@
 
 use super::equations::{Level, Motion, transfer};
 use super::joints::Coordinate;
-use crate::method::evidence::Judge;
 use super::rest::Rest;
 use super::{Compared, HarmonicBalance, Kept, LARGEST, TOLERANCE, estimate, path};
+use crate::method::evidence::Judge;
 use crate::method::guess::Guess;
 use crate::method::{MethodError, OrbitError};
 use crate::model::System;

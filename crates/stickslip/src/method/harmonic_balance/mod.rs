@@ -23,8 +23,8 @@ mod sparse;
 
 use super::guess::Guess;
 use super::{Method, MethodError, MethodInfo, MethodOption, Options, OrbitError, Solver};
-use crate::method::evidence::Judge;
 use crate::dimension::Dimension;
+use crate::method::evidence::Judge;
 use crate::model::System;
 use crate::orbit::Orbit;
 pub(crate) use arc::ModeArc;

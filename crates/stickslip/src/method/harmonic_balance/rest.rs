@@ -49,7 +49,8 @@ struct Modal {
 impl Rest {
     pub fn new(system: &System, coordinates: &[Coordinate]) -> Self {
         let n = system.dofs();
-        let direction = DMatrix::from_fn(n, coordinates.len(), |i, q| system.joints()[coordinates[q].joint].axes()[0].dense(n)[i]);
+        let direction =
+            DMatrix::from_fn(n, coordinates.len(), |i, q| system.joints()[coordinates[q].joint].axes()[0].dense(n)[i]);
         Rest {
             n,
             // where the banded form takes over, the modes are not needed

@@ -51,9 +51,9 @@ impl IncrementalFlow {
             let chosen = regular.unwrap_or_else(|| joint.clone());
             match law::states(&chosen) {
                 Some((states, scale)) => Ok((chosen, states, scale)),
-                None if joint.pieces().is_some() => {
-                    Err("a law with a spring before its slider, or give the method a `width` (m/s), beside laws that are not exact")
-                }
+                None if joint.pieces().is_some() => Err(
+                    "a law with a spring before its slider, or give the method a `width` (m/s), beside laws that are not exact",
+                ),
                 None => Err("a law with a step or rate view"),
             }
         })?;

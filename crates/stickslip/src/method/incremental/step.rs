@@ -200,7 +200,13 @@ impl Step {
     }
 
     /// Residual and its derivative at the present unknowns, from the velocities `v` at the start.
-    fn evaluate(&mut self, assembly: &Assembly, eliminated: &Eliminated, drive: &Drive, (time, v): (f64, &[f64])) -> bool {
+    fn evaluate(
+        &mut self,
+        assembly: &Assembly,
+        eliminated: &Eliminated,
+        drive: &Drive,
+        (time, v): (f64, &[f64]),
+    ) -> bool {
         let (j, h) = (assembly.axes.len(), eliminated.length);
         let matrix = self.lu.zeros(j);
         for row in 0..j {
@@ -274,9 +280,10 @@ impl Step {
                 let (directions, after) = (joint.directions, 2 * joint.directions + joint.states);
                 for (s, own) in joint.internal().enumerate() {
                     let slope = law.state_slope(s);
-                    let moved = joint.axes().enumerate().map(|(e, axis)| {
-                        (0.5 * h * slope[after + e] + slope[after + directions + e]) * w[axis]
-                    });
+                    let moved = joint
+                        .axes()
+                        .enumerate()
+                        .map(|(e, axis)| (0.5 * h * slope[after + e] + slope[after + directions + e]) * w[axis]);
                     states[own] = known(slope, joint) + moved.sum::<f64>();
                 }
                 for (d, axis) in joint.axes().enumerate() {

@@ -187,7 +187,14 @@ impl SmoothFlow {
         let mut shifted = std::mem::take(&mut self.next);
         let laws = self.laws.clone();
         self.set_laws(&shifted, time);
-        slope(&self.assembly, (&shifted, &mut self.load, &mut self.force), &self.laws, &self.drive, time, &mut self.error);
+        slope(
+            &self.assembly,
+            (&shifted, &mut self.load, &mut self.force),
+            &self.laws,
+            &self.drive,
+            time,
+            &mut self.error,
+        );
         self.laws = laws;
         std::mem::swap(&mut self.next, &mut shifted);
         self.second.iter_mut().zip(&self.error).for_each(|(second, again)| *second += again);

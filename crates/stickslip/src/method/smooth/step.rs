@@ -262,7 +262,8 @@ impl Step {
                     rate.linearise(joint.directions, &motion, z, point);
                 }
                 let row = stage * j + joint.first_axis;
-                self.force.as_mut_slice()[row..row + joint.directions].copy_from_slice(&point.force[..joint.directions]);
+                self.force.as_mut_slice()[row..row + joint.directions]
+                    .copy_from_slice(&point.force[..joint.directions]);
             }
         }
     }
