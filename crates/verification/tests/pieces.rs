@@ -44,7 +44,7 @@ fn free(model: &Model, start: f64, step: f64, duration: f64) -> Vec<f64> {
         all.push(state.displacement[0]);
         true
     };
-    motion.run(&model.assemble().unwrap(), &mut keep).unwrap();
+    motion.run(&model.assemble().unwrap(), &mut keep).unwrap_or_else(|error| panic!("{model:?}: {error}"));
     all
 }
 
@@ -274,6 +274,59 @@ fn static_friction_agrees_with_scipy() {
         }
         assert!(orbit.evidence.energy_gap < 1e-10, "{}", orbit.evidence.energy_gap);
         println!("{name}: {} iterations, stability {:?}", orbit.evidence.iterations, orbit.stability());
+    }
+}
+
+/// An overdamped mass creeps towards the place where it would stop, for ever, and is there to all digits after a while: neither that nor a
+/// stop that is approached so is chatter. A mass that slides with `limit` ends where its spring holds that and the constant force.
+#[test]
+fn creeping_to_a_stop_is_no_chatter() {
+    let limit = 0.1;
+    let laws: [(SharedLaw, f64, f64); 3] = [
+        (Arc::new(stickslip::law::Coulomb { limit }), limit, 1.0),
+        (Arc::new(Jenkins { stiffness: 2.0, limit }), limit, 1.0),
+        (Arc::new(Gap { gap: 0.0, stiffness: 2.0 }), 0.0, 3.0),
+    ];
+    for (law, friction, stiffness) in laws {
+        for damping in [1.9, 3.0, 10.0, 50.0] {
+            for constant in [0.0, 0.3] {
+                let mut model = oscillator(1.0, damping, &[law.clone()]);
+                model.forces = vec![force("m", constant, 0)];
+                let x = *free(&model, 1.0, 1.0, 2000.0).last().unwrap();
+                let expected = (constant + friction) / stiffness;
+                if damping > 1.9 {
+                    near(&format!("{law:?}, {damping} kg/s, {constant} N"), x, expected, 1e-9);
+                }
+                // in a drive that does nothing, too
+                let system = model.assemble().unwrap();
+                let motion = Transient {
+                    displacement: vec![1.0],
+                    velocity: vec![0.0],
+                    excitation: Excitation::Steady(1.0),
+                    duration: 2000.0,
+                    step: 10.0,
+                    width: None,
+                };
+                motion.run(&system, &mut |_, _, _| true).unwrap();
+            }
+        }
+    }
+}
+
+/// Driven slowly, an overdamped mass creeps to rest twice a period. Its smooth neighbour moves alike.
+#[test]
+fn creeping_orbits_are_found() {
+    for (constant, omega, amplitude) in
+        [(0.0, 1e-3, 1.0), (0.0, 1e-3, 10.0), (0.3, 1e-3, 0.3), (0.3, 1e-3, 10.0), (0.3, 0.01, 1.0)]
+    {
+        let mut model = oscillator(1.0, 300.0, &[Arc::new(stickslip::law::Coulomb { limit: 0.1 })]);
+        model.forces = vec![force("m", amplitude, 1), force("m", constant, 0)];
+        let system = model.assemble().unwrap();
+        let orbit = exact(&system, omega);
+        let smooth = Shooting { width: Some(1e-9), ..Shooting::default() };
+        let smooth = smooth.solver(&system).unwrap().orbit(omega, Some(&orbit.start)).unwrap();
+        close("amplitude", orbit.places[0].amplitude(), smooth.places[0].amplitude(), 1e-3);
+        close("loss", orbit.energy.friction, smooth.energy.friction, 1e-2);
     }
 }
 

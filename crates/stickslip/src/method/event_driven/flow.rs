@@ -20,6 +20,9 @@ pub(crate) const SWITCH_LIMIT: usize = 20_000;
 /// Bytes of segments in one stretch beyond which it counts as chatter too: a return of a ring of 48 blades has a few hundred switches, and a
 /// segment a tenth of a megabyte.
 const SEGMENT_LIMIT: usize = 256 << 20;
+/// Switches without motion between them, per part, after which decision and signals are taken to contradict each other within rounding: a motion
+/// that creeps towards a border for ever, and is there to all digits.
+const EASED_AFTER: usize = 2;
 /// Switches at one and the same instant beyond which the decision is going round in circles: every part may change once
 /// per derivative that decides.
 const AT_ONCE_LIMIT: usize = 8;
@@ -79,6 +82,8 @@ pub(crate) struct Flow {
     before: DVector<f64>,
     after: DVector<f64>,
     row: DVector<f64>,
+    /// Displacements and velocities at the start of the segment.
+    from: Vec<f64>,
     rate: Vec<Complex64>,
 }
 
@@ -110,6 +115,7 @@ impl Flow {
             before: DVector::zeros(states),
             after: DVector::zeros(states),
             row: DVector::zeros(states),
+            from: Vec::new(),
             rate: Vec::new(),
         }
     }
@@ -131,6 +137,7 @@ impl Flow {
         self.used = 0;
         self.switches = 0;
         let n = self.mechanics.n;
+        self.from.resize(2 * n, 0.0);
         for part in &self.mechanics.parts {
             if let Kind::Elastic { limit, state: s, .. } = part.kind {
                 state[2 * n + s] = state[2 * n + s].clamp(-limit, limit);
@@ -139,7 +146,7 @@ impl Flow {
         let velocity_scale = self.velocity_scale(state);
         let end = start + duration;
         let mut time = start;
-        let (mut at_once, mut bytes) = (0, 0);
+        let (mut at_once, mut idle, mut bytes) = (0, 0, 0);
         if !self.decision.decide(&self.mechanics, &self.drive, time, state, velocity_scale) {
             return Err(Breakdown::Undecidable { time });
         }
@@ -152,7 +159,9 @@ impl Flow {
                     _ => Breakdown::OutOfRange { time },
                 })?;
             self.start_segment(time, &pattern, driven, state);
-            self.watch(&pattern, velocity_scale);
+            let eased = idle > EASED_AFTER * (1 + self.mechanics.parts.len());
+            self.watch(&pattern, velocity_scale, eased);
+            self.from.copy_from_slice(&state[..2 * n]);
             let rest = end - time;
             let basis = self.segments[self.used].basis();
             let zero = basis.first_zero(&self.signals, &self.begins, rest, &mut self.scratch);
@@ -166,6 +175,7 @@ impl Flow {
             time += length;
             self.switches += 1;
             at_once = if length <= f64::EPSILON * end.abs() { at_once + 1 } else { 0 };
+            idle = if self.moved(state) <= REST * velocity_scale { idle + 1 } else { 0 };
             bytes += self.segments[self.used - 1].bytes();
             let many = self.switches > SWITCH_LIMIT || bytes > SEGMENT_LIMIT;
             if many || at_once > AT_ONCE_LIMIT * (1 + self.mechanics.parts.len()) {
@@ -183,6 +193,13 @@ impl Flow {
                 self.jump(part, &pattern, time, state, sensitivity);
             }
         }
+    }
+
+    /// How far the state has come since the segment began, as a velocity, m/s.
+    fn moved(&self, state: &[f64]) -> f64 {
+        let n = self.mechanics.n;
+        let far = |range: std::ops::Range<usize>| range.map(|i| (state[i] - self.from[i]).abs()).fold(0.0, f64::max);
+        far(n..2 * n).max(far(0..n) * self.drive.omega.max(self.mechanics.fastest))
     }
 
     /// The largest relative velocity to be expected: from the state, the imposed motion and the loads.
@@ -294,8 +311,8 @@ impl Flow {
     }
 
     /// The signals whose zeros are switches: `static limit ∓ f` in stick, the velocity in slip direction in slip, the depth of a stop or what is
-    /// missing of it.
-    fn watch(&mut self, shape: &Pattern, velocity_scale: f64) {
+    /// missing of it. If `eased`, those that begin at zero may pass it by as much as counts as zero.
+    fn watch(&mut self, shape: &Pattern, velocity_scale: f64, eased: bool) {
         let segment = &self.segments[self.used];
         let driven = &segment.driven;
         let (n, nb) = (self.mechanics.n, driven.basis.len());
@@ -317,7 +334,8 @@ impl Flow {
                     let at = self.signals.len();
                     self.signals.extend(force.iter().map(|f| f * -side));
                     self.signals[at + constant].re += limit;
-                    self.begins.push(begin(limit - side * now, AT_LIMIT * limit));
+                    let signal = &mut self.signals[at + constant];
+                    self.begins.push(begin(signal, limit - side * now, AT_LIMIT * limit, eased));
                     self.watched.push(i);
                 }
                 continue;
@@ -345,7 +363,7 @@ impl Flow {
                 signal[modes + h] += self.drive.imposed[h][i] * turn * rate * sign;
             }
             let now = real_dot(signal, &self.values);
-            self.begins.push(begin(now, zero));
+            self.begins.push(begin(&mut signal[constant], now, zero, eased));
             self.watched.push(i);
         }
     }
@@ -472,8 +490,16 @@ fn add(sum: &mut [Complex64], signal: &[Complex64], factor: f64) {
     }
 }
 
-fn begin(value: f64, zero: f64) -> Begin {
-    if value > zero { Begin::Positive } else { Begin::Zero }
+/// How a signal with this constant part begins, from its value there and what counts as zero; if `eased`, one that begins at zero is lifted above it.
+fn begin(constant: &mut Complex64, value: f64, zero: f64, eased: bool) -> Begin {
+    if value > zero {
+        Begin::Positive
+    } else if eased {
+        constant.re += 2.0 * zero;
+        Begin::Positive
+    } else {
+        Begin::Zero
+    }
 }
 
 #[cfg(test)]

@@ -42,8 +42,6 @@ pub(crate) struct Pattern {
     pub lambda: Vec<Complex64>,
     /// x = Re(shape η), n × modes, column-major.
     pub shape: DMatrix<Complex64>,
-    /// Modal coordinates of displacements and velocities, modes × 2n.
-    coordinate: DMatrix<Complex64>,
     /// Modal coordinates of a state, less those at which the forces that come with it would hold them, modes × states.
     start: DMatrix<Complex64>,
     /// Besides the modes a state moves on by `place + drift τ + fall τ²/2`, n × states each.
@@ -92,7 +90,8 @@ pub(crate) struct Driven {
     pub modes: usize,
     /// Steady complex displacement per harmonic, n each.
     steady: Vec<DVector<Complex64>>,
-    /// Modal coordinates of the real steady motion, parts that turn with `e^{jhΩt}` and with `e^{-jhΩt}`: harmonic after harmonic.
+    /// Modal coordinates of the steady motion, parts that turn with `e^{jhΩt}` and with `e^{-jhΩt}`: harmonic after harmonic. What a resonant
+    /// pair does instead is left out: it begins at zero.
     steady_start: Vec<(Complex64, Complex64)>,
     /// Forces of the held sliders that the drive causes by itself: complex per harmonic, and constant.
     pub held: Vec<DVector<Complex64>>,
@@ -182,13 +181,11 @@ impl Pattern {
         let free_coordinate = modes.free.transpose() * &coordinates;
         let free_input = modes.free.transpose() * &project;
         let shape = complex(&basis) * &modes.shape;
-        let mut coordinate = DMatrix::from_element(count, 2 * n, ZERO);
-        coordinate.columns_mut(0, n).copy_from(&(&modes.from_displacement * complex(&coordinates)));
-        coordinate.columns_mut(n, n).copy_from(&(&modes.from_velocity * complex(&coordinates)));
         // what a state does by itself, with the constant forces that it brings
         let pushed = &input * complex(&force_from_state);
         let mut start = DMatrix::from_element(count, states, ZERO);
-        start.columns_mut(0, 2 * n).copy_from(&coordinate);
+        start.columns_mut(0, n).copy_from(&(&modes.from_displacement * complex(&coordinates)));
+        start.columns_mut(n, n).copy_from(&(&modes.from_velocity * complex(&coordinates)));
         let mut fixed = DMatrix::from_element(count, states, ZERO);
         let mut drifts = DMatrix::from_element(count, states, ZERO);
         for k in 0..count {
@@ -213,7 +210,6 @@ impl Pattern {
             redundant,
             frozen,
             lambda,
-            coordinate,
             start,
             place,
             drift,
@@ -251,8 +247,7 @@ impl Pattern {
 
     /// Memory that it takes, bytes: matrices of some multiples of n² numbers.
     pub fn bytes(&self) -> usize {
-        let complex =
-            self.lambda.len() + self.shape.len() + self.coordinate.len() + self.start.len() + self.input.len();
+        let complex = self.lambda.len() + self.shape.len() + self.start.len() + self.input.len();
         let real = 3 * self.place.len()
             + self.free.len()
             + self.free_coordinate.len()
@@ -296,21 +291,13 @@ impl Pattern {
                 }
                 let plus = if near { ZERO } else { forward / (s - lambda) };
                 let minus = backward / (-s - lambda);
+                driven.steady_start.push((plus, minus));
                 for i in 0..n {
                     steady[i] += self.shape[(i, k)] * plus + (self.shape[(i, k)] * minus).conj();
                 }
             }
             let free: DVector<Complex64> = complex(&self.free_input) * &force / (s * s);
             steady += complex(&self.free) * &free;
-            for k in 0..self.lambda.len() {
-                let mut parts = (ZERO, ZERO);
-                for (i, &z) in steady.iter().enumerate() {
-                    let (place, speed) = (self.coordinate[(k, i)] * 0.5, self.coordinate[(k, n + i)] * 0.5);
-                    parts.0 += place * z + speed * (s * z);
-                    parts.1 += place * z.conj() + speed * (s * z).conj();
-                }
-                driven.steady_start.push(parts);
-            }
             let inertia = DVector::from_fn(self.held.len(), |i, _| drive.imposed[h][self.held[i]] * (rate * rate));
             let held = complex(&self.multiplier) * &drive.forces[h] - complex(&self.inverse_delassus) * inertia;
             driven.held.push(held);
