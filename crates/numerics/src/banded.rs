@@ -24,12 +24,14 @@ pub struct Banded {
     /// Row i holds columns i - band to i + 2 band: row exchanges fill the upper band up to twice its width.
     rows: Vec<f64>,
     pivots: Vec<usize>,
+    /// Last column of each factored row.
+    ends: Vec<usize>,
 }
 
 impl Banded {
     /// The zero matrix.
     pub fn new(n: usize, band: usize) -> Self {
-        Banded { n, band, rows: vec![0.0; n * (3 * band + 1)], pivots: vec![0; n] }
+        Banded { n, band, rows: vec![0.0; n * (3 * band + 1)], pivots: vec![0; n], ends: vec![0; n] }
     }
 
     /// Sets all entries to zero.
@@ -53,9 +55,10 @@ impl Banded {
         let width = 3 * b + 1;
         // entry (i, j) stands at i * width + j + b - i
         let at = |i: usize, j: usize| i * width + j + b - i;
+        // the last column of every row that is not zero: beyond it only row exchanges fill
+        self.ends.iter_mut().enumerate().for_each(|(i, end)| *end = (i + b).min(n - 1));
         for k in 0..n {
             let last = (k + b).min(n - 1);
-            let end = (k + 2 * b).min(n - 1);
             let mut pivot = k;
             for i in k + 1..=last {
                 if self.rows[at(i, k)].abs() > self.rows[at(pivot, k)].abs() {
@@ -68,15 +71,18 @@ impl Banded {
             }
             self.pivots[k] = pivot;
             if pivot != k {
-                for j in k..=end {
+                for j in k..=self.ends[k].max(self.ends[pivot]) {
                     self.rows.swap(at(k, j), at(pivot, j));
                 }
+                self.ends.swap(k, pivot);
             }
+            let end = self.ends[k];
             let inverse = 1.0 / value;
             for i in k + 1..=last {
                 let factor = self.rows[at(i, k)] * inverse;
                 self.rows[at(i, k)] = factor;
                 if factor != 0.0 {
+                    self.ends[i] = self.ends[i].max(end);
                     let (top, bottom) = self.rows.split_at_mut(i * width);
                     let source = &top[at(k, k) + 1..=at(k, end)];
                     let start = k + 1 + b - i;
@@ -101,7 +107,7 @@ impl Banded {
             }
         }
         for k in (0..n).rev() {
-            let end = (k + 2 * b).min(n - 1);
+            let end = self.ends[k];
             let row = &self.rows[at(k, k)..=at(k, end)];
             let sum: f64 = row[1..].iter().zip(&right[k + 1..=end]).map(|(a, x)| a * x).sum();
             right[k] = (right[k] - sum) / row[0];

@@ -23,7 +23,7 @@ use std::sync::Arc;
 use stickslip::dimension::Dimension;
 use stickslip::law::{self, LawInfo};
 use stickslip::method;
-use stickslip::model::{Model, is_identifier};
+use stickslip::model::{Model, is_identifier, is_place};
 
 /// Most errors that are reported at once.
 const MOST_ERRORS: usize = 20;
@@ -439,10 +439,11 @@ impl Reader {
         self.problems.push(Problem::new(place, key, message).maybe_help(help));
     }
 
-    /// A name, with the indices of a repetition filled in.
+    /// A name, with the indices of a repetition filled in. What names a place may be a direction of a node, `node.direction`.
     fn name(&mut self, key: &str, text: &str, inner: Option<usize>, place: &Place) -> Option<String> {
         let problem = match self.turn().name(text) {
             Ok(name) if is_identifier(&name) => return Some(name),
+            Ok(name) if !matches!(key, "name" | "directions") && is_place(&name) => return Some(name),
             Ok(name) => {
                 let message = format!("`{}` is no name: a letter first, then letters, digits and `_`", shown(&name));
                 Problem::new(place, key, message)

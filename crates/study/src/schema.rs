@@ -240,9 +240,9 @@ pub fn described(takes: &Takes) -> String {
 // ---------------------------------------------------------------------------------------------- JSON Schema
 
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
-const NAME_PATTERN: &str = "^[A-Za-z][A-Za-z0-9_]*$";
+const NAME_PATTERN: &str = "^[A-Za-z][A-Za-z0-9_.]*$";
 /// Names in entries that may be repeated, with indices in braces.
-const REPEATED_PATTERN: &str = "^[A-Za-z]([A-Za-z0-9_]|\\{[^{}]+\\})*$";
+const REPEATED_PATTERN: &str = "^[A-Za-z]([A-Za-z0-9_.]|\\{[^{}]+\\})*$";
 
 /// The JSON Schema (draft 2020-12) of study files, for editors that complete and check TOML.
 pub fn json_schema() -> Value {

@@ -6,7 +6,7 @@ use crate::key::Within;
 use crate::values::{Frequencies, Given, Values};
 use std::collections::BTreeMap;
 use stickslip::dimension::Dimension;
-use stickslip::law::{BuildError, LawInfo, Parameter, SharedLaw};
+use stickslip::law::{LawError, LawInfo, Parameter, SharedLaw};
 
 /// A quantity as it stands in a text.
 #[derive(Debug, Clone, PartialEq)]
@@ -254,8 +254,15 @@ fn law(
         // to a power that is not whole: a plain number in SI
         let dimension = parameter.dimension_under(value).unwrap_or(Dimension::NONE);
         match quantity.number(parameter.key, (dimension, *within), example, environment) {
-            Ok(number) => {
-                numbers.insert(parameter.key, number);
+            Ok(value) if !parameter.range.has(value) => {
+                let Parameter { key, range, .. } = *parameter;
+                let error = LawError::Value { law: row.name, key, dimension, range, value };
+                problems.push(quantity.problem(key, error.to_string()));
+                // what is raised to it would only be misread
+                break;
+            }
+            Ok(value) => {
+                numbers.insert(parameter.key, value);
             }
             Err(problem) => problems.push(problem),
         }
@@ -264,14 +271,7 @@ fn law(
         // already said; the caller only needs to know that there is no law
         return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.place, key, "")));
     }
-    row.build(&numbers).map_err(|error| {
-        let wrong = match &error {
-            BuildError::Value(error) => error.key(),
-            BuildError::Missing { .. } => None,
-        };
-        let place = wrong.map_or(&table.place, |wrong| table.place_of(wrong, None));
-        Problem::new(place, wrong.unwrap_or(key), error.to_string())
-    })
+    row.build(&numbers).map_err(|error| Problem::new(&table.place, key, error.to_string()))
 }
 
 /// Tolerances of adaptive frequencies: finer ones take more points than they are worth, coarser ones show nothing.

@@ -87,14 +87,16 @@ fn the_reference_of_keys_is_up_to_date() {
 const BEGIN: &str = "<!-- begin generated: methods x laws -->\n";
 const END: &str = "<!-- end generated: methods x laws -->";
 
-/// A mass on a spring that rubs on the ground with this law.
+/// A mass on a spring that rubs on the ground with this law, along all directions of the law.
 fn rubbing(law: law::SharedLaw) -> System {
-    let between = || ["body".to_owned(), GROUND.to_owned()];
+    let directions = if law.directions() > 1 { &["x", "y", "z"][..law.directions()] } else { &[] };
+    let mass = Mass::new("body", 1.0).along(directions);
+    let spring = |place| Spring { between: [place, GROUND.to_owned()], stiffness: 1e4, damping: 1.0 };
     Model {
-        masses: vec![Mass::new("body", 1.0)],
-        springs: vec![Spring { between: between(), stiffness: 1e4, damping: 1.0 }],
-        joints: vec![Joint { name: "foot".to_owned(), between: between(), law }],
-        forces: vec![Force { on: "body".to_owned(), amplitude: 1.0, phase: 0.0, harmonic: 1 }],
+        springs: mass.places().into_iter().map(spring).collect(),
+        forces: vec![Force { on: mass.places()[0].clone(), amplitude: 1.0, phase: 0.0, harmonic: 1 }],
+        joints: vec![Joint { name: "foot".to_owned(), between: ["body".to_owned(), GROUND.to_owned()], law }],
+        masses: vec![mass],
         ..Model::default()
     }
     .assemble()
@@ -103,14 +105,14 @@ fn rubbing(law: law::SharedLaw) -> System {
 
 /// Which method takes which law, asked of the methods.
 fn methods_by_laws() -> String {
-    let mut table = "| method |".to_owned();
-    table.extend(law::TABLE.iter().map(|law| format!(" `{}` |", law.name)));
+    let mut table = "| law |".to_owned();
+    table.extend(method::TABLE.iter().map(|row| format!(" `{}` |", row.name)));
     table += "\n| --- |";
-    table.extend(law::TABLE.iter().map(|_| " --- |"));
-    for row in method::TABLE {
-        table += &format!("\n| `{}` |", row.name);
-        for law in law::TABLE {
-            let system = rubbing(law.sample());
+    table.extend(method::TABLE.iter().map(|_| " --- |"));
+    for law in law::TABLE {
+        table += &format!("\n| `{}` |", law.name);
+        let system = rubbing(law.sample());
+        for row in method::TABLE {
             let takes = |options: &method::Options| (row.build)(options).unwrap().solver(&system).is_ok();
             let width = row.options.iter().any(|option| option.key == "width");
             let word = if takes(&method::Options::new()) {
@@ -124,6 +126,15 @@ fn methods_by_laws() -> String {
         }
     }
     table + "\n"
+}
+
+#[test]
+fn every_law_has_its_section_in_the_book() {
+    let page = text_of(&root().join("docs/src/laws.md"));
+    for law in law::TABLE {
+        assert!(page.contains(&format!("\n## {}\n", law.name)), "docs/src/laws.md has no section `{}`", law.name);
+        assert!(page.contains(&format!("](#{})", law.name)), "docs/src/laws.md does not list `{}`", law.name);
+    }
 }
 
 #[test]

@@ -317,3 +317,63 @@ fn columns_of_parameters_have_their_unit() {
     ];
     assert_eq!(columns, expected.map(|(name, value)| (name.to_owned(), value)));
 }
+
+/// A sample of every law of the table, stated by bare numbers in SI, on a node with its directions, is that sample.
+#[test]
+fn every_law_reads_back_from_its_keys() {
+    for row in law::TABLE {
+        let law = row.sample();
+        let mut keys = format!("kind = \"{}\"", row.name);
+        for (parameter, value) in row.parameters.iter().zip(row.sample) {
+            keys += &format!(", {} = {value:e}", parameter.key);
+        }
+        assert!(*joint_law(law.directions(), &keys).unwrap() == *law, "{}", row.name);
+    }
+}
+
+/// The law of a joint between a node with so many directions and the ground.
+fn joint_law(directions: usize, law: &str) -> Result<law::SharedLaw, String> {
+    let names = ["\"x\"", "\"y\"", "\"z\""][..directions].join(", ");
+    let directions = if directions > 1 { format!("directions = [{names}]\n") } else { String::new() };
+    let body = if directions.is_empty() { "body" } else { "body.x" };
+    let text = format!(
+        "schema = 1\n[[mass]]\nname = \"body\"\nmass = \"1 kg\"\n{directions}[[joint]]\nname = \"foot\"\n\
+         between = [\"body\", \"ground\"]\nlaw = {{ {law} }}\n[[force]]\non = \"{body}\"\namplitude = \"1 N\"\n\
+         [study]\nkind = \"orbit\"\nfrequency = \"1 Hz\"\n"
+    );
+    let study = read_study("law.toml", &text, &[]).map_err(|error| error.to_string())?;
+    let case = study.case(0).map_err(|error| error.to_string())?;
+    Ok(case.model.joints[0].law.clone())
+}
+
+#[test]
+fn dimensions_are_raised_to_the_exponent_of_the_law() {
+    let with = |beta: &str, exponent: &str| {
+        let law =
+            format!("kind = \"bouc-wen\", stiffness = \"1 N/mm\", gamma = 0, beta = {beta}, exponent = {exponent}");
+        joint_law(1, &law).map(|law| law.value("beta").unwrap())
+    };
+    assert_eq!(with("\"3 mm^-1\"", "1"), Ok(3e3));
+    assert_eq!(with("\"3 mm^-2\"", "2"), Ok(3e6));
+    assert_eq!(with("\"3 mm^-3\"", "3"), Ok(3e9));
+    assert_eq!(with("4.5", "1.5"), Ok(4.5), "plain numbers in SI where no unit can be written");
+    for (beta, exponent) in [("\"3 mm^-1\"", "2"), ("\"3 mm^-2\"", "1"), ("\"3 mm^-1\"", "1.5")] {
+        let error = with(beta, exponent).unwrap_err();
+        assert!(error.contains("`beta`"), "{error}");
+    }
+    assert!(with("\"3 mm^-1\"", "0.5").unwrap_err().contains("`exponent`"));
+}
+
+#[test]
+fn a_contact_has_the_tangents_of_its_nodes_unless_it_states_them() {
+    let contact = "kind = \"friction-contact\", tangential = 1, normal = 2, friction = 0.3";
+    let tangents = |directions: usize, more: &str| {
+        joint_law(directions, &format!("{contact}{more}")).map(|law| law.value("tangents").unwrap())
+    };
+    assert_eq!(tangents(2, ""), Ok(1.0));
+    assert_eq!(tangents(3, ""), Ok(2.0));
+    assert_eq!(tangents(2, ", tangents = 1"), Ok(1.0));
+    assert!(tangents(2, ", tangents = 2").unwrap_err().contains("3 directions"));
+    assert!(tangents(1, "").unwrap_err().contains("3 directions"));
+    assert!(tangents(2, ", tangents = 1.5").unwrap_err().contains("a whole number from 1 to 2"));
+}

@@ -37,6 +37,16 @@ pub struct Reference<'a> {
     pub lost: usize,
 }
 
+/// Velocity over which a law that has only a resolvent is made smooth, relative to that of the motion.
+const NARROW: f64 = 1e-3;
+
+/// A displacement of the size that the loads cause, m.
+fn travel(system: &System, omega: f64) -> f64 {
+    let structure = system.structure();
+    let hold = structure.stiffness().diagonal().max().max(omega * omega * structure.mass().diagonal().max());
+    system.excitation(omega).iter().map(|(_, f)| f.norm()).sum::<f64>() / hold
+}
+
 /// Stiffness of the spring in front of a rigid slider, in masses over the square of a step.
 const RIGID: f64 = 100.0;
 /// Newton iterations of a step.
@@ -50,7 +60,11 @@ impl<'a> Reference<'a> {
     /// From displacements and velocities, with so many steps a period of the drive; joints begin without memory.
     pub fn new(system: &'a System, omega: f64, steps: usize, displacement: &[f64], velocity: &[f64]) -> Self {
         let contacts = system.joints().iter().map(|joint| {
-            let law = joint.law().clone();
+            let mut law = joint.law().clone();
+            if law.step().is_none() && law.rate().is_none() && law.pieces().is_none() {
+                // set-valued, and no sum of sliders: its smooth neighbour, steeper than anything that the motion shows
+                law = law.regularised(NARROW * omega * travel(system, omega)).unwrap_or(law);
+            }
             let pieces = if law.step().is_none() && law.rate().is_none() { law.pieces() } else { None };
             let states = law.step().map(|s| s.states()).or(law.rate().map(|r| r.states()));
             let states = states.unwrap_or(pieces.as_ref().map_or(0, Vec::len));

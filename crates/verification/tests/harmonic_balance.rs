@@ -60,11 +60,11 @@ fn theory_2_4_and_11_1_describing_function() {
         let stiffness = kt / PI * Complex64::new(slip - 0.5 * (2.0 * slip).sin(), slip.sin().powi(2));
         let system = imposed(Arc::new(Jenkins { stiffness: kt, limit: 1.0 }), a);
         let orbit = orbit(&balance(1, 4096), &system, 1.0);
-        // the force is sampled with its kinks between the samples corrected: third order, (2π/4096)³ and less
+        // a sum over samples misses the kinks between them: second order, (2π/4096)²/12
         let found = first_force(&orbit, 4096) / a;
-        assert!((found - stiffness).norm() < 1e-8 * kt, "{kt} {a}: {found} instead of {stiffness}");
+        assert!((found - stiffness).norm() < 2e-7 * kt, "{kt} {a}: {found} instead of {stiffness}");
         let loss = 4.0 * (a - d);
-        assert!((orbit.joints[0].dissipation - loss).abs() < 1e-8 * loss, "{}", orbit.joints[0].dissipation / loss);
+        assert!((orbit.joints[0].dissipation - loss).abs() < 1e-13 * loss, "{}", orbit.joints[0].dissipation / loss);
     }
 }
 
@@ -450,19 +450,15 @@ fn clear_words_instead_of_wrong_amplitudes() {
     let method = HarmonicBalance { tolerance: Some(1e-7), ..HarmonicBalance::default() };
     let error = method.solver(&system).unwrap().orbit(TAU * 121.0, None).unwrap_err();
     assert_eq!(error.status(), "tolerance-not-reached");
-    // harmonics or samples that are allowed but too few: the orbit says that it is not accurate, and its estimate how far
+    // harmonics that are allowed but too few: the orbit says that it is not accurate, and its estimate how far
     let exact = orbit(&EventDriven, &system, TAU * 121.0);
-    let massless = templates::find("blade-couple-massless").unwrap().model().assemble().unwrap();
-    let exact_massless = orbit(&EventDriven, &massless, TAU * 121.0);
-    let few_harmonics = HarmonicBalance { harmonics: Some(3), ..HarmonicBalance::default() };
-    for (method, system, exact) in [(few_harmonics, &system, &exact), (balance(3, 28), &massless, &exact_massless)] {
-        let found = orbit(&method, system, TAU * 121.0);
-        let (error, estimate) = (distance(&found, exact), found.evidence.truncation.unwrap());
-        assert!(error > 1e-3 && found.evidence.accuracy == Accuracy::Truncated, "{method:?}: {error:.1e}");
-        assert!(estimate > error / 3.0 && estimate < 3.0 * error, "{method:?}: {estimate:.1e} {error:.1e}");
-        let enough = HarmonicBalance { tolerance: Some(0.5), ..method };
-        assert_eq!(orbit(&enough, system, TAU * 121.0).evidence.accuracy, Accuracy::Converged);
-    }
+    let method = HarmonicBalance { harmonics: Some(3), ..HarmonicBalance::default() };
+    let found = orbit(&method, &system, TAU * 121.0);
+    let (error, estimate) = (distance(&found, &exact), found.evidence.truncation.unwrap());
+    assert!(error > 1e-3 && found.evidence.accuracy == Accuracy::Truncated, "{error:.1e}");
+    assert!(estimate > error / 3.0 && estimate < 3.0 * error, "{estimate:.1e} {error:.1e}");
+    let enough = HarmonicBalance { tolerance: Some(0.5), ..method };
+    assert_eq!(orbit(&enough, &system, TAU * 121.0).evidence.accuracy, Accuracy::Converged);
     // a start that is far off: a state is no start for a series, which begins with its own guess
     let far = vec![1e3; exact.start.len()];
     let method = balance(9, 1024);

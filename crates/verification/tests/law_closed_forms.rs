@@ -52,7 +52,7 @@ fn jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form() {
     // kt a, kt, loss, stiffness, damping for a slip limit of 1
     for (stiffness, a, loss, keq, ceq) in [
         (1.0, 1.25, 1.0, 0.857_622, 0.203_718),
-        (1.0, 2.00, 4.0, 0.5, 0.318_310),
+        (1.0, 2.00, 4.0, 0.5, 1.0 / PI),
         (1.0, 2.75, 7.0, 0.328_553, 0.294_634),
         (5.0, 1.25, 4.2, 0.516_377, 0.855_617),
         (5.0, 2.00, 7.2, 0.260_220, 0.572_958),
@@ -140,7 +140,7 @@ fn iwan_has_segalmans_backbone_and_loss() {
         close("backbone", force[1], expected, 5e-4);
     }
     near("all slips", first(&law(1000), View::Pieces, &[0.0, 2.0 * far], 1)[1], 1.0, 1e-12);
-    close("at rest", law(1000).linearised(1e-12, 1.0).re, 10.0, 1e-12);
+    close("at rest", law(32).linearised(1e-12, 1.0).re, 10.0, 1e-12);
 }
 
 #[test]

@@ -16,7 +16,11 @@ use stickslip_verification::replay::{Instant, View, forces, lost, random_motion,
 use stickslip_verification::{Random, exact, near};
 
 /// Samples of a period; fine enough for the smooth laws, whose steepest slope is a thousandth of their fastest motion.
-const SAMPLES: usize = 4000;
+const SAMPLES: usize = 2000;
+
+/// Share of the largest force times the way that the trapezoidal rule over the samples may seem to give; a spring, which loses nothing, seems to give
+/// 1e-6.
+const QUADRATURE: f64 = 1e-5;
 
 /// Largest size of the forces.
 fn largest(forces: &[[f64; MOST_DIRECTIONS]]) -> f64 {
@@ -98,7 +102,7 @@ fn parameters_out_of_range_are_refused_with_their_key() {
     }
 }
 
-/// In the sixth of equal periods the state repeats, and what is lost over it is never negative.
+/// In the fifth of equal periods the state repeats, and what is lost over it is never negative.
 #[test]
 fn no_energy_is_created_over_closed_histories() {
     for row in TABLE {
@@ -108,12 +112,12 @@ fn no_energy_is_created_over_closed_histories() {
             for seed in 0..4 {
                 for speed in [0.1, 20.0] {
                     let motion = random_motion(seed, law.directions(), speed);
-                    let times = steps(1.0 / speed, 6, SAMPLES);
+                    let times = steps(1.0 / speed, 5, SAMPLES);
                     let found = forces(&*law, view, &motion, &times);
-                    let (times, found) = (&times[5 * SAMPLES..], &found[5 * SAMPLES..]);
+                    let (times, found) = (&times[4 * SAMPLES..], &found[4 * SAMPLES..]);
                     let share =
                         lost(&motion, times, found) / (largest(found) * way(&motion, times)).max(f64::MIN_POSITIVE);
-                    assert!((-1e-6..=1.0).contains(&share), "{} by {view:?}, seed {seed}: {share}", row.name);
+                    assert!((-QUADRATURE..=1.0).contains(&share), "{} by {view:?}, seed {seed}: {share}", row.name);
                     (least, most) = (least.min(share), most.max(share));
                 }
             }

@@ -24,10 +24,14 @@ pub(super) static INFO: LawInfo = LawInfo {
     summary: "smooth hysteresis, f = stiffness z, z' = u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n with n = exponent",
     parameters: &[
         Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness at rest"),
-        Parameter::new("beta", Dimension::INVERSE_LENGTH, Range::ZeroOrMore, "makes the loop; to the power `exponent`")
-            .to_the(EXPONENT),
-        Parameter::new("gamma", Dimension::INVERSE_LENGTH, Range::Any, "shapes the loop; beta + gamma > 0")
-            .to_the(EXPONENT),
+        Parameter::new("beta", Dimension::INVERSE_LENGTH, Range::ZeroOrMore, "makes the loop").to_the(EXPONENT),
+        Parameter::new(
+            "gamma",
+            Dimension::INVERSE_LENGTH,
+            Range::Any,
+            "shapes the loop; beta + gamma must be more than zero",
+        )
+        .to_the(EXPONENT),
         Parameter::new(EXPONENT, Dimension::NONE, Range::Within(1.0, SHARPEST), "sharpness of the knee").or(1.0),
     ],
     sample: &[10_000.0, 1.5e7, 1e7, 2.0],

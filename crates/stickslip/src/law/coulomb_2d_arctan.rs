@@ -30,7 +30,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 /// use stickslip::law::{Coulomb2dArctan, RateLaw, Relative};
 /// let law = Coulomb2dArctan { limit: 2.0, alpha: 1.0 };
-/// let motion = Relative { displacement: [0.0; 3], velocity: [0.6, -0.8, 0.0] };
+/// let motion = Relative { displacement: [0.0_f64; 3], velocity: [0.6, -0.8, 0.0] };
 /// let force = law.evaluate(&motion, &[], &mut []);
 /// assert!((force[0] - 0.6).abs() < 1e-15 && (force[1] + 0.8).abs() < 1e-15);
 /// ```

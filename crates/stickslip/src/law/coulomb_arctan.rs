@@ -4,7 +4,7 @@
 //! It never sticks: at `|f| < limit` it creeps with `u' = tan(π f / (2 limit)) / alpha`.
 //! Source: Pust, Pesek, Radolfova (2015), Eq. (2). The paper's alpha = 25 s/mm is 25 000 s/m in SI.
 
-use super::{Law, LawInfo, Parameter, Prox, Rate, RateLaw, Relative};
+use super::{Law, LawInfo, Mean, Parameter, Prox, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, PI};
@@ -89,6 +89,47 @@ impl Prox for CoulombArctan {
         let scaled = self.alpha * velocity;
         let size = self.limit * FRAC_2_PI;
         Some((size * scaled.atan(), size * self.alpha / (1.0 + scaled * scaled)))
+    }
+    fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<Mean> {
+        let mean = mean_of_arctangent(self.alpha * velocity, self.alpha * e);
+        let size = self.limit * FRAC_2_PI;
+        let (force, slope) = (size, size * self.alpha);
+        Some(Mean {
+            zeroth: force * mean.zeroth,
+            first: force * mean.first,
+            slope: slope * mean.slope,
+            slope_first: slope * mean.slope_first,
+            slope_second: slope * mean.slope_second,
+        })
+    }
+}
+
+/// Change of the argument over a sample, relative to the length over which the arctangent changes, up to which the quadrature of [`Mean::of`]
+/// is exact to rounding.
+const GENTLE: f64 = 0.2;
+
+/// Means of `arctan(y + eξ)` over `-1 < ξ < 1`: in closed form, or by quadrature where that cancels.
+fn mean_of_arctangent(y: f64, e: f64) -> Mean {
+    let reach = e.abs();
+    if reach < GENTLE * (1.0 + y.abs()) {
+        return Mean::of(y, e, |x| (x.atan(), 1.0 / (1.0 + x * x)));
+    }
+    let (low, high) = (y - reach, y + reach);
+    let (low_value, high_value) = (low.atan(), high.atan());
+    let once = |x: f64, atan: f64| x * atan - 0.5 * (x * x).ln_1p();
+    let twice = |x: f64, atan: f64| 0.5 * (x * x - 1.0) * atan + 0.5 * x - 0.5 * x * (x * x).ln_1p();
+    let (low_1, high_1) = (once(low, low_value), once(high, high_value));
+    let zeroth = (high_1 - low_1) / (2.0 * reach);
+    let first =
+        (high_1 + low_1) / (2.0 * reach) - (twice(high, high_value) - twice(low, low_value)) / (2.0 * reach * reach);
+    let slope = (high_value - low_value) / (2.0 * reach);
+    let sign = e.signum();
+    Mean {
+        zeroth,
+        first: first * sign,
+        slope,
+        slope_first: ((high_value + low_value) / (2.0 * reach) - zeroth / reach) * sign,
+        slope_second: slope - 2.0 * first / reach,
     }
 }
 

@@ -29,7 +29,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 /// use stickslip::law::{Jenkins2d, StepLaw};
 /// let law = Jenkins2d { stiffness: 1.0, limit: 2.0 };
-/// let mut z = [0.0; 2];
+/// let mut z = [0.0_f64; 2];
 /// assert_eq!(law.advance(&[0.0; 3], &[0.6, 0.8, 0.0], &mut z)[..2], [0.6, 0.8]);
 /// let slipping = law.advance(&[0.6, 0.8, 0.0], &[6.0, 8.0, 0.0], &mut z);
 /// assert!((slipping[0] - 1.2).abs() < 1e-15 && (slipping[1] - 1.6).abs() < 1e-15);

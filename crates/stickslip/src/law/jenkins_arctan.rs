@@ -4,7 +4,7 @@
 //! `f' = kt (u' - tan(π f / (2 limit)) / alpha)`, `|f| < limit`.
 //! Source: Pust, Pesek, Radolfova (2015), Sec. 3, the equation of Fig. 3.
 
-use super::{CoulombArctan, Jenkins, Law, LawInfo, Parameter, Prox, Rate, RateLaw, Relative};
+use super::{CoulombArctan, Jenkins, Law, LawInfo, Mean, Parameter, Prox, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
@@ -91,6 +91,9 @@ impl Prox for JenkinsArctan {
     }
     fn at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
         self.slider().at_velocity(velocity)
+    }
+    fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<Mean> {
+        self.slider().mean_at_velocity(velocity, e)
     }
     fn compliance(&self) -> f64 {
         1.0 / self.stiffness

@@ -51,7 +51,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// use stickslip::law::{LuGre, RateLaw, Relative};
 /// let law = LuGre { stiffness: 1e4, damping: 10.0, viscous: 0.4, limit: 2.0, static_limit: 2.5, velocity: 0.01 };
 /// // steady sliding at 1 m/s: the bristles carry `limit`, and there is viscous friction beside it
-/// let mut rate = [0.0];
+/// let mut rate = [0.0_f64];
 /// let force = law.evaluate(&Relative::along(0.0, 1.0), &[2.0 / 2.5], &mut rate);
 /// assert!((force[0] - 2.4).abs() < 1e-12 && rate[0].abs() < 1e-9);
 /// ```

@@ -47,7 +47,6 @@ mod valanis;
 
 pub use bouc_wen::BoucWen;
 pub use contact::Contact;
-pub(crate) use contact::SLIPS_ABOVE;
 pub use coulomb::Coulomb;
 pub use coulomb_2d::Coulomb2d;
 pub use coulomb_2d_arctan::Coulomb2dArctan;

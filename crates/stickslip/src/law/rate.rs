@@ -21,7 +21,8 @@ impl<S: Real> Relative<S> {
     }
 }
 
-/// What the author of a law of rate form writes, once for numbers and for dual numbers: `f = h(u, u', z)`, `z' = g(u, u', z)`, both smooth.
+/// What the author of a law of rate form writes, once for numbers and for dual numbers: `f = h(u, u', z)`, `z' = g(u, u', z)`, both continuous, and
+/// smooth but for kinks, such as `|u'|` where the motion turns: integration shortens its steps there.
 pub trait RateLaw {
     /// Number of internal states `z`.
     fn states(&self) -> usize {

@@ -41,7 +41,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// use stickslip::law::{RateLaw, Relative, Valanis};
 /// let law = Valanis { stiffness: 1e4, slip_stiffness: 1e3, lambda: 5e3, kappa: 0.0 };
 /// // without kappa the slope falls linearly with the force
-/// let mut rate = [0.0];
+/// let mut rate = [0.0_f64];
 /// law.evaluate(&Relative::along(0.0, 1.0), &[0.5], &mut rate);
 /// assert!((rate[0] - 5e3 * (0.5 - 0.1)).abs() < 1e-9);
 /// ```

@@ -103,13 +103,11 @@ impl Assembly {
         (self.axes[axis].along(x) + g, self.axes[axis].along(v) + speed)
     }
 
-    /// Acceleration of a state (length n) under joint forces.
-    pub fn accelerate(&self, state: &[f64], load: &[f64], force: &[f64], out: &mut [f64]) {
+    /// Acceleration of a state (length n) under loads and joint forces; `left` is the loads, and becomes what the masses are left with.
+    pub fn accelerate(&self, state: &[f64], left: &mut [f64], force: &[f64], out: &mut [f64]) {
         let n = self.n;
         let (x, v) = state.split_at(n);
-        let mut left = vec![0.0; n];
         for i in 0..n {
-            left[i] = load[i];
             for k in 0..n {
                 left[i] -= self.stiffness[(i, k)] * x[k] + self.damping[(i, k)] * v[k];
             }

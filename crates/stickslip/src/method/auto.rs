@@ -40,7 +40,7 @@ impl Auto {
             let because = if joints == 0 { "there are no joints" } else { "every law is exact" };
             (Box::new(EventDriven), because.to_owned())
         } else if !smooth {
-            (Box::new(HarmonicBalance::default()), "exact and smooth laws stand side by side".to_owned())
+            (Box::new(HarmonicBalance::default()), "neither are all laws exact nor all smooth".to_owned())
         } else {
             (Box::new(Shooting::default()), "the laws are smooth".to_owned())
         }

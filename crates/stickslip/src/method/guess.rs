@@ -1,8 +1,11 @@
-//! A first guess of an orbit: every joint as the complex stiffness that its first harmonic has.
+//! A first guess of an orbit: every joint as the complex stiffness that its first harmonic has. A law of several directions that has a
+//! stiffness at rest is taken with that; one that has none, rigid friction, with the same complex stiffness along all of them.
 
+use crate::law::{Law, MOST_DIRECTIONS, RatePoint, Relative, StepPoint};
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use std::f64::consts::PI;
 
 /// Rounds of the fixed-point iteration; it only has to come near.
 const ROUNDS: usize = 60;
@@ -13,8 +16,51 @@ const SETTLED: f64 = 1e-3;
 pub(crate) struct Guess {
     /// (frequency hΩ, complex displacements).
     pub harmonics: Vec<(f64, DVector<Complex64>)>,
-    /// Complex stiffness of each joint.
-    pub joints: Vec<Complex64>,
+    /// Complex stiffness of each joint, directions × directions.
+    pub joints: Vec<DMatrix<Complex64>>,
+}
+
+/// Complex stiffness at amplitude `a`, directions × directions, N/m.
+fn linearised(law: &dyn Law, a: f64, omega: f64) -> DMatrix<Complex64> {
+    let d = law.directions();
+    let along = match law.prox() {
+        _ if d == 1 => law.linearised(a, omega),
+        None => return at_rest(law, omega),
+        Some(prox) => {
+            let rigid = Complex64::new(0.0, 4.0 * law.scale() / (PI * a));
+            rigid / (1.0 + rigid * prox.compliance())
+        }
+    };
+    DMatrix::from_diagonal_element(d, d, along)
+}
+
+/// Complex stiffness of small motions about rest, directions × directions, N/m; zero of a law that tells none.
+pub(crate) fn at_rest(law: &dyn Law, omega: f64) -> DMatrix<Complex64> {
+    let d = law.directions();
+    let zero = Complex64::new(0.0, 0.0);
+    if let Some(step) = law.step() {
+        let mut point = StepPoint::new(d, step.states());
+        let rest = [0.0; MOST_DIRECTIONS];
+        step.linearise(d, &rest, &rest, &vec![0.0; step.states()], &mut point);
+        return DMatrix::from_fn(d, d, |a, b| Complex64::new(point.force_slope(a)[d + b], 0.0));
+    }
+    let Some(rate) = law.rate() else { return DMatrix::from_element(d, d, zero) };
+    let states = rate.states();
+    let mut point = RatePoint::new(d, states);
+    let rest = [0.0; MOST_DIRECTIONS];
+    rate.linearise(d, &Relative { displacement: rest, velocity: rest }, &vec![0.0; states], &mut point);
+    let s = Complex64::new(0.0, omega);
+    let by_motion = |slope: &[f64], b: usize| s * slope[d + b] + slope[b];
+    // s z = g_u u + g_v s u + g_z z
+    let matrix =
+        DMatrix::from_fn(states, states, |i, k| (if i == k { s } else { zero }) - point.rate_slope(i)[2 * d + k]);
+    let right = DMatrix::from_fn(states, d, |i, b| by_motion(point.rate_slope(i), b));
+    let z = if states > 0 { matrix.lu().solve(&right) } else { None };
+    DMatrix::from_fn(d, d, |a, b| {
+        let slope = point.force_slope(a);
+        let kept: Complex64 = z.iter().flat_map(|z| (0..states).map(|i| z[(i, b)] * slope[2 * d + i])).sum();
+        by_motion(slope, b) + kept
+    })
 }
 
 impl Guess {
@@ -23,24 +69,18 @@ impl Guess {
         let n = system.dofs();
         let excitation = system.excitation(omega);
         let mut harmonics: Vec<u32> = excitation.iter().map(|(h, _)| *h).collect();
-        harmonics.extend(
-            system
-                .joints()
-                .iter()
-                .flat_map(|joint| joint.axes().iter().flat_map(|axis| axis.imposed()).map(|(h, _)| *h)),
-        );
+        harmonics.extend(system.axes().flat_map(|(_, axis)| axis.imposed()).map(|(h, _)| *h));
         harmonics.sort_unstable();
         harmonics.dedup();
         let mut amplitudes = vec![f64::INFINITY; system.joints().len()];
-        let mut guess = Guess { harmonics: Vec::new(), joints: vec![Complex64::new(0.0, 0.0); system.joints().len()] };
+        let none = |d: usize| DMatrix::from_element(d, d, Complex64::new(0.0, 0.0));
+        let mut guess = Guess { harmonics: Vec::new(), joints: Vec::new() };
         for _ in 0..ROUNDS {
-            guess.joints = system
-                .joints()
-                .iter()
-                .zip(&amplitudes)
+            let joints = system.joints().iter().zip(&amplitudes);
+            guess.joints = joints
                 .map(
                     |(joint, &a)| {
-                        if a.is_finite() { joint.law().linearised(a, omega) } else { Complex64::new(0.0, 0.0) }
+                        if a.is_finite() { linearised(&**joint.law(), a, omega) } else { none(joint.axes().len()) }
                     },
                 )
                 .collect();
@@ -61,8 +101,8 @@ impl Guess {
                     .zip(&guess.harmonics)
                     .filter(|(h, _)| **h > 0)
                     .map(|(h, (_, x))| {
-                        let u: Complex64 = joint.axes()[0].along_complex(&x);
-                        (u + joint.axes()[0].imposed_at(*h)).norm()
+                        let along = joint.axes().iter().map(|axis| axis.along_complex(x) + axis.imposed_at(*h));
+                        along.map(|u| u.norm_sqr()).sum::<f64>().sqrt()
                     })
                     .sum();
                 let old = amplitudes[j];
@@ -87,13 +127,17 @@ impl Guess {
                 + s * system.structure().damping()[(i, k)]
                 + system.structure().stiffness()[(i, k)]
         });
-        for (joint, &kappa) in system.joints().iter().zip(&self.joints) {
-            let w = joint.axes()[0].dense(n);
-            let g = joint.axes()[0].imposed_at(h);
-            for i in 0..n {
-                force[i] -= kappa * g * w[i];
-                for k in 0..n {
-                    dynamic[(i, k)] += kappa * (w[i] * w[k]);
+        for (joint, stiffness) in system.joints().iter().zip(&self.joints) {
+            for (a, to) in joint.axes().iter().enumerate() {
+                for (b, from) in joint.axes().iter().enumerate() {
+                    let kappa = stiffness[(a, b)];
+                    let g = from.imposed_at(h);
+                    for &(i, w) in to.rows() {
+                        force[i] -= kappa * g * w;
+                        for &(k, v) in from.rows() {
+                            dynamic[(i, k)] += kappa * (w * v);
+                        }
+                    }
                 }
             }
         }

@@ -266,6 +266,16 @@ pub enum OrbitError {
         /// Drive frequency, rad/s.
         omega: f64,
     },
+    /// A path that a method gave is no periodic motion.
+    #[error("the motion of {method} at Ω = {omega:.4} rad/s {what}")]
+    NotAnOrbit {
+        /// The method.
+        method: &'static str,
+        /// Drive frequency, rad/s.
+        omega: f64,
+        /// What is wrong.
+        what: &'static str,
+    },
     /// The drive frequency is no positive finite number.
     #[error("the drive frequency must be positive and finite, found {omega} rad/s")]
     Frequency {
@@ -283,6 +293,7 @@ impl OrbitError {
             OrbitError::Evidence { .. } => "evidence-fails",
             OrbitError::Truncation { .. } => "tolerance-not-reached",
             OrbitError::Drift { .. } => "drifts",
+            OrbitError::NotAnOrbit { .. } => "not-an-orbit",
             OrbitError::Frequency { .. } => "bad-frequency",
         }
     }

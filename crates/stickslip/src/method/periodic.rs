@@ -225,7 +225,7 @@ fn evaluate(
 }
 
 /// `-(I - sign · R')⁻¹ gap`; of least energy norm where the matrix is singular.
-fn newton_step(derivative: &DMatrix<f64>, gap: &DVector<f64>, sign: f64, weights: &[f64]) -> DVector<f64> {
+pub(crate) fn newton_step(derivative: &DMatrix<f64>, gap: &DVector<f64>, sign: f64, weights: &[f64]) -> DVector<f64> {
     let n = gap.len();
     // in energy coordinates, so that singular values and the least norm mean something
     let scaled = DMatrix::from_fn(n, n, |i, j| {

@@ -9,7 +9,7 @@ use super::event_driven::MISSING_WORK;
 use super::flow::{Flow, Kind};
 use super::guess::Guess;
 use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
-use super::periodic::{Aim, Closed, ReturnMap, Search, close, norm};
+use super::periodic::{Aim, Closed, ReturnMap, Search, close, newton_step, norm};
 use super::smooth::flow::SmoothFlow;
 use super::stepped::SteppedPath;
 use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, periods};
@@ -17,13 +17,15 @@ use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::measure::measure;
 use crate::orbit::{Accuracy, Evidence, Orbit, Symmetry};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
 const NAME: &str = "shooting";
 
 /// Relative error per step when none is given: orbits of the paper's couple are then within 1e-7 (see the verification tests).
 const TOLERANCE: f64 = 1e-8;
+/// A step with the derivative of that search leaves at most this share of what the one before moved.
+const CLOSER: f64 = 0.3;
 /// Residual of the first search, in which every run chooses its steps anew: the map is then smooth only to about their error.
 const NEAR: f64 = 1e-6;
 /// Residual at which the orbit is closed on the steps of the last free run, on which the map is smooth.
@@ -150,6 +152,7 @@ pub(super) struct Shooter<'a> {
     tolerance: f64,
     stepping: Stepping,
     weights: Vec<f64>,
+    omega: f64,
     duration: f64,
     contracts: bool,
 }
@@ -185,6 +188,7 @@ impl<'a> Shooter<'a> {
             tolerance: options.tolerance,
             weights: vec![1.0; stepping.assembly().states()],
             stepping,
+            omega: 0.0,
             duration: 0.0,
             // smooth neighbours are passive where the exact laws are
             contracts: system.contracts(),
@@ -216,28 +220,80 @@ impl<'a> Shooter<'a> {
         move |cause| OrbitError::Breakdown { method, omega, cause }
     }
 
-    /// The orbit of the stiff integration: searched with steps that every run chooses anew, then closed on the steps of one run.
+    /// The orbit of the stiff integration: searched, brought near, and closed on the steps of one run.
     fn smooth_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
-        self.freeze(false);
         let search = self.search;
-        let mut closed = search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
-        // steps made for a state close the orbit only as well as they fit it: make them anew until that moves it no more;
-        // a settled motion is left as it is: nothing but time has found it
-        let meshes = if self.search == Search::Newton { MESHES } else { 0 };
-        for _ in 0..meshes {
-            self.freeze(false);
-            self.returned(&mut closed.state.clone(), None).map_err(self.broke(aim.omega))?;
-            self.freeze(true);
-            let again = close(self, &closed.state, Aim { residual: CLOSED, ..aim })?;
-            let moved: Vec<f64> = again.state.iter().zip(&closed.state).map(|(a, b)| a - b).collect();
-            let size = norm(&self.weights, &again.state).max(aim.rest).max(f64::MIN_POSITIVE);
-            let settled = norm(&self.weights, &moved) <= SETTLED * self.tolerance * size;
-            closed = Closed { iterations: closed.iterations + again.iterations, ..again };
-            if settled {
-                break;
-            }
+        self.freeze(false);
+        if search != Search::Newton {
+            // a settled motion is left as it is: nothing but time has found it
+            let closed = search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
+            self.record(&closed)?;
+            return Ok(closed);
         }
-        Ok(closed)
+        let near = search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
+        let mut iterations = near.iterations;
+        let (mut state, mut fits) = match self.brought_near(&near, aim, &mut iterations) {
+            Some(state) => (state, true),
+            None => (near.state, false),
+        };
+        // steps made for a state close the orbit only as well as they fit it: make them anew until that moves it no more
+        let mut mesh = 0;
+        loop {
+            mesh += 1;
+            if !fits {
+                self.freeze(false);
+                self.returned(&mut state.clone(), None).map_err(self.broke(aim.omega))?;
+            }
+            self.freeze(true);
+            self.stepping.flow().keep(true);
+            let closed = close(self, &state, Aim { residual: CLOSED, ..aim });
+            self.stepping.flow().keep(false);
+            let closed = closed?;
+            iterations += closed.iterations;
+            let moved: Vec<f64> = closed.state.iter().zip(&state).map(|(a, b)| a - b).collect();
+            if norm(&self.weights, &moved) <= SETTLED * self.tolerance * self.size(&closed.state, aim) || mesh == MESHES
+            {
+                // the last run of the iteration was that of the closed state
+                return Ok(Closed { iterations, ..closed });
+            }
+            (state, fits) = (closed.state, false);
+        }
+    }
+
+    /// From the orbit that the search has found to a state for which the steps of the last run were made, with the derivative of the search and
+    /// runs that carry none; `None` if that does not come closer.
+    fn brought_near(&mut self, near: &Closed, aim: Aim, iterations: &mut usize) -> Option<Vec<f64>> {
+        let (mut state, mut before) = (near.state.clone(), f64::INFINITY);
+        for _ in 0..MESHES {
+            *iterations += 1;
+            let mut end = state.clone();
+            self.returned(&mut end, None).ok()?;
+            let gap = DVector::from_fn(state.len(), |i, _| state[i] - aim.sign * end[i]);
+            let step = newton_step(&near.derivative, &gap, aim.sign, &self.weights);
+            state.iter_mut().zip(step.iter()).for_each(|(z, d)| *z += d);
+            let moved = norm(&self.weights, step.as_slice()) / self.size(&state, aim);
+            if moved <= SETTLED * self.tolerance {
+                return Some(state);
+            }
+            if moved.is_nan() || moved > CLOSER * before {
+                return None;
+            }
+            before = moved;
+        }
+        None
+    }
+
+    /// Energy norm of a state, or of rest.
+    fn size(&self, state: &[f64], aim: Aim) -> f64 {
+        norm(&self.weights, state).max(aim.rest).max(f64::MIN_POSITIVE)
+    }
+
+    /// Runs from a closed state and keeps the motion.
+    fn record(&mut self, closed: &Closed) -> Result<(), OrbitError> {
+        self.stepping.flow().keep(true);
+        let kept = self.returned(&mut closed.state.clone(), None);
+        self.stepping.flow().keep(false);
+        kept.map_err(self.broke(self.omega))
     }
 
     fn freeze(&mut self, frozen: bool) {
@@ -273,7 +329,9 @@ impl<'a> Shooter<'a> {
             let iterations = coarse.iterations + fine.iterations;
             if error <= tolerance {
                 let missing = Some(error.max(fine.missing.unwrap_or(0.0)));
-                return Ok(Closed { iterations, missing, ..fine });
+                let closed = Closed { iterations, missing, ..fine };
+                self.record(&closed)?;
+                return Ok(closed);
             }
             if count >= MOST {
                 let cause = Breakdown::Unresolved { steps: count, estimate: error, tolerance };
@@ -326,6 +384,7 @@ impl Solver for Shooter<'_> {
         flow.keep(false);
         let symmetry = Symmetry::of(self.system, self.periods);
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
+        self.omega = omega;
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
         let aim = Aim { method: self.name, omega, residual: NEAR, sign, rest };
         let approached;
@@ -342,10 +401,6 @@ impl Solver for Shooter<'_> {
             Stepping::Smooth(_) => self.smooth_orbit(start, aim)?,
             Stepping::Incremental(_) => self.stepped_orbit(start, aim)?,
         };
-        self.stepping.flow().keep(true);
-        let kept = self.returned(&mut closed.state.clone(), None);
-        self.stepping.flow().keep(false);
-        kept.map_err(self.broke(omega))?;
         let orbit = self.orbit_of(omega, symmetry, closed);
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {

@@ -4,15 +4,12 @@ use super::assembly::Assembly;
 use super::drive::Drive;
 use crate::law::{Contact, Relative};
 use crate::model::System;
-use crate::orbit::measure::Signals;
+use crate::orbit::measure::{Signals, extremes};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
 use num_complex::Complex64;
 use std::convert::Infallible;
 use std::sync::Arc;
 use stickslip_numerics::radau::quintic;
-
-/// Turning points are refined until the step in time is below this fraction of the integration step.
-const REFINED: f64 = 1e-12;
 
 /// The record of a run: the state at instants, and values at the nodes of a quadrature between them.
 #[derive(Debug, Clone, Default)]
@@ -112,24 +109,11 @@ impl SteppedPath {
     }
 
     /// Least and largest value over all steps, each a quintic between its ends.
-    fn extremes(&self, ends: impl Fn(usize) -> [[f64; 3]; 2]) -> (f64, f64) {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (step, (_, length)) in self.steps.spans.iter().enumerate() {
+    fn range_of(&self, ends: impl Fn(usize) -> [[f64; 3]; 2]) -> (f64, f64) {
+        extremes(self.steps.spans.iter().enumerate().map(|(step, (_, length))| {
             let [from, to] = ends(step);
-            let mut take = |value: f64| (low, high) = (low.min(value), high.max(value));
-            take(from[0]);
-            take(to[0]);
-            if from[1] * to[1] < 0.0 {
-                // one turning point inside: bisection on the velocity
-                let (mut left, mut right) = (0.0, 1.0);
-                while right - left > REFINED {
-                    let middle = 0.5 * (left + right);
-                    if quintic(middle, *length, from, to).1 * from[1] > 0.0 { left = middle } else { right = middle }
-                }
-                take(quintic(0.5 * (left + right), *length, from, to).0);
-            }
-        }
-        (low, high)
+            (*length, from, to)
+        }))
     }
 
     /// Force along an axis at `s` in [0, 1] of a step: the polynomial through its values at the step's start and at the nodes.
@@ -290,10 +274,10 @@ impl Signals for SteppedPath {
         signal.iter().enumerate().map(term).sum()
     }
     fn range(&self, row: usize) -> Result<(f64, f64), Infallible> {
-        Ok(self.extremes(|step| self.ends(step, row)))
+        Ok(self.range_of(|step| self.ends(step, row)))
     }
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
-        Ok(self.extremes(|step| self.relative_ends(step, axis)))
+        Ok(self.range_of(|step| self.relative_ends(step, axis)))
     }
     fn slip(&self, joint: usize) -> (f64, usize) {
         let slips = |(i, node): (usize, &Node)| {

@@ -68,7 +68,7 @@ pub fn is_identifier(name: &str) -> bool {
 }
 
 /// Whether `name` is an identifier, or a node and a direction of it, `node.direction`.
-fn is_place(name: &str) -> bool {
+pub fn is_place(name: &str) -> bool {
     name.split_once('.')
         .map_or_else(|| is_identifier(name), |(node, along)| is_identifier(node) && is_identifier(along))
 }

@@ -8,7 +8,7 @@ pub mod example;
 mod survey;
 mod system;
 
-pub use assemble::{Element, ModelError, is_identifier};
+pub use assemble::{Element, ModelError, is_identifier, is_place};
 pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey};
 pub use system::{Axis, Load, MovedPlace, System, SystemBuilder, SystemError, SystemJoint};
 

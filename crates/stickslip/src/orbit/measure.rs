@@ -6,6 +6,7 @@
 use super::{Energy, JointMotion, PlaceMotion, Symmetry};
 use crate::model::System;
 use num_complex::Complex64;
+use stickslip_numerics::radau::quintic;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -182,6 +183,29 @@ fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Sig
         }
     }
     ((work, viscous), possible)
+}
+
+/// Turning points are refined until the step in time is below this fraction of the interval.
+const REFINED: f64 = 1e-12;
+
+/// Least and largest value of a signal over intervals: their length, with value, slope and curvature at both ends, between which it is a quintic.
+pub(crate) fn extremes(spans: impl Iterator<Item = (f64, [f64; 3], [f64; 3])>) -> (f64, f64) {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for (length, from, to) in spans {
+        let mut take = |value: f64| (low, high) = (low.min(value), high.max(value));
+        take(from[0]);
+        take(to[0]);
+        if from[1] * to[1] < 0.0 {
+            // one turning point inside: bisection on the velocity
+            let (mut left, mut right) = (0.0, 1.0);
+            while right - left > REFINED {
+                let middle = 0.5 * (left + right);
+                if quintic(middle, length, from, to).1 * from[1] > 0.0 { left = middle } else { right = middle }
+            }
+            take(quintic(0.5 * (left + right), length, from, to).0);
+        }
+    }
+    (low, high)
 }
 
 /// Work below this fraction of what the loads could do is no yardstick for the energy gap: the motion is conservative.

@@ -4,10 +4,12 @@
 //! closed form where it can; [`Orbit::sample`] gives the motion at any time.
 
 pub(crate) mod measure;
+mod sampled;
 mod stability;
 
 pub use crate::law::Contact;
 use crate::law::MOST_DIRECTIONS;
+use crate::method::OrbitError;
 use crate::model::System;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -198,8 +200,8 @@ impl JointSample {
     }
 }
 
-/// A motion that can be evaluated at any time of its period.
-pub(crate) trait Path: Send + Sync {
+/// A motion that can be evaluated at any time of its period; with [`Orbit::new`] the motion of a method from elsewhere becomes an orbit.
+pub trait Path: Send + Sync {
     /// The state at `time` in `[0, T)`.
     fn sample(&self, time: f64) -> Sample;
     /// The instants at which something switches, in `[0, T)`, rising.
@@ -210,7 +212,146 @@ pub(crate) trait Path: Send + Sync {
     }
 }
 
+/// What a method says of an orbit beside its path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Drive frequency Ω, rad/s.
+    pub omega: f64,
+    /// Periods of the drive after which the motion repeats.
+    pub periods: usize,
+    /// Which return it was closed on.
+    pub symmetry: Symmetry,
+    /// State at t = 0: displacements (m), velocities (m/s), then the states of the joints.
+    pub start: Vec<f64>,
+    /// Residual of the method's equations, relative.
+    pub residual: f64,
+    /// Iterations of the method.
+    pub iterations: usize,
+    /// Estimated relative error of the amplitudes, if there is an estimate.
+    pub truncation: Option<f64>,
+    /// Whether that is as little as was asked for.
+    pub accuracy: Accuracy,
+}
+
+/// Difference of displacements, relative to their size, and of velocities, relative to it times Ω, by which the ends of a period, or the start and
+/// the path, may differ: a series of a few harmonics is no more accurate.
+const CLOSES: f64 = 1e-3;
+/// How far before the end of the period it is looked at, as a share of it.
+const BEFORE: f64 = 1e-9;
+/// Energy gap above which a motion is no orbit of the system at all.
+const LARGEST_GAP: f64 = 0.1;
+
 impl Orbit {
+    /// Makes an orbit of a path. All its numbers are measured from samples of the path, so that they are evidence about it.
+    ///
+    /// # Errors
+    /// [`OrbitError::NotAnOrbit`] if the path does not fit the system, does not close, or does not begin at `start`;
+    /// [`OrbitError::Evidence`] if its energies are out of balance by a tenth.
+    ///
+    /// # Example
+    /// An oscillator without joints, whose motion is known.
+    /// ```
+    /// use nalgebra::dmatrix;
+    /// use num_complex::Complex64;
+    /// use std::sync::Arc;
+    /// use stickslip::model::System;
+    /// use stickslip::orbit::{Accuracy, Found, Orbit, Path, Sample, Symmetry};
+    /// use stickslip::structure::Structure;
+    ///
+    /// struct Harmonic { x: Complex64, omega: f64 }
+    ///
+    /// impl Path for Harmonic {
+    ///     fn sample(&self, time: f64) -> Sample {
+    ///         let (x, s) = (self.x * Complex64::cis(self.omega * time), Complex64::new(0.0, self.omega));
+    ///         let [displacement, velocity, acceleration] = [x, s * x, s * s * x].map(|z| vec![z.re]);
+    ///         Sample { displacement, velocity, acceleration, joints: Vec::new(), moved: Vec::new() }
+    ///     }
+    ///     fn switch_times(&self) -> Vec<f64> {
+    ///         Vec::new()
+    ///     }
+    /// }
+    ///
+    /// let structure = Structure::new(vec!["m".into()], dmatrix![1.0], dmatrix![0.1], dmatrix![4.0]).unwrap();
+    /// let system = System::builder(structure).force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap();
+    /// let omega = 1.5;
+    /// let x = 1.0 / Complex64::new(4.0 - omega * omega, 0.1 * omega);
+    /// let found = |x: Complex64| Found {
+    ///     method: "by hand", omega, periods: 1, symmetry: Symmetry::HalfPeriod,
+    ///     start: vec![x.re, -omega * x.im], residual: 0.0, iterations: 1, truncation: None, accuracy: Accuracy::Converged,
+    /// };
+    /// let orbit = Orbit::new(&system, Arc::new(Harmonic { x, omega }), found(x)).unwrap();
+    /// assert!((orbit.places[0].amplitude() - x.norm()).abs() < 1e-9);
+    /// assert!(orbit.evidence.energy_gap < 1e-9);
+    /// // a motion that is none of the system
+    /// let wrong = Harmonic { x: 2.0 * x, omega };
+    /// assert!(Orbit::new(&system, Arc::new(wrong), found(2.0 * x)).is_err());
+    /// ```
+    pub fn new(system: &System, path: Arc<dyn Path>, found: Found) -> Result<Orbit, OrbitError> {
+        let Found { method, omega, periods, symmetry, start, residual, iterations, truncation, accuracy } = found;
+        if !(omega.is_finite() && omega > 0.0) {
+            return Err(OrbitError::Frequency { omega });
+        }
+        let wrong = |what| OrbitError::NotAnOrbit { method, omega, what };
+        let (n, period) = (system.dofs(), periods as f64 * std::f64::consts::TAU / omega);
+        if periods == 0 {
+            return Err(wrong("takes no period: `periods` counts from 1"));
+        }
+        if start.len() < 2 * n || !start.iter().all(|z| z.is_finite()) {
+            return Err(wrong("has no start of displacements and velocities of all places"));
+        }
+        let sampled = sampled::Sampled::new(system, path.as_ref(), omega, period);
+        if !sampled.fits() {
+            return Err(wrong("has samples that do not fit the places and joints, or are not finite"));
+        }
+        let Ok(measured) = measure::measure(system, &sampled, omega, (Symmetry::FullPeriod, period));
+        let size = measured.places.iter().map(|place| place.maximum.abs().max(place.minimum.abs())).fold(0.0, f64::max);
+        let apart =
+            |a: &[f64], sign: f64, b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - sign * b).abs() > CLOSES * size);
+        let rated = |sample: Sample| -> Vec<f64> {
+            sample.displacement.into_iter().chain(sample.velocity.into_iter().map(|v| v / omega)).collect()
+        };
+        let begin = rated(path.sample(0.0));
+        let stated: Vec<f64> = (0..2 * n).map(|i| if i < n { start[i] } else { start[i] / omega }).collect();
+        if apart(&begin, 1.0, &stated) {
+            return Err(wrong("does not begin at its start"));
+        }
+        if apart(&begin, 1.0, &rated(path.sample(period * (1.0 - BEFORE)))) {
+            return Err(wrong("does not return to its start after its period"));
+        }
+        if symmetry == Symmetry::HalfPeriod && apart(&begin, -1.0, &rated(path.sample(0.5 * period))) {
+            return Err(wrong("is not mirrored after half of its period"));
+        }
+        let energy_gap = measured.energy_gap();
+        if energy_gap > LARGEST_GAP {
+            return Err(OrbitError::Evidence { method, omega, energy_gap });
+        }
+        Ok(Orbit {
+            method,
+            omega,
+            periods,
+            symmetry,
+            start,
+            evidence: Evidence {
+                residual,
+                energy_gap,
+                switches: measured.joints.iter().map(|joint| joint.switches).sum(),
+                iterations,
+                truncation,
+                accuracy,
+                return_defect: None,
+                stuck: measured.stuck,
+            },
+            places: measured.places,
+            joints: measured.joints,
+            energy: measured.energy,
+            return_map: DMatrix::zeros(0, 0),
+            contracts: system.contracts(),
+            path,
+        })
+    }
+
     /// Period of the motion: as many periods `2π/Ω` of the drive as [`Orbit::periods`] says, s.
     pub fn period(&self) -> f64 {
         self.periods as f64 * std::f64::consts::TAU / self.omega

@@ -4,7 +4,6 @@
 //! laws of velocity, ω, ζ and `ln a`; the arc length between two points is measured by [`ModeEquations::weigh`].
 //! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods" (2003), Ch. 6.
 
-use super::joints::Element;
 use super::mode::{ITERATIONS, ModeEquations, ModeState, ROUNDED, SOLVED};
 use super::solve::{GROWS, HALVINGS, SHORTENS};
 use num_complex::Complex64;
@@ -140,15 +139,13 @@ impl ModeEquations<'_> {
                 }
             }
         }
-        for coordinate in &self.elastic {
-            let Element::Springs(springs) = &coordinate.element else { continue };
-            let w = self.system.joints()[coordinate.joint].axes()[0].dense(self.system.dofs());
+        for (placed, w) in self.elastic.iter().flat_map(|placed| placed.w.iter().map(move |w| (placed, w))) {
             let along =
                 |k: usize, value: &dyn Fn(usize) -> f64| -> f64 { (0..n).map(|i| w[i] * value(k * n + i)).sum() };
             let square: f64 = (0..nh)
                 .map(|k| along(k, &|i| at.state.x[i].re).powi(2) + along(k, &|i| at.state.x[i].im).powi(2))
                 .sum();
-            let reach: f64 = springs.iter().map(|spring| spring.limit / spring.stiffness).fold(0.0, f64::max);
+            let reach = placed.port.reach();
             let size = square + reach * reach + (SMALL * at.amplitude).powi(2);
             let weight = at.amplitude * at.amplitude / size;
             for k in 0..nh {
@@ -160,10 +157,10 @@ impl ModeEquations<'_> {
                 }
             }
         }
-        for (q, contact) in self.contacts.iter().enumerate() {
-            let first = 2 * nh * (n + q);
-            for i in first..first + 2 * nh {
-                out[i] = direction[i] / (contact.law.limit * contact.law.limit);
+        for placed in &self.contacts {
+            let first = 2 * nh * (n + placed.port.first);
+            for i in first..first + 2 * nh * placed.port.axes {
+                out[i] = direction[i] / (placed.port.scale * placed.port.scale);
             }
         }
         let (omega, zeta) = (at.state.omega, 1.0 + at.state.damping.abs());

@@ -1,7 +1,7 @@
 //! The equations of harmonic balance with a parameter, for continuation.
 
 use super::equations::{Level, Motion, transfer};
-use super::joints::Coordinate;
+use super::ports::Ports;
 use super::rest::Rest;
 use super::{Compared, HarmonicBalance, Kept, LARGEST, TOLERANCE, estimate, path};
 use crate::method::evidence::Judge;
@@ -30,7 +30,7 @@ pub(crate) struct BranchEquations<'a> {
     omega: f64,
     value: f64,
     span: f64,
-    coordinates: Vec<Coordinate>,
+    ports: Ports,
     rest: Rest,
     rest_of: System,
     level: Level,
@@ -56,12 +56,12 @@ impl<'a> BranchEquations<'a> {
         let kept = Kept::new(&system, |_| true);
         method.check(kept.highest)?;
         let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
-        let coordinates = super::joints::coordinates(&system)?;
-        let rest = Rest::new(&system, &coordinates);
+        let ports = Ports::new(&system)?;
+        let rest = Rest::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
-        let level = |top: usize| Level::new(kept.up_to(top), method.samples_at(top), coordinates.len(), None);
-        super::check_size(2 * coordinates.len() * kept.up_to(top).len())?;
-        let few = 2 * coordinates.len() * kept.up_to(kept.double(top)).len() <= LARGEST;
+        let level = |top: usize| Level::new(kept.up_to(top), method.samples_at(top), &ports, None);
+        super::check_size(2 * ports.count() * kept.up_to(top).len())?;
+        let few = 2 * ports.count() * kept.up_to(kept.double(top)).len() <= LARGEST;
         let (finer, level) = (few.then(|| level(kept.double(top))), level(top));
         let motion = Motion::rest(level.linear.len());
         Ok(BranchEquations {
@@ -72,7 +72,7 @@ impl<'a> BranchEquations<'a> {
             omega,
             value: f64::NAN,
             span: (range.1 - range.0).abs(),
-            coordinates,
+            ports,
             rest,
             level,
             finer,
@@ -90,16 +90,13 @@ impl<'a> BranchEquations<'a> {
             return true;
         }
         let (system, omega) = (self.at)(value);
-        let same_place = |a: &Coordinate, b: &Coordinate| {
-            a.joint == b.joint && std::mem::discriminant(&a.element) == std::mem::discriminant(&b.element)
-        };
-        match super::joints::coordinates(&system) {
+        match Ports::new(&system) {
             Ok(found)
                 if omega > 0.0
-                    && found.len() == self.coordinates.len()
-                    && found.iter().zip(&self.coordinates).all(|(a, b)| same_place(a, b)) =>
+                    && found.len() == self.ports.len()
+                    && found.iter().zip(self.ports.iter()).all(|(a, b)| a.is_like(b)) =>
             {
-                self.coordinates = found;
+                self.ports = found;
             }
             _ => return false,
         }
@@ -107,10 +104,10 @@ impl<'a> BranchEquations<'a> {
             && system.structure().damping() == self.rest_of.structure().damping()
             && system.structure().stiffness() == self.rest_of.structure().stiffness();
         if !same {
-            self.rest = Rest::new(&system, &self.coordinates);
+            self.rest = Rest::new(&system, &self.ports);
             self.rest_of = system.clone();
         }
-        self.level.drive(&system, &self.coordinates, &self.rest, omega);
+        self.level.drive(&system, &self.ports, &self.rest, omega);
         if !same || self.system.joints() != system.joints() {
             self.judge = Judge::new(&system);
         }
@@ -128,13 +125,13 @@ impl<'a> BranchEquations<'a> {
             return Err(OrbitError::Frequency { omega: self.omega });
         }
         let guess = Guess::new(&self.system, self.omega);
-        let start = self.level.begin(&self.system, &self.coordinates, Some(&guess), self.omega);
-        let solved = self.level.solve(&self.coordinates, self.omega, start);
+        let start = self.level.begin(&self.system, &self.ports, Some(&guess), self.omega);
+        let solved = self.level.solve(&self.ports, self.omega, start);
         self.motion = solved.map_err(|lost| self.lost(lost.iterations, lost.residual))?;
         let norm = |c: &[Complex64]| c.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
         let size = norm(&self.motion.c).max(1e-3 * norm(&self.level.linear));
         self.length = (RESONANCE * size).max(f64::MIN_POSITIVE);
-        Ok(self.level.pack(&self.coordinates, &self.motion, self.length))
+        Ok(self.level.pack(&self.ports, &self.motion, self.length))
     }
 
     /// The orbit of a point of the branch.
@@ -142,29 +139,29 @@ impl<'a> BranchEquations<'a> {
         if !self.set(value) {
             return None;
         }
-        self.level.unpack(&self.coordinates, (x, self.length), &mut self.motion);
-        self.level.polish(&self.coordinates, self.omega, &mut self.motion, 10).ok()?;
+        self.level.unpack(&self.ports, (x, self.length), &mut self.motion);
+        self.level.polish(&self.ports, self.omega, &mut self.motion, 10).ok()?;
         let places = path::places(&mut self.level, &self.rest, self.omega, &self.motion);
         let truncation = self.finer.as_mut().and_then(|finer| {
-            finer.drive(&self.system, &self.coordinates, &self.rest, self.omega);
-            let mut motion = transfer(&self.motion, self.level.harmonics(), finer.harmonics(), self.coordinates.len());
+            finer.drive(&self.system, &self.ports, &self.rest, self.omega);
+            let mut motion = transfer(&self.motion, self.level.harmonics(), finer.harmonics());
             // Newton's method alone: a search would find another branch where this one turns
-            finer.polish(&self.coordinates, self.omega, &mut motion, CHECK).ok()?;
+            finer.polish(&self.ports, self.omega, &mut motion, CHECK).ok()?;
             let better = path::places(finer, &self.rest, self.omega, &motion);
             let coarse = Compared { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
             let at = (self.kept, self.omega);
-            Some(estimate(&self.coordinates, &self.rest, at, &coarse, (finer, &motion, &better)))
+            Some(estimate(&self.ports, &self.rest, at, &coarse, (finer, &motion, &better)))
         });
         let context = path::Context {
             system: &self.system,
-            coordinates: &self.coordinates,
+            ports: &self.ports,
             omega: self.omega,
             odd: self.kept.half_period(),
             truncation,
             tolerance: self.tolerance,
             judge: Some(&mut self.judge),
         };
-        path::orbit(context, &mut self.level, &self.motion, places)
+        path::orbit(context, &mut self.level, &self.motion, places).filter(|orbit| path::balances(&self.system, orbit))
     }
 
     /// The orbit at `value` that Newton's method finds from the point `x` nearby.
@@ -192,7 +189,7 @@ impl Equations for BranchEquations<'_> {
             if !self.set(at) {
                 return false;
             }
-            self.level.residual_at(&self.coordinates, self.omega, (x, self.length), &mut self.motion, f, None);
+            self.level.residual_at(&self.ports, self.omega, (x, self.length), &mut self.motion, f, None);
             for (d, r) in by_p.iter_mut().zip(f.iter()) {
                 *d = if sign > 0.0 { *r } else { (*d - *r) / (2.0 * step) };
             }
@@ -200,7 +197,7 @@ impl Equations for BranchEquations<'_> {
         if !self.set(p) {
             return false;
         }
-        self.level.residual_at(&self.coordinates, self.omega, (x, self.length), &mut self.motion, f, Some(by_x));
+        self.level.residual_at(&self.ports, self.omega, (x, self.length), &mut self.motion, f, Some(by_x));
         true
     }
 
@@ -209,10 +206,10 @@ impl Equations for BranchEquations<'_> {
             return false;
         }
         let mut start = self.motion.clone();
-        self.level.unpack(&self.coordinates, (x, self.length), &mut start);
-        let Ok(motion) = self.level.solve(&self.coordinates, self.omega, start) else { return false };
+        self.level.unpack(&self.ports, (x, self.length), &mut start);
+        let Ok(motion) = self.level.solve(&self.ports, self.omega, start) else { return false };
         self.motion = motion;
-        x.copy_from_slice(&self.level.pack(&self.coordinates, &self.motion, self.length));
+        x.copy_from_slice(&self.level.pack(&self.ports, &self.motion, self.length));
         true
     }
 }

@@ -1,6 +1,6 @@
 //! Harmonic balance: the orbit as a Fourier series, friction sampled over the period.
 //!
-//! - `joints`: from the harmonics of relative motions to those of friction forces, with the exact derivative;
+//! - `ports`: from the harmonics of relative motions to those of the laws' forces, with the exact derivative;
 //! - `rest`: the receptance of the linear rest, in closed form from its modes;
 //! - `equations`: those along the joints, and their derivative;
 //! - `solve`: Newton's method on them;
@@ -14,9 +14,9 @@
 mod arc;
 mod branch;
 mod equations;
-mod joints;
 mod mode;
 mod path;
+mod ports;
 mod rest;
 mod solve;
 mod sparse;
@@ -30,10 +30,10 @@ use crate::orbit::Orbit;
 pub(crate) use arc::ModeArc;
 pub(crate) use branch::BranchEquations;
 use equations::{Level, Motion};
-use joints::{Coordinate, Element};
 pub(crate) use mode::{LinearMode, ModeEquations, ModeState};
 use nalgebra::DVector;
 use num_complex::Complex64;
+use ports::Ports;
 use rest::Rest;
 use solve::Lost;
 use sparse::Sparse;
@@ -91,7 +91,8 @@ const COLD: usize = 15;
 /// doubling leaves four tenths of the error, between order 1 (one half) and 3/2 (a third): both are observed. Without rigid friction
 /// it leaves next to nothing.
 const RIGID_SHARE: f64 = 1.7;
-/// Samples per period, at least, and per harmonic: the force of a slider is then placed to 1e-6 of the period.
+/// Samples per period, at least, and per harmonic. Sliders and stops need them to tell turning points apart only; sampled laws have errors of
+/// about 1e-6 of their force.
 const SAMPLES: usize = 1024;
 const SAMPLES_PER_HARMONIC: usize = 16;
 
@@ -182,20 +183,18 @@ impl Method for HarmonicBalance {
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         let kept = Kept::new(system, |z| z != Complex64::new(0.0, 0.0));
         self.check(kept.highest)?;
-        let coordinates = joints::coordinates(system)?;
-        let rest = Rest::new(system, &coordinates);
-        let velocity = coordinates.iter().any(|c| matches!(c.element, Element::Velocity(_)));
+        let ports = Ports::new(system)?;
+        let rest = Rest::new(system, &ports);
         let first = (FIRST * kept.unit).max(kept.highest);
         let harmonics = kept.up_to(self.harmonics.unwrap_or(first));
-        if Sparse::new(system, &coordinates, &[1]).is_none() {
-            check_size(2 * coordinates.len() * harmonics.len())?;
+        if Sparse::new(system, &ports, &[1]).is_none() {
+            check_size(2 * ports.count() * harmonics.len())?;
         }
         Ok(Box::new(Balance {
             system,
             method: *self,
-            coordinates,
+            ports,
             rest,
-            velocity,
             kept,
             first,
             judge: Judge::new(system),
@@ -250,7 +249,7 @@ fn common_divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { common_divisor(b, a % b) }
 }
 
-/// A motion for the comparison with a finer one: its harmonics and, per harmonic, the motions of the places and of the coordinates.
+/// A motion for the comparison with a finer one: its harmonics and, per harmonic, the motions of the places and along the axes of the ports.
 struct Compared<'a> {
     harmonics: &'a [usize],
     places: &'a [DVector<Complex64>],
@@ -261,13 +260,13 @@ struct Compared<'a> {
 /// the largest of these motions, without means, times the share that the finer one may be off itself. What the finer one lacks at
 /// resonances above its own harmonics counts too. The finer one is its level, its motion and, per harmonic, the motions of the places.
 fn estimate(
-    coordinates: &[Coordinate],
+    ports: &Ports,
     rest: &Rest,
     (kept, omega): (Kept, f64),
     coarse: &Compared,
     (finer, better, places): (&mut Level, &Motion, &[DVector<Complex64>]),
 ) -> f64 {
-    let above = above(finer, rest, coordinates, kept, omega, better);
+    let above = above(finer, rest, ports, kept, omega, better);
     let fine = Compared { harmonics: finer.harmonics(), places, along: &better.c };
     let (mut distance, mut size) = (0.0f64, 0.0f64);
     let mut compare = |coarse_at: &dyn Fn(usize) -> Complex64, fine_at: &dyn Fn(usize) -> Complex64, missing: f64| {
@@ -284,10 +283,10 @@ fn estimate(
         compare(&|k| coarse.places[k][i], &|k| fine.places[k][i], missing);
     }
     let (few, many) = (coarse.harmonics.len(), fine.harmonics.len());
-    for (q, _) in coordinates.iter().enumerate().filter(|(_, coordinate)| coordinate.series > 0.0) {
+    for q in ports.iter().filter(|port| port.series > 0.0).flat_map(|port| port.range()) {
         compare(&|k| coarse.along[q * few + k], &|k| fine.along[q * many + k], 0.0);
     }
-    let share = if has_rigid(coordinates) { RIGID_SHARE } else { 1.0 };
+    let share = if ports.has_rigid() { RIGID_SHARE } else { 1.0 };
     if size > 0.0 { share * (distance / size).sqrt() } else { 0.0 }
 }
 
@@ -295,7 +294,7 @@ fn estimate(
 fn above(
     level: &mut Level,
     rest: &Rest,
-    coordinates: &[Coordinate],
+    ports: &Ports,
     kept: Kept,
     omega: f64,
     motion: &Motion,
@@ -306,22 +305,15 @@ fn above(
     if wanted.is_empty() {
         return Vec::new();
     }
-    let forces = level.forces_at(coordinates, omega, motion, &wanted);
+    let forces = level.forces_at(ports, omega, motion, &wanted);
     wanted.iter().zip(&forces).map(|(h, forces)| rest.respond(*h, omega, &rest.spread(|q| forces[q]))).collect()
-}
-
-/// Whether there is rigid friction.
-fn has_rigid(coordinates: &[Coordinate]) -> bool {
-    coordinates.iter().any(|c| matches!(c.element, Element::Velocity(law) if law.is_rigid()))
 }
 
 struct Balance<'a> {
     system: &'a System,
     method: HarmonicBalance,
-    coordinates: Vec<Coordinate>,
+    ports: Ports,
     rest: Rest,
-    /// There is a law of velocity.
-    velocity: bool,
     kept: Kept,
     first: usize,
     judge: Judge,
@@ -335,18 +327,17 @@ impl Balance<'_> {
     fn level(&mut self, top: usize, omega: f64) -> &mut Level {
         let harmonics = self.kept.up_to(top);
         let samples = self.method.samples_at(top);
-        let count = self.coordinates.len();
-        let (system, coordinates) = (self.system, &self.coordinates);
+        let (system, ports) = (self.system, &self.ports);
         let level = self.levels.entry(top).or_insert_with(|| {
-            let sparse = Sparse::new(system, coordinates, &harmonics);
-            Level::new(harmonics, samples, count, sparse)
+            let sparse = Sparse::new(system, ports, &harmonics);
+            Level::new(harmonics, samples, ports, sparse)
         });
-        level.drive(self.system, &self.coordinates, &self.rest, omega);
+        level.drive(self.system, &self.ports, &self.rest, omega);
         level
     }
 
     fn unknowns(&self, top: usize) -> usize {
-        2 * self.coordinates.len() * self.kept.up_to(top).len()
+        2 * self.ports.count() * self.kept.up_to(top).len()
     }
 
     /// Solves at `top`, from a motion at another number of harmonics or from the first guess.
@@ -354,10 +345,9 @@ impl Balance<'_> {
         let start = match from {
             Some((other, motion)) => {
                 let harmonics = self.levels[&other].harmonics().to_vec();
-                let coordinates = self.coordinates.len();
-                equations::transfer(motion, &harmonics, self.level(top, omega).harmonics(), coordinates)
+                equations::transfer(motion, &harmonics, self.level(top, omega).harmonics())
             }
-            None if self.velocity && top > COLD * self.kept.unit && top / 2 >= self.first => {
+            None if self.ports.has_forces() && top > COLD * self.kept.unit && top / 2 >= self.first => {
                 let coarse = self.solve(top / 2, omega, None)?;
                 return self.solve(top, omega, Some((top / 2, &coarse)));
             }
@@ -365,11 +355,11 @@ impl Balance<'_> {
                 // the guess solves the whole structure densely: large systems begin without friction
                 let guess = (self.system.dofs() < sparse::LARGE).then(|| Guess::new(self.system, omega));
                 self.level(top, omega);
-                self.levels[&top].begin(self.system, &self.coordinates, guess.as_ref(), omega)
+                self.levels[&top].begin(self.system, &self.ports, guess.as_ref(), omega)
             }
         };
         let level = self.levels.get_mut(&top).expect("made above");
-        level.solve(&self.coordinates, omega, start)
+        level.solve(&self.ports, omega, start)
     }
 
     fn lost(&self, omega: f64, lost: Lost) -> OrbitError {
@@ -391,7 +381,7 @@ impl Balance<'_> {
     ) -> Result<Orbit, OrbitError> {
         let context = path::Context {
             system: self.system,
-            coordinates: &self.coordinates,
+            ports: &self.ports,
             omega,
             odd: self.kept.half_period(),
             truncation,
@@ -400,6 +390,10 @@ impl Balance<'_> {
         };
         let level = self.levels.get_mut(&top).expect("solved");
         let orbit = path::orbit(context, level, &motion, x).ok_or(OrbitError::Drift { method: NAME, omega })?;
+        if !path::balances(self.system, &orbit) {
+            let lost = Lost { iterations: motion.iterations, residual: orbit.evidence.energy_gap };
+            return Err(self.lost(omega, lost));
+        }
         self.recent.truncate(RECENT - 1);
         self.recent.push_front((orbit.start.clone(), top, motion));
         Ok(orbit)
@@ -411,7 +405,7 @@ impl Balance<'_> {
         self.level(top, omega);
         let mut motion = Motion { iterations: 0, ..near.clone() };
         let level = self.levels.get_mut(&top).expect("made above");
-        level.polish(&self.coordinates, omega, &mut motion, NEARBY).map_err(|l| self.lost(omega, l))?;
+        level.polish(&self.ports, omega, &mut motion, NEARBY).map_err(|l| self.lost(omega, l))?;
         let x = self.places(top, omega, &motion);
         self.finish(top, omega, motion, x, None)
     }
@@ -440,7 +434,7 @@ impl Balance<'_> {
         let finer = self.levels.get_mut(&double).expect("solved");
         let coarse = Compared { harmonics: &self.kept.up_to(top), places: x, along: &motion.c };
         let at = (self.kept, omega);
-        Ok((estimate(&self.coordinates, &self.rest, at, &coarse, (finer, &better, &y)), better, y))
+        Ok((estimate(&self.ports, &self.rest, at, &coarse, (finer, &better, &y)), better, y))
     }
 
     /// As many harmonics as the tolerance needs. The solution that is returned is not the finest that was found, but the one whose error

@@ -1,9 +1,9 @@
 //! The orbit of a solution of harmonic balance.
 
 use super::equations::{Level, Motion};
-use super::joints::{Alternation, Coordinate, Element};
+use super::ports::Ports;
 use super::rest::Rest;
-use crate::law::Contact;
+use crate::law::{Contact, MOST_DIRECTIONS};
 use crate::method::evidence::{Judge, Judged};
 use crate::model::{MovedPlace, System};
 use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
@@ -21,7 +21,12 @@ pub(super) fn places(level: &mut Level, rest: &Rest, omega: f64, motion: &Motion
         .map(|k| {
             let forces = rest.spread(|q| motion.force[q * nh + k]);
             let Some(sparse) = &mut level.sparse else {
-                return &level.free[k] - rest.respond(level.harmonics()[k], omega, &forces);
+                let h = level.harmonics()[k];
+                let mut x = &level.free[k] - rest.respond(h, omega, &forces);
+                if h == 0 {
+                    rest.settle(omega, &mut x, |q| level.mean(q, motion));
+                }
+                return x;
             };
             let mut x = level.free[k].clone();
             let mut moved = x.clone();
@@ -48,9 +53,9 @@ pub(super) fn stays(context: &Context, level: &Level, motion: &Motion, x: &[DVec
         .find(|(h, _)| *h == 0)
         .map_or_else(|| DVector::from_element(system.dofs(), ZERO), |(_, load)| load.clone());
     let mut size = left.norm();
-    for (q, coordinate) in context.coordinates.iter().enumerate() {
+    for q in 0..context.ports.count() {
         let force = motion.force[q * nh].re;
-        let direction = system.joints()[coordinate.joint].axes()[0].dense(system.dofs());
+        let direction = context.ports.axis(system, q).dense(system.dofs());
         left -= direction.map(|w| Complex64::new(w * force, 0.0));
         size += direction.norm() * force.abs();
     }
@@ -67,15 +72,15 @@ struct Series {
     omega: f64,
     harmonics: Vec<usize>,
     x: Vec<DVector<Complex64>>,
-    /// Force and contact per joint and sample.
-    force: Vec<Vec<f64>>,
+    /// Forces along the axes and contact, per joint and sample.
+    force: Vec<Vec<[f64; MOST_DIRECTIONS]>>,
     contact: Vec<Vec<Contact>>,
 }
 
 /// What the solver knows beside the motion.
 pub(super) struct Context<'a> {
     pub system: &'a System,
-    pub coordinates: &'a [Coordinate],
+    pub ports: &'a Ports,
     pub omega: f64,
     pub odd: bool,
     pub truncation: Option<f64>,
@@ -90,75 +95,84 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     if !stays(&context, level, motion, &x) {
         return None;
     }
-    let Context { system, coordinates, omega, odd, truncation, tolerance, judge } = context;
+    let Context { system, ports, omega, odd, truncation, tolerance, judge } = context;
     let (n, nh) = (system.dofs(), level.harmonics().len());
     let harmonics = level.harmonics().to_vec();
     let samples = level.alternation.samples();
-    let mut force = vec![vec![0.0; samples]; system.joints().len()];
+    let mut force = vec![vec![[0.0; MOST_DIRECTIONS]; samples]; system.joints().len()];
     let mut contact = vec![vec![Contact::Stick; samples]; system.joints().len()];
     let mut joints = Vec::new();
-    let mut elastic_states = Vec::new();
+    let mut states = Vec::new();
     let mut stuck = Vec::new();
     for (j, joint) in system.joints().iter().enumerate() {
+        let (axes, force, contact) = (joint.axes(), &mut force[j], &mut contact[j]);
         // ∮ f du with the projected force: for the series it is the integral itself
         let mut dissipation = 0.0;
-        for (q, coordinate) in coordinates.iter().enumerate().filter(|(_, coordinate)| coordinate.joint == j) {
-            let range = q * nh..(q + 1) * nh;
-            let (c, f) = (&motion.c[range.clone()], &motion.force[range]);
-            dissipation += (0..nh).map(|k| cycle_work(harmonics[k], f[k], c[k])).sum::<f64>();
-            let mut add = |alternation: &Alternation| {
-                for i in 0..samples {
-                    force[j][i] += alternation.force[i];
-                    if alternation.slips[i] {
-                        contact[j][i] = Contact::slip(alternation.force[i]);
-                    }
+        // no port: what holds nothing slips all the time
+        let mut told = false;
+        for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.joint == j) {
+            for q in port.range() {
+                let range = q * nh..(q + 1) * nh;
+                let (c, f) = (&motion.c[range.clone()], &motion.force[range]);
+                dissipation += (0..nh).map(|k| cycle_work(harmonics[k], f[k], c[k])).sum::<f64>();
+            }
+            level.sample(ports, p, omega, motion);
+            let alternation = &level.alternation;
+            for (i, force) in force.iter_mut().enumerate() {
+                for (a, force) in force.iter_mut().enumerate().take(port.axes) {
+                    *force += alternation.force[a][i];
                 }
-            };
-            match &coordinate.element {
-                Element::Springs(springs) => {
-                    level.alternation.synthesise(c);
-                    for spring in springs {
-                        level.alternation.slide(spring, 1.0, c);
-                        elastic_states.push(level.alternation.force[0]);
-                        add(&level.alternation);
-                    }
-                }
-                Element::Velocity(law) => {
-                    level.apply(*law, q, omega, motion);
-                    if let Some(rate) = joint.law().rate() {
-                        let mut z = vec![0.0; rate.states()];
-                        rate.state_under((0..nh).map(|k| f[k].re).sum(), &mut z);
-                        elastic_states.extend(z);
-                    }
-                    add(&level.alternation);
+                if port.tells_slip() && alternation.slips[i] {
+                    contact[i] = Contact::slip(alternation.force[0][i]);
                 }
             }
+            told |= port.tells_slip();
+            match joint.law().rate() {
+                Some(rate) if port.is_force() => {
+                    let mut z = vec![0.0; rate.states()];
+                    // the sampled force is within the law's bounds, which that of the series may pass
+                    rate.state_under(alternation.force[0][0], &mut z);
+                    states.extend(z);
+                }
+                _ if port.is_force() => {}
+                _ => states.extend(&alternation.state),
+            }
         }
-        let u: Vec<(usize, Complex64)> = harmonics
+        let along: Vec<Vec<(usize, Complex64)>> = axes
             .iter()
-            .zip(&x)
-            .map(|(&h, x)| {
-                let imposed = joint.axes()[0].imposed_at(h as u32);
-                (h, imposed + joint.axes()[0].along_complex(x))
+            .map(|axis| {
+                let series = harmonics.iter().zip(&x);
+                series.map(|(&h, x)| (h, axis.imposed_at(h as u32) + axis.along_complex(x))).collect()
             })
             .collect();
-        if joint.law().is_free() {
-            // what holds nothing slips all the time
-            let velocity: Vec<_> = u.iter().map(|(h, c)| (*h, Complex64::new(0.0, *h as f64 * omega) * c)).collect();
-            level.alternation.fourier.synthesise(&velocity, &mut level.alternation.signal);
-            contact[j] = level.alternation.signal.iter().map(|v| Contact::slip(*v)).collect();
+        if !told {
+            let velocity: Vec<Vec<f64>> = along
+                .iter()
+                .map(|u| {
+                    let velocity: Vec<_> =
+                        u.iter().map(|(h, c)| (*h, Complex64::new(0.0, *h as f64 * omega) * c)).collect();
+                    level.alternation.fourier.synthesise(&velocity, &mut level.alternation.signal);
+                    level.alternation.signal.clone()
+                })
+                .collect();
+            for (i, (contact, force)) in contact.iter_mut().zip(force.iter()).enumerate() {
+                let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| velocity.get(a).map_or(0.0, |v| v[i]));
+                *contact = joint.law().contact(&now[..axes.len()], &force[..axes.len()]);
+            }
         }
-        let (low, high) = extremes(&u, level);
-        let slipping = contact[j].iter().filter(|c| **c != Contact::Stick).count();
-        let switches = (0..samples).filter(|&i| contact[j][i] != contact[j][(i + 1) % samples]).count();
-        if slipping == 0 {
+        let displacement = along.iter().map(|u| extremes(u, level)).collect();
+        let slipping = contact.iter().filter(|c| c.slips()).count();
+        let moving = contact.iter().filter(|c| **c != Contact::Stick).count();
+        let switches = (0..samples).filter(|&i| contact[i] != contact[(i + 1) % samples]).count();
+        // a law that bounds no force never slips, and is one of no continuum
+        if moving == 0 && joint.law().scale().is_finite() {
             stuck.push(joint.name().to_owned());
         }
         joints.push(JointMotion {
             name: joint.name().to_owned(),
             dissipation,
             slip_fraction: slipping as f64 / samples as f64,
-            displacement: vec![(low, high)],
+            displacement,
             switches,
         });
     }
@@ -170,13 +184,13 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
             PlaceMotion { name: system.places()[i].clone(), maximum, minimum, mean: at(0).re, first_harmonic: at(1) }
         })
         .collect();
-    let energy = energy(system, coordinates, omega, &harmonics, &x, motion, &joints);
+    let energy = energy(system, ports, omega, &harmonics, &x, motion, &joints);
     let possible = possible_work(system, omega, &harmonics, &x) + energy.friction.abs();
     let reference = energy.work_in.abs().max(NO_WORK * possible);
     let balance = energy.work_in - energy.viscous - energy.friction;
     let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
     start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
-    start.extend(elastic_states);
+    start.extend(states);
     let contracts = judge.as_ref().is_some_and(|judge| judge.proves());
     let Judged { derivative, defect } =
         judge.map_or_else(Judged::default, |judge| judge.judge(system, omega, odd, &start));
@@ -209,6 +223,22 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     })
 }
 
+/// Energy gap beyond which a solution is no orbit: where the equations hold, energies balance to the residual, but for a resonance without
+/// damping, whose receptance has no number.
+const UNBALANCED: f64 = 1e-2;
+/// Energies below this fraction of what the loads could store in the structure are those of rounding: all is stuck.
+const STILL: f64 = 1e-9;
+
+/// Whether the energies of an orbit balance, or are none.
+pub(super) fn balances(system: &System, orbit: &Orbit) -> bool {
+    let structure = system.structure();
+    let stiff = structure.stiffness().amax().max(orbit.omega * orbit.omega * structure.mass().amax());
+    let loads: f64 = system.excitation(orbit.omega).iter().map(|(_, load)| load.norm_squared()).sum();
+    let Energy { work_in, viscous, friction } = orbit.energy;
+    let balance = (work_in - viscous - friction).abs();
+    orbit.evidence.energy_gap <= UNBALANCED || balance <= STILL * loads / stiff.max(f64::MIN_POSITIVE)
+}
+
 /// Work below this fraction of what the loads could do is no yardstick for the energy gap: the motion is conservative.
 const NO_WORK: f64 = 1e-6;
 
@@ -224,7 +254,7 @@ fn moved(place: &MovedPlace, h: usize) -> Complex64 {
 
 fn energy(
     system: &System,
-    coordinates: &[Coordinate],
+    ports: &Ports,
     omega: f64,
     harmonics: &[usize],
     x: &[DVector<Complex64>],
@@ -251,15 +281,18 @@ fn energy(
         }
         for (m, place) in system.moved().iter().enumerate() {
             let g = moved(place, h);
-            let forces = |j: usize| -> Complex64 {
-                coordinates
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, c)| c.joint == j)
-                    .map(|(q, _)| motion.force[q * nh + k])
-                    .sum()
-            };
-            let joint_part: Complex64 = (0..system.joints().len()).map(|j| place.joints[j] * forces(j)).sum();
+            let numbers: Vec<(usize, usize)> = system
+                .joints()
+                .iter()
+                .enumerate()
+                .flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)))
+                .collect();
+            let joint_part: Complex64 = (0..ports.count())
+                .map(|q| {
+                    let number = numbers.binary_search(&ports.place(q)).unwrap_or(0);
+                    motion.force[q * nh + k] * place.joints[number]
+                })
+                .sum();
             work += cycle_work(h, linear_reaction(system, m, h, s, x) + joint_part, g);
             for i in 0..n {
                 let (stiffness, damping) = (place.stiffness.0[i], place.damping.0[i]);
@@ -366,24 +399,29 @@ impl Path for Series {
                 let samples = self.force[j].len();
                 let at = time / period * samples as f64;
                 let (low, part) = (at.floor() as usize, at.fract());
-                let axis = &joint.axes()[0];
-                let (mut displacement, mut velocity) = (axis.along(&x), axis.along(&v));
-                for &(h, g) in joint.axes()[0].imposed() {
-                    let rate = f64::from(h) * self.omega;
-                    let z = g * Complex64::cis(rate * time);
-                    displacement += z.re;
-                    velocity -= rate * z.im;
+                let (before, after) = (self.force[j][low % samples], self.force[j][(low + 1) % samples]);
+                let mut sample = JointSample::along(0.0, 0.0, 0.0, self.contact[j][(at.round() as usize) % samples]);
+                for (a, axis) in joint.axes().iter().enumerate() {
+                    sample.displacement[a] = axis.along(&x);
+                    sample.velocity[a] = axis.along(&v);
+                    for &(h, g) in axis.imposed() {
+                        let rate = f64::from(h) * self.omega;
+                        let z = g * Complex64::cis(rate * time);
+                        sample.displacement[a] += z.re;
+                        sample.velocity[a] -= rate * z.im;
+                    }
+                    sample.force[a] = (1.0 - part) * before[a] + part * after[a];
                 }
-                let force = (1.0 - part) * self.force[j][low % samples] + part * self.force[j][(low + 1) % samples];
-                JointSample::along(displacement, velocity, force, self.contact[j][(at.round() as usize) % samples])
+                sample
             })
             .collect();
+        let forces: Vec<f64> = joints
+            .iter()
+            .zip(self.system.joints())
+            .flat_map(|(now, joint)| now.force[..joint.axes().len()].to_vec())
+            .collect();
         for (m, now) in moved_now.iter_mut().enumerate() {
-            now.1 += joints
-                .iter()
-                .zip(&self.system.moved()[m].joints)
-                .map(|(joint, sign)| joint.force[0] * sign)
-                .sum::<f64>();
+            now.1 += forces.iter().zip(&self.system.moved()[m].joints).map(|(force, sign)| force * sign).sum::<f64>();
         }
         Sample { displacement: x, velocity: v, acceleration: a, joints, moved: moved_now }
     }

@@ -2,7 +2,7 @@
 //! lowered from where everything sticks.
 
 use super::equations::{Ease, GIVEN, Level, Motion, SOLVED, unit};
-use super::joints::{Coordinate, Element};
+use super::ports::Ports;
 use super::sparse::Along;
 use num_complex::Complex64;
 use stickslip_numerics::dense;
@@ -13,9 +13,9 @@ const ITERATIONS: usize = 60;
 const MOST_RAISING: usize = 200;
 /// Newton iterations in all while they are lowered; a few hundred are usual.
 const MOST_ITERATIONS: usize = 3000;
-/// Residual at which a search that comes no closer has found all that there is: the force of a sampled slider behind a spring moves in
-/// steps when a switch passes a sample, by 1e-8 to 1e-7 of the forces, far below what the series leaves out.
-const STEPS: f64 = 1e-7;
+/// Residual at which a search that comes no closer has found all that there is: forces are differentiable functions of the harmonics, and what is
+/// left is the rounding of structures whose springs are far apart.
+const ROUNDED: f64 = 1e-8;
 /// Iterations without half of the least residual after which a search comes no closer.
 const PATIENCE: usize = 8;
 /// Halvings of a step.
@@ -42,24 +42,17 @@ pub(super) struct Lost {
 impl Level {
     /// Newton's method: the longest of the halved steps that comes closer, and where none does the whole one, which may lead out of a
     /// set of slipping samples that repeats.
-    fn newton(
-        &mut self,
-        coordinates: &[Coordinate],
-        omega: f64,
-        motion: &mut Motion,
-        ease: Ease,
-        most: usize,
-    ) -> Result<(), Lost> {
+    fn newton(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, ease: Ease, most: usize) -> Result<(), Lost> {
         let mut length = self.length(motion);
-        let mut residual = self.evaluate(coordinates, omega, motion, ease, length, true);
+        let mut residual = self.evaluate(ports, omega, motion, ease, length, true);
         let mut least = f64::INFINITY;
         // the residual that is to be halved, and for how long it was not
         let (mut mark, mut waited) = (residual, 0);
         for _ in 0..most {
-            if self.is_exhausted() || residual <= SOLVED || (waited > PATIENCE && least <= STEPS) {
+            if self.is_exhausted() || residual <= SOLVED || (waited > PATIENCE && least <= ROUNDED) {
                 break;
             }
-            if !self.newton_step(coordinates, ease, length) {
+            if !self.newton_step(ports, ease, length) {
                 break;
             }
             motion.iterations += 1;
@@ -70,8 +63,8 @@ impl Level {
                 if halving > HALVINGS {
                     fraction = 1.0;
                 }
-                self.advance(coordinates, motion, fraction, length);
-                after = self.evaluate(coordinates, omega, motion, ease, length, true);
+                self.advance(ports, motion, fraction, length);
+                after = self.evaluate(ports, omega, motion, ease, length, true);
                 if after < (1.0 - SHORTENS * fraction) * residual || self.is_exhausted() {
                     break;
                 }
@@ -90,7 +83,7 @@ impl Level {
             if now < 0.5 * length || now > 2.0 * length {
                 // the motion was far from what it began with: its own size counts
                 length = now;
-                residual = self.evaluate(coordinates, omega, motion, ease, length, true);
+                residual = self.evaluate(ports, omega, motion, ease, length, true);
                 least = f64::INFINITY;
             }
         }
@@ -99,10 +92,10 @@ impl Level {
             motion.c.clone_from(&self.best.c);
             motion.force.clone_from(&self.best.force);
             motion.iterations = iterations;
-            residual = self.evaluate(coordinates, omega, motion, ease, length, false);
+            residual = self.evaluate(ports, omega, motion, ease, length, false);
         }
         motion.residual = residual;
-        if residual <= SOLVED || (waited > PATIENCE && residual <= STEPS) {
+        if residual <= SOLVED || (waited > PATIENCE && residual <= ROUNDED) {
             Ok(())
         } else {
             Err(Lost { iterations: motion.iterations, residual })
@@ -121,23 +114,24 @@ impl Level {
     }
 
     /// The Newton step into `self.step`, in the unknowns' units.
-    fn newton_step(&mut self, coordinates: &[Coordinate], ease: Ease, length: f64) -> bool {
-        let width = 2 * self.harmonics().len();
+    fn newton_step(&mut self, ports: &Ports, ease: Ease, length: f64) -> bool {
+        let pair = 2 * self.harmonics().len();
         self.step.copy_from_slice(&self.residual);
         match &mut self.sparse {
             Some(sparse) => {
                 let along = Along { penalty: &self.penalty, ease: ease.penalty };
-                if !sparse.step(&along, &self.tangents, &mut self.step) {
+                if !sparse.step(ports, &along, &self.tangents, &mut self.step) {
                     return false;
                 }
-                for (i, d) in self.step.iter_mut().enumerate() {
-                    *d /= unit(&coordinates[i / width], length);
+                for port in ports.iter() {
+                    let steps = &mut self.step[pair * port.first..pair * (port.first + port.axes)];
+                    steps.iter_mut().for_each(|d| *d /= unit(port, length));
                 }
                 true
             }
             None => {
-                for (i, d) in self.step.iter_mut().enumerate() {
-                    *d /= unit(&coordinates[i / width], length);
+                for (d, unit) in self.step.iter_mut().zip(&self.units) {
+                    *d /= unit;
                 }
                 let size = self.step.len();
                 dense::solve(&mut self.jacobian, size, &mut self.step)
@@ -146,55 +140,50 @@ impl Level {
     }
 
     /// `self.before` less a fraction of the step, into `motion`.
-    fn advance(&self, coordinates: &[Coordinate], motion: &mut Motion, fraction: f64, length: f64) {
+    fn advance(&self, ports: &Ports, motion: &mut Motion, fraction: f64, length: f64) {
         let nh = self.harmonics().len();
-        for (i, d) in self.step.chunks_exact(2).enumerate() {
-            let coordinate = &coordinates[i / nh];
-            let d = Complex64::new(d[0], d[1]) * (fraction * unit(coordinate, length));
-            match coordinate.element {
-                Element::Springs(_) => motion.c[i] = self.before.c[i] - d,
-                Element::Velocity(_) => motion.force[i] = self.before.force[i] - d,
+        for port in ports.iter() {
+            let range = port.first * nh..(port.first + port.axes) * nh;
+            let (values, before) =
+                if port.is_force() { (&mut motion.force, &self.before.force) } else { (&mut motion.c, &self.before.c) };
+            for i in range {
+                let d = Complex64::new(self.step[2 * i], self.step[2 * i + 1]);
+                values[i] = before[i] - d * (fraction * unit(port, length));
             }
         }
     }
 
     /// The solution that Newton's method finds from `motion`, which is nearby.
-    pub fn polish(
-        &mut self,
-        coordinates: &[Coordinate],
-        omega: f64,
-        motion: &mut Motion,
-        most: usize,
-    ) -> Result<(), Lost> {
+    pub fn polish(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, most: usize) -> Result<(), Lost> {
         self.assembled = 0;
-        self.newton(coordinates, omega, motion, GIVEN, most)
+        self.newton(ports, omega, motion, GIVEN, most)
     }
 
     /// The solution, from `start`.
-    pub fn solve(&mut self, coordinates: &[Coordinate], omega: f64, mut start: Motion) -> Result<Motion, Lost> {
+    pub fn solve(&mut self, ports: &Ports, omega: f64, mut start: Motion) -> Result<Motion, Lost> {
         start.iterations = 0;
         self.assembled = 0;
         let mut motion = start.clone();
-        if self.newton(coordinates, omega, &mut motion, GIVEN, ITERATIONS).is_ok() {
+        if self.newton(ports, omega, &mut motion, GIVEN, ITERATIONS).is_ok() {
             return Ok(motion);
         }
-        if coordinates.iter().any(|c| matches!(c.element, Element::Velocity(_))) {
+        if ports.has_forces() {
             let iterations = motion.iterations;
             motion = Motion { iterations, ..start };
             let mut found = Ok(());
             for penalty in GENTLE {
-                found = self.newton(coordinates, omega, &mut motion, Ease { penalty, ..GIVEN }, ITERATIONS);
+                found = self.newton(ports, omega, &mut motion, Ease { penalty, ..GIVEN }, ITERATIONS);
             }
             if found.is_ok() {
                 return Ok(motion);
             }
         }
-        self.lower_limits(coordinates, omega, &mut motion)?;
+        self.lower_limits(ports, omega, &mut motion)?;
         Ok(motion)
     }
 
     /// From slip limits that hold to those that are given.
-    fn lower_limits(&mut self, coordinates: &[Coordinate], omega: f64, motion: &mut Motion) -> Result<(), Lost> {
+    fn lower_limits(&mut self, ports: &Ports, omega: f64, motion: &mut Motion) -> Result<(), Lost> {
         let mut good = Motion { iterations: motion.iterations, ..Motion::rest(motion.c.len()) };
         good.c.copy_from_slice(&self.linear);
         let mut limits = 1.0;
@@ -202,7 +191,7 @@ impl Level {
         let mut held = Err(Lost { iterations: good.iterations, residual: f64::INFINITY });
         for _ in 0..60 {
             limits *= 4.0;
-            held = self.newton(coordinates, omega, &mut good, Ease { limits, ..GIVEN }, ITERATIONS);
+            held = self.newton(ports, omega, &mut good, Ease { limits, ..GIVEN }, ITERATIONS);
             if held.is_ok() || self.is_exhausted() || good.iterations - motion.iterations > MOST_RAISING {
                 break;
             }
@@ -212,7 +201,7 @@ impl Level {
         while limits > 1.0 {
             motion.copy(&good);
             let next = (limits * factor).max(1.0);
-            let done = self.newton(coordinates, omega, motion, Ease { limits: next, ..GIVEN }, ITERATIONS);
+            let done = self.newton(ports, omega, motion, Ease { limits: next, ..GIVEN }, ITERATIONS);
             good.iterations = motion.iterations;
             match done {
                 Ok(()) => {

@@ -5,8 +5,8 @@
 //! themselves, along laws of velocity, border it as if each contact were one more place: `Z y - W δλ = 0` and
 //! `(1 - T) δλ + ε T D Wᵀ y = r`.
 
-use super::equations::stay;
-use super::joints::{Coordinate, Element};
+use super::equations::{CLEAR, stay};
+use super::ports::Ports;
 use super::rest::HOLD;
 use crate::model::System;
 use num_complex::Complex64;
@@ -15,9 +15,9 @@ use stickslip_numerics::banded::{Banded, order};
 /// Degrees of freedom from which a system counts as large.
 pub(super) const LARGE: usize = 40;
 
-/// What the laws along the coordinates add to the tangents.
+/// What the laws at the ports add to the tangents.
 pub(super) struct Along<'a> {
-    /// ε per coordinate, N s/m.
+    /// ε per port, N s/m.
     pub penalty: &'a [f64],
     /// Factor on it.
     pub ease: f64,
@@ -30,9 +30,9 @@ pub(super) struct Sparse {
     position: Vec<usize>,
     /// Entries of (mass, damping, stiffness) that are not all zero.
     entries: Vec<(usize, usize, [f64; 3])>,
-    /// Per coordinate: its number among the unknown forces.
+    /// Per axis: its number among the unknown forces.
     forces: Vec<Option<usize>>,
-    /// Per coordinate: (place, direction).
+    /// Per axis: (place, direction).
     ends: Vec<Vec<(usize, f64)>>,
     harmonics: Vec<f64>,
     omega: f64,
@@ -46,43 +46,28 @@ pub(super) struct Sparse {
 }
 
 impl Sparse {
-    /// `None` if the system is small, has inner coordinates, or is coupled all over.
-    pub fn new(system: &System, coordinates: &[Coordinate], harmonics: &[usize]) -> Option<Self> {
+    /// `None` if the system is small, has joints with inner motions, or is coupled all over.
+    pub fn new(system: &System, ports: &Ports, harmonics: &[usize]) -> Option<Self> {
         let n = system.dofs();
-        if n < LARGE || coordinates.iter().any(|c| c.series > 0.0) {
+        if n < LARGE || ports.iter().any(|port| port.series > 0.0) {
             return None;
         }
-        let mut entries = Vec::new();
-        for i in 0..n {
-            for k in 0..n {
-                let values = [
-                    system.structure().mass()[(i, k)],
-                    system.structure().damping()[(i, k)],
-                    system.structure().stiffness()[(i, k)],
-                ];
-                if values.iter().any(|v| *v != 0.0) {
-                    entries.push((i, k, values));
+        let entries: Vec<(usize, usize, [f64; 3])> = system.structure().entries().collect();
+        let ends: Vec<Vec<(usize, f64)>> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();
+        let mut links: Vec<(usize, usize)> = entries.iter().map(|(i, k, _)| (*i, *k)).collect();
+        let mut unknown = 0;
+        let mut forces = vec![None; ends.len()];
+        for port in ports.iter() {
+            // all that a port touches is coupled: the places at its axes, and its forces
+            let mut touched: Vec<usize> = port.range().flat_map(|q| &ends[q]).map(|(i, _)| *i).collect();
+            if port.is_force() {
+                for q in port.range() {
+                    forces[q] = Some(n + unknown);
+                    touched.push(n + unknown);
+                    unknown += 1;
                 }
             }
-        }
-        let ends: Vec<Vec<(usize, f64)>> =
-            coordinates.iter().map(|c| system.joints()[c.joint].axes()[0].rows().to_vec()).collect();
-        let mut links: Vec<(usize, usize)> = entries.iter().map(|(i, k, _)| (*i, *k)).collect();
-        for ends in &ends {
-            links.extend(ends.iter().flat_map(|a| ends.iter().map(|b| (a.0, b.0))));
-        }
-        let mut unknown = 0;
-        let forces: Vec<Option<usize>> = coordinates
-            .iter()
-            .map(|c| {
-                matches!(c.element, Element::Velocity(_)).then(|| {
-                    unknown += 1;
-                    n + unknown - 1
-                })
-            })
-            .collect();
-        for (ends, force) in ends.iter().zip(&forces) {
-            links.extend(force.iter().flat_map(|f| ends.iter().map(|(i, _)| (*f, *i))));
+            links.extend(touched.iter().flat_map(|a| touched.iter().map(|b| (*a, *b))));
         }
         let whole = n + unknown;
         let position = order(whole, &links);
@@ -147,7 +132,7 @@ impl Sparse {
         }
     }
 
-    /// Motion along the coordinates at harmonic number `k` under the forces `force(q)` along them, into `out`.
+    /// Motion along the axes at harmonic number `k` under the forces `force(q)` along them, into `out`.
     pub fn receive(&mut self, k: usize, force: impl Fn(usize) -> Complex64, mut out: impl FnMut(usize, Complex64)) {
         self.right.fill(0.0);
         for (q, ends) in self.ends.iter().enumerate() {
@@ -168,7 +153,7 @@ impl Sparse {
         }
     }
 
-    /// Receptances of the coordinates at the real rate `s`, 1/s, where there are no resonances, m/N.
+    /// Receptances of the axes at the real rate `s`, 1/s, where there are no resonances, m/N.
     pub fn own_at(&mut self, s: f64) -> Vec<f64> {
         self.smooth.clear();
         for &(i, l, [mass, damping, stiffness]) in &self.entries {
@@ -193,10 +178,11 @@ impl Sparse {
             .collect()
     }
 
-    /// Replaces the residual by the Newton step; `tangents` holds K or T, one block per coordinate. False if it is singular.
-    pub fn step(&mut self, along: &Along, tangents: &[f64], residual: &mut [f64]) -> bool {
+    /// Replaces the residual by the Newton step; `tangents` holds K or T, one block per port. False if it is singular.
+    pub fn step(&mut self, ports: &Ports, along: &Along, tangents: &[f64], residual: &mut [f64]) -> bool {
         let nh = self.harmonics.len();
-        let (size, block) = (2 * nh, 4 * nh * nh);
+        let size = 2 * nh;
+        let (blocks, _) = super::equations::blocks(ports, nh);
         self.tangent.clear();
         for &(i, l, entry) in &self.entries {
             for k in 0..nh {
@@ -210,46 +196,52 @@ impl Sparse {
             }
         }
         self.whole.fill(0.0);
-        for (q, ends) in self.ends.iter().enumerate() {
-            let tangent = &tangents[q * block..(q + 1) * block];
-            let r = &residual[q * size..(q + 1) * size];
-            let Some(force) = self.forces[q] else {
-                for a in 0..size {
-                    let row = &tangent[a * size..(a + 1) * size];
+        for (p, port) in ports.iter().enumerate() {
+            let tangent = &tangents[super::equations::block(&blocks, p, port, nh)];
+            let wide = size * port.axes;
+            let r = &residual[port.first * size..port.first * size + wide];
+            let penalty = along.penalty[p] * along.ease.max(CLEAR * port.least_penalty / along.penalty[p]);
+            for (a, row) in tangent.chunks_exact(wide).enumerate() {
+                let own = port.first + a / size;
+                let Some(force) = self.forces[own] else {
                     let pull: f64 = row.iter().zip(r).map(|(k, r)| k * r).sum();
-                    for &(i, w) in ends {
-                        let at = self.position[i] * size + a;
+                    for &(i, w) in &self.ends[own] {
+                        let at = self.position[i] * size + a % size;
                         self.whole[at] += w * pull;
-                        for &(l, v) in ends {
-                            let column = self.position[l] * size;
-                            for (b, value) in row.iter().enumerate() {
-                                self.tangent.add(at, column + b, w * v * value);
+                        for (other, row) in port.range().zip(row.chunks_exact(size)) {
+                            for &(l, v) in &self.ends[other] {
+                                let column = self.position[l] * size;
+                                for (b, value) in row.iter().enumerate() {
+                                    self.tangent.add(at, column + b, w * v * value);
+                                }
                             }
                         }
                     }
+                    continue;
+                };
+                let at = self.position[force] * size + a % size;
+                self.whole[at] = r[a];
+                self.tangent.add(at, at, 1.0 + stay(self.harmonics[a % size / 2] as usize));
+                for &(i, w) in &self.ends[own] {
+                    self.tangent.add(self.position[i] * size + a % size, at, -w);
                 }
-                continue;
-            };
-            let base = self.position[force] * size;
-            let penalty = along.penalty[q] * along.ease;
-            for a in 0..size {
-                let row = &tangent[a * size..(a + 1) * size];
-                self.whole[base + a] = r[a];
-                self.tangent.add(base + a, base + a, 1.0 + stay(self.harmonics[a / 2] as usize));
-                for (b, value) in row.iter().enumerate() {
-                    self.tangent.add(base + a, base + b, -value);
-                }
-                for &(i, w) in ends {
-                    let column = self.position[i] * size;
-                    self.tangent.add(column + a, base + a, -w);
+                for (other, row) in port.range().zip(row.chunks_exact(size)) {
+                    let Some(force) = self.forces[other] else { continue };
+                    let base = self.position[force] * size;
+                    for (b, value) in row.iter().enumerate() {
+                        self.tangent.add(at, base + b, -value);
+                    }
                     if penalty.is_infinite() {
                         continue;
                     }
-                    for (k, &h) in self.harmonics.iter().enumerate() {
-                        // ε T jhΩ
-                        let rate = penalty * h * self.omega * w;
-                        self.tangent.add(base + a, column + 2 * k, row[2 * k + 1] * rate);
-                        self.tangent.add(base + a, column + 2 * k + 1, -row[2 * k] * rate);
+                    for &(i, w) in &self.ends[other] {
+                        let column = self.position[i] * size;
+                        for (k, &h) in self.harmonics.iter().enumerate() {
+                            // ε T jhΩ
+                            let rate = penalty * h * self.omega * w;
+                            self.tangent.add(at, column + 2 * k, row[2 * k + 1] * rate);
+                            self.tangent.add(at, column + 2 * k + 1, -row[2 * k] * rate);
+                        }
                     }
                 }
             }

@@ -72,7 +72,7 @@ impl IncrementalFlow {
         let n = self.assembly.n;
         let (mut load, mut acceleration) = (vec![0.0; n], vec![0.0; n]);
         self.drive.load(time, &mut load);
-        self.assembly.accelerate(state, &load, self.step.force.as_slice(), &mut acceleration);
+        self.assembly.accelerate(state, &mut load, self.step.force.as_slice(), &mut acceleration);
         let force = self.step.force.as_slice().to_vec();
         self.steps.instants.push(Instant { state: state[..2 * n].to_vec(), acceleration, force });
     }

@@ -246,7 +246,7 @@ impl SmoothFlow {
         self.set_force();
         self.drive.load(time, &mut self.load);
         let mut acceleration = vec![0.0; n];
-        self.assembly.accelerate(state, &self.load, &self.force, &mut acceleration);
+        self.assembly.accelerate(state, &mut self.load, &self.force, &mut acceleration);
         let instant = Instant { state: state[..2 * n].to_vec(), acceleration, force: self.force.clone() };
         self.steps.instants.push(instant);
     }

@@ -147,6 +147,7 @@ pub(crate) struct Step {
     lu: Lu,
     right: DMatrix<f64>,
     direct: DMatrix<f64>,
+    carried: DMatrix<f64>,
     filter: Filter,
 }
 
@@ -174,6 +175,7 @@ impl Step {
             lu: Lu::default(),
             right: DMatrix::zeros(0, 0),
             direct: DMatrix::zeros(0, 0),
+            carried: DMatrix::zeros(0, 0),
             filter: Filter::new(assembly),
         }
     }
@@ -373,6 +375,7 @@ impl Step {
         if self.right.ncols() != columns {
             self.right = DMatrix::zeros(self.unknown.len(), columns);
             self.direct = DMatrix::zeros(STAGES * j, columns);
+            self.carried = DMatrix::zeros(2 * n, columns);
         }
         let linear = sensitivity.rows(0, 2 * n);
         self.right.rows_mut(0, STAGES * j).gemm(1.0, &eliminated.velocity_from_state, &linear, 0.0);
@@ -426,9 +429,9 @@ impl Step {
                 }
             }
         }
-        let mut end = &eliminated.end[0] * sensitivity.rows(0, 2 * n);
-        end.gemm(1.0, &eliminated.end[2], &self.direct, 1.0);
-        sensitivity.rows_mut(0, 2 * n).copy_from(&end);
+        self.carried.gemm(1.0, &eliminated.end[0], &sensitivity.rows(0, 2 * n), 0.0);
+        self.carried.gemm(1.0, &eliminated.end[2], &self.direct, 1.0);
+        sensitivity.rows_mut(0, 2 * n).copy_from(&self.carried);
         let last = at_state(assembly, STAGES - 1, 0);
         sensitivity.rows_mut(2 * n, internal).copy_from(&self.right.rows(last, internal));
     }

@@ -1,0 +1,197 @@
+//! The alternation between frequency and time: the signals of a port over a period, and what its kernels have in common.
+
+use crate::law::MOST_DIRECTIONS;
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use stickslip_numerics::fourier::Fourier;
+
+pub(super) const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// The transform's memory for one number of harmonics and samples.
+#[derive(Debug, Clone)]
+pub(in super::super) struct Alternation {
+    pub harmonics: Vec<usize>,
+    pub fourier: Fourier,
+    pairs: Vec<(usize, Complex64)>,
+    /// A signal for whoever needs one.
+    pub signal: Vec<f64>,
+    /// Forces of the port evaluated last along its axes, per sample, N; of sliders only after [`Alternation::sample`].
+    pub force: [Vec<f64>; MOST_DIRECTIONS],
+    /// Velocities of the port along its axes, for ports that use them, or displacements.
+    pub(super) displacement: [Vec<f64>; MOST_DIRECTIONS],
+    pub(super) velocity: [Vec<f64>; MOST_DIRECTIONS],
+    /// Per sample of a port whose kernel tells slip: it moves.
+    pub slips: Vec<bool>,
+    /// Internal states at t = 0 of the port evaluated last.
+    pub state: Vec<f64>,
+    /// `e^{2πji/N}`.
+    pub(super) turns: Vec<Complex64>,
+    pub(super) argument: Vec<Complex64>,
+    pub(super) work: Vec<f64>,
+    pub(super) slopes: Vec<Vec<f64>>,
+    pub(super) spectra: [Vec<Complex64>; 3],
+    pub(super) column: Vec<Complex64>,
+    pub(super) row: Vec<Complex64>,
+    pub(super) moment: Vec<f64>,
+    pub(super) intervals: Vec<super::sliders::Interval>,
+    pub(super) extremes: Vec<super::sliders::Extreme>,
+    pub(super) grid: super::sliders::Grid,
+    pub(super) march: super::march::Memory,
+}
+
+impl Alternation {
+    pub fn new(harmonics: Vec<usize>, samples: usize) -> Self {
+        let zeros = vec![0.0; samples];
+        let three = || std::array::from_fn(|_| vec![0.0; samples]);
+        let top = harmonics.last().copied().unwrap_or(0);
+        Alternation {
+            fourier: Fourier::new(samples),
+            pairs: harmonics.iter().map(|&h| (h, ZERO)).collect(),
+            signal: zeros.clone(),
+            force: three(),
+            displacement: three(),
+            velocity: three(),
+            slips: vec![false; samples],
+            state: Vec::new(),
+            turns: (0..samples).map(|i| Complex64::cis(i as f64 * TAU / samples as f64)).collect(),
+            argument: Vec::new(),
+            work: zeros.clone(),
+            moment: zeros,
+            slopes: Vec::new(),
+            spectra: std::array::from_fn(|_| vec![ZERO; 2 * top + 1]),
+            column: vec![ZERO; harmonics.len()],
+            row: vec![ZERO; harmonics.len()],
+            intervals: Vec::new(),
+            extremes: Vec::new(),
+            grid: super::sliders::Grid::new(top),
+            march: super::march::Memory::default(),
+            harmonics,
+        }
+    }
+
+    pub fn samples(&self) -> usize {
+        self.signal.len()
+    }
+
+    /// Samples of the signal with harmonics `c`, each times `factor(h)`, into `self.signal`.
+    pub(super) fn synthesise(&mut self, c: &[Complex64], factor: impl Fn(usize) -> Complex64) {
+        for (pair, value) in self.pairs.iter_mut().zip(c) {
+            pair.1 = value * factor(pair.0);
+        }
+        self.fourier.synthesise(&self.pairs, &mut self.signal);
+    }
+
+    /// Any harmonics below half of the samples of the forces that were sampled last along an axis.
+    pub fn add_harmonics(&mut self, axis: usize, wanted: &[usize], mut add: impl FnMut(usize, Complex64)) {
+        let n = self.samples();
+        self.work.copy_from_slice(&self.force[axis]);
+        let sums = self.fourier.sums(&mut self.work);
+        for (k, &h) in wanted.iter().enumerate().filter(|(_, h)| 2 * **h < n) {
+            add(k, sums[h] * 2.0 / n as f64);
+        }
+    }
+
+    /// Adds the harmonics of the sampled force along an axis.
+    pub(super) fn add_force(&mut self, axis: usize, force: &mut [Complex64]) {
+        let n = self.samples();
+        self.work.copy_from_slice(&self.force[axis]);
+        let sums = self.fourier.sums(&mut self.work);
+        for (f, &h) in force.iter_mut().zip(&self.harmonics) {
+            *f += sums[h] * share(h, n);
+        }
+    }
+
+    /// The spectrum of the slope of number `slope`, into the spectrum of number `to`. False if the slope is zero all the time.
+    pub(super) fn slope_spectrum(&mut self, slope: usize, to: usize) -> bool {
+        if self.slopes[slope].iter().all(|s| *s == 0.0) {
+            return false;
+        }
+        let n = self.samples();
+        self.work.copy_from_slice(&self.slopes[slope]);
+        let sums = self.fourier.sums(&mut self.work);
+        for (m, value) in self.spectra[to].iter_mut().enumerate() {
+            *value = sums[m] / n as f64;
+        }
+        true
+    }
+
+    /// Adds `δf_h = Σ_k (G_{h-k} δy_k + G_{h+k} δy_k*)`, `δy_k = factor(k) δU_k`, from axis `b` of the motion to axis `a` of the force, with the
+    /// spectrum `G` of the slope in the first of the spectra.
+    pub(super) fn add_slope(
+        &self,
+        tangent: &mut [f64],
+        (a, b): (usize, usize),
+        axes: usize,
+        factor: impl Fn(usize) -> Complex64,
+    ) {
+        let nh = self.harmonics.len();
+        for (i, &h) in self.harmonics.iter().enumerate() {
+            for (l, &k) in self.harmonics.iter().enumerate() {
+                let (minus, plus) = pair(&self.spectra[0], h, k);
+                let by = factor(k);
+                let (minus, plus) = (minus * by, plus * by.conj());
+                add_block(tangent, 2 * nh * axes, (a * nh + i, h), (b * nh + l, k), as_block(minus, plus));
+            }
+        }
+    }
+
+    /// Makes `count` signals for slopes.
+    pub(super) fn reserve_slopes(&mut self, count: usize) {
+        let n = self.samples();
+        while self.slopes.len() < count {
+            self.slopes.push(vec![0.0; n]);
+        }
+    }
+}
+
+/// What makes the amplitude of harmonic `h` of a sum over `n` samples.
+pub(super) fn share(h: usize, n: usize) -> f64 {
+    if h == 0 { 1.0 / n as f64 } else { 2.0 / n as f64 }
+}
+
+/// `δf = minus δU + plus δU*` for real and imaginary parts.
+#[inline]
+pub(super) fn as_block(minus: Complex64, plus: Complex64) -> [f64; 4] {
+    [minus.re + plus.re, plus.im - minus.im, minus.im + plus.im, minus.re - plus.re]
+}
+
+/// `G_{h-k}` and `G_{h+k}` of a real signal.
+#[inline]
+pub(super) fn pair(spectrum: &[Complex64], h: usize, k: usize) -> (Complex64, Complex64) {
+    (if h >= k { spectrum[h - k] } else { spectrum[k - h].conj() }, spectrum[h + k])
+}
+
+/// Adds a 2 × 2 block; the mean has half the weight of the others and no imaginary part.
+#[inline]
+pub(super) fn add_block(
+    tangent: &mut [f64],
+    size: usize,
+    row: (usize, usize),
+    column: (usize, usize),
+    block: [f64; 4],
+) {
+    let weight = if row.1 == 0 { 0.5 } else { 1.0 };
+    add_entries(tangent, size, row, column, block.map(|x| weight * x));
+}
+
+/// The same without the weight. `row` and `column` are numbers of unknown pairs and their harmonics.
+#[inline]
+pub(super) fn add_entries(
+    tangent: &mut [f64],
+    size: usize,
+    (a, h): (usize, usize),
+    (b, k): (usize, usize),
+    block: [f64; 4],
+) {
+    let at = 2 * a * size + 2 * b;
+    tangent[at] += block[0];
+    if k > 0 {
+        tangent[at + 1] += block[1];
+    }
+    if h > 0 {
+        tangent[at + size] += block[2];
+        if k > 0 {
+            tangent[at + size + 1] += block[3];
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! Laws with memory: their states are run through the samples of a period until they repeat, with the exact derivative of what is computed.
+//!
+//! A step makes states and forces of the states before it and of its inputs, which are linear in the harmonics of the motion. The states
+//! `z` at t = 0 repeat if `z = F(z)` over the period: Newton's method with the product `Π` of the steps' derivatives, or more periods where
+//! it does not help. By a harmonic of the motion, `δz = Π δz + δq`. In directions in which nothing is forgotten, as in a contact that
+//! sticks all the time, `1 - Π` is singular: there states and derivatives stay what they were when the joint was first moved
+//! from its mean position.
+
+use super::alternation::{Alternation, share};
+use crate::law::MOST_DIRECTIONS;
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+
+/// Distance of the states from those a period later, relative to their size, at which they repeat: the rounding of a thousand steps.
+const REPEATS: f64 = 1e-12;
+/// The same where they come no closer.
+const ROUNDED: f64 = 1e-9;
+/// Periods, at most: hysteresis that slips forgets in a few.
+const PERIODS: usize = 60;
+/// Singular values of `1 - Π` below this belong to states that nothing forgets.
+const NEUTRAL: f64 = 1e-9;
+
+/// A law with memory as a chain of steps.
+pub(super) trait March {
+    fn states(&self) -> usize;
+    /// Their size.
+    fn state_scale(&self) -> f64;
+    fn axes(&self) -> usize;
+    /// Inputs of a step for each axis; they are ordered by kind, then by axis.
+    fn inputs(&self) -> usize;
+    /// What the inputs along an axis are when its motion is `Re(U e^{jhθ})`, by U, in the step that ends where `e^{jhθ}` is `at`; steps
+    /// have the length `angle`.
+    fn waves(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4];
+    /// The same for the first movement.
+    fn first_waves(&self, h: usize) -> [Complex64; 4];
+    /// The step that ends at sample `i`. `rows`: derivatives of the states after it, then of the forces, by inputs and states before.
+    /// False if it has no solution.
+    fn step(
+        &mut self,
+        i: usize,
+        before: &[f64],
+        after: &mut [f64],
+        force: &mut [f64; MOST_DIRECTIONS],
+        rows: Option<&mut [f64]>,
+    ) -> bool;
+    /// The first movement, from the mean position of a joint that has not been moved to sample 0.
+    fn first(
+        &mut self,
+        before: &[f64],
+        after: &mut [f64],
+        force: &mut [f64; MOST_DIRECTIONS],
+        rows: Option<&mut [f64]>,
+    ) -> bool;
+}
+
+/// Memory of a march.
+#[derive(Debug, Clone, Default)]
+pub(in super::super) struct Memory {
+    /// Derivatives of every step.
+    rows: Vec<f64>,
+    /// Those of the first movement.
+    first: Vec<f64>,
+    /// Forces by the states at t = 0, per sample.
+    by_state: Vec<f64>,
+    re: Vec<f64>,
+    im: Vec<f64>,
+    columns: Vec<Complex64>,
+}
+
+impl Alternation {
+    /// Forces along the axes and their derivative. Without an answer the forces are no numbers.
+    pub(super) fn march(&mut self, march: &mut dyn March, force: &mut [Complex64], tangent: Option<&mut [f64]>) {
+        let nh = self.harmonics.len();
+        let mut memory = std::mem::take(&mut self.march);
+        if let Some(product) = self.repeat(march, &mut memory) {
+            for a in 0..march.axes() {
+                self.add_force(a, &mut force[a * nh..(a + 1) * nh]);
+            }
+            if let Some(tangent) = tangent
+                && !self.march_tangent(march, &mut memory, &product, tangent)
+            {
+                force.fill(Complex64::new(f64::NAN, 0.0));
+            }
+        } else {
+            force.fill(Complex64::new(f64::NAN, 0.0));
+        }
+        self.march = memory;
+    }
+
+    /// States that repeat, into `self.state`, the forces, and the derivatives of all steps. Returns Π.
+    fn repeat(&mut self, march: &mut dyn March, memory: &mut Memory) -> Option<DMatrix<f64>> {
+        let m = march.states();
+        let mut z = DVector::zeros(m);
+        let mut force = [0.0; MOST_DIRECTIONS];
+        if !march.first(&vec![0.0; m], z.as_mut_slice(), &mut force, None) {
+            return None;
+        }
+        z = self.period(march, &z, None)?;
+        let scale = march.state_scale();
+        let mut last = f64::INFINITY;
+        for _ in 0..PERIODS {
+            let (after, product) = self.linear_period(march, &z, memory)?;
+            let gap = (&after - &z).amax() / scale;
+            if m == 0 || gap <= REPEATS || (gap <= ROUNDED && gap >= 0.5 * last) {
+                self.state.clear();
+                self.state.extend(z.iter());
+                return Some(product);
+            }
+            // a period forgets; Newton's method helps where that is slow
+            if gap < 0.5 * last || last.is_infinite() {
+                z += pseudo_inverse(DMatrix::identity(m, m) - product) * (after - &z);
+            } else {
+                z = after;
+            }
+            last = gap;
+        }
+        None
+    }
+
+    /// A period from the states `z`.
+    fn period(
+        &mut self,
+        march: &mut dyn March,
+        z: &DVector<f64>,
+        mut rows: Option<&mut Vec<f64>>,
+    ) -> Option<DVector<f64>> {
+        let n = self.samples();
+        let (m, d) = (march.states(), march.axes());
+        let size = (m + d) * (march.inputs() * d + m);
+        if let Some(rows) = rows.as_deref_mut() {
+            rows.resize(n * size, 0.0);
+        }
+        let (mut z, mut after) = (z.clone(), z.clone());
+        let mut force = [0.0; MOST_DIRECTIONS];
+        for step in 1..=n {
+            let i = step % n;
+            let slot = rows.as_deref_mut().map(|rows| &mut rows[i * size..(i + 1) * size]);
+            if !march.step(i, z.as_slice(), after.as_mut_slice(), &mut force, slot) {
+                return None;
+            }
+            std::mem::swap(&mut z, &mut after);
+            for (signal, force) in self.force.iter_mut().zip(force).take(d) {
+                signal[i] = force;
+            }
+        }
+        Some(z)
+    }
+
+    /// The same with the derivative by the states before, and that of the forces.
+    fn linear_period(
+        &mut self,
+        march: &mut dyn March,
+        z: &DVector<f64>,
+        memory: &mut Memory,
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let n = self.samples();
+        let (m, d) = (march.states(), march.axes());
+        let inputs = march.inputs() * d;
+        let width = inputs + m;
+        let after = self.period(march, z, Some(&mut memory.rows))?;
+        let mut product = DMatrix::<f64>::identity(m, m);
+        let mut next = product.clone();
+        memory.by_state.resize(n * d * m, 0.0);
+        for step in 1..=n {
+            let i = step % n;
+            let rows = &memory.rows[i * (m + d) * width..(i + 1) * (m + d) * width];
+            for t in 0..m {
+                for s in 0..m + d {
+                    let row = &rows[s * width + inputs..(s + 1) * width];
+                    let value: f64 = row.iter().enumerate().map(|(r, x)| x * product[(r, t)]).sum();
+                    match s.checked_sub(m) {
+                        None => next[(s, t)] = value,
+                        Some(a) => memory.by_state[(i * d + a) * m + t] = value,
+                    }
+                }
+            }
+            std::mem::swap(&mut product, &mut next);
+        }
+        Some((after, product))
+    }
+
+    /// Adds the derivative of the forces. False if the first movement has none.
+    fn march_tangent(
+        &mut self,
+        march: &mut dyn March,
+        memory: &mut Memory,
+        product: &DMatrix<f64>,
+        tangent: &mut [f64],
+    ) -> bool {
+        let (n, nh) = (self.samples(), self.harmonics.len());
+        let (m, d) = (march.states(), march.axes());
+        let (kinds, inputs) = (march.inputs(), march.inputs() * d);
+        let width = inputs + m;
+        let (size, angle) = (2 * nh * d, TAU / n as f64);
+        let open = DMatrix::identity(m, m) - product;
+        let neutral = m > 0 && open.clone().singular_values().min() <= NEUTRAL;
+        let inverse = pseudo_inverse(open);
+        // where something is never forgotten, its derivative is that of the first period
+        let beginning = if neutral {
+            let mut first = std::mem::take(&mut memory.first);
+            let rows = self.first_period(march, &mut first);
+            memory.first = first;
+            match rows {
+                Some(rows) => rows,
+                None => return false,
+            }
+        } else {
+            Vec::new()
+        };
+        let zero = Complex64::new(0.0, 0.0);
+        memory.columns.resize(n * d, zero);
+        memory.re.resize(n, 0.0);
+        memory.im.resize(n, 0.0);
+        let (mut s, mut next) = (vec![zero; m], vec![zero; m]);
+        for b in 0..d {
+            for k in 0..nh {
+                let h = self.harmonics[k];
+                // by the motion, from states that do not change
+                let mut start = vec![zero; m];
+                if neutral {
+                    let waves = march.first_waves(h);
+                    for (r, start) in start.iter_mut().enumerate() {
+                        *start = (0..kinds).map(|kind| waves[kind] * memory.first[r * width + kind * d + b]).sum();
+                    }
+                    for step in 1..=n {
+                        let i = step % n;
+                        let waves = march.waves(h, angle, self.turns[i * h % n]);
+                        let rows = &beginning[i * (m + d) * width..(i + 1) * (m + d) * width];
+                        advance(&rows[..m * width], (width, kinds, d, b), &waves, &start, &mut next);
+                        std::mem::swap(&mut start, &mut next);
+                    }
+                }
+                s.copy_from_slice(&start);
+                for step in 1..=n {
+                    let i = step % n;
+                    let waves = march.waves(h, angle, self.turns[i * h % n]);
+                    let rows = &memory.rows[i * (m + d) * width..(i + 1) * (m + d) * width];
+                    advance(
+                        &rows[m * width..],
+                        (width, kinds, d, b),
+                        &waves,
+                        &s,
+                        &mut memory.columns[i * d..(i + 1) * d],
+                    );
+                    advance(&rows[..m * width], (width, kinds, d, b), &waves, &s, &mut next);
+                    std::mem::swap(&mut s, &mut next);
+                }
+                // the states at t = 0 follow so that they repeat
+                let shift: Vec<Complex64> =
+                    (0..m).map(|r| (0..m).map(|t| (s[t] - start[t]) * inverse[(r, t)]).sum()).collect();
+                for a in 0..d {
+                    for i in 0..n {
+                        let by_state = &memory.by_state[(i * d + a) * m..(i * d + a + 1) * m];
+                        let follow: Complex64 = by_state.iter().zip(&shift).map(|(x, z)| z * x).sum();
+                        let value = memory.columns[i * d + a] + follow;
+                        (memory.re[i], memory.im[i]) = (value.re, -value.im);
+                    }
+                    for (part, signal) in [&mut memory.re, &mut memory.im].into_iter().enumerate() {
+                        if h == 0 && part == 1 {
+                            continue; // a mean has no imaginary part
+                        }
+                        let sums = self.fourier.sums(signal);
+                        for (l, &to) in self.harmonics.iter().enumerate() {
+                            let value = sums[to] * share(to, n);
+                            let at = 2 * (a * nh + l) * size + 2 * (b * nh + k) + part;
+                            tangent[at] += value.re;
+                            if to > 0 {
+                                tangent[at + size] += value.im;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// Derivatives of the steps of the first period; those of the first movement into `first`. The forces stay those of the last.
+    fn first_period(&mut self, march: &mut dyn March, first: &mut Vec<f64>) -> Option<Vec<f64>> {
+        let (m, d) = (march.states(), march.axes());
+        first.resize((m + d) * (march.inputs() * d + m), 0.0);
+        let mut z = DVector::zeros(m);
+        let mut force = [0.0; MOST_DIRECTIONS];
+        if !march.first(&vec![0.0; m], z.as_mut_slice(), &mut force, Some(first)) {
+            return None;
+        }
+        let forces = self.force.clone();
+        let mut rows = Vec::new();
+        let run = self.period(march, &z, Some(&mut rows));
+        self.force = forces;
+        run.map(|_| rows)
+    }
+}
+
+/// `rows` times inputs and states, into `out`.
+#[inline]
+fn advance(
+    rows: &[f64],
+    (width, kinds, d, b): (usize, usize, usize, usize),
+    waves: &[Complex64; 4],
+    states: &[Complex64],
+    out: &mut [Complex64],
+) {
+    for (row, out) in rows.chunks_exact(width).zip(out) {
+        let moved: Complex64 = (0..kinds).map(|kind| waves[kind] * row[kind * d + b]).sum();
+        let kept: Complex64 = row[kinds * d..].iter().zip(states).map(|(x, z)| z * x).sum();
+        *out = moved + kept;
+    }
+}
+
+/// The inverse where there is one, and zero along directions that are neutral.
+fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let m = matrix.nrows();
+    if m == 0 {
+        return matrix;
+    }
+    let svd = matrix.svd(true, true);
+    svd.pseudo_inverse(NEUTRAL).unwrap_or_else(|_| DMatrix::zeros(m, m))
+}

@@ -1,0 +1,342 @@
+//! Ports: where a law meets the equations.
+//!
+//! A joint's law becomes one or several ports, by the view that is chosen for it. A port has an axis for each of the law's directions, and an
+//! unknown per axis and harmonic:
+//! - a *motion port* (sliders and stops, rate, step) has the motion `u` and makes the force `f(u)` of it;
+//! - a *force port* (prox) has the force `λ`, and makes `P J(λ + ε u')` of it, which it must be.
+//!
+//! Both give the derivative by the unknowns exactly, over all axes and harmonics at once. The equations know nothing else of a law.
+
+mod alternation;
+mod march;
+mod prox;
+mod rate;
+mod sliders;
+mod step;
+#[cfg(test)]
+mod tests;
+
+pub(super) use alternation::Alternation;
+use prox::Rigid;
+use sliders::Part;
+
+use crate::law::{MOST_DIRECTIONS, Piece, Prox, SharedLaw, Slider};
+use crate::method::MethodError;
+use crate::model::{Axis, System};
+use num_complex::Complex64;
+
+/// What acts at a port.
+#[derive(Debug, Clone)]
+enum Kernel {
+    /// Sliders behind springs, and stops, side by side along one axis: the force is exact for the series.
+    Sliders(Vec<Part>),
+    /// Rigid sliders side by side along one axis, as one.
+    Rigid(Rigid),
+    /// A law by its resolvent.
+    Prox(SharedLaw),
+    /// A law by its return map.
+    Step(SharedLaw),
+    /// A law by its rates.
+    Rate(SharedLaw),
+}
+
+/// A relative motion along one to three axes with what acts along it: that of a joint, or of a joint's inner slider behind a spring.
+#[derive(Debug, Clone)]
+pub(super) struct Port {
+    /// The joint.
+    pub joint: usize,
+    /// Number of its first axis among those of all ports.
+    pub first: usize,
+    /// How many it has.
+    pub axes: usize,
+    /// Compliance of the spring between the joint and this port, m/N; zero if it is the joint's own motion.
+    pub series: f64,
+    /// Size of its forces, N; infinite if nothing bounds them. Finite for a force port.
+    pub scale: f64,
+    /// The penalty above which its resolvent is single-valued, N s/m.
+    pub least_penalty: f64,
+    kernel: Kernel,
+}
+
+impl Port {
+    /// Its unknown is the force.
+    pub fn is_force(&self) -> bool {
+        matches!(self.kernel, Kernel::Rigid(_) | Kernel::Prox(_))
+    }
+
+    /// Whether it holds rigidly, so that accelerations jump.
+    pub fn is_rigid(&self) -> bool {
+        match &self.kernel {
+            Kernel::Rigid(_) => true,
+            Kernel::Prox(law) => law.prox().is_some_and(|prox| prox.at_velocity(0.0).is_none()),
+            _ => false,
+        }
+    }
+
+    /// Whether the kernel itself tells slip from stick, sample by sample ([`Alternation::slips`]).
+    pub fn tells_slip(&self) -> bool {
+        match &self.kernel {
+            Kernel::Sliders(parts) => parts.iter().all(|part| matches!(part, Part::Slider { .. })),
+            Kernel::Rigid(_) => true,
+            _ => false,
+        }
+    }
+
+    /// Numbers of its axes among those of all ports.
+    pub fn range(&self) -> std::ops::Range<usize> {
+        self.first..self.first + self.axes
+    }
+
+    /// The same kind of port at the same place, whatever the numbers.
+    pub fn is_like(&self, other: &Port) -> bool {
+        let kind = |port: &Port| (port.joint, port.first, port.axes, std::mem::discriminant(&port.kernel));
+        kind(self) == kind(other)
+    }
+
+    /// Stiffness at rest along its axes, N/m, roughly; zero if it is rigid.
+    pub fn stiffness(&self) -> f64 {
+        match &self.kernel {
+            Kernel::Sliders(parts) => parts.iter().map(Part::stiffness).sum(),
+            Kernel::Rigid(_) | Kernel::Prox(_) => {
+                if self.series > 0.0 {
+                    1.0 / self.series
+                } else {
+                    0.0
+                }
+            }
+            Kernel::Step(law) | Kernel::Rate(law) => {
+                // a rate law at a frequency at which its states follow
+                let at_rest = crate::method::guess::at_rest(&**law, 1.0);
+                (0..self.axes).map(|a| at_rest[(a, a)].norm()).fold(0.0, f64::max)
+            }
+        }
+    }
+
+    /// How far its springs reach before they slip, m; zero if there are none.
+    pub fn reach(&self) -> f64 {
+        match &self.kernel {
+            Kernel::Sliders(parts) => parts.iter().map(Part::reach).fold(0.0, f64::max),
+            _ => 0.0,
+        }
+    }
+
+    fn prox(&self) -> Option<&dyn Prox> {
+        match &self.kernel {
+            Kernel::Rigid(rigid) => Some(rigid),
+            Kernel::Prox(law) => law.prox(),
+            _ => None,
+        }
+    }
+}
+
+/// The ports of a system; a joint that carries no force has none.
+#[derive(Debug, Clone)]
+pub(super) struct Ports {
+    list: Vec<Port>,
+    /// Joint and number within it of every axis.
+    axes: Vec<(usize, usize)>,
+}
+
+impl std::ops::Deref for Ports {
+    type Target = [Port];
+    fn deref(&self) -> &[Port] {
+        &self.list
+    }
+}
+
+impl Ports {
+    /// # Errors
+    /// A law whose views harmonic balance cannot take.
+    pub fn new(system: &System) -> Result<Self, MethodError> {
+        let mut ports = Ports { list: Vec::new(), axes: Vec::new() };
+        for (j, joint) in system.joints().iter().enumerate() {
+            let law = joint.law();
+            let unsupported = |instead| MethodError::Law {
+                method: super::NAME,
+                joint: joint.name().to_owned(),
+                law: law.name(),
+                instead,
+            };
+            if law.is_free() {
+                continue;
+            }
+            let axes = joint.axes().len();
+            if axes == 1
+                && let Some(pieces) = law.pieces()
+            {
+                let holds_more = |piece: &Piece| matches!(piece, Piece::Slider(s) if s.static_limit > s.limit);
+                if pieces.iter().any(holds_more) {
+                    return Err(unsupported("method `event-driven`: its limit jumps when slip begins"));
+                }
+                ports.add_pieces(j, &pieces);
+                continue;
+            }
+            let (kernel, series, least) = if let Some(prox) = law.prox() {
+                (Kernel::Prox(law.clone()), prox.compliance(), prox.least_penalty())
+            } else if law.step().is_some() {
+                (Kernel::Step(law.clone()), 0.0, 0.0)
+            } else if law.rate().is_some() {
+                (Kernel::Rate(law.clone()), 0.0, 0.0)
+            } else {
+                return Err(unsupported("a law with one of the views prox, step, rate, or pieces along one direction"));
+            };
+            let scale = law.scale();
+            if matches!(kernel, Kernel::Prox(_)) && !(scale.is_finite() && scale > 0.0) {
+                return Err(unsupported("a resolvent with a finite scale of forces"));
+            }
+            ports.add(j, axes, kernel, (series, scale, least));
+        }
+        Ok(ports)
+    }
+
+    fn add(&mut self, joint: usize, axes: usize, kernel: Kernel, (series, scale, least_penalty): (f64, f64, f64)) {
+        let first = self.axes.len();
+        self.axes.extend((0..axes).map(|a| (joint, a)));
+        self.list.push(Port { joint, first, axes, series, scale, least_penalty, kernel });
+    }
+
+    /// One port for elastic sliders and stops, and one for rigid sliders: both move alike.
+    fn add_pieces(&mut self, joint: usize, pieces: &[Piece]) {
+        let mut parts = Vec::new();
+        // rigid sliders side by side are one
+        let (mut rigid, mut scale) = (0.0, 0.0);
+        for piece in pieces {
+            match *piece {
+                Piece::Slider(Slider { limit: 0.0, .. }) => {}
+                Piece::Slider(Slider { stiffness: None, limit, .. }) => rigid += limit,
+                Piece::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {
+                    scale += limit;
+                    parts.push(Part::Slider { stiffness, limit });
+                }
+                Piece::Stop { stiffness: 0.0, .. } => {}
+                Piece::Stop { gap, stiffness } => {
+                    scale = f64::INFINITY;
+                    parts.push(Part::Stop { gap, stiffness });
+                }
+            }
+        }
+        if !parts.is_empty() {
+            self.add(joint, 1, Kernel::Sliders(parts), (0.0, scale, 0.0));
+        }
+        if rigid > 0.0 {
+            self.add(joint, 1, Kernel::Rigid(Rigid { limit: rigid }), (0.0, rigid, 0.0));
+        }
+    }
+
+    /// Axes of all ports.
+    pub fn count(&self) -> usize {
+        self.axes.len()
+    }
+
+    /// An axis by its number.
+    pub fn axis<'a>(&self, system: &'a System, number: usize) -> &'a Axis {
+        let (joint, axis) = self.axes[number];
+        &system.joints()[joint].axes()[axis]
+    }
+
+    /// The joint of an axis, and which of its axes it is.
+    pub fn place(&self, number: usize) -> (usize, usize) {
+        self.axes[number]
+    }
+
+    /// Whether some unknown is a force.
+    pub fn has_forces(&self) -> bool {
+        self.list.iter().any(Port::is_force)
+    }
+
+    /// Whether something holds rigidly.
+    pub fn has_rigid(&self) -> bool {
+        self.list.iter().any(Port::is_rigid)
+    }
+}
+
+/// Where the structure cannot move along a contact, because its motion is imposed, rigid friction changes its sign over this
+/// share of the velocity.
+const IMPOSED: f64 = 1e-9;
+
+impl Alternation {
+    /// Harmonics of the force of a motion port that moves with the harmonics `c`, [axis][harmonic], into `force`; the derivative with respect
+    /// to (Re, Im) of the harmonics into `tangent` (row-major, 2 × axes × harmonics squared). The law is taken at `1/share` of the motion
+    /// and gives `share` times that force: with a large share every law is what it is at rest, stuck.
+    pub fn respond(
+        &mut self,
+        port: &Port,
+        (omega, share): (f64, f64),
+        c: &[Complex64],
+        force: &mut [Complex64],
+        mut tangent: Option<&mut [f64]>,
+    ) {
+        let mut motion = std::mem::take(&mut self.argument);
+        motion.clear();
+        motion.extend(c.iter().map(|c| c / share));
+        force.fill(ZERO);
+        if let Some(tangent) = tangent.as_deref_mut() {
+            tangent.fill(0.0);
+        }
+        match &port.kernel {
+            Kernel::Sliders(parts) => self.slide(parts, &motion, force, tangent),
+            Kernel::Rate(law) => {
+                if let Some(rate) = law.rate() {
+                    self.rate(rate, port.axes, omega, &motion, force, tangent);
+                }
+            }
+            Kernel::Step(law) => {
+                if let Some(step) = law.step() {
+                    self.step(step, port.axes, &motion, force, tangent);
+                }
+            }
+            Kernel::Rigid(_) | Kernel::Prox(_) => {}
+        }
+        force.iter_mut().for_each(|f| *f *= share);
+        self.argument = motion;
+    }
+
+    /// The image of the forces λ of a force port along a motion c: `P J(λ + ε c')`, or the law itself where the motion is imposed, which λ
+    /// does not change (`penalty` infinite). The derivative of the image by `λ + ε c'` into `tangent`; `share` as in [`Alternation::respond`].
+    pub fn image(
+        &mut self,
+        port: &Port,
+        (omega, penalty, share): (f64, f64, f64),
+        (c, force): (&[Complex64], &[Complex64]),
+        image: &mut [Complex64],
+        mut tangent: Option<&mut [f64]>,
+    ) {
+        image.fill(ZERO);
+        if let Some(tangent) = tangent.as_deref_mut() {
+            tangent.fill(0.0);
+        }
+        let Some(prox) = port.prox() else { return };
+        let nh = self.harmonics.len();
+        let turn = |i: usize, harmonics: &[usize]| Complex64::new(0.0, harmonics[i % nh] as f64 * omega);
+        let mut signal = std::mem::take(&mut self.argument);
+        signal.clear();
+        if penalty.is_infinite() {
+            let speed: f64 = c.iter().enumerate().map(|(i, c)| (c * turn(i, &self.harmonics)).norm()).sum();
+            let width = (IMPOSED * speed).max(f64::MIN_POSITIVE);
+            signal.extend(c.iter().enumerate().map(|(i, c)| c * turn(i, &self.harmonics) / share));
+            self.velocity(prox, port, width / share, &mut signal, image);
+        } else {
+            let moved = c.iter().enumerate().map(|(i, c)| c * turn(i, &self.harmonics) * penalty);
+            signal.extend(moved.zip(force).map(|(moved, force)| (force + moved) / share));
+            self.resolve(prox, port, penalty, &signal, image, tangent);
+        }
+        image.iter_mut().for_each(|f| *f *= share);
+        self.argument = signal;
+    }
+
+    /// Samples of the forces of a port in a motion that has been found, see [`Alternation::force`].
+    pub fn sample(&mut self, port: &Port, (omega, penalty): (f64, f64), (c, force): (&[Complex64], &[Complex64])) {
+        let mut out = vec![ZERO; c.len()];
+        if port.is_force() {
+            self.image(port, (omega, penalty, 1.0), (c, force), &mut out, None);
+            return;
+        }
+        self.respond(port, (omega, 1.0), c, &mut out, None);
+        if let Kernel::Sliders(parts) = &port.kernel {
+            self.sample_slides(parts, c);
+        }
+    }
+}
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+const _: () = assert!(MOST_DIRECTIONS == 3, "signals of a port are kept for three axes");

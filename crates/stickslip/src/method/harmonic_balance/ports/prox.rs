@@ -1,0 +1,234 @@
+//! Force ports: a law of velocity by its resolvent, rigid, steep or smooth.
+//!
+//! `λ = φ(v)` is for any `ε > 0` the same as `λ = J(λ + ε v)` with `J = (1 + ε φ⁻¹)⁻¹`, which for rigid friction is the projection onto
+//! `[-limit, limit]`. `J` never rises faster than its argument, however steep φ is.
+//! Source: Alart and Curnier (1991); Nacivet et al. (2003); Parikh and Boyd, "Proximal Algorithms" (2014).
+//!
+//! Steep maps change within a sample. Along one axis their mean over it is taken for an argument `y + eξ`, `-1 < ξ < 1`, that is linear there:
+//! so a zero of the velocity is placed within its sample, and the forces stay the gradient of a convex function. In a plane the argument
+//! turns rather than passes through zero, and the value in the middle is taken.
+
+use super::Port;
+use super::alternation::{Alternation, add_block, as_block, pair, share};
+use crate::law::{MOST_DIRECTIONS, Mean, Prox};
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+
+/// A resolvent counts as smooth over a sample if its argument changes there by less than this share of the law's scale: the point value is
+/// then exact to spectral accuracy, and the mean would be the less accurate of the two.
+const SMOOTH: f64 = 0.1;
+
+/// Rigid friction along one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rigid {
+    /// N.
+    pub limit: f64,
+}
+
+impl Prox for Rigid {
+    fn resolve(&self, y: &[f64], _penalty: f64, force: &mut [f64], slope: &mut [f64]) {
+        force[0] = y[0].clamp(-self.limit, self.limit);
+        slope[0] = if y[0].abs() < self.limit { 1.0 } else { 0.0 };
+    }
+    fn mean(&self, y: f64, e: f64, _penalty: f64) -> Mean {
+        let mean = saturation(y / self.limit, e / self.limit);
+        Mean { zeroth: self.limit * mean.zeroth, first: self.limit * mean.first, ..mean }
+    }
+}
+
+impl Alternation {
+    /// Adds the harmonics of the resolvent of the signal `y`, [axis][harmonic], to `image`, and their derivative to `tangent`.
+    pub(super) fn resolve(
+        &mut self,
+        prox: &dyn Prox,
+        port: &Port,
+        penalty: f64,
+        y: &[Complex64],
+        image: &mut [Complex64],
+        tangent: Option<&mut [f64]>,
+    ) {
+        if port.axes == 1 {
+            // the projection has kinks wherever it goes
+            let mean = port.is_rigid() || self.changes_by(y, 1.0 / port.scale);
+            // where the map is the identity, the force of a sticking contact has to be the signal: the mean over a sample is undone before
+            return self.along(|y, e| prox.mean(y, e, penalty), (mean, mean), port.scale, y, image, tangent);
+        }
+        self.turn(prox, port.axes, penalty, y, image, tangent);
+    }
+
+    /// The same of the velocities `v` themselves, where the force does not change them; rigid friction changes its sign over `width` (m/s).
+    pub(super) fn velocity(
+        &mut self,
+        prox: &dyn Prox,
+        port: &Port,
+        width: f64,
+        v: &mut [Complex64],
+        image: &mut [Complex64],
+    ) {
+        if port.axes == 1
+            && let Some((_, slope)) = prox.at_velocity(0.0)
+        {
+            let mean = self.changes_by(v, slope / port.scale);
+            let law = |v, e| prox.mean_at_velocity(v, e).unwrap_or_default();
+            return self.along(law, (mean, false), port.scale, v, image, None);
+        }
+        // a force of the limit at that velocity
+        let penalty = port.scale / width;
+        v.iter_mut().for_each(|v| *v *= penalty);
+        if port.axes == 1 {
+            return self.along(|y, e| prox.mean(y, e, penalty), (true, true), port.scale, v, image, None);
+        }
+        self.turn(prox, port.axes, penalty, v, image, None);
+    }
+
+    /// Whether a signal times `scale` changes by much over a sample.
+    fn changes_by(&self, y: &[Complex64], scale: f64) -> bool {
+        let highest = self.harmonics.last().map_or(1.0, |&h| h as f64);
+        let largest: f64 = y.iter().map(|y| y.norm()).sum();
+        scale * largest * TAU * highest / self.samples() as f64 >= SMOOTH
+    }
+
+    /// A map along one axis. `mean`: it is taken over the sample; `undo`: the signal is widened before, so that the mean of the identity is
+    /// the identity.
+    fn along(
+        &mut self,
+        map: impl Fn(f64, f64) -> Mean,
+        (mean, undo): (bool, bool),
+        scale: f64,
+        y: &[Complex64],
+        image: &mut [Complex64],
+        tangent: Option<&mut [f64]>,
+    ) {
+        let n = self.samples();
+        let widen = |h: usize| if undo { 1.0 / (1.0 + change(h, n).norm_sqr() / 3.0) } else { 1.0 };
+        self.synthesise(y, |h| Complex64::new(widen(h), 0.0));
+        self.reserve_slopes(3);
+        for i in 0..n {
+            let y = self.signal[i];
+            let (before, after) =
+                (self.signal[if i == 0 { n - 1 } else { i - 1 }], self.signal[if i + 1 == n { 0 } else { i + 1 }]);
+            let e = if mean { 0.25 * (after - before) } else { 0.0 };
+            let value = map(y, e);
+            self.slips[i] = y.abs() >= scale;
+            self.force[0][i] = value.zeroth;
+            self.moment[i] = value.first;
+            self.slopes[0][i] = value.slope;
+            self.slopes[1][i] = value.slope_first;
+            self.slopes[2][i] = value.slope_second;
+        }
+        self.add_force(0, image);
+        if mean {
+            self.work.copy_from_slice(&self.moment);
+            let sums = self.fourier.sums(&mut self.work);
+            for (f, &h) in image.iter_mut().zip(&self.harmonics) {
+                *f += sums[h] * share(h, n) * change(h, n).conj();
+            }
+        }
+        let Some(tangent) = tangent else { return };
+        for slope in 0..if mean { 3 } else { 1 } {
+            if !self.slope_spectrum(slope, slope) {
+                self.spectra[slope].fill(Complex64::default());
+            }
+        }
+        let size = 2 * self.harmonics.len();
+        for (a, &h) in self.harmonics.iter().enumerate() {
+            for (b, &k) in self.harmonics.iter().enumerate() {
+                let (mut minus, mut plus) = pair(&self.spectra[0], h, k);
+                if mean {
+                    let (row, column) = (change(h, n).conj(), change(k, n));
+                    let (minus_1, plus_1) = pair(&self.spectra[1], h, k);
+                    let (minus_2, plus_2) = pair(&self.spectra[2], h, k);
+                    minus += (row + column) * minus_1 + row * column * minus_2;
+                    plus += (row + column.conj()) * plus_1 + row * column.conj() * plus_2;
+                }
+                add_block(tangent, size, (a, h), (b, k), as_block(minus, plus).map(|x| widen(k) * x));
+            }
+        }
+    }
+
+    /// A map along several axes.
+    fn turn(
+        &mut self,
+        prox: &dyn Prox,
+        axes: usize,
+        penalty: f64,
+        y: &[Complex64],
+        image: &mut [Complex64],
+        tangent: Option<&mut [f64]>,
+    ) {
+        let (n, nh) = (self.samples(), self.harmonics.len());
+        for a in 0..axes {
+            self.synthesise(&y[a * nh..(a + 1) * nh], |_| Complex64::new(1.0, 0.0));
+            self.displacement[a].copy_from_slice(&self.signal);
+        }
+        self.reserve_slopes(axes * axes);
+        let (mut force, mut slope) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS * MOST_DIRECTIONS]);
+        for i in 0..n {
+            let y: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| self.displacement[a][i]);
+            prox.resolve(&y[..axes], penalty, &mut force[..axes], &mut slope[..axes * axes]);
+            for a in 0..axes {
+                self.force[a][i] = force[a];
+            }
+            for (signal, slope) in self.slopes.iter_mut().zip(&slope[..axes * axes]) {
+                signal[i] = *slope;
+            }
+        }
+        for a in 0..axes {
+            self.add_force(a, &mut image[a * nh..(a + 1) * nh]);
+        }
+        let Some(tangent) = tangent else { return };
+        for at in 0..axes * axes {
+            if self.slope_spectrum(at, 0) {
+                self.add_slope(tangent, (at / axes, at % axes), axes, |_| Complex64::new(1.0, 0.0));
+            }
+        }
+    }
+}
+
+/// Half of the change of `e^{jhθ}` over a sample, relative to its middle.
+fn change(h: usize, n: usize) -> Complex64 {
+    Complex64::new(0.0, 0.5 * (h as f64 * TAU / n as f64).sin())
+}
+
+/// Means of x cut off at ±1.
+#[inline]
+fn saturation(y: f64, e: f64) -> Mean {
+    let (at, reach) = (y.abs(), e.abs());
+    if at >= 1.0 + reach {
+        return Mean { zeroth: y.signum(), ..Mean::default() };
+    }
+    if at + reach <= 1.0 {
+        return Mean { zeroth: y, first: e / 3.0, slope: 1.0, slope_second: 1.0 / 3.0, ..Mean::default() };
+    }
+    let mut mean = if at - reach >= -1.0 {
+        // only the upper end of the ramp lies within the sample, at ξ = t
+        let t = ((1.0 - at) / reach).clamp(-1.0, 1.0);
+        Mean {
+            zeroth: 1.0 - 0.25 * reach * (t + 1.0) * (t + 1.0),
+            first: -0.5 * reach * (t * t * t / 6.0 - 0.5 * t - 1.0 / 3.0),
+            slope: 0.5 * (t + 1.0),
+            slope_first: 0.25 * (t * t - 1.0),
+            slope_second: (t * t * t + 1.0) / 6.0,
+        }
+    } else {
+        // both ends: from ξ = s to ξ = t
+        let (s, t) = ((-1.0 - at) / reach, (1.0 - at) / reach);
+        let (s, t) = (s.clamp(-1.0, 1.0), t.clamp(-1.0, 1.0));
+        let ramp = |power: i32| (t.powi(power) - s.powi(power)) / f64::from(power);
+        let (r1, r2, r3) = (ramp(1), ramp(2), ramp(3));
+        Mean {
+            zeroth: 0.5 * (at * r1 + reach * r2 + (1.0 - t) - (s + 1.0)),
+            first: 0.5 * (at * r2 + reach * r3 + 0.5 * (1.0 - t * t) - 0.5 * (s * s - 1.0)),
+            slope: 0.5 * r1,
+            slope_first: 0.5 * r2,
+            slope_second: 0.5 * r3,
+        }
+    };
+    if y < 0.0 {
+        (mean.zeroth, mean.slope_first) = (-mean.zeroth, -mean.slope_first);
+    }
+    if e < 0.0 {
+        (mean.first, mean.slope_first) = (-mean.first, -mean.slope_first);
+    }
+    mean
+}

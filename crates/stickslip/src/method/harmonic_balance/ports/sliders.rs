@@ -1,0 +1,473 @@
+//! Motion ports of sliders behind springs, and of stops: exact for the series.
+//!
+//! A slider that moves once forgets everything before, so that one period is enough. Its history is that of the motion's turning points.
+//! From one to the next the motion is monotone: the slider sticks, `f = ±limit + kt (u - u*)` with the turning point `u*` that ended the slip
+//! before, and then slips, `f = ±limit`. Turning points and the begin of slip are zeros of the series, found by Newton's method between
+//! samples; the harmonics of the force are integrals over the intervals in closed form. So the force is a differentiable function of the
+//! harmonics: in stick `δf = kt (δu - δu*)`, in slip `δf = 0`, and where they meet the force is continuous. Every stick interval
+//! adds one product of a column and a row to the derivative.
+
+use super::alternation::{Alternation, ZERO, add_block, add_entries, as_block, pair};
+use num_complex::Complex64;
+use std::f64::consts::{PI, TAU};
+use stickslip_numerics::fourier::Fourier;
+
+/// One of the parts that stand side by side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Part {
+    /// A slider behind a spring (N/m, N).
+    Slider { stiffness: f64, limit: f64 },
+    /// A spring beyond a gap (m, N/m).
+    Stop { gap: f64, stiffness: f64 },
+}
+
+impl Part {
+    /// At rest, N/m.
+    pub fn stiffness(&self) -> f64 {
+        match *self {
+            Part::Slider { stiffness, .. } => stiffness,
+            Part::Stop { gap, stiffness } => {
+                if gap < 0.0 {
+                    stiffness
+                } else {
+                    0.0
+                }
+            }
+        }
+    }
+
+    /// How far the spring of a slider reaches, m.
+    pub fn reach(&self) -> f64 {
+        match *self {
+            Part::Slider { stiffness, limit } => limit / stiffness,
+            Part::Stop { .. } => 0.0,
+        }
+    }
+}
+
+/// A part of the period in which the force is `stiffness u + offset`.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Interval {
+    /// Phase, rad; the end may lie beyond a period.
+    begin: f64,
+    end: f64,
+    stiffness: f64,
+    offset: f64,
+    anchor: Anchor,
+    slips: bool,
+}
+
+/// What the offset moves with.
+#[derive(Debug, Clone, Copy)]
+enum Anchor {
+    Nothing,
+    /// The mean of the motion: the slider was never moved.
+    Mean,
+    /// The motion at a phase, rad.
+    At(f64),
+}
+
+/// A turning point of the motion: phase (rad) and value (m).
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Extreme {
+    at: f64,
+    value: f64,
+}
+
+/// Where a motion is looked at to tell its turning points apart.
+#[derive(Debug, Clone)]
+pub(in super::super) struct Grid {
+    fourier: Fourier,
+    pairs: Vec<(usize, Complex64)>,
+    value: Vec<f64>,
+    slope: Vec<f64>,
+}
+
+/// Points of the grid for every harmonic, at least: between two of them the motion is a cubic but for a thousandth of the highest harmonic.
+const POINTS: usize = 16;
+
+impl Grid {
+    /// For harmonics up to `top`.
+    pub fn new(top: usize) -> Self {
+        let points = (POINTS * (top + 1)).next_power_of_two();
+        Grid { fourier: Fourier::new(points), pairs: Vec::new(), value: vec![0.0; points], slope: vec![0.0; points] }
+    }
+}
+
+/// Newton iterations for an event; three are usual, and where they lead astray the middle between bounds is taken.
+const ITERATIONS: usize = 60;
+/// Distance of an event from its last iterate, in samples, that is rounding.
+const PLACED: f64 = 1e-11;
+
+/// Value, slope and curvature of the series at a phase. Harmonics stand at equal distances.
+#[derive(Clone, Copy)]
+struct Series<'a> {
+    harmonics: &'a [usize],
+    c: &'a [Complex64],
+}
+
+impl Series<'_> {
+    fn at(&self, theta: f64) -> (f64, f64, f64) {
+        let (mut turn, step) = turns(self.harmonics, theta);
+        let (mut value, mut slope, mut bend) = (0.0, 0.0, 0.0);
+        for (&h, c) in self.harmonics.iter().zip(self.c) {
+            let h = h as f64;
+            let z = c * turn;
+            value += z.re;
+            slope -= h * z.im;
+            bend -= h * h * z.re;
+            turn *= step;
+        }
+        (value, slope, bend)
+    }
+
+    /// The zero of a function between two phases at whose ends its signs differ, with `sign` its sign at the end: `f` gives it and its slope.
+    fn zero(
+        &self,
+        (mut low, mut high): (f64, f64),
+        start: f64,
+        sign: f64,
+        tolerance: f64,
+        f: impl Fn(&Self, f64) -> (f64, f64),
+    ) -> f64 {
+        let mut at = start.clamp(low, high);
+        for _ in 0..ITERATIONS {
+            let (value, slope) = f(self, at);
+            if value * sign > 0.0 {
+                high = at
+            } else {
+                low = at
+            }
+            let mut next = at - value / slope;
+            if !(next >= low && next <= high) {
+                next = 0.5 * (low + high);
+            }
+            let moved = (next - at).abs();
+            at = next;
+            if moved <= tolerance {
+                break;
+            }
+        }
+        at
+    }
+}
+
+impl Alternation {
+    /// Adds the harmonics of the force of the parts in the motion `c` to `force`, and their derivative to `tangent`.
+    pub(super) fn slide(
+        &mut self,
+        parts: &[Part],
+        c: &[Complex64],
+        force: &mut [Complex64],
+        mut tangent: Option<&mut [f64]>,
+    ) {
+        self.find(c);
+        self.state.clear();
+        let harmonics = std::mem::take(&mut self.harmonics);
+        for part in parts {
+            self.history(part, Series { harmonics: &harmonics, c });
+            self.add_intervals(&harmonics, c, force, tangent.as_deref_mut());
+        }
+        self.harmonics = harmonics;
+    }
+
+    /// Samples of the force, of slip, and the forces of the sliders at t = 0.
+    pub(super) fn sample_slides(&mut self, parts: &[Part], c: &[Complex64]) {
+        self.find(c);
+        self.synthesise(c, |_| Complex64::new(1.0, 0.0));
+        self.state.clear();
+        self.force[0].fill(0.0);
+        self.slips.fill(false);
+        let n = self.samples();
+        let harmonics = std::mem::take(&mut self.harmonics);
+        for part in parts {
+            self.history(part, Series { harmonics: &harmonics, c });
+            let before = self.force[0][0];
+            for interval in &self.intervals {
+                let sample = |phase: f64| (phase * n as f64 / TAU).ceil() as isize;
+                for i in sample(interval.begin)..sample(interval.end) {
+                    let i = i.rem_euclid(n as isize) as usize;
+                    self.force[0][i] += interval.stiffness * self.signal[i] + interval.offset;
+                    self.slips[i] |= interval.slips;
+                }
+            }
+            if matches!(part, Part::Slider { .. }) {
+                self.state.push(self.force[0][0] - before);
+            }
+        }
+        self.harmonics = harmonics;
+    }
+
+    /// The motion on the grid that tells its turning points apart, and these.
+    fn find(&mut self, c: &[Complex64]) {
+        let Grid { fourier, pairs, value, slope } = &mut self.grid;
+        pairs.clear();
+        pairs.extend(self.harmonics.iter().copied().zip(c.iter().copied()));
+        fourier.synthesise(pairs, value);
+        for pair in pairs.iter_mut() {
+            pair.1 *= Complex64::new(0.0, pair.0 as f64);
+        }
+        fourier.synthesise(pairs, slope);
+        let series = Series { harmonics: &self.harmonics, c };
+        let n = value.len();
+        let angle = TAU / n as f64;
+        self.extremes.clear();
+        let extremes = &mut self.extremes;
+        let mut add = |(low, high): (f64, f64), start: f64, sign: f64| {
+            let at = series.zero((low, high), start, sign, PLACED * angle, |series, theta| {
+                let (_, slope, bend) = series.at(theta);
+                (slope, bend)
+            });
+            extremes.push(Extreme { at, value: series.at(at).0 });
+        };
+        for i in 0..n {
+            let (u, v) = (value[i], slope[i] * angle);
+            let next = if i + 1 == n { 0 } else { i + 1 };
+            let (w, z) = (value[next], slope[next] * angle);
+            let low = i as f64 * angle;
+            if (v > 0.0) != (z > 0.0) {
+                add((low, low + angle), low + angle * v / (v - z), if z > 0.0 { 1.0 } else { -1.0 });
+                continue;
+            }
+            // a pair between two samples: the slope of Hermite's cubic is v + 2 p s + 3 q s², 0 < s < 1
+            let (p, q) = (3.0 * (w - u) - 2.0 * v - z, v + z - 2.0 * (w - u));
+            let under = p * p - 3.0 * q * v;
+            if q == 0.0 || under <= 0.0 || p * q >= 0.0 {
+                continue;
+            }
+            // the slope has its own extreme, on the other side of zero, between them
+            let middle = -p / (3.0 * q);
+            let theta = low + angle * middle;
+            if middle < 1.0 && (series.at(theta).1 > 0.0) != (v > 0.0) {
+                let spread = angle * under.sqrt() / (3.0 * q.abs());
+                let sign = if v > 0.0 { -1.0 } else { 1.0 };
+                add((low, theta), theta - spread, sign);
+                add((theta, low + angle), theta + spread, -sign);
+            }
+        }
+    }
+
+    /// The intervals of one part; motion and turning points have been found.
+    fn history(&mut self, part: &Part, series: Series) {
+        self.intervals.clear();
+        match *part {
+            Part::Slider { stiffness, limit } => self.slider(stiffness, limit, series),
+            Part::Stop { gap, stiffness } => self.stop(gap, stiffness, series),
+        }
+    }
+
+    fn slider(&mut self, kt: f64, limit: f64, series: Series) {
+        let mean = if series.harmonics[0] == 0 { series.c[0].re } else { 0.0 };
+        let count = self.extremes.len();
+        let hold_at = |hold: f64, from: f64, anchor: Anchor, begin: f64, end: f64| Interval {
+            begin,
+            end,
+            stiffness: kt,
+            offset: hold - kt * from,
+            anchor,
+            slips: false,
+        };
+        // force and displacement at the anchor
+        let (mut hold, mut from, mut anchor) = (0.0, mean, Anchor::Mean);
+        let mut slipped = None;
+        for leg in 0..2 * count {
+            let Extreme { at, value } = self.extremes[leg % count];
+            let trial = hold + kt * (value - from);
+            if trial.abs() > limit {
+                (hold, from, anchor) = (limit.copysign(trial), value, Anchor::At(at));
+                if leg >= count {
+                    slipped = Some(leg);
+                    break;
+                }
+            }
+        }
+        let Some(first) = slipped else {
+            self.intervals.push(hold_at(hold, from, anchor, 0.0, TAU));
+            return;
+        };
+        // one period from the end of that slip
+        let phase = |leg: usize, extremes: &[Extreme]| extremes[leg % count].at + TAU * (leg / count) as f64;
+        let mut begin = phase(first, &self.extremes);
+        for leg in first + 1..=first + count {
+            let (before, end) = (phase(leg - 1, &self.extremes), phase(leg, &self.extremes));
+            let value = self.extremes[leg % count].value;
+            let trial = hold + kt * (value - from);
+            if trial.abs() > limit {
+                let slip = limit.copysign(trial);
+                let onset = self.passage(series, (before, end), from + (slip - hold) / kt, slip.signum());
+                self.intervals.push(hold_at(hold, from, anchor, begin, onset));
+                self.intervals.push(Interval {
+                    begin: onset,
+                    end,
+                    stiffness: 0.0,
+                    offset: slip,
+                    anchor: Anchor::Nothing,
+                    slips: true,
+                });
+                (hold, from, anchor, begin) = (slip, value, Anchor::At(end), end);
+            } else if leg == first + count {
+                // by rounding alone
+                self.intervals.push(hold_at(hold, from, anchor, begin, end));
+            }
+        }
+    }
+
+    fn stop(&mut self, gap: f64, stiffness: f64, series: Series) {
+        let closed = |begin: f64, end: f64| Interval {
+            begin,
+            end,
+            stiffness,
+            offset: -stiffness * gap,
+            anchor: Anchor::Nothing,
+            slips: false,
+        };
+        let count = self.extremes.len();
+        let mut opened = None;
+        for leg in 0..count {
+            let (a, b) = (self.extremes[leg], self.extremes[(leg + 1) % count]);
+            let end = b.at + if leg + 1 == count { TAU } else { 0.0 };
+            // one passage out of the gap, and the next one back
+            if a.value <= gap && b.value > gap {
+                opened = Some((leg, self.passage(series, (a.at, end), gap, 1.0)));
+                break;
+            }
+        }
+        let Some((first, mut begin)) = opened else {
+            if self.grid.value[0] > gap {
+                self.intervals.push(closed(0.0, TAU));
+            }
+            return;
+        };
+        let mut touching = true;
+        for leg in first + 1..=first + count {
+            let (a, b) = (self.extremes[leg % count], self.extremes[(leg + 1) % count]);
+            let turns = |leg: usize| TAU * (leg / count) as f64;
+            let (from, to) = (a.at + turns(leg), b.at + turns(leg + 1));
+            if touching && b.value <= gap {
+                let end = self.passage(series, (from, to), gap, -1.0);
+                self.intervals.push(closed(begin, end));
+                touching = false;
+            } else if !touching && b.value > gap && leg < first + count {
+                begin = self.passage(series, (from, to), gap, 1.0);
+                touching = true;
+            }
+        }
+    }
+
+    /// The phase between two neighbouring turning points at which the motion passes `value`, upwards or downwards.
+    fn passage(&self, series: Series, (before, after): (f64, f64), value: f64, upwards: f64) -> f64 {
+        let n = self.grid.value.len() as isize;
+        let angle = TAU / n as f64;
+        let u = |i: isize| self.grid.value[i.rem_euclid(n) as usize];
+        // samples strictly between, by halving
+        let (mut low, mut high) = ((before / angle).floor() as isize, (after / angle).ceil() as isize);
+        while high - low > 1 {
+            let middle = low + (high - low) / 2;
+            if (u(middle) - value) * upwards > 0.0 { high = middle } else { low = middle }
+        }
+        let bounds = ((low as f64 * angle).max(before), (high as f64 * angle).min(after));
+        let rise = u(high) - u(low);
+        let share = if rise != 0.0 { (value - u(low)) / rise } else { 0.5 };
+        series.zero(bounds, (low as f64 + share.clamp(0.0, 1.0)) * angle, upwards, PLACED * angle, |series, theta| {
+            let (at, slope, _) = series.at(theta);
+            (at - value, slope)
+        })
+    }
+
+    /// Harmonics of the force, and their derivative.
+    fn add_intervals(
+        &mut self,
+        harmonics: &[usize],
+        c: &[Complex64],
+        force: &mut [Complex64],
+        mut tangent: Option<&mut [f64]>,
+    ) {
+        let size = 2 * harmonics.len();
+        let scale = |h: usize| if h == 0 { 1.0 / TAU } else { 1.0 / PI };
+        let [stiffness, integrals, _] = &mut self.spectra;
+        stiffness.fill(ZERO);
+        for interval in &self.intervals {
+            integrate(interval, integrals);
+            for (sum, integral) in stiffness.iter_mut().zip(&*integrals) {
+                *sum += integral * (interval.stiffness / TAU);
+            }
+            for (value, &h) in self.column.iter_mut().zip(harmonics) {
+                *value = integrals[h] * scale(h);
+            }
+            for (force, integral) in force.iter_mut().zip(&self.column) {
+                *force += integral * interval.offset;
+            }
+            let Some(tangent) = tangent.as_deref_mut() else { continue };
+            let by = Complex64::new(-interval.stiffness, 0.0);
+            match interval.anchor {
+                Anchor::Nothing => continue,
+                Anchor::Mean => {
+                    self.row.fill(ZERO);
+                    if harmonics[0] == 0 {
+                        self.row[0] = by;
+                    }
+                }
+                Anchor::At(phase) => {
+                    let (mut turn, step) = turns(harmonics, phase);
+                    for value in &mut self.row {
+                        *value = turn * by;
+                        turn *= step;
+                    }
+                }
+            }
+            // δu* = Re(row δU) = row.re x - row.im y
+            for (a, (&h, f)) in harmonics.iter().zip(&self.column).enumerate() {
+                for (b, (&k, r)) in harmonics.iter().zip(&self.row).enumerate() {
+                    let block = [f.re * r.re, -f.re * r.im, f.im * r.re, -f.im * r.im];
+                    add_entries(tangent, size, (a, h), (b, k), block);
+                }
+            }
+        }
+        for (a, &h) in harmonics.iter().enumerate() {
+            let mut sum = ZERO;
+            for (b, &k) in harmonics.iter().enumerate() {
+                let (minus, plus) = pair(stiffness, h, k);
+                sum += minus * c[b] + plus * c[b].conj();
+                if let Some(tangent) = tangent.as_deref_mut() {
+                    add_block(tangent, size, (a, h), (b, k), as_block(minus, plus));
+                }
+            }
+            force[a] += if h == 0 { Complex64::new(0.5 * sum.re, 0.0) } else { sum };
+        }
+    }
+}
+
+/// `e^{jhθ}` of the first harmonic, and what leads from each to the next.
+#[inline]
+fn turns(harmonics: &[usize], theta: f64) -> (Complex64, Complex64) {
+    let first = harmonics[0];
+    let gap = harmonics.get(1).map_or(0, |h| h - first);
+    let step = Complex64::cis(gap as f64 * theta);
+    // 0, 1, … and 1, 3, … need one rotation alone
+    match (first, gap) {
+        (0, _) => (Complex64::new(1.0, 0.0), step),
+        (1, 2) => {
+            let turn = Complex64::cis(theta);
+            (turn, turn * turn)
+        }
+        _ => (Complex64::cis(first as f64 * theta), step),
+    }
+}
+
+/// `∫ e^{-jmθ} dθ` over an interval, for m from zero on.
+fn integrate(interval: &Interval, out: &mut [Complex64]) {
+    let width = interval.end - interval.begin;
+    if width >= TAU {
+        out.fill(ZERO);
+        out[0] = Complex64::new(TAU, 0.0);
+        return;
+    }
+    let (middle, half) = (Complex64::cis(-0.5 * (interval.begin + interval.end)), Complex64::cis(0.5 * width));
+    let (mut turn, mut reach) = (middle, half);
+    out[0] = Complex64::new(width, 0.0);
+    for (m, out) in out.iter_mut().enumerate().skip(1) {
+        *out = turn * (2.0 * reach.im / m as f64);
+        turn *= middle;
+        reach *= half;
+    }
+}

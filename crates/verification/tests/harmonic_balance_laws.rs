@@ -1,0 +1,143 @@
+//! Every law in harmonic balance: the orbit's motion is given to the law alone, by a view of it and not by a port, and what it answers must
+//! balance the structure and lose what the orbit says.
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use stickslip::law::{SharedLaw, TABLE};
+use stickslip::method::{Method, MethodError, harmonic_balance::HarmonicBalance};
+use stickslip::model::{Axis, System};
+use stickslip::orbit::Orbit;
+use stickslip::structure::Structure;
+use stickslip_verification::replay::{self, View};
+
+const MASS: f64 = 0.182;
+const STIFFNESS: f64 = 105_103.0;
+const DAMPING: f64 = 5.0;
+const FORCE: f64 = 10.0;
+const OMEGA: f64 = TAU * 118.0;
+
+/// What errors of the series may come to in the force, in units of the estimated error of the motion: elastic forces are ten times the drive's,
+/// and a steep law answers the motion's ripple.
+const SERIES: f64 = 100.0;
+/// What they may come to in the return of the state, in the same unit: velocities count there as displacements do.
+const RETURN: f64 = 30.0;
+/// The same of what a port samples: the way between two of 1024 samples is curved, and a rate law's step is of order 3.
+const SAMPLED: f64 = 5e-6;
+
+/// A mass on springs along each of the law's directions, held by the law too, with a harmonic force and a constant one.
+fn system(law: &SharedLaw, constant: f64) -> System {
+    let d = law.directions();
+    let one = DMatrix::identity(d, d);
+    let places = (0..d).map(|a| format!("x{a}")).collect();
+    let structure = Structure::new(places, &one * MASS, &one * DAMPING, &one * STIFFNESS).unwrap();
+    let axes = (0..d).map(|a| Axis::new(vec![(a, 1.0)])).collect();
+    let mut builder = System::builder(structure).joint("j", law.clone(), axes);
+    for a in 0..d {
+        builder = builder.force(a, 1, load(a));
+        if constant != 0.0 {
+            builder = builder.force(a, 0, Complex64::new(constant, 0.0));
+        }
+    }
+    builder.build().unwrap()
+}
+
+/// Amplitude of the force along a direction, N.
+fn load(a: usize) -> Complex64 {
+    Complex64::from_polar(FORCE / (1 + a) as f64, 0.9 * a as f64)
+}
+
+/// The forces that the law gives in the orbit's motion, one period after some that it may forget: samples, and what it loses.
+fn answer(law: &SharedLaw, view: View, orbit: &Orbit) -> (Vec<[f64; 3]>, f64) {
+    const SAMPLES: usize = 4096;
+    const PERIODS: usize = 5;
+    let period = orbit.period();
+    let motion = |t: f64| {
+        let joint = orbit.sample(t).joints[0];
+        (joint.displacement, joint.velocity)
+    };
+    let times: Vec<f64> = (0..=SAMPLES * PERIODS).map(|i| period * i as f64 / SAMPLES as f64).collect();
+    let forces = replay::forces(&**law, view, &motion, &times);
+    let last = SAMPLES * (PERIODS - 1);
+    let loss = replay::lost(&motion, &times[last..], &forces[last..]);
+    (forces[last..times.len() - 1].to_vec(), loss)
+}
+
+/// Amplitude of a harmonic of samples along a direction.
+fn harmonic(samples: &[[f64; 3]], a: usize, h: usize) -> Complex64 {
+    let n = samples.len() as f64;
+    let scale = if h == 0 { 1.0 } else { 2.0 } / n;
+    samples.iter().enumerate().map(|(i, f)| Complex64::cis(-TAU * (h * i) as f64 / n) * (f[a] * scale)).sum()
+}
+
+#[test]
+fn every_law_balances_the_structure() {
+    let (mut taken, mut returned) = (0, 0);
+    for (info, constant) in TABLE.iter().flat_map(|info| [(info, 0.0), (info, 1.5)]) {
+        let law = (info.build)(info.sample);
+        let system = system(&law, constant);
+        let method = HarmonicBalance { harmonics: Some(31), ..HarmonicBalance::default() };
+        let mut solver = match method.solver(&system) {
+            Ok(solver) => solver,
+            // a law may be refused by name, with what to use instead
+            Err(MethodError::Law { instead, .. }) => {
+                assert!(instead.contains("event-driven"), "{}: {instead}", info.name);
+                continue;
+            }
+            Err(error) => panic!("{}: {error}", info.name),
+        };
+        taken += 1;
+        let orbit = solver.orbit(OMEGA, None).unwrap_or_else(|error| panic!("{} {constant}: {error}", info.name));
+        let views = replay::views(&*law);
+        // a rigid law's resolvent leaves the force open at rest, which a series never reaches: any other view is better
+        let view = *views.iter().find(|view| **view != View::Prox).unwrap_or(&views[0]);
+        // a flow through time comes back to where the series begins, with the states that the port gives
+        if let Some(defect) = orbit.evidence.return_defect {
+            let bound = SAMPLED + RETURN * orbit.evidence.truncation.expect("an estimate");
+            assert!(defect < bound, "{} {constant}: returns {defect:.1e} of {bound:.1e}", info.name);
+            returned += 1;
+        }
+        let (forces, loss) = answer(&law, view, &orbit);
+        let bound = SAMPLED + SERIES * orbit.evidence.truncation.expect("an estimate");
+        let off = (orbit.joints[0].dissipation - loss).abs() / orbit.energy.work_in;
+        assert!(off < bound, "{} {constant}: loss {off:.1e} of {bound:.1e}", info.name);
+        for (a, place) in orbit.places.iter().enumerate() {
+            let dynamic = Complex64::new(STIFFNESS - OMEGA * OMEGA * MASS, OMEGA * DAMPING);
+            let moving = dynamic * place.first_harmonic + harmonic(&forces, a, 1) - load(a);
+            let mean = STIFFNESS * place.mean + harmonic(&forces, a, 0).re - constant;
+            for off in [moving.norm() / FORCE, mean.abs() / FORCE] {
+                assert!(off < bound, "{} {constant} {a}: {off:.1e} of {bound:.1e}", info.name);
+            }
+        }
+    }
+    assert!(taken > TABLE.len() && 2 * returned > taken, "most laws: {taken} {returned}");
+}
+
+/// Where the force is too small for any slip, and where it is large, there is an orbit too.
+#[test]
+fn every_law_has_small_and_large_orbits() {
+    for (info, share) in TABLE.iter().flat_map(|info| [(info, 0.01), (info, 10.0)]) {
+        let law = (info.build)(info.sample);
+        let d = law.directions();
+        let mut builder = System::builder(system(&law, 0.0).structure().clone()).joint(
+            "j",
+            law.clone(),
+            (0..d).map(|a| Axis::new(vec![(a, 1.0)])).collect(),
+        );
+        for a in 0..d {
+            builder = builder.force(a, 1, load(a) * share);
+        }
+        let system = builder.build().unwrap();
+        let Ok(mut solver) = HarmonicBalance { harmonics: Some(9), ..HarmonicBalance::default() }.solver(&system)
+        else {
+            continue;
+        };
+        let orbit = solver.orbit(OMEGA, None).unwrap_or_else(|error| panic!("{} {share}: {error}", info.name));
+        // what is left where rigid friction holds all is rounding
+        let unit = FORCE * FORCE * share * share / STIFFNESS;
+        let energy = orbit.energy;
+        let gap = (energy.work_in - energy.viscous - energy.friction).abs();
+        assert!(gap < 1e-6 * energy.work_in.abs() + 1e-12 * unit, "{} {share}: {energy:?}", info.name);
+        assert!(energy.friction > -1e-9 * unit, "{} {share}: {energy:?}", info.name);
+    }
+}

@@ -1,0 +1,253 @@
+//! Laws and a method that are stated here, in another crate than the library's: what it takes to add one, and that everything takes it.
+//!
+//! Nothing in the library names them: harmonic balance, shooting, transients and the linear start find their views by themselves.
+
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use stickslip::dimension::Dimension;
+use stickslip::law::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative, SharedLaw, Step, StepLaw};
+use stickslip::method::harmonic_balance::HarmonicBalance;
+use stickslip::method::settling::Settling;
+use stickslip::method::shooting::Shooting;
+use stickslip::method::{Method, MethodError, OrbitError, Solver};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
+use stickslip::orbit::{Accuracy, Found, Orbit, Path, Sample, Symmetry};
+use stickslip_numerics::dual::Real;
+use stickslip_verification::reference::Reference;
+
+/// Two rubbing surfaces side by side that creep towards their limits after different ways: a rate law with two states.
+#[derive(Debug)]
+struct TwoSurfaces {
+    stiffness: f64,
+    limit: f64,
+    ratio: f64,
+}
+
+static TWO_SURFACES: LawInfo = LawInfo {
+    name: "two-surfaces",
+    summary: "f = limit (z1 + z2)/2, z' = stiffness/limit (u' - |u'| z), the second with the stiffness times ratio",
+    parameters: &[
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness of the first surface at rest"),
+        Parameter::limit("force that both tend to"),
+        Parameter::new("ratio", Dimension::NONE, Range::Within(0.1, 10.0), "stiffness of the second surface over that of the first"),
+    ],
+    sample: &[1e4, 2.0, 3.0],
+    build: |values| Arc::new(TwoSurfaces { stiffness: values[0], limit: values[1], ratio: values[2] }),
+};
+
+impl Law for TwoSurfaces {
+    fn info(&self) -> &'static LawInfo {
+        &TWO_SURFACES
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![self.stiffness, self.limit, self.ratio]
+    }
+    fn scale(&self) -> f64 {
+        self.limit
+    }
+    fn rate(&self) -> Option<&dyn Rate> {
+        Some(self)
+    }
+}
+
+impl RateLaw for TwoSurfaces {
+    fn states(&self) -> usize {
+        2
+    }
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+        let v = motion.velocity[0];
+        for (i, stiffness) in [self.stiffness, self.stiffness * self.ratio].into_iter().enumerate() {
+            rate[i] = (v - v.abs() * z[i]) * (stiffness / self.limit);
+        }
+        [(z[0] + z[1]) * (0.5 * self.limit), S::from(0.0), S::from(0.0)]
+    }
+}
+
+/// A slider behind a spring whose limit hardens with the way that it has slid: linear kinematic hardening, a step law.
+#[derive(Debug)]
+struct Hardening {
+    stiffness: f64,
+    limit: f64,
+    tangent: f64,
+}
+
+static HARDENING: LawInfo = LawInfo {
+    name: "hardening",
+    summary: "spring and slider in series, with a spring beside the slider",
+    parameters: &[
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness of the spring in series"),
+        Parameter::limit("force at which the slider begins to move"),
+        Parameter::positive("tangent", Dimension::STIFFNESS, "stiffness of the spring beside the slider"),
+    ],
+    sample: &[1e4, 2.0, 2e3],
+    build: |values| Arc::new(Hardening { stiffness: values[0], limit: values[1], tangent: values[2] }),
+};
+
+impl Law for Hardening {
+    fn info(&self) -> &'static LawInfo {
+        &HARDENING
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![self.stiffness, self.limit, self.tangent]
+    }
+    fn scale(&self) -> f64 {
+        self.limit
+    }
+    fn step(&self) -> Option<&dyn Step> {
+        Some(self)
+    }
+}
+
+impl StepLaw for Hardening {
+    fn states(&self) -> usize {
+        1
+    }
+    fn state_scale(&self) -> f64 {
+        self.limit / self.stiffness
+    }
+    /// The state is where the slider stands.
+    fn advance<S: Real>(&self, _from: &[S; 3], to: &[S; 3], z: &mut [S]) -> [S; 3] {
+        let trial = (to[0] - z[0]) * self.stiffness;
+        let over = trial - z[0] * self.tangent;
+        if over.re().abs() > self.limit {
+            let sign = over.re().signum();
+            z[0] += (over - sign * self.limit) * (1.0 / (self.stiffness + self.tangent));
+        }
+        [(to[0] - z[0]) * self.stiffness, S::from(0.0), S::from(0.0)]
+    }
+}
+
+/// Two masses, the law between them.
+fn model(law: SharedLaw) -> Model {
+    let spring = |a: &str, b: &str| Spring { between: [a.into(), b.into()], stiffness: 2e4, damping: 8.0 };
+    Model {
+        masses: vec![Mass::new("a", 1.0), Mass::new("b", 0.6)],
+        springs: vec![spring("a", GROUND), spring("b", GROUND)],
+        joints: vec![Joint { name: "rub".into(), between: ["a".into(), "b".into()], law }],
+        forces: vec![Force { on: "a".into(), amplitude: 12.0, phase: 0.0, harmonic: 1 }],
+        ..Model::default()
+    }
+}
+
+fn amplitudes(orbit: &Orbit) -> Vec<f64> {
+    orbit.places.iter().map(|place| place.amplitude()).collect()
+}
+
+#[test]
+fn laws_from_outside_work_in_every_method_that_takes_their_view() {
+    for law in [TWO_SURFACES.sample(), HARDENING.sample()] {
+        let system = model(law.clone()).assemble().unwrap();
+        let omega = TAU * 24.0;
+        let start = [0.0; 2];
+        // the reference shares no code with a method; its own error is of second order in 2000 steps
+        let (expected, change) = Reference::new(&system, omega, 2000, &start, &start).settle(80, 1e-6);
+        assert!(change <= 1e-6, "{change}");
+        let methods: [&dyn Method; 3] =
+            [&HarmonicBalance::default(), &Shooting::default(), &Settling { tolerance: 1e-6, ..Settling::default() }];
+        for method in methods {
+            let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+            let allowed = 2e-4 + 2.0 * orbit.evidence.truncation.unwrap_or(0.0);
+            for (found, expected) in amplitudes(&orbit).iter().zip(&expected) {
+                assert!((found / expected - 1.0).abs() < allowed, "{} {}: {found} {expected}", law.name(), method.name());
+            }
+            assert!(orbit.joints[0].dissipation > 0.0 && orbit.energy.friction > 0.0);
+        }
+        // a method that cannot take it says which view it misses, and names law and joint
+        let error = stickslip::method::event_driven::EventDriven.solver(&system).err().unwrap().to_string();
+        assert!(error.contains(law.name()) && error.contains("rub"), "{error}");
+    }
+}
+
+/// A method from outside: linear systems, solved harmonic by harmonic.
+#[derive(Debug)]
+struct Linear;
+
+struct LinearSolver<'a>(&'a System);
+
+struct Harmonics {
+    omega: f64,
+    x: Vec<(f64, Vec<Complex64>)>,
+}
+
+impl Path for Harmonics {
+    fn sample(&self, time: f64) -> Sample {
+        let n = self.x.first().map_or(0, |(_, x)| x.len());
+        let of = |order: u32| -> Vec<f64> {
+            (0..n)
+                .map(|i| {
+                    let term = |(h, x): &(f64, Vec<Complex64>)| {
+                        let s = Complex64::new(0.0, h * self.omega);
+                        (x[i] * s.powu(order) * (s * time).exp()).re
+                    };
+                    self.x.iter().map(term).sum()
+                })
+                .collect()
+        };
+        let [displacement, velocity, acceleration] = [of(0), of(1), of(2)];
+        Sample { displacement, velocity, acceleration, joints: Vec::new(), moved: Vec::new() }
+    }
+    fn switch_times(&self) -> Vec<f64> {
+        Vec::new()
+    }
+}
+
+impl Method for Linear {
+    fn name(&self) -> &'static str {
+        "linear"
+    }
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        match system.joints().first() {
+            None => Ok(Box::new(LinearSolver(system))),
+            Some(joint) => Err(MethodError::Law {
+                method: "linear",
+                joint: joint.name().to_owned(),
+                law: joint.law().name(),
+                instead: "any other method",
+            }),
+        }
+    }
+}
+
+impl Solver for LinearSolver<'_> {
+    fn orbit(&mut self, omega: f64, _start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        let structure = self.0.structure();
+        let x = self.0.excitation(omega).into_iter().map(|(h, force)| {
+            let s = Complex64::new(0.0, f64::from(h) * omega);
+            let complex = |matrix: &nalgebra::DMatrix<f64>| matrix.map(|v| Complex64::new(v, 0.0));
+            let dynamic = complex(structure.mass()) * (s * s) + complex(structure.damping()) * s + complex(structure.stiffness());
+            let x = dynamic.lu().solve(&force).expect("no undamped resonance in this test");
+            (f64::from(h), x.iter().copied().collect())
+        });
+        let path = Harmonics { omega, x: x.collect() };
+        let start = path.sample(0.0);
+        let found = Found {
+            method: "linear",
+            omega,
+            periods: 1,
+            symmetry: Symmetry::FullPeriod,
+            start: [start.displacement, start.velocity].concat(),
+            residual: 0.0,
+            iterations: 1,
+            truncation: None,
+            accuracy: Accuracy::Converged,
+        };
+        Orbit::new(self.0, Arc::new(path), found)
+    }
+}
+
+#[test]
+fn a_method_from_outside_makes_orbits_with_evidence() {
+    let mut linear = model(TWO_SURFACES.sample());
+    assert!(Linear.solver(&linear.assemble().unwrap()).is_err());
+    linear.joints.clear();
+    linear.forces.push(Force { on: "b".into(), amplitude: 3.0, phase: 0.4, harmonic: 2 });
+    let system = linear.assemble().unwrap();
+    let omega = TAU * 20.0;
+    let orbit = Linear.solver(&system).unwrap().orbit(omega, None).unwrap();
+    let exact = stickslip_verification::exact(&system, omega);
+    for (one, other) in amplitudes(&orbit).iter().zip(amplitudes(&exact)) {
+        assert!((one / other - 1.0).abs() < 1e-6, "{one} {other}");
+    }
+    assert!(orbit.evidence.energy_gap < 1e-6, "{}", orbit.evidence.energy_gap);
+}
