@@ -330,6 +330,31 @@ fn creeping_orbits_are_found() {
     }
 }
 
+/// A body that nothing but friction holds against a mean force wanders off as soon as it slips: the reason is said. While it does not slip, it stays.
+#[test]
+fn free_bodies_under_a_mean_force_drift() {
+    for law in [
+        Arc::new(stickslip::law::Coulomb { limit: 0.1 }) as SharedLaw,
+        Arc::new(Jenkins { stiffness: 2.0, limit: 0.1 }),
+    ] {
+        for damping in [0.0, 0.1, 3.0] {
+            for (constant, amplitude) in [(0.03, 1.0), (0.09, 0.3), (0.1, 0.3), (0.3, 0.05), (0.3, 1.0)] {
+                let mut model = oscillator(0.0, damping, &[law.clone()]);
+                model.forces = vec![force("m", constant, 0), force("m", amplitude, 1)];
+                let system = model.assemble().unwrap();
+                let error = EventDriven.solver(&system).unwrap().orbit(1.0, None).unwrap_err();
+                assert_eq!(error.status(), "drifts", "{law:?} {damping} {constant} {amplitude}: {error}");
+            }
+            let mut model = oscillator(0.0, damping, &[law.clone()]);
+            model.forces = vec![force("m", 0.03, 0), force("m", 0.02, 1)];
+            assert!(
+                EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(0.1, None).is_ok(),
+                "{law:?} {damping}"
+            );
+        }
+    }
+}
+
 /// What the method cannot follow it refuses by the law's name.
 #[test]
 fn a_drop_behind_a_spring_is_refused() {

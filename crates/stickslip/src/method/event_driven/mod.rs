@@ -29,6 +29,7 @@ use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
 use nalgebra::DMatrix;
 use std::sync::Arc;
+use stickslip_numerics::eigen;
 
 pub(crate) const NAME: &str = "event-driven";
 
@@ -50,6 +51,9 @@ const CLOSED: f64 = 1e-12;
 pub(crate) const MISSING_WORK: f64 = 1e3;
 /// A state counts as rest below this fraction of what the loads could cause.
 const NEAR_REST: f64 = 1e-3;
+/// Springs below this fraction of the stiffest hold nothing, and a force that they leave below this fraction of itself is held: rounding of a
+/// stiffness matrix with some digits lost in its assembly.
+const UNHELD: f64 = 1e-12;
 /// Energy gap above which an orbit is not reported as converged. The closed-form integrals are exact to about 1e-12.
 const ENERGY_GAP: f64 = 1e-8;
 
@@ -153,6 +157,17 @@ impl<'a> Exact<'a> {
         })
     }
 
+    /// Whether nothing but friction holds the structure against the constant forces.
+    fn drifts(&self) -> bool {
+        let (mechanics, force) = (&self.flow.mechanics, &self.flow.drive.constant);
+        if force.amax() == 0.0 || mechanics.parts.iter().any(|part| !part.is_slider()) {
+            return false;
+        }
+        let at_rest = eigen::singular(mechanics.stiffness.clone())
+            .and_then(|svd| svd.solve(force, UNHELD * svd.singular_values.amax()).ok());
+        at_rest.is_some_and(|x| (force - &mechanics.stiffness * x).amax() > UNHELD * force.amax())
+    }
+
     fn first_state(&self, omega: f64) -> Vec<f64> {
         let mechanics = &self.flow.mechanics;
         let guess = Guess::new(self.system, omega);
@@ -175,7 +190,10 @@ impl Solver for Exact<'_> {
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
         let (name, search) = (self.name, self.search);
         let aim = Aim { method: name, omega, residual: CLOSED, sign, rest: NEAR_REST * self.flow.energy_scale };
-        let closed = search.find(self, start, |exact| exact.first_state(omega), aim)?;
+        let closed = search.find(self, start, |exact| exact.first_state(omega), aim).map_err(|error| match error {
+            OrbitError::NotConverged { .. } if self.drifts() => OrbitError::Drift { method: name, omega },
+            error => error,
+        })?;
         let size = norm(&self.weights, &closed.state);
         let closed = (closed, size * size);
         // the last run of the iteration was that of the closed state: its segments are the orbit
