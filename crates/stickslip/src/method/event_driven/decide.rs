@@ -439,3 +439,52 @@ fn subtract_product(matrix: &DMatrix<f64>, vector: &[f64], out: &mut DVector<f64
 fn multiply(matrix: &DMatrix<f64>, vector: &DVector<f64>, out: &mut DVector<f64>) {
     out.gemv(1.0, matrix, vector, 0.0);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::Stribeck;
+    use crate::model::{Force, GROUND, Joint, Mass, Model};
+    use std::sync::Arc;
+
+    /// Two masses at rest of 1 kg under constant forces (N); the first rubs on the ground and on the second, each with (dynamic, static limit).
+    fn decided(forces: [f64; 2], limits: [(f64, f64); 2]) -> (Vec<Contact>, [f64; 2]) {
+        let law = |(limit, static_limit): (f64, f64)| Arc::new(Stribeck { limit, static_limit, velocity: 0.0 });
+        let joint = |name: &str, other: &str, limits| Joint {
+            name: name.into(),
+            between: ["a".into(), other.into()],
+            law: law(limits),
+        };
+        let force = |on: &str, amplitude: f64| Force { on: on.into(), amplitude, phase: 0.0, harmonic: 0 };
+        let model = Model {
+            masses: vec![Mass::new("a", 1.0), Mass::new("b", 1.0)],
+            joints: vec![joint("floor", GROUND, limits[0]), joint("between", "b", limits[1])],
+            forces: vec![force("a", forces[0]), force("b", forces[1])],
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let mechanics = Mechanics::new(&system).unwrap();
+        let drive = Drive::new(&system, &mechanics.owners(), 1.0);
+        let mut decision = Decision::new(&mechanics);
+        assert!(decision.decide(&mechanics, &drive, 0.0, &[0.0; 4], 1.0));
+        (decision.contacts.clone(), [decision.acceleration[0], decision.acceleration[1]])
+    }
+
+    #[test]
+    fn what_rests_holds_up_to_its_static_limit() {
+        use Contact::{SlipBackward, SlipForward, Stick};
+        let check = |forces, limits, contacts: [Contact; 2], acceleration: [f64; 2]| {
+            let (found, motion) = decided(forces, limits);
+            assert_eq!(found, contacts, "{forces:?}");
+            assert!((0..2).all(|i| (motion[i] - acceleration[i]).abs() < 1e-12), "{motion:?}");
+        };
+        // between both limits it could slide, and rests
+        check([3.0, 0.0], [(1.0, 5.0), (0.5, 1.0)], [Stick, Stick], [0.0, 0.0]);
+        // above its static limit it slides with the dynamic one: together, 4 N on 2 kg, or apart
+        check([6.0, 0.0], [(2.0, 5.0), (1.0, 3.0)], [SlipForward, Stick], [2.0, 2.0]);
+        check([6.0, 0.0], [(2.0, 5.0), (0.5, 1.0)], [SlipForward, SlipForward], [3.5, 0.5]);
+        check([0.0, 6.0], [(0.5, 9.0), (1.0, 2.0)], [Stick, SlipBackward], [0.0, 5.0]);
+        // the second lets go backward as long as the floor holds the first with 5 N; the 1 N left of them drive it forward: it rests again
+        check([10.0, 8.0], [(1.0, 5.0), (0.5, 1.0)], [SlipForward, Stick], [8.5, 8.5]);
+    }
+}

@@ -138,7 +138,7 @@ impl Flow {
         self.switches = 0;
         let n = self.mechanics.n;
         self.from.resize(2 * n, 0.0);
-        for part in &self.mechanics.parts {
+        for part in self.mechanics.parts.iter() {
             if let Kind::Elastic { limit, state: s, .. } = part.kind {
                 state[2 * n + s] = state[2 * n + s].clamp(-limit, limit);
             }

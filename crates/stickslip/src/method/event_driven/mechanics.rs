@@ -5,6 +5,7 @@ use crate::law::{Contact, Law, Piece};
 use crate::method::MethodError;
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// What a part of a joint does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,7 +114,7 @@ pub(crate) struct Mechanics {
     pub damping: DMatrix<f64>,
     pub stiffness: DMatrix<f64>,
     /// Sliders and stops of all joints, those that carry nothing left out.
-    pub parts: Vec<Part>,
+    pub parts: Arc<[Part]>,
     /// Number of sliders behind springs.
     pub elastic: usize,
     /// Estimate of the fastest natural frequency, rad/s.
@@ -175,7 +176,7 @@ impl Mechanics {
             inverse_mass,
             damping: system.structure().damping().clone(),
             stiffness: system.structure().stiffness().clone(),
-            parts,
+            parts: parts.into(),
             elastic,
         })
     }

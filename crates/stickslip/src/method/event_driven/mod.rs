@@ -104,7 +104,7 @@ pub(crate) fn weights(mechanics: &Mechanics, omega: f64) -> Vec<f64> {
         weights[i] = mechanics.stiffness[(i, i)].max(inertia).sqrt();
         weights[n + i] = mechanics.mass[(i, i)].sqrt();
     }
-    for part in &mechanics.parts {
+    for part in mechanics.parts.iter() {
         if let (Some(s), Some(kt)) = (part.state(), part.stiffness()) {
             weights[2 * n + s] = 1.0 / kt.sqrt();
         }

@@ -28,7 +28,7 @@ pub(crate) struct ExactPath {
     system: Arc<System>,
     pieces: Vec<Piece>,
     /// Ideal parts of the joints.
-    parts: Vec<Part>,
+    parts: Arc<[Part]>,
     symmetry: Symmetry,
     period: f64,
     rates: Vec<f64>,
