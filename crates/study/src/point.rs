@@ -25,6 +25,7 @@ pub(crate) struct Summary {
     pub residual: f64,
     pub energy_gap: f64,
     pub truncation: f64,
+    pub return_defect: f64,
     pub iterations: u64,
     pub status: String,
     pub failure: Option<String>,
@@ -54,6 +55,7 @@ impl Summary {
             residual: orbit.evidence.residual,
             energy_gap: orbit.evidence.energy_gap,
             truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),
+            return_defect: orbit.evidence.return_defect.unwrap_or(f64::NAN),
             iterations: orbit.evidence.iterations as u64,
             status: orbit.evidence.accuracy.status().to_owned(),
             failure: None,
@@ -72,6 +74,7 @@ impl Summary {
             residual: f64::NAN,
             energy_gap: f64::NAN,
             truncation: f64::NAN,
+            return_defect: f64::NAN,
             iterations: 0,
             status: status.to_owned(),
             failure: None,
@@ -100,6 +103,9 @@ impl Summary {
         rows.number(columns::RESIDUAL, self.residual);
         rows.number(columns::ENERGY_GAP, self.energy_gap);
         rows.number("truncation", self.truncation);
+        if !prepared.method.closes_motions(&prepared.system) {
+            rows.number("return_defect", self.return_defect);
+        }
         rows.integer("iterations", self.iterations);
         rows.text("status", &self.status);
     }

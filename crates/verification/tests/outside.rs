@@ -30,7 +30,12 @@ static TWO_SURFACES: LawInfo = LawInfo {
     parameters: &[
         Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness of the first surface at rest"),
         Parameter::limit("force that both tend to"),
-        Parameter::new("ratio", Dimension::NONE, Range::Within(0.1, 10.0), "stiffness of the second surface over that of the first"),
+        Parameter::new(
+            "ratio",
+            Dimension::NONE,
+            Range::Within(0.1, 10.0),
+            "stiffness of the second surface over that of the first",
+        ),
     ],
     sample: &[1e4, 2.0, 3.0],
     build: |values| Arc::new(TwoSurfaces { stiffness: values[0], limit: values[1], ratio: values[2] }),
@@ -149,7 +154,12 @@ fn laws_from_outside_work_in_every_method_that_takes_their_view() {
             let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
             let allowed = 2e-4 + 2.0 * orbit.evidence.truncation.unwrap_or(0.0);
             for (found, expected) in amplitudes(&orbit).iter().zip(&expected) {
-                assert!((found / expected - 1.0).abs() < allowed, "{} {}: {found} {expected}", law.name(), method.name());
+                assert!(
+                    (found / expected - 1.0).abs() < allowed,
+                    "{} {}: {found} {expected}",
+                    law.name(),
+                    method.name()
+                );
             }
             assert!(orbit.joints[0].dissipation > 0.0 && orbit.energy.friction > 0.0);
         }
@@ -215,7 +225,8 @@ impl Solver for LinearSolver<'_> {
         let x = self.0.excitation(omega).into_iter().map(|(h, force)| {
             let s = Complex64::new(0.0, f64::from(h) * omega);
             let complex = |matrix: &nalgebra::DMatrix<f64>| matrix.map(|v| Complex64::new(v, 0.0));
-            let dynamic = complex(structure.mass()) * (s * s) + complex(structure.damping()) * s + complex(structure.stiffness());
+            let dynamic =
+                complex(structure.mass()) * (s * s) + complex(structure.damping()) * s + complex(structure.stiffness());
             let x = dynamic.lu().solve(&force).expect("no undamped resonance in this test");
             (f64::from(h), x.iter().copied().collect())
         });

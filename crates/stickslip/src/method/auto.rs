@@ -55,6 +55,9 @@ impl Method for Auto {
         let (method, because) = Auto::chosen(system);
         Choice { method: method.name(), because: Some(format!("chosen by auto: {because}")) }
     }
+    fn closes_motions(&self, system: &System) -> bool {
+        Auto::chosen(system).0.closes_motions(system)
+    }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         Auto::chosen(system).0.solver(system)
     }

@@ -33,6 +33,10 @@ pub trait Method: Send + Sync + std::fmt::Debug {
     fn choice(&self, _system: &System) -> Choice {
         Choice { method: self.name(), because: None }
     }
+    /// Whether its orbits of this system are motions in time that were closed: their residual then is their return defect. A series is none.
+    fn closes_motions(&self, _system: &System) -> bool {
+        true
+    }
     /// Prepares for one system.
     ///
     /// # Errors

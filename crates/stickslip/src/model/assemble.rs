@@ -83,6 +83,9 @@ impl Mass {
     }
 }
 
+/// A direction that a joint acts along: its name, if there are several, and where both ends lead.
+type Along<'a> = (Option<&'a str>, [End; 2]);
+
 /// Every place of a model, and the directions of every node.
 struct Places {
     ends: BTreeMap<String, End>,
@@ -112,12 +115,7 @@ impl Places {
     }
 
     /// Where both ends of a joint lead, along each of `count` directions.
-    fn axes(
-        &self,
-        between: &[String; 2],
-        count: usize,
-        element: Element,
-    ) -> Result<Vec<(Option<&str>, [End; 2])>, ModelError> {
+    fn axes(&self, between: &[String; 2], count: usize, element: Element) -> Result<Vec<Along<'_>>, ModelError> {
         let key = "between";
         let nodes: Vec<&Vec<String>> = between.iter().filter_map(|name| self.directions.get(name)).collect();
         let Some(directions) = nodes.first().copied() else {

@@ -89,7 +89,8 @@ mod tests {
         assert!(!system(one, two, [-0.1, 1.0, 0.05]).contracts(), "a damper that gives energy");
         assert!(system(one, two, [-0.1, 1.0, 1.0]).contracts(), "others take more: 0.9 · 2 > 1");
         // a system with other dampers and springs
-        let with = |system: System, damping: &dyn Fn(&mut DMatrix<f64>), stiffness: &dyn Fn(&mut DMatrix<f64>)| {
+        type Change<'a> = &'a dyn Fn(&mut DMatrix<f64>);
+        let with = |system: System, damping: Change, stiffness: Change| {
             let old = system.structure();
             let (mut c, mut k) = (old.damping().clone(), old.stiffness().clone());
             (damping(&mut c), stiffness(&mut k));

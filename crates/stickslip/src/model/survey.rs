@@ -6,7 +6,7 @@
 //! frequency of every mode (Courant, Fischer).
 
 use super::{GROUND, Model, ModelError, System, SystemJoint};
-use crate::law::Law;
+use crate::law::{Law, MOST_DIRECTIONS, RatePoint, Relative, StepPoint};
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 use num_complex::Complex64;
 use std::collections::HashMap;
@@ -81,6 +81,9 @@ pub struct Survey {
 /// A joint while its sliders stand.
 #[derive(Debug, Clone, PartialEq)]
 struct Stuck {
+    /// Which joint of the system, and which of its axes.
+    joint: usize,
+    axis: usize,
     name: String,
     /// `W`, by its entries.
     at: Vec<(usize, f64)>,
@@ -103,8 +106,9 @@ enum Hold {
 }
 
 impl Hold {
-    fn of(law: &dyn Law) -> Hold {
-        let Some(branches) = law.sliders() else { return Hold::smooth(law) };
+    /// Along one of the law's axes.
+    fn of(law: &dyn Law, axis: usize) -> Hold {
+        let Some(branches) = law.sliders() else { return Hold::smooth(law, axis) };
         let branches = || branches.iter().filter(|branch| branch.limit > 0.0);
         let rigid = branches().filter(|branch| branch.stiffness.is_none()).map(|branch| branch.limit);
         if let Some(limit) = rigid.reduce(|a, b| a + b) {
@@ -118,14 +122,37 @@ impl Hold {
 
     /// A smooth law: the spring that it is in small motion, or rigid where its resistance is viscous. The steeper its
     /// slope, the nearer it is to that.
-    fn smooth(law: &dyn Law) -> Hold {
-        let (limit, stiffness) = (law.scale(), law.linearised(SMALL, 1.0).re);
+    fn smooth(law: &dyn Law, axis: usize) -> Hold {
+        let (limit, stiffness) = (law.scale(), small_stiffness(law, axis));
         match (limit > 0.0, stiffness > 0.0) {
             (false, _) => Hold::Nothing,
+            // a law of displacement alone holds as the spring that it is, and never gives way
+            (true, false) if limit.is_infinite() => Hold::Nothing,
             (true, true) => Hold::Spring { stiffness, limit, displacement: limit / stiffness },
             (true, false) => Hold::Rigid { limit },
         }
     }
+}
+
+/// Stiffness in motion that is small in every direction, N/m.
+fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
+    if law.directions() == 1 {
+        return law.linearised(SMALL, 1.0).re;
+    }
+    let (count, rest) = (law.directions(), [0.0; MOST_DIRECTIONS]);
+    if let Some(step) = law.step() {
+        let z = vec![0.0; step.states()];
+        let mut point = StepPoint::new(count, z.len());
+        step.linearise(count, &rest, &rest, &z, &mut point);
+        return point.force_slope(axis)[count + axis];
+    }
+    let Some(rate) = law.rate() else { return 0.0 };
+    // with what the states do at once: f_u + f_z z_v
+    let z = vec![0.0; rate.states()];
+    let mut point = RatePoint::new(count, z.len());
+    rate.linearise(count, &Relative { displacement: rest, velocity: rest }, &z, &mut point);
+    let by_states = (0..z.len()).map(|s| point.force_slope(axis)[2 * count + s] * point.rate_slope(s)[count + axis]);
+    point.force_slope(axis)[axis] + by_states.sum::<f64>()
 }
 
 /// An amplitude (m) so small that no law slips, whose square is still a normal number.
@@ -192,7 +219,7 @@ impl Model {
             .map(|s| Link { at: ends(&s.between), stiffness: s.stiffness, damping: s.damping })
             .filter(|link| !link.at.is_empty())
             .collect();
-        let joints: Vec<Stuck> = system.joints().iter().map(Stuck::new).collect();
+        let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(Stuck::of_joint).collect();
         let mass: Vec<f64> = system.structure().mass().diagonal().iter().copied().collect();
         let loose = self.loose(&joints);
         if system.dofs() > LARGEST {
@@ -219,32 +246,45 @@ impl Model {
 
     /// Bodies of masses that no spring holds to the ground or to a moved place.
     fn loose(&self, joints: &[Stuck]) -> Vec<Loose> {
-        let mut index: HashMap<&str, usize> = HashMap::from([(GROUND, 0)]);
+        let mut index: HashMap<String, usize> = HashMap::from([(GROUND.to_owned(), 0)]);
         for motion in &self.motions {
-            index.insert(&motion.on, 0); // moved places are held as the ground is
+            index.insert(motion.on.clone(), 0); // moved places are held as the ground is
         }
-        for (i, mass) in self.masses.iter().enumerate() {
-            index.entry(&mass.name).or_insert(i + 1);
+        let places: Vec<String> = self.masses.iter().flat_map(super::Mass::places).collect();
+        for (i, place) in places.iter().enumerate() {
+            index.entry(place.clone()).or_insert(i + 1);
         }
-        let ends = |between: &[String; 2]| Some((*index.get(between[0].as_str())?, *index.get(between[1].as_str())?));
-        let mut bodies = Groups::new(self.masses.len() + 1);
+        let ends = |between: &[String; 2]| Some((*index.get(&between[0])?, *index.get(&between[1])?));
+        let mut bodies = Groups::new(places.len() + 1);
         self.springs.iter().filter(|s| s.stiffness > 0.0).filter_map(|s| ends(&s.between)).for_each(|e| bodies.join(e));
         let mut gripped = bodies.clone();
-        let carries = |(i, _): &(usize, &super::Joint)| joints.get(*i).is_some_and(|j| j.hold != Hold::Nothing);
+        let carries = |(i, _): &(usize, &super::Joint)| joints.iter().any(|j| j.joint == *i && j.hold != Hold::Nothing);
         let grips = self.joints.iter().enumerate().filter(carries);
-        grips.filter_map(|(_, joint)| ends(&joint.between)).for_each(|e| gripped.join(e));
+        for (_, joint) in grips {
+            // of nodes, each direction
+            let along = |name: &String, label: &String| match label.strip_prefix(joint.name.as_str()) {
+                Some(rest) if !rest.is_empty() && name != GROUND => format!("{name}{rest}"),
+                _ => name.clone(),
+            };
+            for label in self.joint_labels(joint) {
+                let between = [along(&joint.between[0], &label), along(&joint.between[1], &label)];
+                if let Some(e) = ends(&between) {
+                    gripped.join(e);
+                }
+            }
+        }
         let mut loose: Vec<(usize, Loose)> = Vec::new();
-        for mass in &self.masses {
-            let at = index[mass.name.as_str()];
+        for place in &places {
+            let at = index[place];
             let body = bodies.of(at);
             if body == bodies.of(0) {
                 continue;
             }
             match loose.iter_mut().find(|(known, _)| *known == body) {
-                Some((_, one)) => one.masses.push(mass.name.clone()),
+                Some((_, one)) => one.masses.push(place.clone()),
                 None => {
                     let held_by_friction = gripped.of(at) == gripped.of(0);
-                    loose.push((body, Loose { masses: vec![mass.name.clone()], held_by_friction }));
+                    loose.push((body, Loose { masses: vec![place.clone()], held_by_friction }));
                 }
             }
         }
@@ -253,9 +293,14 @@ impl Model {
 }
 
 impl Stuck {
-    fn new(joint: &SystemJoint) -> Self {
-        let at = joint.axes()[0].rows().to_vec();
-        Stuck { name: joint.name().to_owned(), at, hold: Hold::of(&**joint.law()) }
+    /// One for each axis of a joint.
+    fn of_joint((index, joint): (usize, &SystemJoint)) -> Vec<Self> {
+        let axes = joint.labels().zip(joint.axes()).enumerate();
+        axes.map(|(axis, (name, along))| {
+            let hold = Hold::of(&**joint.law(), axis);
+            Stuck { joint: index, axis, name, at: along.rows().to_vec(), hold }
+        })
+        .collect()
     }
 }
 
@@ -754,7 +799,10 @@ impl Survey {
                 b[i] = load.force[i] + Complex64::new(0.0, w) * load.by_velocity[i];
             }
         }
-        let imposed = |joint: usize| system.joints()[joint].axes()[0].imposed_at(h);
+        let imposed = |index: usize| {
+            let Stuck { joint, axis, .. } = self.joints[index];
+            system.joints()[joint].axes()[axis].imposed_at(h)
+        };
         for (index, joint) in self.joints.iter().enumerate() {
             if let Hold::Spring { stiffness, .. } = joint.hold {
                 for (i, wi) in &joint.at {
@@ -844,13 +892,13 @@ mod tests {
     #[test]
     fn laws_hold_as_they_do_in_small_motion() {
         let spring = Hold::Spring { stiffness: 1e4, limit: 2.0, displacement: 2e-4 };
-        assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 2.0 }), spring);
-        assert_eq!(Hold::of(&JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 }), spring);
-        assert_eq!(Hold::of(&Coulomb { limit: 2.0 }), Hold::Rigid { limit: 2.0 });
-        assert_eq!(Hold::of(&CoulombArctan { limit: 2.0, alpha: 25e3 }), Hold::Rigid { limit: 2.0 });
+        assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 2.0 }, 0), spring);
+        assert_eq!(Hold::of(&JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 }, 0), spring);
+        assert_eq!(Hold::of(&Coulomb { limit: 2.0 }, 0), Hold::Rigid { limit: 2.0 });
+        assert_eq!(Hold::of(&CoulombArctan { limit: 2.0, alpha: 25e3 }, 0), Hold::Rigid { limit: 2.0 });
         // without a limit a joint is a free reference
-        assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 0.0 }), Hold::Nothing);
-        assert_eq!(Hold::of(&Coulomb { limit: 0.0 }), Hold::Nothing);
+        assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 0.0 }, 0), Hold::Nothing);
+        assert_eq!(Hold::of(&Coulomb { limit: 0.0 }, 0), Hold::Nothing);
     }
 
     #[test]

@@ -180,6 +180,9 @@ impl Method for HarmonicBalance {
     fn name(&self) -> &'static str {
         NAME
     }
+    fn closes_motions(&self, _system: &System) -> bool {
+        false
+    }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         let kept = Kept::new(system, |z| z != Complex64::new(0.0, 0.0));
         self.check(kept.highest)?;

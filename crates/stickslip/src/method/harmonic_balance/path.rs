@@ -350,19 +350,29 @@ fn extremes(series: &[(usize, Complex64)], level: &mut Level) -> (f64, f64) {
         let mut theta = start as f64 * TAU / n as f64;
         let mut best = alternation.signal[start];
         for _ in 0..3 {
-            let (mut slope, mut bend) = (0.0, 0.0);
+            // harmonics stand at equal distances
+            let first = series[0].0;
+            let mut turn = Complex64::cis(first as f64 * theta);
+            let next = Complex64::cis(series.get(1).map_or(0, |(h, _)| h - first) as f64 * theta);
+            let (mut value, mut slope, mut bend) = (0.0, 0.0, 0.0);
             for &(h, c) in series {
-                let z = c * Complex64::cis(h as f64 * theta);
+                let z = c * turn;
                 let h = h as f64;
+                value += z.re;
                 slope -= h * z.im;
                 bend -= h * h * z.re;
+                turn *= next;
             }
             let step = slope / bend;
             if !step.is_finite() || step.abs() > TAU / n as f64 {
                 break;
             }
             theta -= step;
-            best = series.iter().map(|&(h, c)| (c * Complex64::cis(h as f64 * theta)).re).sum();
+            // the vertex of the parabola there: what it leaves out has the third power of the step
+            best = value - 0.5 * slope * step;
+            if step.abs() * step.abs() < f64::EPSILON {
+                break;
+            }
         }
         best
     };

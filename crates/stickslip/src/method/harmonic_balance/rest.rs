@@ -138,8 +138,8 @@ impl Rest {
         let receptance = self.receptance(0, omega).map(|r| r.re);
         let largest = receptance.amax();
         let unheld = free_fraction(ZERO, omega).re / self.mass.amax();
-        if !(largest >= HELD * unheld) {
-            return; // springs hold all that moves
+        if largest == 0.0 || largest < HELD * unheld {
+            return; // springs hold all that moves, or nothing does
         }
         // only along what nothing else holds
         let Ok(inverse) = receptance.pseudo_inverse(HELD * largest) else { return };

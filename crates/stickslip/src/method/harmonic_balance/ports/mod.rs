@@ -326,14 +326,14 @@ impl Alternation {
 
     /// Samples of the forces of a port in a motion that has been found, see [`Alternation::force`].
     pub fn sample(&mut self, port: &Port, (omega, penalty): (f64, f64), (c, force): (&[Complex64], &[Complex64])) {
+        if let Kernel::Sliders(parts) = &port.kernel {
+            return self.sample_slides(parts, c);
+        }
         let mut out = vec![ZERO; c.len()];
         if port.is_force() {
             self.image(port, (omega, penalty, 1.0), (c, force), &mut out, None);
-            return;
-        }
-        self.respond(port, (omega, 1.0), c, &mut out, None);
-        if let Kernel::Sliders(parts) = &port.kernel {
-            self.sample_slides(parts, c);
+        } else {
+            self.respond(port, (omega, 1.0), c, &mut out, None);
         }
     }
 }

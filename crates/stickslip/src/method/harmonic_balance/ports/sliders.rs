@@ -84,7 +84,7 @@ pub(in super::super) struct Grid {
 }
 
 /// Points of the grid for every harmonic, at least: between two of them the motion is a cubic but for a thousandth of the highest harmonic.
-const POINTS: usize = 16;
+const POINTS: usize = 8;
 
 impl Grid {
     /// For harmonics up to `top`.

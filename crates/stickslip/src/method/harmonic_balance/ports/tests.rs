@@ -1,7 +1,10 @@
 //! Every kind of port: its derivative against differences, and orbits against closed forms and other methods.
 
+use super::super::equations::Level;
+use super::super::rest::Rest;
+use super::super::sparse::Sparse;
 use super::*;
-use crate::law::{BoucWen, Cubic, Dahl, Gap, Jenkins, Law, LawInfo, Rate, RateLaw, Relative, Step, StepLaw};
+use crate::law::{BoucWen, Cubic, Dahl, Gap, Jenkins, Law, LawInfo, Rate, RateLaw, Relative, Step, StepLaw, Stribeck};
 use crate::method::Method;
 use crate::method::harmonic_balance::HarmonicBalance;
 use crate::method::shooting::Shooting;
@@ -27,6 +30,8 @@ enum Plane {
     Relaxing,
     /// Rigid friction.
     Rigid,
+    /// It offers no view.
+    Unknown,
 }
 
 const STIFFNESS: f64 = 2.0;
@@ -129,6 +134,26 @@ fn ports_of(law: &SharedLaw) -> Ports {
     let structure = Structure::new(places, DMatrix::identity(d, d), DMatrix::zeros(d, d), DMatrix::identity(d, d));
     let axes = (0..d).map(|i| Axis::new(vec![(i, 1.0)])).collect();
     Ports::new(&System::builder(structure.unwrap()).joint("j", law.clone(), axes).build().unwrap()).unwrap()
+}
+
+/// What no port can be made of is refused by the joint, the law, and what would do.
+#[test]
+fn refusals_name_the_law_and_what_would_do() {
+    let jump = Arc::new(Stribeck { limit: 1.0, static_limit: 1.5, velocity: 0.0 });
+    for (law, words) in
+        [(jump as SharedLaw, "`event-driven`"), (Arc::new(Plane::Unknown), "prox, step, rate, or pieces")]
+    {
+        let d = law.directions();
+        let places = (0..d).map(|i| format!("p{i}")).collect();
+        let one = DMatrix::identity(d, d);
+        let structure = Structure::new(places, one.clone(), one.clone(), one).unwrap();
+        let axes = (0..d).map(|i| Axis::new(vec![(i, 1.0)])).collect();
+        let system = System::builder(structure).joint("rub", law.clone(), axes).build().unwrap();
+        let error = HarmonicBalance::default().solver(&system).err().expect("refused").to_string();
+        for part in ["harmonic-balance", "rub", law.name(), words] {
+            assert!(error.contains(part), "{error}");
+        }
+    }
 }
 
 /// Values without a pattern between -1 and 1.
@@ -341,5 +366,44 @@ fn a_full_mass_matrix_is_that_of_the_equations() {
     let orbit = balanced(&system, 3, omega);
     for (place, x) in orbit.places.iter().zip(expected.iter()) {
         assert!((place.first_harmonic - x).norm() < 1e-9, "{place:?} {x}");
+    }
+}
+
+/// A row of nodes in a plane with coupled laws of every view between them: the banded form finds the motion of the dense one.
+#[test]
+fn banded_and_dense_agree_in_a_plane() {
+    let nodes = 24;
+    let n = 2 * nodes;
+    let places = (0..n).map(|i| format!("p{i}")).collect();
+    let stiffness = DMatrix::from_fn(n, n, |i, k| match i.abs_diff(k) {
+        0 => 2.0 + 0.01 * i as f64,
+        2 => -0.3,
+        _ => 0.0,
+    });
+    let structure = Structure::new(places, DMatrix::identity(n, n), DMatrix::identity(n, n) * 0.1, stiffness).unwrap();
+    let laws = [Plane::Masing, Plane::Rigid, Plane::Stiffening];
+    let mut builder = System::builder(structure);
+    for i in 1..nodes {
+        let axis = |a: usize| Axis::new(vec![(2 * i + a, 1.0), (2 * i - 2 + a, -1.0)]);
+        builder = builder.joint(format!("j{i}"), Arc::new(laws[i % laws.len()]), vec![axis(0), axis(1)]);
+    }
+    for i in (0..n).step_by(7) {
+        builder = builder.force(i, 1, Complex64::from_polar(1.0, 0.7 * i as f64));
+    }
+    let system = builder.build().unwrap();
+    let ports = Ports::new(&system).unwrap();
+    let rest = Rest::new(&system, &ports);
+    let (harmonics, omega) = (vec![1, 3, 5], 1.2);
+    let solve = |banded: bool| {
+        let sparse = banded.then(|| Sparse::new(&system, &ports, &harmonics).unwrap());
+        let mut level = Level::new(harmonics.clone(), 256, &ports, sparse);
+        level.drive(&system, &ports, &rest, omega);
+        let start = level.begin(&system, &ports, None, omega);
+        level.solve(&ports, omega, start).unwrap()
+    };
+    let (dense, banded) = (solve(false), solve(true));
+    assert!(dense.force.iter().any(|f| f.norm() > 0.5 * LIMIT), "{:?}", dense.force);
+    for (a, b) in dense.c.iter().zip(&banded.c).chain(dense.force.iter().zip(&banded.force)) {
+        assert!((a - b).norm() < 1e-8, "{a} {b}");
     }
 }
