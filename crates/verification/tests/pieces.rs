@@ -290,7 +290,7 @@ fn creeping_to_a_stop_is_no_chatter() {
     for (law, friction, stiffness) in laws {
         for damping in [1.9, 3.0, 10.0, 50.0] {
             for constant in [0.0, 0.3] {
-                let mut model = oscillator(1.0, damping, &[law.clone()]);
+                let mut model = oscillator(1.0, damping, std::slice::from_ref(&law));
                 model.forces = vec![force("m", constant, 0)];
                 let x = *free(&model, 1.0, 1.0, 2000.0).last().unwrap();
                 let expected = (constant + friction) / stiffness;
@@ -339,13 +339,13 @@ fn free_bodies_under_a_mean_force_drift() {
     ] {
         for damping in [0.0, 0.1, 3.0] {
             for (constant, amplitude) in [(0.03, 1.0), (0.09, 0.3), (0.1, 0.3), (0.3, 0.05), (0.3, 1.0)] {
-                let mut model = oscillator(0.0, damping, &[law.clone()]);
+                let mut model = oscillator(0.0, damping, std::slice::from_ref(&law));
                 model.forces = vec![force("m", constant, 0), force("m", amplitude, 1)];
                 let system = model.assemble().unwrap();
                 let error = EventDriven.solver(&system).unwrap().orbit(1.0, None).unwrap_err();
                 assert_eq!(error.status(), "drifts", "{law:?} {damping} {constant} {amplitude}: {error}");
             }
-            let mut model = oscillator(0.0, damping, &[law.clone()]);
+            let mut model = oscillator(0.0, damping, std::slice::from_ref(&law));
             model.forces = vec![force("m", 0.03, 0), force("m", 0.02, 1)];
             assert!(
                 EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(0.1, None).is_ok(),
