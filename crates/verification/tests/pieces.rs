@@ -151,6 +151,26 @@ fn subharmonic_motion_beside_an_unstable_one() {
     assert!((double.start[0] - later).abs() > 0.1, "it repeats after one period");
 }
 
+/// A motion that just touches the stop, or just does not, or presses a little: at the turning point velocity and depth vanish together, and the
+/// orbit is the linear one but for what the stop is pressed.
+#[test]
+fn grazing_a_stop_is_no_jump() {
+    let (omega, damping) = (0.5f64, 0.1);
+    let amplitude = 1.0 / ((1.0 - omega * omega).powi(2) + (damping * omega).powi(2)).sqrt();
+    for off in [-1e-4, -1e-6, -1e-8, -1e-10, -1e-12, -1e-14, 0.0, 1e-14, 1e-12, 1e-10, 1e-8, 1e-4] {
+        let mut model = oscillator(1.0, damping, &[Arc::new(Gap { gap: amplitude * (1.0 + off), stiffness: 50.0 })]);
+        model.forces = vec![force("m", 1.0, 1)];
+        let orbit = exact(&model.assemble().unwrap(), omega);
+        let place = &orbit.places[0];
+        // the stop is pressed by less than it stands in the way
+        let pressed = f64::max(-off, 0.0) * amplitude;
+        near("largest", place.maximum, amplitude, pressed + 1e-10);
+        near("smallest", place.minimum, -amplitude, pressed + 1e-10);
+        assert_eq!(orbit.is_stable(), Some(true), "{off:e}");
+        assert!(off.abs() < 1e-9 || orbit.joints[0].switches == if off < 0.0 { 2 } else { 0 }, "{off:e}");
+    }
+}
+
 /// A stop whose wall moves: imposed motion with a mean is a gap that is smaller by it.
 #[test]
 fn a_moved_wall_counts_with_its_mean() {
