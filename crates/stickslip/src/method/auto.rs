@@ -1,5 +1,6 @@
 //! Picks a method: event-driven for exact laws, shooting for smooth ones, harmonic balance for many joints.
 
+use super::event_driven::takes;
 use super::harmonic_balance::HarmonicBalance;
 use super::{Choice, Method, MethodError, MethodInfo, Solver, event_driven::EventDriven, shooting::Shooting};
 use crate::model::System;
@@ -30,7 +31,7 @@ pub struct Auto;
 impl Auto {
     fn chosen(system: &System) -> (Box<dyn Method>, String) {
         let joints = system.joints().len();
-        let exact = system.joints().iter().all(|joint| joint.law().sliders().is_some());
+        let exact = system.joints().iter().all(|joint| takes(joint.law().as_ref()));
         let smooth = system.joints().iter().all(|joint| joint.law().rate().is_some());
         if joints > FOLLOWED {
             let because = format!("{joints} joints are more than {FOLLOWED}");

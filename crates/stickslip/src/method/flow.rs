@@ -2,15 +2,16 @@
 //!
 //! | flow | laws | motion |
 //! | --- | --- | --- |
-//! | [`ExactFlow`](super::exact_flow::ExactFlow) | sliders | closed forms between switches |
+//! | [`ExactFlow`](super::exact_flow::ExactFlow) | sliders and stops | closed forms between switches |
 //! | [`SmoothFlow`](super::smooth::flow::SmoothFlow) | rate | Radau IIA-5 with controlled steps |
 //! | [`IncrementalFlow`](super::incremental::flow::IncrementalFlow) | step and rate side by side | average acceleration on equal steps |
 
-use super::event_driven::Mechanics;
+use super::event_driven::{Mechanics, takes};
 use super::exact_flow::ExactFlow;
 use super::incremental::flow::IncrementalFlow;
 use super::smooth::flow::SmoothFlow;
 use super::{Breakdown, MethodError};
+use crate::law::SharedLaw;
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
@@ -75,17 +76,27 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// Sliders alone are followed exactly, laws with a rate alone by integration, everything else in small steps.
+    /// Sliders and stops alone are followed exactly, laws with a rate alone by integration, everything else in small steps.
     pub fn of(system: &System, width: Option<f64>) -> Kind {
-        let all = |has: &dyn Fn(&crate::law::SharedLaw) -> bool| system.joints().iter().all(|joint| has(joint.law()));
-        if width.is_none() && all(&|law| law.sliders().is_some()) {
+        if width.is_none() && system.joints().iter().all(|joint| takes(joint.law().as_ref())) {
             return Kind::Exact;
         }
-        let regular = |law: &crate::law::SharedLaw| width.and_then(|width| law.regularised(width));
+        Kind::integrated(system, width)
+    }
+
+    /// The same without the exact one, unless all laws are sliders, which nothing integrates.
+    pub fn integrated(system: &System, width: Option<f64>) -> Kind {
+        let all = |has: &dyn Fn(&SharedLaw) -> bool| system.joints().iter().all(|joint| has(joint.law()));
+        let regular = |law: &SharedLaw| width.and_then(|width| law.regularised(width));
         // a law that carries nothing has a rate without saying so
-        let smooth =
-            |law: &crate::law::SharedLaw| regular(law).as_ref().unwrap_or(law).rate().is_some() || carries_nothing(law);
-        if all(&smooth) { Kind::Smooth } else { Kind::Incremental }
+        let smooth = |law: &SharedLaw| regular(law).as_ref().unwrap_or(law).rate().is_some() || carries_nothing(law);
+        if all(&smooth) {
+            Kind::Smooth
+        } else if width.is_none() && all(&|law| law.sliders().is_some()) {
+            Kind::Exact
+        } else {
+            Kind::Incremental
+        }
     }
 }
 
@@ -93,7 +104,7 @@ impl Kind {
 mod tests {
     use super::*;
     use crate::dimension::Dimension;
-    use crate::law::{Coulomb, Gap, Jenkins, Law, LawInfo, Parameter, Rate, RateLaw, Relative, SharedLaw, StepLaw};
+    use crate::law::{Coulomb, Gap, Jenkins, Law, LawInfo, Parameter, Rate, RateLaw, Relative, StepLaw};
     use crate::method::shooting::Shooting;
     use crate::method::{Method, event_driven, settling::Settling};
     use crate::model::Axis;

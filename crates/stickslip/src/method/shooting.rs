@@ -171,7 +171,7 @@ impl<'a> Shooter<'a> {
     /// # Errors
     /// A law that no integration takes, a place without mass.
     pub fn new(system: &'a System, options: Shooting, name: &'static str, search: Search) -> Result<Self, MethodError> {
-        let stepping = match Kind::of(system, options.width) {
+        let stepping = match Kind::integrated(system, options.width) {
             Kind::Incremental => Stepping::Incremental(Box::new(IncrementalFlow::new(system, options.width, name)?)),
             // exact laws, if they are meant to be smoothed, are told so by the assembly
             Kind::Smooth | Kind::Exact => {

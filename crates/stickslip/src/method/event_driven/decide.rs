@@ -1,12 +1,18 @@
-//! Stick or slip: which pattern begins at an instant.
+//! Stick or slip, open or closed: which pattern begins at an instant.
 //!
 //! Sliders with relative velocity slip on. For the rigid ones at rest the accelerations and friction forces solve a box
 //! complementarity problem (all of them together, so the order of listing plays no part): an acceleration means slip, a force
 //! inside its limit means stick. Where a force is exactly at its limit and the acceleration is zero, which is the rule when stick
 //! ends, the same problem for the next derivative decides, and so on.
+//!
+//! A slider whose static limit lies above its dynamic one loses force when it lets go, so that it may be able both to rest and to slide. What rests
+//! holds as long as it can: the problem is solved with static limits first, those that it lets go slide with their dynamic limits from then on,
+//! all together, and the others are asked again under the forces that this leaves to them. One that would then be driven back rests again.
+//!
+//! Springs and stops carry forces that do not jump: what they do next is asked of the first derivative that does not vanish.
 //! Source: Glocker, "Set-Valued Force Laws" (2001), Ch. 10; Leine and Nijmeijer (2004), Ch. 6.
 
-use super::mechanics::Mechanics;
+use super::mechanics::{Kind, Mechanics, Part};
 use crate::law::Contact;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
@@ -35,6 +41,9 @@ pub(crate) struct Decision {
     delassus: DMatrix<f64>,
     free: DVector<f64>,
     at_rest: Vec<usize>,
+    /// Rigid sliders without velocity that have not let go; of those that have, the ones whose force dropped.
+    resting: Vec<usize>,
+    dropped: Vec<usize>,
     /// Sliders that are not decided yet, with the sign of their force.
     undecided: Vec<(usize, f64)>,
     problem: Problem,
@@ -83,20 +92,22 @@ impl Problem {
 
 impl Decision {
     pub fn new(mechanics: &Mechanics) -> Self {
-        let count = mechanics.sliders.len();
+        let count = mechanics.parts.len();
         let mut response = DMatrix::zeros(mechanics.n, count);
-        for (i, slider) in mechanics.sliders.iter().enumerate() {
-            response.set_column(i, &(&mechanics.inverse_mass * &slider.direction));
+        for (i, part) in mechanics.parts.iter().enumerate() {
+            response.set_column(i, &(&mechanics.inverse_mass * &part.direction));
         }
-        let delassus = DMatrix::from_fn(count, count, |a, b| mechanics.sliders[a].direction.dot(&response.column(b)));
+        let delassus = DMatrix::from_fn(count, count, |a, b| mechanics.parts[a].direction.dot(&response.column(b)));
         Decision {
             response,
             delassus,
-            contacts: vec![Contact::Stick; mechanics.sliders.len()],
+            contacts: vec![Contact::Stick; count],
             acceleration: DVector::zeros(mechanics.n),
             pushed: 0.0,
             free: DVector::zeros(mechanics.n),
             at_rest: Vec::new(),
+            resting: Vec::new(),
+            dropped: Vec::new(),
             undecided: Vec::new(),
             problem: Problem::default(),
             derivatives: vec![DVector::zeros(mechanics.n); LEVELS as usize + 3],
@@ -104,7 +115,8 @@ impl Decision {
     }
 
     /// Decides at `time` for `state`; `velocity_scale` is the largest relative velocity of the motion (m/s).
-    /// Returns false if the complementarity problem has no solution, which needs an indefinite mass matrix.
+    /// Returns false if the complementarity problem has no solution, which needs an indefinite mass matrix, or if sliders that lose force when they
+    /// let go drive each other back.
     pub fn decide(
         &mut self,
         mechanics: &Mechanics,
@@ -116,55 +128,114 @@ impl Decision {
         let n = mechanics.n;
         let (x, v) = (&state[..n], &state[n..2 * n]);
         let still = REST * velocity_scale;
-        self.at_rest.clear();
-        let mut elastic_undecided = false;
-        for (i, slider) in mechanics.sliders.iter().enumerate() {
-            let velocity = relative(slider, v) + drive.imposed_at(i, time, 1);
-            self.contacts[i] = match slider.state {
-                None if velocity.abs() > still => Contact::slip(velocity),
-                None => {
-                    self.at_rest.push(i);
+        self.resting.clear();
+        self.dropped.clear();
+        let mut springs_undecided = false;
+        for (i, part) in mechanics.parts.iter().enumerate() {
+            let velocity = part.along(v) + drive.imposed_at(i, time, 1);
+            self.contacts[i] = match part.kind {
+                Kind::Rigid { .. } if velocity.abs() > still => Contact::slip(velocity),
+                Kind::Rigid { .. } => {
+                    self.resting.push(i);
                     Contact::Stick
                 }
-                Some(s) => {
+                Kind::Elastic { limit, state: s, .. } => {
                     let force = state[2 * n + s];
-                    if force.abs() < slider.limit * (1.0 - AT_LIMIT) {
+                    if force.abs() < limit * (1.0 - AT_LIMIT) {
                         Contact::Stick
                     } else if velocity.abs() > still {
                         if velocity * force > 0.0 { Contact::slip(force) } else { Contact::Stick }
                     } else {
-                        elastic_undecided = true;
+                        springs_undecided = true;
                         Contact::Stick
+                    }
+                }
+                Kind::Stop { gap, .. } => {
+                    let depth = part.along(x) + drive.imposed_at(i, time, 0) - gap;
+                    if depth.abs() > mechanics.touch(part, drive.omega, velocity_scale) {
+                        closed(depth)
+                    } else if velocity.abs() > still {
+                        closed(velocity)
+                    } else {
+                        springs_undecided = true;
+                        Contact::Open
                     }
                 }
             };
         }
-        // accelerations without the forces of the rigid sliders at rest
+        // each round lets sliders go or takes one back
+        for _ in 0..=2 * self.resting.len() {
+            self.accelerate(mechanics, drive, time, state);
+            self.at_rest.clone_from(&self.resting);
+            if !self.settle_rigid(mechanics, drive, time, state) {
+                return false;
+            }
+            if !self.let_go(mechanics, drive, time) {
+                if springs_undecided {
+                    self.settle_springs(mechanics, drive, time, state, velocity_scale);
+                }
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Accelerations without the forces of the rigid sliders that rest.
+    fn accelerate(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64]) {
+        let n = mechanics.n;
+        let (x, v) = (&state[..n], &state[n..2 * n]);
         self.free.fill(0.0);
         drive.add_force(time, 0, &mut self.free);
         subtract_product(&mechanics.damping, v, &mut self.free);
         subtract_product(&mechanics.stiffness, x, &mut self.free);
-        for (i, slider) in mechanics.sliders.iter().enumerate() {
-            let force = match slider.state {
-                Some(s) => state[2 * n + s],
-                None => self.contacts[i].sign() * slider.limit,
+        for (i, part) in mechanics.parts.iter().enumerate() {
+            let force = match (part.kind, self.contacts[i]) {
+                (Kind::Elastic { state: s, .. }, _) => state[2 * n + s],
+                (Kind::Stop { stiffness, gap }, Contact::Stick) => {
+                    stiffness * (part.along(x) + drive.imposed_at(i, time, 0) - gap)
+                }
+                (_, contact) => part.constant_force(contact),
             };
             if force != 0.0 {
-                self.free.axpy(-force, &slider.direction, 1.0);
+                self.free.axpy(-force, &part.direction, 1.0);
             }
         }
         multiply(&mechanics.inverse_mass, &self.free, &mut self.acceleration);
         self.pushed = self.free.amax();
-        if self.at_rest.is_empty() && !elastic_undecided {
-            return true;
-        }
-        if !self.settle_rigid(mechanics, drive, time, state) {
+    }
+
+    /// Those that rest no longer and lose force by that, and those that lost it and are driven back; whether there are any.
+    fn let_go(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64) -> bool {
+        let lets_go = |i: usize| self.contacts[i] != Contact::Stick && mechanics.parts[i].drops();
+        if self.dropped.is_empty() && !self.resting.iter().any(|&i| lets_go(i)) {
             return false;
         }
-        if elastic_undecided {
-            self.settle_elastic(mechanics, drive, time, state, still);
+        let size = self.size(mechanics, drive, 2);
+        let (contacts, acceleration) = (&mut self.contacts, &self.acceleration);
+        let back = self.dropped.iter().position(|&i| {
+            let relative = mechanics.parts[i].direction.dot(acceleration) + drive.imposed_at(i, time, 2);
+            relative * contacts[i].sign() < -BALANCED * size
+        });
+        if let Some(back) = back {
+            self.resting.push(self.dropped.swap_remove(back));
+            self.resting.sort_unstable();
         }
-        true
+        let before = self.dropped.len();
+        let dropped = &mut self.dropped;
+        if back.is_none() {
+            self.resting.retain(|&i| {
+                let drops = contacts[i] != Contact::Stick && mechanics.parts[i].drops();
+                if drops {
+                    dropped.push(i);
+                }
+                !drops
+            });
+        }
+        let again = back.is_some() || dropped.len() > before;
+        if again {
+            self.resting.iter().for_each(|&i| contacts[i] = Contact::Stick);
+        }
+        again
     }
 
     /// Rigid sliders at rest: accelerations first, then higher derivatives for those at their limit.
@@ -175,7 +246,7 @@ impl Decision {
         self.pose(mechanics, drive, time, 2, None);
         let problem = &mut self.problem;
         for (k, &i) in self.at_rest.iter().enumerate() {
-            let limit = mechanics.sliders[i].limit;
+            let limit = mechanics.parts[i].holds();
             (problem.low[k], problem.high[k]) = (-limit, limit);
         }
         if !problem.solve() {
@@ -206,7 +277,7 @@ impl Decision {
 
     /// The size of the terms that the derivative of this order (2: acceleration) is the sum of.
     fn size(&self, mechanics: &Mechanics, drive: &Drive, order: u32) -> f64 {
-        let limit = mechanics.sliders.iter().map(|slider| slider.limit).fold(0.0, f64::max);
+        let limit = mechanics.parts.iter().filter(|p| p.is_slider()).map(Part::holds).fold(0.0, f64::max);
         let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax() };
         let imposed = drive
             .rates
@@ -227,7 +298,7 @@ impl Decision {
             for (b, &j) in self.at_rest.iter().enumerate() {
                 problem.delassus[(a, b)] = self.delassus[(i, j)];
             }
-            problem.push[a] = mechanics.sliders[i].direction.dot(motion) + drive.imposed_at(i, time, order);
+            problem.push[a] = mechanics.parts[i].direction.dot(motion) + drive.imposed_at(i, time, order);
         }
     }
 
@@ -284,24 +355,34 @@ impl Decision {
         drive.add_force(time, level, &mut self.free);
         subtract_product(&mechanics.damping, derivatives[l + 1].as_slice(), &mut self.free);
         subtract_product(&mechanics.stiffness, derivatives[l].as_slice(), &mut self.free);
-        for (i, slider) in mechanics.sliders.iter().enumerate() {
-            if let (Some(kt), Contact::Stick) = (slider.stiffness, self.contacts[i]) {
-                let force = kt * (slider.direction.dot(&derivatives[l]) + drive.imposed_at(i, time, level));
-                self.free.axpy(-force, &slider.direction, 1.0);
+        for (i, part) in mechanics.parts.iter().enumerate() {
+            if let (Some(kt), Contact::Stick) = (part.stiffness(), self.contacts[i]) {
+                let force = kt * (part.direction.dot(&derivatives[l]) + drive.imposed_at(i, time, level));
+                self.free.axpy(-force, &part.direction, 1.0);
             }
         }
     }
 
-    /// Sliders behind springs, at their limit with zero relative velocity: its first derivative that does not vanish decides.
-    fn settle_elastic(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64], still: f64) {
+    /// Sliders behind springs at their limit and stops at their gap, with zero relative velocity: its first derivative that does not vanish decides.
+    fn settle_springs(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64], velocity_scale: f64) {
         let n = mechanics.n;
-        let mut undecided: Vec<(usize, f64)> = (0..mechanics.sliders.len())
+        let still = REST * velocity_scale;
+        let mut undecided: Vec<(usize, f64)> = (0..mechanics.parts.len())
             .filter_map(|i| {
-                let slider = &mechanics.sliders[i];
-                let force = state[2 * n + slider.state?];
-                let velocity = relative(slider, &state[n..2 * n]) + drive.imposed_at(i, time, 1);
-                let at_limit = force.abs() >= slider.limit * (1.0 - AT_LIMIT) && velocity.abs() <= still;
-                at_limit.then_some((i, force.signum()))
+                let part = &mechanics.parts[i];
+                let velocity = part.along(&state[n..2 * n]) + drive.imposed_at(i, time, 1);
+                let (at_border, sign) = match part.kind {
+                    Kind::Rigid { .. } => return None,
+                    Kind::Elastic { limit, state: s, .. } => {
+                        let force = state[2 * n + s];
+                        (force.abs() >= limit * (1.0 - AT_LIMIT), force.signum())
+                    }
+                    Kind::Stop { gap, .. } => {
+                        let depth = part.along(&state[..n]) + drive.imposed_at(i, time, 0) - gap;
+                        (depth.abs() <= mechanics.touch(part, drive.omega, velocity_scale), 1.0)
+                    }
+                };
+                (at_border && velocity.abs() <= still).then_some((i, sign))
             })
             .collect();
         self.begin_derivatives(n, state);
@@ -309,13 +390,13 @@ impl Decision {
             let order = level + 1;
             let size = self.size(mechanics, drive, order);
             undecided.retain(|&(i, sign)| {
-                let slope = mechanics.sliders[i].direction.dot(&self.derivatives[order as usize])
-                    + drive.imposed_at(i, time, order);
+                let part = &mechanics.parts[i];
+                let slope = part.direction.dot(&self.derivatives[order as usize]) + drive.imposed_at(i, time, order);
                 if slope.abs() <= BALANCED * size {
                     return true;
                 }
                 if slope * sign > 0.0 {
-                    self.contacts[i] = Contact::slip(sign);
+                    self.contacts[i] = if part.is_slider() { Contact::slip(sign) } else { Contact::Stick };
                 }
                 false
             });
@@ -342,8 +423,9 @@ impl Decision {
     }
 }
 
-fn relative(slider: &super::mechanics::Slider, v: &[f64]) -> f64 {
-    slider.direction.iter().zip(v).map(|(w, v)| w * v).sum()
+/// A stop by the sign of its depth.
+fn closed(depth: f64) -> Contact {
+    if depth > 0.0 { Contact::Stick } else { Contact::Open }
 }
 
 fn subtract_product(matrix: &DMatrix<f64>, vector: &[f64], out: &mut DVector<f64>) {
@@ -356,4 +438,53 @@ fn subtract_product(matrix: &DMatrix<f64>, vector: &[f64], out: &mut DVector<f64
 
 fn multiply(matrix: &DMatrix<f64>, vector: &DVector<f64>, out: &mut DVector<f64>) {
     out.gemv(1.0, matrix, vector, 0.0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::Stribeck;
+    use crate::model::{Force, GROUND, Joint, Mass, Model};
+    use std::sync::Arc;
+
+    /// Two masses at rest of 1 kg under constant forces (N); the first rubs on the ground and on the second, each with (dynamic, static limit).
+    fn decided(forces: [f64; 2], limits: [(f64, f64); 2]) -> (Vec<Contact>, [f64; 2]) {
+        let law = |(limit, static_limit): (f64, f64)| Arc::new(Stribeck { limit, static_limit, velocity: 0.0 });
+        let joint = |name: &str, other: &str, limits| Joint {
+            name: name.into(),
+            between: ["a".into(), other.into()],
+            law: law(limits),
+        };
+        let force = |on: &str, amplitude: f64| Force { on: on.into(), amplitude, phase: 0.0, harmonic: 0 };
+        let model = Model {
+            masses: vec![Mass::new("a", 1.0), Mass::new("b", 1.0)],
+            joints: vec![joint("floor", GROUND, limits[0]), joint("between", "b", limits[1])],
+            forces: vec![force("a", forces[0]), force("b", forces[1])],
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let mechanics = Mechanics::new(&system).unwrap();
+        let drive = Drive::new(&system, &mechanics.owners(), 1.0);
+        let mut decision = Decision::new(&mechanics);
+        assert!(decision.decide(&mechanics, &drive, 0.0, &[0.0; 4], 1.0));
+        (decision.contacts.clone(), [decision.acceleration[0], decision.acceleration[1]])
+    }
+
+    #[test]
+    fn what_rests_holds_up_to_its_static_limit() {
+        use Contact::{SlipBackward, SlipForward, Stick};
+        let check = |forces, limits, contacts: [Contact; 2], acceleration: [f64; 2]| {
+            let (found, motion) = decided(forces, limits);
+            assert_eq!(found, contacts, "{forces:?}");
+            assert!((0..2).all(|i| (motion[i] - acceleration[i]).abs() < 1e-12), "{motion:?}");
+        };
+        // between both limits it could slide, and rests
+        check([3.0, 0.0], [(1.0, 5.0), (0.5, 1.0)], [Stick, Stick], [0.0, 0.0]);
+        // above its static limit it slides with the dynamic one: together, 4 N on 2 kg, or apart
+        check([6.0, 0.0], [(2.0, 5.0), (1.0, 3.0)], [SlipForward, Stick], [2.0, 2.0]);
+        check([6.0, 0.0], [(2.0, 5.0), (0.5, 1.0)], [SlipForward, SlipForward], [3.5, 0.5]);
+        check([0.0, 6.0], [(0.5, 9.0), (1.0, 2.0)], [Stick, SlipBackward], [0.0, 5.0]);
+        // the second lets go backward as long as the floor holds the first with 5 N; the 1 N left of them drive it forward: it rests again
+        check([10.0, 8.0], [(1.0, 5.0), (0.5, 1.0)], [SlipForward, Stick], [8.5, 8.5]);
+    }
 }

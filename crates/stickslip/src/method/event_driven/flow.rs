@@ -1,7 +1,7 @@
 //! The motion over a stretch of time: closed-form segments joined at the switches, with its exact sensitivity.
 
 use super::decide::{AT_LIMIT, Decision, REST};
-use super::mechanics::Mechanics;
+use super::mechanics::{Kind, Mechanics};
 use super::memory::Memory;
 use super::pattern::{Beginning, Driven, Pattern, Work};
 use crate::law::Contact;
@@ -20,7 +20,10 @@ pub(crate) const SWITCH_LIMIT: usize = 20_000;
 /// Bytes of segments in one stretch beyond which it counts as chatter too: a return of a ring of 48 blades has a few hundred switches, and a
 /// segment a tenth of a megabyte.
 const SEGMENT_LIMIT: usize = 256 << 20;
-/// Switches at one and the same instant beyond which the decision is going round in circles: every slider may change once
+/// Switches without motion between them, per part, after which decision and signals are taken to contradict each other within rounding: a motion
+/// that creeps towards a border for ever, and is there to all digits.
+const EASED_AFTER: usize = 2;
+/// Switches at one and the same instant beyond which the decision is going round in circles: every part may change once
 /// per derivative that decides.
 const AT_ONCE_LIMIT: usize = 8;
 
@@ -31,13 +34,13 @@ pub(crate) struct Segment {
     pub start: f64,
     /// Length, s.
     pub length: f64,
-    /// What sticks, and which way the others slip.
+    /// What sticks or is closed, and which way the others slip.
     pub contacts: Vec<Contact>,
     /// The response to the drive of its pattern, with the basis of its signals.
     pub driven: Arc<Driven>,
     /// Coefficients of the displacements, n × basis, row after row.
     pub displacement: Vec<Complex64>,
-    /// Forces of the sliders, sliders × basis, row after row.
+    /// Forces of the parts of joints, parts × basis, row after row.
     pub force: Vec<Complex64>,
 }
 
@@ -79,6 +82,9 @@ pub(crate) struct Flow {
     before: DVector<f64>,
     after: DVector<f64>,
     row: DVector<f64>,
+    /// Displacements and velocities at the start of the segment.
+    from: Vec<f64>,
+    rate: Vec<Complex64>,
 }
 
 /// What springs before sliders can hold counts up to this multiple of what the loads can give: structures that slip at all have it below 10.
@@ -109,6 +115,8 @@ impl Flow {
             before: DVector::zeros(states),
             after: DVector::zeros(states),
             row: DVector::zeros(states),
+            from: Vec::new(),
+            rate: Vec::new(),
         }
     }
 
@@ -129,15 +137,16 @@ impl Flow {
         self.used = 0;
         self.switches = 0;
         let n = self.mechanics.n;
-        for slider in &self.mechanics.sliders {
-            if let Some(s) = slider.state {
-                state[2 * n + s] = state[2 * n + s].clamp(-slider.limit, slider.limit);
+        self.from.resize(2 * n, 0.0);
+        for part in self.mechanics.parts.iter() {
+            if let Kind::Elastic { limit, state: s, .. } = part.kind {
+                state[2 * n + s] = state[2 * n + s].clamp(-limit, limit);
             }
         }
         let velocity_scale = self.velocity_scale(state);
         let end = start + duration;
         let mut time = start;
-        let (mut at_once, mut bytes) = (0, 0);
+        let (mut at_once, mut idle, mut bytes) = (0, 0, 0);
         if !self.decision.decide(&self.mechanics, &self.drive, time, state, velocity_scale) {
             return Err(Breakdown::Undecidable { time });
         }
@@ -150,7 +159,9 @@ impl Flow {
                     _ => Breakdown::OutOfRange { time },
                 })?;
             self.start_segment(time, &pattern, driven, state);
-            self.watch(&pattern, velocity_scale);
+            let eased = idle > EASED_AFTER * (1 + self.mechanics.parts.len());
+            self.watch(&pattern, velocity_scale, eased);
+            self.from.copy_from_slice(&state[..2 * n]);
             let rest = end - time;
             let basis = self.segments[self.used].basis();
             let zero = basis.first_zero(&self.signals, &self.begins, rest, &mut self.scratch);
@@ -160,30 +171,35 @@ impl Flow {
                 FirstZero::TooManySteps => return Err(Breakdown::TooFast { time }),
             };
             self.finish_segment(&pattern, length, state, sensitivity.as_deref_mut());
-            let Some(slider) = event else { return Ok(()) };
+            let Some(part) = event else { return Ok(()) };
             time += length;
             self.switches += 1;
             at_once = if length <= f64::EPSILON * end.abs() { at_once + 1 } else { 0 };
+            idle = if self.moved(state) <= REST * velocity_scale { idle + 1 } else { 0 };
             bytes += self.segments[self.used - 1].bytes();
             let many = self.switches > SWITCH_LIMIT || bytes > SEGMENT_LIMIT;
-            if many || at_once > AT_ONCE_LIMIT * (1 + self.mechanics.sliders.len()) {
-                let joint = self.mechanics.sliders[slider].joint;
+            if many || at_once > AT_ONCE_LIMIT * (1 + self.mechanics.parts.len()) {
+                let joint = self.mechanics.parts[part].joint;
                 if pattern.redundant {
                     return Err(Breakdown::Redundant { time, joint });
                 }
                 return Err(Breakdown::Chatter { time, switches: self.switches, joint });
             }
-            let old = self.segments[self.used - 1].contacts[slider];
-            if old != Contact::Stick || self.mechanics.sliders[slider].state.is_some() {
-                self.snap(slider, old, state);
-            }
+            self.snap(part, state);
             if !self.decision.decide(&self.mechanics, &self.drive, time, state, velocity_scale) {
                 return Err(Breakdown::Undecidable { time });
             }
             if let Some(sensitivity) = sensitivity.as_deref_mut() {
-                self.jump(slider, time, state, sensitivity);
+                self.jump(part, &pattern, time, state, sensitivity);
             }
         }
+    }
+
+    /// How far the state has come since the segment began, as a velocity, m/s.
+    fn moved(&self, state: &[f64]) -> f64 {
+        let n = self.mechanics.n;
+        let far = |range: std::ops::Range<usize>| range.map(|i| (state[i] - self.from[i]).abs()).fold(0.0, f64::max);
+        far(n..2 * n).max(far(0..n) * self.drive.omega.max(self.mechanics.fastest))
     }
 
     /// The largest relative velocity to be expected: from the state, the imposed motion and the loads.
@@ -200,7 +216,12 @@ impl Flow {
     pub fn set_drive(&mut self, drive: Drive) {
         self.work.set_harmonics(drive.rates.len());
         let mechanics = &self.mechanics;
-        let springs = mechanics.sliders.iter().filter_map(|slider| Some(slider.limit / slider.stiffness?.sqrt()));
+        let springs = mechanics.parts.iter().filter_map(|part| match part.kind {
+            Kind::Rigid { .. } => None,
+            Kind::Elastic { stiffness, limit, .. } => Some(limit / stiffness.sqrt()),
+            // what it presses with at rest
+            Kind::Stop { stiffness, gap } => Some((-gap).max(0.0) * stiffness.sqrt()),
+        });
         let loads = drive.energy_scale(&mechanics.mass, &mechanics.stiffness);
         // a limit that the loads never reach says nothing of the motion
         let most = if loads > 0.0 { PRELOADED * loads } else { f64::INFINITY };
@@ -216,12 +237,12 @@ impl Flow {
             self.segments.push(Segment::default());
         }
         let segment = &mut self.segments[self.used];
-        let (n, nb, sliders) = (self.mechanics.n, driven.basis.len(), self.mechanics.sliders.len());
+        let (n, nb, parts) = (self.mechanics.n, driven.basis.len(), self.mechanics.parts.len());
         (segment.start, segment.driven) = (time, driven);
         segment.contacts.clone_from(&self.decision.contacts);
         let driven = &segment.driven;
         segment.displacement.resize(n * nb, ZERO);
-        segment.force.resize(sliders * nb, ZERO);
+        segment.force.resize(parts * nb, ZERO);
         let beginning = Beginning { driven, contacts: &segment.contacts, time, state };
         shape.displacement(&self.mechanics, &self.drive, beginning, &mut self.work, &mut segment.displacement);
         self.velocity.resize(n * nb, ZERO);
@@ -234,32 +255,35 @@ impl Flow {
         self.forces(time, shape, state);
     }
 
-    /// Forces of all sliders as signals.
+    /// Forces of all parts as signals.
     fn forces(&mut self, time: f64, shape: &Pattern, state: &[f64]) {
         let Segment { force, displacement, contacts, driven, .. } = &mut self.segments[self.used];
         let (n, basis) = (self.mechanics.n, &driven.basis);
         let (nb, constant, modes) = (basis.len(), basis.constant(), shape.lambda.len());
         let turns = &self.work.turn;
         force.fill(ZERO);
-        for (i, slider) in self.mechanics.sliders.iter().enumerate() {
+        for (i, part) in self.mechanics.parts.iter().enumerate() {
             let row = &mut force[i * nb..(i + 1) * nb];
-            match (contacts[i], slider.stiffness) {
-                (Contact::Stick, None) => {}
-                (Contact::Stick, Some(kt)) => {
-                    let state_index = 2 * n + slider.state.expect("a slider behind a spring has a state");
-                    let stretch: f64 = (0..n).map(|k| slider.direction[k] * state[k]).sum();
-                    row[constant].re = state[state_index] - kt * (stretch + self.drive.imposed_at(i, time, 0));
-                    for k in 0..n {
-                        add(row, &displacement[k * nb..(k + 1) * nb], kt * slider.direction[k]);
-                    }
-                    for (h, turn) in turns.iter().enumerate() {
-                        row[modes + h] += self.drive.imposed[h][i] * turn * kt;
-                    }
+            let (kt, begins) = match (contacts[i], part.kind) {
+                (Contact::Stick, Kind::Rigid { .. }) => continue,
+                (Contact::Stick, Kind::Elastic { stiffness, state: s, .. }) => {
+                    let stretch = part.along(&state[..n]) + self.drive.imposed_at(i, time, 0);
+                    (stiffness, state[2 * n + s] - stiffness * stretch)
                 }
-                (slip, _) => row[constant].re = slip.sign() * slider.limit,
+                (contact @ Contact::Stick, Kind::Stop { stiffness, .. }) => (stiffness, part.constant_force(contact)),
+                (contact, _) => (0.0, part.constant_force(contact)),
+            };
+            row[constant].re = begins;
+            if kt > 0.0 {
+                for k in 0..n {
+                    add(row, &displacement[k * nb..(k + 1) * nb], kt * part.direction[k]);
+                }
+                for (h, turn) in turns.iter().enumerate() {
+                    row[modes + h] += self.drive.imposed[h][i] * turn * kt;
+                }
             }
         }
-        // the held ones: λ = multiplier (F - C v - K x - other sliders) + inverse_delassus g''
+        // the held ones: λ = multiplier (F - C v - K x - other parts) + inverse_delassus g''
         for (s, &held) in shape.held.iter().enumerate() {
             let (before, rest) = force.split_at_mut(held * nb);
             let (row, after) = rest.split_at_mut(nb);
@@ -275,7 +299,7 @@ impl Flow {
                 if shape.held.contains(&i) {
                     continue; // the multipliers themselves
                 }
-                let (factor, elastic) = (-shape.held_by_sliders[(s, i)], *contact == Contact::Stick);
+                let (factor, elastic) = (-shape.held_by_parts[(s, i)], *contact == Contact::Stick);
                 let other = if i < held { &before[i * nb..] } else { &after[(i - held - 1) * nb..] };
                 if elastic {
                     add(row, &other[..nb], factor);
@@ -286,8 +310,9 @@ impl Flow {
         }
     }
 
-    /// The signals whose zeros are switches: `limit ∓ f` in stick, the velocity in slip direction in slip.
-    fn watch(&mut self, shape: &Pattern, velocity_scale: f64) {
+    /// The signals whose zeros are switches: `static limit ∓ f` in stick, the velocity in slip direction in slip, the depth of a stop or what is
+    /// missing of it. If `eased`, those that begin at zero may pass it by as much as counts as zero.
+    fn watch(&mut self, shape: &Pattern, velocity_scale: f64, eased: bool) {
         let segment = &self.segments[self.used];
         let driven = &segment.driven;
         let (n, nb) = (self.mechanics.n, driven.basis.len());
@@ -297,36 +322,49 @@ impl Flow {
         self.signals.clear();
         self.begins.clear();
         self.watched.clear();
-        for (i, slider) in self.mechanics.sliders.iter().enumerate() {
-            if segment.contacts[i] == Contact::Stick {
+        for (i, part) in self.mechanics.parts.iter().enumerate() {
+            let contact = segment.contacts[i];
+            if part.is_slider() && contact == Contact::Stick {
                 if shape.frozen[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
                     continue; // its force is constant, whatever rounding says
                 }
                 let force = &segment.force[i * nb..(i + 1) * nb];
-                let now = real_dot(force, &self.values);
+                let (now, limit) = (real_dot(force, &self.values), part.holds());
                 for side in [1.0, -1.0] {
                     let at = self.signals.len();
                     self.signals.extend(force.iter().map(|f| f * -side));
-                    self.signals[at + constant].re += slider.limit;
-                    self.begins.push(begin(slider.limit - side * now, AT_LIMIT * slider.limit));
+                    self.signals[at + constant].re += limit;
+                    let signal = &mut self.signals[at + constant];
+                    self.begins.push(begin(signal, limit - side * now, AT_LIMIT * limit, eased));
                     self.watched.push(i);
                 }
-            } else {
-                let (at, sign) = (self.signals.len(), segment.contacts[i].sign());
-                self.signals.resize(at + nb, ZERO);
-                let signal = &mut self.signals[at..];
-                for k in 0..n {
-                    add(signal, &self.velocity[k * nb..(k + 1) * nb], sign * slider.direction[k]);
-                }
-                for (h, turn) in self.work.turn.iter().enumerate() {
-                    let rate = self.drive.rates[h];
-                    let velocity = self.drive.imposed[h][i] * turn * Complex64::new(0.0, rate);
-                    signal[modes + h] += velocity * sign;
-                }
-                let now = real_dot(signal, &self.values);
-                self.begins.push(begin(now, REST * velocity_scale));
-                self.watched.push(i);
+                continue;
             }
+            if !part.is_slider() && shape.frozen[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
+                continue;
+            }
+            let at = self.signals.len();
+            self.signals.resize(at + nb, ZERO);
+            let signal = &mut self.signals[at..];
+            // how often the displacement is differentiated, and what counts as zero
+            let (motion, sign, order, zero) = match part.kind {
+                Kind::Stop { gap, .. } => {
+                    let sign = if contact == Contact::Stick { 1.0 } else { -1.0 };
+                    signal[constant].re = -sign * gap;
+                    (&segment.displacement, sign, 0, self.mechanics.touch(part, self.drive.omega, velocity_scale))
+                }
+                _ => (&self.velocity, contact.sign(), 1, REST * velocity_scale),
+            };
+            for k in 0..n {
+                add(signal, &motion[k * nb..(k + 1) * nb], sign * part.direction[k]);
+            }
+            for (h, turn) in self.work.turn.iter().enumerate() {
+                let rate = if order == 1 { Complex64::new(0.0, self.drive.rates[h]) } else { Complex64::new(1.0, 0.0) };
+                signal[modes + h] += self.drive.imposed[h][i] * turn * rate * sign;
+            }
+            let now = real_dot(signal, &self.values);
+            self.begins.push(begin(&mut signal[constant], now, zero, eased));
+            self.watched.push(i);
         }
     }
 
@@ -352,8 +390,8 @@ impl Flow {
             state[n + row] = real_dot(&self.velocity[range.clone()], values);
             self.before[n + row] = real_dot(&self.acceleration[range], values);
         }
-        for (i, slider) in self.mechanics.sliders.iter().enumerate() {
-            if let Some(s) = slider.state {
+        for (i, part) in self.mechanics.parts.iter().enumerate() {
+            if let Some(s) = part.state() {
                 state[2 * n + s] = real_dot(&segment.force[i * nb..(i + 1) * nb], values);
             }
         }
@@ -363,47 +401,72 @@ impl Flow {
     }
 
     /// A spring force that reached its limit is set exactly there.
-    fn snap(&self, slider: usize, old: Contact, state: &mut [f64]) {
-        let slider = &self.mechanics.sliders[slider];
-        if let (Some(s), Contact::Stick) = (slider.state, old) {
+    fn snap(&self, part: usize, state: &mut [f64]) {
+        let old = self.segments[self.used - 1].contacts[part];
+        if let (Kind::Elastic { limit, state: s, .. }, Contact::Stick) = (self.mechanics.parts[part].kind, old) {
             let force = &mut state[2 * self.mechanics.n + s];
-            *force = slider.limit.copysign(*force);
+            *force = limit.copysign(*force);
         }
     }
 
-    /// The jump of the sensitivity at a switch of `slider` (saltation): `S = I + (F⁺ - F⁻) ∇g / g'`.
+    /// The jump of the sensitivity at a switch of `part`, which ends a stretch with the pattern `shape` (saltation): `S = I + (F⁺ - F⁻) ∇g / g'`.
     /// Source: Leine and Nijmeijer (2004), Sec. 7.
-    fn jump(&mut self, slider: usize, time: f64, state: &[f64], sensitivity: &mut DMatrix<f64>) {
+    fn jump(&mut self, part: usize, shape: &Pattern, time: f64, state: &[f64], sensitivity: &mut DMatrix<f64>) {
         let n = self.mechanics.n;
-        let contacts = &self.segments[self.used - 1].contacts;
-        let body = &self.mechanics.sliders[slider];
+        let segment = &self.segments[self.used - 1];
+        let contacts = &segment.contacts;
+        let body = &self.mechanics.parts[part];
         // rates of the state before and after: displacements go on smoothly
         for row in 0..n {
             self.after[n + row] = self.decision.acceleration[row];
             (self.before[row], self.after[row]) = (0.0, 0.0);
         }
-        for (i, other) in self.mechanics.sliders.iter().enumerate() {
-            if let (Some(s), Some(kt)) = (other.state, other.stiffness) {
-                let velocity: f64 =
-                    (0..n).map(|k| other.direction[k] * state[n + k]).sum::<f64>() + self.drive.imposed_at(i, time, 1);
+        for (i, other) in self.mechanics.parts.iter().enumerate() {
+            if let Kind::Elastic { stiffness: kt, state: s, .. } = other.kind {
+                let velocity = other.along(&state[n..2 * n]) + self.drive.imposed_at(i, time, 1);
                 let rate = |contact: Contact| if contact == Contact::Stick { kt * velocity } else { 0.0 };
                 self.before[2 * n + s] = rate(contacts[i]);
                 self.after[2 * n + s] = rate(self.decision.contacts[i]);
             }
         }
         self.row.fill(0.0);
-        let slope = match (contacts[slider], body.state) {
-            (Contact::Stick, Some(s)) => {
+        let slope = match (contacts[part], body.kind) {
+            // the force of a stop is continuous
+            (_, Kind::Stop { .. }) => return,
+            (Contact::Stick, Kind::Elastic { state: s, .. }) => {
                 self.row[2 * n + s] = 1.0;
                 self.before[2 * n + s]
             }
             // a rigid slider lets go with continuous forces: nothing jumps
-            (Contact::Stick, None) => return,
+            (Contact::Stick, Kind::Rigid { .. }) if !body.drops() => return,
+            (Contact::Stick, Kind::Rigid { .. }) => {
+                let Some(held) = shape.held.iter().position(|&h| h == part) else { return };
+                // the force that it holds with: λ = multiplier (F - C v - K x - other parts) + …
+                for k in 0..n {
+                    self.row[k] = -shape.held_by_displacement[(held, k)];
+                    self.row[n + k] = -shape.held_by_velocity[(held, k)];
+                }
+                for (i, other) in self.mechanics.parts.iter().enumerate() {
+                    let factor = -shape.held_by_parts[(held, i)];
+                    match other.kind {
+                        Kind::Elastic { state: s, .. } if contacts[i] == Contact::Stick => self.row[2 * n + s] = factor,
+                        Kind::Stop { stiffness, .. } if contacts[i] == Contact::Stick => {
+                            self.row.rows_mut(0, n).axpy(factor * stiffness, &other.direction, 1.0);
+                        }
+                        _ => {}
+                    }
+                }
+                let basis = segment.basis();
+                let nb = basis.len();
+                self.rate.resize(nb, ZERO);
+                basis.differentiate(&segment.force[part * nb..(part + 1) * nb], &mut self.rate);
+                real_dot(&self.rate, &self.values)
+            }
             _ => {
                 for k in 0..n {
                     self.row[n + k] = body.direction[k];
                 }
-                body.direction.dot(&self.before.rows(n, n)) + self.drive.imposed_at(slider, time, 2)
+                body.direction.dot(&self.before.rows(n, n)) + self.drive.imposed_at(part, time, 2)
             }
         };
         if slope == 0.0 {
@@ -427,6 +490,99 @@ fn add(sum: &mut [Complex64], signal: &[Complex64], factor: f64) {
     }
 }
 
-fn begin(value: f64, zero: f64) -> Begin {
-    if value > zero { Begin::Positive } else { Begin::Zero }
+/// How a signal with this constant part begins, from its value there and what counts as zero; if `eased`, one that begins at zero is lifted above it.
+fn begin(constant: &mut Complex64, value: f64, zero: f64, eased: bool) -> Begin {
+    if value > zero {
+        Begin::Positive
+    } else if eased {
+        constant.re += 2.0 * zero;
+        Begin::Positive
+    } else {
+        Begin::Zero
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Coulomb, Gap, Jenkins, SharedLaw, Stribeck};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
+    use std::sync::Arc;
+
+    /// Two masses with a law each to the ground and one between them, driven by the first and third harmonic.
+    fn flow(laws: [SharedLaw; 3]) -> Flow {
+        let between = [["a", GROUND], ["b", GROUND], ["a", "b"]].map(|pair| pair.map(str::to_owned));
+        let joints = between.iter().zip(laws).enumerate();
+        let model = Model {
+            masses: vec![Mass::new("a", 1.0), Mass::new("b", 1.3)],
+            springs: between
+                .iter()
+                .map(|between| Spring { between: between.clone(), stiffness: 0.9, damping: 0.05 })
+                .collect(),
+            joints: joints
+                .map(|(i, (between, law))| Joint { name: format!("j{i}"), between: between.clone(), law })
+                .collect(),
+            forces: [(1, 1.2), (3, 0.4)]
+                .map(|(harmonic, amplitude)| Force { on: "a".into(), amplitude, phase: 0.2, harmonic })
+                .to_vec(),
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let mechanics = Mechanics::new(&system).unwrap();
+        let drive = Drive::new(&system, &mechanics.owners(), 0.7);
+        let mut flow = Flow::new(mechanics, Drive::default());
+        flow.set_drive(drive);
+        flow
+    }
+
+    /// The derivative of the motion through stops that open and close and through sliders that drop their force, behind held ones, springs and
+    /// stops, is what a small change of the start does to the end.
+    #[test]
+    fn sensitivities_pass_stops_and_drops() {
+        let stop: SharedLaw = Arc::new(Gap { gap: 0.1, stiffness: 3.0 });
+        let pressed: SharedLaw = Arc::new(Gap { gap: -0.2, stiffness: 1.5 });
+        let dropping: SharedLaw = Arc::new(Stribeck { limit: 0.3, static_limit: 0.5, velocity: 0.0 });
+        let weak: SharedLaw = Arc::new(Stribeck { limit: 0.1, static_limit: 0.2, velocity: 0.0 });
+        let spring: SharedLaw = Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 });
+        let rigid: SharedLaw = Arc::new(Coulomb { limit: 0.15 });
+        let cases = [
+            [stop.clone(), pressed.clone(), spring.clone()],
+            [dropping.clone(), stop.clone(), spring.clone()],
+            [dropping.clone(), weak.clone(), stop.clone()],
+            [dropping.clone(), rigid.clone(), weak.clone()],
+            [rigid, dropping, pressed],
+        ];
+        let mut drops = 0;
+        for (case, laws) in cases.into_iter().enumerate() {
+            let mut flow = flow(laws);
+            let states = flow.mechanics.states();
+            for duration in [5.0, 9.0, 14.0] {
+                let start: Vec<f64> = (0..states).map(|i| [0.5, -0.3, 0.4, -0.6, 0.05][i]).collect();
+                let mut derivative = DMatrix::identity(states, states);
+                flow.run(&mut start.clone(), 0.0, duration, Some(&mut derivative)).unwrap();
+                for pair in flow.segments().windows(2) {
+                    let let_go = |s: &usize| pair[0].contacts[*s] == Contact::Stick && pair[1].contacts[*s].slips();
+                    drops += (0..flow.mechanics.parts.len())
+                        .filter(|s| flow.mechanics.parts[*s].drops() && let_go(s))
+                        .count();
+                }
+                let step = 1e-6;
+                for column in 0..states {
+                    let mut ends = [start.clone(), start.clone()];
+                    ends[0][column] += step;
+                    ends[1][column] -= step;
+                    for end in &mut ends {
+                        flow.run(end, 0.0, duration, None).unwrap();
+                    }
+                    for row in 0..states {
+                        let slope = (ends[0][row] - ends[1][row]) / (2.0 * step);
+                        let exact = derivative[(row, column)];
+                        let what = format!("case {case}, {duration} s, {row} by {column}: {exact} and {slope}");
+                        assert!((slope - exact).abs() < 1e-6 * (1.0 + exact.abs()), "{what}");
+                    }
+                }
+            }
+        }
+        assert!(drops > 5, "{drops} drops");
+    }
 }

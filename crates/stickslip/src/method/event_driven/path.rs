@@ -2,6 +2,7 @@
 
 use super::NAME;
 use super::flow::{Flow, Segment};
+use super::mechanics::Part;
 use crate::law::Contact;
 use crate::method::Breakdown;
 use crate::method::drive::Drive;
@@ -17,11 +18,17 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Work below this fraction of (force times velocity) of the period is no yardstick for the energy gap: the motion is conservative.
 const NO_WORK: f64 = 1e-6;
 
+/// Work below this fraction of the stored energy is none either: an orbit that is closed to `CLOSED` of its state may have gained or lost that
+/// much, and the gap that this makes must stay below what is allowed.
+const STORED: f64 = super::CLOSED / super::ENERGY_GAP;
+
 /// The closed-form segments of one return, with all that is needed to evaluate them.
 #[derive(Debug, Clone)]
 pub(crate) struct ExactPath {
     system: Arc<System>,
     pieces: Vec<Piece>,
+    /// Ideal parts of the joints.
+    parts: Arc<[Part]>,
     symmetry: Symmetry,
     period: f64,
     rates: Vec<f64>,
@@ -36,26 +43,28 @@ struct Piece {
     at_end: Vec<Complex64>,
 }
 
-/// Makes the orbit of the flow's last run.
+/// Makes the orbit of the flow's last run, which began at the state `closed` with the energy `stored`, J.
 pub(super) fn orbit(
     system: &Arc<System>,
     contracts: bool,
     flow: &Flow,
     (omega, periods): (f64, usize),
     symmetry: Symmetry,
-    closed: Closed,
+    (closed, stored): (Closed, f64),
 ) -> Result<Orbit, Breakdown> {
     let path = ExactPath::new(system.clone(), flow, symmetry, periods as f64 * std::f64::consts::TAU / omega);
     let places = path.places(omega)?;
-    let joints = path.joints(flow)?;
+    let joints = path.joints()?;
     let energy = path.energy(flow, &joints);
     let stuck = joints
         .iter()
         .zip(system.joints())
-        .filter(|(motion, _)| motion.slip_fraction == 0.0)
-        .map(|(_, j)| j.name().to_owned());
+        .enumerate()
+        .filter(|(j, (motion, _))| motion.slip_fraction == 0.0 && path.of_joint(*j).any(|s| path.parts[s].is_slider()))
+        .map(|(_, (_, joint))| joint.name().to_owned());
     let rest = super::NEAR_REST * flow.energy_scale;
-    let reference = energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive)).max(NO_WORK * rest * rest);
+    let reference =
+        energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive)).max(NO_WORK * rest * rest).max(STORED * stored);
     let balance = energy.work_in - energy.viscous - energy.friction;
     Ok(Orbit {
         method: NAME,
@@ -96,7 +105,7 @@ impl ExactPath {
             })
             .collect();
         let (rates, omega) = (flow.drive.rates.clone(), flow.drive.omega);
-        ExactPath { system, pieces, symmetry, period, rates, omega }
+        ExactPath { system, pieces, parts: flow.mechanics.parts.clone(), symmetry, period, rates, omega }
     }
 
     /// How often the segments are run through in a period.
@@ -148,7 +157,17 @@ impl ExactPath {
             .collect()
     }
 
-    fn joints(&self, flow: &Flow) -> Result<Vec<JointMotion>, Breakdown> {
+    /// The parts of a joint.
+    fn of_joint(&self, joint: usize) -> impl Iterator<Item = usize> {
+        self.parts.iter().enumerate().filter(move |(_, part)| part.joint == joint).map(|(s, _)| s)
+    }
+
+    /// What the contact at the end of the return goes on as after it.
+    fn next_of(&self, last: Contact) -> Contact {
+        if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last }
+    }
+
+    fn joints(&self) -> Result<Vec<JointMotion>, Breakdown> {
         let n = self.system.dofs();
         let mut memory = Memory::default();
         let (mut u, mut velocity) = (Vec::new(), Vec::new());
@@ -157,8 +176,7 @@ impl ExactPath {
             .iter()
             .enumerate()
             .map(|(j, joint)| {
-                let sliders: Vec<usize> =
-                    (0..flow.mechanics.sliders.len()).filter(|&s| flow.mechanics.sliders[s].joint == j).collect();
+                let parts: Vec<usize> = self.of_joint(j).collect();
                 let (mut dissipation, mut slipping, mut switches) = (0.0, 0.0, 0);
                 let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
                 let mut before: Option<&Piece> = None;
@@ -179,25 +197,22 @@ impl ExactPath {
                     let travel = real_dot(&u, &piece.at_end) - piece.basis().beginning(&u);
                     let (least, most) = piece.extremes(&u, &velocity, &mut memory)?;
                     (low, high) = (low.min(least), high.max(most));
-                    for &s in &sliders {
-                        dissipation += piece.segment.contacts[s].sign() * flow.mechanics.sliders[s].limit * travel;
+                    for &s in &parts {
+                        dissipation += piece.segment.contacts[s].sign() * self.parts[s].limit() * travel;
                     }
-                    if sliders.iter().any(|&s| piece.segment.contacts[s] != Contact::Stick) {
+                    if parts.iter().any(|&s| piece.segment.contacts[s].slips()) {
                         slipping += piece.segment.length;
                     }
                     if let Some(before) = before {
-                        switches += sliders
-                            .iter()
-                            .filter(|&&s| before.segment.contacts[s] != piece.segment.contacts[s])
-                            .count();
+                        switches +=
+                            parts.iter().filter(|&&s| before.segment.contacts[s] != piece.segment.contacts[s]).count();
                     }
                     before = Some(piece);
                 }
                 if let (Some(first), Some(last)) = (self.pieces.first(), self.pieces.last()) {
-                    let sign = if self.symmetry == Symmetry::HalfPeriod { -1.0 } else { 1.0 };
-                    switches += sliders
+                    switches += parts
                         .iter()
-                        .filter(|&&s| last.segment.contacts[s].sign() != sign * first.segment.contacts[s].sign())
+                        .filter(|&&s| self.next_of(last.segment.contacts[s]) != first.segment.contacts[s])
                         .count();
                 }
                 if self.symmetry == Symmetry::HalfPeriod {
@@ -208,7 +223,7 @@ impl ExactPath {
                     name: joint.name().to_owned(),
                     dissipation: self.times() * dissipation,
                     // a joint that holds nothing slips all the time
-                    slip_fraction: if sliders.is_empty() { 1.0 } else { self.times() * slipping / self.period },
+                    slip_fraction: if parts.is_empty() { 1.0 } else { self.times() * slipping / self.period },
                     displacement: vec![(low, high)],
                     switches: self.times() as usize * switches,
                 })
@@ -256,7 +271,7 @@ impl ExactPath {
             }
             for (m, place) in self.system.moved().iter().enumerate() {
                 let (motion, speed) = self.moved_motion(piece, m);
-                work += product(&self.reaction(piece, m, flow), &speed);
+                work += product(&self.reaction(piece, m), &speed);
                 for i in 0..n {
                     let (k, c) = (place.stiffness.0[i], place.damping.0[i]);
                     // the load on the masses contains what the moved place does to them: that is no work from outside
@@ -305,11 +320,7 @@ impl ExactPath {
     }
 
     /// The force that moves a place, as a signal.
-    fn reaction(&self, piece: &Piece, m: usize, flow: &Flow) -> Vec<Complex64> {
-        self.reaction_of(piece, m, &flow.mechanics.owners())
-    }
-
-    fn reaction_of(&self, piece: &Piece, m: usize, owners: &[usize]) -> Vec<Complex64> {
+    fn reaction(&self, piece: &Piece, m: usize) -> Vec<Complex64> {
         let (n, nb, place) = (self.system.dofs(), piece.basis().len(), &self.system.moved()[m]);
         let mut force = vec![ZERO; nb];
         let add = |force: &mut [Complex64], signal: &[Complex64], factor: f64| {
@@ -331,8 +342,8 @@ impl ExactPath {
             add(&mut force, &piece.segment.displacement[i * nb..(i + 1) * nb], place.stiffness.0[i]);
             add(&mut force, &piece.velocity[i * nb..(i + 1) * nb], place.damping.0[i]);
         }
-        for (s, &joint) in owners.iter().enumerate() {
-            add(&mut force, &piece.segment.force[s * nb..(s + 1) * nb], place.joints[joint]);
+        for (s, part) in self.parts.iter().enumerate() {
+            add(&mut force, &piece.segment.force[s * nb..(s + 1) * nb], place.joints[part.joint]);
         }
         force
     }
@@ -352,8 +363,9 @@ impl ExactPath {
             .system
             .joints()
             .iter()
-            .map(|joint| {
-                let limit: f64 = joint.law().sliders().unwrap_or_default().iter().map(|b| b.limit).sum();
+            .enumerate()
+            .map(|(j, joint)| {
+                let limit: f64 = self.of_joint(j).map(|s| self.parts[s].limit()).sum();
                 limit * joint.axes()[0].imposed().iter().map(|(h, g)| f64::from(*h) * g.norm()).sum::<f64>()
                     / self.period
             })
@@ -475,7 +487,6 @@ impl Path for ExactPath {
         let rows = |coefficients: &[Complex64]| (0..n).map(|i| row(coefficients, i)).collect::<Vec<f64>>();
         let (displacement, velocity) = (rows(&piece.segment.displacement), rows(&piece.velocity));
         let acceleration = rows(&derivative(piece.basis(), &piece.velocity));
-        let owners = slider_owners(&self.system);
         let joints = self
             .system
             .joints()
@@ -487,14 +498,14 @@ impl Path for ExactPath {
                 let mut speed = vec![ZERO; nb];
                 piece.basis().differentiate(&imposed, &mut speed);
                 let along = |v: &[f64]| joint.axes()[0].along(v);
-                let mine = || owners.iter().enumerate().filter(|(_, owner)| **owner == j).map(|(s, _)| s);
-                let contact =
-                    mine().map(|s| piece.segment.contacts[s]).find(|c| *c != Contact::Stick).unwrap_or(Contact::Stick);
+                let mine = || self.of_joint(j);
                 let joint_velocity = along(&velocity) + sign * real_dot(&speed, &values);
-                let contact = match contact {
-                    Contact::Stick if mine().next().is_none() => Contact::slip(joint_velocity),
-                    Contact::Stick => contact,
-                    _ => Contact::slip(sign * contact.sign()),
+                let of_parts = || mine().map(|s| piece.segment.contacts[s]);
+                // a joint slips if a part of it does, rests if one does, and is open if all its stops are
+                let contact = match of_parts().find(|c| c.slips()).or_else(|| of_parts().min()) {
+                    None => Contact::slip(joint_velocity),
+                    Some(contact) if sign < 0.0 => contact.mirrored(),
+                    Some(contact) => contact,
                 };
                 let joint_displacement = along(&displacement) + sign * real_dot(&imposed, &values);
                 let force = mine().map(|s| row(&piece.segment.force, s)).sum();
@@ -504,7 +515,7 @@ impl Path for ExactPath {
         let moved = (0..self.system.moved().len())
             .map(|m| {
                 let (motion, _) = self.moved_motion(piece, m);
-                let reaction = self.reaction_of(piece, m, &owners);
+                let reaction = self.reaction(piece, m);
                 (sign * real_dot(&motion, &values), sign * real_dot(&reaction, &values))
             })
             .collect();
@@ -514,9 +525,8 @@ impl Path for ExactPath {
     fn switch_times(&self) -> Vec<f64> {
         let inner = self.pieces.iter().skip(1).map(|piece| piece.segment.start);
         // a switch may also fall on the instant at which the return is cut
-        let sign = if self.symmetry == Symmetry::HalfPeriod { -1.0 } else { 1.0 };
         let at_cut = self.pieces.first().zip(self.pieces.last()).is_some_and(|(first, last)| {
-            first.segment.contacts.iter().zip(&last.segment.contacts).any(|(f, l)| l.sign() != sign * f.sign())
+            first.segment.contacts.iter().zip(&last.segment.contacts).any(|(f, l)| self.next_of(*l) != *f)
         });
         let first: Vec<f64> = at_cut.then_some(0.0).into_iter().chain(inner).collect();
         match self.symmetry {
@@ -527,10 +537,4 @@ impl Path for ExactPath {
             }
         }
     }
-}
-
-/// The joint of every slider, in the order in which `Mechanics` lists them.
-fn slider_owners(system: &System) -> Vec<usize> {
-    let branches = |joint: &crate::model::SystemJoint| joint.law().sliders().map_or(0, |b| b.len());
-    system.joints().iter().enumerate().flat_map(|(j, joint)| std::iter::repeat_n(j, branches(joint))).collect()
 }

@@ -1,12 +1,12 @@
 //! The linear motion while a pattern of stick and slip lasts.
 //!
-//! In a pattern the rigid sliders that stick hold `Wₛᵀx + g(t) = c`; those that slip, and the springs in front of sliders, are
+//! In a pattern the rigid sliders that stick hold `Wₛᵀx + g(t) = c`; those that slip, the springs in front of sliders, and stops are
 //! forces that are constant or linear in `x`. With `N` an M-orthonormal basis of the directions that are left free and
 //! `S = M⁻¹Wₛ(WₛᵀM⁻¹Wₛ)⁺`, the motion is `x = N q + S (c - g)` and `q'' + NᵀCN q' + NᵀKₚN q = Nᵀ(forces)`, which the modes of
 //! [`stickslip_numerics::modes`] solve in closed form. Nothing here depends on time, drive frequency or slip direction:
-//! a pattern is known by what sticks.
+//! a pattern is known by what sticks and what is closed.
 
-use super::mechanics::Mechanics;
+use super::mechanics::{Kind, Mechanics};
 use crate::law::Contact;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
@@ -30,20 +30,18 @@ const LARGE: usize = 24;
 /// The closed-form motion of one pattern.
 #[derive(Debug, Clone)]
 pub(crate) struct Pattern {
-    /// Which sliders stick.
+    /// Which sliders stick, and which stops are closed.
     pub stuck: Vec<bool>,
     /// Rigid sliders that stick.
     pub held: Vec<usize>,
     /// Whether fewer of them would hold the same motion, so that their forces are not unique.
     pub redundant: bool,
-    /// Sliders behind springs that the held ones keep from moving.
+    /// Springs, in front of sliders and of stops, that the held sliders keep from moving.
     pub frozen: Vec<bool>,
     /// Exponents.
     pub lambda: Vec<Complex64>,
     /// x = Re(shape η), n × modes, column-major.
     pub shape: DMatrix<Complex64>,
-    /// Modal coordinates of displacements and velocities, modes × 2n.
-    coordinate: DMatrix<Complex64>,
     /// Modal coordinates of a state, less those at which the forces that come with it would hold them, modes × states.
     start: DMatrix<Complex64>,
     /// Besides the modes a state moves on by `place + drift τ + fall τ²/2`, n × states each.
@@ -60,15 +58,15 @@ pub(crate) struct Pattern {
     free_input: DMatrix<f64>,
     /// S, n × held.
     hold: DMatrix<f64>,
-    /// Stiffness with the springs of stuck sliders, n × n.
+    /// Stiffness with the springs of stuck sliders and closed stops, n × n.
     pub stiffness: DMatrix<f64>,
-    /// Forces of the held sliders: `multiplier (F - C v - K x - other sliders) + inverse_delassus g''`. Held × n, held × held.
+    /// Forces of the held sliders: `multiplier (F - C v - K x - other parts) + inverse_delassus g''`. Held × n, held × held.
     multiplier: DMatrix<f64>,
     inverse_delassus: DMatrix<f64>,
-    /// `multiplier` times C, K, and the directions of the sliders: held × n, held × n, held × sliders.
+    /// `multiplier` times C, K, and the directions of the parts: held × n, held × n, held × parts.
     pub held_by_velocity: DMatrix<f64>,
     pub held_by_displacement: DMatrix<f64>,
-    pub held_by_sliders: DMatrix<f64>,
+    pub held_by_parts: DMatrix<f64>,
 }
 
 /// Where a stretch of motion begins.
@@ -92,7 +90,8 @@ pub(crate) struct Driven {
     pub modes: usize,
     /// Steady complex displacement per harmonic, n each.
     steady: Vec<DVector<Complex64>>,
-    /// Modal coordinates of the real steady motion, parts that turn with `e^{jhΩt}` and with `e^{-jhΩt}`: harmonic after harmonic.
+    /// Modal coordinates of the steady motion, parts that turn with `e^{jhΩt}` and with `e^{-jhΩt}`: harmonic after harmonic. What a resonant
+    /// pair does instead is left out: it begins at zero.
     steady_start: Vec<(Complex64, Complex64)>,
     /// Forces of the held sliders that the drive causes by itself: complex per harmonic, and constant.
     pub held: Vec<DVector<Complex64>>,
@@ -118,12 +117,12 @@ impl Pattern {
     pub fn new(mechanics: &Mechanics, stuck: &[bool]) -> Result<Self, Defective> {
         let n = mechanics.n;
         let held: Vec<usize> =
-            (0..stuck.len()).filter(|&s| stuck[s] && mechanics.sliders[s].stiffness.is_none()).collect();
-        let w = DMatrix::from_fn(n, held.len(), |i, s| mechanics.sliders[held[s]].direction[i]);
+            (0..stuck.len()).filter(|&s| stuck[s] && mechanics.parts[s].stiffness().is_none()).collect();
+        let w = DMatrix::from_fn(n, held.len(), |i, s| mechanics.parts[held[s]].direction[i]);
         let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
         let inverse_delassus = weighted_inverse(
             &(w.transpose() * &mechanics.inverse_mass * &w),
-            &held.iter().map(|&s| mechanics.sliders[s].limit).collect::<Vec<_>>(),
+            &held.iter().map(|&s| mechanics.parts[s].holds()).collect::<Vec<_>>(),
         )
         .ok_or(out_of_range)?;
         let redundant = !held.is_empty() && {
@@ -138,14 +137,15 @@ impl Pattern {
         let mut stiffness = mechanics.stiffness.clone();
         // constant force: -Σ w (f0 - kt wᵀx0) of stuck springs, and -Kₚ S Wₛᵀ x0
         let mut force_from_state = DMatrix::zeros(n, states);
-        for (slider, stuck) in mechanics.sliders.iter().zip(stuck) {
-            if let (Some(kt), Some(state), true) = (slider.stiffness, slider.state, stuck) {
-                let outer = &slider.direction * slider.direction.transpose() * kt;
-                stiffness += &outer;
+        for (part, _) in mechanics.parts.iter().zip(stuck).filter(|(_, stuck)| **stuck) {
+            let Some(kt) = part.stiffness() else { continue };
+            let outer = &part.direction * part.direction.transpose() * kt;
+            stiffness += &outer;
+            if let Some(state) = part.state() {
                 let mut block = force_from_state.columns_mut(0, n);
                 block += outer;
                 let mut column = force_from_state.column_mut(2 * n + state);
-                column -= &slider.direction;
+                column -= &part.direction;
             }
         }
         let hold_projection = &hold * w.transpose();
@@ -158,11 +158,11 @@ impl Pattern {
         let modes =
             Modes::new(&(basis.transpose() * &mechanics.damping * &basis), &(basis.transpose() * &stiffness * &basis))?;
         let frozen = mechanics
-            .sliders
+            .parts
             .iter()
-            .map(|slider| {
-                let moves = (basis.transpose() * &slider.direction).amax();
-                slider.stiffness.is_some() && moves <= REDUNDANT.sqrt() * basis.amax() * slider.direction.amax()
+            .map(|part| {
+                let moves = (basis.transpose() * &part.direction).amax();
+                part.stiffness().is_some() && moves <= REDUNDANT.sqrt() * basis.amax() * part.direction.amax()
             })
             .collect();
         let project = basis.transpose(); // forces to modal
@@ -181,13 +181,11 @@ impl Pattern {
         let free_coordinate = modes.free.transpose() * &coordinates;
         let free_input = modes.free.transpose() * &project;
         let shape = complex(&basis) * &modes.shape;
-        let mut coordinate = DMatrix::from_element(count, 2 * n, ZERO);
-        coordinate.columns_mut(0, n).copy_from(&(&modes.from_displacement * complex(&coordinates)));
-        coordinate.columns_mut(n, n).copy_from(&(&modes.from_velocity * complex(&coordinates)));
         // what a state does by itself, with the constant forces that it brings
         let pushed = &input * complex(&force_from_state);
         let mut start = DMatrix::from_element(count, states, ZERO);
-        start.columns_mut(0, 2 * n).copy_from(&coordinate);
+        start.columns_mut(0, n).copy_from(&(&modes.from_displacement * complex(&coordinates)));
+        start.columns_mut(n, n).copy_from(&(&modes.from_velocity * complex(&coordinates)));
         let mut fixed = DMatrix::from_element(count, states, ZERO);
         let mut drifts = DMatrix::from_element(count, states, ZERO);
         for k in 0..count {
@@ -205,14 +203,13 @@ impl Pattern {
         block += &free * &free_coordinate;
         let mut block = drift.columns_mut(n, n);
         block += &free * &free_coordinate;
-        let directions = DMatrix::from_fn(n, stuck.len(), |i, s| mechanics.sliders[s].direction[i]);
+        let directions = DMatrix::from_fn(n, stuck.len(), |i, s| mechanics.parts[s].direction[i]);
         Ok(Pattern {
             stuck: stuck.to_vec(),
             held,
             redundant,
             frozen,
             lambda,
-            coordinate,
             start,
             place,
             drift,
@@ -226,7 +223,7 @@ impl Pattern {
             stiffness,
             held_by_velocity: &multiplier * &mechanics.damping,
             held_by_displacement: &multiplier * &mechanics.stiffness,
-            held_by_sliders: &multiplier * directions,
+            held_by_parts: &multiplier * directions,
             multiplier,
             inverse_delassus,
             shape,
@@ -250,8 +247,7 @@ impl Pattern {
 
     /// Memory that it takes, bytes: matrices of some multiples of n² numbers.
     pub fn bytes(&self) -> usize {
-        let complex =
-            self.lambda.len() + self.shape.len() + self.coordinate.len() + self.start.len() + self.input.len();
+        let complex = self.lambda.len() + self.shape.len() + self.start.len() + self.input.len();
         let real = 3 * self.place.len()
             + self.free.len()
             + self.free_coordinate.len()
@@ -261,7 +257,7 @@ impl Pattern {
             + self.multiplier.len()
             + self.inverse_delassus.len()
             + 2 * self.held_by_velocity.len()
-            + self.held_by_sliders.len();
+            + self.held_by_parts.len();
         size_of::<Self>() + 16 * complex + 8 * real + 16 * self.stuck.len()
     }
 
@@ -278,9 +274,9 @@ impl Pattern {
             let moved = complex(&self.hold) * held; // S g: the stuck part moves with -S g
             let mut force =
                 drive.forces[h].clone() + (complex(&self.stiffness) + complex(&mechanics.damping) * s) * &moved;
-            for (i, slider) in mechanics.sliders.iter().enumerate() {
-                if let (Some(kt), true) = (slider.stiffness, self.stuck[i]) {
-                    force -= complex_vector(&slider.direction) * (drive.imposed[h][i] * kt);
+            for (i, part) in mechanics.parts.iter().enumerate() {
+                if let (Some(kt), true) = (part.stiffness(), self.stuck[i]) {
+                    force -= complex_vector(&part.direction) * (drive.imposed[h][i] * kt);
                 }
             }
             let mut steady = -moved;
@@ -295,21 +291,13 @@ impl Pattern {
                 }
                 let plus = if near { ZERO } else { forward / (s - lambda) };
                 let minus = backward / (-s - lambda);
+                driven.steady_start.push((plus, minus));
                 for i in 0..n {
                     steady[i] += self.shape[(i, k)] * plus + (self.shape[(i, k)] * minus).conj();
                 }
             }
             let free: DVector<Complex64> = complex(&self.free_input) * &force / (s * s);
             steady += complex(&self.free) * &free;
-            for k in 0..self.lambda.len() {
-                let mut parts = (ZERO, ZERO);
-                for (i, &z) in steady.iter().enumerate() {
-                    let (place, speed) = (self.coordinate[(k, i)] * 0.5, self.coordinate[(k, n + i)] * 0.5);
-                    parts.0 += place * z + speed * (s * z);
-                    parts.1 += place * z.conj() + speed * (s * z).conj();
-                }
-                driven.steady_start.push(parts);
-            }
             let inertia = DVector::from_fn(self.held.len(), |i, _| drive.imposed[h][self.held[i]] * (rate * rate));
             let held = complex(&self.multiplier) * &drive.forces[h] - complex(&self.inverse_delassus) * inertia;
             driven.held.push(held);
@@ -337,14 +325,14 @@ impl Pattern {
         work.force.extend(drive.constant.iter());
         work.held.clear();
         work.held.extend(self.held.iter().map(|&s| drive.imposed_at(s, time, 0)));
-        for (i, slider) in mechanics.sliders.iter().enumerate() {
-            let value = match (contacts[i], slider.stiffness) {
-                (Contact::Stick, None) => continue,
-                (Contact::Stick, Some(kt)) => kt * drive.imposed_at(i, time, 0),
-                (slip, _) => -slip.sign() * slider.limit,
+        for (i, part) in mechanics.parts.iter().enumerate() {
+            let value = match (contacts[i], part.kind) {
+                (Contact::Stick, Kind::Rigid { .. }) => continue,
+                (Contact::Stick, Kind::Elastic { stiffness, .. }) => stiffness * drive.imposed_at(i, time, 0),
+                (contact, _) => -part.constant_force(contact),
             };
             for row in 0..n {
-                work.force[row] += value * slider.direction[row];
+                work.force[row] += value * part.direction[row];
             }
         }
         for row in 0..n {
@@ -482,11 +470,11 @@ impl Pattern {
                     *motion += re * start.re - im * start.im;
                 }
             }
-            for (slider, stuck) in mechanics.sliders.iter().zip(&self.stuck) {
-                if let (Some(kt), Some(state)) = (slider.stiffness, slider.state) {
+            for (part, stuck) in mechanics.parts.iter().zip(&self.stuck) {
+                if let Kind::Elastic { stiffness: kt, state, .. } = part.kind {
                     springs[state] = if *stuck {
-                        let moved: f64 = slider.direction.iter().zip(&*motion).map(|(w, x)| w * x).sum();
-                        let before = if j < n { slider.direction[j] } else { 0.0 };
+                        let moved: f64 = part.direction.iter().zip(&*motion).map(|(w, x)| w * x).sum();
+                        let before = if j < n { part.direction[j] } else { 0.0 };
                         kt * (moved - before) + if j == 2 * n + state { 1.0 } else { 0.0 }
                     } else {
                         0.0
@@ -530,7 +518,7 @@ impl Work {
         let (n, states) = (mechanics.n, mechanics.states());
         Work {
             force: vec![0.0; n],
-            held: Vec::with_capacity(mechanics.sliders.len()),
+            held: Vec::with_capacity(mechanics.parts.len()),
             shift: vec![0.0; n],
             turn: vec![ZERO; harmonics],
             eta: vec![ZERO; 2 * n],

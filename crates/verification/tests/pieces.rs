@@ -1,0 +1,398 @@
+//! The exact method with every piece: stops, alone and beside sliders, and sliders whose friction drops when they let go. Against closed forms,
+//! integration, and orbits that SciPy integrated (`data/static_friction`).
+
+#![allow(clippy::print_stdout)] // tests say what they measured
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+use stickslip::law::{Contact, Gap, Jenkins, Law, LawInfo, Parameter, Piece, SharedLaw, Stribeck};
+use stickslip::method::event_driven::{EventDriven, Subharmonic};
+use stickslip::method::transient::{Excitation, Transient};
+use stickslip::method::{Method, auto::Auto, shooting::Shooting};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
+use stickslip::orbit::Orbit;
+use stickslip_verification::{close, exact, near, number, table};
+
+/// A mass of 1 kg on a spring (N/m) and a damper (kg/s) with these joints to the ground.
+fn oscillator(stiffness: f64, damping: f64, laws: &[SharedLaw]) -> Model {
+    let between = || ["m".to_owned(), GROUND.to_owned()];
+    let joint = |(i, law): (usize, &SharedLaw)| Joint { name: format!("j{i}"), between: between(), law: law.clone() };
+    Model {
+        masses: vec![Mass::new("m", 1.0)],
+        springs: vec![Spring { between: between(), stiffness, damping }],
+        joints: laws.iter().enumerate().map(joint).collect(),
+        ..Model::default()
+    }
+}
+
+fn force(on: &str, amplitude: f64, harmonic: u32) -> Force {
+    Force { on: on.into(), amplitude, phase: 0.0, harmonic }
+}
+
+/// The displacements of the first place at these times of a free motion that begins at rest at `start`.
+fn free(model: &Model, start: f64, step: f64, duration: f64) -> Vec<f64> {
+    let motion = Transient {
+        displacement: vec![start],
+        velocity: vec![0.0],
+        excitation: Excitation::Free,
+        duration,
+        step,
+        width: None,
+    };
+    let mut all = Vec::new();
+    let mut keep = |_: f64, _: f64, state: &stickslip::orbit::Sample| {
+        all.push(state.displacement[0]);
+        true
+    };
+    motion.run(&model.assemble().unwrap(), &mut keep).unwrap_or_else(|error| panic!("{model:?}: {error}"));
+    all
+}
+
+/// A free oscillator on one side of a stop is one sine, on the other side another: for a gap of zero the frequency is 2 w1 w2 / (w1 + w2).
+#[test]
+fn bilinear_oscillator_swings_with_its_frequency() {
+    let (k, stop) = (100.0f64, 800.0);
+    let model = oscillator(k, 0.0, &[Arc::new(Gap { gap: 0.0, stiffness: stop })]);
+    let (w1, w2) = (k.sqrt(), (k + stop).sqrt());
+    let period = TAU / (2.0 * w1 * w2 / (w1 + w2));
+    for start in [-0.3, 0.05] {
+        let x = free(&model, start, period / 4.0, 20.0 * period);
+        for (i, x) in x.iter().enumerate().step_by(4) {
+            near("after a period", *x, start, 1e-12 * (i + 1) as f64);
+        }
+    }
+    // the other turning point is lower by the frequencies
+    let turning = free(&model, -0.3, 0.5 * period, 0.5 * period);
+    near("turning point", turning[1], 0.3 * w1 / w2, 1e-13);
+}
+
+/// The same with a gap, compressed at rest or open, and a constant force: sines about two equilibria, of one energy.
+#[test]
+fn preloaded_oscillator_swings_with_its_period() {
+    let (k, stop) = (100.0f64, 800.0);
+    for (gap, constant) in [(0.02, 0.0), (-0.02, 0.0), (0.01, 3.0), (-0.01, -5.0)] {
+        let mut model = oscillator(k, 0.0, &[Arc::new(Gap { gap, stiffness: stop })]);
+        model.forces.push(force("m", constant, 0));
+        let start = gap - 0.1;
+        let (w1, w2) = (k.sqrt(), (k + stop).sqrt());
+        let (open, closed) = (constant / k, (constant + stop * gap) / (k + stop));
+        let (a, at) = (open - start, gap - open);
+        let t1 = (at / -a).acos() / w1;
+        let v = w1 * (a * a - at * at).sqrt();
+        // beyond the gap: x = closed + b sin(w2 t + p), its velocity v at the gap
+        let b = (v * v / (w2 * w2) + (gap - closed).powi(2)).sqrt();
+        let t2 = 0.5 * PI / w2 - ((gap - closed) / b).asin() / w2;
+        let period = 2.0 * (t1 + t2);
+        let x = free(&model, start, 0.5 * period, 10.0 * period);
+        for (i, x) in x.iter().enumerate() {
+            let expected = if i % 2 == 0 { start } else { closed + b };
+            near("turning point", *x, expected, 1e-12 * (i + 1) as f64);
+        }
+    }
+}
+
+/// Driven, with and without preload: the orbit of events and that of the integration of the law's rate are the same, and as stable.
+#[test]
+fn stops_agree_with_integration() {
+    let (mut worst, mut unstable) = (0.0f64, 0);
+    for (gap, stiffness, constant) in
+        [(0.0, 4.0, 0.0), (0.5, 10.0, 0.0), (-0.3, 4.0, 0.0), (0.2, 2.0, 0.7), (0.1, 4.0, -0.5)]
+    {
+        let mut model = oscillator(1.0, 0.1, &[Arc::new(Gap { gap, stiffness })]);
+        model.forces = vec![force("m", 1.0, 1), force("m", constant, 0)];
+        let system = model.assemble().unwrap();
+        assert_eq!(Auto.choice(&system).method, "event-driven");
+        for omega in [0.4, 0.8, 1.3, 1.9, 2.6, 3.1] {
+            let orbit = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+            let shooting = Shooting { tolerance: 1e-10, ..Shooting::default() };
+            let other = shooting.solver(&system).unwrap().orbit(omega, Some(&orbit.start)).unwrap();
+            let (a, b) = (&orbit.places[0], &other.places[0]);
+            let scale = a.amplitude();
+            for (a, b) in [(a.maximum, b.maximum), (a.minimum, b.minimum), (a.mean, b.mean)] {
+                worst = worst.max((a - b).abs() / scale);
+            }
+            let largest = |orbit: &Orbit| orbit.multipliers().unwrap()[0].norm();
+            // the integration's derivative is that of steps which the kink of the force falls into
+            near("multiplier", largest(&orbit), largest(&other), 1e-4);
+            assert_eq!(orbit.is_stable(), other.is_stable());
+            unstable += usize::from(orbit.is_stable() == Some(false));
+            assert_eq!((orbit.joints[0].slip_fraction, orbit.joints[0].dissipation), (0.0, 0.0));
+            assert!(!orbit.is_one_of_many(), "a stop does not stick");
+            // half of the drive's work goes into the damper, none into the stop
+            assert!(orbit.evidence.energy_gap < 1e-10, "{}", orbit.evidence.energy_gap);
+            for i in 0..20 {
+                let at = &orbit.sample(orbit.period() * f64::from(i) / 20.0).joints[0];
+                let depth = at.displacement[0] - gap;
+                near("force", at.force[0], stiffness * depth.max(0.0), 1e-12 * stiffness * scale);
+                assert_eq!(at.contact, if depth > 0.0 { Contact::Stick } else { Contact::Open });
+            }
+        }
+    }
+    println!("worst difference of displacements {worst:.1e}, {unstable} unstable orbits");
+    assert!(worst < 1e-7, "{worst}");
+    assert!(unstable > 0, "no unstable orbit was met");
+}
+
+/// Theory 11.13: where a motion of one period of the drive is unstable, it says so, and that of two is found and stable.
+#[test]
+fn subharmonic_motion_beside_an_unstable_one() {
+    let mut model = oscillator(1.0, 0.1, &[Arc::new(Gap { gap: 0.0, stiffness: 4.0 })]);
+    model.forces = vec![force("m", 1.0, 1)];
+    let system = model.assemble().unwrap();
+    let omega = 2.6;
+    let single = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+    assert_eq!(single.is_stable(), Some(false));
+    let double = Subharmonic { period: 2 }.solver(&system).unwrap().orbit(omega, Some(&[-1.0, 0.3])).unwrap();
+    let other = Shooting { period: 2, tolerance: 1e-10, ..Shooting::default() };
+    let other = other.solver(&system).unwrap().orbit(omega, Some(&double.start)).unwrap();
+    close("maximum", double.places[0].maximum, other.places[0].maximum, 1e-7);
+    assert_eq!(double.is_stable(), Some(true));
+    let later = double.sample(TAU / omega).displacement[0];
+    assert!((double.start[0] - later).abs() > 0.1, "it repeats after one period");
+}
+
+/// A motion that just touches the stop, or just does not, or presses a little: at the turning point velocity and depth vanish together, and the
+/// orbit is the linear one but for what the stop is pressed.
+#[test]
+fn grazing_a_stop_is_no_jump() {
+    let (omega, damping) = (0.5f64, 0.1);
+    let amplitude = 1.0 / ((1.0 - omega * omega).powi(2) + (damping * omega).powi(2)).sqrt();
+    for off in [-1e-4, -1e-6, -1e-8, -1e-10, -1e-12, -1e-14, 0.0, 1e-14, 1e-12, 1e-10, 1e-8, 1e-4] {
+        let mut model = oscillator(1.0, damping, &[Arc::new(Gap { gap: amplitude * (1.0 + off), stiffness: 50.0 })]);
+        model.forces = vec![force("m", 1.0, 1)];
+        let orbit = exact(&model.assemble().unwrap(), omega);
+        let place = &orbit.places[0];
+        // the stop is pressed by less than it stands in the way
+        let pressed = f64::max(-off, 0.0) * amplitude;
+        near("largest", place.maximum, amplitude, pressed + 1e-10);
+        near("smallest", place.minimum, -amplitude, pressed + 1e-10);
+        assert_eq!(orbit.is_stable(), Some(true), "{off:e}");
+        assert!(off.abs() < 1e-9 || orbit.joints[0].switches == if off < 0.0 { 2 } else { 0 }, "{off:e}");
+    }
+}
+
+/// A stop whose wall moves: imposed motion with a mean is a gap that is smaller by it.
+#[test]
+fn a_moved_wall_counts_with_its_mean() {
+    let wall = |mean: f64, gap: f64| {
+        let mut model = oscillator(1.0, 0.1, &[]);
+        let law: SharedLaw = Arc::new(Gap { gap, stiffness: 5.0 });
+        model.joints.push(Joint { name: "stop".into(), between: ["m".into(), "wall".into()], law });
+        let motion = |amplitude: f64, harmonic: u32| Motion { on: "wall".into(), amplitude, phase: 0.4, harmonic };
+        model.motions = vec![motion(0.3, 1)];
+        if mean != 0.0 {
+            model.motions.push(Motion { phase: 0.0, ..motion(mean, 0) });
+        }
+        model.forces = vec![force("m", 0.5, 1)];
+        model.assemble().unwrap()
+    };
+    let (moved, still) = (wall(0.2, 0.1), wall(0.0, 0.3));
+    let (a, b) = (exact(&moved, 1.2), exact(&still, 1.2));
+    close("maximum", a.places[0].maximum, b.places[0].maximum, 1e-11);
+    let shooting = Shooting { tolerance: 1e-10, ..Shooting::default() };
+    let other = shooting.solver(&moved).unwrap().orbit(1.2, None).unwrap();
+    close("maximum", a.places[0].maximum, other.places[0].maximum, 1e-7);
+    close("work", a.energy.work_in, other.energy.work_in, 1e-6);
+}
+
+/// A law of a slider behind a spring, a rigid one and a stop side by side.
+#[derive(Debug)]
+struct Mixed;
+
+static MIXED: LawInfo = LawInfo {
+    name: "mixed",
+    summary: "a law that only tests need",
+    parameters: &[Parameter::positive("gap", stickslip::dimension::Dimension::LENGTH, "not read")],
+    sample: &[1.0],
+    build: |_| Arc::new(Mixed),
+};
+
+impl Law for Mixed {
+    fn info(&self) -> &'static LawInfo {
+        &MIXED
+    }
+    fn values(&self) -> Vec<f64> {
+        vec![1.0]
+    }
+    fn is_odd(&self) -> bool {
+        false
+    }
+    fn pieces(&self) -> Option<Vec<Piece>> {
+        let stop = Piece::Stop { gap: 0.4, stiffness: 3.0 };
+        Some(vec![Piece::slider(Some(2.0), 0.3), stop, Piece::slider(None, 0.1)])
+    }
+}
+
+/// Pieces of one law are those of three joints side by side: motion, losses, slip.
+#[test]
+fn pieces_of_one_law_are_joints_side_by_side() {
+    let apart: [SharedLaw; 3] = [
+        Arc::new(Jenkins { stiffness: 2.0, limit: 0.3 }),
+        Arc::new(Gap { gap: 0.4, stiffness: 3.0 }),
+        Arc::new(stickslip::law::Coulomb { limit: 0.1 }),
+    ];
+    for omega in [0.5, 1.1, 2.0] {
+        let solve = |laws: &[SharedLaw]| {
+            let mut model = oscillator(1.0, 0.02, laws);
+            model.forces = vec![force("m", 1.0, 1)];
+            exact(&model.assemble().unwrap(), omega)
+        };
+        let (one, three) = (solve(&[Arc::new(Mixed)]), solve(&apart));
+        close("maximum", one.places[0].maximum, three.places[0].maximum, 1e-10);
+        close("minimum", one.places[0].minimum, three.places[0].minimum, 1e-10);
+        let loss: f64 = three.joints.iter().map(|joint| joint.dissipation).sum();
+        close("loss", one.joints[0].dissipation, loss, 1e-10);
+        // the rigid slider slips whenever the other one does
+        close("slip", one.joints[0].slip_fraction, three.joints[2].slip_fraction, 1e-9);
+        assert!(one.evidence.energy_gap < 1e-10, "{}", one.evidence.energy_gap);
+    }
+}
+
+/// Friction that drops when a mass lets go: amplitudes, losses, slip and states of three orbits that SciPy integrated.
+#[test]
+fn static_friction_agrees_with_scipy() {
+    type Case = (&'static str, &'static [(f64, f64)], f64, f64);
+    let cases: [Case; 3] = [
+        ("one_slow", &[(0.5, 0.8)], 0.0, 0.3),
+        ("one_fast", &[(0.3, 0.6)], 0.0, 1.4),
+        ("two", &[(0.4, 0.6), (0.2, 0.35)], 0.7, 0.55),
+    ];
+    let rows = table("static_friction/static_limit.csv");
+    for (name, limits, coupling, omega) in cases {
+        let place = |i: usize| format!("m{}", i + 1);
+        let mut model = Model::default();
+        for (i, &(limit, static_limit)) in limits.iter().enumerate() {
+            let between = || [place(i), GROUND.to_owned()];
+            model.masses.push(Mass::new(place(i), 1.0));
+            model.springs.push(Spring { between: between(), stiffness: 1.0, damping: 0.05 });
+            let law = Arc::new(Stribeck { limit, static_limit, velocity: 0.0 });
+            model.joints.push(Joint { name: format!("j{}", i + 1), between: between(), law });
+            if i > 0 {
+                let between = [place(i - 1), place(i)];
+                model.springs.push(Spring { between, stiffness: coupling, damping: 0.0 });
+            }
+        }
+        model.forces = vec![force("m1", 1.0, 1)];
+        let system = model.assemble().unwrap();
+        assert!(!system.contracts());
+        let orbit = exact(&system, omega);
+        let state = orbit.sample(0.0);
+        for row in rows.iter().filter(|row| row["case"] == name) {
+            let (i, expected) = (number(row, "mass") as usize - 1, number(row, "value"));
+            let found = match row["quantity"].as_str() {
+                "amplitude" => orbit.places[i].amplitude(),
+                "slip_fraction" => orbit.joints[i].slip_fraction,
+                "loss" => orbit.joints[i].dissipation,
+                "switches" => orbit.joints[i].switches as f64,
+                "displacement_0" => state.displacement[i],
+                "velocity_0" => state.velocity[i],
+                "return" => continue,
+                other => panic!("{other}"),
+            };
+            // two runs of the integration differ by up to 2e-9
+            near(&format!("{name}: {} {}", row["quantity"], i + 1), found, expected, 1e-10 * (1.0 + expected.abs()));
+        }
+        assert!(orbit.evidence.energy_gap < 1e-10, "{}", orbit.evidence.energy_gap);
+        println!("{name}: {} iterations, stability {:?}", orbit.evidence.iterations, orbit.stability());
+    }
+}
+
+/// An overdamped mass creeps towards the place where it would stop, for ever, and is there to all digits after a while: neither that nor a
+/// stop that is approached so is chatter. A mass that slides with `limit` ends where its spring holds that and the constant force.
+#[test]
+fn creeping_to_a_stop_is_no_chatter() {
+    let limit = 0.1;
+    let laws: [(SharedLaw, f64, f64); 3] = [
+        (Arc::new(stickslip::law::Coulomb { limit }), limit, 1.0),
+        (Arc::new(Jenkins { stiffness: 2.0, limit }), limit, 1.0),
+        (Arc::new(Gap { gap: 0.0, stiffness: 2.0 }), 0.0, 3.0),
+    ];
+    for (law, friction, stiffness) in laws {
+        for damping in [1.9, 3.0, 10.0, 50.0] {
+            for constant in [0.0, 0.3] {
+                let mut model = oscillator(1.0, damping, std::slice::from_ref(&law));
+                model.forces = vec![force("m", constant, 0)];
+                let x = *free(&model, 1.0, 1.0, 2000.0).last().unwrap();
+                let expected = (constant + friction) / stiffness;
+                if damping > 1.9 {
+                    near(&format!("{law:?}, {damping} kg/s, {constant} N"), x, expected, 1e-9);
+                }
+                // in a drive that does nothing, too
+                let system = model.assemble().unwrap();
+                let motion = Transient {
+                    displacement: vec![1.0],
+                    velocity: vec![0.0],
+                    excitation: Excitation::Steady(1.0),
+                    duration: 2000.0,
+                    step: 10.0,
+                    width: None,
+                };
+                motion.run(&system, &mut |_, _, _| true).unwrap();
+            }
+        }
+    }
+}
+
+/// Driven slowly, an overdamped mass creeps to rest twice a period. Its smooth neighbour moves alike.
+#[test]
+fn creeping_orbits_are_found() {
+    for (constant, omega, amplitude) in
+        [(0.0, 1e-3, 1.0), (0.0, 1e-3, 10.0), (0.3, 1e-3, 0.3), (0.3, 1e-3, 10.0), (0.3, 0.01, 1.0)]
+    {
+        let mut model = oscillator(1.0, 300.0, &[Arc::new(stickslip::law::Coulomb { limit: 0.1 })]);
+        model.forces = vec![force("m", amplitude, 1), force("m", constant, 0)];
+        let system = model.assemble().unwrap();
+        let orbit = exact(&system, omega);
+        let smooth = Shooting { width: Some(1e-9), ..Shooting::default() };
+        let smooth = smooth.solver(&system).unwrap().orbit(omega, Some(&orbit.start)).unwrap();
+        close("amplitude", orbit.places[0].amplitude(), smooth.places[0].amplitude(), 1e-3);
+        close("loss", orbit.energy.friction, smooth.energy.friction, 1e-2);
+    }
+}
+
+/// A body that nothing but friction holds against a mean force wanders off as soon as it slips: the reason is said. While it does not slip, it stays.
+#[test]
+fn free_bodies_under_a_mean_force_drift() {
+    for law in [
+        Arc::new(stickslip::law::Coulomb { limit: 0.1 }) as SharedLaw,
+        Arc::new(Jenkins { stiffness: 2.0, limit: 0.1 }),
+    ] {
+        for damping in [0.0, 0.1, 3.0] {
+            for (constant, amplitude) in [(0.03, 1.0), (0.09, 0.3), (0.1, 0.3), (0.3, 0.05), (0.3, 1.0)] {
+                let mut model = oscillator(0.0, damping, std::slice::from_ref(&law));
+                model.forces = vec![force("m", constant, 0), force("m", amplitude, 1)];
+                let system = model.assemble().unwrap();
+                let error = EventDriven.solver(&system).unwrap().orbit(1.0, None).unwrap_err();
+                assert_eq!(error.status(), "drifts", "{law:?} {damping} {constant} {amplitude}: {error}");
+            }
+            let mut model = oscillator(0.0, damping, std::slice::from_ref(&law));
+            model.forces = vec![force("m", 0.03, 0), force("m", 0.02, 1)];
+            assert!(
+                EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(0.1, None).is_ok(),
+                "{law:?} {damping}"
+            );
+        }
+    }
+}
+
+/// What the method cannot follow it refuses by the law's name.
+#[test]
+fn a_drop_behind_a_spring_is_refused() {
+    #[derive(Debug)]
+    struct Dropping;
+    impl Law for Dropping {
+        fn info(&self) -> &'static LawInfo {
+            &MIXED
+        }
+        fn values(&self) -> Vec<f64> {
+            vec![1.0]
+        }
+        fn pieces(&self) -> Option<Vec<Piece>> {
+            let slider = stickslip::law::Slider { stiffness: Some(2.0), limit: 0.3, static_limit: 0.4 };
+            Some(vec![Piece::Slider(slider)])
+        }
+    }
+    let system = oscillator(1.0, 0.1, &[Arc::new(Dropping)]).assemble().unwrap();
+    let refused = EventDriven.solver(&system).map(|_| ()).unwrap_err().to_string();
+    assert!(refused.contains("`mixed` of joint `j0`") && refused.contains("static and dynamic"), "{refused}");
+}
