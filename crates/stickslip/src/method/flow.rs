@@ -63,7 +63,7 @@ pub(crate) fn of(
 }
 
 /// Whether all that a law has are sliders without a limit.
-pub(crate) fn carries_nothing(law: &crate::law::SharedLaw) -> bool {
+pub(crate) fn carries_nothing(law: &SharedLaw) -> bool {
     law.sliders().is_some_and(|sliders| sliders.is_empty())
 }
 
