@@ -37,7 +37,7 @@ fn oscillator(laws: &[SharedLaw]) -> Model {
 
 /// The methods that take this law, with a width where one is needed.
 fn methods(law: SharedLaw) -> Vec<(&'static str, Box<dyn Method>)> {
-    let system = oscillator(&[law.clone()]).assemble().unwrap();
+    let system = oscillator(std::slice::from_ref(&law)).assemble().unwrap();
     let mut all = Vec::new();
     for row in method::TABLE {
         let widths = [Options::new(), Options::from([("width".to_owned(), 1e-5)])];
@@ -89,7 +89,7 @@ fn beside_another_joint_it_is_not_there() {
         let other = row.sample();
         for (name, method) in methods(other.clone()) {
             let with = orbit(&*method, &oscillator(&[free(row), other.clone(), free(row)]), 95.0);
-            let without = orbit(&*method, &oscillator(&[other.clone()]), 95.0);
+            let without = orbit(&*method, &oscillator(std::slice::from_ref(&other)), 95.0);
             let (a, b) = (with.places[0].amplitude(), without.places[0].amplitude());
             assert!((a / b - 1.0).abs() < NEAR, "{}, {name}: {a} {b}", row.name);
             let (a, b) = (with.joints[1].dissipation, without.joints[0].dissipation);
@@ -120,8 +120,8 @@ fn its_loop_has_no_area() {
 #[test]
 fn a_limit_that_nothing_reaches_makes_a_spring() {
     for limit in [1e3, 1e6, 1e12] {
-        let law = std::sync::Arc::new(law::Jenkins { stiffness: 5e3, limit });
-        let system = oscillator(&[law.clone()]).assemble().unwrap();
+        let law: SharedLaw = std::sync::Arc::new(law::Jenkins { stiffness: 5e3, limit });
+        let system = oscillator(std::slice::from_ref(&law)).assemble().unwrap();
         let omega = (1.5e4f64).sqrt();
         // F/(c Ω) where k + kt = m Ω²
         let expected = 3.0 / (20.0 * omega);

@@ -93,7 +93,8 @@ mod tests {
         let with = |system: System, damping: Change, stiffness: Change| {
             let old = system.structure();
             let (mut c, mut k) = (old.damping().clone(), old.stiffness().clone());
-            (damping(&mut c), stiffness(&mut k));
+            damping(&mut c);
+            stiffness(&mut k);
             system.on(Structure::new(old.places().to_vec(), old.mass().clone(), c, k).unwrap()).unwrap()
         };
         let turning = |c: &mut DMatrix<f64>| (c[(0, 1)], c[(1, 0)]) = (3.0, -3.0);
