@@ -457,7 +457,7 @@ fn check_says_what_is_known_before_a_run() {
 
 #[test]
 fn warnings_stand_on_standard_error_and_in_the_record() {
-    let edits = [("points = 241", "points = 5"), ("F0 = \"10 N\"", "F0 = \"10 N\"\nspare = \"1 N\"")];
+    let edits = [("points = 241", "points = 25"), ("F0 = \"10 N\"", "F0 = \"10 N\"\nspare = \"1 N\"")];
     let (folder, _) = folder("blade-couple", &edits);
     let output = stickslip(folder.path(), &["check", "study.toml"]);
     assert!(String::from_utf8_lossy(&output.stdout).contains("1 warning\n"));

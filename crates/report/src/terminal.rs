@@ -376,7 +376,7 @@ results/fig02/: loops_summary.csv, figure.svg
             let text = Terminal { width: Some(width), ..Terminal::default() }.text(&dataset, &[]);
             let lines: Vec<&str> = text.lines().skip_while(|line| *line != "peaks").skip(1).take(3).collect();
             assert!(lines.iter().all(|line| line.chars().count() <= width), "{text}");
-            assert!(lines[0].contains("frequency (Hz)") && lines[0].contains("… "), "{text}");
+            assert!(lines[0].contains("frequency (Hz)") && lines[0].contains("…amplitude (mm)"), "{text}");
             assert!(lines[1].contains("_left ") && lines[2].contains("_right "), "{text}");
         }
         // what could not be told apart stays as it is
