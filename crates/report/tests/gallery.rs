@@ -141,7 +141,9 @@ fn every_study_runs() {
         let few = dataset(name, &reduced(&text(name)));
         assert!(few.failures.is_empty(), "{name}: {:?}", few.failures);
         assert!(few.record.points.keys().all(|status| status == "converged"), "{name}: {:?}", few.record.points);
-        assert!(few.notes.iter().all(|note| !note.starts_with("warning")), "{name}: {:?}", few.notes);
+        // few points step over resonances, and it is said with the number that would do
+        let wrong = |note: &String| note.starts_with("warning") && !note.contains("would do");
+        assert!(!few.notes.iter().any(wrong), "{name}: {:?}", few.notes);
         assert!(!few.figure.panels.is_empty(), "{name}");
         assert!(picture(&few).contains("<path"), "{name}");
     }

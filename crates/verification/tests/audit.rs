@@ -9,10 +9,11 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
 use stickslip::law::{SharedLaw, TABLE};
-use stickslip::method::{Options, TABLE as METHODS};
+use stickslip::method::TABLE as METHODS;
 use stickslip::model::{Axis, System};
 use stickslip::orbit::Orbit;
 use stickslip::structure::Structure;
+use std::time::Instant;
 use stickslip_verification::Random;
 use stickslip_verification::reference::Reference;
 
@@ -26,6 +27,10 @@ const PERIODS: usize = 40;
 const NEAR: f64 = 5e-3;
 /// Change over the last period below which the reference has settled.
 const SETTLED: f64 = 1e-4;
+/// Tolerance of method `transient`.
+const WAITED: f64 = 1e-6;
+/// Seconds for one orbit that are worth a line.
+const SLOW: f64 = 5.0;
 /// Share of orbits that may fail without a reason that explains it.
 const UNEXPLAINED: f64 = 0.02;
 
@@ -111,7 +116,9 @@ fn every_orbit_is_a_motion() {
         let (system, omega) = system(seed);
         let laws: Vec<&str> = system.joints().iter().map(|joint| joint.law().name()).collect();
         for row in METHODS.iter().filter(|row| row.name != "auto") {
-            let method = (row.build)(&Options::new()).unwrap();
+            // waiting for transients is brute force: so much of it is enough here
+            let options = row.options.iter().filter(|o| row.name == "transient" && o.key == "tolerance");
+            let method = (row.build)(&options.map(|o| (o.key.to_owned(), WAITED)).collect()).unwrap();
             let mut count = |what: String| *counts.entry((row.name, what)).or_default() += 1;
             let mut solver = match method.solver(&system) {
                 Ok(solver) => solver,
@@ -123,7 +130,13 @@ fn every_orbit_is_a_motion() {
                 }
             };
             tried += 1;
-            let orbit = match solver.orbit(omega, None) {
+            let begun = Instant::now();
+            let found = solver.orbit(omega, None);
+            let seconds = begun.elapsed().as_secs_f64();
+            if seconds > SLOW {
+                println!("{seed} {laws:?} {}: {seconds:.1} s", row.name);
+            }
+            let orbit = match found {
                 Ok(orbit) => orbit,
                 Err(error) => {
                     count(error.status().to_owned());

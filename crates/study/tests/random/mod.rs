@@ -121,11 +121,18 @@ fn template(chance: &mut Chance, text: &mut String) -> (Names, Scales) {
 
 /// A law with parameters of these scales; half of the limits are the parameter `limit`.
 fn law_text(chance: &mut Chance, scales: &Scales, smooth: bool) -> String {
-    let rows: Vec<&law::LawInfo> =
-        law::TABLE.iter().copied().filter(|row| row.name.ends_with("arctan") == smooth).collect();
+    // places here move along one direction; smooth laws have a rate and exact ones are of pieces
+    let fits = |row: &&law::LawInfo| {
+        let law = row.sample();
+        law.directions() == 1 && if smooth { law.rate().is_some() } else { law.pieces().is_some() }
+    };
+    let rows: Vec<&law::LawInfo> = law::TABLE.iter().copied().filter(fits).collect();
     let row = chance.of(&rows);
     let mut text = format!("{{ kind = \"{}\"", row.name);
-    for parameter in row.parameters {
+    for (parameter, sample) in row.parameters.iter().zip(row.sample) {
+        if parameter.default.is_some() {
+            continue;
+        }
         let value = match parameter.key {
             "limit" if chance.one_in(2) => {
                 text.push_str(", limit = \"limit\"");
@@ -134,8 +141,17 @@ fn law_text(chance: &mut Chance, scales: &Scales, smooth: bool) -> String {
             "limit" if chance.one_in(12) => 0.0,
             "limit" => scales.force * chance.decade(-2.0, 1.5),
             "stiffness" => scales.stiffness() * chance.decade(-2.0, 2.0),
+            // lengths and velocities by the scales of the model, pure numbers as in the sample
+            "gap" => scales.length() * (chance.decade(-2.0, 1.0) - 0.1),
+            "static_limit" => scales.force * chance.decade(0.5, 2.0),
+            "velocity" => chance.decade(-1.0, 1.0) * scales.length() * std::f64::consts::TAU * scales.hertz,
+            "slip_stiffness" => scales.stiffness() * chance.decade(-4.0, -2.0),
+            _ if parameter.dimension == stickslip::dimension::Dimension::NONE => *sample,
+            "lambda" | "beta" | "gamma" => chance.decade(-1.0, 1.0) / scales.length(),
+            "damping" | "viscous" => 1e-3 * chance.decade(-1.0, 1.0) * (scales.mass * scales.stiffness()).sqrt(),
             // steepness at rest: a share of the velocity scale
-            _ => chance.decade(0.0, 3.0) / (scales.length() * std::f64::consts::TAU * scales.hertz),
+            "alpha" => chance.decade(0.0, 3.0) / (scales.length() * std::f64::consts::TAU * scales.hertz),
+            _ => sample * chance.decade(-1.0, 1.0),
         };
         let value = if value == 0.0 { 0.0 } else { chance.or_extreme(value) };
         let _ = write!(text, ", {} = {value:e}", parameter.key);
