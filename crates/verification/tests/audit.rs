@@ -8,17 +8,17 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
+use std::time::Instant;
 use stickslip::law::{SharedLaw, TABLE};
 use stickslip::method::TABLE as METHODS;
 use stickslip::model::{Axis, System};
 use stickslip::orbit::Orbit;
 use stickslip::structure::Structure;
-use std::time::Instant;
 use stickslip_verification::Random;
 use stickslip_verification::reference::Reference;
 
 /// Models without a wish.
-const MODELS: u64 = 40;
+const MODELS: u64 = 12;
 /// Steps a period of the reference; its own error is then some 1e-4: (2π 3/500)²/12 for the third harmonic.
 const STEPS: usize = 500;
 /// Periods that the reference is given to settle.
@@ -119,6 +119,12 @@ fn every_orbit_is_a_motion() {
             // waiting for transients is brute force: so much of it is enough here
             let options = row.options.iter().filter(|o| row.name == "transient" && o.key == "tolerance");
             let method = (row.build)(&options.map(|o| (o.key.to_owned(), WAITED)).collect()).unwrap();
+            // waiting in equal steps takes up to half a minute an orbit: only in long audits
+            let quick =
+                system.joints().iter().all(|joint| joint.law().pieces().is_some() || joint.law().rate().is_some());
+            if row.name == "transient" && !quick && models <= MODELS {
+                continue;
+            }
             let mut count = |what: String| *counts.entry((row.name, what)).or_default() += 1;
             let mut solver = match method.solver(&system) {
                 Ok(solver) => solver,

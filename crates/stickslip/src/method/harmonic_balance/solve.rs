@@ -31,6 +31,8 @@ const GENTLE: [f64; 3] = [0.04, 0.2, 1.0];
 /// search that is to end takes a few of them.
 const WORK: f64 = 1e10;
 const FEWEST: f64 = 40.0;
+/// Steps of laws with a memory in one search. A search that is to end takes a few hundred thousand; where a law is stiff these take ten seconds.
+const MARCHED: usize = 3_000_000;
 
 /// The search did not end.
 #[derive(Debug, Clone, Copy)]
@@ -110,7 +112,7 @@ impl Level {
             Some(_) => size * (4 * self.harmonics().len()).pow(2) as f64,
             None => size * size * size / 3.0,
         };
-        self.assembled as f64 > (WORK / one).max(FEWEST)
+        self.assembled as f64 > (WORK / one).max(FEWEST) || self.alternation.marched > MARCHED
     }
 
     /// The Newton step into `self.step`, in the unknowns' units.
@@ -155,14 +157,14 @@ impl Level {
 
     /// The solution that Newton's method finds from `motion`, which is nearby.
     pub fn polish(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, most: usize) -> Result<(), Lost> {
-        self.assembled = 0;
+        (self.assembled, self.alternation.marched) = (0, 0);
         self.newton(ports, omega, motion, GIVEN, most)
     }
 
     /// The solution, from `start`.
     pub fn solve(&mut self, ports: &Ports, omega: f64, mut start: Motion) -> Result<Motion, Lost> {
         start.iterations = 0;
-        self.assembled = 0;
+        (self.assembled, self.alternation.marched) = (0, 0);
         let mut motion = start.clone();
         if self.newton(ports, omega, &mut motion, GIVEN, ITERATIONS).is_ok() {
             return Ok(motion);

@@ -10,6 +10,8 @@ pub(super) const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// The transform's memory for one number of harmonics and samples.
 #[derive(Debug, Clone)]
 pub(in super::super) struct Alternation {
+    /// Steps that laws with a memory were marched, in the present search.
+    pub marched: usize,
     pub harmonics: Vec<usize>,
     pub fourier: Fourier,
     pairs: Vec<(usize, Complex64)>,
@@ -45,6 +47,7 @@ impl Alternation {
         let three = || std::array::from_fn(|_| vec![0.0; samples]);
         let top = harmonics.last().copied().unwrap_or(0);
         Alternation {
+            marched: 0,
             fourier: Fourier::new(samples),
             pairs: harmonics.iter().map(|&h| (h, ZERO)).collect(),
             signal: zeros.clone(),

@@ -133,6 +133,7 @@ impl Alternation {
         }
         let (mut z, mut after) = (z.clone(), z.clone());
         let mut force = [0.0; MOST_DIRECTIONS];
+        self.marched += n;
         for step in 1..=n {
             let i = step % n;
             let slot = rows.as_deref_mut().map(|rows| &mut rows[i * size..(i + 1) * size]);
