@@ -67,7 +67,7 @@ pub struct Evidence {
 /// # Example
 /// ```
 /// use stickslip_study::{read_study, results::worst_evidence, run::{Context, run}};
-/// let text = stickslip::model::templates::find("element").unwrap().study;
+/// let text = stickslip_study::templates::find("element").unwrap().study;
 /// let study = read_study("element.toml", text, &[]).unwrap();
 /// let evidence = worst_evidence(&run(&study, &Context::unwatched(1)).unwrap());
 /// assert!(evidence.energy_gap.unwrap() < 1e-9);

@@ -57,7 +57,7 @@ pub struct Checked {
 /// # Example
 /// ```
 /// use stickslip_study::{read_study, run::{Context, check}};
-/// let text = stickslip::model::templates::find("element").unwrap().study;
+/// let text = stickslip_study::templates::find("element").unwrap().study;
 /// let checked = check(&read_study("element.toml", text, &[]).unwrap()).unwrap();
 /// assert_eq!(checked.summary().joints.len(), 1);
 /// assert_eq!(checked.run(&Context::unwatched(1)).unwrap().tables.len(), 2);

@@ -91,7 +91,7 @@ const CANDIDATE: f64 = 0.8;
 /// use stickslip::curve::peak::highest;
 /// use stickslip::method::{Method, event_driven::EventDriven};
 /// let mut couple = stickslip::model::example::blade_couple();
-/// couple.joints[0].law = stickslip::law::Law::Coulomb(stickslip::law::Coulomb { limit: 4.0 });
+/// couple.joints[0].law = std::sync::Arc::new(stickslip::law::Coulomb { limit: 4.0 });
 /// let system = couple.assemble().unwrap();
 /// let mut solver = EventDriven.solver(&system).unwrap();
 /// let omegas: Vec<f64> = (0..9).map(|i| std::f64::consts::TAU * (120.9 + 0.1 * f64::from(i))).collect();

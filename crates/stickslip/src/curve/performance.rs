@@ -111,12 +111,12 @@ impl<E: Send> Performance<'_, E> {
     /// ```
     /// use stickslip::curve::performance::Performance;
     /// use stickslip::method::event_driven::EventDriven;
-    /// use stickslip::law::{Coulomb, Law};
+    /// use stickslip::law::Coulomb;
     /// use stickslip::model::example;
     /// let curve = Performance {
     ///     system: &|limit| {
     ///         let mut couple = example::blade_couple();
-    ///         couple.joints[0].law = Law::Coulomb(Coulomb { limit });
+    ///         couple.joints[0].law = std::sync::Arc::new(Coulomb { limit });
     ///         couple.assemble()
     ///     },
     ///     method: &EventDriven,

@@ -41,7 +41,7 @@ pub fn blade_couple() -> Model {
 /// # Example
 /// ```
 /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
-/// assert_eq!(system.places, ["blade1", "blade3"]);
+/// assert_eq!(system.places(), ["blade1", "blade3"]);
 /// ```
 pub fn blade_couple_massless() -> Model {
     let mut model = blades(BLADE);

@@ -78,7 +78,7 @@ pub(super) fn single(table: &Table, rows: Range<usize>) -> Vec<Range<usize>> {
 /// # Example
 /// ```
 /// use stickslip_study::{kinds::hysteresis, read_study, run::{Context, run}};
-/// let text = stickslip::model::templates::find("element").unwrap().study;
+/// let text = stickslip_study::templates::find("element").unwrap().study;
 /// let study = read_study("element.toml", text, &[]).unwrap();
 /// let loops = hysteresis::loops(&study, &run(&study, &Context::unwatched(1)).unwrap()).unwrap();
 /// assert!((loops[1].dissipation - 4e-6).abs() < 1e-15);   // 4 Ft (a - Ft/kt), a = 2 mm
