@@ -262,3 +262,16 @@ fn a_method_from_outside_makes_orbits_with_evidence() {
     }
     assert!(orbit.evidence.energy_gap < 1e-6, "{}", orbit.evidence.energy_gap);
 }
+
+/// The page of the book shows this code, and no other.
+#[test]
+fn the_book_shows_the_code_of_this_file() {
+    let page = include_str!("../../../docs/src/extending.md");
+    let blocks: Vec<&str> = page.split("```rust\n").skip(1).filter_map(|rest| rest.split("\n```").next()).collect();
+    assert_eq!(blocks.len(), 3);
+    for block in blocks {
+        for part in block.split("\n\nimpl ") {
+            assert!(include_str!("outside.rs").contains(part), "not in this file:\n{part}");
+        }
+    }
+}
