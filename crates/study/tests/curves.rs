@@ -277,3 +277,44 @@ harmonics = 3
     assert_eq!(error.key(), Some("harmonics"));
     assert_eq!(error.line(), Some(17), "{error}");
 }
+
+/// A cubic spring that stiffens: `branch` turns twice, where the one-term formula `F² = ((k + ¾ k₃ a² - ω²)² + c² ω²) a²` does, and the orbits
+/// between the two turns are unstable.
+#[test]
+fn a_duffing_oscillator_has_both_folds_and_an_unstable_middle() {
+    let text = oscillating("0.1 kg/s", r#"{ kind = "cubic", stiffness = "1 N/m^3" }"#, "").replace("1 N\"", "0.3 N\"");
+    let text = text.split("[study]").next().unwrap().to_owned()
+        + "[method]\nkind = \"harmonic-balance\"\nharmonics = 9\n[study]\nkind = \"branch\"\n\
+           frequency = { from = \"0.1 Hz\", to = \"0.4 Hz\", points = 151 }\n";
+    let dataset = dataset(&text);
+    // ω² of both sides of the backbone by amplitude; where ω turns along the curve
+    let omega = |a: f64, side: f64| {
+        let (spring, c2, f2) = (1.0 + 0.75 * a * a, 0.01, 0.09);
+        let middle = spring - 0.5 * c2;
+        let root = middle * middle - spring * spring + f2 / (a * a);
+        (root >= 0.0).then(|| (middle + side * root.sqrt()).max(0.0).sqrt())
+    };
+    let upper: Vec<(f64, f64)> =
+        (300..1800).filter_map(|i| Some((omega(1e-3 * f64::from(i), 1.0)?, 1e-3 * f64::from(i)))).collect();
+    let lower = upper.iter().copied().fold((f64::INFINITY, 0.0), |best, one| if one.0 < best.0 { one } else { best });
+    let highest = upper
+        .iter()
+        .copied()
+        .filter(|one| one.1 > lower.1)
+        .fold((0.0, 0.0), |best: (f64, f64), one| if one.0 > best.0 { one } else { best });
+    let turns = table(&dataset, "turns");
+    let (frequency, amplitude) = (turns.numbers("frequency_Hz").unwrap(), turns.numbers("amplitude_m").unwrap());
+    assert_eq!(frequency.len(), 2, "{frequency:?}");
+    for (i, (omega, a)) in [highest, lower].into_iter().enumerate() {
+        let hertz = omega / std::f64::consts::TAU;
+        assert!((frequency[i] / hertz - 1.0).abs() < 0.01, "{i}: {} {hertz}", frequency[i]);
+        // higher harmonics raise the largest displacement by some hundredths
+        assert!((amplitude[i] / a - 1.0).abs() < 0.05, "{i}: {} {a}", amplitude[i]);
+    }
+    let branch = table(&dataset, "branch");
+    let stable = branch.flags("stable").unwrap();
+    let first = stable.iter().position(|s| *s == Some(false)).unwrap();
+    let last = stable.iter().rposition(|s| *s == Some(false)).unwrap();
+    assert!(first > 0 && last + 1 < stable.len() && last - first > 5);
+    assert!(stable[first..=last].iter().all(|s| *s == Some(false)), "the unstable orbits are one piece");
+}
