@@ -12,15 +12,12 @@
 //! Springs and stops carry forces that do not jump: what they do next is asked of the first derivative that does not vanish.
 //! Source: Glocker, "Set-Valued Force Laws" (2001), Ch. 10; Leine and Nijmeijer (2004), Ch. 6.
 
-use super::mechanics::{Kind, Mechanics, Part};
+use super::mechanics::{Kind, Mechanics, Part, REST};
 use crate::law::Contact;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::complementarity;
 
-/// A relative velocity below this fraction of the largest one is rest. Switch instants are found to 1e-15 of the velocity scale;
-/// joints that switch together by symmetry differ by the rounding of the whole orbit, about 1e-12.
-pub(crate) const REST: f64 = 1e-10;
 /// A force within this fraction of its limit is at the limit, for the same reason.
 pub(crate) const AT_LIMIT: f64 = 1e-10;
 /// An acceleration (or a higher derivative) below this fraction of the terms that it is the sum of is zero.

@@ -1,7 +1,7 @@
 //! The motion over a stretch of time: closed-form segments joined at the switches, with its exact sensitivity.
 
-use super::decide::{AT_LIMIT, Decision, REST};
-use super::mechanics::{Kind, Mechanics};
+use super::decide::{AT_LIMIT, Decision};
+use super::mechanics::{Kind, Mechanics, REST};
 use super::memory::Memory;
 use super::pattern::{Beginning, Driven, Pattern, Work};
 use crate::law::Contact;

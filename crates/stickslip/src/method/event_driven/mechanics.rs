@@ -1,11 +1,14 @@
 //! The system as the event-driven method sees it: masses, springs, ideal parts of joints, one drive frequency.
 
-use super::decide::REST;
 use crate::law::{Contact, Law, Piece};
 use crate::method::MethodError;
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
+
+/// A relative velocity below this fraction of the largest one is rest. Switch instants are found to 1e-15 of the velocity scale;
+/// joints that switch together by symmetry differ by the rounding of the whole orbit, about 1e-12.
+pub(crate) const REST: f64 = 1e-10;
 
 /// What a part of a joint does.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -15,7 +15,8 @@
 //!
 //! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian frequency-time method".
 
-use super::ports::{Alternation, Port, Ports};
+use super::hold::{CLEAR, stay};
+use super::ports::{Alternation, Port, Ports, block, blocks};
 use super::rest::Rest;
 use super::sparse::Sparse;
 use crate::method::guess::Guess;
@@ -32,11 +33,6 @@ pub(super) const SOLVED: f64 = 1e-10;
 /// follow the force: with a larger ε it chatters in stick, with a smaller one a passage through zero is blurred. The second term
 /// makes the passage sharp where the harmonics are few and do not chatter, so that one harmonic is the describing function.
 const RIPPLE: f64 = 30.0;
-/// How far ε stays above the least one at which a resolvent is single-valued: nearer, its slope grows without bound.
-pub(super) const CLEAR: f64 = 2.0;
-/// What is added to the diagonal of the force equations, so that forces which nothing decides stay as they are: the mean in a contact
-/// that sticks all the time, and forces in redundant contacts. Newton's method leaves this share of the force as an error.
-const STAY: [f64; 2] = [1e-9, 1e-12];
 /// The receptance below which motion counts as imposed, relative to that of the excited structure.
 const RIGID: f64 = 1e-14;
 
@@ -114,20 +110,6 @@ pub(super) struct Ease {
 }
 
 pub(super) const GIVEN: Ease = Ease { limits: 1.0, penalty: 1.0 };
-
-/// Where the tangent of every port begins, and the length of all: a port with d axes has a square of 2 d × harmonics.
-pub(super) fn blocks(ports: &Ports, harmonics: usize) -> (Vec<usize>, usize) {
-    let mut length = 0;
-    let starts = ports
-        .iter()
-        .map(|port| {
-            let start = length;
-            length += (2 * harmonics * port.axes).pow(2);
-            start
-        })
-        .collect();
-    (starts, length)
-}
 
 impl Level {
     pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, sparse: Option<Sparse>) -> Self {
@@ -543,11 +525,6 @@ impl Level {
     }
 }
 
-/// The tangent of port number `p`.
-pub(super) fn block(blocks: &[usize], p: usize, port: &Port, harmonics: usize) -> std::ops::Range<usize> {
-    blocks[p]..blocks[p] + (2 * harmonics * port.axes).pow(2)
-}
-
 /// The penalty ε (N s/m) of a contact with the receptance (m/N) of the highest harmonic `top`, see [`RIPPLE`].
 pub(super) fn penalty(receptance: f64, top: usize, omega: f64) -> f64 {
     let impedance = 1.0 / (receptance * top as f64 * omega);
@@ -557,11 +534,6 @@ pub(super) fn penalty(receptance: f64, top: usize, omega: f64) -> f64 {
 /// Unit of a port's unknowns: the motion's length, m, or the law's scale, N.
 pub(super) fn unit(port: &Port, length: f64) -> f64 {
     if port.is_force() { port.scale } else { length }
-}
-
-/// See [`STAY`].
-pub(super) fn stay(h: usize) -> f64 {
-    STAY[h.min(1)]
 }
 
 /// Weight of a harmonic in norms: that of its velocity.

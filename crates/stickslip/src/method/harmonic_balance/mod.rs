@@ -14,6 +14,7 @@
 mod arc;
 mod branch;
 mod equations;
+mod hold;
 mod mode;
 mod path;
 mod ports;

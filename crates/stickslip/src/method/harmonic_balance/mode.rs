@@ -7,7 +7,8 @@
 //! spring `k`: rigid friction is not smoothed, and a contact that sticks is a constraint.
 //! Source: Krack (2015), "Nonlinear modal analysis of nonconservative systems: extension of the periodic motion concept".
 
-use super::equations::{CLEAR, penalty, stay};
+use super::equations::penalty;
+use super::hold::{CLEAR, stay};
 use super::ports::{Alternation, Port, Ports};
 use super::solve::{HALVINGS, SHORTENS};
 use crate::method::MethodError;

@@ -3,6 +3,7 @@
 //! With the modes `(λ, φ)` of `M x'' + C x' + K x`, computed once, the response to `Re(F e^{st})` is a sum of `φ (ψᵀF) / (s - λ)`.
 //! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored.
 
+use super::hold::HOLD;
 use super::ports::Ports;
 use super::sparse::Sparse;
 use crate::model::System;
@@ -11,10 +12,6 @@ use num_complex::Complex64;
 use stickslip_numerics::modes::Modes;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
-
-/// A direction that nothing holds gets, for its mean position only, a spring that makes it as slow as this fraction of the drive
-/// frequency: its mean is arbitrary otherwise. The motion changes by the square of it.
-pub(super) const HOLD: f64 = 1e-5;
 
 /// Share of the largest static receptance below which springs hold a direction, if any is held by [`HOLD`] alone.
 const HELD: f64 = 1e-5;

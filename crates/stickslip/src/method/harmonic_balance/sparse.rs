@@ -5,9 +5,8 @@
 //! themselves, along laws of velocity, border it as if each contact were one more place: `Z y - W δλ = 0` and
 //! `(1 - T) δλ + ε T D Wᵀ y = r`.
 
-use super::equations::{CLEAR, stay};
+use super::hold::{CLEAR, HOLD, stay};
 use super::ports::Ports;
-use super::rest::HOLD;
 use crate::model::System;
 use num_complex::Complex64;
 use stickslip_numerics::banded::{Banded, order};
@@ -182,7 +181,7 @@ impl Sparse {
     pub fn step(&mut self, ports: &Ports, along: &Along, tangents: &[f64], residual: &mut [f64]) -> bool {
         let nh = self.harmonics.len();
         let size = 2 * nh;
-        let (blocks, _) = super::equations::blocks(ports, nh);
+        let (blocks, _) = super::ports::blocks(ports, nh);
         self.tangent.clear();
         for &(i, l, entry) in &self.entries {
             for k in 0..nh {
@@ -197,7 +196,7 @@ impl Sparse {
         }
         self.whole.fill(0.0);
         for (p, port) in ports.iter().enumerate() {
-            let tangent = &tangents[super::equations::block(&blocks, p, port, nh)];
+            let tangent = &tangents[super::ports::block(&blocks, p, port, nh)];
             let wide = size * port.axes;
             let r = &residual[port.first * size..port.first * size + wide];
             let penalty = along.penalty[p] * along.ease.max(CLEAR * port.least_penalty / along.penalty[p]);

@@ -38,7 +38,7 @@ pub(in super::super) struct Alternation {
     pub(super) intervals: Vec<super::sliders::Interval>,
     pub(super) extremes: Vec<super::sliders::Extreme>,
     pub(super) grid: super::sliders::Grid,
-    pub(super) march: super::march::Memory,
+    pub(super) march: super::memory::Memory,
 }
 
 impl Alternation {
@@ -67,7 +67,7 @@ impl Alternation {
             intervals: Vec::new(),
             extremes: Vec::new(),
             grid: super::sliders::Grid::new(top),
-            march: super::march::Memory::default(),
+            march: super::memory::Memory::default(),
             harmonics,
         }
     }

@@ -7,6 +7,7 @@
 //! from its mean position.
 
 use super::alternation::{Alternation, share};
+use super::memory::Memory;
 use crate::law::MOST_DIRECTIONS;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -52,20 +53,6 @@ pub(super) trait March {
         force: &mut [f64; MOST_DIRECTIONS],
         rows: Option<&mut [f64]>,
     ) -> bool;
-}
-
-/// Memory of a march.
-#[derive(Debug, Clone, Default)]
-pub(in super::super) struct Memory {
-    /// Derivatives of every step.
-    rows: Vec<f64>,
-    /// Those of the first movement.
-    first: Vec<f64>,
-    /// Forces by the states at t = 0, per sample.
-    by_state: Vec<f64>,
-    re: Vec<f64>,
-    im: Vec<f64>,
-    columns: Vec<Complex64>,
 }
 
 impl Alternation {

@@ -9,6 +9,7 @@
 
 mod alternation;
 mod march;
+mod memory;
 mod prox;
 mod rate;
 mod sliders;
@@ -340,3 +341,22 @@ impl Alternation {
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 const _: () = assert!(MOST_DIRECTIONS == 3, "signals of a port are kept for three axes");
+
+/// Where the tangent of every port begins, and the length of all: a port with d axes has a square of 2 d × harmonics.
+pub(super) fn blocks(ports: &Ports, harmonics: usize) -> (Vec<usize>, usize) {
+    let mut length = 0;
+    let starts = ports
+        .iter()
+        .map(|port| {
+            let start = length;
+            length += (2 * harmonics * port.axes).pow(2);
+            start
+        })
+        .collect();
+    (starts, length)
+}
+
+/// The tangent of port number `p`.
+pub(super) fn block(blocks: &[usize], p: usize, port: &Port, harmonics: usize) -> std::ops::Range<usize> {
+    blocks[p]..blocks[p] + (2 * harmonics * port.axes).pow(2)
+}
