@@ -5,7 +5,8 @@
 //! defect; its derivative is the return map that stability asks for, where no theorem answers it ([`System::contracts`]).
 
 use super::assembly::NEAR_REST;
-use super::flow::{self, Flow, Kind};
+use super::flow::Flow;
+use super::followed::{self, Kind};
 use super::incremental::flow::IncrementalFlow;
 use super::periodic::norm;
 use crate::model::System;
@@ -56,7 +57,7 @@ impl Judge {
                 flow.count = STEPS;
                 Box::new(flow)
             }),
-            Kind::Exact | Kind::Smooth => flow::of(system, None, TOLERANCE, name).ok(),
+            Kind::Exact | Kind::Smooth => followed::of(system, None, TOLERANCE, name).ok(),
         };
         Judge { flow, proven: false }
     }

@@ -10,6 +10,7 @@ pub mod event_driven;
 mod evidence;
 mod exact_flow;
 mod flow;
+mod followed;
 mod guess;
 pub mod harmonic_balance;
 mod incremental;
@@ -23,6 +24,7 @@ pub mod transient;
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::Orbit;
+pub use crate::orbit::{Breakdown, OrbitError};
 use std::collections::BTreeMap;
 
 /// Turns systems into orbits.
@@ -121,186 +123,6 @@ pub enum MethodError {
         /// What is expected.
         message: String,
     },
-}
-
-/// Why a motion could not be followed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Breakdown {
-    /// Too many switches.
-    #[error("joint {joint} chatters at t = {time:.6e} s after {switches} switches", joint = joint + 1)]
-    Chatter {
-        /// When, s.
-        time: f64,
-        /// Switches until then.
-        switches: usize,
-        /// Index of the joint.
-        joint: usize,
-    },
-    /// Rigid joints that form a loop stick together, and how they share the load is not unique.
-    #[error(
-        "joint {joint} and others stick in a loop of rigid contacts whose forces are not unique at t = {time:.6e} s; \
-         give one of them a stiffness (law `jenkins`)", joint = joint + 1
-    )]
-    Redundant {
-        /// When, s.
-        time: f64,
-        /// Index of one of the joints.
-        joint: usize,
-    },
-    /// The contact problem has no solution.
-    #[error("no stick-slip state is consistent at t = {time:.6e} s")]
-    Undecidable {
-        /// When, s.
-        time: f64,
-    },
-    /// The linear motion of a pattern has no full set of modes.
-    #[error(
-        "two modes fall together at {lambda:.6e} rad/s (critical damping) at t = {time:.6e} s; change a damper slightly"
-    )]
-    Defective {
-        /// When, s.
-        time: f64,
-        /// Modulus of the exponent, rad/s.
-        lambda: f64,
-    },
-    /// The signals oscillate too fast for the period.
-    #[error("modes far faster than the drive: no switch could be excluded within the allowed steps, t = {time:.6e} s")]
-    TooFast {
-        /// When, s.
-        time: f64,
-    },
-    /// The step size of an integration became too small.
-    #[error("the integration stalls at t = {time:.6e} s (step {step:.1e} s)")]
-    Stalled {
-        /// When, s.
-        time: f64,
-        /// The step, s.
-        step: f64,
-    },
-    /// Equal steps, however short, do not reach the tolerance.
-    #[error(
-        "{steps} steps leave an estimated error of {estimate:.1e} where {tolerance:.1e} is wanted; \
-         raise the tolerance, or soften what is far stiffer than the rest"
-    )]
-    Unresolved {
-        /// Steps of the finest attempt.
-        steps: usize,
-        /// Its error relative to the motion, estimated.
-        estimate: f64,
-        /// The error that was allowed.
-        tolerance: f64,
-    },
-    /// Numbers leave the range of floating point, or what they need to be solved with.
-    #[error("masses, springs and dampers are too far apart to compute with at t = {time:.6e} s; check their units")]
-    OutOfRange {
-        /// When, s.
-        time: f64,
-    },
-    /// A number is no longer finite.
-    #[error("the motion grows beyond all bounds by t = {time:.6e} s")]
-    Unbounded {
-        /// When, s.
-        time: f64,
-    },
-}
-
-/// No orbit was found.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum OrbitError {
-    /// The iteration did not converge.
-    #[error(
-        "{method} stopped at Ω = {omega:.4} rad/s after {iterations} iterations, residual {residual:.1e}; \
-         start from a neighbouring orbit, or check that a periodic motion exists (undamped resonance has none)"
-    )]
-    NotConverged {
-        /// The method.
-        method: &'static str,
-        /// Drive frequency, rad/s.
-        omega: f64,
-        /// Iterations made.
-        iterations: usize,
-        /// Smallest residual reached.
-        residual: f64,
-    },
-    /// The motion broke down.
-    #[error("{method} broke down at Ω = {omega:.4} rad/s: {cause}")]
-    Breakdown {
-        /// The method.
-        method: &'static str,
-        /// Drive frequency, rad/s.
-        omega: f64,
-        /// The cause.
-        cause: Breakdown,
-    },
-    /// The evidence contradicts the orbit.
-    #[error("{method} closed an orbit at Ω = {omega:.4} rad/s that fails its check: energy gap {energy_gap:.1e}")]
-    Evidence {
-        /// The method.
-        method: &'static str,
-        /// Drive frequency, rad/s.
-        omega: f64,
-        /// The gap.
-        energy_gap: f64,
-    },
-    /// The series that the method may take is too short for the tolerance.
-    #[error(
-        "{method} reaches an estimated error of {estimate:.1e} at Ω = {omega:.4} rad/s with {harmonics} harmonics, not {tolerance:.1e}; \
-         raise `tolerance`, or use method `event-driven` (exact laws) or `shooting` (smooth ones)"
-    )]
-    Truncation {
-        /// The method.
-        method: &'static str,
-        /// Drive frequency, rad/s.
-        omega: f64,
-        /// Highest harmonic tried.
-        harmonics: usize,
-        /// Error of the motion relative to its amplitude, estimated.
-        estimate: f64,
-        /// The error that was allowed.
-        tolerance: f64,
-    },
-    /// Nothing holds the structure against the mean of the forces, or only friction does.
-    #[error(
-        "{method} finds no motion at Ω = {omega:.4} rad/s that stays where it is: nothing but friction holds the structure against \
-         a mean force; add the spring that holds it (where friction is enough, method `event-driven` finds the motion)"
-    )]
-    Drift {
-        /// The method.
-        method: &'static str,
-        /// Drive frequency, rad/s.
-        omega: f64,
-    },
-    /// A path that a method gave is no periodic motion.
-    #[error("the motion of {method} at Ω = {omega:.4} rad/s {what}")]
-    NotAnOrbit {
-        /// The method.
-        method: &'static str,
-        /// Drive frequency, rad/s.
-        omega: f64,
-        /// What is wrong.
-        what: &'static str,
-    },
-    /// The drive frequency is no positive finite number.
-    #[error("the drive frequency must be positive and finite, found {omega} rad/s")]
-    Frequency {
-        /// What was given, rad/s.
-        omega: f64,
-    },
-}
-
-impl OrbitError {
-    /// One word for tables.
-    pub fn status(&self) -> &'static str {
-        match self {
-            OrbitError::NotConverged { .. } => "not-converged",
-            OrbitError::Breakdown { .. } => "breakdown",
-            OrbitError::Evidence { .. } => "evidence-fails",
-            OrbitError::Truncation { .. } => "tolerance-not-reached",
-            OrbitError::Drift { .. } => "drifts",
-            OrbitError::NotAnOrbit { .. } => "not-an-orbit",
-            OrbitError::Frequency { .. } => "bad-frequency",
-        }
-    }
 }
 
 /// An option of a method: a key in `[method]`.

@@ -5,7 +5,7 @@
 //! creeps for seconds. It needs no derivative and no luck, so it is an independent check of the other methods.
 
 use super::event_driven::Exact;
-use super::flow::Kind;
+use super::followed::Kind;
 use super::periodic::Search;
 use super::shooting::{Shooter, Shooting};
 use super::{Method, MethodError, MethodInfo, MethodOption, PERIOD, Solver, periods};

@@ -6,7 +6,8 @@
 
 use super::assembly::{Assembly, NEAR_REST};
 use super::event_driven::MISSING_WORK;
-use super::flow::{Flow, Kind};
+use super::flow::Flow;
+use super::followed::Kind;
 use super::guess::Guess;
 use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
 use super::periodic::{Aim, Closed, ReturnMap, Search, close, newton_step, norm};

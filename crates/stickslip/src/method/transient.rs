@@ -3,7 +3,7 @@
 //! Exact laws are followed by events, smooth laws by stiff integration, others and mixtures in equal steps, all in stretches of one drive
 //! period. In a run-up every cycle has its own frequency, constant over the cycle and continuous in phase, as in a stepped-sine test.
 
-use super::{Breakdown, MethodError, flow};
+use super::{Breakdown, MethodError, followed};
 use crate::model::System;
 use crate::orbit::{Sample, Symmetry};
 use std::f64::consts::TAU;
@@ -99,7 +99,7 @@ impl Transient {
         sample: &mut dyn FnMut(f64, f64, &Sample) -> bool,
     ) -> Result<(), TransientError> {
         let shared = Arc::new(system.clone());
-        let mut flow = flow::of(system, self.width, TOLERANCE, NAME)?;
+        let mut flow = followed::of(system, self.width, TOLERANCE, NAME)?;
         flow.keep(true);
         let mut state = [self.displacement.as_slice(), &self.velocity].concat();
         state.resize(flow.states(), 0.0);

@@ -3,14 +3,15 @@
 //! All methods return the same [`Orbit`]. Its numbers (amplitudes, energies, slip) are computed by the method that found it, in
 //! closed form where it can; [`Orbit::sample`] gives the motion at any time.
 
+mod error;
 pub(crate) mod measure;
 mod sampled;
 mod stability;
 
 pub use crate::law::Contact;
 use crate::law::MOST_DIRECTIONS;
-use crate::method::OrbitError;
 use crate::model::System;
+pub use error::{Breakdown, OrbitError};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 pub use stability::Stability;

@@ -8,7 +8,7 @@ pub(crate) mod step;
 
 use super::MethodError;
 use super::assembly::Assembly;
-use super::flow::carries_nothing;
+use super::assembly::carries_nothing;
 use crate::model::System;
 
 /// A system as this integration sees it; `width` (m/s) smooths laws that can be smoothed.

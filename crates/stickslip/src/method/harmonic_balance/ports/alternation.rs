@@ -35,9 +35,9 @@ pub(in super::super) struct Alternation {
     pub(super) column: Vec<Complex64>,
     pub(super) row: Vec<Complex64>,
     pub(super) moment: Vec<f64>,
-    pub(super) intervals: Vec<super::sliders::Interval>,
-    pub(super) extremes: Vec<super::sliders::Extreme>,
-    pub(super) grid: super::sliders::Grid,
+    pub(super) intervals: Vec<super::events::Interval>,
+    pub(super) extremes: Vec<super::events::Extreme>,
+    pub(super) grid: super::events::Grid,
     pub(super) march: super::memory::Memory,
 }
 
@@ -66,7 +66,7 @@ impl Alternation {
             row: vec![ZERO; harmonics.len()],
             intervals: Vec::new(),
             extremes: Vec::new(),
-            grid: super::sliders::Grid::new(top),
+            grid: super::events::Grid::new(top),
             march: super::memory::Memory::default(),
             harmonics,
         }

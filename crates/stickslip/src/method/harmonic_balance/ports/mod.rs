@@ -8,6 +8,7 @@
 //! Both give the derivative by the unknowns exactly, over all axes and harmonics at once. The equations know nothing else of a law.
 
 mod alternation;
+mod events;
 mod march;
 mod memory;
 mod prox;

@@ -8,9 +8,9 @@
 //! adds one product of a column and a row to the derivative.
 
 use super::alternation::{Alternation, ZERO, add_block, add_entries, as_block, pair};
+use super::events::{Anchor, Extreme, Grid, Interval};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
-use stickslip_numerics::fourier::Fourier;
 
 /// One of the parts that stand side by side.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,55 +42,6 @@ impl Part {
             Part::Slider { stiffness, limit } => limit / stiffness,
             Part::Stop { .. } => 0.0,
         }
-    }
-}
-
-/// A part of the period in which the force is `stiffness u + offset`.
-#[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Interval {
-    /// Phase, rad; the end may lie beyond a period.
-    begin: f64,
-    end: f64,
-    stiffness: f64,
-    offset: f64,
-    anchor: Anchor,
-    slips: bool,
-}
-
-/// What the offset moves with.
-#[derive(Debug, Clone, Copy)]
-enum Anchor {
-    Nothing,
-    /// The mean of the motion: the slider was never moved.
-    Mean,
-    /// The motion at a phase, rad.
-    At(f64),
-}
-
-/// A turning point of the motion: phase (rad) and value (m).
-#[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Extreme {
-    at: f64,
-    value: f64,
-}
-
-/// Where a motion is looked at to tell its turning points apart.
-#[derive(Debug, Clone)]
-pub(in super::super) struct Grid {
-    fourier: Fourier,
-    pairs: Vec<(usize, Complex64)>,
-    value: Vec<f64>,
-    slope: Vec<f64>,
-}
-
-/// Points of the grid for every harmonic, at least: between two of them the motion is a cubic but for a thousandth of the highest harmonic.
-const POINTS: usize = 8;
-
-impl Grid {
-    /// For harmonics up to `top`.
-    pub fn new(top: usize) -> Self {
-        let points = (POINTS * (top + 1)).next_power_of_two();
-        Grid { fourier: Fourier::new(points), pairs: Vec::new(), value: vec![0.0; points], slope: vec![0.0; points] }
     }
 }
 
