@@ -318,3 +318,23 @@ fn a_duffing_oscillator_has_both_folds_and_an_unstable_middle() {
     assert!(first > 0 && last + 1 < stable.len() && last - first > 5);
     assert!(stable[first..=last].iter().all(|s| *s == Some(false)), "the unstable orbits are one piece");
 }
+
+/// A node begins where the study says, direction by direction; its name alone does not say where.
+#[test]
+fn a_node_begins_along_its_directions() {
+    let text = |start: &str| {
+        format!(
+            "schema = 1\ntitle = \"Node\"\n[[mass]]\nname = \"b\"\nmass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n\
+             [[spring]]\nbetween = [\"b.x\", \"ground\"]\nstiffness = \"1 N/m\"\n\
+             [[spring]]\nbetween = [\"b.z\", \"ground\"]\nstiffness = \"4 N/m\"\n\
+             [study]\nkind = \"transient\"\nstart = {{ {start} }}\nduration = \"1 s\"\ntime_step = \"0.1 s\"\n"
+        )
+    };
+    let dataset = dataset(&text("\"b.z\" = \"5 mm\""));
+    let motion = table(&dataset, "motion");
+    assert_eq!(motion.numbers("b_x_displacement_m").unwrap()[0], 0.0);
+    assert_eq!(motion.numbers("b_z_displacement_m").unwrap()[0], 5e-3);
+    let study = read_study("study.toml", &text("b = \"5 mm\""), &[]);
+    let problem = study.err().map(|error| error.to_string()).unwrap_or_default();
+    assert!(problem.contains("no free mass `b`"), "{problem}");
+}

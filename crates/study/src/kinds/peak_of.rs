@@ -20,7 +20,8 @@ pub(super) const PEAK_OF: Key = optional(
 
 /// Whether it names masses of the model.
 pub(super) fn check_peak_of(values: &Values, model: &Model) -> Result<(), Complaint> {
-    let masses: Vec<&str> = model.masses.iter().map(|mass| mass.name.as_str()).collect();
+    let places: Vec<String> = model.masses.iter().flat_map(|mass| mass.places()).collect();
+    let masses: Vec<&str> = places.iter().map(String::as_str).collect();
     for name in values.names("peak_of").unwrap_or_default() {
         if name != ALL && !masses.contains(&name.as_str()) {
             return Err(Complaint::unknown("peak_of", "mass", name, &masses));

@@ -136,10 +136,10 @@ fn cost(costing: &Costing<'_>) -> Cost {
 }
 
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
-    let free: Vec<&str> = model
-        .masses
+    let places: Vec<String> = model.masses.iter().flat_map(|mass| mass.places()).collect();
+    let free: Vec<&str> = places
         .iter()
-        .map(|mass| mass.name.as_str())
+        .map(String::as_str)
         .filter(|name| !model.motions.iter().any(|motion| motion.on == *name))
         .collect();
     for key in ["start", "start_velocity"] {
