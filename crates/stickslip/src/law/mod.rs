@@ -40,6 +40,7 @@ mod parameter;
 mod plane;
 mod prox;
 mod rate;
+mod slopes;
 mod step;
 mod stribeck;
 mod stribeck_arctan;

@@ -1,8 +1,9 @@
 //! The rate view: force and rates of internal states, smooth in the motion.
 
 use super::MOST_DIRECTIONS;
+use super::slopes::{FEW, Slopes, WIDTH, seeded};
 use std::fmt::Debug;
-use stickslip_numerics::dual::{Dual, Real, partials, variable};
+use stickslip_numerics::dual::{Dual, Real};
 
 /// The relative motion at a joint, along up to three directions; the first ones count, as many as the law has.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,40 +63,25 @@ pub struct RatePoint {
     /// Rates of the internal states.
     pub rate: Vec<f64>,
     /// Derivatives, one row of arguments for each force, then for each rate.
-    slopes: Vec<f64>,
-    directions: usize,
-    arguments: usize,
+    slopes: Slopes,
 }
 
 impl RatePoint {
     /// For a law with so many directions and internal states.
     pub fn new(directions: usize, states: usize) -> Self {
-        let arguments = 2 * directions + states;
-        RatePoint {
-            force: [0.0; MOST_DIRECTIONS],
-            rate: vec![0.0; states],
-            slopes: vec![0.0; (directions + states) * arguments],
-            directions,
-            arguments,
-        }
+        RatePoint { force: [0.0; MOST_DIRECTIONS], rate: vec![0.0; states], slopes: Slopes::new(directions, states) }
     }
 
     /// Derivatives of force `a` by all arguments.
     pub fn force_slope(&self, a: usize) -> &[f64] {
-        &self.slopes[a * self.arguments..(a + 1) * self.arguments]
+        self.slopes.force(a)
     }
 
     /// Derivatives of the rate of state `s` by all arguments.
     pub fn rate_slope(&self, s: usize) -> &[f64] {
-        let row = self.directions + s;
-        &self.slopes[row * self.arguments..(row + 1) * self.arguments]
+        self.slopes.state(s)
     }
 }
-
-/// Derivatives that are computed in one pass, where there are more than fit a smaller number.
-const WIDTH: usize = 8;
-/// Internal states that are kept on the stack.
-const FEW: usize = 8;
 
 impl<L: RateLaw + Debug + Send + Sync> Rate for L {
     fn states(&self) -> usize {
@@ -136,12 +122,7 @@ fn pass<const N: usize, L: RateLaw>(
     first: usize,
     point: &mut RatePoint,
 ) {
-    let seeded = |value: f64, argument: usize| -> Dual<N> {
-        match argument.checked_sub(first) {
-            Some(at) if at < N => variable(value, at),
-            _ => Dual::from(value),
-        }
-    };
+    let seeded = |value: f64, argument: usize| -> Dual<N> { seeded(value, argument, first) };
     let mut moving = Relative::along(Dual::from(0.0), Dual::from(0.0));
     for a in 0..directions {
         moving.displacement[a] = seeded(motion.displacement[a], a);
@@ -156,17 +137,12 @@ fn pass<const N: usize, L: RateLaw>(
         *dual = seeded(value, 2 * directions + s);
     }
     let force = law.evaluate(&moving, state, rate);
-    let width = N.min(point.arguments - first);
-    let mut keep = |row: usize, value: &Dual<N>| {
-        let at = row * point.arguments + first;
-        point.slopes[at..at + width].copy_from_slice(&partials(value)[..width]);
-    };
     for a in 0..directions {
         point.force[a] = force[a].re;
-        keep(a, &force[a]);
+        point.slopes.keep(a, first, &force[a]);
     }
     for (s, rate) in rate.iter().enumerate() {
         point.rate[s] = rate.re;
-        keep(directions + s, rate);
+        point.slopes.keep(directions + s, first, rate);
     }
 }

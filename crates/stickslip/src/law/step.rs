@@ -1,8 +1,9 @@
 //! The step view: the force at the end of a step, from the motion over it and the state before it (return map).
 
 use super::MOST_DIRECTIONS;
+use super::slopes::{FEW, Slopes, WIDTH, seeded};
 use std::fmt::Debug;
-use stickslip_numerics::dual::{Dual, Real, partials, variable};
+use stickslip_numerics::dual::{Dual, Real};
 
 /// What the author of a law of step form writes, once for numbers and for dual numbers. Time does not occur in it: what happens depends on the
 /// way and not on the speed.
@@ -55,38 +56,25 @@ pub struct StepPoint {
     /// States at the end.
     pub state: Vec<f64>,
     /// Derivatives, one row of arguments for each force, then for each state.
-    slopes: Vec<f64>,
-    directions: usize,
-    arguments: usize,
+    slopes: Slopes,
 }
 
 impl StepPoint {
     /// For a law with so many directions and internal states.
     pub fn new(directions: usize, states: usize) -> Self {
-        let arguments = 2 * directions + states;
-        StepPoint {
-            force: [0.0; MOST_DIRECTIONS],
-            state: vec![0.0; states],
-            slopes: vec![0.0; (directions + states) * arguments],
-            directions,
-            arguments,
-        }
+        StepPoint { force: [0.0; MOST_DIRECTIONS], state: vec![0.0; states], slopes: Slopes::new(directions, states) }
     }
 
     /// Derivatives of force `a` by all arguments.
     pub fn force_slope(&self, a: usize) -> &[f64] {
-        &self.slopes[a * self.arguments..(a + 1) * self.arguments]
+        self.slopes.force(a)
     }
 
     /// Derivatives of state `s` at the end by all arguments.
     pub fn state_slope(&self, s: usize) -> &[f64] {
-        let row = self.directions + s;
-        &self.slopes[row * self.arguments..(row + 1) * self.arguments]
+        self.slopes.state(s)
     }
 }
-
-/// Derivatives that are computed in one pass, where there are more than fit a smaller number.
-const WIDTH: usize = 8;
 
 impl<L: StepLaw + Debug + Send + Sync> Step for L {
     fn states(&self) -> usize {
@@ -124,9 +112,6 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
     }
 }
 
-/// Internal states that are kept on the stack.
-const FEW: usize = 8;
-
 /// Derivatives by the arguments from `first` on, as many as the dual number has.
 fn pass<const N: usize, L: StepLaw>(
     law: &L,
@@ -136,12 +121,7 @@ fn pass<const N: usize, L: StepLaw>(
     first: usize,
     point: &mut StepPoint,
 ) {
-    let seeded = |value: f64, argument: usize| -> Dual<N> {
-        match argument.checked_sub(first) {
-            Some(at) if at < N => variable(value, at),
-            _ => Dual::from(value),
-        }
-    };
+    let seeded = |value: f64, argument: usize| -> Dual<N> { seeded(value, argument, first) };
     let zero = Dual::<N>::from(0.0);
     let (mut before, mut after) = ([zero; MOST_DIRECTIONS], [zero; MOST_DIRECTIONS]);
     for a in 0..directions {
@@ -155,17 +135,12 @@ fn pass<const N: usize, L: StepLaw>(
         *dual = seeded(value, 2 * directions + s);
     }
     let force = law.advance(&before, &after, state);
-    let width = N.min(point.arguments - first);
-    let mut keep = |row: usize, value: &Dual<N>| {
-        let at = row * point.arguments + first;
-        point.slopes[at..at + width].copy_from_slice(&partials(value)[..width]);
-    };
     for a in 0..directions {
         point.force[a] = force[a].re;
-        keep(a, &force[a]);
+        point.slopes.keep(a, first, &force[a]);
     }
     for (s, state) in state.iter().enumerate() {
         point.state[s] = state.re;
-        keep(directions + s, state);
+        point.slopes.keep(directions + s, first, state);
     }
 }
