@@ -88,6 +88,9 @@ impl Law for FrictionContact {
     fn directions(&self) -> usize {
         self.tangents + 1
     }
+    fn normal(&self) -> Option<usize> {
+        Some(self.tangents)
+    }
     /// The slip limit at rest; infinite if there is none.
     fn scale(&self) -> f64 {
         let limit = self.friction * self.preload;

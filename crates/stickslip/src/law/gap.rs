@@ -51,6 +51,9 @@ impl Law for Gap {
     fn values(&self) -> Vec<f64> {
         vec![self.gap, self.stiffness]
     }
+    fn normal(&self) -> Option<usize> {
+        Some(0)
+    }
     fn pieces(&self) -> Option<Vec<Piece>> {
         Some(vec![Piece::Stop { gap: self.gap, stiffness: self.stiffness }])
     }

@@ -159,6 +159,10 @@ pub trait Law: Debug + Send + Sync {
     fn directions(&self) -> usize {
         1
     }
+    /// The direction along which its faces press on each other, if it knows one: that opens and closes, where the others slip.
+    fn normal(&self) -> Option<usize> {
+        None
+    }
     /// The size of its forces, N, for tolerances and guesses: a slip limit, or infinity if nothing bounds them.
     fn scale(&self) -> f64 {
         f64::INFINITY
@@ -241,6 +245,11 @@ impl Piece {
     /// A slider that holds up to the force with which it moves.
     pub fn slider(stiffness: Option<f64>, limit: f64) -> Self {
         Piece::Slider(Slider { stiffness, limit, static_limit: limit })
+    }
+
+    /// Whether it is a slider that holds more than it carries in slip.
+    pub fn drops(&self) -> bool {
+        matches!(self, Piece::Slider(slider) if slider.static_limit > slider.limit)
     }
 
     /// Whether it never carries a force.

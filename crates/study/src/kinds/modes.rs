@@ -49,7 +49,7 @@ pub(super) const KIND: Kind = Kind {
         axes: [Some(Dimension::LENGTH), None],
         // free vibration has no drive frequency: harmonic balance with an unknown frequency and damping is solved
         uses_method: false,
-        needs: |_, system| stickslip::curve::modes::check(system),
+        needs: |_, _, system| stickslip::curve::modes::check(system),
         adapts: false,
         tables: &["modes", "modes_summary"],
     },

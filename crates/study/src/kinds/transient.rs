@@ -1,6 +1,6 @@
 //! Transients: the motion in time from rest or from given displacements; free decay, switched-on drive, or run-up.
 
-use super::keys::{MOST_SAMPLES, anything};
+use super::keys::MOST_SAMPLES;
 use super::orbit::write_sample;
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Figure, Panel, Series};
@@ -19,7 +19,8 @@ use crate::words::shown_hertz;
 use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
-use stickslip::method::transient::{Excitation, Transient};
+use stickslip::method::WIDTH;
+use stickslip::method::transient::{Excitation, Transient, TransientError};
 use stickslip::model::Model;
 
 const FREQUENCY: Takes = Takes::Quantity(Dimension::FREQUENCY, Within::Positive);
@@ -88,7 +89,7 @@ pub(super) const KIND: Kind = Kind {
         axes: [Some(Dimension::TIME), Some(Dimension::LENGTH)],
         // exact and smooth laws alike are followed in time; there is no orbit to be found
         uses_method: false,
-        needs: anything,
+        needs: |_, options, system| Transient::check(system, options.get(WIDTH).copied()),
         adapts: false,
         tables: &["motion", "motion_summary", "decay", "decay_summary"],
     },
@@ -232,7 +233,7 @@ fn compute(work: &Work<'_>) -> Computed {
             excitation,
             duration,
             step,
-            width: case.method.options.get("width").copied(),
+            width: case.method.options.get(WIDTH).copied(),
         };
         let mut stopped = false;
         // of every mass the largest displacement, and when
@@ -275,6 +276,7 @@ fn compute(work: &Work<'_>) -> Computed {
         match end {
             Ok(()) if stopped => part.count(at, NOT_REACHED, None),
             Ok(()) => part.count(at, CONVERGED, None),
+            Err(TransientError::Method(error)) => return Err((case.index, error)),
             Err(error) => part.count(at, "breakdown", Some(error.to_string())),
         }
     }
