@@ -19,6 +19,7 @@ mod key;
 mod kind;
 pub mod kinds;
 pub mod memory;
+mod names;
 mod near;
 mod note;
 mod point;

@@ -71,6 +71,29 @@ vary = { Ft = ["5.5 N", "6.5 N", "7.5 N"] }
     assert!(short.notes.iter().any(|note| note.contains("too short")), "{:?}", short.notes);
 }
 
+/// A slider that holds more than the force never lets the mass move: then no limit is the best, and where only some hold, none of these is.
+#[test]
+fn no_value_is_the_best_where_nothing_moves() {
+    let found = |limits: &str| {
+        let study = format!(
+            "kind = \"performance\"\nfrequency = {{ from = \"0.1 Hz\", to = \"0.2 Hz\", points = 5 }}\nvary = {{ Fc = {limits} }}"
+        );
+        let law = r#"{ kind = "coulomb", limit = "Fc" }"#;
+        let text = oscillating("0.1 kg/s", law, &study).replace("F0 = \"1 N\"", "F0 = \"1 N\"\nFc = \"1 N\"");
+        let found = dataset(&text);
+        let best = table(&found, "optimum");
+        assert!(best.numbers("amplitude_m").unwrap()[0].is_nan() && best.texts("status").unwrap()[0] == "none");
+        assert!(!found.figure.panels[0].series.iter().any(|series| series.label == "optimum"));
+        found.notes.join("; ")
+    };
+    let still = found("[\"2 N\", \"3 N\", \"4 N\"]");
+    assert!(still.contains("nothing whose peak counts moves at any value of Fc"), "{still}");
+    let level = found("[\"0.2 N\", \"2 N\", \"3 N\", \"4 N\"]");
+    assert!(level.contains("3 values of Fc have the same lowest peak, from Fc = 2 N to Fc = 4 N"), "{level}");
+    let falling = found("[\"0.1 N\", \"0.2 N\", \"0.3 N\"]");
+    assert!(falling.contains("stands at an end"), "{falling}");
+}
+
 /// (10.3) at its ends: stuck with the spring of the joint, free without it.
 #[test]
 fn modes_go_from_stuck_to_free() {
@@ -336,5 +359,5 @@ fn a_node_begins_along_its_directions() {
     assert_eq!(motion.numbers("b_z_displacement_m").unwrap()[0], 5e-3);
     let study = read_study("study.toml", &text("b = \"5 mm\""), &[]);
     let problem = study.err().map(|error| error.to_string()).unwrap_or_default();
-    assert!(problem.contains("no free mass `b`"), "{problem}");
+    assert!(problem.contains("`b` has several directions"), "{problem}");
 }

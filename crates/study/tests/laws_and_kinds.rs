@@ -37,7 +37,10 @@ fn model(row: &LawInfo, mass: &str) -> String {
     // whole numbers are written as such
     let values = values.join(", ").replace(".0,", ",");
     let values = values.strip_suffix(".0").unwrap_or(&values);
-    text + &format!("[[joint]]\nname = \"j\"\nbetween = [\"a\", \"ground\"]\nlaw = {{ kind = \"{}\", {values} }}\n", row.name)
+    text + &format!(
+        "[[joint]]\nname = \"j\"\nbetween = [\"a\", \"ground\"]\nlaw = {{ kind = \"{}\", {values} }}\n",
+        row.name
+    )
 }
 
 /// Whether a sentence is a refusal of a model.

@@ -73,8 +73,8 @@ pub use valanis::Valanis;
 
 use num_complex::Complex64;
 use serde::ser::{Serialize, SerializeMap, Serializer};
-use std::fmt::Debug;
 use springs::Springs;
+use std::fmt::Debug;
 use std::sync::Arc;
 
 /// Every law there is, in the order in which lists show them.

@@ -87,7 +87,8 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
         return Err(Complaint::new("amplitude", "the range is empty", "`from` must be below `to`"));
     }
     check_samples(values)?;
-    let (number, masses) = (values.count("mode").unwrap_or(1), model.masses.len() as u64);
+    let (number, masses): (u64, u64) =
+        (values.count("mode").unwrap_or(1), model.masses.iter().map(|mass| mass.places().len() as u64).sum());
     if number > masses {
         let message = format!("there is no mode {number}: the structure has {masses}");
         return Err(Complaint::new("mode", message, "count modes from 1, by rising frequency"));

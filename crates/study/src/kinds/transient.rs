@@ -10,6 +10,7 @@ use crate::info::Complaint;
 use crate::info::KindInfo;
 use crate::key::{Key, Takes, Within, default, optional, required};
 use crate::kind::Kind;
+use crate::names::Names;
 use crate::note::Note;
 use crate::point::place_of;
 use crate::rows::Rows;
@@ -137,17 +138,10 @@ fn cost(costing: &Costing<'_>) -> Cost {
 }
 
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
-    let places: Vec<String> = model.masses.iter().flat_map(|mass| mass.places()).collect();
-    let free: Vec<&str> = places
-        .iter()
-        .map(String::as_str)
-        .filter(|name| !model.motions.iter().any(|motion| motion.on == *name))
-        .collect();
+    let free = Names::of_free_masses(model);
     for key in ["start", "start_velocity"] {
         for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
-            if !free.contains(&name.as_str()) {
-                return Err(Complaint::unknown(key, "free mass", name, &free));
-            }
+            free.one(key, "free mass", name)?;
         }
     }
     let (drive, run_up) = (values.frequencies("frequency"), values.table("run_up"));
