@@ -342,6 +342,25 @@ fn a_duffing_oscillator_has_both_folds_and_an_unstable_middle() {
     assert!(stable[first..=last].iter().all(|s| *s == Some(false)), "the unstable orbits are one piece");
 }
 
+/// A block on a belt sticks until its spring pulls with the static limit, and then slides about the stretch of the dynamic one, with the
+/// velocity of the belt to begin with. The belt is a slow and long motion, as the book advises.
+#[test]
+fn a_long_motion_is_a_belt() {
+    let book = include_str!("../../../docs/src/laws.md");
+    let from = book.find("schema = 1\n[parameters]\nv =").unwrap();
+    let text = &book[from..from + book[from..].find("```").unwrap()];
+    let found = dataset(text);
+    assert!(found.failures.is_empty() && found.record.points.get("converged") == Some(&1), "{:?}", found.record);
+    let x = table(&found, "motion").numbers("block_displacement_m").unwrap();
+    let (fs, fc, k, omega, v) = (2.0f64, 1.0, 100.0, 10.0, 0.05);
+    let slide = ((fs - fc) / k).hypot(v / omega);
+    let late = &x[x.len() / 2..];
+    let (low, high) = late.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(*x), high.max(*x)));
+    // between samples the turning points are missed by slide (ω Δt)²/8
+    let missed = slide * (omega * 2e-3f64).powi(2) / 8.0 + 1e-9;
+    assert!((high - fc / k - slide).abs() < missed && (low - fc / k + slide).abs() < missed, "{low} {high} {slide}");
+}
+
 /// A node begins where the study says, direction by direction; its name alone does not say where.
 #[test]
 fn a_node_begins_along_its_directions() {

@@ -105,7 +105,10 @@ fn a_method_is_refused_or_taken_when_it_is_checked() {
     for row in TABLE {
         for method in method::TABLE {
             let (_, keys) = STUDIES[0];
-            let named = format!("{keys}\n[method]\nkind = \"{}\"", method.name);
+            // whether a motion that is waited for settles is no matter here
+            let waits = method.options.iter().any(|option| option.key == "periods");
+            let few = if waits { "\nperiods = 2" } else { "" };
+            let named = format!("{keys}\n[method]\nkind = \"{}\"{few}", method.name);
             let text = format!("{}[study]\nkind = \"orbit\"\n{named}\n", model(row, "1"));
             hold(&format!("{}, {}", row.name, method.name), &text);
         }

@@ -110,6 +110,8 @@ impl Transient {
         while next <= samples {
             let omega = self.frequency(begin);
             let length = if omega > 0.0 { TAU / omega } else { STRETCH as f64 * self.step };
+            // of a cycle that outlasts the motion only what is asked for
+            let length = if length > self.duration { self.duration + self.step } else { length };
             flow.set_drive(system, omega);
             flow.follow(&mut state, length).map_err(|cause| TransientError::Breakdown { time: begin, cause })?;
             let path = flow.path(&shared, Symmetry::FullPeriod, length);
