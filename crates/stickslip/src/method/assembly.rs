@@ -49,7 +49,7 @@ impl PlacedLaw {
 }
 
 impl Assembly {
-    /// `states` tells the law that a joint is followed with, the number of its states and their size; or what to use instead.
+    /// `states` tells the law that a joint is followed with, the number of its states and their size; or what is missed in it.
     ///
     /// # Errors
     /// A joint that is refused by `states`; a place without mass; a mass matrix that has no inverse.
@@ -60,18 +60,14 @@ impl Assembly {
     ) -> Result<Self, MethodError> {
         let (structure, n) = (system.structure(), system.dofs());
         if let Some(i) = (0..n).find(|&i| structure.mass()[(i, i)] <= 0.0) {
-            return Err(MethodError::NeedsMass { method, place: system.places()[i].clone() });
+            return Err(MethodError::needs_mass(method, system, i));
         }
         let inverse_mass =
-            structure.mass().clone().try_inverse().ok_or(MethodError::NotPositive { method, matrix: "mass" })?;
+            structure.mass().clone().try_inverse().ok_or_else(|| MethodError::mass_not_positive(method))?;
         let (mut joints, mut first_axis, mut internal) = (Vec::new(), 0, 0);
         for joint in system.joints() {
-            let (law, count, state_scale) = states(joint.law()).map_err(|instead| MethodError::Law {
-                method,
-                joint: joint.name().to_owned(),
-                law: joint.law().name(),
-                instead,
-            })?;
+            let (law, count, state_scale) =
+                states(joint.law()).map_err(|misses| MethodError::law(method, joint, misses))?;
             let directions = joint.axes().len();
             joints.push(PlacedLaw { law, first_axis, directions, first_state: internal, states: count, state_scale });
             first_axis += directions;

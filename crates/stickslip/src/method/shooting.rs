@@ -13,7 +13,7 @@ use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
 use super::periodic::{Aim, Closed, ReturnMap, Search, close, newton_step, norm};
 use super::smooth::flow::SmoothFlow;
 use super::stepped::SteppedPath;
-use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, periods};
+use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, WIDTH, periods};
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::measure::measure;
@@ -58,7 +58,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             doc: "relative error per step of the integration, a thousandth of that of orbits in equal steps; 1e-8 when absent",
         },
         MethodOption {
-            key: "width",
+            key: WIDTH,
             dimension: Dimension::VELOCITY,
             count: false,
             doc: "replaces exact laws by smooth ones that change sign over this velocity; exact laws are refused when absent",
@@ -71,7 +71,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             let message = format!("must lie between 1e-13 and 1e-3, found {tolerance}");
             return Err(MethodError::Option { method: NAME, key: "tolerance", message });
         }
-        Ok(Box::new(Shooting { tolerance, width: options.get("width").copied(), period: periods(options) }))
+        Ok(Box::new(Shooting { tolerance, width: options.get(WIDTH).copied(), period: periods(options) }))
     },
 };
 
@@ -108,7 +108,7 @@ impl Method for Shooting {
     fn name(&self) -> &'static str {
         NAME
     }
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         Ok(Box::new(Shooter::new(system, *self, NAME, Search::Newton)?))
     }
 }

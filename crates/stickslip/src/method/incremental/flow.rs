@@ -2,7 +2,7 @@
 
 use super::law;
 use super::step::{Eliminated, Step};
-use crate::law::Contact;
+use crate::law::{Contact, Piece};
 use crate::method::assembly::{Assembly, NEAR_REST};
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
@@ -22,6 +22,9 @@ pub(crate) const MOST: usize = 1 << 16;
 const TOLERANCE: f64 = 1e-6;
 /// Steps are doubled only where they must be: the next stretch tries half as many when the error is below this share of the tolerance.
 const EASY: f64 = 0.1;
+
+/// What is missed in a law of which no smooth neighbour is left either.
+const DROPS: &str = "its friction drops at once when slip begins; that of a law that falls over a `velocity` above zero can be smoothed";
 
 /// Runs the motion of a structure with any laws but rigid sliders.
 pub(crate) struct IncrementalFlow {
@@ -51,10 +54,9 @@ impl IncrementalFlow {
             let chosen = regular.unwrap_or_else(|| joint.clone());
             match law::states(&chosen) {
                 Some((states, scale)) => Ok((chosen, states, scale)),
-                None if joint.pieces().is_some() => Err(
-                    "a law with a spring before its slider, or give the method a `width` (m/s), beside laws that are not exact",
-                ),
-                None => Err("a law with a step or rate view"),
+                None if chosen.pieces().is_some_and(|pieces| pieces.iter().any(Piece::drops)) => Err(DROPS),
+                None if chosen.pieces().is_some() => Err("its slider is rigid, with no spring before it"),
+                None => Err("it has neither a step nor a rate view"),
             }
         })?;
         Ok(IncrementalFlow {
