@@ -1,7 +1,7 @@
 //! The motion over a stretch of time: closed-form segments joined at the switches, with its exact sensitivity.
 
 use super::decide::{AT_LIMIT, Decision};
-use super::mechanics::{Kind, Mechanics, REST};
+use super::mechanics::{Kind, Mechanics, Part, REST};
 use super::memory::Memory;
 use super::pattern::{Beginning, Driven, Pattern, Work};
 use crate::law::Contact;
@@ -79,6 +79,8 @@ pub(crate) struct Flow {
     signals: Vec<Complex64>,
     begins: Vec<Begin>,
     watched: Vec<usize>,
+    /// Of every part, whether it is watched for what ends its pattern forward and backward.
+    nearest: Vec<[bool; 2]>,
     before: DVector<f64>,
     after: DVector<f64>,
     row: DVector<f64>,
@@ -112,6 +114,7 @@ impl Flow {
             signals: Vec::new(),
             begins: Vec::new(),
             watched: Vec::new(),
+            nearest: Vec::new(),
             before: DVector::zeros(states),
             after: DVector::zeros(states),
             row: DVector::zeros(states),
@@ -160,7 +163,7 @@ impl Flow {
                 })?;
             self.start_segment(time, &pattern, driven, state);
             let eased = idle > EASED_AFTER * (1 + self.mechanics.parts.len());
-            self.watch(&pattern, velocity_scale, eased);
+            self.watch(&pattern, &state[2 * n..], velocity_scale, eased);
             self.from.copy_from_slice(&state[..2 * n]);
             let rest = end - time;
             let basis = self.segments[self.used].basis();
@@ -312,8 +315,9 @@ impl Flow {
 
     /// The signals whose zeros are switches: `static limit ∓ f` in stick, the velocity in slip direction in slip, the depth of a stop or what is
     /// missing of it. If `eased`, those that begin at zero may pass it by as much as counts as zero.
-    fn watch(&mut self, shape: &Pattern, velocity_scale: f64, eased: bool) {
+    fn watch(&mut self, shape: &Pattern, springs: &[f64], velocity_scale: f64, eased: bool) {
         let segment = &self.segments[self.used];
+        nearest(&self.mechanics.parts, &segment.contacts, springs, &mut self.nearest);
         let driven = &segment.driven;
         let (n, nb) = (self.mechanics.n, driven.basis.len());
         let (constant, modes) = (driven.basis.constant(), shape.lambda.len());
@@ -330,7 +334,8 @@ impl Flow {
                 }
                 let force = &segment.force[i * nb..(i + 1) * nb];
                 let (now, limit) = (real_dot(force, &self.values), part.holds());
-                for side in [1.0, -1.0] {
+                let sides = [1.0, -1.0].into_iter().zip(self.nearest[i]);
+                for side in sides.filter_map(|(side, nearest)| nearest.then_some(side)) {
                     let at = self.signals.len();
                     self.signals.extend(force.iter().map(|f| f * -side));
                     self.signals[at + constant].re += limit;
@@ -342,6 +347,9 @@ impl Flow {
             }
             if !part.is_slider() && shape.frozen[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
                 continue;
+            }
+            if !self.nearest[i][usize::from(contact == Contact::SlipBackward)] {
+                continue; // it stops with another one of its joint
             }
             let at = self.signals.len();
             self.signals.resize(at + nb, ZERO);
@@ -476,6 +484,35 @@ impl Flow {
         for mut column in sensitivity.column_iter_mut() {
             let along = self.row.dot(&column) / slope;
             column.axpy(along, &self.after, 1.0);
+        }
+    }
+}
+
+/// Which parts are watched, forward and backward, where the sliders behind springs have the forces `springs`. Those of one joint share its
+/// displacement: of the ones that stick only that is watched which reaches its limit first, of the ones that slip only one.
+fn nearest(parts: &[Part], contacts: &[Contact], springs: &[f64], out: &mut Vec<[bool; 2]>) {
+    out.clear();
+    out.resize(parts.len(), [true; 2]);
+    let mut first = 0;
+    for joint in parts.chunk_by(|a, b| a.joint == b.joint) {
+        let range = first..first + joint.len();
+        first = range.end;
+        if joint.len() == 1 {
+            continue;
+        }
+        for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+            let (mut room, mut sticking, mut slipping) = (f64::INFINITY, None, None);
+            for i in range.clone() {
+                let Kind::Elastic { stiffness, limit, state } = parts[i].kind else { continue };
+                out[i][side] = false;
+                let left = (limit - sign * springs[state]) / stiffness;
+                if contacts[i] == Contact::Stick && left < room {
+                    (room, sticking) = (left, Some(i));
+                } else if contacts[i].sign() == sign {
+                    slipping.get_or_insert(i);
+                }
+            }
+            sticking.into_iter().chain(slipping).for_each(|i| out[i][side] = true);
         }
     }
 }

@@ -107,16 +107,15 @@ impl Flow for IncrementalFlow {
     }
 
     fn set_drive(&mut self, system: &System, omega: f64) {
-        let axes: Vec<usize> = (0..self.assembly.axes.len()).collect();
-        self.drive = Drive::at(system, &axes, omega);
+        self.drive = self.assembly.drive(system, omega);
     }
 
     fn weights(&self) -> Vec<f64> {
-        self.assembly.weights(self.drive.omega, NEAR_REST * self.energy_scale())
+        self.assembly.weights(&self.drive)
     }
 
     fn energy_scale(&self) -> f64 {
-        self.drive.energy_scale(&self.assembly.mass, &self.assembly.stiffness)
+        self.assembly.energy_scale(&self.drive)
     }
 
     fn run(
