@@ -400,7 +400,7 @@ impl<'a> Shooter<'a> {
             start: closed.state,
             evidence: Evidence {
                 residual: closed.residual,
-                energy_gap: measured.energy_gap(),
+                energy_gap: measured.energy_gap(0.0),
                 switches: measured.joints.iter().map(|joint| joint.switches).sum(),
                 iterations: closed.iterations,
                 truncation: closed.missing,
