@@ -157,7 +157,8 @@ mod tests {
     #[test]
     fn products_have_the_bits_of_plain_sums() {
         let entry = |at: usize| ((at * 7919 + 13) as f64).sin();
-        for (rows, inner, columns) in [(1, 1, 1), (4, 3, 4), (5, 7, 9), (8, 0, 2), (0, 3, 2), (13, 6, 3), (16, 40, 21)] {
+        for (rows, inner, columns) in [(1, 1, 1), (4, 3, 4), (5, 7, 9), (8, 0, 2), (0, 3, 2), (13, 6, 3), (16, 40, 21)]
+        {
             let a: Vec<f64> = (0..rows * inner).map(entry).collect();
             let b: Vec<f64> = (0..inner * columns).map(|at| entry(at + 1000)).collect();
             let mut c = vec![f64::NAN; rows * columns];

@@ -215,7 +215,8 @@ impl Measured {
     /// `|work in - viscous - friction|` relative to the work, or to what is the least yardstick, J.
     pub fn energy_gap(&self, least: f64) -> f64 {
         let balance = (self.energy.work_in - self.energy.viscous - self.energy.friction).abs();
-        let reference = self.energy.work_in.abs().max(NO_WORK * (self.possible + self.energy.friction.abs())).max(least);
+        let reference =
+            self.energy.work_in.abs().max(NO_WORK * (self.possible + self.energy.friction.abs())).max(least);
         if reference > 0.0 { balance / reference } else { balance }
     }
 }

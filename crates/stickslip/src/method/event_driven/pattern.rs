@@ -504,13 +504,7 @@ impl Pattern {
 
     /// [`Pattern::carry`] of many states: the springs of one joint that stick push together and are stretched together, so that the motion
     /// depends on them by one number, and they on the motion by another.
-    fn carry_by_joints(
-        &self,
-        mechanics: &Mechanics,
-        length: f64,
-        sensitivity: &mut DMatrix<f64>,
-        work: &mut Work,
-    ) {
+    fn carry_by_joints(&self, mechanics: &Mechanics, length: f64, sensitivity: &mut DMatrix<f64>, work: &mut Work) {
         let (n, states) = (mechanics.n, mechanics.states());
         // the parts that stick and their joint, counted among those that have any
         work.sticking.clear();
