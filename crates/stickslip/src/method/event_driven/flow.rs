@@ -542,7 +542,7 @@ fn begin(constant: &mut Complex64, value: f64, zero: f64, eased: bool) -> Begin 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Coulomb, Gap, Jenkins, SharedLaw, Stribeck};
+    use crate::law::{Coulomb, Gap, Iwan, Jenkins, SharedLaw, Stribeck};
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
     use std::sync::Arc;
 
@@ -570,6 +570,45 @@ mod tests {
         let mut flow = Flow::new(mechanics, Drive::default());
         flow.set_drive(drive);
         flow
+    }
+
+    /// Many sliders side by side, beside few: the derivative of the motion is what a small change of the start does to the end, and what those
+    /// that are not watched do is what the force of each says.
+    #[test]
+    fn sensitivities_pass_many_sliders() {
+        let many: SharedLaw = Arc::new(Iwan { stiffness: 2.0, limit: 0.6, chi: -0.5, beta: 0.3, elements: 24 });
+        let spring: SharedLaw = Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 });
+        let mut flow = flow([many.clone(), spring, many]);
+        let states = flow.mechanics.states();
+        assert!(states > 50);
+        let mut start = vec![0.0; states];
+        start[..4].copy_from_slice(&[0.5, -0.3, 0.4, -0.6]);
+        let mut derivative = DMatrix::identity(states, states);
+        let mut end = start.clone();
+        flow.run(&mut end, 0.0, 9.0, Some(&mut derivative)).unwrap();
+        assert!(flow.segments().len() > 30);
+        for segment in flow.segments() {
+            let nb = segment.basis().len();
+            let mut values = vec![ZERO; nb];
+            segment.basis().evaluate(segment.length, &mut values);
+            for (i, part) in flow.mechanics.parts.iter().enumerate() {
+                let force = real_dot(&segment.force[i * nb..(i + 1) * nb], &values);
+                assert!(force.abs() <= part.limit() * (1.0 + 1e-9), "{i}: {force} of {}", part.limit());
+            }
+        }
+        let step = 1e-7;
+        for column in (0..states).step_by(3) {
+            let mut ends = [start.clone(), start.clone()];
+            ends[0][column] += step;
+            ends[1][column] -= step;
+            for end in &mut ends {
+                flow.run(end, 0.0, 9.0, None).unwrap();
+            }
+            for row in 0..states {
+                let (slope, exact) = ((ends[0][row] - ends[1][row]) / (2.0 * step), derivative[(row, column)]);
+                assert!((slope - exact).abs() < 1e-5 * (1.0 + exact.abs()), "{row} by {column}: {exact} and {slope}");
+            }
+        }
     }
 
     /// The derivative of the motion through stops that open and close and through sliders that drop their force, behind held ones, springs and

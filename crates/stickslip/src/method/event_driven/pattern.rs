@@ -506,50 +506,68 @@ impl Pattern {
     /// depends on them by one number, and they on the motion by another.
     fn carry_by_joints(&self, mechanics: &Mechanics, length: f64, sensitivity: &mut DMatrix<f64>, work: &mut Work) {
         let (n, states) = (mechanics.n, mechanics.states());
-        // the parts that stick and their joint, counted among those that have any
-        work.sticking.clear();
-        let mut firsts: Vec<usize> = Vec::new();
+        // springs of one joint have their states side by side; those that slip count with a stiffness of zero, and are forgotten
+        work.springs.clear();
+        work.stiffness.clear();
+        work.kept.clear();
         for (i, part) in mechanics.parts.iter().enumerate() {
-            let (Kind::Elastic { stiffness, state, .. }, true) = (part.kind, self.stuck[i]) else { continue };
-            if firsts.last().is_none_or(|first| mechanics.parts[*first].joint != part.joint) {
-                firsts.push(i);
+            let Kind::Elastic { stiffness, state, .. } = part.kind else { continue };
+            match work.springs.last_mut() {
+                Some(springs) if mechanics.parts[springs.part].joint == part.joint => springs.states.end = state + 1,
+                _ => work.springs.push(Springs { part: i, states: state..state + 1, sticking: None }),
             }
-            work.sticking.push((firsts.len() - 1, 2 * n + state, stiffness));
+            if let (true, Some(springs)) = (self.stuck[i], work.springs.last_mut()) {
+                springs.sticking.get_or_insert(state);
+            }
+            work.stiffness.push(if self.stuck[i] { stiffness } else { 0.0 });
+            work.kept.push(if self.stuck[i] { 1.0 } else { 0.0 });
         }
-        let inner = 2 * n + firsts.len();
+        let inner = 2 * n + work.springs.len();
         work.transition.resize(2 * n * inner, 0.0);
         for (column, motion) in work.transition.chunks_exact_mut((2 * n).max(1)).enumerate() {
-            let spring = column.checked_sub(2 * n).and_then(|g| mechanics.parts[firsts[g]].state());
-            self.moved_by(spring.map_or(column, |state| 2 * n + state), length, &work.moved, motion);
+            match column.checked_sub(2 * n).map(|joint| work.springs[joint].sticking) {
+                None => self.moved_by(column, length, &work.moved, motion),
+                Some(Some(state)) => self.moved_by(2 * n + state, length, &work.moved, motion),
+                Some(None) => motion.fill(0.0),
+            }
         }
         work.rows.resize(inner * states, 0.0);
         let columns = sensitivity.as_slice().chunks_exact(states);
         for (row, from) in work.rows.chunks_exact_mut(inner.max(1)).zip(columns) {
             let (motion, pushes) = row.split_at_mut(2 * n);
-            motion.copy_from_slice(&from[..2 * n]);
-            pushes.fill(0.0);
-            work.sticking.iter().for_each(|(joint, state, _)| pushes[*joint] += from[*state]);
+            let (from, springs) = from.split_at(2 * n);
+            motion.copy_from_slice(from);
+            for (push, Springs { states, .. }) in pushes.iter_mut().zip(&work.springs) {
+                *push = sum_of_products(&work.kept[states.clone()], &springs[states.clone()]);
+            }
         }
         work.product.resize(2 * n * states, 0.0);
         multiply(&work.transition, &work.rows, &mut work.product, (2 * n, inner, states));
-        work.stretch.resize(firsts.len(), 0.0);
         for (c, column) in sensitivity.as_mut_slice().chunks_exact_mut(states).enumerate() {
             let moved = &work.product[c * 2 * n..(c + 1) * 2 * n];
-            for (stretch, first) in work.stretch.iter_mut().zip(&firsts) {
-                let part = &mechanics.parts[*first];
-                *stretch = part.along(&moved[..n]) - part.along(&column[..n]);
-            }
             let (motion, springs) = column.split_at_mut(2 * n);
-            motion.copy_from_slice(moved);
-            let mut next = 0;
-            for &(joint, state, stiffness) in &work.sticking {
-                springs[next..state - 2 * n].fill(0.0); // those that slip forget
-                springs[state - 2 * n] += stiffness * work.stretch[joint];
-                next = state - 2 * n + 1;
+            for Springs { part, states, .. } in &work.springs {
+                let part = &mechanics.parts[*part];
+                let stretch = part.along(&moved[..n]) - part.along(&motion[..n]);
+                let of_joint = work.stiffness[states.clone()].iter().zip(&work.kept[states.clone()]);
+                for (force, (stiffness, kept)) in springs[states.clone()].iter_mut().zip(of_joint) {
+                    *force = kept * *force + stiffness * stretch;
+                }
             }
-            springs[next..].fill(0.0);
+            motion.copy_from_slice(moved);
         }
     }
+}
+
+/// `Σ a b`, in four sums side by side.
+fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (whole, rest) = (a.chunks_exact(4).zip(b.chunks_exact(4)), a.len() - a.len() % 4);
+    for (a, b) in whole {
+        (0..4).for_each(|k| sums[k] += a[k] * b[k]);
+    }
+    let last: f64 = a[rest..].iter().zip(&b[rest..]).map(|(a, b)| a * b).sum();
+    sums[0] + sums[1] + sums[2] + sums[3] + last
 }
 
 /// Scratch memory of the pattern's formulas.
@@ -567,11 +585,23 @@ pub(crate) struct Work {
     /// Derivative of the end of a stretch by its start, column after column, and what becomes of the sensitivity.
     transition: Vec<f64>,
     product: Vec<f64>,
-    /// Of [`Pattern::carry_by_joints`]: joint, state and stiffness of the springs that stick; what the sensitivity moves and pushes by; how far the
-    /// joints' springs are stretched.
-    sticking: Vec<(usize, usize, f64)>,
+    /// Of [`Pattern::carry_by_joints`]: the springs of each joint, with stiffness and whether they stick (1 or 0); what the sensitivity moves and
+    /// pushes by.
+    springs: Vec<Springs>,
+    stiffness: Vec<f64>,
+    kept: Vec<f64>,
     rows: Vec<f64>,
-    stretch: Vec<f64>,
+}
+
+/// The springs before the sliders of one joint.
+#[derive(Debug, Clone)]
+struct Springs {
+    /// The first part.
+    part: usize,
+    /// Their forces among those of all springs.
+    states: std::ops::Range<usize>,
+    /// The first that sticks.
+    sticking: Option<usize>,
 }
 
 impl Work {
@@ -588,9 +618,10 @@ impl Work {
             moved: vec![0.0; 8 * n * n],
             transition: vec![0.0; small * small],
             product: vec![0.0; small * small],
-            sticking: Vec::new(),
+            springs: Vec::new(),
+            stiffness: Vec::new(),
+            kept: Vec::new(),
             rows: Vec::new(),
-            stretch: Vec::new(),
         }
     }
 
