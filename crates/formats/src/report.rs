@@ -17,7 +17,7 @@ const SHOWN: usize = 6;
 ///
 /// let k = Matrix::new(2, 2, Symmetry::Symmetric, [(0, 0, 2e5), (1, 0, -1e5)])?;
 /// let report = Report::new(&k);
-/// assert_eq!((report.entries, report.zero_diagonal), (2, vec![1]));
+/// assert_eq!((report.entries, &report.zero_diagonal[..]), (2, &[1][..]));
 /// assert!(report.to_string().contains("2 x 2, 2 entries"));
 /// # Ok::<(), stickslip_formats::Error>(())
 /// ```
