@@ -154,7 +154,7 @@ mod tests {
         fn name(&self) -> &'static str {
             "folded"
         }
-        fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
             Ok(Box::new(FoldedSolver { solver: EventDriven.solver(system)?, fold: self.fold, last: None }))
         }
     }
