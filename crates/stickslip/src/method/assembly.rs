@@ -118,10 +118,21 @@ impl Assembly {
         }
     }
 
-    /// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia, internal states with the scale of the
-    /// motion, `rest` (√J).
-    pub fn weights(&self, omega: f64, rest: f64) -> Vec<f64> {
-        let n = self.n;
+    /// The excitation at `omega` (rad/s) along the axes; at zero only constant forces are left.
+    pub fn drive(&self, system: &System, omega: f64) -> Drive {
+        let axes: Vec<usize> = (0..self.axes.len()).collect();
+        Drive::at(system, &axes, omega)
+    }
+
+    /// Square root of an energy that the loads can give, √J.
+    pub fn energy_scale(&self, drive: &Drive) -> f64 {
+        drive.energy_scale(&self.mass, &self.stiffness)
+    }
+
+    /// Weights of the energy norm under a drive: each displacement with the larger of its stiffness and its inertia, internal states with the
+    /// scale of the motion.
+    pub fn weights(&self, drive: &Drive) -> Vec<f64> {
+        let (n, omega, rest) = (self.n, drive.omega, NEAR_REST * self.energy_scale(drive));
         let mut weights = vec![1.0; self.states()];
         for i in 0..n {
             let inertia = omega * omega * self.mass[(i, i)];
@@ -144,7 +155,7 @@ impl Assembly {
         let x = state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs()));
         let v = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
         let mobility = if n == 0 { 0.0 } else { self.inverse_mass.amax().sqrt() };
-        let loads = drive.energy_scale(&self.mass, &self.stiffness) * mobility;
+        let loads = self.energy_scale(drive) * mobility;
         let velocity = v.max(x * rate).max(drive.imposed_velocity()).max(NEAR_REST * loads).max(f64::MIN_POSITIVE);
         (velocity / rate, velocity)
     }

@@ -1,0 +1,198 @@
+//! MATLAB `.mat` of version 7.3, which is HDF5, and plain HDF5 of h5py: full matrices as datasets, sparse ones as groups.
+//!
+//! MATLAB stores columns first, so that HDF5 sees its matrices transposed; what has the attribute `MATLAB_class` is turned back.
+//! A sparse matrix is a group with the parts `data`, `ir`, `jc` and the number of its rows as attribute `MATLAB_sparse`.
+//! Source: HDF5 File Format Specification 3.0 (by the crate `hdf5-pure`); MathWorks documentation of `save`, `-v7.3`.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
+
+use crate::error::{Error, Kind, Place};
+use crate::inflate::EXPANSION;
+use crate::matrix::{Symmetry, Triplets};
+use crate::npz::compressed;
+use crate::{COMPLEX, Format, Item};
+
+pub(crate) const FORMAT: Format = Format {
+    name: "hdf5",
+    summary: "MATLAB (.mat) of version 7.3, `save -v7.3`, and datasets of h5py (.h5)",
+    // The superblock stands at the beginning or, behind a block of the user such as MATLAB's, at 512, 1024, 2048.
+    sniff: |bytes| [0, 512, 1024, 2048].iter().any(|&at| bytes.get(at..).is_some_and(|rest| rest.starts_with(MAGIC))),
+    open,
+};
+
+const MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
+
+/// Groups within groups that are followed: links may go in circles.
+const DEPTH: usize = 8;
+
+/// Members of a file that are listed.
+const MEMBERS: usize = 10_000;
+
+/// Numbers that any dataset may have, beyond what its file has bytes for.
+const ALWAYS: usize = 1 << 17;
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let file = File::from_bytes(bytes.to_vec()).map_err(|error| fault(&error, Place::File))?;
+    let mut items = Vec::new();
+    let limit = ALWAYS.max(bytes.len().saturating_mul(EXPANSION) / size_of::<f64>());
+    walk(&Rc::new(file.root()), "", limit, DEPTH, &mut items)?;
+    Ok(items)
+}
+
+fn fault(error: &hdf5_pure::Error, place: Place) -> Error {
+    let problem = format!("the HDF5 file cannot be read: {error}");
+    Error::new(Kind::Malformed, place, problem, "save or copy it again, in MATLAB without -v7.3 if that does not help")
+}
+
+/// Adds what a group and the groups in it hold.
+fn walk(group: &Rc<Group>, path: &str, limit: usize, depth: usize, items: &mut Vec<Item>) -> Result<(), Error> {
+    let here = || Place::Variable(path.to_string());
+    // MATLAB keeps the parts of cells and objects in groups of its own, `#refs#` and `#subsystem#`.
+    let own = |name: &String| !name.starts_with('#');
+    let full = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
+    for name in group.datasets().map_err(|error| fault(&error, here()))?.into_iter().filter(own) {
+        if items.len() >= MEMBERS {
+            return Ok(());
+        }
+        let dataset = group.dataset(&name).map_err(|error| fault(&error, Place::Variable(full(&name))))?;
+        items.push(dense_item(dataset, full(&name), limit)?);
+    }
+    for name in group.groups().map_err(|error| fault(&error, here()))?.into_iter().filter(own) {
+        if items.len() >= MEMBERS {
+            return Ok(());
+        }
+        let place = || Place::Variable(full(&name));
+        let inner = Rc::new(group.group(&name).map_err(|error| fault(&error, place()))?);
+        let attributes = inner.attrs().map_err(|error| fault(&error, place()))?;
+        if let Some(rows) = attributes.get("MATLAB_sparse") {
+            let rows = whole(rows).ok_or_else(|| {
+                let problem = "the attribute MATLAB_sparse is no number of rows".into();
+                Error::new(Kind::Malformed, place(), problem, "save the file again")
+            })?;
+            items.push(sparse_item(inner, full(&name), rows, limit)?);
+        } else if depth > 0 {
+            walk(&inner, &full(&name), limit, depth - 1, items)?;
+        }
+    }
+    Ok(())
+}
+
+/// A count in an attribute.
+fn whole(value: &AttrValue) -> Option<usize> {
+    match value {
+        AttrValue::U64(value) => usize::try_from(*value).ok(),
+        AttrValue::I64(value) => usize::try_from(*value).ok(),
+        AttrValue::U64Array(values) => usize::try_from(*values.first()?).ok(),
+        AttrValue::I64Array(values) => usize::try_from(*values.first()?).ok(),
+        AttrValue::U32(value) => usize::try_from(*value).ok(),
+        AttrValue::I32(value) => usize::try_from(*value).ok(),
+        _ => None,
+    }
+}
+
+fn dense_item(dataset: Dataset, name: String, limit: usize) -> Result<Item<'static>, Error> {
+    let place = Place::Variable(name.clone());
+    let error = |error: hdf5_pure::Error| fault(&error, place.clone());
+    let note = match dataset.dtype().map_err(error)? {
+        DType::Compound(fields) if fields.iter().any(|(field, _)| field == "imag" || field == "i") => Some(COMPLEX),
+        DType::F32 | DType::F64 => None,
+        DType::I8 | DType::I16 | DType::I32 | DType::I64 | DType::U8 | DType::U16 | DType::U32 | DType::U64 => None,
+        DType::String | DType::VariableLengthString => Some("text"),
+        DType::ObjectReference => Some("a cell array or an object"),
+        _ => Some("of a type that is no number"),
+    };
+    let attributes = dataset.attrs().map_err(error)?;
+    let note = note.or_else(|| of_matlab(&attributes));
+    if let Some(note) = note {
+        return Ok(Item::other(name, note));
+    }
+    let matlab = attributes.contains_key("MATLAB_class");
+    let shape = sizes(&dataset, &place)?;
+    let (rows, columns) = match shape[..] {
+        [] => (1, 1),
+        [rows] => (rows, 1),
+        [columns, rows] if matlab => (rows, columns),
+        [rows, columns] => (rows, columns),
+        _ => return Ok(Item::other(name, format!("an array of {} dimensions", shape.len()))),
+    };
+    Ok(Item::new(name.clone(), rows, columns, move || {
+        let values = numbers(&dataset, limit, &name, Dataset::read_f64)?;
+        if rows.checked_mul(columns) != Some(values.len()) {
+            let problem = format!("{} numbers for {rows} x {columns}", values.len());
+            return Err(Error::new(Kind::Count, Place::Variable(name.clone()), problem, "save the file again"));
+        }
+        let mut triplets = Triplets::new(rows, columns, 0, Place::File)?;
+        for (at, &value) in values.iter().enumerate() {
+            let (row, column) = if matlab { (at % rows, at / rows) } else { (at / columns, at % columns) };
+            triplets.push(row, column, value, Place::Variable(name.clone()))?;
+        }
+        triplets.finish(Symmetry::General)
+    }))
+}
+
+/// What MATLAB says that a dataset of numbers is, if that is no matrix.
+fn of_matlab(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
+    if attributes.contains_key("MATLAB_empty") {
+        return Some("empty");
+    }
+    match attributes.get("MATLAB_class")? {
+        AttrValue::AsciiString(class) | AttrValue::String(class) if class == "char" => Some("text"),
+        AttrValue::AsciiString(class) | AttrValue::String(class) if class == "cell" => Some("a cell array"),
+        _ => None,
+    }
+}
+
+fn sizes(dataset: &Dataset, place: &Place) -> Result<Vec<usize>, Error> {
+    let shape = dataset.shape().map_err(|error| fault(&error, place.clone()))?;
+    shape.into_iter().map(usize::try_from).collect::<Result<_, _>>().map_err(|_| too_large(place.clone()))
+}
+
+fn too_large(place: Place) -> Error {
+    let problem = "the dataset states more numbers than a file of this length can hold".into();
+    Error::new(Kind::TooLarge, place, problem, "save the file again, without compression if it is right")
+}
+
+/// All numbers of a dataset, of which there may be `limit`.
+fn numbers<T>(
+    dataset: &Dataset,
+    limit: usize,
+    name: &str,
+    read: impl Fn(&Dataset) -> Result<Vec<T>, hdf5_pure::Error>,
+) -> Result<Vec<T>, Error> {
+    let place = Place::Variable(name.to_string());
+    // A chunk is unpacked as a whole, even where the dataset ends within it.
+    let chunk = dataset.chunk_shape().map_err(|error| fault(&error, place.clone()))?.unwrap_or_default();
+    let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
+    let shape = dataset.shape().map_err(|error| fault(&error, place.clone()))?;
+    let counts = [product(&shape), product(&chunk)];
+    if counts.iter().any(|count| count.is_none_or(|count| count > limit as u64)) {
+        return Err(too_large(place));
+    }
+    read(dataset).map_err(|error| fault(&error, place))
+}
+
+fn sparse_item(group: Rc<Group>, name: String, rows: usize, limit: usize) -> Result<Item<'static>, Error> {
+    let place = Place::Variable(name.clone());
+    let part = move |part: &str| group.dataset(part).map_err(|error| fault(&error, place.clone()));
+    let pointers = sizes(&part("jc")?, &Place::Variable(name.clone()))?;
+    let columns = pointers.first().copied().unwrap_or_default().saturating_sub(1);
+    Ok(Item::new(name.clone(), rows, columns, move || {
+        let whole = |name_of: &str| -> Result<Vec<usize>, Error> {
+            let found = numbers(&part(name_of)?, limit, &name, Dataset::read_u64)?;
+            Ok(found.into_iter().map(|index| usize::try_from(index).unwrap_or(usize::MAX)).collect())
+        };
+        let pointers = whole("jc")?;
+        let mut triplets = Triplets::new(rows, columns, 0, Place::File)?;
+        // A matrix without entries has neither rows nor values.
+        if pointers.last().is_some_and(|&count| count > 0) {
+            let (inner, values) = (whole("ir")?, numbers(&part("data")?, limit, &name, Dataset::read_f64)?);
+            compressed(&pointers, &inner, &values, columns, |column, row, value| {
+                triplets.push(row, column, value, Place::Variable(name.clone()))
+            })?;
+        }
+        triplets.finish(Symmetry::General)
+    }))
+}
