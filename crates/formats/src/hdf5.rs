@@ -5,12 +5,13 @@
 //! Source: HDF5 File Format Specification 3.0 (by the crate `hdf5-pure`); MathWorks documentation of `save`, `-v7.3`.
 
 use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 
 use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 
 use crate::error::{Error, Kind, Place};
-use crate::inflate::EXPANSION;
+use crate::inflate::Limit;
 use crate::matrix::{Symmetry, Triplets};
 use crate::npz::compressed;
 use crate::{COMPLEX, Format, Item};
@@ -28,45 +29,53 @@ const MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// Groups within groups that are followed: links may go in circles.
 const DEPTH: usize = 8;
 
+/// Numbers that a chunk may have, even where its dataset has less: those of h5py have at most 2^17.
+const CHUNK: u64 = 1 << 20;
+
 /// Members of a file that are listed.
 const MEMBERS: usize = 10_000;
 
-/// Numbers that any dataset may have, beyond what its file has bytes for.
-const ALWAYS: usize = 1 << 17;
-
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    let file = File::from_bytes(bytes.to_vec()).map_err(|error| fault(&error, Place::File))?;
+    let file = guarded(Place::File, || File::from_bytes(bytes.to_vec()))?;
     let mut items = Vec::new();
-    let limit = ALWAYS.max(bytes.len().saturating_mul(EXPANSION) / size_of::<f64>());
-    walk(&Rc::new(file.root()), "", limit, DEPTH, &mut items)?;
+    walk(&Rc::new(file.root()), "", Limit::of(bytes.len()), DEPTH, &mut items)?;
     Ok(items)
 }
 
-fn fault(error: &hdf5_pure::Error, place: Place) -> Error {
-    let problem = format!("the HDF5 file cannot be read: {error}");
-    Error::new(Kind::Malformed, place, problem, "save or copy it again, in MATLAB without -v7.3 if that does not help")
+/// What the crate `hdf5-pure` answers. It adds up numbers of damaged files without a check (0.47, positions of chunks), and may panic.
+fn guarded<T>(place: Place, ask: impl FnOnce() -> Result<T, hdf5_pure::Error>) -> Result<T, Error> {
+    // What it was working on is dropped with the error: nobody sees a half-made state.
+    let answer = catch_unwind(AssertUnwindSafe(ask));
+    let problem = match answer {
+        Ok(Ok(answer)) => return Ok(answer),
+        Ok(Err(error)) => error.to_string(),
+        Err(_) => "its numbers contradict each other".into(),
+    };
+    let problem = format!("the HDF5 file cannot be read: {problem}");
+    let remedy = "save or copy it again, in MATLAB without -v7.3 if that does not help";
+    Err(Error::new(Kind::Malformed, place, problem, remedy))
 }
 
 /// Adds what a group and the groups in it hold.
-fn walk(group: &Rc<Group>, path: &str, limit: usize, depth: usize, items: &mut Vec<Item>) -> Result<(), Error> {
+fn walk(group: &Rc<Group>, path: &str, limit: Limit, depth: usize, items: &mut Vec<Item>) -> Result<(), Error> {
     let here = || Place::Variable(path.to_string());
     // MATLAB keeps the parts of cells and objects in groups of its own, `#refs#` and `#subsystem#`.
     let own = |name: &String| !name.starts_with('#');
     let full = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
-    for name in group.datasets().map_err(|error| fault(&error, here()))?.into_iter().filter(own) {
+    for name in guarded(here(), || group.datasets())?.into_iter().filter(own) {
         if items.len() >= MEMBERS {
             return Ok(());
         }
-        let dataset = group.dataset(&name).map_err(|error| fault(&error, Place::Variable(full(&name))))?;
+        let dataset = guarded(Place::Variable(full(&name)), || group.dataset(&name))?;
         items.push(dense_item(dataset, full(&name), limit)?);
     }
-    for name in group.groups().map_err(|error| fault(&error, here()))?.into_iter().filter(own) {
+    for name in guarded(here(), || group.groups())?.into_iter().filter(own) {
         if items.len() >= MEMBERS {
             return Ok(());
         }
         let place = || Place::Variable(full(&name));
-        let inner = Rc::new(group.group(&name).map_err(|error| fault(&error, place()))?);
-        let attributes = inner.attrs().map_err(|error| fault(&error, place()))?;
+        let inner = Rc::new(guarded(place(), || group.group(&name))?);
+        let attributes = guarded(place(), || inner.attrs())?;
         if let Some(rows) = attributes.get("MATLAB_sparse") {
             let rows = whole(rows).ok_or_else(|| {
                 let problem = "the attribute MATLAB_sparse is no number of rows".into();
@@ -93,10 +102,9 @@ fn whole(value: &AttrValue) -> Option<usize> {
     }
 }
 
-fn dense_item(dataset: Dataset, name: String, limit: usize) -> Result<Item<'static>, Error> {
+fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'static>, Error> {
     let place = Place::Variable(name.clone());
-    let error = |error: hdf5_pure::Error| fault(&error, place.clone());
-    let note = match dataset.dtype().map_err(error)? {
+    let note = match guarded(place.clone(), || dataset.dtype())? {
         DType::Compound(fields) if fields.iter().any(|(field, _)| field == "imag" || field == "i") => Some(COMPLEX),
         DType::F32 | DType::F64 => None,
         DType::I8 | DType::I16 | DType::I32 | DType::I64 | DType::U8 | DType::U16 | DType::U32 | DType::U64 => None,
@@ -104,7 +112,7 @@ fn dense_item(dataset: Dataset, name: String, limit: usize) -> Result<Item<'stat
         DType::ObjectReference => Some("a cell array or an object"),
         _ => Some("of a type that is no number"),
     };
-    let attributes = dataset.attrs().map_err(error)?;
+    let attributes = guarded(place.clone(), || dataset.attrs())?;
     let note = note.or_else(|| of_matlab(&attributes));
     if let Some(note) = note {
         return Ok(Item::other(name, note));
@@ -146,7 +154,7 @@ fn of_matlab(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
 }
 
 fn sizes(dataset: &Dataset, place: &Place) -> Result<Vec<usize>, Error> {
-    let shape = dataset.shape().map_err(|error| fault(&error, place.clone()))?;
+    let shape = guarded(place.clone(), || dataset.shape())?;
     shape.into_iter().map(usize::try_from).collect::<Result<_, _>>().map_err(|_| too_large(place.clone()))
 }
 
@@ -155,28 +163,29 @@ fn too_large(place: Place) -> Error {
     Error::new(Kind::TooLarge, place, problem, "save the file again, without compression if it is right")
 }
 
-/// All numbers of a dataset, of which there may be `limit`.
+/// All numbers of a dataset.
 fn numbers<T>(
     dataset: &Dataset,
-    limit: usize,
+    limit: Limit,
     name: &str,
     read: impl Fn(&Dataset) -> Result<Vec<T>, hdf5_pure::Error>,
 ) -> Result<Vec<T>, Error> {
     let place = Place::Variable(name.to_string());
     // A chunk is unpacked as a whole, even where the dataset ends within it.
-    let chunk = dataset.chunk_shape().map_err(|error| fault(&error, place.clone()))?.unwrap_or_default();
+    let chunk = guarded(place.clone(), || dataset.chunk_shape())?.unwrap_or_default();
     let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
-    let shape = dataset.shape().map_err(|error| fault(&error, place.clone()))?;
-    let counts = [product(&shape), product(&chunk)];
-    if counts.iter().any(|count| count.is_none_or(|count| count > limit as u64)) {
+    let shape = guarded(place.clone(), || dataset.shape())?;
+    let count = product(&shape).filter(|&count| count <= limit.numbers());
+    let most = count.map(|count| count.max(CHUNK));
+    if most.is_none_or(|most| product(&chunk).is_none_or(|chunk| chunk > most)) {
         return Err(too_large(place));
     }
-    read(dataset).map_err(|error| fault(&error, place))
+    guarded(place, || read(dataset))
 }
 
-fn sparse_item(group: Rc<Group>, name: String, rows: usize, limit: usize) -> Result<Item<'static>, Error> {
+fn sparse_item(group: Rc<Group>, name: String, rows: usize, limit: Limit) -> Result<Item<'static>, Error> {
     let place = Place::Variable(name.clone());
-    let part = move |part: &str| group.dataset(part).map_err(|error| fault(&error, place.clone()));
+    let part = move |part: &str| guarded(place.clone(), || group.dataset(part));
     let pointers = sizes(&part("jc")?, &Place::Variable(name.clone()))?;
     let columns = pointers.first().copied().unwrap_or_default().saturating_sub(1);
     Ok(Item::new(name.clone(), rows, columns, move || {
@@ -195,4 +204,17 @@ fn sparse_item(group: Rc<Group>, name: String, rows: usize, limit: usize) -> Res
         }
         triplets.finish(Symmetry::General)
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_of_the_library_is_an_error() {
+        let found = guarded::<()>(Place::Byte(3), || panic!("attempt to add with overflow, on purpose"));
+        assert_eq!(found.map_err(|error| (error.kind, error.place)), Err((Kind::Malformed, Place::Byte(3))));
+        let found = guarded(Place::File, || File::from_bytes(vec![0; 600])).map(|_| ());
+        assert_eq!(found.map_err(|error| error.kind), Err(Kind::Malformed));
+    }
 }

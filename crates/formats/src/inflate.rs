@@ -6,13 +6,30 @@ use flate2::read::{DeflateDecoder, ZlibDecoder};
 
 use crate::error::{Error, Kind, Place};
 
-/// How much larger than its file a compressed part may become, beyond [`ALWAYS`].
+/// How many times as large as its file what is unpacked may become, beyond [`UNPACKED_ALWAYS`].
 ///
-/// Deflate can pack 1030 bytes into one, which makes bombs possible. Matrices of regular meshes, whose values repeat, reach 40.
+/// Deflate can pack 1030 bytes into one, which makes bombs possible. A sparse stiffness of a regular mesh, whose values repeat, is packed
+/// to a 25th; parts of files, such as the equal values of a mass, and full matrices of mostly zeros to a 900th.
 pub const EXPANSION: usize = 100;
 
-/// Bytes that any compressed part may have.
-const ALWAYS: usize = 1 << 20;
+/// Bytes that may always be unpacked: a full matrix of 5800 rows.
+pub const UNPACKED_ALWAYS: usize = 256 << 20;
+
+/// How many bytes may be unpacked from a file.
+#[derive(Clone, Copy)]
+pub(crate) struct Limit(usize);
+
+impl Limit {
+    /// Of a file of so many bytes.
+    pub fn of(file: usize) -> Self {
+        Self(UNPACKED_ALWAYS.max(file.saturating_mul(EXPANSION)))
+    }
+
+    /// In numbers of 8 bytes.
+    pub fn numbers(self) -> u64 {
+        (self.0 / size_of::<f64>()) as u64
+    }
+}
 
 /// The two wrappings of deflate.
 #[derive(Clone, Copy)]
@@ -24,13 +41,13 @@ pub(crate) enum Wrapping {
 }
 
 /// Unpacks all of `packed`.
-pub(crate) fn inflate(packed: &[u8], wrapping: Wrapping, place: &Place) -> Result<Vec<u8>, Error> {
-    let most = ALWAYS.max(packed.len().saturating_mul(EXPANSION));
+pub(crate) fn inflate(packed: &[u8], wrapping: Wrapping, limit: Limit, place: &Place) -> Result<Vec<u8>, Error> {
+    let most = limit.0;
     let (bytes, damage) = up_to(packed, wrapping, most + 1);
     let fault = |kind, problem: String, remedy: &str| Err(Error::new(kind, place.clone(), problem, remedy));
     if bytes.len() > most {
         let problem = format!("{} compressed bytes become more than {most}", packed.len());
-        return fault(Kind::TooLarge, problem, "save it without compression");
+        return fault(Kind::TooLarge, problem, "save it as a sparse matrix, or without compression");
     }
     match damage {
         None => Ok(bytes),
@@ -71,9 +88,10 @@ mod tests {
 
     #[test]
     fn a_bomb_stops_early() -> std::io::Result<()> {
-        let bomb = pack(&vec![0; 40 << 20])?;
-        assert!(bomb.len() < 50_000);
-        let found = inflate(&bomb, Wrapping::Zlib, &Place::Byte(7)).map_err(|e| (e.kind, e.place));
+        let limit = Limit::of(1);
+        let bomb = pack(&vec![0; UNPACKED_ALWAYS + 1])?;
+        assert!(bomb.len() < 300_000);
+        let found = inflate(&bomb, Wrapping::Zlib, limit, &Place::Byte(7)).map_err(|e| (e.kind, e.place));
         assert_eq!(found, Err((Kind::TooLarge, Place::Byte(7))));
         assert_eq!(beginning(&bomb, Wrapping::Zlib, 5), [0; 5]);
         Ok(())
@@ -82,8 +100,11 @@ mod tests {
     #[test]
     fn what_is_damaged_or_short_is_refused() -> std::io::Result<()> {
         let packed = pack(b"a text that is packed")?;
-        assert_eq!(inflate(&packed, Wrapping::Zlib, &Place::File).as_deref(), Ok(&b"a text that is packed"[..]));
-        let short = inflate(&packed[..packed.len() - 6], Wrapping::Zlib, &Place::File);
+        assert_eq!(
+            inflate(&packed, Wrapping::Zlib, Limit::of(1), &Place::File).as_deref(),
+            Ok(&b"a text that is packed"[..])
+        );
+        let short = inflate(&packed[..packed.len() - 6], Wrapping::Zlib, Limit::of(1), &Place::File);
         assert_eq!(short.map_err(|e| e.kind), Err(Kind::Malformed));
         Ok(())
     }

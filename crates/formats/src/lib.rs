@@ -16,7 +16,7 @@
 //! ```
 //!
 //! Formats are rows of [`TABLE`]; names of rows have a table of their own, [`names::TABLE`]. What a header says of sizes is not
-//! believed: memory follows what is really in the file, see [`EXPANSION`].
+//! believed: memory follows what is really in the file, see [`EXPANSION`] for compressed ones.
 
 mod abaqus_element;
 mod abaqus_input;
@@ -42,7 +42,7 @@ use std::fmt;
 use std::path::Path;
 
 pub use error::{Error, Kind, Place};
-pub use inflate::EXPANSION;
+pub use inflate::{EXPANSION, UNPACKED_ALWAYS};
 pub use matrix::{Entry, Matrix, Origin, Symmetry};
 pub use report::Report;
 

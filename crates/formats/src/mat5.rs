@@ -8,7 +8,7 @@ use std::borrow::Cow;
 
 use crate::bytes::{Bytes, Number, Order};
 use crate::error::{Error, Kind, Place};
-use crate::inflate::{Wrapping, beginning, inflate};
+use crate::inflate::{Limit, Wrapping, beginning, inflate};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::npz::compressed;
 use crate::{COMPLEX, Format, Item};
@@ -77,6 +77,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         order(bytes).ok_or_else(|| Bytes::new(bytes, Order::Little).malformed("the header of MATLAB 5", "none"))?;
     let mut file = Bytes::new(bytes, order);
     file.skip(HEADER);
+    let limit = Limit::of(bytes.len());
     let mut items = Vec::new();
     while file.left() >= 8 {
         let Element { kind, data, place } = element(&mut file)?;
@@ -84,7 +85,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
             MATRIX => variable(Source { data: Cow::Borrowed(data), packed: None, order, place }),
             COMPRESSED => {
                 let start = beginning(data, Wrapping::Zlib, BEGINNING);
-                variable(Source { data: start.into(), packed: Some(data), order, place })
+                variable(Source { data: start.into(), packed: Some((data, limit)), order, place })
             }
             _ => continue,
         };
@@ -97,7 +98,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 #[derive(Clone)]
 struct Source<'a> {
     data: Cow<'a, [u8]>,
-    packed: Option<&'a [u8]>,
+    packed: Option<(&'a [u8], Limit)>,
     order: Order,
     place: Place,
 }
@@ -105,8 +106,8 @@ struct Source<'a> {
 impl<'a> Source<'a> {
     /// All of its bytes, from its first part on.
     fn whole(&self) -> Result<Cow<'_, [u8]>, Error> {
-        let Some(packed) = self.packed else { return Ok(Cow::Borrowed(&self.data)) };
-        let mut all = inflate(packed, Wrapping::Zlib, &self.place)?;
+        let Some((packed, limit)) = self.packed else { return Ok(Cow::Borrowed(&self.data)) };
+        let mut all = inflate(packed, Wrapping::Zlib, limit, &self.place)?;
         // Past the tag of the matrix within.
         all.drain(..all.len().min(8));
         Ok(Cow::Owned(all))

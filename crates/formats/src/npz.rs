@@ -6,7 +6,7 @@ use std::borrow::Cow;
 
 use crate::bytes::{Bytes, Number, Order};
 use crate::error::{Error, Kind, Place};
-use crate::inflate::{Wrapping, beginning, inflate};
+use crate::inflate::{Limit, Wrapping, beginning, inflate};
 use crate::matrix::{Entry, Matrix, Symmetry, Triplets};
 use crate::npy::{self, Array};
 use crate::text::shown;
@@ -152,6 +152,7 @@ struct Member<'a> {
     deflated: bool,
     packed: &'a [u8],
     crc: u32,
+    limit: Limit,
 }
 
 impl<'a> Member<'a> {
@@ -168,7 +169,7 @@ impl<'a> Member<'a> {
 
     fn contents(&self) -> Result<Cow<'a, [u8]>, Error> {
         let contents = match self.deflated {
-            true => Cow::Owned(inflate(self.packed, Wrapping::Bare, &self.place())?),
+            true => Cow::Owned(inflate(self.packed, Wrapping::Bare, self.limit, &self.place())?),
             false => Cow::Borrowed(self.packed),
         };
         let mut crc = flate2::Crc::new();
@@ -194,6 +195,7 @@ const IN_EXTRA: usize = u32::MAX as usize;
 fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
     let mut zip = Bytes::new(bytes, Order::Little);
     zip.seek(directory(bytes)?)?;
+    let limit = Limit::of(bytes.len());
     let mut members = Vec::new();
     while zip.clone().u32().is_ok_and(|mark| mark == CENTRAL) {
         zip.skip(8);
@@ -223,7 +225,7 @@ fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
         data.skip(22);
         let skip = usize::from(data.u16()?) + usize::from(data.u16()?);
         data.skip(skip);
-        members.push(Member { name, deflated: method == 8, packed: data.take(packed)?, crc });
+        members.push(Member { name, deflated: method == 8, packed: data.take(packed)?, crc, limit });
     }
     Ok(members)
 }

@@ -13,8 +13,8 @@ static MEMORY: PeakAlloc = PeakAlloc;
 /// Peaks of memory are those of the whole process: one test at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// Bytes that reading may take beyond a multiple of the file: compressed parts and datasets of HDF5 may always have 1 MiB, and twelve
-/// formats hold a few copies of it.
+/// Bytes that reading may take beyond a multiple of the file, which has some kilobytes: no header makes more of it, and what is
+/// compressed may only become what it is.
 const ALWAYS: usize = 16 << 20;
 
 /// Bytes of memory for every byte of a damaged file.
