@@ -122,6 +122,12 @@ impl Assembly {
         }
     }
 
+    /// The largest acceleration that forces along the axes give to the masses, m/s².
+    pub fn pushed(&self, force: &[f64]) -> f64 {
+        let on_masses = &self.directions * nalgebra::DVectorView::from_slice(force, force.len());
+        if self.n == 0 { 0.0 } else { (&self.inverse_mass * on_masses).amax() }
+    }
+
     /// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia, internal states with the scale of the
     /// motion, `rest` (√J).
     pub fn weights(&self, omega: f64, rest: f64) -> Vec<f64> {

@@ -130,9 +130,11 @@ impl Flow for IncrementalFlow {
             self.eliminated = Eliminated::new(&self.assembly, h);
         }
         let eliminated = self.eliminated.take().ok_or(Breakdown::OutOfRange { time: 0.0 })?;
-        let (_, scale) = self.assembly.scales(state, &self.drive);
         self.steps.clear();
         self.step.start(&self.assembly, state, &self.drive, sensitivity.as_deref());
+        // joints that are pressed at rest set in motion what neither moves nor is loaded
+        let pushed = NEAR_REST * duration * self.assembly.pushed(self.step.force.as_slice());
+        let scale = self.assembly.scales(state, &self.drive).1.max(pushed);
         if self.keep {
             self.keep_instant(state, 0.0);
         }
