@@ -8,7 +8,9 @@ use crate::method::Breakdown;
 use crate::method::drive::Drive;
 use crate::method::periodic::Closed;
 use crate::model::System;
-use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
+use crate::orbit::{
+    Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry, history, laws,
+};
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::signal::{Basis, Begin, FirstZero, FourierIntegrals, Products, Scratch, real_dot, size_of};
@@ -62,6 +64,7 @@ pub(super) fn orbit(
         .enumerate()
         .filter(|(j, (motion, _))| motion.slip_fraction == 0.0 && path.of_joint(*j).any(|s| path.parts[s].is_slider()))
         .map(|(_, (_, joint))| joint.name().to_owned());
+    let stuck: Vec<String> = stuck.collect();
     let rest = super::NEAR_REST * flow.energy_scale;
     let reference =
         energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive)).max(NO_WORK * rest * rest).max(STORED * stored);
@@ -80,7 +83,8 @@ pub(super) fn orbit(
             truncation: closed.missing,
             return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,
-            stuck: stuck.collect(),
+            history: history(laws(system), &joints, &stuck, symmetry),
+            stuck,
         },
         places,
         joints,

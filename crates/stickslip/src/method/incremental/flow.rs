@@ -7,6 +7,7 @@ use crate::method::assembly::{Assembly, NEAR_REST};
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
 use crate::method::periodic::norm;
+use crate::method::relaxed::Spring;
 use crate::method::stepped::{Instant, Node, SteppedPath, Steps};
 use crate::method::{Breakdown, MethodError};
 use crate::model::System;
@@ -66,6 +67,23 @@ impl IncrementalFlow {
             eliminated: None,
             assembly,
         })
+    }
+
+    /// The sliders behind springs whose forces are among the states.
+    pub fn springs(&self) -> Vec<Spring> {
+        let mut springs = Vec::new();
+        for (joint, placed) in self.assembly.joints.iter().enumerate() {
+            let first = 2 * self.assembly.n + placed.first_state;
+            let sliders = law::springs(&placed.law).into_iter().enumerate();
+            springs.extend(sliders.map(|(s, (stiffness, limit))| Spring { joint, state: first + s, stiffness, limit }));
+        }
+        springs
+    }
+
+    /// Gives all of [`IncrementalFlow::springs`] the limits that these state.
+    pub fn limit(&mut self, springs: &[Spring]) {
+        let mut limits = springs.iter().map(|spring| spring.limit);
+        self.step.laws.iter_mut().for_each(|law| law.limit(&mut limits));
     }
 
     fn keep_instant(&mut self, state: &[f64], time: f64) {
