@@ -81,24 +81,40 @@ pub fn column_name(name: &str) -> Cow<'_, str> {
     if name.contains('.') { Cow::Owned(name.replace('.', "_")) } else { Cow::Borrowed(name) }
 }
 
+impl Column {
+    /// Of numbers.
+    pub fn numbers(name: &str, values: Vec<f64>) -> Column {
+        Column { name: name.to_owned(), values: Values::Number(values) }
+    }
+
+    /// Of words.
+    pub fn texts(name: &str, values: Vec<String>) -> Column {
+        Column { name: name.to_owned(), values: Values::Text(values) }
+    }
+}
+
 impl Table {
+    /// The column of this name.
+    pub fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|column| column.name == column_name(name))
+    }
     /// The numbers of a column.
     pub fn numbers(&self, column: &str) -> Option<&[f64]> {
-        self.columns.iter().find(|c| c.name == column_name(column)).and_then(|c| match &c.values {
+        self.column(column).and_then(|c| match &c.values {
             Values::Number(v) => Some(v.as_slice()),
             _ => None,
         })
     }
     /// The words of a column.
     pub fn texts(&self, column: &str) -> Option<&[String]> {
-        self.columns.iter().find(|c| c.name == column_name(column)).and_then(|c| match &c.values {
+        self.column(column).and_then(|c| match &c.values {
             Values::Text(v) => Some(v.as_slice()),
             _ => None,
         })
     }
     /// The flags of a column.
     pub fn flags(&self, column: &str) -> Option<&[Option<bool>]> {
-        self.columns.iter().find(|c| c.name == column_name(column)).and_then(|c| match &c.values {
+        self.column(column).and_then(|c| match &c.values {
             Values::Flag(v) => Some(v.as_slice()),
             _ => None,
         })
