@@ -118,6 +118,12 @@ impl Assembly {
         }
     }
 
+    /// The largest acceleration that forces along the axes give to the masses, m/s².
+    pub fn pushed(&self, force: &[f64]) -> f64 {
+        let on_masses = &self.directions * nalgebra::DVectorView::from_slice(force, force.len());
+        if self.n == 0 { 0.0 } else { (&self.inverse_mass * on_masses).amax() }
+    }
+
     /// The excitation at `omega` (rad/s) along the axes; at zero only constant forces are left.
     pub fn drive(&self, system: &System, omega: f64) -> Drive {
         let axes: Vec<usize> = (0..self.axes.len()).collect();

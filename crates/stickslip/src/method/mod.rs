@@ -15,6 +15,7 @@ mod guess;
 pub mod harmonic_balance;
 mod incremental;
 mod periodic;
+mod relaxed;
 pub mod settling;
 pub mod shooting;
 mod smooth;

@@ -8,7 +8,7 @@ use crate::method::Breakdown;
 use crate::method::periodic::Closed;
 use crate::model::{Axis, System};
 use crate::orbit::measure::{NO_WORK, Signals, measure};
-use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry};
+use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use num_complex::Complex64;
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -68,6 +68,7 @@ pub(super) fn orbit(
             truncation: closed.missing,
             return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,
+            history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
         },
         places: measured.places,
