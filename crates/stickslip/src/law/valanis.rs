@@ -131,7 +131,7 @@ mod tests {
         let law = Valanis { stiffness: 10.0, slip_stiffness: 2.0, lambda: 3.0, kappa: 0.98 };
         for y in [1.0, 1.0 / 0.98, 1.1, 2.0] {
             for sign in [1.0, -1.0] {
-                let mut rate = [0.0];
+                let mut rate = [0.0f64];
                 law.evaluate(&Relative::along(0.0, sign), &[sign * y], &mut rate);
                 assert!(rate[0] * sign < 0.0 && rate[0].is_finite(), "{y} {sign}: {}", rate[0]);
             }
