@@ -12,7 +12,7 @@ use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 
 use crate::error::{Error, Kind, Place};
 use crate::inflate::Limit;
-use crate::matrix::{Symmetry, Triplets};
+use crate::matrix::{Along, Symmetry, Triplets, dense};
 use crate::npz::compressed;
 use crate::{COMPLEX, Format, Item};
 
@@ -132,12 +132,8 @@ fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'stat
             let problem = format!("{} numbers for {rows} x {columns}", values.len());
             return Err(Error::new(Kind::Count, Place::Variable(name.clone()), problem, "save the file again"));
         }
-        let mut triplets = Triplets::new(rows, columns, 0, Place::File)?;
-        for (at, &value) in values.iter().enumerate() {
-            let (row, column) = if matlab { (at % rows, at / rows) } else { (at / columns, at % columns) };
-            triplets.push(row, column, value, Place::Variable(name.clone()))?;
-        }
-        triplets.finish(Symmetry::General)
+        let along = if matlab { Along::Columns } else { Along::Rows };
+        dense((rows, columns), along, &Place::Variable(name.clone()), |at| Ok(values[at]))
     }))
 }
 
