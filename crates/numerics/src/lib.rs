@@ -13,3 +13,4 @@ pub mod maximum;
 pub mod modes;
 pub mod radau;
 pub mod signal;
+pub mod sparse;

@@ -3,6 +3,7 @@
 //! Exact laws are followed by events, smooth laws by stiff integration, others and mixtures in equal steps, all in stretches of one drive
 //! period. In a run-up every cycle has its own frequency, constant over the cycle and continuous in phase, as in a stepped-sine test.
 
+use super::flow::Flow;
 use super::{Breakdown, MethodError, followed};
 use crate::model::System;
 use crate::orbit::{Sample, Symmetry};
@@ -99,7 +100,7 @@ impl Transient {
         sample: &mut dyn FnMut(f64, f64, &Sample) -> bool,
     ) -> Result<(), TransientError> {
         let shared = Arc::new(system.clone());
-        let mut flow = followed::of(system, self.width, TOLERANCE, NAME)?;
+        let mut flow = Transient::flow(system, self.width)?;
         flow.keep(true);
         let mut state = [self.displacement.as_slice(), &self.velocity].concat();
         state.resize(flow.states(), 0.0);
@@ -109,6 +110,8 @@ impl Transient {
         while next <= samples {
             let omega = self.frequency(begin);
             let length = if omega > 0.0 { TAU / omega } else { STRETCH as f64 * self.step };
+            // of a cycle that outlasts the motion only what is asked for
+            let length = if length > self.duration { self.duration + self.step } else { length };
             flow.set_drive(system, omega);
             flow.follow(&mut state, length).map_err(|cause| TransientError::Breakdown { time: begin, cause })?;
             let path = flow.path(&shared, Symmetry::FullPeriod, length);
@@ -123,6 +126,18 @@ impl Transient {
             begin = end;
         }
         Ok(())
+    }
+
+    /// Whether such motions of a system can be followed, with laws smoothed over `width` (m/s) if it is given.
+    ///
+    /// # Errors
+    /// [`MethodError`], as [`Transient::run`].
+    pub fn check(system: &System, width: Option<f64>) -> Result<(), MethodError> {
+        Transient::flow(system, width).map(drop)
+    }
+
+    fn flow(system: &System, width: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
+        followed::of(system, width, TOLERANCE, NAME).map_err(|error| error.with_ways(system))
     }
 
     /// Drive frequency of the cycle that begins at `time`: of a run-up the one with which the cycle ends when that of the frequency that

@@ -99,6 +99,11 @@ impl Axis {
         self
     }
 
+    /// Name of the direction, of joints that act along several.
+    pub fn name(&self) -> Option<&str> {
+        self.name.as_deref()
+    }
+
     /// The same with imposed relative motion `g(t) = Re Σ_h G_h e^{j h Ω t}`: (harmonic, complex amplitude in m).
     pub fn moved(mut self, imposed: impl IntoIterator<Item = (u32, Complex64)>) -> Self {
         let mut sum: BTreeMap<u32, Complex64> = self.imposed.into_iter().collect();

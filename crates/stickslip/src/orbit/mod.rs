@@ -324,7 +324,7 @@ impl Orbit {
         if symmetry == Symmetry::HalfPeriod && apart(&begin, -1.0, &rated(path.sample(0.5 * period))) {
             return Err(wrong("is not mirrored after half of its period"));
         }
-        let energy_gap = measured.energy_gap();
+        let energy_gap = measured.energy_gap(0.0);
         if energy_gap > LARGEST_GAP {
             return Err(OrbitError::Evidence { method, omega, energy_gap });
         }

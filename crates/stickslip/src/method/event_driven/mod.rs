@@ -74,7 +74,7 @@ impl Method for EventDriven {
     fn name(&self) -> &'static str {
         NAME
     }
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         Ok(Box::new(Exact::new(system, NAME, Search::Newton, 1)?))
     }
 }
@@ -90,7 +90,7 @@ impl Method for Subharmonic {
     fn name(&self) -> &'static str {
         NAME
     }
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         Ok(Box::new(Exact::new(system, NAME, Search::Newton, self.period)?))
     }
 }

@@ -56,7 +56,7 @@ impl<'a> BranchEquations<'a> {
         let kept = Kept::new(&system, |_| true);
         method.check(kept.highest)?;
         let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
-        let ports = Ports::new(&system)?;
+        let ports = Ports::new(&system).map_err(|error| error.with_ways(&system))?;
         let rest = Rest::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
         let level = |top: usize| Level::new(kept.up_to(top), method.samples_at(top), &ports, None);

@@ -184,7 +184,7 @@ impl Method for HarmonicBalance {
     fn closes_motions(&self, _system: &System) -> bool {
         false
     }
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         let kept = Kept::new(system, |z| z != Complex64::new(0.0, 0.0));
         self.check(kept.highest)?;
         let ports = Ports::new(system)?;

@@ -85,10 +85,10 @@ impl<'a> ModeEquations<'a> {
     /// A law with several directions, a place without mass, a mass matrix that is not positive definite.
     pub fn new(system: &'a System, harmonics: usize, samples: usize) -> Result<Self, MethodError> {
         if let Some(massless) = (0..system.dofs()).find(|&i| system.structure().mass()[(i, i)] == 0.0) {
-            return Err(MethodError::NeedsMass { method: super::NAME, place: system.places()[massless].clone() });
+            return Err(MethodError::needs_mass(super::NAME, system, massless));
         }
         if system.structure().mass().clone().cholesky().is_none() {
-            return Err(MethodError::NotPositive { method: super::NAME, matrix: "mass" });
+            return Err(MethodError::mass_not_positive(super::NAME));
         }
         let (mut elastic, mut contacts): (Vec<Placed>, Vec<Placed>) = (Vec::new(), Vec::new());
         let ports = Ports::new(system)?;

@@ -153,12 +153,7 @@ impl Ports {
         let mut ports = Ports { list: Vec::new(), axes: Vec::new() };
         for (j, joint) in system.joints().iter().enumerate() {
             let law = joint.law();
-            let unsupported = |instead| MethodError::Law {
-                method: super::NAME,
-                joint: joint.name().to_owned(),
-                law: law.name(),
-                instead,
-            };
+            let unsupported = |misses| MethodError::law(super::NAME, joint, misses);
             if law.is_free() {
                 continue;
             }
@@ -166,9 +161,8 @@ impl Ports {
             if axes == 1
                 && let Some(pieces) = law.pieces()
             {
-                let holds_more = |piece: &Piece| matches!(piece, Piece::Slider(s) if s.static_limit > s.limit);
-                if pieces.iter().any(holds_more) {
-                    return Err(unsupported("method `event-driven`: its limit jumps when slip begins"));
+                if pieces.iter().any(Piece::drops) {
+                    return Err(unsupported("its limit jumps when slip begins"));
                 }
                 ports.add_pieces(j, &pieces);
                 continue;
@@ -180,11 +174,13 @@ impl Ports {
             } else if law.rate().is_some() {
                 (Kernel::Rate(law.clone()), 0.0, 0.0)
             } else {
-                return Err(unsupported("a law with one of the views prox, step, rate, or pieces along one direction"));
+                return Err(unsupported(
+                    "it has none of the views prox, step and rate, nor pieces along one direction",
+                ));
             };
             let scale = law.scale();
             if matches!(kernel, Kernel::Prox(_)) && !(scale.is_finite() && scale > 0.0) {
-                return Err(unsupported("a resolvent with a finite scale of forces"));
+                return Err(unsupported("its resolvent has no finite scale of forces"));
             }
             ports.add(j, axes, kernel, (series, scale, least));
         }

@@ -1,0 +1,539 @@
+//! Factors of sparse matrices, and what they solve.
+
+use super::analysis::{Pattern, Symbolic};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::lblt::factor::LbltParams;
+use faer::linalg::lu::partial_pivoting::factor::PartialPivLuParams;
+use faer::perm::PermRef;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalIntranodeLbltRef;
+use faer::sparse::linalg::cholesky::{IntranodeLbltRef, SymbolicCholeskyRaw};
+use faer::sparse::linalg::lu::{LuRef, NumericLu};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Par, Side, Spec};
+use num_complex::Complex64;
+use std::sync::Arc;
+
+/// A pivot of a real factor below this share of the largest entry of its row is rounding: it is what is left of entries that cancelled.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+/// Error of a solution with known result, relative to matrix times solution, up to which elimination without exchanges between blocks counts
+/// as accurate: 1e-15 is usual.
+const ACCURATE: f64 = 1e-12;
+/// Addition to the diagonal, relative to the largest entry, by which the motion is found that a singular matrix leaves free.
+const NUDGE: f64 = 1e-9;
+
+/// A matrix that is singular to rounding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the matrix is singular: row {row} (from 0) depends on the others; hold what it belongs to, or shift the matrix"
+)]
+pub struct Singular {
+    /// A row of what nothing holds, from 0.
+    pub row: usize,
+}
+
+/// `A = L D Lᵀ` of a real symmetric matrix.
+#[derive(Debug, Clone)]
+pub struct Factor {
+    pattern: Arc<Pattern>,
+    blocks: Blocks,
+    negative: usize,
+}
+
+/// A complex matrix, factored.
+#[derive(Debug, Clone)]
+pub struct ComplexFactor {
+    pattern: Arc<Pattern>,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    Symmetric(Blocks),
+    Exchanged(Box<NumericLu<u32, Complex64>>),
+    Empty,
+}
+
+/// The numbers of `L D Lᵀ`: D has pivots of one and of two rows, exchanged inside the blocks of columns.
+#[derive(Debug, Clone)]
+struct Blocks {
+    values: Vec<f64>,
+    /// Off the diagonal of D.
+    beside: Vec<f64>,
+    order: Vec<u32>,
+    inverse: Vec<u32>,
+}
+
+impl Factor {
+    pub(super) fn new(pattern: &Arc<Pattern>, values: Vec<f64>) -> Result<Self, Singular> {
+        let empty = Blocks { values: vec![], beside: vec![], order: vec![], inverse: vec![] };
+        let mut factor = Factor { pattern: pattern.clone(), blocks: empty, negative: 0 };
+        if pattern.n == 0 {
+            return Ok(factor);
+        }
+        let symbolic = pattern.real();
+        let mut lower = Vec::with_capacity(symbolic.rows.len());
+        for column in 0..pattern.n {
+            lower.extend(pattern.column(column).filter(|at| pattern.rows[*at] as usize >= column).map(|at| values[at]));
+        }
+        factor.blocks = Blocks::new(symbolic, &lower);
+        let mut largest = vec![0.0f64; pattern.n];
+        for column in 0..pattern.n {
+            for at in pattern.column(column) {
+                let row = pattern.rows[at] as usize;
+                largest[row] = largest[row].max(values[at].abs());
+            }
+        }
+        let (mut negative, mut weak) = (0, None);
+        factor.blocks.pivots(symbolic, |row, pivot| {
+            negative += usize::from(pivot < 0.0);
+            // a number that is none is no pivot either
+            if !(pivot.abs() > ROUNDING * largest[row] && pivot.is_finite()) && weak.is_none() {
+                weak = Some(row);
+            }
+        });
+        if let Some(row) = weak {
+            return Err(Singular { row });
+        }
+        factor.negative = negative;
+        Ok(factor)
+    }
+
+    /// How many pivots are negative: as many as the matrix has negative eigenvalues. Of `K - ω² M` with M positive definite these are the
+    /// natural frequencies below ω.
+    ///
+    /// Source: Sylvester's law of inertia.
+    pub fn negative(&self) -> usize {
+        self.negative
+    }
+
+    /// Solves in place for right sides of length n, one after the other.
+    ///
+    /// # Panics
+    /// If the length of `right` is no multiple of n.
+    pub fn solve(&self, right: &mut [f64]) {
+        let n = self.pattern.n;
+        if n == 0 || right.is_empty() {
+            return;
+        }
+        assert!(right.len().is_multiple_of(n), "{} numbers are no columns of {n}", right.len());
+        self.blocks.solve(self.pattern.real(), right);
+    }
+}
+
+impl ComplexFactor {
+    pub(super) fn new(pattern: &Arc<Pattern>, values: Vec<Complex64>) -> Result<Self, Singular> {
+        let make = |kind| ComplexFactor { pattern: pattern.clone(), kind };
+        if pattern.n == 0 {
+            return Ok(make(Kind::Empty));
+        }
+        if pattern.is_symmetric(&values) {
+            let factor = make(Kind::Symmetric(Blocks::new(pattern.complex(), &pattern.doubled(&values))));
+            if factor.error(&values) <= ACCURATE {
+                return Ok(factor);
+            }
+        }
+        let factor = make(Kind::Exchanged(exchanged(pattern, &values)));
+        if factor.error(&values) <= ACCURATE {
+            return Ok(factor);
+        }
+        Err(Singular { row: factor.free_row(values) })
+    }
+
+    /// Solves in place for right sides of length n, one after the other.
+    ///
+    /// # Panics
+    /// If the length of `right` is no multiple of n.
+    pub fn solve(&self, right: &mut [Complex64]) {
+        let n = self.pattern.n;
+        if n == 0 || right.is_empty() {
+            return;
+        }
+        assert!(right.len().is_multiple_of(n), "{} numbers are no columns of {n}", right.len());
+        match &self.kind {
+            Kind::Symmetric(blocks) => {
+                let mut parts: Vec<f64> = right.iter().flat_map(|z| [z.re, z.im]).collect();
+                blocks.solve(self.pattern.complex(), &mut parts);
+                // the real form gives the conjugate
+                for (z, part) in right.iter_mut().zip(parts.chunks_exact(2)) {
+                    *z = Complex64::new(part[0], -part[1]);
+                }
+            }
+            Kind::Exchanged(numeric) => {
+                let symbolic = self.pattern.unsymmetric();
+                let columns = right.len() / n;
+                let mut memory = MemBuffer::new(symbolic.solve_in_place_scratch::<Complex64>(columns, Par::Seq));
+                LuRef::new_unchecked(symbolic, numeric).solve_in_place_with_conj(
+                    Conj::No,
+                    MatMut::from_column_major_slice_mut(right, n, columns),
+                    Par::Seq,
+                    MemStack::new(&mut memory),
+                );
+            }
+            Kind::Empty => {}
+        }
+    }
+
+    /// Error of a solution whose result is known, relative to matrix times solution: how far from the matrix the factors are.
+    fn error(&self, values: &[Complex64]) -> f64 {
+        let n = self.pattern.n;
+        // entries without a pattern
+        let right: Vec<Complex64> =
+            (0..n).map(|i| Complex64::new((i as f64 * 0.7 + 1.0).sin(), (i as f64 * 1.3 + 0.4).cos())).collect();
+        let mut x = right.clone();
+        self.solve(&mut x);
+        let (mut left, mut size) = (vec![Complex64::new(0.0, 0.0); n], vec![0.0; n]);
+        for column in 0..n {
+            for at in self.pattern.column(column) {
+                let (row, product) = (self.pattern.rows[at] as usize, values[at] * x[column]);
+                left[row] += product;
+                size[row] += product.norm();
+            }
+        }
+        let off = left.iter().zip(&right).map(|(l, r)| (l - r).norm());
+        let share = off.zip(&size).map(|(off, size)| off / (size + 1.0));
+        // what is not a number is no small error
+        share.fold(0.0, |most, share| if share.is_finite() { share.max(most) } else { f64::INFINITY })
+    }
+
+    /// Where the motion is largest that a singular matrix leaves free: inverse iteration beside the matrix.
+    fn free_row(&self, mut values: Vec<Complex64>) -> usize {
+        let pattern = &self.pattern;
+        let largest = values.iter().fold(0.0f64, |m, v| m.max(v.norm()));
+        for column in 0..pattern.n {
+            for at in pattern.column(column).filter(|at| pattern.rows[*at] as usize == column) {
+                values[at] += Complex64::new(1.0, 1.0) * (NUDGE * largest.max(f64::MIN_POSITIVE));
+            }
+        }
+        let beside = ComplexFactor { pattern: pattern.clone(), kind: Kind::Exchanged(exchanged(pattern, &values)) };
+        let mut x: Vec<Complex64> = (0..pattern.n).map(|i| Complex64::new(1.0 + (i as f64).cos(), 0.0)).collect();
+        beside.solve(&mut x);
+        (0..pattern.n).max_by(|&a, &b| x[a].norm().total_cmp(&x[b].norm())).unwrap_or(0)
+    }
+}
+
+/// Elimination with row exchanges.
+fn exchanged(pattern: &Pattern, values: &[Complex64]) -> Box<NumericLu<u32, Complex64>> {
+    let n = pattern.n;
+    let symbolic = pattern.unsymmetric();
+    let matrix =
+        SparseColMatRef::new(SymbolicSparseColMatRef::new_checked(n, n, &pattern.starts, None, &pattern.rows), values);
+    let params = Spec::<PartialPivLuParams, Complex64>::default();
+    let mut memory = MemBuffer::new(symbolic.factorize_numeric_lu_scratch::<Complex64>(Par::Seq, params));
+    let mut numeric = Box::new(NumericLu::new());
+    if let Err(error) =
+        symbolic.factorize_numeric_lu(&mut numeric, matrix, Par::Seq, MemStack::new(&mut memory), params).map(|_| ())
+    {
+        // the diagonal is part of every pattern, so that each column has a pivot
+        panic!("{n} rows, {} entries: {error:?}", values.len());
+    }
+    numeric
+}
+
+impl Blocks {
+    /// Of the lower triangle.
+    fn new(symbolic: &Symbolic, lower: &[f64]) -> Self {
+        let cholesky = &symbolic.cholesky;
+        let n = cholesky.nrows();
+        let params = Spec::<LbltParams, f64>::default();
+        let mut memory = MemBuffer::new(cholesky.factorize_numeric_intranode_lblt_scratch::<f64>(Par::Seq, params));
+        let mut blocks = Blocks {
+            values: vec![0.0; cholesky.len_val()],
+            beside: vec![0.0; n],
+            order: vec![0; n],
+            inverse: vec![0; n],
+        };
+        cholesky.factorize_numeric_intranode_lblt(
+            &mut blocks.values,
+            &mut blocks.beside,
+            &mut blocks.order,
+            &mut blocks.inverse,
+            SparseColMatRef::new(
+                SymbolicSparseColMatRef::new_checked(n, n, &symbolic.starts, None, &symbolic.rows),
+                lower,
+            ),
+            Side::Lower,
+            Par::Seq,
+            MemStack::new(&mut memory),
+            params,
+        );
+        blocks
+    }
+
+    fn solve(&self, symbolic: &Symbolic, right: &mut [f64]) {
+        let n = self.order.len();
+        let columns = right.len() / n;
+        let exchanges = PermRef::new_checked(&self.order, &self.inverse, n);
+        let mut memory = MemBuffer::new(symbolic.cholesky.solve_in_place_scratch::<f64>(columns, Par::Seq));
+        IntranodeLbltRef::new(&symbolic.cholesky, &self.values, &self.beside, exchanges).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(right, n, columns),
+            Par::Seq,
+            MemStack::new(&mut memory),
+        );
+    }
+
+    /// Tells `each` the eigenvalues of D, with a row that they belong to.
+    fn pivots(&self, symbolic: &Symbolic, mut each: impl FnMut(usize, f64)) {
+        let SymbolicCholeskyRaw::Supernodal(supernodal) = symbolic.cholesky.raw() else {
+            unreachable!("blocks of columns were asked for");
+        };
+        let exchanges = PermRef::new_checked(&self.order, &self.inverse, self.order.len());
+        let parts = SupernodalIntranodeLbltRef::new(supernodal, &self.values, &self.beside, exchanges);
+        let row = |at: usize| match symbolic.cholesky.perm() {
+            Some(order) => order.arrays().0[self.order[at] as usize] as usize,
+            None => self.order[at] as usize,
+        };
+        for s in 0..supernodal.n_supernodes() {
+            let part = parts.supernode(s);
+            let (first, values) = (part.start(), part.val());
+            let mut k = 0;
+            while k < values.ncols() {
+                let (a, b) = (values[(k, k)], self.beside[first + k]);
+                if b == 0.0 {
+                    each(row(first + k), a);
+                    k += 1;
+                    continue;
+                }
+                let c = values[(k + 1, k + 1)];
+                let (mean, radius) = (0.5 * (a + c), (0.5 * (a - c)).hypot(b));
+                // the eigenvalue of the larger magnitude, and the other by the determinant: no difference of large numbers
+                let large = if mean < 0.0 { mean - radius } else { mean + radius };
+                each(row(first + k), large);
+                each(row(first + k + 1), (a * c - b * b) / large);
+                k += 2;
+            }
+        }
+    }
+}
+
+impl Pattern {
+    fn column(&self, column: usize) -> std::ops::Range<usize> {
+        self.starts[column] as usize..self.starts[column + 1] as usize
+    }
+
+    fn is_symmetric(&self, values: &[Complex64]) -> bool {
+        (0..self.n).all(|column| {
+            self.column(column).filter(|at| self.rows[*at] as usize > column).all(|at| {
+                let mirrored = self.column(self.rows[at] as usize);
+                let rows = &self.rows[mirrored.clone()];
+                rows.binary_search(&(column as u32)).is_ok_and(|k| values[mirrored.start + k] == values[at])
+            })
+        })
+    }
+
+    /// The lower triangle of `[Re Im; Im -Re]`.
+    fn doubled(&self, values: &[Complex64]) -> Vec<f64> {
+        let mut lower = Vec::with_capacity(2 * values.len());
+        for column in 0..self.n {
+            for part in 0..2 {
+                for at in self.column(column).filter(|at| self.rows[*at] as usize >= column) {
+                    let (z, on) = (values[at], self.rows[at] as usize == column);
+                    match part {
+                        0 => lower.extend([z.re, z.im]),
+                        _ if on => lower.push(-z.re),
+                        _ => lower.extend([z.im, -z.re]),
+                    }
+                }
+            }
+        }
+        lower
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Analysis, Matrix};
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+    use proptest::prelude::*;
+
+    /// Springs of stiffness one between neighbours and, `held`, to the walls at both ends.
+    fn chain(n: usize, held: bool) -> Matrix {
+        let between = (1..n).flat_map(|i| [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)]);
+        let walls = [(0, 0, f64::from(u8::from(held))), (n - 1, n - 1, f64::from(u8::from(held)))];
+        Matrix::from_triplets(n, between.chain(walls)).unwrap()
+    }
+
+    fn identity(n: usize) -> Matrix {
+        Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap()
+    }
+
+    /// Springs between the neighbours of a cube of `side`³ nodes, the ground behind one face.
+    fn brick(side: usize) -> Matrix {
+        let at = |x: usize, y: usize, z: usize| (x * side + y) * side + z;
+        let mut entries = Vec::new();
+        for x in 0..side {
+            for y in 0..side {
+                for z in 0..side {
+                    let here = at(x, y, z);
+                    entries.push((here, here, if x == 0 { 1.5 } else { 0.0 }));
+                    let next = [(x + 1, y, z, 1.0), (x, y + 1, z, 0.7), (x, y, z + 1, 0.4)];
+                    for (x, y, z, k) in next.into_iter().filter(|(x, y, z, _)| *x.max(y).max(z) < side) {
+                        let there = at(x, y, z);
+                        entries.extend([(here, here, k), (there, there, k), (here, there, -k), (there, here, -k)]);
+                    }
+                }
+            }
+        }
+        Matrix::from_triplets(side * side * side, entries).unwrap()
+    }
+
+    fn dense(matrix: &Matrix) -> DMatrix<f64> {
+        let mut full = DMatrix::zeros(matrix.n(), matrix.n());
+        matrix.entries().for_each(|(i, k, value)| full[(i, k)] = value);
+        full
+    }
+
+    /// Between the frequencies `4 sin²(π k / 2 (n + 1))` of a chain between walls there are as many below as there should be.
+    #[test]
+    fn the_frequencies_of_a_chain_are_counted() {
+        for n in [1, 2, 3, 40, 257] {
+            let (k, m) = (chain(n, true), identity(n));
+            let analysis = Analysis::new(&[&k, &m]);
+            let frequency = |i: f64| 4.0 * (std::f64::consts::FRAC_PI_2 * i / (n + 1) as f64).sin().powi(2);
+            for below in 0..=n {
+                let shift = frequency(below as f64 + 0.5);
+                let factor = analysis.factor(&[(1.0, &k), (-shift, &m)]).unwrap();
+                assert_eq!(factor.negative(), below, "{n} masses, shift {shift}");
+            }
+        }
+    }
+
+    /// The static deflection of a chain under a force in it is two straight lines.
+    #[test]
+    fn the_deflection_of_a_chain() {
+        let n = 1000;
+        let k = chain(n, true);
+        let factor = Analysis::new(&[&k]).factor(&[(1.0, &k)]).unwrap();
+        assert_eq!(factor.negative(), 0);
+        let mut x = vec![0.0; 2 * n];
+        (x[0], x[n + 399]) = (1.0, 1.0);
+        factor.solve(&mut x);
+        let line = |at: f64, i: f64| if i <= at { i * (1001.0 - at) / 1001.0 } else { at * (1001.0 - i) / 1001.0 };
+        // condition 4 (n / π)², times the rounding of the largest deflection
+        let rounding = 4.0 * 1e6 / 9.9 * f64::EPSILON * 240.0;
+        for i in 0..n {
+            assert!((x[i] - line(1.0, i as f64 + 1.0)).abs() < rounding);
+            assert!((x[n + i] - line(400.0, i as f64 + 1.0)).abs() < rounding);
+        }
+    }
+
+    /// What nothing holds is singular, and the row is one of it; a soft spring beside stiff ones holds.
+    #[test]
+    fn what_is_free_is_named() {
+        let n = 50;
+        for first in [0, 20] {
+            // masses from `first` on are held by nobody, the others by a wall
+            let mut entries: Vec<_> =
+                chain(n, false).entries().filter(|(i, k, _)| (*i < first) == (*k < first)).collect();
+            if first > 0 {
+                entries.extend([(0, 0, 1.0), (first - 1, first - 1, -1.0), (first, first, -1.0)]);
+            }
+            let k = Matrix::from_triplets(n, entries.clone()).unwrap();
+            let analysis = Analysis::new(&[&k]);
+            let real = analysis.factor(&[(1.0, &k)]).unwrap_err();
+            assert!(real.row >= first, "{real}");
+            entries.push((n - 1, n - 1, 1e-10));
+            let k = Matrix::from_triplets(n, entries).unwrap();
+            assert_eq!(analysis.factor(&[(1.0, &k)]).unwrap().negative(), 0);
+        }
+        let empty_row = Matrix::from_triplets(3, [(0, 0, 1.0), (2, 2, 4.0)]).unwrap();
+        let analysis = Analysis::new(&[&empty_row]);
+        assert_eq!(analysis.factor(&[(1.0, &empty_row)]).unwrap_err(), Singular { row: 1 });
+        let complex = analysis.factor_complex(&[(Complex64::new(0.0, 2.0), &empty_row)]);
+        assert_eq!(complex.unwrap_err(), Singular { row: 1 });
+    }
+
+    /// Dynamic stiffness with symmetric and with gyroscopic damping, against the dense solution.
+    #[test]
+    fn dynamic_stiffness_against_dense() {
+        for (k, gyroscopic) in [(brick(4), false), (brick(4), true), (chain(64, true), false), (chain(64, true), true)]
+        {
+            let n = k.n();
+            let m = identity(n);
+            let spin = (0..if gyroscopic { n / 2 } else { 0 })
+                .flat_map(|i| [(2 * i, 2 * i + 1, 0.2), (2 * i + 1, 2 * i, -0.2)]);
+            let c = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 0.01)).chain(spin)).unwrap();
+            let analysis = Analysis::new(&[&k, &m, &c]);
+            for omega in [0.0, 0.3, 1.1, 1.7] {
+                let sum = [(1.0, 0.0), (-omega * omega, 0.0), (0.0, omega)].map(|(re, im)| Complex64::new(re, im));
+                let factor = analysis.factor_complex(&[(sum[0], &k), (sum[1], &m), (sum[2], &c)]).unwrap();
+                let right: Vec<Complex64> =
+                    (0..3 * n).map(|i| Complex64::new((i as f64).sin(), (2.0 * i as f64).cos())).collect();
+                let mut x = right.clone();
+                factor.solve(&mut x);
+                let complex = |a: &Matrix, factor: Complex64| dense(a).map(|v| factor * v);
+                let full = (complex(&k, sum[0]) + complex(&m, sum[1]) + complex(&c, sum[2])).lu();
+                for (x, right) in x.chunks(n).zip(right.chunks(n)) {
+                    let expected = full.solve(&DVector::from_column_slice(right)).unwrap();
+                    let error = (DVector::from_column_slice(x) - &expected).norm() / expected.norm();
+                    assert!(error < 1e-10, "{n}, {omega}, {gyroscopic}: {error:.1e}");
+                }
+            }
+        }
+    }
+
+    /// Masses on the diagonal only by their coupling: pivots of two rows, which have one negative eigenvalue each.
+    #[test]
+    fn zeros_on_the_diagonal() {
+        let n = 60;
+        let pairs = (0..n / 2).flat_map(|i| [(2 * i, 2 * i + 1, 2.0), (2 * i + 1, 2 * i, 2.0)]);
+        let matrix = Matrix::from_triplets(n, pairs).unwrap();
+        let factor = Analysis::new(&[&matrix]).factor(&[(1.0, &matrix)]).unwrap();
+        assert_eq!(factor.negative(), n / 2);
+        let mut x: Vec<f64> = (0..n).map(|i| i as f64).collect();
+        factor.solve(&mut x);
+        assert!((0..n).all(|i| (x[i] - 0.5 * (i ^ 1) as f64).abs() < 1e-14));
+    }
+
+    #[test]
+    fn nothing_is_a_matrix_too() {
+        let none = Matrix::from_triplets(0, []).unwrap();
+        let analysis = Analysis::new(&[&none]);
+        analysis.factor(&[(1.0, &none)]).unwrap().solve(&mut []);
+        analysis.factor_complex(&[]).unwrap().solve(&mut []);
+        assert_eq!(analysis.fill(), 0);
+    }
+
+    /// Same input, same bits, on any thread; and one order of elimination serves every shift.
+    #[test]
+    fn same_bits_on_every_thread() {
+        let solve = || {
+            let (k, m) = (brick(7), identity(343));
+            let analysis = Analysis::new(&[&k, &m]);
+            let mut x = vec![1.0; 343];
+            analysis.factor(&[(1.0, &k), (-0.8, &m)]).unwrap().solve(&mut x);
+            let mut z = vec![Complex64::new(1.0, 0.5); 343];
+            analysis.factor_complex(&[(Complex64::new(1.0, 0.1), &k)]).unwrap().solve(&mut z);
+            (x, z)
+        };
+        let here = solve();
+        let there: Vec<_> = (0..3).map(|_| std::thread::spawn(solve)).collect();
+        assert!(there.into_iter().all(|thread| thread.join().unwrap() == here));
+    }
+
+    proptest! {
+        /// Of random symmetric matrices: solutions, and negative eigenvalues, are those of the dense ones.
+        #[test]
+        fn random_matrices(entries in proptest::collection::vec((0usize..30, 0usize..30, -1.0f64..1.0), 20..200)) {
+            let both = entries.iter().flat_map(|&(i, k, v)| [(i, k, v), (k, i, v)]);
+            let loose = (0..30).map(|i| (i, i, 0.3 * ((i * 7919 + 13) as f64).sin()));
+            let matrix = Matrix::from_triplets(30, both.chain(loose)).unwrap();
+            let full = dense(&matrix);
+            let eigenvalues = full.clone().symmetric_eigenvalues();
+            prop_assume!(eigenvalues.iter().all(|e| e.abs() > 1e-3));
+            let analysis = Analysis::new(&[&matrix]);
+            let right = DVector::from_fn(30, |i, _| (i as f64).cos());
+            let expected = full.lu().solve(&right).unwrap();
+            if let Ok(factor) = analysis.factor(&[(1.0, &matrix)]) {
+                prop_assert_eq!(factor.negative(), eigenvalues.iter().filter(|e| **e < 0.0).count());
+            }
+            let complex = analysis.factor_complex(&[(Complex64::new(0.0, 1.0), &matrix)]).unwrap();
+            let mut z: Vec<Complex64> = right.iter().map(|r| Complex64::new(0.0, *r)).collect();
+            complex.solve(&mut z);
+            for (z, x) in z.iter().zip(expected.iter()) {
+                prop_assert!((z - Complex64::new(*x, 0.0)).norm() < 1e-8 * (1.0 + expected.norm()));
+            }
+        }
+    }
+}

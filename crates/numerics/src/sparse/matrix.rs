@@ -1,0 +1,234 @@
+//! A square sparse matrix, by columns.
+
+use num_complex::Complex64;
+use std::ops::Range;
+
+/// Rows and entries are counted in 32 bits, which halves the memory of the pattern.
+const MOST: usize = i32::MAX as usize;
+
+/// A square matrix of which only the entries that are not zero are kept, by columns, rows rising.
+///
+/// A symmetric matrix has both of its triangles; [`asymmetry`](Matrix::asymmetry) tells whether it is one.
+///
+/// # Example
+/// ```
+/// use stickslip_numerics::sparse::Matrix;
+/// // a spring between two masses, given as what it adds to either
+/// let k = Matrix::from_triplets(2, [(0, 0, 5.0), (1, 1, 5.0), (0, 1, -5.0), (1, 0, -5.0), (0, 0, 1.0)]).unwrap();
+/// assert_eq!((k.get(0, 0), k.get(0, 1), k.entries().count()), (6.0, -5.0, 4));
+/// assert_eq!(k.times(&[1.0, 1.0]), [1.0, 0.0]);
+/// assert!(k.asymmetry(0.0).is_none());
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matrix {
+    n: usize,
+    /// Where the columns start in the other two, n + 1.
+    pub(super) starts: Vec<u32>,
+    pub(super) rows: Vec<u32>,
+    values: Vec<f64>,
+}
+
+/// Why triplets make no matrix. Rows and columns count from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MatrixError {
+    /// An entry stands outside.
+    #[error("an entry stands in row {row}, column {column} (from 0), and the matrix is {n} x {n}")]
+    OutOfRange {
+        /// Its row.
+        row: usize,
+        /// Its column.
+        column: usize,
+        /// Rows and columns of the matrix.
+        n: usize,
+    },
+    /// A number is not finite.
+    #[error("row {row}, column {column} (from 0) has {value}; every entry must be finite")]
+    NotFinite {
+        /// Its row.
+        row: usize,
+        /// Its column.
+        column: usize,
+        /// The entry.
+        value: f64,
+    },
+    /// More rows or entries than the indices count.
+    #[error("a matrix of {n} rows and {entries} entries is too large: at most {MOST} of either")]
+    TooLarge {
+        /// Rows.
+        n: usize,
+        /// Entries.
+        entries: usize,
+    },
+}
+
+/// Two entries across the diagonal that differ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Asymmetry {
+    /// Row of `value`, from 0.
+    pub row: usize,
+    /// Its column.
+    pub column: usize,
+    /// The entry.
+    pub value: f64,
+    /// The one across the diagonal.
+    pub mirrored: f64,
+}
+
+impl Matrix {
+    /// Of entries (row, column, value), counted from 0, in any order. Entries of one place are added in the order in which they come; zeros are
+    /// dropped.
+    ///
+    /// # Errors
+    /// [`MatrixError`]: an entry outside, a sum that is not finite, more entries than 32 bits count.
+    pub fn from_triplets(
+        n: usize,
+        triplets: impl IntoIterator<Item = (usize, usize, f64)>,
+    ) -> Result<Self, MatrixError> {
+        let mut entries = Vec::new();
+        for (row, column, value) in triplets {
+            if row >= n || column >= n {
+                return Err(MatrixError::OutOfRange { row, column, n });
+            }
+            if n > MOST || entries.len() == MOST {
+                return Err(MatrixError::TooLarge { n, entries: entries.len() + 1 });
+            }
+            entries.push((column as u32, row as u32, value));
+        }
+        // stable: what is added to one place keeps its order
+        entries.sort_by_key(|&(column, row, _)| (column, row));
+        entries.dedup_by(|next, kept| {
+            let same = (next.0, next.1) == (kept.0, kept.1);
+            if same {
+                kept.2 += next.2;
+            }
+            same
+        });
+        if let Some(&(column, row, value)) = entries.iter().find(|entry| !entry.2.is_finite()) {
+            return Err(MatrixError::NotFinite { row: row as usize, column: column as usize, value });
+        }
+        entries.retain(|entry| entry.2 != 0.0);
+        let mut starts = vec![0; n + 1];
+        entries.iter().for_each(|&(column, ..)| starts[column as usize + 1] += 1);
+        (0..n).for_each(|column| starts[column + 1] += starts[column]);
+        let rows = entries.iter().map(|entry| entry.1).collect();
+        Ok(Matrix { n, starts, rows, values: entries.iter().map(|entry| entry.2).collect() })
+    }
+
+    /// Rows, and columns.
+    pub fn n(&self) -> usize {
+        self.n
+    }
+
+    /// How many entries are not zero.
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Whether all entries are zero.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    pub(super) fn range(&self, column: usize) -> Range<usize> {
+        self.starts[column] as usize..self.starts[column + 1] as usize
+    }
+
+    /// The entries of a column that are not zero: (row, value), rows rising.
+    pub fn column(&self, column: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let range = self.range(column);
+        self.rows[range.clone()].iter().zip(&self.values[range]).map(|(&row, &value)| (row as usize, value))
+    }
+
+    /// All entries that are not zero: (row, column, value), column by column.
+    pub fn entries(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
+        (0..self.n).flat_map(move |column| self.column(column).map(move |(row, value)| (row, column, value)))
+    }
+
+    /// The entry (row, column), from 0.
+    ///
+    /// # Panics
+    /// If the column lies outside.
+    pub fn get(&self, row: usize, column: usize) -> f64 {
+        let range = self.range(column);
+        let rows = &self.rows[range.clone()];
+        rows.binary_search_by(|r| (*r as usize).cmp(&row)).map_or(0.0, |at| self.values[range.start + at])
+    }
+
+    /// The largest magnitude of an entry.
+    pub fn largest(&self) -> f64 {
+        self.values.iter().fold(0.0, |largest, value| largest.max(value.abs()))
+    }
+
+    /// The first two entries across the diagonal that differ by more than `rounding`, in the unit of the entries; `None` if the matrix is symmetric.
+    pub fn asymmetry(&self, rounding: f64) -> Option<Asymmetry> {
+        self.entries().find_map(|(row, column, value)| {
+            let mirrored = self.get(column, row);
+            ((value - mirrored).abs() > rounding).then_some(Asymmetry { row, column, value, mirrored })
+        })
+    }
+
+    /// `A x`.
+    ///
+    /// # Panics
+    /// If `x` has not n entries.
+    pub fn times(&self, x: &[f64]) -> Vec<f64> {
+        assert_eq!(x.len(), self.n, "the vector of a product has as many entries as the matrix has columns");
+        let mut product = vec![0.0; self.n];
+        for (row, column, value) in self.entries() {
+            product[row] += value * x[column];
+        }
+        product
+    }
+
+    /// `A x` of a complex `x`.
+    ///
+    /// # Panics
+    /// If `x` has not n entries.
+    pub fn times_complex(&self, x: &[Complex64]) -> Vec<Complex64> {
+        assert_eq!(x.len(), self.n, "the vector of a product has as many entries as the matrix has columns");
+        let mut product = vec![Complex64::new(0.0, 0.0); self.n];
+        for (row, column, value) in self.entries() {
+            product[row] += x[column] * value;
+        }
+        product
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_triplets_are_refused_with_their_place() {
+        let make = |entries: &[(usize, usize, f64)]| Matrix::from_triplets(2, entries.iter().copied());
+        assert_eq!(make(&[(2, 0, 1.0)]), Err(MatrixError::OutOfRange { row: 2, column: 0, n: 2 }));
+        assert!(matches!(make(&[(0, 1, f64::NAN)]), Err(MatrixError::NotFinite { row: 0, column: 1, .. })));
+        assert!(matches!(make(&[(0, 1, f64::MAX), (0, 1, f64::MAX)]), Err(MatrixError::NotFinite { .. })));
+        // what cancels is no entry
+        assert!(make(&[(0, 1, 2.0), (0, 1, -2.0)]).unwrap().is_empty());
+        let one_sided = make(&[(0, 1, 2.0), (0, 0, 1.0)]).unwrap();
+        assert_eq!(one_sided.asymmetry(1.0), Some(Asymmetry { row: 0, column: 1, value: 2.0, mirrored: 0.0 }));
+        assert_eq!(one_sided.asymmetry(2.0), None);
+    }
+
+    /// Products are those of the dense matrix, and any order of triplets without repetitions makes the same matrix.
+    #[test]
+    fn products_and_orders() {
+        let n = 7;
+        let value = |i: usize, k: usize| ((i * 31 + k * 17 + 1) as f64).sin();
+        let all: Vec<(usize, usize, f64)> =
+            (0..n * n).filter(|at| at % 3 == 0).map(|at| (at / n, at % n, value(at / n, at % n))).collect();
+        let matrix = Matrix::from_triplets(n, all.iter().copied()).unwrap();
+        assert_eq!(matrix, Matrix::from_triplets(n, all.iter().rev().copied()).unwrap());
+        assert_eq!(matrix.len(), all.len());
+        let x: Vec<f64> = (0..n).map(|i| 1.0 + i as f64).collect();
+        for (i, y) in matrix.times(&x).iter().enumerate() {
+            let row: f64 = (0..n).filter(|k| (i * n + k) % 3 == 0).map(|k| value(i, k) * x[k]).sum();
+            assert!((y - row).abs() < 1e-13, "{y} {row}");
+        }
+        let twisted: Vec<Complex64> = x.iter().map(|x| Complex64::new(*x, -2.0 * x)).collect();
+        for (z, y) in matrix.times_complex(&twisted).iter().zip(matrix.times(&x)) {
+            assert!((z - Complex64::new(y, -2.0 * y)).norm() < 1e-12);
+        }
+    }
+}
