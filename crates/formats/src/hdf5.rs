@@ -12,7 +12,7 @@ use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 
 use crate::error::{Error, Kind, Place};
 use crate::inflate::Limit;
-use crate::matrix::{Symmetry, Triplets};
+use crate::matrix::{Along, Symmetry, Triplets, dense};
 use crate::npz::compressed;
 use crate::{COMPLEX, Format, Item};
 
@@ -29,8 +29,11 @@ const MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// Groups within groups that are followed: links may go in circles.
 const DEPTH: usize = 8;
 
-/// Numbers that a chunk may have, even where its dataset has less: those of h5py have at most 2^17.
-const CHUNK: u64 = 1 << 20;
+/// Numbers that any dataset may have, stored or not, and any chunk: those of h5py have at most this many.
+const FEW: u64 = 1 << 17;
+
+/// Bytes that deflate can pack into one.
+const DEFLATE: u64 = 1032;
 
 /// Members of a file that are listed.
 const MEMBERS: usize = 10_000;
@@ -132,12 +135,8 @@ fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'stat
             let problem = format!("{} numbers for {rows} x {columns}", values.len());
             return Err(Error::new(Kind::Count, Place::Variable(name.clone()), problem, "save the file again"));
         }
-        let mut triplets = Triplets::new(rows, columns, 0, Place::File)?;
-        for (at, &value) in values.iter().enumerate() {
-            let (row, column) = if matlab { (at % rows, at / rows) } else { (at / columns, at % columns) };
-            triplets.push(row, column, value, Place::Variable(name.clone()))?;
-        }
-        triplets.finish(Symmetry::General)
+        let along = if matlab { Along::Columns } else { Along::Rows };
+        dense((rows, columns), along, &Place::Variable(name.clone()), |at| Ok(values[at]))
     }))
 }
 
@@ -175,9 +174,16 @@ fn numbers<T>(
     let chunk = guarded(place.clone(), || dataset.chunk_shape())?.unwrap_or_default();
     let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
     let shape = guarded(place.clone(), || dataset.shape())?;
-    let count = product(&shape).filter(|&count| count <= limit.numbers());
-    let most = count.map(|count| count.max(CHUNK));
-    if most.is_none_or(|most| product(&chunk).is_none_or(|chunk| chunk > most)) {
+    // Of a dataset in chunks, what is in the file; the index of some kinds of chunks cannot be asked.
+    let stored = match chunk[..] {
+        [] => None,
+        _ => guarded(place.clone(), || dataset.chunks())
+            .ok()
+            .map(|chunks| chunks.iter().map(|one| one.storage_size).sum()),
+    };
+    let room = stored.map_or(u64::MAX, |stored: u64| stored.saturating_mul(DEFLATE)).max(FEW).min(limit.numbers());
+    let count = product(&shape).filter(|&count| count <= room);
+    if count.is_none_or(|count| product(&chunk).is_none_or(|chunk| chunk > count.max(FEW))) {
         return Err(too_large(place));
     }
     guarded(place, || read(dataset))

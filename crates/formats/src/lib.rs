@@ -68,10 +68,11 @@ pub const TABLE: &[Format] = &[
     abaqus_element::FORMAT,
     abaqus_input::FORMAT,
     nastran_op4::FORMAT,
-    nastran_dmig::FORMAT,
     ansys_full::FORMAT,
     harwell_boeing::FORMAT,
     coordinate::FORMAT,
+    // Its cards may stand anywhere in a file, so that it looks through all of it.
+    nastran_dmig::FORMAT,
 ];
 
 /// What a matrix of complex numbers is noted as.

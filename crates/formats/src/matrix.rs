@@ -474,6 +474,37 @@ impl Triplets {
     }
 }
 
+/// How the numbers of a full matrix follow each other.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Along {
+    Rows,
+    Columns,
+}
+
+/// A full matrix whose numbers, as many as its size says, `value` gives by their place in the file.
+pub(crate) fn dense(
+    (rows, columns): (usize, usize),
+    along: Along,
+    place: &Place,
+    value: impl Fn(usize) -> Result<f64, Error>,
+) -> Result<Matrix, Error> {
+    let count = rows.saturating_mul(columns);
+    // Memory for what is not zero: full matrices of structures are mostly zeros.
+    let filled = (0..count).map(&value).filter(|value| value.as_ref().is_ok_and(|&value| value != 0.0)).count();
+    let mut triplets = Triplets::new(rows, columns, filled, place.clone())?;
+    // In the order of a matrix, so that nothing is left to sort.
+    for column in 0..columns {
+        for row in 0..rows {
+            let at = match along {
+                Along::Rows => row * columns + column,
+                Along::Columns => column * rows + row,
+            };
+            triplets.push(row, column, value(at)?, place.clone())?;
+        }
+    }
+    triplets.finish(Symmetry::General)
+}
+
 /// Sorts entries and sums those of one place, in the order of the file.
 fn sum_equal(entries: &mut Vec<Entry>) -> Result<(), Error> {
     let key = |e: &Entry| (e.column, e.row);
