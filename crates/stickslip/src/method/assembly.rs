@@ -4,17 +4,19 @@ use super::MethodError;
 use super::drive::Drive;
 use crate::law::SharedLaw;
 use crate::model::{Axis, System};
+use crate::structure::Matrices;
 use nalgebra::DMatrix;
+use std::ops::Deref;
+use std::sync::Arc;
 
 /// Matrices, axes and laws; independent of the drive.
 #[derive(Debug, Clone)]
 pub(crate) struct Assembly {
     /// Degrees of freedom.
     pub n: usize,
-    pub mass: DMatrix<f64>,
+    /// Of the structure, shared with it.
+    matrices: Arc<Matrices>,
     pub inverse_mass: DMatrix<f64>,
-    pub damping: DMatrix<f64>,
-    pub stiffness: DMatrix<f64>,
     /// The axes of all joints, in their order.
     pub axes: Vec<Axis>,
     /// The same as columns, n × axes.
@@ -45,6 +47,14 @@ impl PlacedLaw {
     /// Its internal states.
     pub fn internal(&self) -> std::ops::Range<usize> {
         self.first_state..self.first_state + self.states
+    }
+}
+
+/// Mass, damping and stiffness are read as its own.
+impl Deref for Assembly {
+    type Target = Matrices;
+    fn deref(&self) -> &Matrices {
+        &self.matrices
     }
 }
 
@@ -80,10 +90,8 @@ impl Assembly {
         let axes: Vec<_> = system.axes().map(|(_, axis)| axis.dense(n)).collect();
         Ok(Assembly {
             n,
-            mass: structure.mass().clone(),
+            matrices: structure.full().clone(),
             inverse_mass,
-            damping: structure.damping().clone(),
-            stiffness: structure.stiffness().clone(),
             axes: system.axes().map(|(_, axis)| axis.clone()).collect(),
             directions: DMatrix::from_fn(n, first_axis, |row, axis| axes[axis][row]),
             joints,
@@ -107,9 +115,10 @@ impl Assembly {
     pub fn accelerate(&self, state: &[f64], left: &mut [f64], force: &[f64], out: &mut [f64]) {
         let n = self.n;
         let (x, v) = state.split_at(n);
+        let Matrices { stiffness, damping, .. } = &*self.matrices;
         for i in 0..n {
             for k in 0..n {
-                left[i] -= self.stiffness[(i, k)] * x[k] + self.damping[(i, k)] * v[k];
+                left[i] -= stiffness[(i, k)] * x[k] + damping[(i, k)] * v[k];
             }
         }
         for (axis, force) in self.axes.iter().zip(force) {

@@ -3,7 +3,9 @@
 use crate::law::{Contact, Law, Piece};
 use crate::method::MethodError;
 use crate::model::System;
+use crate::structure::Matrices;
 use nalgebra::{DMatrix, DVector};
+use std::ops::Deref;
 use std::sync::Arc;
 
 /// A relative velocity below this fraction of the largest one is rest. Switch instants are found to 1e-15 of the velocity scale;
@@ -112,16 +114,23 @@ pub(crate) fn takes(law: &dyn Law) -> bool {
 #[derive(Debug, Clone)]
 pub(crate) struct Mechanics {
     pub n: usize,
-    pub mass: DMatrix<f64>,
+    /// Of the structure, shared with it.
+    matrices: Arc<Matrices>,
     pub inverse_mass: DMatrix<f64>,
-    pub damping: DMatrix<f64>,
-    pub stiffness: DMatrix<f64>,
     /// Sliders and stops of all joints, those that carry nothing left out.
     pub parts: Arc<[Part]>,
     /// Number of sliders behind springs.
     pub elastic: usize,
     /// Estimate of the fastest natural frequency, rad/s.
     pub fastest: f64,
+}
+
+/// Mass, damping and stiffness are read as its own.
+impl Deref for Mechanics {
+    type Target = Matrices;
+    fn deref(&self) -> &Matrices {
+        &self.matrices
+    }
 }
 
 impl Mechanics {
@@ -175,10 +184,8 @@ impl Mechanics {
         Ok(Mechanics {
             n,
             fastest,
-            mass: system.structure().mass().clone(),
+            matrices: system.structure().full().clone(),
             inverse_mass,
-            damping: system.structure().damping().clone(),
-            stiffness: system.structure().stiffness().clone(),
             parts: parts.into(),
             elastic,
         })

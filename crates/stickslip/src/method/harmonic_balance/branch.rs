@@ -100,9 +100,7 @@ impl<'a> BranchEquations<'a> {
             }
             _ => return false,
         }
-        let same = system.structure().mass() == self.rest_of.structure().mass()
-            && system.structure().damping() == self.rest_of.structure().damping()
-            && system.structure().stiffness() == self.rest_of.structure().stiffness();
+        let same = system.structure() == self.rest_of.structure();
         if !same {
             self.rest = Rest::new(&system, &self.ports);
             self.rest_of = system.clone();

@@ -1,14 +1,18 @@
 //! The linear rest of a structure: what its places do under harmonic forces, in closed form for every frequency.
 //!
 //! With the modes `(λ, φ)` of `M x'' + C x' + K x`, computed once, the response to `Re(F e^{st})` is a sum of `φ (ψᵀF) / (s - λ)`.
-//! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored.
+//! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored. Structures that are sparse
+//! are not taken apart into modes: their dynamic stiffness is factored at every frequency.
 
 use super::hold::HOLD;
 use super::ports::Ports;
-use super::sparse::Sparse;
 use crate::model::System;
+use crate::structure::{DynamicStiffness, Matrices, Structure};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 use stickslip_numerics::modes::Modes;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -24,11 +28,11 @@ const HIGHEST: f64 = 1e6;
 pub(super) struct Rest {
     n: usize,
     modal: Option<Modal>,
-    mass: DMatrix<f64>,
-    damping: DMatrix<f64>,
-    stiffness: DMatrix<f64>,
-    /// Directions of the axes, n × q.
-    direction: DMatrix<f64>,
+    /// Dynamic stiffnesses of sparse structures at the last drive frequency, by their rates.
+    factors: RefCell<Vec<(Complex64, f64, Option<Arc<DynamicStiffness>>)>>,
+    structure: Structure,
+    /// Directions of the axes: rows, rising, with their weights.
+    directions: Vec<Vec<(usize, f64)>>,
 }
 
 /// Modes, and what they are at the joints.
@@ -49,16 +53,19 @@ struct Modal {
 impl Rest {
     pub fn new(system: &System, ports: &Ports) -> Self {
         let n = system.dofs();
-        let columns: Vec<DVector<f64>> = (0..ports.count()).map(|q| ports.axis(system, q).dense(n)).collect();
-        let direction = if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) };
+        let directions = (0..ports.count())
+            .map(|q| {
+                let mut rows = BTreeMap::new();
+                ports.axis(system, q).rows().iter().for_each(|(i, w)| *rows.entry(*i).or_insert(0.0) += w);
+                rows.into_iter().collect()
+            })
+            .collect::<Vec<Vec<(usize, f64)>>>();
         Rest {
             n,
-            // where the banded form takes over, the modes are not needed
-            modal: if Sparse::new(system, ports, &[1]).is_some() { None } else { modal(system, &direction) },
-            mass: system.structure().mass().clone(),
-            damping: system.structure().damping().clone(),
-            stiffness: system.structure().stiffness().clone(),
-            direction,
+            modal: if system.structure().is_sparse() { None } else { modal(system, &columns(n, &directions)) },
+            factors: RefCell::default(),
+            structure: system.structure().clone(),
+            directions,
         }
     }
 
@@ -69,10 +76,16 @@ impl Rest {
 
     /// The same at any `s`; on the positive real axis it has no resonances.
     pub fn receptance_at(&self, s: Complex64, omega: f64) -> DMatrix<Complex64> {
-        let q = self.direction.ncols();
+        let q = self.directions.len();
+        if self.structure.is_sparse() {
+            let Some(factor) = self.factor(s, omega) else { return DMatrix::from_element(q, q, ZERO) };
+            let mut moved = columns(self.n, &self.directions).map(|w| Complex64::new(w, 0.0));
+            factor.solve(moved.as_mut_slice());
+            return DMatrix::from_fn(q, q, |a, b| self.directions[a].iter().map(|&(i, w)| moved[(i, b)] * w).sum());
+        }
         let Some(modal) = &self.modal else {
             let Some(inverse) = self.dynamic(s).try_inverse() else { return DMatrix::from_element(q, q, ZERO) };
-            let direction = self.direction.map(|w| Complex64::new(w, 0.0));
+            let direction = columns(self.n, &self.directions).map(|w| Complex64::new(w, 0.0));
             return direction.transpose() * inverse * direction;
         };
         let mut sum = DMatrix::from_element(q, q, ZERO);
@@ -99,6 +112,12 @@ impl Rest {
     /// Displacements of all places under the complex forces `force` (length n, N), m.
     pub fn respond(&self, harmonic: usize, omega: f64, force: &DVector<Complex64>) -> DVector<Complex64> {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
+        if self.structure.is_sparse() {
+            let Some(factor) = self.factor(s, omega) else { return DVector::from_element(self.n, ZERO) };
+            let mut x = force.clone();
+            factor.solve(x.as_mut_slice());
+            return x;
+        }
         let Some(modal) = &self.modal else {
             return self.dynamic(s).lu().solve(force).unwrap_or_else(|| DVector::from_element(self.n, ZERO));
         };
@@ -128,13 +147,12 @@ impl Rest {
     /// Moves the mean positions `x` (length n) so that they are `along` the axes what the ports know. Where only laws hold a direction, positions
     /// are the small difference of large ones, and rounding of the forces would move them.
     pub fn settle(&self, omega: f64, x: &mut DVector<Complex64>, along: impl Fn(usize) -> f64) {
-        let q = self.direction.ncols();
-        let off = DVector::from_fn(q, |a, _| {
-            along(a) - self.direction.column(a).iter().zip(x.iter()).map(|(w, x)| w * x.re).sum::<f64>()
-        });
+        let q = self.directions.len();
+        let off =
+            DVector::from_fn(q, |a, _| along(a) - self.directions[a].iter().map(|&(i, w)| w * x[i].re).sum::<f64>());
         let receptance = self.receptance(0, omega).map(|r| r.re);
         let largest = receptance.amax();
-        let unheld = free_fraction(ZERO, omega).re / self.mass.amax();
+        let unheld = free_fraction(ZERO, omega).re / self.structure.largest()[0];
         if largest == 0.0 || largest < HELD * unheld {
             return; // springs hold all that moves, or nothing does
         }
@@ -161,20 +179,41 @@ impl Rest {
     /// `W f`: forces on all places from forces along the axes.
     pub fn spread(&self, along: impl Fn(usize) -> Complex64) -> DVector<Complex64> {
         let mut force = DVector::from_element(self.n, ZERO);
-        for q in 0..self.direction.ncols() {
+        for (q, rows) in self.directions.iter().enumerate() {
             let f = along(q);
-            for i in 0..self.n {
-                force[i] += f * self.direction[(i, q)];
-            }
+            rows.iter().for_each(|&(i, w)| force[i] += f * w);
         }
         force
     }
 
+    /// Of a full structure.
     fn dynamic(&self, s: Complex64) -> DMatrix<Complex64> {
-        DMatrix::from_fn(self.n, self.n, |i, k| {
-            s * s * self.mass[(i, k)] + s * self.damping[(i, k)] + self.stiffness[(i, k)]
-        })
+        let Matrices { mass, damping, stiffness } = &**self.structure.full();
+        DMatrix::from_fn(self.n, self.n, |i, k| s * s * mass[(i, k)] + s * damping[(i, k)] + stiffness[(i, k)])
     }
+
+    /// Of a sparse structure: kept as long as the drive frequency stays. `None` at a resonance without damping.
+    fn factor(&self, s: Complex64, omega: f64) -> Option<Arc<DynamicStiffness>> {
+        let mut factors = self.factors.borrow_mut();
+        factors.retain(|(_, driven, _)| *driven == omega);
+        if let Some((.., found)) = factors.iter().find(|(rate, ..)| *rate == s) {
+            return found.clone();
+        }
+        // as in the modal form, what nothing holds has a mean position by a soft spring
+        let hold = if s == ZERO { (HOLD * omega).powi(2) } else { 0.0 };
+        let found = self.structure.held_stiffness(s, hold).ok().map(Arc::new);
+        factors.push((s, omega, found.clone()));
+        found
+    }
+}
+
+/// Directions as columns, n × q.
+fn columns(n: usize, directions: &[Vec<(usize, f64)>]) -> DMatrix<f64> {
+    let mut columns = DMatrix::zeros(n, directions.len());
+    for (q, rows) in directions.iter().enumerate() {
+        rows.iter().for_each(|&(i, w)| columns[(i, q)] = w);
+    }
+    columns
 }
 
 /// `1/(s - λ)` and `1/(s - λ*)`.
