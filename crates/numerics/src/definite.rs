@@ -75,7 +75,7 @@ pub fn semidefinite(matrix: &DMatrix<f64>) -> Option<usize> {
 pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
     let n = matrix.n();
     // above what a factor takes for rounding of a pivot
-    let largest = ROUNDING * n.max(16) as f64;
+    let rounding = ROUNDING * n.max(16) as f64;
     let diagonal: Vec<f64> = (0..n).map(|i| matrix.get(i, i)).collect();
     let beside_zero = |(i, k, _): (usize, usize, f64)| i != k && (diagonal[i] == 0.0 || diagonal[k] == 0.0);
     if diagonal.iter().any(|d| *d < 0.0) || matrix.entries().any(beside_zero) {
@@ -86,17 +86,17 @@ pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
     let scaled = matrix.entries().map(|(i, k, value)| (i, k, value / scale[i] / scale[k]));
     let empty = (0..n).filter(|i| diagonal[*i] == 0.0).map(|i| (i, i, 1.0));
     let scaled = Matrix::from_triplets(n, scaled.chain(empty)).ok()?;
-    if scaled.asymmetry(largest).is_some() {
+    if scaled.asymmetry(rounding).is_some() {
         return None;
     }
     let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).ok()?;
     let analysis = Analysis::new(&[&scaled, &one]);
     let positive =
         |shift: f64| analysis.factor(&[(1.0, &scaled), (shift, &one)]).is_ok_and(|factor| factor.negative() == 0);
-    if diagonal.iter().all(|d| *d > 0.0) && positive(-largest) {
+    if diagonal.iter().all(|d| *d > 0.0) && positive(-rounding) {
         return Some(true);
     }
-    positive(largest).then_some(false)
+    positive(rounding).then_some(false)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::MethodError;
 use super::drive::Drive;
 use crate::law::SharedLaw;
 use crate::model::{Axis, System};
-use crate::structure::Matrices;
+use crate::structure::{MOST_IN_FULL, Matrices};
 use nalgebra::DMatrix;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -69,7 +69,10 @@ impl Assembly {
         mut states: impl FnMut(&SharedLaw) -> Result<(SharedLaw, usize, f64), &'static str>,
     ) -> Result<Self, MethodError> {
         let (structure, n) = (system.structure(), system.dofs());
-        if let Some(i) = (0..n).find(|&i| structure.mass()[(i, i)] <= 0.0) {
+        if n > MOST_IN_FULL {
+            return Err(MethodError::TooLarge { method, dofs: n, most: MOST_IN_FULL });
+        }
+        if let Some(i) = (0..n).find(|&i| structure.own_mass(i) <= 0.0) {
             return Err(MethodError::NeedsMass { method, place: system.places()[i].clone() });
         }
         let inverse_mass =

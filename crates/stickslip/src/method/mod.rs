@@ -105,6 +105,18 @@ pub enum MethodError {
         /// The place.
         place: String,
     },
+    /// More degrees of freedom than the method's full matrices may have.
+    #[error(
+        "{method} carries full matrices of all places, at most {most} of them, and there are {dofs}; use harmonic-balance"
+    )]
+    TooLarge {
+        /// The method.
+        method: &'static str,
+        /// Degrees of freedom of the system.
+        dofs: usize,
+        /// Most that the method takes.
+        most: usize,
+    },
     /// A matrix is not positive definite.
     #[error("{method} needs a positive definite {matrix} matrix")]
     NotPositive {

@@ -51,6 +51,8 @@ pub struct Matrices {
     pub stiffness: DMatrix<f64>,
 }
 
+/// Degrees of freedom up to which methods take full matrices: a product of two then takes seconds, and each has 32 MB.
+pub const MOST_IN_FULL: usize = 2000;
 /// Degrees of freedom from which matrices are kept sparse.
 pub const SPARSE: usize = 40;
 /// Share of the entries that are not zero from which they are kept full all the same.

@@ -3,7 +3,7 @@
 use crate::law::{Contact, Law, Piece};
 use crate::method::MethodError;
 use crate::model::System;
-use crate::structure::Matrices;
+use crate::structure::{MOST_IN_FULL, Matrices};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Deref;
 use std::sync::Arc;
@@ -138,7 +138,10 @@ impl Mechanics {
     /// A joint whose law has no exact view, or none that can be followed ([`refusal`]); a place without mass.
     pub fn new(system: &System) -> Result<Self, MethodError> {
         let n = system.dofs();
-        if let Some(i) = (0..n).find(|&i| system.structure().mass()[(i, i)] <= 0.0) {
+        if n > MOST_IN_FULL {
+            return Err(MethodError::TooLarge { method: super::NAME, dofs: n, most: MOST_IN_FULL });
+        }
+        if let Some(i) = (0..n).find(|&i| system.structure().own_mass(i) <= 0.0) {
             return Err(MethodError::NeedsMass { method: super::NAME, place: system.places()[i].clone() });
         }
         let mut parts = Vec::new();

@@ -40,7 +40,8 @@ use solve::Lost;
 use sparse::Sparse;
 use std::collections::{BTreeMap, VecDeque};
 
-pub(crate) const NAME: &str = "harmonic-balance";
+/// Its name in study files.
+pub const NAME: &str = "harmonic-balance";
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {

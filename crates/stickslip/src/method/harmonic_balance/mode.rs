@@ -13,6 +13,7 @@ use super::ports::{Alternation, Port, Ports};
 use super::solve::{HALVINGS, SHORTENS};
 use crate::method::MethodError;
 use crate::model::System;
+use crate::structure::MOST_IN_FULL;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::dense;
@@ -84,7 +85,10 @@ impl<'a> ModeEquations<'a> {
     /// # Errors
     /// A law with several directions, a place without mass, a mass matrix that is not positive definite.
     pub fn new(system: &'a System, harmonics: usize, samples: usize) -> Result<Self, MethodError> {
-        if let Some(massless) = (0..system.dofs()).find(|&i| system.structure().mass()[(i, i)] == 0.0) {
+        if system.dofs() > MOST_IN_FULL {
+            return Err(MethodError::TooLarge { method: "modes", dofs: system.dofs(), most: MOST_IN_FULL });
+        }
+        if let Some(massless) = (0..system.dofs()).find(|&i| system.structure().own_mass(i) == 0.0) {
             return Err(MethodError::NeedsMass { method: super::NAME, place: system.places()[massless].clone() });
         }
         if system.structure().mass().clone().cholesky().is_none() {

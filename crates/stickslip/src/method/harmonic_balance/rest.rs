@@ -253,3 +253,82 @@ fn modal(system: &System, direction: &DMatrix<f64>) -> Option<Modal> {
         free,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::Jenkins;
+    use crate::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
+    use std::f64::consts::PI;
+
+    /// Equal masses of a kilogram on equal springs between walls, pulled at the first, two joints on the ground.
+    fn chain(n: usize, stiffness: f64, damping: f64) -> System {
+        let name = |i: usize| if i == 0 || i > n { GROUND.to_owned() } else { format!("m{i}") };
+        let mut model = Model::default();
+        for i in 1..=n {
+            model.masses.push(Mass::new(name(i), 1.0));
+        }
+        for i in 0..=n {
+            model.springs.push(Spring { between: [name(i), name(i + 1)], stiffness, damping });
+        }
+        model.forces.push(Force { on: name(1), amplitude: 1.0, phase: 0.3, harmonic: 1 });
+        for i in [3, n - 1] {
+            let law = Arc::new(Jenkins { stiffness: 0.5 * stiffness, limit: 0.05 });
+            model.joints.push(Joint { name: format!("j{i}"), between: [name(i), GROUND.into()], law });
+        }
+        model.assemble().unwrap()
+    }
+
+    /// A structure that is too large for its modes responds as the sum of the modes that it would have: `sin(π k i/(n + 1))` with the
+    /// frequencies `2 √(k/m) sin(π k/(2 (n + 1)))`.
+    #[test]
+    fn receptances_without_modes() {
+        let (n, stiffness, damping) = (60, 40.0, 0.02);
+        let system = chain(n, stiffness, damping);
+        assert!(system.structure().is_sparse());
+        let ports = Ports::new(&system).unwrap();
+        let rest = Rest::new(&system, &ports);
+        let walls = (n + 1) as f64;
+        for (h, omega) in [(1, 0.7), (3, 0.7), (1, 2.9), (0, 0.7)] {
+            let s = Complex64::new(0.0, h as f64 * omega);
+            let exact = |i: f64, l: f64| -> Complex64 {
+                let one = |k: usize| {
+                    let shape = |i: f64| (2.0 / walls).sqrt() * (PI * k as f64 * i / walls).sin();
+                    let square = 4.0 * (0.5 * PI * k as f64 / walls).sin().powi(2);
+                    shape(i) * shape(l) / (s * s + s * damping * square + stiffness * square)
+                };
+                (1..=n).map(one).sum()
+            };
+            let at = [3.0, (n - 1) as f64];
+            let receptance = rest.receptance(h, omega);
+            for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let expected = exact(at[a], at[b]);
+                assert!((receptance[(a, b)] - expected).norm() < 1e-9 * exact(at[0], at[0]).norm(), "{a} {b}: {h}");
+            }
+            let mut force = DVector::from_element(n, ZERO);
+            force[9] = Complex64::new(0.0, 2.0);
+            let x = rest.respond(h, omega, &force);
+            for i in [1, 10, n] {
+                let expected = exact(i as f64, 10.0) * Complex64::new(0.0, 2.0);
+                assert!((x[i - 1] - expected).norm() < 1e-9 * exact(10.0, 10.0).norm());
+            }
+        }
+    }
+
+    /// Few joints on a large structure: the series against the exact motion.
+    #[test]
+    fn few_joints_on_a_large_structure() {
+        let system = chain(60, 400.0, 0.5);
+        let omega = 1.03;
+        assert!(super::super::sparse::Sparse::new(&system, &Ports::new(&system).unwrap(), &[1]).is_none());
+        let method = HarmonicBalance { harmonics: Some(21), ..HarmonicBalance::default() };
+        let series = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+        let exact = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+        assert!(exact.joints.iter().any(|joint| joint.slip_fraction > 0.1), "{:?}", exact.joints);
+        let largest = exact.places.iter().map(|place| place.amplitude()).fold(0.0, f64::max);
+        for (a, b) in series.places.iter().zip(&exact.places) {
+            assert!((a.amplitude() - b.amplitude()).abs() < 1e-3 * largest, "{} {}", a.amplitude(), b.amplitude());
+        }
+    }
+}
