@@ -102,9 +102,73 @@ fn in_blocks(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
     right.iter().all(|x| x.is_finite()).then_some(sign)
 }
 
+/// Rows and columns of a product that are summed side by side, in registers.
+const TILE: usize = 4;
+
+/// `C = A B` of column-major matrices: A is `rows × inner`, B `inner × columns`. Every entry is summed in rising order of the inner index, without
+/// fused operations: the same bits on every processor, which `gemm` of nalgebra does not promise from some size upward.
+///
+/// # Example
+/// ```
+/// let mut c = [0.0; 2];
+/// stickslip_numerics::dense::multiply(&[1.0, 2.0, 3.0, 4.0], &[5.0, 6.0], &mut c, (2, 2, 1));
+/// assert_eq!(c, [23.0, 34.0]);
+/// ```
+pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (usize, usize, usize)) {
+    if rows == 0 || columns == 0 {
+        return;
+    }
+    let c = &mut c[..rows * columns];
+    if inner == 0 {
+        c.fill(0.0);
+        return;
+    }
+    let whole = rows - rows % TILE;
+    for (b, c) in b[..inner * columns].chunks(TILE * inner).zip(c.chunks_mut(TILE * rows)) {
+        let wide = c.len() == TILE * rows;
+        for row in (0..if wide { whole } else { 0 }).step_by(TILE) {
+            let mut sums = [[0.0; TILE]; TILE];
+            for (k, a) in a.chunks_exact(rows).enumerate().take(inner) {
+                let a: [f64; TILE] = std::array::from_fn(|r| a[row + r]);
+                for (j, sum) in sums.iter_mut().enumerate() {
+                    let factor = b[j * inner + k];
+                    sum.iter_mut().zip(a).for_each(|(sum, a)| *sum += a * factor);
+                }
+            }
+            sums.iter().enumerate().for_each(|(j, sum)| c[j * rows + row..j * rows + row + TILE].copy_from_slice(sum));
+        }
+        let from = if wide { whole } else { 0 };
+        for (b, c) in b.chunks_exact(inner).zip(c.chunks_exact_mut(rows)) {
+            let rest = &mut c[from..];
+            rest.fill(0.0);
+            for (a, factor) in a.chunks_exact(rows).zip(b) {
+                rest.iter_mut().zip(&a[from..]).for_each(|(sum, a)| *sum += a * factor);
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The product in tiles has the bits of the plain sums, at every size beside the tile's.
+    #[test]
+    fn products_have_the_bits_of_plain_sums() {
+        let entry = |at: usize| ((at * 7919 + 13) as f64).sin();
+        for (rows, inner, columns) in [(1, 1, 1), (4, 3, 4), (5, 7, 9), (8, 0, 2), (0, 3, 2), (13, 6, 3), (16, 40, 21)]
+        {
+            let a: Vec<f64> = (0..rows * inner).map(entry).collect();
+            let b: Vec<f64> = (0..inner * columns).map(|at| entry(at + 1000)).collect();
+            let mut c = vec![f64::NAN; rows * columns];
+            multiply(&a, &b, &mut c, (rows, inner, columns));
+            for (at, c) in c.iter().enumerate() {
+                let (i, j) = (at % rows, at / rows);
+                let sum = (0..inner).fold(0.0, |sum, k| sum + a[k * rows + i] * b[j * inner + k]);
+                assert_eq!(c.to_bits(), sum.to_bits(), "{rows} {inner} {columns}: {i}, {j}");
+            }
+        }
+    }
 
     /// In blocks or not, the solution is the one that the matrix was multiplied with.
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::further::Further;
 use crate::measure::{Loop, largest};
-use crate::part::{Part, finding};
+use crate::part::{Finding, Part, finding};
 use crate::studies::Results;
 use crate::text::{join, list, percent, words};
 use crate::verdict::{APPROXIMATE, DIFFERENT, SIMILAR, in_all, small};
@@ -77,126 +77,9 @@ pub fn exact(results: &Results) -> Option<Part> {
 
 /// Figs. 3 and 4 with the law that the paper used.
 pub fn approximate(results: &Results, further: &Further) -> Option<Part> {
-    let exact = results.loops(&["fig02"])?;
-    let arctan = results.loops(&["fig03a", "fig03b"])?;
-    let massive = results.loops(&["fig04a", "fig04b"])?;
-    let coulomb = results.loops(&["fig04a_coulomb", "fig04b_coulomb"])?;
-    let excess = |a: &[Loop], b: &[Loop]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a.area / b.area - 1.0).collect() };
-    let apart =
-        |a: &[Loop], b: &[Loop]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a.difference(b) / LIMIT).collect() };
-    let within = |values: &[f64]| in_all(&values.iter().map(|v| v.abs() <= SIMILAR).collect::<Vec<_>>());
-    let (arctan_area, massive_area) = (excess(&arctan, &exact), excess(&massive, &exact));
-    let both: Vec<f64> = arctan_area.iter().chain(&massive_area).copied().collect();
-    let form = |a: &[Loop]| -> Vec<f64> { a.iter().zip(&exact).map(|(a, b)| b.distance(a, LIMIT)).collect() };
-    let (arctan_form, massive_form) = (form(&arctan), form(&massive));
-    let forms: Vec<f64> = arctan_form.iter().chain(&massive_form).copied().collect();
-    let (mutual_area, mutual_form) = (excess(&massive, &arctan), apart(&massive, &arctan));
-    let per_cent = |values: &[f64]| format!("{} %", list(values.iter().map(|v| 100.0 * v), 1));
-    let mut findings = vec![
-        finding(
-            "areas very similar to the exact element",
-            "Both models \u{201c}give very similar properties \u{2026} from the point of view of \u{2026} area proportional to the friction loss \
-             energy\u{201d} as the exact loops of Fig. 2. (Sec. 3)",
-            format!(
-                "Area beyond the exact one, arctangent law: {}; with mass: {} (loops in the order of the table). {} of {} are within {}.",
-                per_cent(&arctan_area),
-                per_cent(&massive_area),
-                both.iter().filter(|v| v.abs() <= SIMILAR).count(),
-                both.len(),
-                percent(SIMILAR)
-            ),
-            within(&both),
-        ),
-        finding(
-            "form very similar to the exact element",
-            "They are very similar \u{201c}from the point of view of hysteresis loop\u{2019}s form\u{201d}. (Sec. 3)",
-            format!(
-                "Largest distance between the loops, displacements in a and forces in Ft, arctangent law: {}; with mass: {}. \
-                 Highest force, arctangent law: {} to {} mN; with mass: {} to {} mN.",
-                per_cent(&arctan_form),
-                per_cent(&massive_form),
-                list([1e3 * arctan.iter().map(Loop::highest).fold(f64::NAN, f64::min)], 3),
-                list([1e3 * largest(arctan.iter().map(Loop::highest))], 3),
-                list([1e3 * massive.iter().map(Loop::highest).fold(f64::NAN, f64::min)], 3),
-                list([1e3 * largest(massive.iter().map(Loop::highest))], 3)
-            ),
-            small(largest(forms.iter().copied()), APPROXIMATE, DIFFERENT),
-        ),
-        finding(
-            "the mass changes the force only slightly",
-            "With the small mass \u{201c}the excitation force is slightly different\u{201d} from that of the weightless element. (Sec. 2)",
-            format!(
-                "Largest difference of force between Fig. 4 and Fig. 3 up to {} of Ft; areas differ by up to {}.",
-                percent(largest(mutual_form.iter().copied())),
-                percent(largest(mutual_area.iter().map(|v| v.abs())))
-            ),
-            small(largest(mutual_form.iter().chain(&mutual_area).map(|v| v.abs())), SIMILAR, 2.0 * SIMILAR),
-        ),
-    ];
-    if let (Some(exact), Some(arctan)) = (results.get("fig06"), results.get("fig06_arctan")) {
-        let ratio = arctan.record.wall_time_s / exact.record.wall_time_s;
-        findings.push(finding(
-            "more advantageous than the piecewise solution",
-            "The approximate models \u{201c}are also more advantageous than the stepwise piece-wise solution when one period is divided into several \
-             intervals\u{201d}. (Sec. 3)",
-            format!(
-                "Computing time: the {} points of Fig. 6 take {:.2} s piecewise, in closed form between switches, and \
-                 {:.1} s with the arctangent law, {ratio:.0} times as long (times of this run).",
-                exact.record.points.values().sum::<u64>(),
-                exact.record.wall_time_s,
-                arctan.record.wall_time_s
-            ),
-            if ratio <= 1.0 { Verdict::Holds } else { Verdict::DoesNotHold },
-        ));
-    }
-    let microjoule = |l: &Loop| format!("{:.4}", 1e6 * l.area);
-    let signed = |v: f64| format!("{:+.1}", 100.0 * v).replace('-', "\u{2212}");
-    let rows = (0..exact.len().min(arctan.len()).min(massive.len()).min(coulomb.len()))
-        .map(|i| {
-            vec![
-                format!("{}", exact[i].stiffness),
-                format!("{}", 1e3 * exact[i].amplitude),
-                microjoule(&exact[i]),
-                microjoule(&arctan[i]),
-                signed(arctan_area[i]),
-                microjoule(&massive[i]),
-                signed(massive_area[i]),
-                microjoule(&coulomb[i]),
-                signed(coulomb[i].area / exact[i].area - 1.0),
-            ]
-        })
-        .collect();
-    let areas = PageTable {
-        caption: "Loss per cycle (\u{b5}J), and per cent beyond the exact loop".to_owned(),
-        header: words(&[
-            "kt (N/m)",
-            "a (mm)",
-            "exact, Fig. 2",
-            "arctangent, Fig. 3",
-            "%",
-            "with mass, Fig. 4",
-            "%",
-            "mass, Coulomb",
-            "%",
-        ]),
-        rows,
-    };
-    let frequencies = PageTable {
-        caption: "Why \u{3c9} = 1 rad/s: over the six loops, how much Fig. 4 differs from Fig. 3".to_owned(),
-        header: words(&["\u{3c9} (rad/s)", "force, % of Ft", "area, %", "highest force in Fig. 4, Ft"]),
-        rows: further
-            .omega
-            .iter()
-            .map(|(omega, arctan, massive)| {
-                vec![
-                    format!("{omega:.4}"),
-                    list([100.0 * largest(apart(massive, arctan))], 1),
-                    list([100.0 * largest(excess(massive, arctan).iter().map(|v| v.abs()))], 1),
-                    list([largest(massive.iter().map(Loop::highest)) / LIMIT], 2),
-                ]
-            })
-            .collect(),
-    };
+    let elements = Elements::of(results)?;
+    let mut findings = elements.findings();
+    findings.extend(computing_time(results));
     let section = Section {
         heading: "Figs. 3 and 4: the approximate elements".to_owned(),
         paragraphs: vec![
@@ -210,10 +93,164 @@ pub fn approximate(results: &Results, further: &Further) -> Option<Part> {
             "",
             &[("fig03a", "Fig. 3a"), ("fig03b", "Fig. 3b"), ("fig04a", "Fig. 4a"), ("fig04b", "Fig. 4b")],
         ),
-        tables: vec![areas, frequencies],
+        tables: vec![elements.areas(), frequencies(further)],
         ..Section::default()
     };
     Some(Part { section, findings })
+}
+
+/// The loops of the four kinds of element, in the same order.
+struct Elements {
+    exact: Vec<Loop>,
+    arctan: Vec<Loop>,
+    massive: Vec<Loop>,
+    coulomb: Vec<Loop>,
+}
+
+/// How much larger each area is than the one beside it, as a share of that.
+fn excess(a: &[Loop], b: &[Loop]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a.area / b.area - 1.0).collect()
+}
+
+/// The largest difference of force between loops of the same displacements, in limits.
+fn apart(a: &[Loop], b: &[Loop]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a.difference(b) / LIMIT).collect()
+}
+
+fn per_cents(values: &[f64]) -> String {
+    format!("{} %", list(values.iter().map(|v| 100.0 * v), 1))
+}
+
+impl Elements {
+    fn of(results: &Results) -> Option<Elements> {
+        Some(Elements {
+            exact: results.loops(&["fig02"])?,
+            arctan: results.loops(&["fig03a", "fig03b"])?,
+            massive: results.loops(&["fig04a", "fig04b"])?,
+            coulomb: results.loops(&["fig04a_coulomb", "fig04b_coulomb"])?,
+        })
+    }
+
+    fn findings(&self) -> Vec<Finding> {
+        vec![self.same_areas(), self.same_form(), self.little_mass()]
+    }
+
+    fn same_areas(&self) -> Finding {
+        let (arctan, massive) = (excess(&self.arctan, &self.exact), excess(&self.massive, &self.exact));
+        let both: Vec<bool> = arctan.iter().chain(&massive).map(|v| v.abs() <= SIMILAR).collect();
+        finding(
+            "areas very similar to the exact element",
+            "Both models \u{201c}give very similar properties \u{2026} from the point of view of \u{2026} area proportional to the friction loss \
+             energy\u{201d} as the exact loops of Fig. 2. (Sec. 3)",
+            format!(
+                "Area beyond the exact one, arctangent law: {}; with mass: {} (loops in the order of the table). {} of {} are within {}.",
+                per_cents(&arctan),
+                per_cents(&massive),
+                both.iter().filter(|within| **within).count(),
+                both.len(),
+                percent(SIMILAR)
+            ),
+            in_all(&both),
+        )
+    }
+
+    fn same_form(&self) -> Finding {
+        let form =
+            |loops: &[Loop]| -> Vec<f64> { loops.iter().zip(&self.exact).map(|(a, b)| b.distance(a, LIMIT)).collect() };
+        let (arctan, massive) = (form(&self.arctan), form(&self.massive));
+        let lowest_top = |loops: &[Loop]| list([1e3 * loops.iter().map(Loop::highest).fold(f64::NAN, f64::min)], 3);
+        let highest_top = |loops: &[Loop]| list([1e3 * largest(loops.iter().map(Loop::highest))], 3);
+        finding(
+            "form very similar to the exact element",
+            "They are very similar \u{201c}from the point of view of hysteresis loop\u{2019}s form\u{201d}. (Sec. 3)",
+            format!(
+                "Largest distance between the loops, displacements in a and forces in Ft, arctangent law: {}; with mass: {}. \
+                 Highest force, arctangent law: {} to {} mN; with mass: {} to {} mN.",
+                per_cents(&arctan),
+                per_cents(&massive),
+                lowest_top(&self.arctan),
+                highest_top(&self.arctan),
+                lowest_top(&self.massive),
+                highest_top(&self.massive)
+            ),
+            small(largest(arctan.iter().chain(&massive).copied()), APPROXIMATE, DIFFERENT),
+        )
+    }
+
+    fn little_mass(&self) -> Finding {
+        let (area, form) = (excess(&self.massive, &self.arctan), apart(&self.massive, &self.arctan));
+        finding(
+            "the mass changes the force only slightly",
+            "With the small mass \u{201c}the excitation force is slightly different\u{201d} from that of the weightless element. (Sec. 2)",
+            format!(
+                "Largest difference of force between Fig. 4 and Fig. 3 up to {} of Ft; areas differ by up to {}.",
+                percent(largest(form.iter().copied())),
+                percent(largest(area.iter().map(|v| v.abs())))
+            ),
+            small(largest(form.iter().chain(&area).map(|v| v.abs())), SIMILAR, 2.0 * SIMILAR),
+        )
+    }
+
+    fn areas(&self) -> PageTable {
+        let microjoule = |l: &Loop| format!("{:.4}", 1e6 * l.area);
+        let beyond =
+            |l: &Loop, exact: &Loop| format!("{:+.1}", 100.0 * (l.area / exact.area - 1.0)).replace('-', "\u{2212}");
+        let loops = self.exact.iter().zip(&self.arctan).zip(&self.massive).zip(&self.coulomb);
+        let row = |(((exact, arctan), massive), coulomb): (((&Loop, &Loop), &Loop), &Loop)| {
+            let mut row = vec![format!("{}", exact.stiffness), format!("{}", 1e3 * exact.amplitude), microjoule(exact)];
+            row.extend([arctan, massive, coulomb].into_iter().flat_map(|l| [microjoule(l), beyond(l, exact)]));
+            row
+        };
+        PageTable {
+            caption: "Loss per cycle (\u{b5}J), and per cent beyond the exact loop".to_owned(),
+            header: words(&[
+                "kt (N/m)",
+                "a (mm)",
+                "exact, Fig. 2",
+                "arctangent, Fig. 3",
+                "%",
+                "with mass, Fig. 4",
+                "%",
+                "mass, Coulomb",
+                "%",
+            ]),
+            rows: loops.map(row).collect(),
+        }
+    }
+}
+
+fn computing_time(results: &Results) -> Option<Finding> {
+    let (exact, arctan) = (results.get("fig06")?, results.get("fig06_arctan")?);
+    let ratio = arctan.record.wall_time_s / exact.record.wall_time_s;
+    Some(finding(
+        "more advantageous than the piecewise solution",
+        "The approximate models \u{201c}are also more advantageous than the stepwise piece-wise solution when one period is divided into several \
+         intervals\u{201d}. (Sec. 3)",
+        format!(
+            "Computing time: the {} points of Fig. 6 take {:.2} s piecewise, in closed form between switches, and \
+             {:.1} s with the arctangent law, {ratio:.0} times as long (times of this run).",
+            exact.record.points.values().sum::<u64>(),
+            exact.record.wall_time_s,
+            arctan.record.wall_time_s
+        ),
+        if ratio <= 1.0 { Verdict::Holds } else { Verdict::DoesNotHold },
+    ))
+}
+
+fn frequencies(further: &Further) -> PageTable {
+    let row = |(omega, arctan, massive): &(f64, Vec<Loop>, Vec<Loop>)| {
+        vec![
+            format!("{omega:.4}"),
+            list([100.0 * largest(apart(massive, arctan))], 1),
+            list([100.0 * largest(excess(massive, arctan).iter().map(|v| v.abs()))], 1),
+            list([largest(massive.iter().map(Loop::highest)) / LIMIT], 2),
+        ]
+    };
+    PageTable {
+        caption: "Why \u{3c9} = 1 rad/s: over the six loops, how much Fig. 4 differs from Fig. 3".to_owned(),
+        header: words(&["\u{3c9} (rad/s)", "force, % of Ft", "area, %", "highest force in Fig. 4, Ft"]),
+        rows: further.omega.iter().map(row).collect(),
+    }
 }
 
 /// Fig. 4 as its caption has it.

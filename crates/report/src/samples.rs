@@ -12,12 +12,8 @@ fn series(label: &str, x: Vec<f64>, y: Vec<f64>, style: Style, colour: usize) ->
     Series { label: label.into(), x, y, style, colour, ..Series::default() }
 }
 
-fn number(name: &str, values: Vec<f64>) -> Column {
-    Column { name: name.into(), values: Values::Number(values) }
-}
-
 fn text(name: &str, values: &[&str]) -> Column {
-    Column { name: name.into(), values: Values::Text(values.iter().map(|v| (*v).to_owned()).collect()) }
+    Column::texts(name, values.iter().map(|v| (*v).to_owned()).collect())
 }
 
 fn record(points: &[(&str, u64)]) -> Record {
@@ -86,11 +82,11 @@ pub(crate) fn response() -> Dataset {
             Table {
                 name: "curve".into(),
                 columns: vec![
-                    number("Ft", limits),
-                    number("frequency_Hz", f.repeat(4)),
-                    number("blade1_amplitude_m", a1),
-                    number("contact_amplitude_m", a2),
-                    number("blade3_amplitude_m", a3),
+                    Column::numbers("Ft", limits),
+                    Column::numbers("frequency_Hz", f.repeat(4)),
+                    Column::numbers("blade1_amplitude_m", a1),
+                    Column::numbers("contact_amplitude_m", a2),
+                    Column::numbers("blade3_amplitude_m", a3),
                     Column { name: "stable".into(), values: Values::Flag(vec![Some(true); 964]) },
                     Column { name: "iterations".into(), values: Values::Integer(vec![4; 964]) },
                     text("status", &["converged"; 964]),
@@ -99,10 +95,10 @@ pub(crate) fn response() -> Dataset {
             Table {
                 name: "peaks".into(),
                 columns: vec![
-                    number("Ft", peak_case),
+                    Column::numbers("Ft", peak_case),
                     text("mass", &peak_mass),
-                    number("frequency_Hz", peak_f),
-                    number("amplitude_m", peak_a),
+                    Column::numbers("frequency_Hz", peak_f),
+                    Column::numbers("amplitude_m", peak_a),
                 ],
             },
         ],
@@ -146,11 +142,11 @@ pub(crate) fn hysteresis() -> Dataset {
         tables: vec![Table {
             name: "loops_summary".into(),
             columns: vec![
-                number("kt", stiffness),
-                number("amplitude_m", amplitude),
-                number("dissipation_J", loss.clone()),
-                number("equivalent_stiffness_N_per_m", loss.iter().map(|e| 1.25e6 * e).collect()),
-                number("equivalent_damping_kg_per_s", loss.iter().map(|e| 3.3e3 * e).collect()),
+                Column::numbers("kt", stiffness),
+                Column::numbers("amplitude_m", amplitude),
+                Column::numbers("dissipation_J", loss.clone()),
+                Column::numbers("equivalent_stiffness_N_per_m", loss.iter().map(|e| 1.25e6 * e).collect()),
+                Column::numbers("equivalent_damping_kg_per_s", loss.iter().map(|e| 3.3e3 * e).collect()),
             ],
         }],
         figure: Figure { title: "Hysteresis loops of elastic dry friction".into(), panels, ..Figure::default() },
@@ -217,8 +213,8 @@ pub(crate) fn hostile() -> Dataset {
         source: Some("<i>nobody</i> & sons".into()),
         kind: "orbit".into(),
         tables: vec![
-            Table { name: "peaks".into(), columns: vec![number("frequency_Hz", vec![f64::NAN, 1e-300, 121.25]), text("mass", &["<b>", "a,b", "位移"]), number("amplitude_m", vec![1e300, -0.0, 0.0487321])] },
-            Table { name: "empty".into(), columns: vec![number("a_m", vec![])] },
+            Table { name: "peaks".into(), columns: vec![Column::numbers("frequency_Hz", vec![f64::NAN, 1e-300, 121.25]), text("mass", &["<b>", "a,b", "位移"]), Column::numbers("amplitude_m", vec![1e300, -0.0, 0.0487321])] },
+            Table { name: "empty".into(), columns: vec![Column::numbers("a_m", vec![])] },
             Table { name: "none".into(), columns: vec![] },
         ],
         figure: Figure { title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž, with a title that has so many words that it must be broken into more than one line of text to fit the figure, which is not all that narrow".into(), panels, ..Figure::default() },

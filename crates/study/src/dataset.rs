@@ -5,6 +5,7 @@
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// The result of one study.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -81,24 +82,40 @@ pub fn column_name(name: &str) -> Cow<'_, str> {
     if name.contains('.') { Cow::Owned(name.replace('.', "_")) } else { Cow::Borrowed(name) }
 }
 
+impl Column {
+    /// Of numbers.
+    pub fn numbers(name: &str, values: Vec<f64>) -> Column {
+        Column { name: name.to_owned(), values: Values::Number(values) }
+    }
+
+    /// Of words.
+    pub fn texts(name: &str, values: Vec<String>) -> Column {
+        Column { name: name.to_owned(), values: Values::Text(values) }
+    }
+}
+
 impl Table {
+    /// The column of this name.
+    pub fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|column| column.name == column_name(name))
+    }
     /// The numbers of a column.
     pub fn numbers(&self, column: &str) -> Option<&[f64]> {
-        self.columns.iter().find(|c| c.name == column_name(column)).and_then(|c| match &c.values {
+        self.column(column).and_then(|c| match &c.values {
             Values::Number(v) => Some(v.as_slice()),
             _ => None,
         })
     }
     /// The words of a column.
     pub fn texts(&self, column: &str) -> Option<&[String]> {
-        self.columns.iter().find(|c| c.name == column_name(column)).and_then(|c| match &c.values {
+        self.column(column).and_then(|c| match &c.values {
             Values::Text(v) => Some(v.as_slice()),
             _ => None,
         })
     }
     /// The flags of a column.
     pub fn flags(&self, column: &str) -> Option<&[Option<bool>]> {
-        self.columns.iter().find(|c| c.name == column_name(column)).and_then(|c| match &c.values {
+        self.column(column).and_then(|c| match &c.values {
             Values::Flag(v) => Some(v.as_slice()),
             _ => None,
         })
@@ -283,10 +300,20 @@ pub enum Style {
 /// A point that did not converge: where, and why.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Failure {
-    /// The place in words, for example `Ft = 2 N, frequency = 121.25 Hz`.
+    /// The place in words, for example `Ft = 2 N, frequency = 121.25 Hz`; empty in a study that has but one.
     pub at: String,
     /// The reason and what to try.
     pub reason: String,
+}
+
+impl fmt::Display for Failure {
+    /// `failed at PLACE: REASON`; of a study that has but one place, without it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.at.as_str() {
+            "" => write!(f, "failed: {}", self.reason),
+            at => write!(f, "failed at {at}: {}", self.reason),
+        }
+    }
 }
 
 /// How a run was made, so that it can be repeated.

@@ -9,9 +9,12 @@
 //! indefinite systems", for exchanges inside blocks of columns only.
 
 mod analysis;
+pub mod columns;
 mod factor;
 mod matrix;
+mod modes;
 
 pub use analysis::Analysis;
 pub use factor::{ComplexFactor, Factor, Singular};
 pub use matrix::{Asymmetry, Matrix, MatrixError};
+pub use modes::{Effort, ModesError, NaturalModes, Wanted};

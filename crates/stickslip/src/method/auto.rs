@@ -62,7 +62,7 @@ impl Method for Auto {
     fn closes_motions(&self, system: &System) -> bool {
         Auto::chosen(system).0.closes_motions(system)
     }
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Auto::chosen(system).0.solver(system)
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        Auto::chosen(system).0.prepare(system)
     }
 }

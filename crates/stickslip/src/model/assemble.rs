@@ -109,10 +109,12 @@ impl Places {
             let message = format!("`{name}` moves in several directions; name one of them: {}", places.join(", "));
             return Err(ModelError::new(element, key, message));
         }
-        Err(ModelError {
-            wrong_name: Some(name.to_owned()),
-            ..ModelError::new(element, key, format!("there is no place `{name}`"))
-        })
+        let node = name.split_once('.').filter(|(node, _)| self.directions.contains_key(*node));
+        let message = match node {
+            Some((node, along)) => format!("there is no place `{name}`: `{node}` has no direction {along}"),
+            None => format!("there is no place `{name}`"),
+        };
+        Err(ModelError { wrong_name: Some(name.to_owned()), ..ModelError::new(element, key, message) })
     }
 
     /// Where both ends of a joint lead, along each of `count` directions.

@@ -209,13 +209,14 @@ pub(crate) fn extremes(spans: impl Iterator<Item = (f64, [f64; 3], [f64; 3])>) -
 }
 
 /// Work below this fraction of what the loads could do is no yardstick for the energy gap: the motion is conservative.
-const NO_WORK: f64 = 1e-6;
+pub(crate) const NO_WORK: f64 = 1e-6;
 
 impl Measured {
-    /// `|work in - viscous - friction|` relative to the work.
-    pub fn energy_gap(&self) -> f64 {
+    /// `|work in - viscous - friction|` relative to the work, or to what is the least yardstick, J.
+    pub fn energy_gap(&self, least: f64) -> f64 {
         let balance = (self.energy.work_in - self.energy.viscous - self.energy.friction).abs();
-        let reference = self.energy.work_in.abs().max(NO_WORK * (self.possible + self.energy.friction.abs()));
+        let reference =
+            self.energy.work_in.abs().max(NO_WORK * (self.possible + self.energy.friction.abs())).max(least);
         if reference > 0.0 { balance / reference } else { balance }
     }
 }

@@ -54,8 +54,16 @@ impl ModelSummary {
     }
 
     fn joint(&self, joint: &JointSummary) -> String {
+        match joint.pressed {
+            Some(0.0) => return "apart at rest: it closes and opens".to_owned(),
+            Some(force) => return format!("pressed with {} at rest: it opens and closes", quantity(force, "N")),
+            None => {}
+        }
         if joint.limit == 0.0 {
-            return "limit 0: free".to_owned();
+            return "free: carries nothing at rest".to_owned();
+        }
+        if joint.limit.is_infinite() {
+            return "a spring at rest, never slips".to_owned();
         }
         let mut text = match joint.displacement {
             Some(displacement) => {

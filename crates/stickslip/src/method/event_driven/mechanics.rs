@@ -3,7 +3,7 @@
 use crate::law::{Contact, Law, Piece};
 use crate::method::MethodError;
 use crate::model::System;
-use crate::structure::{MOST_IN_FULL, Matrices};
+use crate::structure::Matrices;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Deref;
 use std::sync::Arc;
@@ -92,14 +92,14 @@ impl Part {
     }
 }
 
-/// Why the method cannot take a law: what to use instead.
+/// Why the method cannot take a law: what it misses.
 fn refusal(law: &dyn Law) -> Option<&'static str> {
-    let Some(pieces) = law.pieces() else { return Some("method `shooting`, or the exact law") };
+    let Some(pieces) = law.pieces() else { return Some("it is not made of ideal sliders, springs and stops") };
     let drops = |piece: &Piece| matches!(piece, Piece::Slider(s) if s.stiffness.is_some() && s.static_limit > s.limit);
     if law.directions() != 1 {
-        Some("a law with one direction")
+        Some("it acts along several directions")
     } else if pieces.iter().any(drops) {
-        Some("equal static and dynamic limits where a slider is behind a spring")
+        Some("the slider behind its spring holds more than it carries in slip")
     } else {
         None
     }
@@ -138,22 +138,17 @@ impl Mechanics {
     /// A joint whose law has no exact view, or none that can be followed ([`refusal`]); a place without mass.
     pub fn new(system: &System) -> Result<Self, MethodError> {
         let n = system.dofs();
-        if n > MOST_IN_FULL {
-            return Err(MethodError::TooLarge { method: super::NAME, dofs: n, most: MOST_IN_FULL });
+        if let Some(error) = MethodError::too_large(super::NAME, system) {
+            return Err(error);
         }
         if let Some(i) = (0..n).find(|&i| system.structure().own_mass(i) <= 0.0) {
-            return Err(MethodError::NeedsMass { method: super::NAME, place: system.places()[i].clone() });
+            return Err(MethodError::needs_mass(super::NAME, system, i));
         }
         let mut parts = Vec::new();
         let mut elastic = 0;
         for (j, joint) in system.joints().iter().enumerate() {
-            if let Some(instead) = refusal(joint.law().as_ref()) {
-                return Err(MethodError::Law {
-                    method: super::NAME,
-                    joint: joint.name().to_owned(),
-                    law: joint.law().name(),
-                    instead,
-                });
+            if let Some(misses) = refusal(joint.law().as_ref()) {
+                return Err(MethodError::law(super::NAME, joint, misses));
             }
             let axis = &joint.axes()[0];
             for piece in joint.law().pieces().unwrap_or_default() {
@@ -180,7 +175,7 @@ impl Mechanics {
             .clone()
             .try_inverse()
             .filter(|inverse| positive && inverse.iter().all(|x| x.is_finite()))
-            .ok_or(MethodError::NotPositive { method: super::NAME, matrix: "mass" })?;
+            .ok_or_else(|| MethodError::mass_not_positive(super::NAME))?;
         let fastest = (0..n)
             .map(|i| (system.structure().stiffness()[(i, i)] / system.structure().mass()[(i, i)]).sqrt())
             .fold(0.0, f64::max);

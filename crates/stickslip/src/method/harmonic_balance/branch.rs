@@ -57,10 +57,10 @@ impl<'a> BranchEquations<'a> {
         let kept = Kept::new(&system, |_| true);
         method.check(kept.highest)?;
         let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
-        let ports = Ports::new(&system)?;
+        let ports = Ports::new(&system).map_err(|error| error.with_ways(&system))?;
         let rest = Rest::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
-        let level = |top: usize| Level::new(kept.up_to(top), method.samples_at(top), &ports, None);
+        let level = |top: usize| Level::new(kept.up_to(top), method.samples_at(top, &ports), &ports, None);
         super::check_size(2 * ports.count() * kept.up_to(top).len())?;
         let few = 2 * ports.count() * kept.up_to(kept.double(top)).len() <= LARGEST;
         let (finer, level) = (few.then(|| level(kept.double(top))), level(top));
@@ -156,6 +156,7 @@ impl<'a> BranchEquations<'a> {
             system: &self.system,
             ports: &self.ports,
             omega: self.omega,
+            first: 1,
             odd: self.kept.half_period(),
             truncation,
             tolerance: self.tolerance,

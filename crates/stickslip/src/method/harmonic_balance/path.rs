@@ -6,7 +6,9 @@ use super::rest::Rest;
 use crate::law::{Contact, MOST_DIRECTIONS};
 use crate::method::evidence::{Judge, Judged};
 use crate::model::{MovedPlace, System};
-use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
+use crate::orbit::{
+    Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry, history, laws,
+};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
@@ -81,6 +83,8 @@ pub(super) struct Context<'a> {
     pub system: &'a System,
     pub ports: &'a Ports,
     pub omega: f64,
+    /// The harmonic that has the drive's frequency.
+    pub first: usize,
     pub odd: bool,
     pub truncation: Option<f64>,
     /// The error that it is compared with.
@@ -94,7 +98,7 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     if !stays(&context, level, motion, &x) {
         return None;
     }
-    let Context { system, ports, omega, odd, truncation, tolerance, judge } = context;
+    let Context { system, ports, omega, first, odd, truncation, tolerance, judge } = context;
     let (n, nh) = (system.dofs(), level.harmonics().len());
     let harmonics = level.harmonics().to_vec();
     let samples = level.alternation.samples();
@@ -130,7 +134,8 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
                 Some(rate) if port.is_force() => {
                     let mut z = vec![0.0; rate.states()];
                     // the sampled force is within the law's bounds, which that of the series may pass
-                    rate.state_under(alternation.force[0][0], &mut z);
+                    let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| alternation.force[a][0]);
+                    rate.state_under(&now[..port.axes], &mut z);
                     states.extend(z);
                 }
                 _ if port.is_force() => {}
@@ -180,7 +185,13 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
             let series: Vec<(usize, Complex64)> = (0..nh).map(|k| (harmonics[k], x[k][i])).collect();
             let (minimum, maximum) = extremes(&series, level);
             let at = |h: usize| harmonics.binary_search(&h).map_or(ZERO, |k| x[k][i]);
-            PlaceMotion { name: system.places()[i].clone(), maximum, minimum, mean: at(0).re, first_harmonic: at(1) }
+            PlaceMotion {
+                name: system.places()[i].clone(),
+                maximum,
+                minimum,
+                mean: at(0).re,
+                first_harmonic: at(first),
+            }
         })
         .collect();
     let energy = energy(system, ports, omega, &harmonics, &x, motion, &joints);
@@ -190,6 +201,7 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
     start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
     start.extend(states);
+    let symmetry = if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod };
     let contracts = judge.as_ref().is_some_and(|judge| judge.proves());
     let Judged { derivative, defect } =
         judge.map_or_else(Judged::default, |judge| judge.judge(system, omega, odd, &start));
@@ -197,7 +209,7 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
         method: super::NAME,
         omega,
         periods: 1,
-        symmetry: if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod },
+        symmetry,
         start,
         places,
         evidence: Evidence {
@@ -212,6 +224,7 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
                 Some(_) => Accuracy::Truncated,
                 None => Accuracy::Unchecked,
             },
+            history: history(laws(system), &joints, &stuck, symmetry),
             stuck,
         },
         joints,

@@ -1,0 +1,873 @@
+//! The lowest natural modes of `K φ = λ M φ`, λ = ω², and the proof that none is missing.
+//!
+//! Block Lanczos process with `(K - σM)⁻¹ M` in the inner product of M, every vector orthogonalised against all others: near the shift σ the
+//! eigenvalues `θ = 1 / (λ - σ)` are large and well apart, and converge first. A block finds eigenvalues of its own multiplicity at once, and
+//! modes that are already found are projected out, so that a next run finds the rest of larger groups.
+//!
+//! How many eigenvalues lie below μ is known without computing them: as many as the factor of `K - μM` has negative pivots. Modes are handed
+//! out when that number agrees with those found below; otherwise the same factor becomes the next shift, and the search goes on around it.
+//!
+//! M may be singular: vectors that come out of the operator have no component without mass, up to rounding that another multiplication
+//! removes. K may be singular too: the first shift is negative.
+//!
+//! Sources: Ericsson and Ruhe (1980), "The spectral transformation Lanczos method for the numerical solution of large sparse generalized
+//! symmetric eigenvalue problems"; Nour-Omid, Parlett, Ericsson and Jensen (1987), "How to implement the spectral transformation", for singular
+//! M; Grimes, Lewis and Simon (1994), "A shifted block Lanczos algorithm for solving sparse symmetric generalized eigenproblems", for blocks, shifts
+//! and counts.
+
+use super::{Analysis, Factor, Matrix, Singular, columns};
+use crate::eigen;
+use nalgebra::DMatrix;
+
+/// Vectors of a block: eigenvalues of multiplicity up to four are found in one run, and a solution for four right sides takes much less
+/// than four times one.
+const BLOCK: usize = 4;
+/// Residual of a mode in the Lanczos process, relative to θ, at which it counts as found: what follows squares the error of the eigenvalue.
+const CONVERGED: f64 = 1e-10;
+/// Largest relative error bound of `λ - σ` with which a mode is handed out; 1e-11 to 1e-15 is usual. The error itself is about its square.
+const ACCURATE: f64 = 1e-8;
+/// Norm of a new vector, relative to its norm before what is known was projected out, below which it is rounding.
+const DEPENDENT: f64 = 1e-14;
+/// Below this share so many digits have cancelled that it is made orthogonal once more; if half of it goes, it was rounding after all.
+const CANCELLED: f64 = 1e-6;
+/// A negative `vᵀ M v` is rounding up to this share of `|v| |M v|`.
+const MASSLESS: f64 = 1e-10;
+/// An eigenvalue counts as one up to a bound if it is above by less than this share.
+const ROUNDING: f64 = 1e-9;
+/// Vectors of a run: so many times the modes that are wanted and so many more, but no more than `MOST`.
+const TIMES: usize = 2;
+const MORE: usize = 60;
+const MOST: usize = 320;
+/// Runs at most. Each but the first starts where eigenvalues are known to be missing, and a run finds about a third of `MOST`.
+const RUNS: usize = 100;
+/// The first shift, relative to a usual `k_ii / m_ii`, if nothing else is known: below the first mode of a compact body, and far above the rounding
+/// of a free motion.
+const SHIFT: f64 = 1e-6;
+/// No shift is smaller than this, relative to a usual `k_ii / m_ii`: rounding of K.
+const LEAST_SHIFT: f64 = 1e-12;
+/// The first shift relative to the bound up to which modes are wanted.
+const SHIFT_OF_BOUND: f64 = 0.01;
+/// A first eigenvalue between these shares of the first shift says that the shift is far too large for a slender structure; below the smaller
+/// one the motion is free.
+const SLENDER: (f64, f64) = (1e-6, 0.1);
+/// Blocks after which a search that has not ended asks whether its first shift was too large: these cost about as much as another factor.
+const JUDGED: usize = 12;
+/// Blocks between two looks at what has converged.
+const CHECKED: usize = 4;
+/// Gap between two eigenvalues, relative to their distance from the first shift, in which they can be counted.
+const GAP: f64 = 1e-5;
+/// How far beyond the last mode found eigenvalues are counted, and the next are looked for, relative to its distance from the first shift;
+/// at least as far as that shift is from zero, where many free motions are.
+const BEYOND: f64 = 0.1;
+/// Attempts to factor beside an eigenvalue, each further by `GAP`.
+const ATTEMPTS: usize = 8;
+
+/// Which modes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Wanted {
+    /// The lowest so many, or all if there are fewer.
+    Lowest(usize),
+    /// All with an eigenvalue λ = ω² up to a bound.
+    UpTo {
+        /// The bound, rad²/s².
+        value: f64,
+        /// More than these are refused: memory is n numbers for each.
+        most: usize,
+    },
+}
+
+/// The lowest natural modes, complete.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NaturalModes {
+    /// λ = ω², rad²/s², rising. Free motions have rounding around zero.
+    pub values: Vec<f64>,
+    /// Shapes φ, columns of length n one after the other, with `φᵀ M φ = 1`.
+    pub shapes: Vec<f64>,
+    /// Of every mode `‖φ - (λ - σ)(K - σM)⁻¹ M φ‖` in the norm of M: some eigenvalue has a distance from the shift σ that differs by no more
+    /// than this share.
+    pub residuals: Vec<f64>,
+    /// What they took.
+    pub effort: Effort,
+}
+
+/// What modes took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Effort {
+    /// Factors.
+    pub factors: usize,
+    /// Vectors of the Lanczos process.
+    pub vectors: usize,
+}
+
+/// Why there are no modes.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ModesError {
+    /// A motion has neither mass nor stiffness.
+    #[error("a motion has neither mass nor stiffness: {0}")]
+    Massless(Singular),
+    /// The stiffness is not positive semidefinite.
+    #[error(
+        "{count} eigenvalues lie below {below:.3e} rad²/s²: the stiffness is not positive semidefinite; check its signs, or a state beyond buckling"
+    )]
+    Negative {
+        /// How many.
+        count: usize,
+        /// Below this, rad²/s².
+        below: f64,
+    },
+    /// The mass is not positive semidefinite.
+    #[error("some motion has a negative mass; the mass matrix must be positive semidefinite")]
+    NegativeMass,
+    /// More modes than asked for.
+    #[error("{count} modes lie below {below:.3e} rad²/s², and at most {most} are allowed; lower the bound")]
+    TooMany {
+        /// How many.
+        count: usize,
+        /// The bound, rad²/s².
+        below: f64,
+        /// How many are allowed.
+        most: usize,
+    },
+    /// The factor is too inaccurate.
+    #[error(
+        "the mode at {value:.6e} rad²/s² keeps a residual of {residual:.1e}: stiffness and mass range over so many orders that rounding drowns it; \
+         replace what is nearly rigid by constraints, or take longer elements"
+    )]
+    Inaccurate {
+        /// λ, rad²/s².
+        value: f64,
+        /// As [`NaturalModes::residuals`].
+        residual: f64,
+    },
+    /// Numbers left the range.
+    #[error("the entries of mass and stiffness leave the range of numbers; choose other units")]
+    OutOfRange,
+    /// The count and the modes found disagree, or nothing more is found.
+    #[error(
+        "the search for modes ended with {found} below {below:.3e} rad²/s², where the count of negative pivots is {counted}; \
+         matrices whose entries are scaled very differently need better units"
+    )]
+    NotConverged {
+        /// Modes found below.
+        found: usize,
+        /// Eigenvalues below.
+        counted: usize,
+        /// Where, rad²/s².
+        below: f64,
+    },
+}
+
+impl NaturalModes {
+    /// The lowest modes of symmetric `stiffness` K and `mass` M, both positive semidefinite, both among the matrices of `analysis`.
+    ///
+    /// # Errors
+    /// [`ModesError`]: a motion without mass and stiffness, a negative eigenvalue, more modes than allowed, no convergence.
+    ///
+    /// # Panics
+    /// If the matrices have not the size of the analysis.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
+    /// // two equal masses on a ring of two springs, held by nobody: 0 and 4
+    /// let k = Matrix::from_triplets(2, [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]).unwrap();
+    /// let m = Matrix::from_triplets(2, [(0, 0, 1.0), (1, 1, 1.0)]).unwrap();
+    /// let modes = NaturalModes::new(&Analysis::new(&[&k, &m]), &k, &m, Wanted::Lowest(2)).unwrap();
+    /// assert!(modes.values[0].abs() < 1e-12 && (modes.values[1] - 4.0).abs() < 1e-12);
+    /// ```
+    pub fn new(analysis: &Analysis, stiffness: &Matrix, mass: &Matrix, wanted: Wanted) -> Result<Self, ModesError> {
+        if mass.n() == 0 {
+            return Ok(NaturalModes::none());
+        }
+        Search { analysis, stiffness, mass, wanted, scale: usual(stiffness, mass), found: NaturalModes::none() }.run()
+    }
+
+    fn none() -> Self {
+        NaturalModes { values: vec![], shapes: vec![], residuals: vec![], effort: Effort::default() }
+    }
+
+    /// How many.
+    pub fn count(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Shape φ of a mode, from 0.
+    ///
+    /// # Panics
+    /// If there is no such mode.
+    pub fn shape(&self, mode: usize) -> &[f64] {
+        let n = self.shapes.len() / self.count();
+        &self.shapes[mode * n..(mode + 1) * n]
+    }
+
+    /// The first `count` of them.
+    pub fn truncate(&mut self, count: usize) {
+        if count < self.count() {
+            let n = self.shapes.len() / self.count();
+            self.shapes.truncate(count * n);
+            self.values.truncate(count);
+            self.residuals.truncate(count);
+        }
+    }
+
+    fn below(&self, value: f64) -> usize {
+        self.values.partition_point(|v| *v < value)
+    }
+
+    /// Adds modes and sorts all.
+    fn join(&mut self, n: usize, other: NaturalModes) {
+        self.values.extend(other.values);
+        self.shapes.extend(other.shapes);
+        self.residuals.extend(other.residuals);
+        let mut order: Vec<usize> = (0..self.count()).collect();
+        order.sort_by(|&a, &b| self.values[a].total_cmp(&self.values[b]));
+        if order.is_sorted() {
+            return;
+        }
+        self.values = order.iter().map(|&k| self.values[k]).collect();
+        self.residuals = order.iter().map(|&k| self.residuals[k]).collect();
+        self.shapes = order.iter().flat_map(|&k| self.shapes[k * n..(k + 1) * n].iter().copied()).collect();
+    }
+}
+
+/// The median of `k_ii / m_ii`, rad²/s²; one if there is none.
+fn usual(stiffness: &Matrix, mass: &Matrix) -> f64 {
+    let mut ratios: Vec<f64> = (0..mass.n())
+        .map(|i| stiffness.get(i, i) / mass.get(i, i))
+        .filter(|ratio| ratio.is_finite() && *ratio > 0.0)
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios.get(ratios.len() / 2).copied().unwrap_or(1.0)
+}
+
+/// A search under way.
+struct Search<'a> {
+    analysis: &'a Analysis,
+    stiffness: &'a Matrix,
+    mass: &'a Matrix,
+    wanted: Wanted,
+    /// A usual `k_ii / m_ii`, rad²/s².
+    scale: f64,
+    found: NaturalModes,
+}
+
+/// A run of the Lanczos process.
+struct Run {
+    modes: NaturalModes,
+    vectors: usize,
+    end: End,
+}
+
+/// What ended it.
+enum End {
+    /// Enough modes, or no more room.
+    Full,
+    /// The space has no further vectors: all modes are known.
+    Exhausted,
+    /// A first shift that is much larger than this eigenvalue.
+    Slender(f64),
+}
+
+impl Search<'_> {
+    fn run(mut self) -> Result<NaturalModes, ModesError> {
+        let least = LEAST_SHIFT * self.scale;
+        let mut depth = match self.wanted {
+            Wanted::Lowest(0) => return Ok(self.found),
+            Wanted::Lowest(_) => SHIFT * self.scale,
+            Wanted::UpTo { value, .. } if value.is_nan() || value <= 0.0 => return Ok(self.found),
+            Wanted::UpTo { value, .. } => (SHIFT_OF_BOUND * value).max(least),
+        };
+        let (mut shift, mut factor) = self.first(depth)?;
+        let mut counted = 0;
+        for _ in 0..RUNS {
+            let run = self.around(shift, &factor, counted, depth)?;
+            self.found.effort.vectors += run.vectors;
+            // the memory of the old factor is needed for the new one
+            drop(factor);
+            if let End::Slender(value) = run.end {
+                depth = value.max(least);
+                (shift, factor) = self.first(depth)?;
+                continue;
+            }
+            let (exhausted, more) = (matches!(run.end, End::Exhausted), run.modes.count());
+            self.found.join(self.mass.n(), run.modes);
+            (shift, factor) = self.beside(self.bound(exhausted, depth), depth)?;
+            counted = factor.negative();
+            let found = self.found.below(shift);
+            let (enough, keep) = match self.wanted {
+                Wanted::Lowest(n) => (found >= n, n),
+                Wanted::UpTo { value, most } if counted > most => {
+                    return Err(ModesError::TooMany { count: counted, below: shift.min(value), most });
+                }
+                Wanted::UpTo { value, .. } => (shift >= value, self.found.below(value + ROUNDING * value.abs())),
+            };
+            if found == counted && (enough || exhausted) {
+                self.found.truncate(keep);
+                return Ok(self.found);
+            }
+            if found > counted || exhausted || more == 0 {
+                break;
+            }
+        }
+        Err(ModesError::NotConverged { found: self.found.below(shift), counted, below: shift })
+    }
+
+    /// The factor at the first, negative shift.
+    fn first(&mut self, depth: f64) -> Result<(f64, Factor), ModesError> {
+        self.found.effort.factors += 1;
+        let factor =
+            self.analysis.factor(&[(1.0, self.stiffness), (depth, self.mass)]).map_err(ModesError::Massless)?;
+        match factor.negative() {
+            0 => Ok((-depth, factor)),
+            count => Err(ModesError::Negative { count, below: -depth }),
+        }
+    }
+
+    /// The factor at a shift, or a little further where that is an eigenvalue.
+    fn beside(&mut self, shift: f64, depth: f64) -> Result<(f64, Factor), ModesError> {
+        let mut last = Singular { row: 0 };
+        for attempt in 0..ATTEMPTS {
+            let shift = shift + attempt as f64 * GAP * (shift.abs() + depth);
+            self.found.effort.factors += 1;
+            match self.analysis.factor(&[(1.0, self.stiffness), (-shift, self.mass)]) {
+                Ok(factor) => return Ok((shift, factor)),
+                Err(singular) => last = singular,
+            }
+        }
+        Err(ModesError::Massless(last))
+    }
+
+    /// Up to where the modes found may be complete, in a gap between them.
+    fn bound(&self, exhausted: bool, depth: f64) -> f64 {
+        let values = &self.found.values;
+        // so many have to lie below, and the bound above this
+        let (below, above) = match self.wanted {
+            Wanted::Lowest(n) => (n.min(values.len()), f64::NEG_INFINITY),
+            Wanted::UpTo { value, .. } => match values.partition_point(|v| *v <= value) {
+                all if all == values.len() && !exhausted => (all, f64::NEG_INFINITY),
+                below => (below, value),
+            },
+        };
+        let last = values.last().copied().unwrap_or(0.0).max(above);
+        let mut gaps =
+            (below..values.len()).map(|i| (if i == 0 { above } else { values[i - 1].max(above) }, values[i]));
+        let gap = gaps.find(|(low, high)| high - low > GAP * (high + depth));
+        gap.map_or(last + (BEYOND * (last + depth)).max(depth), |(low, high)| 0.5 * (low + high))
+    }
+
+    /// A run of the Lanczos process around a shift, below which `counted` eigenvalues lie.
+    fn around(&self, shift: f64, factor: &Factor, counted: usize, depth: f64) -> Result<Run, ModesError> {
+        let mut lanczos = Lanczos::new(factor, self.mass, &self.found.shapes);
+        let missing = counted.saturating_sub(self.found.below(shift));
+        let wanted = match self.wanted {
+            Wanted::Lowest(n) => missing.max((n + 1).saturating_sub(self.found.count())),
+            Wanted::UpTo { .. } => MOST,
+        };
+        let room = (TIMES * wanted + MORE).min(MOST);
+        let value = |pair: &Pair| shift + 1.0 / pair.theta;
+        let mut blocks = 0;
+        loop {
+            blocks += 1;
+            let exhausted = !lanczos.expand()?;
+            let full = lanczos.expanded + BLOCK > room;
+            // the projected eigenvalue problem at every fourth block costs less than the blocks
+            if !(exhausted || full || blocks % CHECKED == 0) {
+                continue;
+            }
+            let mut pairs = lanczos.pairs()?;
+            let converged = |pair: &Pair| pair.residual <= CONVERGED * pair.theta.abs();
+            let nearest = pairs.iter().take_while(|pair| converged(pair)).count();
+            pairs.retain(converged);
+            let near = &pairs[..nearest];
+            let low = near.iter().filter(|pair| pair.theta < 0.0).count();
+            let enough = match self.wanted {
+                Wanted::Lowest(_) => nearest >= wanted,
+                Wanted::UpTo { value: bound, .. } => {
+                    self.found.values.last().is_some_and(|v| *v > bound) || near.iter().any(|pair| value(pair) > bound)
+                }
+            };
+            if (enough && low >= missing) || full || exhausted {
+                let modes = lanczos.modes(self.stiffness, shift, &pairs)?;
+                let end = if exhausted { End::Exhausted } else { End::Full };
+                return Ok(Run { modes, vectors: lanczos.expanded, end });
+            }
+            if blocks >= JUDGED && self.found.count() == 0 && depth > LEAST_SHIFT * self.scale {
+                let elastic = pairs.iter().map(value).filter(|value| *value > SLENDER.0 * depth);
+                let first = elastic.fold(f64::INFINITY, f64::min);
+                if first < SLENDER.1 * depth {
+                    let end = End::Slender(first);
+                    return Ok(Run { modes: NaturalModes::none(), vectors: lanczos.expanded, end });
+                }
+            }
+        }
+    }
+}
+
+/// An eigenvalue of the projected operator.
+struct Pair {
+    theta: f64,
+    /// Combination of the basis.
+    vector: Vec<f64>,
+    /// `‖(K - σM)⁻¹ M y - θ y‖` in the norm of M.
+    residual: f64,
+}
+
+/// A basis of vectors that M makes orthonormal, orthogonal to the modes already found, and `T = Vᵀ M (K - σM)⁻¹ M V`.
+struct Lanczos<'a> {
+    factor: &'a Factor,
+    mass: &'a Matrix,
+    found: &'a [f64],
+    n: usize,
+    basis: Vec<f64>,
+    /// Columns of T, each as long as the basis was.
+    projected: Vec<Vec<f64>>,
+    /// How many vectors of the basis the operator was applied to.
+    expanded: usize,
+    /// What the last block that the operator was applied to has of the block after it.
+    beyond: DMatrix<f64>,
+    /// State of the start vectors' sequence.
+    seed: u64,
+}
+
+impl<'a> Lanczos<'a> {
+    fn new(factor: &'a Factor, mass: &'a Matrix, found: &'a [f64]) -> Self {
+        let n = mass.n();
+        let beyond = DMatrix::zeros(0, 0);
+        Lanczos { factor, mass, found, n, basis: vec![], projected: vec![], expanded: 0, beyond, seed: 0 }
+    }
+
+    fn size(&self) -> usize {
+        self.basis.len().checked_div(self.n).unwrap_or(0)
+    }
+
+    /// Applies the operator to the last block and adds what is new; false if nothing is.
+    fn expand(&mut self) -> Result<bool, ModesError> {
+        if self.size() == 0 {
+            self.fill(BLOCK)?;
+            if self.size() == 0 {
+                return Ok(false);
+            }
+        }
+        let n = self.n;
+        let mut block = self.operator(&self.basis[self.expanded * n..]);
+        let width = block.len() / n;
+        let sizes = self.norms(&block)?;
+        let coefficients = self.clear(&mut block);
+        for k in 0..width {
+            self.projected.push(coefficients.column(k).iter().copied().collect());
+        }
+        self.expanded += width;
+        self.beyond = self.append(block, &sizes)?;
+        let added = self.size() - self.expanded;
+        if added < BLOCK {
+            self.fill(BLOCK - added)?;
+        }
+        Ok(self.size() > self.expanded)
+    }
+
+    /// `(K - σM)⁻¹ M V`.
+    fn operator(&self, v: &[f64]) -> Vec<f64> {
+        let mut block = self.mass.times_columns(v);
+        self.factor.solve(&mut block);
+        block
+    }
+
+    fn norms(&self, block: &[f64]) -> Result<Vec<f64>, ModesError> {
+        let forces = self.mass.times_columns(block);
+        let squares = block.chunks(self.n).zip(forces.chunks(self.n)).map(|(v, f)| (dot(v, f), length(v) * length(f)));
+        squares
+            .map(|(square, size)| match square {
+                square if !square.is_finite() => Err(ModesError::OutOfRange),
+                square if square >= 0.0 => Ok(square.sqrt()),
+                // of a vector without mass rounding may be negative
+                square if square >= -MASSLESS * size => Ok(0.0),
+                _ => Err(ModesError::NegativeMass),
+            })
+            .collect()
+    }
+
+    /// Projects the modes found and the basis out of a block, and returns its components along the basis. Twice is enough.
+    fn clear(&self, block: &mut [f64]) -> DMatrix<f64> {
+        let n = self.n;
+        let mut coefficients = DMatrix::zeros(self.size(), block.len() / n);
+        for _ in 0..2 {
+            let forces = self.mass.times_columns(block);
+            let known = columns::products(n, self.found, &forces);
+            columns::add(n, block, -1.0, self.found, &known);
+            let along = columns::products(n, &self.basis, &forces);
+            columns::add(n, block, -1.0, &self.basis, &along);
+            coefficients += along;
+        }
+        coefficients
+    }
+
+    /// Makes the columns of a cleared block orthonormal, one after the other, and adds those that are not rounding beside their former `sizes`. Returns the
+    /// block's components along the new vectors.
+    fn append(&mut self, block: Vec<f64>, sizes: &[f64]) -> Result<DMatrix<f64>, ModesError> {
+        let n = self.n;
+        let first = self.size();
+        let mut components = DMatrix::zeros(0, sizes.len());
+        for (k, (column, size)) in block.chunks(n).zip(sizes).enumerate() {
+            let mut column = column.to_vec();
+            let mut along = DMatrix::zeros(self.size() - first, 1);
+            for _ in 0..2 {
+                let force = self.mass.times_columns(&column);
+                let part = columns::products(n, &self.basis[first * n..], &force);
+                columns::add(n, &mut column, -1.0, &self.basis[first * n..], &part);
+                along += part;
+            }
+            let norm = self.norms(&column)?[0];
+            (0..along.nrows()).for_each(|i| components[(i, k)] = along[(i, 0)]);
+            if norm <= DEPENDENT * size {
+                continue;
+            }
+            scale(&mut column, 1.0 / norm);
+            if norm < CANCELLED * size {
+                self.clear(&mut column);
+                let left = self.norms(&column)?[0];
+                if left < 0.5 {
+                    continue;
+                }
+                scale(&mut column, 1.0 / left);
+            }
+            self.basis.extend(column);
+            components = components.insert_row(self.size() - first - 1, 0.0);
+            components[(self.size() - first - 1, k)] = norm;
+        }
+        Ok(components)
+    }
+
+    /// Adds up to `count` vectors that have nothing to do with those before; fewer where the space has no more.
+    fn fill(&mut self, count: usize) -> Result<(), ModesError> {
+        let mut start: Vec<f64> = (0..count * self.n).map(|_| self.next()).collect();
+        // without what is known before the operator, which would drown the rest in it
+        self.clear(&mut start);
+        start = self.operator(&start);
+        let sizes = self.norms(&start)?;
+        self.clear(&mut start);
+        self.append(start, &sizes)?;
+        Ok(())
+    }
+
+    /// Numbers between -1 and 1 without a pattern, the same on every machine (Steele, Lea and Flood 2014, splitmix64).
+    fn next(&mut self) -> f64 {
+        self.seed = self.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.seed;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    /// Eigenvalues of the projected operator, the largest |θ| first.
+    fn pairs(&self) -> Result<Vec<Pair>, ModesError> {
+        let m = self.expanded;
+        if m == 0 {
+            return Ok(vec![]);
+        }
+        // of the symmetric matrix the upper triangle was computed
+        let upper = |i: usize, k: usize| self.projected[k].get(i).copied().unwrap_or(0.0);
+        let t = DMatrix::from_fn(m, m, |i, k| upper(i.min(k), i.max(k)));
+        let eigen = eigen::symmetric(t).ok_or(ModesError::OutOfRange)?;
+        let mut order: Vec<usize> = (0..m).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].abs().total_cmp(&eigen.eigenvalues[a].abs()));
+        let last = self.beyond.ncols();
+        let pair = |k: usize| {
+            let vector: Vec<f64> = eigen.eigenvectors.column(k).iter().copied().collect();
+            let tail = DMatrix::from_column_slice(last, 1, &vector[m - last..]);
+            Pair { theta: eigen.eigenvalues[k], vector, residual: (&self.beyond * tail).norm() }
+        };
+        Ok(order.into_iter().map(pair).filter(|pair| pair.theta != 0.0).collect())
+    }
+
+    /// Modes of eigenvalues of the projected operator: multiplied by the operator once more, and combined so that K and M are diagonal.
+    fn modes(&self, stiffness: &Matrix, shift: f64, pairs: &[Pair]) -> Result<NaturalModes, ModesError> {
+        let (n, count) = (self.n, pairs.len());
+        if count == 0 {
+            return Ok(NaturalModes::none());
+        }
+        let failed = || ModesError::NotConverged { found: 0, counted: count, below: shift };
+        let coefficients = DMatrix::from_fn(self.expanded, count, |i, k| pairs[k].vector[i]);
+        let ritz = columns::combination(n, &self.basis[..self.expanded * n], &coefficients);
+        let mut shapes = self.operator(&ritz);
+        shapes.chunks_mut(n).zip(pairs).for_each(|(shape, pair)| scale(shape, 1.0 / pair.theta));
+        let forces = self.mass.times_columns(&shapes);
+        let known = columns::products(n, self.found, &forces);
+        columns::add(n, &mut shapes, -1.0, self.found, &known);
+        let m = columns::products(n, &shapes, &self.mass.times_columns(&shapes));
+        let k = columns::products(n, &shapes, &stiffness.times_columns(&shapes));
+        let inverse = m
+            .clone()
+            .cholesky()
+            .map(|c| c.l())
+            .and_then(|l| l.solve_lower_triangular(&DMatrix::identity(count, count)));
+        let inverse = inverse.ok_or_else(failed)?;
+        // relative to the shift, so that modes far above do not drown those near it in their rounding
+        let eigen = eigen::symmetric(&inverse * (k - m * shift) * inverse.transpose()).ok_or_else(failed)?;
+        let shapes = columns::combination(n, &shapes, &(inverse.transpose() * &eigen.eigenvectors));
+        let values: Vec<f64> = eigen.eigenvalues.iter().map(|v| v + shift).collect();
+        let mut off = self.operator(&shapes);
+        for ((off, shape), value) in off.chunks_mut(n).zip(shapes.chunks(n)).zip(&values) {
+            off.iter_mut().zip(shape).for_each(|(off, x)| *off = x - (value - shift) * *off);
+        }
+        // inside of the modes' own space K and M are diagonal: what the factor's rounding adds there is no error of theirs
+        for modes in [self.found, &shapes] {
+            let inside = columns::products(n, modes, &self.mass.times_columns(&off));
+            columns::add(n, &mut off, -1.0, modes, &inside);
+        }
+        let residuals = self.norms(&off)?;
+        // a free motion that is not found yet may drown others by the factor's rounding; they are found after it
+        let good: Vec<usize> = (0..count).filter(|&k| residuals[k] <= ACCURATE).collect();
+        if good.is_empty() {
+            return Err(ModesError::Inaccurate { value: values[0], residual: residuals[0] });
+        }
+        let shapes = good.iter().flat_map(|&k| shapes[k * n..(k + 1) * n].iter().copied()).collect();
+        let [values, residuals] = [values, residuals].map(|all| good.iter().map(|&k| all[k]).collect());
+        let mut modes = NaturalModes::none();
+        modes.join(n, NaturalModes { values, shapes, residuals, effort: Effort::default() });
+        Ok(modes)
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn length(v: &[f64]) -> f64 {
+    dot(v, v).sqrt()
+}
+
+fn scale(v: &mut [f64], factor: f64) {
+    v.iter_mut().for_each(|x| *x *= factor);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::f64::consts::PI;
+
+    fn modes(k: &Matrix, m: &Matrix, wanted: Wanted) -> Result<NaturalModes, ModesError> {
+        NaturalModes::new(&Analysis::new(&[k, m]), k, m, wanted)
+    }
+
+    fn matrix(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> Matrix {
+        Matrix::from_triplets(n, entries).unwrap()
+    }
+
+    fn identity(n: usize) -> Matrix {
+        matrix(n, (0..n).map(|i| (i, i, 1.0)))
+    }
+
+    /// Springs between (i, k) of stiffness one; a spring to oneself is one to the ground.
+    fn springs(n: usize, between: impl IntoIterator<Item = (usize, usize)>) -> Matrix {
+        let spring = |(i, k): (usize, usize)| match i == k {
+            true => vec![(i, i, 1.0)],
+            false => vec![(i, i, 1.0), (k, k, 1.0), (i, k, -1.0), (k, i, -1.0)],
+        };
+        matrix(n, between.into_iter().flat_map(spring))
+    }
+
+    /// Eigenvalues are those expected, to `tolerance` of the value plus `rounding`; shapes are orthonormal and belong to them.
+    fn check(k: &Matrix, m: &Matrix, modes: &NaturalModes, expected: &[f64], rounding: f64) {
+        assert_eq!(modes.count(), expected.len(), "{:?}", modes.values);
+        let n = k.n();
+        for (value, expected) in modes.values.iter().zip(expected) {
+            assert!((value - expected).abs() <= 1e-11 * expected + rounding, "{value} instead of {expected}");
+        }
+        let gram = columns::products(n, &modes.shapes, &m.times_columns(&modes.shapes));
+        assert!((gram - DMatrix::identity(modes.count(), modes.count())).amax() < 1e-10);
+        let (kx, mx) = (k.times_columns(&modes.shapes), m.times_columns(&modes.shapes));
+        for mode in 0..modes.count() {
+            let size = k.largest() * length(modes.shape(mode));
+            let off =
+                (0..n).map(|i| (kx[mode * n + i] - modes.values[mode] * mx[mode * n + i]).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-9 * size, "mode {mode}: {off:e} of {size:e}");
+        }
+    }
+
+    /// A chain between walls, `λ = 4 sin²(π i / 2 (n + 1))`; alone in the space, `4 sin²(π i / 2 n)` from zero; as a ring, `4 sin²(π i / n)`, twice.
+    #[test]
+    fn chains_and_rings() {
+        for n in [1, 2, 3, 5, 40, 900] {
+            let m = identity(n);
+            let count = n.min(12);
+            let sine = |x: f64| 4.0 * x.sin().powi(2);
+            let held = springs(n, (1..n).map(|i| (i - 1, i)).chain([(0, 0), (n - 1, n - 1)]));
+            let expected: Vec<f64> = (1..=count).map(|i| sine(PI * i as f64 / (2 * n + 2) as f64)).collect();
+            check(&held, &m, &modes(&held, &m, Wanted::Lowest(12)).unwrap(), &expected, 1e-14);
+            if n == 1 {
+                continue;
+            }
+            let free = springs(n, (1..n).map(|i| (i - 1, i)));
+            let expected: Vec<f64> = (0..count).map(|i| sine(PI * i as f64 / (2 * n) as f64)).collect();
+            check(&free, &m, &modes(&free, &m, Wanted::Lowest(12)).unwrap(), &expected, 1e-14);
+            let ring = springs(n, (0..n).map(|i| (i, (i + 1) % n)));
+            let expected: Vec<f64> = (0..count).map(|i| sine(PI * i.div_ceil(2) as f64 / n as f64)).collect();
+            check(&ring, &m, &modes(&ring, &m, Wanted::Lowest(12)).unwrap(), &expected, 1e-14);
+        }
+    }
+
+    /// A bar of linear elements with their own mass matrix, held at one end: `λ = (6 / h²) (1 - cos β) / (2 + cos β)`, `β = (i - ½) π / n`.
+    #[test]
+    fn a_bar_held_at_one_end() {
+        let n = 400;
+        let h = 1.0 / n as f64;
+        let element = |i: usize, a: f64, b: f64| {
+            let own = [(i, i, a)];
+            let linked = (i > 0).then(|| [(i - 1, i - 1, a), (i, i - 1, b), (i - 1, i, b)]);
+            own.into_iter().chain(linked.into_iter().flatten())
+        };
+        let k = matrix(n, (0..n).flat_map(|i| element(i, 1.0 / h, -1.0 / h)));
+        let m = matrix(n, (0..n).flat_map(|i| element(i, h / 3.0, h / 6.0)));
+        let value = |i: usize| {
+            let cosine = ((i as f64 + 0.5) * PI / n as f64).cos();
+            6.0 / (h * h) * (1.0 - cosine) / (2.0 + cosine)
+        };
+        let expected: Vec<f64> = (0..30).map(value).collect();
+        // the largest eigenvalue is 12 / h² = 2e6, and its rounding is everywhere
+        check(&k, &m, &modes(&k, &m, Wanted::Lowest(30)).unwrap(), &expected, 1e-9);
+        let bound = 0.5 * (expected[24] + expected[25]);
+        let up_to = modes(&k, &m, Wanted::UpTo { value: bound, most: 25 }).unwrap();
+        check(&k, &m, &up_to, &expected[..25], 1e-9);
+        let many = modes(&k, &m, Wanted::UpTo { value: bound, most: 24 });
+        assert_eq!(many.unwrap_err(), ModesError::TooMany { count: 25, below: bound, most: 24 });
+        assert_eq!(modes(&k, &m, Wanted::UpTo { value: 0.9 * expected[0], most: 9 }).unwrap().count(), 0);
+        assert_eq!(modes(&k, &m, Wanted::UpTo { value: -1.0, most: 9 }).unwrap().count(), 0);
+    }
+
+    /// Groups of eigenvalues that are larger than a block, and a bound that is one of them.
+    #[test]
+    fn groups_larger_than_a_block() {
+        let n = 300;
+        let value = |i: usize| 1.0 + (i / 11) as f64;
+        let (k, m) = (matrix(n, (0..n).map(|i| (i, i, 2.0 * value(i)))), matrix(n, (0..n).map(|i| (i, i, 2.0))));
+        let expected: Vec<f64> = (0..n).map(value).collect();
+        check(&k, &m, &modes(&k, &m, Wanted::Lowest(30)).unwrap(), &expected[..30], 0.0);
+        check(&k, &m, &modes(&k, &m, Wanted::UpTo { value: 3.0, most: 99 }).unwrap(), &expected[..33], 0.0);
+        check(&k, &m, &modes(&k, &m, Wanted::Lowest(n + 5)).unwrap(), &expected, 0.0);
+    }
+
+    /// More modes than one run has room for.
+    #[test]
+    fn hundreds_of_modes() {
+        let n = 1500;
+        let (k, m) = (springs(n, (0..n).map(|i| (i, (i + 1) % n))), identity(n));
+        let expected: Vec<f64> =
+            (0..401usize).map(|i| 4.0 * (PI * i.div_ceil(2) as f64 / n as f64).sin().powi(2)).collect();
+        let found = modes(&k, &m, Wanted::Lowest(401)).unwrap();
+        check(&k, &m, &found, &expected, 1e-13);
+        assert!(found.effort.factors > 2, "{:?}", found.effort);
+    }
+
+    /// A slender beam is softer than its elements by many orders: `λ = (β / L)⁴ EI / (ρA)` of a cantilever, β = 1.8751, 4.6941, 7.8548.
+    #[test]
+    fn a_slender_cantilever() {
+        let n = 120;
+        let h = 1.0 / n as f64;
+        let place = |node: usize, k: usize| (2 * node + k).checked_sub(2);
+        let element = |values: [[f64; 4]; 4], factor: f64| {
+            let at = move |e: usize| {
+                let entry = move |i: usize, k: usize| {
+                    let (row, column) = (place(e + i / 2, i % 2)?, place(e + k / 2, k % 2)?);
+                    let units = [h, 1.0][1 - i % 2] * [h, 1.0][1 - k % 2];
+                    Some((row, column, factor * values[i][k] * units))
+                };
+                (0..16).filter_map(move |at| entry(at / 4, at % 4))
+            };
+            matrix(2 * n, (0..n).flat_map(at))
+        };
+        let bending =
+            [[12.0, 6.0, -12.0, 6.0], [6.0, 4.0, -6.0, 2.0], [-12.0, -6.0, 12.0, -6.0], [6.0, 2.0, -6.0, 4.0]];
+        let inertia = [
+            [156.0, 22.0, 54.0, -13.0],
+            [22.0, 4.0, 13.0, -3.0],
+            [54.0, 13.0, 156.0, -22.0],
+            [-13.0, -3.0, -22.0, 4.0],
+        ];
+        let (k, m) = (element(bending, h.powi(-3)), element(inertia, h / 420.0));
+        let found = modes(&k, &m, Wanted::Lowest(8)).unwrap();
+        // roots of cos β cosh β = -1, by Newton's method
+        for (i, value) in found.values.iter().enumerate() {
+            let mut beta = (i as f64 + 0.5) * PI;
+            for _ in 0..50 {
+                let f = beta.cos() + 1.0 / beta.cosh();
+                beta += f / (beta.sin() + beta.sinh() / beta.cosh().powi(2));
+            }
+            // elements err by (β h)⁴ / 720; rounding is that of the largest eigenvalue, 9e11
+            let tolerance = (beta * h).powi(4) / 700.0 * beta.powi(4) + 1e-4;
+            assert!((value - beta.powi(4)).abs() < tolerance, "{i}: {value} instead of {}", beta.powi(4));
+        }
+    }
+
+    /// Places without mass follow the others: a chain in which every second place is massless is one of springs in series.
+    #[test]
+    fn places_without_mass() {
+        let n = 201;
+        let k = springs(n, (1..n).map(|i| (i - 1, i)).chain([(0, 0), (n - 1, n - 1)]));
+        let m = matrix(n, (0..n).filter(|i| i % 2 == 1).map(|i| (i, i, 1.0)));
+        let expected: Vec<f64> = (1..=100).map(|i| 2.0 * (PI * i as f64 / 202.0).sin().powi(2)).collect();
+        check(&k, &m, &modes(&k, &m, Wanted::Lowest(9)).unwrap(), &expected[..9], 1e-14);
+        // no more than have mass
+        check(&k, &m, &modes(&k, &m, Wanted::Lowest(150)).unwrap(), &expected, 1e-14);
+        let none = matrix(n, []);
+        assert_eq!(modes(&k, &none, Wanted::Lowest(3)).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn what_has_no_modes_says_why() {
+        let n = 30;
+        let (free, m) = (springs(n, (1..n).map(|i| (i - 1, i))), identity(n));
+        let unstable = matrix(n, free.entries().chain([(4, 4, -0.5)]));
+        assert!(matches!(modes(&unstable, &m, Wanted::Lowest(2)), Err(ModesError::Negative { count: 1, .. })));
+        let massless = matrix(n, m.entries().filter(|(i, ..)| *i < n - 2));
+        let loose = springs(n, (1..n - 2).map(|i| (i - 1, i)));
+        assert!(matches!(modes(&loose, &massless, Wanted::Lowest(2)), Err(ModesError::Massless(_))));
+        let negative = matrix(n, m.entries().map(|(i, k, v)| (i, k, if i == 3 { -v } else { v })));
+        let held = springs(n, (1..n).map(|i| (i - 1, i)).chain([(0, 0)]));
+        let wrong = modes(&held, &negative, Wanted::Lowest(2));
+        assert!(matches!(wrong, Err(ModesError::NegativeMass | ModesError::Negative { .. })), "{wrong:?}");
+        let none = matrix(0, []);
+        assert_eq!(modes(&none, &none, Wanted::Lowest(3)).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn same_bits_on_every_thread() {
+        let solve = || {
+            let (k, m) = (springs(500, (0..500).map(|i| (i, (i + 1) % 500))), identity(500));
+            modes(&k, &m, Wanted::Lowest(21)).unwrap()
+        };
+        let here = solve();
+        let there: Vec<_> = (0..3).map(|_| std::thread::spawn(solve)).collect();
+        assert!(there.into_iter().all(|thread| thread.join().unwrap() == here));
+    }
+
+    proptest! {
+        /// Of random structures, eigenvalues are those of the dense problem `L⁻¹ K L⁻ᵀ`, M = L Lᵀ.
+        #[test]
+        fn random_structures(
+            links in proptest::collection::vec((0usize..40, 0usize..40, 0.1f64..10.0), 30..120),
+            masses in proptest::collection::vec(0.1f64..10.0, 40),
+            count in 1usize..45,
+        ) {
+            let n = 40;
+            let spring = |&(i, k, v): &(usize, usize, f64)| match i == k {
+                true => vec![(i, i, v)],
+                false => vec![(i, i, v), (k, k, v), (i, k, -v), (k, i, -v)],
+            };
+            let k = matrix(n, links.iter().flat_map(spring));
+            let coupled = links.iter().take(8).flat_map(|(i, k, v)| [(*i, *i, *v), (*k, *k, *v), (*i, *k, 0.5 * v), (*k, *i, 0.5 * v)]);
+            let m = matrix(n, (0..n).map(|i| (i, i, masses[i])).chain(coupled));
+            let dense = |a: &Matrix| DMatrix::from_fn(n, n, |i, k| a.get(i, k));
+            let l = dense(&m).cholesky().unwrap().l();
+            let inverse = l.solve_lower_triangular(&DMatrix::identity(n, n)).unwrap();
+            let mut expected: Vec<f64> = (&inverse * dense(&k) * inverse.transpose()).symmetric_eigenvalues().iter().copied().collect();
+            expected.sort_by(f64::total_cmp);
+            let found = modes(&k, &m, Wanted::Lowest(count)).unwrap();
+            check(&k, &m, &found, &expected[..count.min(n)], 1e-11 * expected[n - 1]);
+            let bound = 0.5 * (expected[count.min(n) - 1] + expected.get(count).copied().unwrap_or(1e3 * expected[n - 1]));
+            prop_assume!(expected.iter().all(|e| (e - bound).abs() > 1e-9 * expected[n - 1]));
+            let found = modes(&k, &m, Wanted::UpTo { value: bound, most: n }).unwrap();
+            prop_assert_eq!(found.count(), count.min(n));
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Several runs of one kind beside each other: their curves in one figure, and how far their numbers lie apart.
+//!
+//! Every run is compared with the first. Rows that stand for the same thing (same varied parameters, mass, joint) are told by the
+//! columns that say so. Where both runs have the same abscissae, rows are compared one by one; where they have not, the later
+//! run is interpolated linearly to the abscissae of the first, which the table says. A relative difference is one relative to the largest size
+//! in that column of the first run, so that a zero of a curve is no infinity.
+
+mod differences;
+mod labels;
+mod overlay;
+mod pairs;
+mod people;
+mod reading;
+
+pub use people::for_people;
+
+use crate::file::{ReportError, file_name};
+use crate::output::{Outputs, write_dataset};
+use crate::stored::{COMPARISON, Stored, StoredError};
+use differences::Differences;
+use labels::{folder_name, labels};
+use overlay::overlay;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use stickslip_study::dataset::{Dataset, Figure, Record};
+/// Why runs cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// One run alone.
+    #[error("a comparison needs two runs: name the folders of both")]
+    Single,
+    /// Runs of different kinds.
+    #[error("{} holds results of the kind `{kind}`, {} of the kind `{other_kind}`; only runs of one kind can be compared", folder.display(), other.display())]
+    Kinds {
+        /// The folder of the first run.
+        folder: PathBuf,
+        /// Its kind.
+        kind: String,
+        /// The folder of the other.
+        other: PathBuf,
+        /// Its kind.
+        other_kind: String,
+    },
+}
+
+/// The runs in one figure, and tables of their differences: `differences`, and the `peaks` or optima one by one.
+///
+/// # Errors
+/// [`CompareError`]: there is only one, or their kinds differ.
+pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
+    let [first, others @ ..] = runs else { return Err(CompareError::Single) };
+    if others.is_empty() {
+        return Err(CompareError::Single);
+    }
+    if let Some(other) = others.iter().find(|run| run.dataset.kind != first.dataset.kind) {
+        return Err(CompareError::Kinds {
+            folder: first.folder.clone(),
+            kind: first.dataset.kind.clone(),
+            other: other.folder.clone(),
+            other_kind: other.dataset.kind.clone(),
+        });
+    }
+    let labels = labels(runs);
+    let mut notes = vec![format!(
+        "Differences are against {}; relative ones are relative to the largest size in that column there.",
+        labels[0]
+    )];
+    for (run, label) in runs.iter().zip(&labels).filter(|(run, _)| run.dataset.record.interrupted) {
+        notes.push(format!("{label}: the run in {} was interrupted.", run.folder.display()));
+    }
+    let mut differences = Differences::default();
+    for (run, label) in others.iter().zip(&labels[1..]) {
+        differences.add((first, &labels[0]), (run, label));
+    }
+    notes.append(&mut differences.notes);
+    let titles: BTreeSet<&str> = runs.iter().map(|run| run.dataset.title.as_str()).collect();
+    let title =
+        if titles.len() == 1 { first.dataset.title.clone() } else { format!("Comparison of {} runs", runs.len()) };
+    let figures: Vec<(&str, &Figure)> =
+        labels.iter().map(String::as_str).zip(runs.iter().map(|run| &run.dataset.figure)).collect();
+    let figure = Figure { title: title.clone(), ..overlay(&figures) };
+    let about = runs.iter().zip(&labels).map(|(run, label)| {
+        serde_json::json!({
+            "folder": run.folder.display().to_string(),
+            "label": label,
+            "version": run.dataset.record.version,
+            "methods": run.dataset.record.methods,
+            "interrupted": run.dataset.record.interrupted,
+        })
+    });
+    Ok(Dataset {
+        name: name(runs),
+        title,
+        source: None,
+        kind: COMPARISON.to_owned(),
+        tables: differences.tables(),
+        figure,
+        notes,
+        failures: Vec::new(),
+        record: Record {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            study: serde_json::json!({ "runs": about.collect::<Vec<_>>() }),
+            methods: Vec::new(),
+            seed: None,
+            threads: 1,
+            wall_time_s: 0.0,
+            points: BTreeMap::new(),
+            interrupted: false,
+        },
+    })
+}
+/// Writes a comparison into `out/NAME/`, which must be free or hold a comparison.
+///
+/// # Errors
+/// In words: the folder holds a run, or a file cannot be written.
+pub fn write(comparison: &Dataset, out: &Path, outputs: &Outputs) -> Result<Vec<PathBuf>, ReportError> {
+    let folder = out.join(file_name(&comparison.name, "comparison")?);
+    match crate::stored::read(&folder) {
+        // what cannot be read may be a run all the same
+        Err(StoredError::Nothing { .. } | StoredError::Comparison { .. }) => write_dataset(comparison, out, outputs),
+        _ => Err(ReportError::Write { path: folder, cause: std::io::Error::other("the results of a run are there") }),
+    }
+}
+
+/// Names of runs in the name of their comparison; more are counted.
+const MOST_NAMES: usize = 2;
+
+/// The names of the folders, joined.
+fn name(runs: &[Stored]) -> String {
+    let mut names: Vec<String> = runs.iter().take(MOST_NAMES).map(|run| folder_name(&run.folder)).collect();
+    if runs.len() > MOST_NAMES {
+        names.push(format!("{} more", runs.len() - MOST_NAMES));
+    }
+    names.join("+")
+}

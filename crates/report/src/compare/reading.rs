@@ -1,0 +1,106 @@
+//! How the rows of a table are to be read: which columns tell them apart, and along which the others are curves.
+
+use crate::stored::Stored;
+use std::collections::BTreeMap;
+use stickslip_study::dataset::{Column, Table, Values};
+use stickslip_study::{Case, VariedValue};
+/// Columns that say how well a number is known, not what it is.
+const EVIDENCE: [&str; 3] = ["residual", "energy_gap", "truncation"];
+/// Columns of words and counts that tell rows apart.
+const KEYS: [&str; 5] = ["mass", "joint", "loop", "index", "stretch"];
+/// Tables whose rows are told apart by the drive frequency.
+const BY_FREQUENCY: [&str; 5] = ["orbit", "orbits", "multipliers", "loops", "loops_summary"];
+/// How the rows of a table are to be read.
+pub(super) struct Reading {
+    /// Columns that tell rows apart.
+    pub(super) keys: Vec<String>,
+    /// The column along which the other ones are curves.
+    pub(super) abscissa: Option<String>,
+}
+
+impl Reading {
+    pub(super) fn new(run: &Stored, table: &Table) -> Reading {
+        let has = |name: &str| table.columns.iter().any(|column| column.name == name);
+        let case = run.study.case(0).ok();
+        let names = |values: &[VariedValue]| values.iter().map(|value| value.column().0).collect::<Vec<_>>();
+        let varied = case.as_ref().map(|case| names(&case.varied)).unwrap_or_default();
+        let last = varied.last().cloned();
+        // a value that another run varies stands in a column too
+        let fixed = case.as_ref().map(|case| names(&fixed(case))).unwrap_or_default();
+        // a branch along a parameter, an optimum: the last parameter is found, not given
+        let along = run.dataset.kind == "branch" && !has("frequency_Hz");
+        let abscissa = match table.name.as_str() {
+            "curve" | "references" => Some("frequency_Hz".to_owned()),
+            "orbit" | "loops" | "motion" => Some("time_s".to_owned()),
+            "modes" => Some("modal_amplitude_m_sqrt_kg".to_owned()),
+            "branch" if !along => Some("frequency_Hz".to_owned()),
+            "branch" | "performance" => last.clone(),
+            _ => None,
+        };
+        let found = along || table.name == "optimum";
+        let mut given: Vec<String> =
+            varied.into_iter().filter(|name| !(found && Some(name) == last.as_ref())).chain(fixed).collect();
+        given.sort();
+        let frequency = BY_FREQUENCY.contains(&table.name.as_str()).then_some("frequency_Hz");
+        let named = KEYS.into_iter().chain(["drive_frequency_Hz"]).chain(frequency).map(str::to_owned);
+        let keys = given.into_iter().chain(named).filter(|name| has(name) && Some(name) != abscissa.as_ref()).collect();
+        Reading { keys, abscissa: abscissa.filter(|name| has(name)) }
+    }
+
+    /// The rows of each group, in the order of the table.
+    pub(super) fn groups(&self, table: &Table) -> Vec<(String, Vec<usize>)> {
+        let columns: Vec<&Column> = self.keys.iter().filter_map(|key| table.column(key)).collect();
+        let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
+        let mut known: BTreeMap<String, usize> = BTreeMap::new();
+        for row in 0..table.rows() {
+            let key: Vec<String> = columns
+                .iter()
+                .map(|column| format!("{} = {}", column.name, crate::csv::cell(&column.values, row)))
+                .collect();
+            let key = key.join(", ");
+            let at = *known.entry(key.clone()).or_insert_with(|| {
+                groups.push((key, Vec::new()));
+                groups.len() - 1
+            });
+            groups[at].1.push(row);
+        }
+        groups
+    }
+
+    /// The columns to be compared.
+    pub(super) fn values<'t>(&self, table: &'t Table) -> Vec<&'t str> {
+        let wanted = |column: &&Column| {
+            matches!(column.values, Values::Number(_))
+                && !self.keys.contains(&column.name)
+                && self.abscissa.as_ref() != Some(&column.name)
+                && !EVIDENCE.contains(&column.name.as_str())
+        };
+        table.columns.iter().filter(wanted).map(|column| column.name.as_str()).collect()
+    }
+}
+
+/// The parameters of a case that are not varied, each with its column.
+fn fixed(case: &Case) -> Vec<VariedValue> {
+    let fixed = case.parameters.iter().filter(|(name, _)| case.varied.iter().all(|varied| varied.name != **name));
+    fixed
+        .map(|(name, (si, dimension))| VariedValue {
+            name: name.clone(),
+            si: *si,
+            dimension: *dimension,
+            text: String::new(),
+        })
+        .collect()
+}
+
+/// The table with a column for every parameter that the other run varies and this one does not.
+pub(super) fn completed(run: &Stored, table: &Table, (other, with): (&Stored, &Table)) -> Table {
+    let mut table = table.clone();
+    let (Ok(case), Ok(varied)) = (run.study.case(0), other.study.case(0).map(|case| case.varied)) else { return table };
+    for value in fixed(&case).iter().filter(|value| varied.iter().any(|varied| varied.name == value.name)) {
+        let (name, value) = value.column();
+        if with.column(&name).is_some() && table.column(&name).is_none() {
+            table.columns.insert(0, Column::numbers(&name, vec![value; table.rows()]));
+        }
+    }
+    table
+}

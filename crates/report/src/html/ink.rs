@@ -1,0 +1,65 @@
+//! What traces and layout share: colours with their partners on dark, names of axes, text shown literally.
+
+use crate::axis::{self, Range};
+use crate::colour::Colour;
+use crate::frame::{AREA, Shades};
+use crate::svg::escape;
+use std::collections::BTreeMap;
+use stickslip_study::dataset::Figure;
+
+/// Colours of all that is no curve, and their partners on dark: text, background, axes, grid, fine grid, zero.
+pub(super) const TEXT: &str = "#1a1a1a";
+pub(super) const GROUND: &str = "#ffffff";
+pub(super) const LINE: &str = "#444444";
+pub(super) const GRID: &str = "#e3e3e3";
+pub(super) const FINE_GRID: &str = "#f2f2f2";
+pub(super) const ZERO: &str = "#b0b0b0";
+const DARK: [[&str; 2]; 6] = [
+    [TEXT, "#e4e6ea"],
+    [GROUND, "#16181d"],
+    [LINE, "#9aa0a8"],
+    [GRID, "#2e323a"],
+    [FINE_GRID, "#22252b"],
+    [ZERO, "#5a606a"],
+];
+
+/// The colours of a figure on white, and what they become on dark.
+pub(super) struct Ink {
+    pub(super) shades: Shades,
+    pub(super) dark: BTreeMap<String, String>,
+}
+
+impl Ink {
+    pub(super) fn new(figure: &Figure) -> Ink {
+        let dark = DARK.iter().map(|[light, dark]| ((*light).to_owned(), (*dark).to_owned())).collect();
+        Ink { shades: Shades::of(figure), dark }
+    }
+
+    /// The colour as the script takes it, its partner noted.
+    pub(super) fn use_of(&mut self, colour: &Colour) -> String {
+        self.dark.insert(colour.light.clone(), colour.dark.clone());
+        colour.light.clone()
+    }
+
+    /// The same, transparent.
+    pub(super) fn area(&mut self, colour: &Colour) -> String {
+        let [light, dark] = [&colour.light, &colour.dark].map(|c| format!("{c}{:02x}", (AREA * 255.0).round() as u8));
+        self.dark.insert(light.clone(), dark);
+        light
+    }
+}
+
+/// Names the axis of a panel the way plotly counts: x, x2, x3, …
+pub(super) fn axis_name(letter: &str, panel: usize) -> String {
+    if panel == 0 { letter.to_owned() } else { format!("{letter}{}", panel + 1) }
+}
+
+/// Text that plotly, which reads some tags and templates, shows literally.
+pub(super) fn plain(text: &str) -> String {
+    escape(text).replace("&quot;", "\"").replace("&#39;", "'").replace("%{", "%\u{200b}{")
+}
+
+/// The power of ten that the axis of this range takes out, the same as in the static figure.
+pub(super) fn power(range: Range) -> i32 {
+    axis::ticks(range, 6.0).power
+}

@@ -1,0 +1,199 @@
+//! Panels, axes, titles and the colour bar, as the script takes them.
+
+use super::ink::{FINE_GRID, GRID, GROUND, Ink, LINE, TEXT, ZERO, axis_name, plain, power};
+use crate::axis::{self, Range};
+use crate::colour::Colour;
+use crate::font;
+use crate::frame::{self, Axes};
+use serde_json::{Value, json};
+use stickslip_study::dataset::{Axis, Figure, Scale};
+
+/// Sizes of the interactive figure, px. The toolbar stands in the upper margin, above the titles of the panels.
+const TOOLBAR: f64 = 36.0;
+const BOTTOM: f64 = 60.0;
+const ROW_GAP: f64 = 92.0;
+const COLUMN_GAP: f64 = 85.0;
+const TITLE: f64 = 15.0;
+const LABEL: f64 = 14.0;
+const TICK: f64 = 13.0;
+/// Height of a line of text, part of its size.
+const LEADING: f64 = 1.3;
+/// Pages narrower than this have one column, by the columns of the wide figure; a wide figure is at least as wide less
+/// the margins of the page and of its outer axes.
+pub(super) const NARROW: [f64; 3] = [600.0, 900.0, 1100.0];
+const PAGE_MARGINS: f64 = 150.0;
+/// Longest line of a title above or below a panel of a narrow page, which may be 390 wide.
+const NARROW_LINE: f64 = 250.0;
+/// Height that the colour bar needs below the panels of a narrow page.
+const BAR: f64 = 90.0;
+
+/// The title of an axis in lines; a panel that does not share the axis of its like says so.
+fn axis_title(shown: &Axis, range: Range, own: bool, limit: f64) -> Vec<String> {
+    let own = if own { ", own range" } else { "" };
+    let text = format!("{}{own}", axis::axis_title(shown, power(range)));
+    font::wrap(&text, LABEL, font::Weight::Regular, limit)
+}
+
+fn broken(lines: &[String]) -> String {
+    lines.iter().map(|l| plain(l)).collect::<Vec<_>>().join("<br>")
+}
+
+/// The page that a layout is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Page {
+    Wide,
+    /// One panel below the other.
+    Narrow,
+}
+
+pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
+    let count = figure.panels.len().max(1);
+    let narrow = page == Page::Narrow;
+    let columns = if narrow { 1 } else { frame::grid(figure).0 };
+    let rows = count.div_ceil(columns);
+    let plot_height = match (columns, rows) {
+        (1, 1) => 460.0,
+        (1, _) => 270.0,
+        (2, 1) => 380.0,
+        _ => 270.0,
+    };
+    let axes = frame::axes(figure);
+    let widest = |axes: &Axes| {
+        let ticks = axis::ticks(axes.y, 6.0);
+        ticks.labels.iter().map(|l| font::width(l, TICK, font::Weight::Regular)).fold(0.0, f64::max)
+    };
+    let most = |lines: &[Vec<String>]| lines.iter().map(Vec::len).max().unwrap_or(0).max(1) as f64 - 1.0;
+    let least = NARROW[columns.clamp(1, 3) - 1] - PAGE_MARGINS;
+    let y_titles: Vec<Vec<String>> =
+        (figure.panels.iter().zip(&axes)).map(|(p, a)| axis_title(&p.y, a.y, a.own_y, plot_height)).collect();
+    let beside = axes.iter().map(widest).fold(0.0, f64::max) + 60.0 + LEADING * LABEL * most(&y_titles);
+    let column_gap = if columns == 1 { 0.0 } else { COLUMN_GAP.max(beside) / least };
+    let plot_width = ((1.0 - column_gap * (columns as f64 - 1.0)) / columns as f64).max(0.1);
+    let limit = if narrow { NARROW_LINE } else { least * plot_width };
+    let x_titles: Vec<Vec<String>> =
+        (figure.panels.iter().zip(&axes)).map(|(p, a)| axis_title(&p.x, a.x, a.own_x, limit)).collect();
+    let titles: Vec<Vec<String>> =
+        figure.panels.iter().map(|p| font::wrap(&p.title, TITLE, font::Weight::Bold, limit)).collect();
+    // titles of several lines push the rows apart
+    let titled = if titles.iter().all(Vec::is_empty) { 0.0 } else { LEADING * TITLE * (1.0 + most(&titles)) };
+    let below = LEADING * LABEL * most(&x_titles);
+    let bar = if narrow && ink.shades.bar.is_some() { BAR } else { 0.0 };
+    let (top, bottom) = (TOOLBAR + titled, BOTTOM + below + bar);
+    let row_gap = ROW_GAP - LEADING * TITLE + titled + below;
+    let inside = rows as f64 * plot_height + (rows as f64 - 1.0) * row_gap;
+    let font = json!({ "family": "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif", "size": LABEL, "color": TEXT });
+    let mut layout = json!({
+        "height": inside + top + bottom, "autosize": true, "font": font,
+        "margin": { "l": if narrow { 60 } else { 70 }, "r": if narrow { 12 } else { 20 }, "t": top, "b": bottom },
+        "paper_bgcolor": GROUND, "plot_bgcolor": GROUND, "hovermode": "closest", "dragmode": "zoom",
+        "hoverlabel": { "bgcolor": GROUND, "font": { "size": TICK, "color": TEXT } },
+        "modebar": { "orientation": "h", "bgcolor": GROUND, "color": LINE, "activecolor": TEXT },
+        "barmode": "group", "bargap": 0.2, "showlegend": false, "separators": ".",
+        // showing and hiding keeps what the reader has zoomed into
+        "uirevision": 1,
+        // for images: below the panels
+        "legend": { "orientation": "h", "x": 0.5, "xanchor": "center", "y": -(bottom + 4.0) / inside, "yanchor": "top", "font": { "size": LABEL } },
+    });
+    let mut notes = Vec::new();
+    for (i, (panel, own)) in figure.panels.iter().zip(&axes).enumerate() {
+        let (column, row) = ((i % columns) as f64, (i / columns) as f64);
+        let left = (column * (plot_width + column_gap)).min(1.0);
+        let right = (left + plot_width).min(1.0);
+        let top = (1.0 - row * (plot_height + row_gap) / inside).clamp(0.0, 1.0);
+        let bottom = (top - plot_height / inside).max(0.0);
+        let panels = &figure.panels;
+        let x_partner = (0..i).find(|&j| frame::alike(&panels[j].x, &panel.x) && axes[j].x == own.x);
+        let y_partner = (0..i).find(|&j| frame::alike(&panels[j].y, &panel.y) && axes[j].y == own.y);
+        let mut x =
+            axis(own.x, [left, right], axis_name("y", i), x_partner.map(|j| axis_name("x", j)), [limit, ROOM[0]]);
+        x["title"]["text"] = json!(broken(&x_titles[i]));
+        if own.x.scale == Scale::Linear {
+            x["nticks"] = json!(if narrow || columns == 3 { 6 } else { 8 });
+        }
+        layout[axis_name("xaxis", i)] = x;
+        let mut y =
+            axis(own.y, [bottom, top], axis_name("x", i), y_partner.map(|j| axis_name("y", j)), [plot_height, ROOM[1]]);
+        y["title"]["text"] = json!(broken(&y_titles[i]));
+        layout[axis_name("yaxis", i)] = y;
+        let note = json!({ "x": (left + right) / 2.0, "xref": "paper", "yref": "paper", "xanchor": "center", "showarrow": false });
+        let mut title = note.clone();
+        title["text"] = json!(format!("<b>{}</b>", broken(&titles[i])));
+        title["y"] = json!(top);
+        title["yanchor"] = json!("bottom");
+        title["yshift"] = json!(2);
+        title["font"] = json!({ "size": TITLE });
+        if !titles[i].is_empty() {
+            notes.push(title);
+        }
+        if !frame::has_data(panel) {
+            let mut empty = note;
+            empty["text"] = json!("no data");
+            empty["y"] = json!((top + bottom) / 2.0);
+            notes.push(empty);
+        }
+    }
+    layout["annotations"] = Value::from(notes);
+    if let Some((shown, range)) = ink.shades.bar.clone() {
+        layout["coloraxis"] = colour_axis(&shown, range, narrow, -(BOTTOM + below) / inside, ink);
+    }
+    layout
+}
+
+/// The colour bar: upright at the right, or lying below the panels of a narrow page.
+fn colour_axis(shown: &Axis, range: Range, narrow: bool, below: f64, ink: &mut Ink) -> Value {
+    const STEPS: u32 = 16;
+    let scale: Vec<Value> = (0..=STEPS)
+        .map(|i| f64::from(i) / f64::from(STEPS))
+        .map(|part| json!([part, ink.use_of(&Colour::sequential(part))]))
+        .collect();
+    let ticks = axis::ticks(range, if narrow { 5.0 } else { 7.0 });
+    let title = plain(&axis::axis_title(shown, ticks.power));
+    let mut bar = json!({
+        "thickness": 16, "outlinecolor": LINE, "outlinewidth": 1, "ticks": "outside", "tickcolor": LINE,
+        "tickmode": "array", "tickvals": ticks.at.iter().map(|v| range.measure(*v)).collect::<Vec<_>>(),
+        "ticktext": ticks.labels, "tickfont": { "size": TICK }, "title": { "text": title, "side": "right", "font": { "size": LABEL } },
+    });
+    if narrow {
+        bar["orientation"] = json!("h");
+        bar["title"]["side"] = json!("top");
+        bar["y"] = json!(below);
+        bar["yanchor"] = json!("top");
+    } else {
+        bar["x"] = json!(1.02);
+    }
+    json!({ "cmin": range.measure(range.from), "cmax": range.measure(range.to), "colorscale": scale, "colorbar": bar })
+}
+
+/// The shortest distance between labels at 1, 2 and 5 times a power of ten, decades.
+const FINEST: f64 = 0.301;
+/// Room that a label needs beside the next, across and upright, px.
+const ROOM: [f64; 2] = [42.0, 18.0];
+
+/// An axis; `partner` is the earlier axis of the same quantity and range that it zooms with. `length` and the room of a
+/// label are in px.
+fn axis(range: Range, domain: [f64; 2], anchor: String, partner: Option<String>, [length, room]: [f64; 2]) -> Value {
+    let power = power(range);
+    let log = range.scale == Scale::Log;
+    let end = |v: f64| if log { axis::log10(v) } else { axis::scaled(v, power) };
+    let mut value = json!({
+        "domain": domain, "anchor": anchor, "type": if log { "log" } else { "linear" }, "range": [end(range.from), end(range.to)],
+        "title": { "standoff": 8, "font": { "size": LABEL } },
+        "showline": true, "mirror": true, "linecolor": LINE, "gridcolor": GRID, "zerolinecolor": ZERO,
+        "ticks": "outside", "tickcolor": LINE, "exponentformat": if log { "power" } else { "none" }, "separatethousands": false,
+        "nticks": 8, "automargin": true, "zeroline": !log && range.from < 0.0, "tickfont": { "size": TICK },
+    });
+    if log {
+        // the script chooses steps of whole decades beyond 0.7 decades per tick, 1, 2 and 5 beyond 0.3
+        let digits = FINEST * length / range.span() >= room;
+        value["nticks"] = json!((range.span() / if digits { 0.31 } else { 0.71 }).floor().clamp(2.0, 8.0));
+        if range.from >= 1e-3 && range.to <= 1e4 {
+            value["tickformat"] = json!("~g");
+        }
+        value["minor"] =
+            json!({ "ticks": "outside", "ticklen": 3, "tickcolor": LINE, "showgrid": true, "gridcolor": FINE_GRID });
+    }
+    if let Some(partner) = partner {
+        value["matches"] = json!(partner);
+    }
+    value
+}

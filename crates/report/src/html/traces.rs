@@ -1,0 +1,262 @@
+//! The curves, as the script takes them.
+
+use super::ink::{GROUND, Ink, axis_name, plain, power};
+use crate::axis::{self, Range};
+use crate::colour::Colour;
+use crate::frame::{self, Axes, Entry, PALE};
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Style};
+
+pub(super) fn traces(figure: &Figure, ink: &mut Ink) -> Vec<Value> {
+    let (entries, _) = frame::legend(figure);
+    // in an image, a label of several colours stands in the legend in grey, as a trace without points
+    let several: Vec<&Entry> = entries.iter().filter(|entry| entry.colour == Colour::many()).collect();
+    let mut traces: Vec<Value> = several.iter().map(|entry| legend_trace(entry, ink)).collect();
+    let mut seen: BTreeSet<&str> = several.iter().map(|entry| entry.label.as_str()).collect();
+    let listed: BTreeSet<&str> = entries.iter().map(|entry| entry.label.as_str()).collect();
+    for (index, (panel, axes)) in figure.panels.iter().zip(frame::axes(figure)).enumerate() {
+        let said = figure.panels.len() == 1;
+        let drawn = Drawn { index, panel, axes, alone: said, x: Form::of(axes.x), y: Form::of(axes.y) };
+        for series in frame::layers(panel) {
+            let label = series.label.as_str();
+            let named = listed.contains(label) && frame::drawn(panel, series).next().is_some() && seen.insert(label);
+            traces.extend(drawn.traces(series, named, ink));
+        }
+    }
+    traces.extend(ink.shades.bar.as_ref().map(|(_, range)| bar_trace(*range)));
+    traces
+}
+
+/// A trace without points for the legend of an image.
+fn legend_trace(entry: &Entry, ink: &mut Ink) -> Value {
+    let mode = match (entry.line, entry.marks) {
+        (None, _) => "markers",
+        (_, true) => "lines+markers",
+        (_, false) => "lines",
+    };
+    let colour = ink.use_of(&entry.colour);
+    json!({
+        "type": "scatter", "x": [null], "y": [null], "mode": mode, "legendrank": 2000,
+        "name": plain(&entry.label), "legendgroup": entry.label, "showlegend": true,
+        "line": { "color": colour, "width": 2, "dash": dash(entry.line.unwrap_or(Style::Solid)) },
+        "marker": { "color": GROUND, "size": 8, "line": { "color": colour, "width": 2 } },
+    })
+}
+
+/// A trace without points that carries the colour bar.
+fn bar_trace(range: Range) -> Value {
+    let value = range.measure(range.from);
+    json!({
+        "type": "scatter", "x": [null], "y": [null], "mode": "markers", "showlegend": false, "hoverinfo": "skip",
+        "marker": { "color": [value], "coloraxis": "coloraxis" },
+    })
+}
+
+/// Curves of more points are drawn by the graphics processor.
+const MANY_POINTS: usize = 5000;
+
+/// A panel whose curves are drawn.
+struct Drawn<'f> {
+    index: usize,
+    panel: &'f Panel,
+    axes: Axes,
+    /// Whether it is the only one.
+    alone: bool,
+    x: Form,
+    y: Form,
+}
+
+impl Drawn<'_> {
+    /// The trace of a series; a line with lonely points has one more, before it.
+    fn traces(&self, series: &Series, named: bool, ink: &mut Ink) -> Vec<Value> {
+        let mut trace = self.trace(series, named, ink);
+        let shade = ink.shades.colour(series);
+        let colour = ink.use_of(&shade);
+        let crowd = frame::crowded(self.panel);
+        match series.style {
+            Style::Marks => {
+                trace["mode"] = json!("markers");
+                trace["marker"] = if crowd {
+                    json!({ "color": colour, "size": 4 })
+                } else {
+                    json!({ "color": GROUND, "size": 8, "line": { "color": colour, "width": 2 } })
+                };
+            }
+            Style::Band => {
+                trace["fillcolor"] = json!(ink.area(&shade));
+                self.band(series, &mut trace, &colour);
+            }
+            Style::Bars => self.bars(series, &mut trace, &colour),
+            Style::Solid | Style::Dashed | Style::Dotted => {
+                let dots = self.lonely_points(series, &trace, &colour);
+                let width = if series.emphasis == Emphasis::Pale || crowd { 1.0 } else { 2.0 };
+                let dash = dash(frame::line_style(series));
+                trace["mode"] = json!("lines");
+                trace["line"] = json!({ "color": colour, "width": width, "simplify": false, "dash": dash });
+                return dots.into_iter().chain([trace]).collect();
+            }
+        }
+        vec![trace]
+    }
+
+    /// What traces of all styles have: points, names, what the pointer shows.
+    fn trace(&self, series: &Series, named: bool, ink: &Ink) -> Value {
+        let panel = self.panel;
+        let said = panel.title.is_empty() || panel.title == series.label;
+        let place = if self.alone || said { String::new() } else { format!("<br>{}", plain(&panel.title)) };
+        let value = ink.shades.value(series).filter(|text| !series.label.contains(text.as_str()));
+        let value = value.map_or(String::new(), |text| format!("<br>{}", plain(&text)));
+        let (x, y) = (hover("x", &panel.x, self.x.power), hover("y", &panel.y, self.y.power));
+        let mut trace = json!({
+            "type": if series.x.len() > MANY_POINTS { "scattergl" } else { "scatter" },
+            "x": self.x.numbers(frame::points(panel, series).map(|p| p.0)),
+            "y": self.y.numbers(frame::points(panel, series).map(|p| p.1)),
+            "xaxis": axis_name("x", self.index), "yaxis": axis_name("y", self.index),
+            "name": plain(&series.label), "legendgroup": series.label, "showlegend": named,
+            "connectgaps": false,
+            "hovertemplate": format!("{x}<br>{y}<extra>{}{value}{place}</extra>", plain(&series.label)),
+        });
+        if series.emphasis == Emphasis::Pale {
+            trace["opacity"] = json!(PALE);
+        }
+        trace
+    }
+
+    fn band(&self, series: &Series, trace: &mut Value, colour: &str) {
+        let (x, y) = outline(self.panel, series, self.axes.y);
+        trace["x"] = json!(self.x.numbers(x.into_iter()));
+        trace["y"] = json!(self.y.numbers(y.into_iter()));
+        trace["type"] = json!("scatter");
+        trace["mode"] = json!("lines");
+        trace["fill"] = json!("toself");
+        trace["line"] = json!({ "width": 0, "color": colour });
+        trace["hoverinfo"] = json!("skip");
+        trace["hovertemplate"] = Value::Null;
+    }
+
+    fn bars(&self, series: &Series, trace: &mut Value, colour: &str) {
+        trace["type"] = json!("bar");
+        trace["marker"] = json!({ "color": colour });
+        if series.base.is_empty() {
+            return;
+        }
+        // the script counts the bar from its foot
+        let feet = |i: usize| frame::base(self.panel, series, i).unwrap_or(self.axes.y.from);
+        let count = series.x.len().min(series.y.len());
+        trace["base"] = json!(self.y.numbers((0..count).map(feet)));
+        let heights = frame::points(self.panel, series).enumerate().map(|(i, p)| p.1 - feet(i));
+        trace["y"] = json!(self.y.numbers(heights));
+    }
+
+    /// Points that a line alone would not show.
+    fn lonely_points(&self, series: &Series, trace: &Value, colour: &str) -> Option<Value> {
+        let points = lonely(self.panel, series);
+        if points.is_empty() {
+            return None;
+        }
+        let mut dots = trace.clone();
+        dots["x"] = Value::from(self.x.numbers(points.iter().map(|p| p.0)));
+        dots["y"] = Value::from(self.y.numbers(points.iter().map(|p| p.1)));
+        dots["mode"] = json!("markers");
+        dots["marker"] = json!({ "color": colour, "size": 5 });
+        dots["showlegend"] = json!(false);
+        Some(dots)
+    }
+}
+
+/// The outlines of the pieces of a band: along the upper edge, back along the lower, a gap.
+fn outline(panel: &Panel, series: &Series, range: Range) -> (Vec<f64>, Vec<f64>) {
+    let points: Vec<(usize, (f64, f64))> = frame::points(panel, series).enumerate().collect();
+    let (mut x, mut y) = (Vec::new(), Vec::new());
+    for piece in points.split(|(_, p)| !frame::drawable(*p)).filter(|piece| !piece.is_empty()) {
+        let lower = piece.iter().rev().map(|(i, p)| (p.0, frame::base(panel, series, *i).unwrap_or(range.from)));
+        for p in piece.iter().map(|(_, p)| *p).chain(lower).chain([(f64::NAN, f64::NAN)]) {
+            x.push(p.0);
+            y.push(p.1);
+        }
+    }
+    (x, y)
+}
+
+/// The dashes of the static figure, in the words of plotly.
+fn dash(style: Style) -> &'static str {
+    match style {
+        Style::Dashed => "7px,4px",
+        Style::Dotted => "2px,3px",
+        Style::Solid | Style::Marks | Style::Band | Style::Bars => "solid",
+    }
+}
+
+/// The points with gaps on both sides: a line alone would not show them.
+fn lonely(panel: &Panel, series: &Series) -> Vec<(f64, f64)> {
+    let points: Vec<(f64, f64)> = frame::points(panel, series).collect();
+    points
+        .split(|p| !frame::drawable(*p))
+        .filter_map(|piece| if let [point] = piece { Some(*point) } else { None })
+        .collect()
+}
+
+/// How the numbers of an axis are written.
+struct Form {
+    /// The power of ten taken out of them, the same as in the static figure.
+    power: i32,
+    /// Digits after the point; on a logarithmic axis all digits after the first.
+    digits: usize,
+    scale: Scale,
+}
+
+/// Digits of a number, counted from the first digit of the length of its axis: a reader may zoom in ten thousand times
+/// before a thousandth of the picture moves.
+const DIGITS: i32 = 8;
+
+impl Form {
+    fn of(range: Range) -> Form {
+        let power = power(range);
+        let first = axis::log10(axis::scaled(range.to - range.from, power)).floor() as i32;
+        let digits = match range.scale {
+            Scale::Linear => (DIGITS - 1 - first).clamp(0, 300),
+            Scale::Log => DIGITS - 1,
+        };
+        Form { power, digits: digits as usize, scale: range.scale }
+    }
+
+    /// Numbers for the page; what does not exist is null and interrupts the curve.
+    fn numbers(&self, values: impl Iterator<Item = f64>) -> Vec<Value> {
+        let digits = self.digits;
+        let number = |v: f64| {
+            let v = axis::scaled(v, self.power);
+            let text = if self.scale == Scale::Log { format!("{v:.digits$e}") } else { format!("{v:.digits$}") };
+            text.parse::<f64>().ok().filter(|v| v.is_finite()).map(|v| v + 0.0)
+        };
+        // a whole number without its point is shorter
+        let value = |v: f64| if v.abs() < 1e15 && v.fract() == 0.0 { Value::from(v as i64) } else { Value::from(v) };
+        values.map(|v| number(v).map_or(Value::Null, value)).collect()
+    }
+}
+
+/// `frequency = 121.25 Hz` for the value under the pointer.
+fn hover(letter: &str, shown: &Axis, power: i32) -> String {
+    let quantity = if shown.quantity.trim().is_empty() { letter } else { shown.quantity.trim() };
+    format!("{} = %{{{letter}:.6~g}} {}", plain(quantity), plain(&axis::unit(shown, power)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_null_and_numbers_have_the_digits_of_their_axis() {
+        let form = Form::of(Range { from: 0.0, to: 2.0, scale: Scale::Linear });
+        assert_eq!(
+            json!(form.numbers([1.0, f64::NAN, f64::INFINITY, 0.1 + 0.2].into_iter())),
+            json!([1, null, null, 0.3])
+        );
+        let log = Form::of(Range { from: 1e-9, to: 1e3, scale: Scale::Log });
+        assert_eq!(json!(log.numbers([1.234_567_891e-9, 100.0].into_iter())), json!([1.2345679e-9, 100]));
+        // an offset takes no digits away from what is seen
+        let offset = Form::of(Range { from: 1e6, to: 1e6 + 1e-3, scale: Scale::Linear });
+        let values: Vec<f64> = offset.numbers([1e6 + 3e-7].into_iter()).iter().filter_map(Value::as_f64).collect();
+        assert!((values[0] - (1e6 + 3e-7)).abs() < 2e-10);
+    }
+}
