@@ -4,6 +4,7 @@ use super::event_driven::takes;
 use super::harmonic_balance::HarmonicBalance;
 use super::{Choice, Method, MethodError, MethodInfo, Solver, event_driven::EventDriven, shooting::Shooting};
 use crate::model::System;
+use crate::structure::MOST_IN_FULL;
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -38,7 +39,10 @@ impl Auto {
         let smooth = system.joints().iter().all(|joint| joint.law().rate().is_some());
         let pieces: usize =
             system.joints().iter().map(|joint| joint.law().pieces().map_or(0, |pieces| pieces.len())).sum();
-        if joints > FOLLOWED {
+        if system.dofs() > MOST_IN_FULL {
+            let because = format!("{} places are more than {MOST_IN_FULL}", system.dofs());
+            (Box::new(HarmonicBalance::default()), because)
+        } else if joints > FOLLOWED {
             let because = format!("{joints} joints are more than {FOLLOWED}");
             (Box::new(HarmonicBalance::default()), because)
         } else if exact && pieces > PIECES {

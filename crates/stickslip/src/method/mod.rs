@@ -27,6 +27,7 @@ use crate::dimension::Dimension;
 use crate::model::{System, SystemJoint};
 use crate::orbit::Orbit;
 pub use crate::orbit::{Breakdown, OrbitError};
+use crate::structure::MOST_IN_FULL;
 use std::collections::BTreeMap;
 pub use ways::Ways;
 
@@ -119,6 +120,18 @@ pub enum MethodError {
         /// What to use instead.
         ways: Box<Ways>,
     },
+    /// More degrees of freedom than the method's full matrices may have.
+    #[error("{method} carries full matrices over at most {most} places, and there are {dofs}{}", .ways.behind())]
+    TooLarge {
+        /// The method.
+        method: &'static str,
+        /// Degrees of freedom of the system.
+        dofs: usize,
+        /// Most that the method takes.
+        most: usize,
+        /// What to use instead.
+        ways: Box<Ways>,
+    },
     /// A matrix is not positive definite.
     #[error("{method} needs a positive definite {matrix} matrix{}", .ways.behind())]
     NotPositive {
@@ -153,6 +166,12 @@ impl MethodError {
         MethodError::NeedsMass { method, place: system.places()[place].clone(), ways: Box::default() }
     }
 
+    /// `method` carries full matrices: whether those of a system are too large for it.
+    pub(crate) fn too_large(method: &'static str, system: &System) -> Option<Self> {
+        let (dofs, most) = (system.dofs(), MOST_IN_FULL);
+        (dofs > most).then(|| MethodError::TooLarge { method, dofs, most, ways: Box::default() })
+    }
+
     /// `method` needs a positive definite mass matrix.
     pub(crate) fn mass_not_positive(method: &'static str) -> Self {
         MethodError::NotPositive { method, matrix: "mass", ways: Box::default() }
@@ -163,6 +182,7 @@ impl MethodError {
         match self {
             MethodError::Law { ways, .. }
             | MethodError::NeedsMass { ways, .. }
+            | MethodError::TooLarge { ways, .. }
             | MethodError::NotPositive { ways, .. } => Some(&**ways),
             MethodError::Option { .. } => None,
         }
@@ -184,6 +204,7 @@ impl MethodError {
         match &mut self {
             MethodError::Law { ways, .. }
             | MethodError::NeedsMass { ways, .. }
+            | MethodError::TooLarge { ways, .. }
             | MethodError::NotPositive { ways, .. } => {
                 **ways = instead;
             }

@@ -42,7 +42,8 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::f64::consts::TAU;
 
-pub(crate) const NAME: &str = "harmonic-balance";
+/// Its name in study files.
+pub const NAME: &str = "harmonic-balance";
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {

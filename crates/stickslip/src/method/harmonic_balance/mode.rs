@@ -84,7 +84,10 @@ impl<'a> ModeEquations<'a> {
     /// # Errors
     /// A law with several directions, a place without mass, a mass matrix that is not positive definite.
     pub fn new(system: &'a System, harmonics: usize, samples: usize) -> Result<Self, MethodError> {
-        if let Some(massless) = (0..system.dofs()).find(|&i| system.structure().mass()[(i, i)] == 0.0) {
+        if let Some(error) = MethodError::too_large("modes", system) {
+            return Err(error);
+        }
+        if let Some(massless) = (0..system.dofs()).find(|&i| system.structure().own_mass(i) == 0.0) {
             return Err(MethodError::needs_mass(super::NAME, system, massless));
         }
         if system.structure().mass().clone().cholesky().is_none() {

@@ -62,11 +62,10 @@ pub(super) fn stays(context: &Context, level: &Level, motion: &Motion, x: &[DVec
         left -= direction.map(|w| Complex64::new(w * force, 0.0));
         size += direction.norm() * force.abs();
     }
-    let held = system.structure().stiffness() * x[0].map(|z| z.re);
+    let held = system.structure().spring_forces(x[0].map(|z| z.re).as_slice());
     // positions far away have forces that are rounding
-    let rounding =
-        f64::EPSILON * system.structure().stiffness().amax() * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
-    (left.map(|z| z.re) - held).norm() <= UNHELD * size + 1e3 * rounding
+    let rounding = f64::EPSILON * system.structure().largest()[2] * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+    (left.map(|z| z.re) - DVector::from_vec(held)).norm() <= UNHELD * size + 1e3 * rounding
 }
 
 #[derive(Debug, Clone)]
@@ -350,8 +349,8 @@ const STILL: f64 = 1e-9;
 
 /// Whether the energies of an orbit balance, or are none.
 pub(super) fn balances(system: &System, orbit: &Orbit) -> bool {
-    let structure = system.structure();
-    let stiff = structure.stiffness().amax().max(orbit.omega * orbit.omega * structure.mass().amax());
+    let [mass, _, stiffness] = system.structure().largest();
+    let stiff = stiffness.max(orbit.omega * orbit.omega * mass);
     let loads: f64 = system.excitation(orbit.omega).iter().map(|(_, load)| load.norm_squared()).sum();
     let Energy { work_in, viscous, friction } = orbit.energy;
     let balance = (work_in - viscous - friction).abs();
