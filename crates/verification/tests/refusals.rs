@@ -104,10 +104,10 @@ fn what_a_refusal_names_takes_the_system() {
 #[test]
 fn a_place_without_mass_has_ways_too() {
     for law in laws() {
-        let (refused, hopeless) = hold(&system(&[law.clone()], 0.0));
+        let (refused, hopeless) = hold(&system(std::slice::from_ref(&law), 0.0));
         assert!(refused > 0, "{}", law.name());
         // balanced harmonics need no mass, unless they cannot take the law at all
-        let alone = asked(named("harmonic-balance"), false, &system(&[law.clone()], 1.0));
+        let alone = asked(named("harmonic-balance"), false, &system(std::slice::from_ref(&law), 1.0));
         assert_eq!(hopeless > 0, alone.is_err(), "{}", law.name());
     }
 }

@@ -106,7 +106,7 @@ pub enum MethodError {
         /// What the method misses in it.
         misses: &'static str,
         /// What to use instead.
-        ways: Ways,
+        ways: Box<Ways>,
     },
     /// A place has no mass.
     #[error("{method} needs a mass above zero at `{place}` (the law `jenkins` stands for a spring, a massless place and a slider){}", .ways.behind())]
@@ -116,7 +116,7 @@ pub enum MethodError {
         /// The place.
         place: String,
         /// What to use instead.
-        ways: Ways,
+        ways: Box<Ways>,
     },
     /// A matrix is not positive definite.
     #[error("{method} needs a positive definite {matrix} matrix{}", .ways.behind())]
@@ -126,7 +126,7 @@ pub enum MethodError {
         /// Which matrix.
         matrix: &'static str,
         /// What to use instead.
-        ways: Ways,
+        ways: Box<Ways>,
     },
     /// An option has an impossible value.
     #[error("option `{key}` of {method}: {message}")]
@@ -144,17 +144,17 @@ impl MethodError {
     /// `method` misses something in the law of a joint.
     pub fn law(method: &'static str, joint: &SystemJoint, misses: &'static str) -> Self {
         let (joint, law) = (joint.name().to_owned(), joint.law().name());
-        MethodError::Law { method, joint, law, misses, ways: Ways::default() }
+        MethodError::Law { method, joint, law, misses, ways: Box::default() }
     }
 
     /// `method` needs a mass where a system has none.
     pub(crate) fn needs_mass(method: &'static str, system: &System, place: usize) -> Self {
-        MethodError::NeedsMass { method, place: system.places()[place].clone(), ways: Ways::default() }
+        MethodError::NeedsMass { method, place: system.places()[place].clone(), ways: Box::default() }
     }
 
     /// `method` needs a positive definite mass matrix.
     pub(crate) fn mass_not_positive(method: &'static str) -> Self {
-        MethodError::NotPositive { method, matrix: "mass", ways: Ways::default() }
+        MethodError::NotPositive { method, matrix: "mass", ways: Box::default() }
     }
 
     /// What to use instead; `None` where another value of an option is all that is needed.
@@ -184,7 +184,7 @@ impl MethodError {
             MethodError::Law { ways, .. }
             | MethodError::NeedsMass { ways, .. }
             | MethodError::NotPositive { ways, .. } => {
-                *ways = instead;
+                **ways = instead;
             }
             MethodError::Option { .. } => {}
         }
