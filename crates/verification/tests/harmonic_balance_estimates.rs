@@ -13,7 +13,7 @@ use stickslip::orbit::Orbit;
 use stickslip_verification::random_system_of;
 
 /// Models of every law without a wish.
-const MODELS: u64 = 6;
+const MODELS: u64 = 5;
 /// The true error is at most this many times what is stated.
 const FACTOR: f64 = 2.0;
 /// Relative error of the motions that count as true.
