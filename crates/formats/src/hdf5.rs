@@ -79,7 +79,10 @@ fn walk(group: &Rc<Group>, path: &str, limit: Limit, depth: usize, items: &mut V
         let place = || Place::Variable(full(&name));
         let inner = Rc::new(guarded(place(), || group.group(&name))?);
         let attributes = guarded(place(), || inner.attrs())?;
-        if let Some(rows) = attributes.get("MATLAB_sparse") {
+        if attributes.contains_key("OCTAVE_NEW_FORMAT") {
+            // Its matrices are transposed, and nothing at them says so.
+            items.push(Item::other(full(&name), "in the form of Octave's `save -hdf5` (`save -v7` is read)"));
+        } else if let Some(rows) = attributes.get("MATLAB_sparse") {
             let rows = whole(rows).ok_or_else(|| {
                 let problem = "the attribute MATLAB_sparse is no number of rows".into();
                 Error::new(Kind::Malformed, place(), problem, "save the file again")

@@ -233,7 +233,8 @@ fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> R
         [] => "nothing".to_string(),
         items => items.iter().map(|item| item.variable.to_string()).collect::<Vec<_>>().join(", "),
     };
-    let matrices: Vec<_> = items.iter().filter(|item| item.variable.note.is_none()).collect();
+    let filled = |variable: &Variable| variable.note.is_none() && variable.rows.min(variable.columns) > 0;
+    let matrices: Vec<_> = items.iter().filter(|item| filled(&item.variable)).collect();
     match (name, matrices.as_slice()) {
         (Some(name), _) => match items.iter().find(|item| item.variable.name == name && !name.is_empty()) {
             Some(item) => Ok(item),
