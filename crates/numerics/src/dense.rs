@@ -1,9 +1,10 @@
 //! Dense linear equations in memory that the caller owns.
 
-use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn};
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::lu::partial_pivoting::factor::{PartialPivLuParams, lu_in_place, lu_in_place_scratch};
+use faer::linalg::lu::partial_pivoting::solve::{solve_transpose_in_place, solve_transpose_in_place_scratch};
+use faer::{MatMut, Par, Spec};
 
-/// Columns that are eliminated together before the rest is updated by one product: the block and its rows then stay in the cache.
-const BLOCK: usize = 32;
 /// Size from which elimination in blocks is the faster one.
 const LARGE: usize = 96;
 
@@ -24,15 +25,10 @@ pub fn solve(matrix: &mut [f64], n: usize, right: &mut [f64]) -> bool {
 
 /// As [`solve`], with the sign of the determinant of A, ±1; `None` where it returns false.
 pub fn solve_signed(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
-    let mut exchanges = 0;
-    let block = if n < LARGE { n.max(1) } else { BLOCK };
-    for start in (0..n).step_by(block) {
-        let end = (start + block).min(n);
-        exchanges += panel(matrix, n, (start, end), right)?;
-        if end < n {
-            update(matrix, n, (start, end));
-        }
+    if n >= LARGE {
+        return in_blocks(&mut matrix[..n * n], n, &mut right[..n]);
     }
+    let exchanges = eliminate(matrix, n, right)?;
     for k in (0..n).rev() {
         let row = &matrix[k * n..(k + 1) * n];
         let sum: f64 = row[k + 1..].iter().zip(&right[k + 1..n]).map(|(a, x)| a * x).sum();
@@ -43,10 +39,10 @@ pub fn solve_signed(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f
     right[..n].iter().all(|x| x.is_finite()).then_some(sign)
 }
 
-/// Eliminates the columns `start..end`; below the diagonal they keep the factors. Rows are exchanged whole; returns how often.
-fn panel(matrix: &mut [f64], n: usize, (start, end): (usize, usize), right: &mut [f64]) -> Option<usize> {
+/// Eliminates all columns. Rows are exchanged whole; returns how often.
+fn eliminate(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<usize> {
     let mut exchanges = 0;
-    for k in start..end {
+    for k in 0..n {
         let mut pivot = k;
         for i in k + 1..n {
             if matrix[i * n + k].abs() > matrix[pivot * n + k].abs() {
@@ -64,13 +60,13 @@ fn panel(matrix: &mut [f64], n: usize, (start, end): (usize, usize), right: &mut
             right.swap(k, pivot);
         }
         let (top, bottom) = matrix.split_at_mut((k + 1) * n);
-        let pivot_row = &top[k * n + k..k * n + end];
+        let pivot_row = &top[k * n + k..];
         let inverse = 1.0 / largest;
-        for (i, row) in bottom.chunks_exact_mut(n).enumerate() {
+        for (i, row) in bottom.chunks_exact_mut(n).take(n - 1 - k).enumerate() {
             let factor = row[k] * inverse;
             row[k] = factor;
             if factor != 0.0 {
-                for (x, p) in row[k + 1..end].iter_mut().zip(&pivot_row[1..]) {
+                for (x, p) in row[k + 1..].iter_mut().zip(&pivot_row[1..]) {
                     *x -= factor * p;
                 }
                 right[k + 1 + i] -= factor * right[k];
@@ -80,27 +76,30 @@ fn panel(matrix: &mut [f64], n: usize, (start, end): (usize, usize), right: &mut
     Some(exchanges)
 }
 
-/// What the elimination of the columns `start..end` does to those after them.
-fn update(matrix: &mut [f64], n: usize, (start, end): (usize, usize)) {
-    let (width, rest) = (end - start, n - end);
-    let (top, bottom) = matrix.split_at_mut(end * n);
-    let top = &mut top[start * n..];
-    for k in 0..width {
-        let (done, open) = top.split_at_mut((k + 1) * n);
-        let row = &done[k * n + end..];
-        for below in open.chunks_exact_mut(n) {
-            let factor = below[start + k];
-            for (x, p) in below[end..].iter_mut().zip(row) {
-                *x -= factor * p;
-            }
+/// The same as [`solve_signed`] in blocks that stay in the cache. Row after row, the memory holds what is the transpose to who reads it
+/// column by column: that is factored, and the transposed equations solved.
+fn in_blocks(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
+    let params = Spec::<PartialPivLuParams, f64>::default();
+    let mut memory = MemBuffer::new(StackReq::any_of(&[
+        lu_in_place_scratch::<u32, f64>(n, n, Par::Seq, params),
+        solve_transpose_in_place_scratch::<u32, f64>(n, 1, Par::Seq),
+    ]));
+    let stack = MemStack::new(&mut memory);
+    let (mut order, mut inverse) = (vec![0u32; n], vec![0u32; n]);
+    let mut factors = MatMut::from_column_major_slice_mut(matrix, n, n);
+    let (info, exchanges) = lu_in_place(factors.as_mut(), &mut order, &mut inverse, Par::Seq, stack, params);
+    let mut negative = info.transposition_count;
+    for k in 0..n {
+        let pivot = factors[(k, k)];
+        if pivot == 0.0 || !pivot.is_finite() {
+            return None;
         }
+        negative += usize::from(pivot < 0.0);
     }
-    // memory is row-major, which to nalgebra is the transpose
-    let factors = DMatrix::from_fn(width, rest, |k, i| bottom[i * n + start + k]);
-    let rows = DMatrixView::from_slice_with_strides_generic(&top[end..], Dyn(rest), Dyn(width), nalgebra::U1, Dyn(n));
-    let mut open =
-        DMatrixViewMut::from_slice_with_strides_generic(&mut bottom[end..], Dyn(rest), Dyn(rest), nalgebra::U1, Dyn(n));
-    open.gemm(-1.0, &rows, &factors, 1.0);
+    let right_column = MatMut::from_column_major_slice_mut(right, n, 1);
+    solve_transpose_in_place(factors.as_ref(), factors.as_ref(), exchanges, right_column, Par::Seq, stack);
+    let sign = if negative.is_multiple_of(2) { 1.0 } else { -1.0 };
+    right.iter().all(|x| x.is_finite()).then_some(sign)
 }
 
 /// Rows and columns of a product that are summed side by side, in registers.

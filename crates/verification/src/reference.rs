@@ -49,6 +49,8 @@ fn travel(system: &System, omega: f64) -> f64 {
 
 /// Stiffness of the spring in front of a rigid slider, in masses over the square of a step.
 const RIGID: f64 = 100.0;
+/// The longest change of a state in an iteration, in sizes of states.
+const STRIDE: f64 = 2.0;
 /// Newton iterations of a step.
 const ITERATIONS: usize = 40;
 /// Residual relative to the forces at which a step is solved.
@@ -88,6 +90,40 @@ impl<'a> Reference<'a> {
             (reference.contacts[j].u, reference.contacts[j].v) = (u, v);
         }
         reference
+    }
+
+    /// Begins with the states of joints that an orbit begins with, if these are all: forces of sliders behind springs, and those of steps and rates.
+    #[must_use]
+    pub fn with_states(mut self, states: &[f64]) -> Self {
+        let mut left = states;
+        let mut take = |count: usize| -> Option<&[f64]> {
+            let (now, rest) = left.split_at_checked(count)?;
+            left = rest;
+            Some(now)
+        };
+        let mut found = Vec::new();
+        for contact in &self.contacts {
+            let mut z = contact.z.clone();
+            let elastic =
+                |piece: &Piece| matches!(piece, Piece::Slider(s) if s.stiffness.is_some() && s.static_limit > 0.0);
+            match &contact.pieces {
+                Some(pieces) => {
+                    for (z, _) in z.iter_mut().zip(pieces).filter(|(_, piece)| elastic(piece)) {
+                        let Some(one) = take(1) else { return self };
+                        *z = one[0];
+                    }
+                }
+                None => {
+                    let Some(all) = take(z.len()) else { return self };
+                    z.copy_from_slice(all);
+                }
+            }
+            found.push(z);
+        }
+        if left.is_empty() {
+            self.contacts.iter_mut().zip(found).for_each(|(contact, z)| contact.z = z);
+        }
+        self
     }
 
     fn motion(&self, j: usize, x: &DVector<f64>, v: &DVector<f64>, time: f64) -> (Along, Along) {
@@ -221,7 +257,10 @@ impl Contact {
                     let jacobian = DMatrix::from_fn(s, s, |i, l| {
                         f64::from(u8::from(i == l)) - 0.5 * h * point.rate_slope(i)[2 * directions + l]
                     });
-                    let Some(change) = jacobian.lu().solve(&residual) else { break };
+                    let Some(mut change) = jacobian.lu().solve(&residual) else { break };
+                    // some states are logarithms of what they stand for
+                    let far = change.amax() / (STRIDE * rate.state_scale());
+                    change /= far.max(1.0);
                     z.iter_mut().zip(change.iter()).for_each(|(z, d)| *z -= d);
                     if change.amax() <= SOLVED * (1.0 + z.iter().fold(0.0f64, |a, z| a.max(z.abs()))) {
                         break;

@@ -95,8 +95,8 @@ impl RateLaw for BoucWen {
     fn states(&self) -> usize {
         1
     }
-    fn state_under(&self, force: f64, z: &mut [f64]) -> bool {
-        z.fill((force / self.scale()).clamp(-1.0, 1.0));
+    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
+        z.fill((force[0] / self.scale()).clamp(-1.0, 1.0));
         true
     }
     #[inline]

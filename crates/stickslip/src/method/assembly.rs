@@ -4,17 +4,19 @@ use super::MethodError;
 use super::drive::Drive;
 use crate::law::SharedLaw;
 use crate::model::{Axis, System};
+use crate::structure::Matrices;
 use nalgebra::DMatrix;
+use std::ops::Deref;
+use std::sync::Arc;
 
 /// Matrices, axes and laws; independent of the drive.
 #[derive(Debug, Clone)]
 pub(crate) struct Assembly {
     /// Degrees of freedom.
     pub n: usize,
-    pub mass: DMatrix<f64>,
+    /// Of the structure, shared with it.
+    matrices: Arc<Matrices>,
     pub inverse_mass: DMatrix<f64>,
-    pub damping: DMatrix<f64>,
-    pub stiffness: DMatrix<f64>,
     /// The axes of all joints, in their order.
     pub axes: Vec<Axis>,
     /// The same as columns, n × axes.
@@ -48,6 +50,14 @@ impl PlacedLaw {
     }
 }
 
+/// Mass, damping and stiffness are read as its own.
+impl Deref for Assembly {
+    type Target = Matrices;
+    fn deref(&self) -> &Matrices {
+        &self.matrices
+    }
+}
+
 impl Assembly {
     /// `states` tells the law that a joint is followed with, the number of its states and their size; or what is missed in it.
     ///
@@ -59,7 +69,10 @@ impl Assembly {
         mut states: impl FnMut(&SharedLaw) -> Result<(SharedLaw, usize, f64), &'static str>,
     ) -> Result<Self, MethodError> {
         let (structure, n) = (system.structure(), system.dofs());
-        if let Some(i) = (0..n).find(|&i| structure.mass()[(i, i)] <= 0.0) {
+        if let Some(error) = MethodError::too_large(method, system) {
+            return Err(error);
+        }
+        if let Some(i) = (0..n).find(|&i| structure.own_mass(i) <= 0.0) {
             return Err(MethodError::needs_mass(method, system, i));
         }
         let inverse_mass =
@@ -76,10 +89,8 @@ impl Assembly {
         let axes: Vec<_> = system.axes().map(|(_, axis)| axis.dense(n)).collect();
         Ok(Assembly {
             n,
-            mass: structure.mass().clone(),
+            matrices: structure.full().clone(),
             inverse_mass,
-            damping: structure.damping().clone(),
-            stiffness: structure.stiffness().clone(),
             axes: system.axes().map(|(_, axis)| axis.clone()).collect(),
             directions: DMatrix::from_fn(n, first_axis, |row, axis| axes[axis][row]),
             joints,
@@ -103,9 +114,10 @@ impl Assembly {
     pub fn accelerate(&self, state: &[f64], left: &mut [f64], force: &[f64], out: &mut [f64]) {
         let n = self.n;
         let (x, v) = state.split_at(n);
+        let Matrices { stiffness, damping, .. } = &*self.matrices;
         for i in 0..n {
             for k in 0..n {
-                left[i] -= self.stiffness[(i, k)] * x[k] + self.damping[(i, k)] * v[k];
+                left[i] -= stiffness[(i, k)] * x[k] + damping[(i, k)] * v[k];
             }
         }
         for (axis, force) in self.axes.iter().zip(force) {
@@ -116,6 +128,12 @@ impl Assembly {
         for i in 0..n {
             out[i] = (0..n).map(|k| self.inverse_mass[(i, k)] * left[k]).sum();
         }
+    }
+
+    /// The largest acceleration that forces along the axes give to the masses, m/s².
+    pub fn pushed(&self, force: &[f64]) -> f64 {
+        let on_masses = &self.directions * nalgebra::DVectorView::from_slice(force, force.len());
+        if self.n == 0 { 0.0 } else { (&self.inverse_mass * on_masses).amax() }
     }
 
     /// The excitation at `omega` (rad/s) along the axes; at zero only constant forces are left.

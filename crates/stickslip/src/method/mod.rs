@@ -15,6 +15,7 @@ mod guess;
 pub mod harmonic_balance;
 mod incremental;
 mod periodic;
+mod relaxed;
 pub mod settling;
 pub mod shooting;
 mod smooth;
@@ -26,6 +27,7 @@ use crate::dimension::Dimension;
 use crate::model::{System, SystemJoint};
 use crate::orbit::Orbit;
 pub use crate::orbit::{Breakdown, OrbitError};
+use crate::structure::MOST_IN_FULL;
 use std::collections::BTreeMap;
 pub use ways::Ways;
 
@@ -106,7 +108,7 @@ pub enum MethodError {
         /// What the method misses in it.
         misses: &'static str,
         /// What to use instead.
-        ways: Ways,
+        ways: Box<Ways>,
     },
     /// A place has no mass.
     #[error("{method} needs a mass above zero at `{place}` (the law `jenkins` stands for a spring, a massless place and a slider){}", .ways.behind())]
@@ -116,7 +118,19 @@ pub enum MethodError {
         /// The place.
         place: String,
         /// What to use instead.
-        ways: Ways,
+        ways: Box<Ways>,
+    },
+    /// More degrees of freedom than the method's full matrices may have.
+    #[error("{method} carries full matrices over at most {most} places, and there are {dofs}{}", .ways.behind())]
+    TooLarge {
+        /// The method.
+        method: &'static str,
+        /// Degrees of freedom of the system.
+        dofs: usize,
+        /// Most that the method takes.
+        most: usize,
+        /// What to use instead.
+        ways: Box<Ways>,
     },
     /// A matrix is not positive definite.
     #[error("{method} needs a positive definite {matrix} matrix{}", .ways.behind())]
@@ -126,7 +140,7 @@ pub enum MethodError {
         /// Which matrix.
         matrix: &'static str,
         /// What to use instead.
-        ways: Ways,
+        ways: Box<Ways>,
     },
     /// An option has an impossible value.
     #[error("option `{key}` of {method}: {message}")]
@@ -144,17 +158,23 @@ impl MethodError {
     /// `method` misses something in the law of a joint.
     pub fn law(method: &'static str, joint: &SystemJoint, misses: &'static str) -> Self {
         let (joint, law) = (joint.name().to_owned(), joint.law().name());
-        MethodError::Law { method, joint, law, misses, ways: Ways::default() }
+        MethodError::Law { method, joint, law, misses, ways: Box::default() }
     }
 
     /// `method` needs a mass where a system has none.
     pub(crate) fn needs_mass(method: &'static str, system: &System, place: usize) -> Self {
-        MethodError::NeedsMass { method, place: system.places()[place].clone(), ways: Ways::default() }
+        MethodError::NeedsMass { method, place: system.places()[place].clone(), ways: Box::default() }
+    }
+
+    /// `method` carries full matrices: whether those of a system are too large for it.
+    pub(crate) fn too_large(method: &'static str, system: &System) -> Option<Self> {
+        let (dofs, most) = (system.dofs(), MOST_IN_FULL);
+        (dofs > most).then(|| MethodError::TooLarge { method, dofs, most, ways: Box::default() })
     }
 
     /// `method` needs a positive definite mass matrix.
     pub(crate) fn mass_not_positive(method: &'static str) -> Self {
-        MethodError::NotPositive { method, matrix: "mass", ways: Ways::default() }
+        MethodError::NotPositive { method, matrix: "mass", ways: Box::default() }
     }
 
     /// What to use instead; `None` where another value of an option is all that is needed.
@@ -162,7 +182,8 @@ impl MethodError {
         match self {
             MethodError::Law { ways, .. }
             | MethodError::NeedsMass { ways, .. }
-            | MethodError::NotPositive { ways, .. } => Some(ways),
+            | MethodError::TooLarge { ways, .. }
+            | MethodError::NotPositive { ways, .. } => Some(&**ways),
             MethodError::Option { .. } => None,
         }
     }
@@ -183,8 +204,9 @@ impl MethodError {
         match &mut self {
             MethodError::Law { ways, .. }
             | MethodError::NeedsMass { ways, .. }
+            | MethodError::TooLarge { ways, .. }
             | MethodError::NotPositive { ways, .. } => {
-                *ways = instead;
+                **ways = instead;
             }
             MethodError::Option { .. } => {}
         }

@@ -95,6 +95,22 @@ impl Search {
     }
 }
 
+/// Returns by which a motion comes near an orbit that repeats after several periods, before Newton's method begins: it would find one that
+/// repeats after one period first.
+const APPROACH: usize = 60;
+
+/// The state to which one comes by itself after a while.
+pub(crate) fn approached(map: &mut dyn ReturnMap, mut state: Vec<f64>, sign: f64) -> Vec<f64> {
+    for _ in 0..APPROACH {
+        let mut next = state.clone();
+        if map.returned(&mut next, None).is_err() || next.iter().any(|z| !z.is_finite()) {
+            break;
+        }
+        state = next.iter().map(|z| sign * z).collect();
+    }
+    state
+}
+
 /// Returns over which the rate of decay is measured: beats of neighbouring modes average out.
 const DECAY_WINDOW: usize = 256;
 /// The first, short window, and by how much windows grow: who has died early is not waited for. Beats do not average out over it, so that the

@@ -10,14 +10,15 @@ use super::flow::Flow;
 use super::followed::Kind;
 use super::guess::Guess;
 use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
-use super::periodic::{Aim, Closed, ReturnMap, Search, close, newton_step, norm};
+use super::periodic::{Aim, Closed, ReturnMap, Search, approached, close, newton_step, norm};
+use super::relaxed::{Closing, Spring, relaxed};
 use super::smooth::flow::SmoothFlow;
 use super::stepped::SteppedPath;
 use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, WIDTH, periods};
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::measure::measure;
-use crate::orbit::{Accuracy, Evidence, Orbit, Symmetry};
+use crate::orbit::{Accuracy, Evidence, Orbit, Symmetry, history};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -49,9 +50,6 @@ const COARSE_RETURNS: usize = 1024;
 /// Orbits in steps of twice the length differ by less than this share of the motion where they are the same one: 256 steps of a period err by 1e-3
 /// at a Q of ten, and in proportion to it.
 const NEIGHBOUR: f64 = 0.1;
-/// Returns by which a motion comes near an orbit that repeats after several periods, before Newton's method begins: it would find one that
-/// repeats after one period first.
-const APPROACH: usize = 60;
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -175,6 +173,25 @@ impl ReturnMap for Shooter<'_> {
     }
 }
 
+impl Closing for Shooter<'_> {
+    fn springs(&self) -> Vec<Spring> {
+        match &self.stepping {
+            Stepping::Smooth(_) => Vec::new(),
+            Stepping::Incremental(flow) => flow.springs(),
+        }
+    }
+    fn limit(&mut self, springs: &[Spring]) {
+        if let Stepping::Incremental(flow) = &mut self.stepping {
+            flow.limit(springs);
+        }
+    }
+    fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError> {
+        self.record(&closed)?;
+        let symmetry = self.search.symmetry(self.system, self.periods);
+        Ok(self.orbit_of(self.omega, symmetry, closed))
+    }
+}
+
 impl<'a> Shooter<'a> {
     /// # Errors
     /// A law that no integration takes, a place without mass.
@@ -207,19 +224,6 @@ impl<'a> Shooter<'a> {
         let assembly = self.stepping.assembly();
         let mut state = Guess::new(self.system, omega).state(assembly.n);
         state.resize(assembly.states(), 0.0);
-        state
-    }
-
-    /// A state near a motion of several periods: that to which the first guess comes by itself.
-    fn approached(&mut self, omega: f64, sign: f64) -> Vec<f64> {
-        let mut state = self.first_state(omega);
-        for _ in 0..APPROACH {
-            let mut next = state.clone();
-            if self.returned(&mut next, None).is_err() || next.iter().any(|z| !z.is_finite()) {
-                break;
-            }
-            state = next.iter().map(|z| sign * z).collect();
-        }
         state
     }
 
@@ -392,6 +396,7 @@ impl<'a> Shooter<'a> {
         let period = self.periods as f64 * std::f64::consts::TAU / omega;
         let path = self.stepping.path(&self.shared, symmetry, period);
         let Ok(measured) = measure(self.system, &path, omega, (symmetry, period));
+        let laws = self.stepping.assembly().joints.iter().map(|joint| &joint.law);
         Orbit {
             method: self.name,
             omega,
@@ -406,6 +411,7 @@ impl<'a> Shooter<'a> {
                 truncation: closed.missing,
                 accuracy: Accuracy::Converged,
                 return_defect: Some(closed.residual),
+                history: history(laws, &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
             },
             places: measured.places,
@@ -433,13 +439,14 @@ impl Solver for Shooter<'_> {
         self.omega = omega;
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
         let aim = Aim { method: self.name, omega, residual: NEAR, sign, rest };
-        let approached;
+        let near;
         let known = start.filter(|state| state.len() == self.weights.len());
         let start = if self.periods > 1 && known.is_none() {
             self.freeze(false);
             self.set_count(FIRST * self.periods);
-            approached = self.approached(omega, sign);
-            Some(approached.as_slice())
+            let first = self.first_state(omega);
+            near = approached(self, first, sign);
+            Some(near.as_slice())
         } else {
             known
         };
@@ -447,7 +454,11 @@ impl Solver for Shooter<'_> {
             Stepping::Smooth(_) => self.smooth_orbit(start, aim)?,
             Stepping::Incremental(_) => self.stepped_orbit(start, aim)?,
         };
-        let orbit = self.orbit_of(omega, symmetry, closed);
+        let mut orbit = self.orbit_of(omega, symmetry, closed);
+        if self.search == Search::Newton {
+            let system = self.system;
+            orbit = relaxed(self, system, orbit, Aim { residual: CLOSED_STEPS, ..aim });
+        }
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
             return Err(OrbitError::Evidence { method: self.name, omega, energy_gap: orbit.evidence.energy_gap });

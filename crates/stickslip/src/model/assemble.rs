@@ -3,10 +3,11 @@
 use super::system::{Axis, MovedPlace, System};
 use super::{GROUND, Joint, Mass, Model};
 use crate::structure::Structure;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
+use stickslip_numerics::sparse::Matrix;
 
 /// The element of a model that an error is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -211,8 +212,8 @@ impl Model {
             End::Free(i) => Some(i),
             End::Moved(i) => Some(n + i),
         };
-        let (mut mass, mut damping, mut stiffness) =
-            (DVector::zeros(total), DMatrix::zeros(total, total), DMatrix::zeros(total, total));
+        let mut mass = vec![0.0; total];
+        let (mut damping, mut stiffness) = (Vec::new(), Vec::new());
         let mut names = vec![String::new(); total];
         for (name, end) in &places.ends {
             if let Some(i) = index(*end) {
@@ -254,14 +255,15 @@ impl Model {
             }
         }
 
-        let block = |matrix: &DMatrix<f64>| matrix.view((0, 0), (n, n)).into_owned();
-        let structure = Structure::new(
-            names[..n].to_vec(),
-            DMatrix::from_diagonal(&mass.rows(0, n).into_owned()),
-            block(&damping),
-            block(&stiffness),
-        );
         let whole = |error: &dyn fmt::Display| ModelError::new(Element::Whole, "mass", error.to_string());
+        let sum = |entries| Matrix::from_triplets(total, entries).map_err(|error| whole(&error));
+        let (damping, stiffness) = (sum(damping)?, sum(stiffness)?);
+        let block = |matrix: &Matrix| {
+            let free = matrix.entries().filter(|(row, column, _)| *row < n && *column < n);
+            Matrix::from_triplets(n, free).map_err(|error| whole(&error))
+        };
+        let masses = Matrix::from_triplets(n, (0..n).map(|i| (i, i, mass[i]))).map_err(|error| whole(&error))?;
+        let structure = Structure::sparse(names[..n].to_vec(), masses, block(&damping)?, block(&stiffness)?);
         let mut builder = System::builder(structure.map_err(|error| whole(&error))?);
 
         let zero = Complex64::new(0.0, 0.0);
@@ -282,9 +284,8 @@ impl Model {
         for (k, motion) in motion_of.iter().enumerate() {
             for (&harmonic, &amplitude) in motion {
                 for row in 0..n {
-                    let at = (row, n + k);
-                    builder =
-                        builder.load(row, harmonic, zero - amplitude * stiffness[at], zero - amplitude * damping[at]);
+                    let [stiffness, damping] = [&stiffness, &damping].map(|matrix| matrix.get(row, n + k));
+                    builder = builder.load(row, harmonic, zero - amplitude * stiffness, zero - amplitude * damping);
                 }
             }
         }
@@ -320,10 +321,10 @@ impl Model {
         }
 
         for k in 0..moved_count {
-            let row = |matrix: &DMatrix<f64>| {
+            let row = |matrix: &Matrix| {
                 (
-                    DVector::from_fn(n, |i, _| matrix[(n + k, i)]),
-                    (0..moved_count).map(|i| matrix[(n + k, n + i)]).collect(),
+                    DVector::from_fn(n, |i, _| matrix.get(n + k, i)),
+                    (0..moved_count).map(|i| matrix.get(n + k, n + i)).collect(),
                 )
             };
             builder = builder.moved(MovedPlace {
@@ -452,12 +453,12 @@ fn harmonic_amplitude(amplitude: f64, phase: f64, element: Element) -> Result<Co
     Ok(Complex64::from_polar(1.0, phase) * amplitude)
 }
 
-fn add_between(matrix: &mut DMatrix<f64>, a: Option<usize>, b: Option<usize>, value: f64) {
+fn add_between(entries: &mut Vec<(usize, usize, f64)>, a: Option<usize>, b: Option<usize>, value: f64) {
     for (row, other) in [(a, b), (b, a)] {
         if let Some(row) = row {
-            matrix[(row, row)] += value;
+            entries.push((row, row, value));
             if let Some(column) = other {
-                matrix[(row, column)] -= value;
+                entries.push((row, column, -value));
             }
         }
     }

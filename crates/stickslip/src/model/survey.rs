@@ -252,7 +252,7 @@ impl Model {
             .filter(|link| !link.at.is_empty())
             .collect();
         let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(Stuck::of_joint).collect();
-        let mass: Vec<f64> = system.structure().mass().diagonal().iter().copied().collect();
+        let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().own_mass(i)).collect();
         let loose = self.loose(&joints);
         if system.dofs() > LARGEST {
             let unknown = || Linear { modes: Modes { lost: mass.len(), ..Modes::default() }, shapes: None };

@@ -329,6 +329,17 @@ impl System {
         builder.build()
     }
 
+    /// The same system, driven by harmonics of a frequency that is so many times lower: harmonic h becomes `h · periods`, and what repeats after
+    /// so many periods of the drive repeats after one.
+    pub(crate) fn slowed(&self, periods: u32) -> System {
+        let mut system = self.clone();
+        system.loads.iter_mut().for_each(|load| load.harmonic *= periods);
+        let axes = system.joints.iter_mut().flat_map(|joint| &mut joint.axes);
+        axes.flat_map(|axis| &mut axis.imposed).for_each(|(h, _)| *h *= periods);
+        system.moved.iter_mut().flat_map(|place| &mut place.motion).for_each(|(h, _)| *h *= periods);
+        system
+    }
+
     /// Number of degrees of freedom.
     pub fn dofs(&self) -> usize {
         self.structure.dofs()

@@ -22,8 +22,8 @@ pub(super) const PEAK_OF: Key = optional(
 /// Whether it names masses of the model.
 pub(super) fn check_peak_of(values: &Values, model: &Model) -> Result<(), Complaint> {
     let masses = Names::of_masses(model);
-    let named = values.names("peak_of").unwrap_or_default().iter().filter(|name| *name != ALL);
-    named.map(|name| masses.all(PEAK_OF.name, "mass", name).map(drop)).collect()
+    let mut named = values.names("peak_of").unwrap_or_default().iter().filter(|name| *name != ALL);
+    named.try_for_each(|name| masses.all(PEAK_OF.name, "mass", name).map(drop))
 }
 
 /// The places that the key names; none if it is absent.

@@ -575,11 +575,11 @@ impl Drawn<'_> {
         let (mut panel, names) = (self.panel(stretch.label()), self.names());
         panel.series.extend(self.references(&names));
         if self.single() {
-            let mass = self.system.structure().mass();
-            let heaviest = mass.diagonal().max();
+            let mass = |place: usize| self.system.structure().own_mass(place);
+            let heaviest = (0..self.system.dofs()).map(mass).fold(0.0, f64::max);
             for (name, place) in &self.shown {
                 let (x, y) = self.line(stretch, name);
-                let light = mass[(*place, *place)] < LIGHT * heaviest;
+                let light = mass(*place) < LIGHT * heaviest;
                 let style = if light { Style::Dashed } else { Style::Solid };
                 panel.series.push(Series { style, ..Series::line(name, x, y, *place) });
             }

@@ -3,7 +3,9 @@
 use crate::law::{Contact, Law, Piece};
 use crate::method::MethodError;
 use crate::model::System;
+use crate::structure::Matrices;
 use nalgebra::{DMatrix, DVector};
+use std::ops::Deref;
 use std::sync::Arc;
 
 /// A relative velocity below this fraction of the largest one is rest. Switch instants are found to 1e-15 of the velocity scale;
@@ -112,10 +114,9 @@ pub(crate) fn takes(law: &dyn Law) -> bool {
 #[derive(Debug, Clone)]
 pub(crate) struct Mechanics {
     pub n: usize,
-    pub mass: DMatrix<f64>,
+    /// Of the structure, shared with it.
+    matrices: Arc<Matrices>,
     pub inverse_mass: DMatrix<f64>,
-    pub damping: DMatrix<f64>,
-    pub stiffness: DMatrix<f64>,
     /// Sliders and stops of all joints, those that carry nothing left out.
     pub parts: Arc<[Part]>,
     /// Number of sliders behind springs.
@@ -124,12 +125,23 @@ pub(crate) struct Mechanics {
     pub fastest: f64,
 }
 
+/// Mass, damping and stiffness are read as its own.
+impl Deref for Mechanics {
+    type Target = Matrices;
+    fn deref(&self) -> &Matrices {
+        &self.matrices
+    }
+}
+
 impl Mechanics {
     /// # Errors
     /// A joint whose law has no exact view, or none that can be followed ([`refusal`]); a place without mass.
     pub fn new(system: &System) -> Result<Self, MethodError> {
         let n = system.dofs();
-        if let Some(i) = (0..n).find(|&i| system.structure().mass()[(i, i)] <= 0.0) {
+        if let Some(error) = MethodError::too_large(super::NAME, system) {
+            return Err(error);
+        }
+        if let Some(i) = (0..n).find(|&i| system.structure().own_mass(i) <= 0.0) {
             return Err(MethodError::needs_mass(super::NAME, system, i));
         }
         let mut parts = Vec::new();
@@ -170,10 +182,8 @@ impl Mechanics {
         Ok(Mechanics {
             n,
             fastest,
-            mass: system.structure().mass().clone(),
+            matrices: system.structure().full().clone(),
             inverse_mass,
-            damping: system.structure().damping().clone(),
-            stiffness: system.structure().stiffness().clone(),
             parts: parts.into(),
             elastic,
         })

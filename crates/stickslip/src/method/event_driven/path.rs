@@ -7,8 +7,8 @@ use crate::law::Contact;
 use crate::method::Breakdown;
 use crate::method::periodic::Closed;
 use crate::model::{Axis, System};
-use crate::orbit::measure::{NO_WORK, Signals, measure};
-use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry};
+use crate::orbit::measure::{NO_WORK, Signals, Slip, measure};
+use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use num_complex::Complex64;
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -16,8 +16,8 @@ use stickslip_numerics::signal::{Basis, Begin, FirstZero, FourierIntegrals, Prod
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Work below this fraction of the stored energy is no yardstick for the energy gap: an orbit that is closed to `CLOSED` of its state may have gained or lost that
-/// much, and the gap that this makes must stay below what is allowed.
+/// Work below this fraction of the stored energy is no yardstick for the energy gap: an orbit that is closed to `CLOSED` of its state may have
+/// gained or lost that much, and the gap that this makes must stay below what is allowed.
 const STORED: f64 = super::CLOSED / super::ENERGY_GAP;
 
 /// The closed-form segments of one return, with all that is needed to evaluate them.
@@ -68,6 +68,7 @@ pub(super) fn orbit(
             truncation: closed.missing,
             return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,
+            history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
         },
         places: measured.places,
@@ -313,10 +314,10 @@ impl Signals for Measuring<'_> {
         let signal = self.relative(axis);
         self.range_of(&signal, &self.derivative(&signal))
     }
-    fn slip(&self, joint: usize) -> (f64, usize) {
+    fn slip(&self, joint: usize) -> Slip {
         let path = self.path;
         if path.of_joint(joint).next().is_none() {
-            return (1.0, 0); // a joint that holds nothing slips all the time
+            return Slip { share: 1.0, switches: 0, rests: false }; // a joint that holds nothing slips all the time
         }
         // both sums run in one order, so that a joint that always slips has a share of exactly one
         let time = |counts: &dyn Fn(&Segment) -> bool| -> f64 {
@@ -330,7 +331,8 @@ impl Signals for Measuring<'_> {
             let (first, last) = (&first.segment.contacts, &last.segment.contacts);
             switches += path.of_joint(joint).filter(|&s| path.next_of(last[s]) != first[s]).count();
         }
-        (time(&slips) / time(&|_| true), switches)
+        let rests = !path.pieces.iter().any(|piece| slips(&piece.segment));
+        Slip { share: time(&slips) / time(&|_| true), switches, rests }
     }
 }
 

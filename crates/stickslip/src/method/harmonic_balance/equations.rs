@@ -192,8 +192,8 @@ impl Level {
             return;
         }
         let top = self.alternation.harmonics[nh - 1].max(1);
-        let structure = system.structure();
-        let stiff = structure.stiffness().amax().max(omega * omega * structure.mass().amax());
+        let [mass, _, stiffness] = system.structure().largest();
+        let stiff = stiffness.max(omega * omega * mass);
         let soft = 1.0 / stiff.max(f64::MIN_POSITIVE);
         // on the real axis: the impedance of the highest harmonic without the resonances that it may meet
         let rate = top as f64 * omega;

@@ -7,6 +7,7 @@ use crate::method::assembly::{Assembly, NEAR_REST};
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
 use crate::method::periodic::norm;
+use crate::method::relaxed::Spring;
 use crate::method::stepped::{Instant, Node, SteppedPath, Steps, extrapolate};
 use crate::method::{Breakdown, MethodError};
 use crate::model::System;
@@ -71,6 +72,23 @@ impl IncrementalFlow {
             eliminated: None,
             assembly,
         })
+    }
+
+    /// The sliders behind springs whose forces are among the states.
+    pub fn springs(&self) -> Vec<Spring> {
+        let mut springs = Vec::new();
+        for (joint, placed) in self.assembly.joints.iter().enumerate() {
+            let first = 2 * self.assembly.n + placed.first_state;
+            let sliders = law::springs(&placed.law).into_iter().enumerate();
+            springs.extend(sliders.map(|(s, (stiffness, limit))| Spring { joint, state: first + s, stiffness, limit }));
+        }
+        springs
+    }
+
+    /// Gives all of [`IncrementalFlow::springs`] the limits that these state.
+    pub fn limit(&mut self, springs: &[Spring]) {
+        let mut limits = springs.iter().map(|spring| spring.limit);
+        self.step.laws.iter_mut().for_each(|law| law.limit(&mut limits));
     }
 
     /// The end of a run from `state` with its record.
@@ -142,9 +160,11 @@ impl Flow for IncrementalFlow {
             self.eliminated = Eliminated::new(&self.assembly, h);
         }
         let eliminated = self.eliminated.take().ok_or(Breakdown::OutOfRange { time: 0.0 })?;
-        let (_, scale) = self.assembly.scales(state, &self.drive);
         self.steps.clear();
         self.step.start(&self.assembly, state, &self.drive, sensitivity.as_deref());
+        // joints that are pressed at rest set in motion what neither moves nor is loaded
+        let pushed = NEAR_REST * duration * self.assembly.pushed(self.step.force.as_slice());
+        let scale = self.assembly.scales(state, &self.drive).1.max(pushed);
         if self.keep {
             self.keep_instant(state, 0.0);
         }

@@ -242,9 +242,13 @@ impl Ports {
         self.list.iter().any(Port::is_force)
     }
 
-    /// Whether something holds rigidly.
-    pub fn has_rigid(&self) -> bool {
-        self.list.iter().any(Port::is_rigid)
+    /// Whether the velocity alone decides a bounded force that is sampled: friction that is steep, falls with velocity, or turns in a plane.
+    pub fn has_steep(&self) -> bool {
+        self.list.iter().any(|port| match &port.kernel {
+            Kernel::Prox(_) => true,
+            Kernel::Rate(law) => port.scale.is_finite() && law.rate().is_some_and(|rate| rate.states() == 0),
+            _ => false,
+        })
     }
 }
 
@@ -270,6 +274,10 @@ impl Alternation {
         force.fill(ZERO);
         if let Some(tangent) = tangent.as_deref_mut() {
             tangent.fill(0.0);
+            if let Some(by_frequency) = &mut self.by_frequency {
+                by_frequency.clear();
+                by_frequency.resize(c.len(), ZERO);
+            }
         }
         match &port.kernel {
             Kernel::Sliders(parts) => self.slide(parts, &motion, force, tangent),
@@ -286,6 +294,7 @@ impl Alternation {
             Kernel::Rigid(_) | Kernel::Prox(_) => {}
         }
         force.iter_mut().for_each(|f| *f *= share);
+        self.by_frequency.iter_mut().flatten().for_each(|f| *f *= share);
         self.argument = motion;
     }
 
