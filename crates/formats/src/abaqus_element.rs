@@ -19,10 +19,10 @@
 use std::rc::Rc;
 
 use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::names::direction;
 use crate::text::{Line, Lines, integer, shown};
-use crate::{Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "abaqus-element",
