@@ -1,6 +1,6 @@
 """Writes the files of this folder: the same matrices by as many programs as there are, and what must be read from each, bit by bit.
 
-    python3 -m venv /tmp/venv && /tmp/venv/bin/pip install numpy==2.4.6 scipy==1.17.1 h5py==3.16.0 pyyeti==1.4.10
+    python3 -m venv /tmp/venv && /tmp/venv/bin/pip install numpy==2.4.6 scipy==1.17.1 h5py==3.16.0 pyyeti==1.4.7
     apt-get install calculix-ccx octave   # 2.20, 7.3.0
     /tmp/venv/bin/python make.py
 
