@@ -8,10 +8,9 @@ use std::borrow::Cow;
 
 use crate::bytes::{Bytes, Number, Order};
 use crate::error::{Error, Kind, Place};
+use crate::format::{COMPLEX, Format, Item};
 use crate::inflate::{Limit, Wrapping, beginning, inflate};
-use crate::matrix::{Along, Matrix, Symmetry, Triplets, dense};
-use crate::npz::compressed;
-use crate::{COMPLEX, Format, Item};
+use crate::matrix::{Along, Matrix, Symmetry, Triplets, compressed, dense};
 
 pub(crate) const FORMAT: Format = Format {
     name: "matlab",

@@ -32,7 +32,7 @@ pub enum Symmetry {
 /// Where a matrix came from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
-    /// Name of the format, of [`TABLE`](crate::TABLE).
+    /// Name of the format, of the list of formats.
     pub format: &'static str,
     /// Name of the matrix in its file; empty where the format has none.
     pub variable: String,
@@ -503,6 +503,32 @@ pub(crate) fn dense(
         }
     }
     triplets.finish(Symmetry::General)
+}
+
+/// The entries of a matrix stored by columns (or rows): `pointers` say where each one begins.
+pub(crate) fn compressed(
+    pointers: &[usize],
+    inner: &[usize],
+    values: &[f64],
+    outer: usize,
+    mut push: impl FnMut(usize, usize, f64) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let fault = |problem| Err(Error::new(Kind::Count, Place::File, problem, "the file is damaged: export it again"));
+    if Some(pointers.len()) != outer.checked_add(1) {
+        return fault(format!("{} pointers for {outer} columns or rows, one more was expected", pointers.len()));
+    }
+    let stored = inner.len().min(values.len());
+    let sorted = pointers.first() == Some(&0) && pointers.is_sorted();
+    match pointers.last() {
+        Some(&last) if sorted && last <= stored => {}
+        last => return fault(format!("pointers up to {last:?} for {stored} entries, ascending ones were expected")),
+    }
+    for (outer, pair) in pointers.windows(2).enumerate() {
+        for at in pair[0]..pair[1] {
+            push(outer, inner[at], values[at])?;
+        }
+    }
+    Ok(())
 }
 
 /// Sorts entries and sums those of one place, in the order of the file.

@@ -14,10 +14,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::error::{Error, Kind, Place};
+use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::names::direction;
 use crate::text::{Line, Lines};
-use crate::{COMPLEX, Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "nastran-dmig",

@@ -7,9 +7,9 @@
 
 use crate::bytes::{Bytes, Order};
 use crate::error::{Error, Kind, Place};
+use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::text::{Line, Lines, integer, shown};
-use crate::{COMPLEX, Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "nastran-op4",

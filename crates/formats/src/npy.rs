@@ -7,9 +7,9 @@
 
 use crate::bytes::{Bytes, Number, Order};
 use crate::error::{Error, Kind, Place};
+use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Along, Matrix, dense};
 use crate::text::shown;
-use crate::{COMPLEX, Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "npy",

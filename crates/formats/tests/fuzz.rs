@@ -163,14 +163,15 @@ fn damaged_files_of_every_format() {
 
 /// Ten minutes for every format: `cargo test -p stickslip-formats --test fuzz -- --ignored --nocapture`.
 ///
-/// `STICKSLIP_FUZZ_SECONDS` and `STICKSLIP_FUZZ_SEED` set another time and another start.
+/// `STICKSLIP_FUZZ_SECONDS` and `STICKSLIP_FUZZ_SEED` set another time and another start, `STICKSLIP_FUZZ_FORMAT` one format.
 #[test]
 #[ignore = "ten minutes for every format"]
 fn damaged_files_of_every_format_for_ten_minutes() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let number = |name: &str, default| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default);
     let (seconds, seed) = (number("STICKSLIP_FUZZ_SECONDS", 600), number("STICKSLIP_FUZZ_SEED", 0x1234_5678_9abc_def1));
-    for format in TABLE {
+    let only = std::env::var("STICKSLIP_FUZZ_FORMAT").ok();
+    for format in TABLE.iter().filter(|format| only.as_ref().is_none_or(|only| only == format.name)) {
         let end = Instant::now() + Duration::from_secs(seconds);
         let (runs, matrices) = fuzz(format.name, seed.max(1), usize::MAX, end);
         eprintln!("{}: {runs} damaged files, {matrices} matrices in them", format.name);
