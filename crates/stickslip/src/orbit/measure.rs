@@ -38,6 +38,10 @@ pub(crate) trait Signals {
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Self::Error>;
     /// When a joint slips.
     fn slip(&self, joint: usize) -> Slip;
+    /// What the `force` along an axis takes from the motion in the return, J.
+    fn dissipation(&self, axis: usize, force: &Self::Signal) -> f64 {
+        self.product(force, &self.relative_velocity(axis))
+    }
 }
 
 /// When a joint slips in a return.
@@ -92,8 +96,7 @@ pub(crate) fn measure<S: Signals>(
     for (j, joint) in system.joints().iter().enumerate() {
         let axes = first..first + joint.axes().len();
         first = axes.end;
-        let dissipation: f64 =
-            axes.clone().map(|axis| signals.product(&forces[axis], &signals.relative_velocity(axis))).sum();
+        let dissipation: f64 = axes.clone().map(|axis| signals.dissipation(axis, &forces[axis])).sum();
         let displacement = axes.map(|axis| signals.relative_range(axis).map(mirrored)).collect::<Result<_, _>>()?;
         let Slip { share, switches, rests } = signals.slip(j);
         // a law without a limit never slips: it is not stuck, and its orbit is none of many

@@ -314,6 +314,19 @@ impl Signals for Measuring<'_> {
         let signal = self.relative(axis);
         self.range_of(&signal, &self.derivative(&signal))
     }
+    /// The sliders' alone: springs and stops give back what they take, to the last digit.
+    fn dissipation(&self, axis: usize, _force: &Vec<Complex64>) -> f64 {
+        let u = self.relative(axis);
+        let mut sum = 0.0;
+        for (piece, range) in self.pieces() {
+            let u = &u[range];
+            let travel = real_dot(u, &piece.at_end) - piece.basis().beginning(u);
+            for part in self.path.of_joint(axis) {
+                sum += piece.segment.contacts[part].sign() * self.path.parts[part].limit() * travel;
+            }
+        }
+        sum
+    }
     fn slip(&self, joint: usize) -> Slip {
         let path = self.path;
         if path.of_joint(joint).next().is_none() {
