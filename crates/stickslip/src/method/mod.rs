@@ -26,8 +26,8 @@ mod ways;
 use crate::dimension::Dimension;
 use crate::model::{System, SystemJoint};
 use crate::orbit::Orbit;
-use crate::structure::MOST_IN_FULL;
 pub use crate::orbit::{Breakdown, OrbitError};
+use crate::structure::MOST_IN_FULL;
 use std::collections::BTreeMap;
 pub use ways::Ways;
 
