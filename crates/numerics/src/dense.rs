@@ -2,8 +2,12 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::lu::partial_pivoting::factor::{PartialPivLuParams, lu_in_place, lu_in_place_scratch};
-use faer::linalg::lu::partial_pivoting::solve::{solve_transpose_in_place, solve_transpose_in_place_scratch};
-use faer::{MatMut, Par, Spec};
+use faer::linalg::lu::partial_pivoting::solve::{
+    solve_in_place, solve_in_place_scratch, solve_transpose_in_place, solve_transpose_in_place_scratch,
+};
+use faer::perm::PermRef;
+use faer::{MatMut, MatRef, Par, Spec};
+use num_complex::Complex64;
 
 /// Size from which elimination in blocks is the faster one.
 const LARGE: usize = 96;
@@ -148,6 +152,61 @@ pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (us
     }
 }
 
+/// `P A = L U` of a complex matrix, in blocks that stay in the cache, for many right sides.
+///
+/// # Example
+/// ```
+/// use num_complex::Complex64;
+/// use stickslip_numerics::dense::ComplexLu;
+/// let j = Complex64::I;
+/// // columns (0, j) and (2, 0)
+/// let factor = ComplexLu::new(vec![0.0 * j, j, 2.0 + 0.0 * j, 0.0 * j], 2).unwrap();
+/// let mut x = [Complex64::ONE, Complex64::ONE];
+/// factor.solve(&mut x);
+/// assert_eq!(x, [-j, 0.5 + 0.0 * j]);
+/// ```
+#[derive(Debug, Clone)]
+pub struct ComplexLu {
+    n: usize,
+    factors: Vec<Complex64>,
+    order: Vec<u32>,
+    inverse: Vec<u32>,
+}
+
+impl ComplexLu {
+    /// Of a matrix column after column, n × n.
+    ///
+    /// # Errors
+    /// The column in which no pivot is left.
+    pub fn new(mut matrix: Vec<Complex64>, n: usize) -> Result<Self, usize> {
+        let params = Spec::<PartialPivLuParams, Complex64>::default();
+        let mut memory = MemBuffer::new(lu_in_place_scratch::<u32, Complex64>(n, n, Par::Seq, params));
+        let (mut order, mut inverse) = (vec![0; n], vec![0; n]);
+        let mut factors = MatMut::from_column_major_slice_mut(&mut matrix, n, n);
+        lu_in_place(factors.as_mut(), &mut order, &mut inverse, Par::Seq, MemStack::new(&mut memory), params);
+        let weak = (0..n).find(|&k| factors[(k, k)] == Complex64::ZERO || !factors[(k, k)].is_finite());
+        weak.map_or(Ok(ComplexLu { n, factors: matrix, order, inverse }), Err)
+    }
+
+    /// Solves in place for right sides of length n, one after the other.
+    ///
+    /// # Panics
+    /// If the length of `right` is no multiple of n.
+    pub fn solve(&self, right: &mut [Complex64]) {
+        let n = self.n;
+        if n == 0 || right.is_empty() {
+            return;
+        }
+        assert!(right.len().is_multiple_of(n), "{} numbers are no columns of {n}", right.len());
+        let columns = right.len() / n;
+        let mut memory = MemBuffer::new(solve_in_place_scratch::<u32, Complex64>(n, columns, Par::Seq));
+        let factors = MatRef::from_column_major_slice(&self.factors, n, n);
+        let exchanges = PermRef::new_checked(&self.order, &self.inverse, n);
+        let right = MatMut::from_column_major_slice_mut(right, n, columns);
+        solve_in_place(factors, factors, exchanges, right, Par::Seq, MemStack::new(&mut memory));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -196,5 +255,25 @@ mod tests {
         }
         let mut singular = vec![1.0; 4];
         assert!(!solve(&mut singular, 2, &mut [1.0, 2.0]));
+    }
+
+    /// The product of the matrix and what was solved for is the right side, in every column.
+    #[test]
+    fn complex_systems_with_many_right_sides() {
+        for n in [1, 5, 130] {
+            let entry =
+                |i: usize, k: usize| Complex64::new(((i * 7919 + k * 31) as f64).sin(), ((i + 5 * k) as f64).cos());
+            let matrix: Vec<Complex64> = (0..n * n).map(|at| entry(at % n, at / n)).collect();
+            let right: Vec<Complex64> = (0..3 * n).map(|i| entry(i, 7)).collect();
+            let mut x = right.clone();
+            ComplexLu::new(matrix.clone(), n).unwrap().solve(&mut x);
+            for (x, right) in x.chunks(n).zip(right.chunks(n)) {
+                for i in 0..n {
+                    let product: Complex64 = (0..n).map(|k| matrix[k * n + i] * x[k]).sum();
+                    assert!((product - right[i]).norm() < 1e-9, "{n}: {product} {}", right[i]);
+                }
+            }
+        }
+        assert_eq!(ComplexLu::new(vec![Complex64::ONE; 4], 2).unwrap_err(), 1);
     }
 }

@@ -11,11 +11,8 @@ use stickslip::{law, method};
 
 pub use crate::key::{Key, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, refused, required};
 
-/// Most elements in one list (`[[spring]]`, …), repetitions counted.
+/// Most elements in one list (`[[mass]]`, `[[spring]]`, …), repetitions counted.
 pub const MOST_ELEMENTS: usize = 10_000;
-
-/// Most masses, repetitions counted: the matrices are dense.
-pub const MOST_MASSES: usize = 2_000;
 
 /// Most bytes of a study file.
 pub const MOST_BYTES: u64 = 4 * 1024 * 1024;

@@ -105,7 +105,9 @@ pub(crate) fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyE
             let table = if study.kind().uses_method { "method" } else { "study" };
             study.error_at(table, 0, key, message, None)
         }
-        MethodError::NotPositive { .. } => study.error_at("method", 0, "kind", message, help),
+        MethodError::NotPositive { .. } | MethodError::TooLarge { .. } => {
+            study.error_at("method", 0, "kind", message, help)
+        }
     }
 }
 

@@ -1,8 +1,8 @@
 //! What a structure answers to harmonic forces: `(s² M + s C + K) x = F` at `s = jhΩ`.
 
 use super::{Form, Structure};
-use nalgebra::{DMatrix, DMatrixViewMut, Dyn, LU};
 use num_complex::Complex64;
+use stickslip_numerics::dense::ComplexLu;
 use stickslip_numerics::sparse::{Analysis, ComplexFactor, Singular};
 
 /// The dynamic stiffness of a structure at one rate, factored: it answers as many loads as one likes.
@@ -13,7 +13,7 @@ pub struct DynamicStiffness {
 
 #[derive(Debug, Clone)]
 enum Factor {
-    Full(LU<Complex64, Dyn, Dyn>),
+    Full(ComplexLu),
     Sparse(ComplexFactor),
 }
 
@@ -32,15 +32,9 @@ impl Structure {
         let factor = match &self.0.form {
             Form::Full(full) => {
                 let n = self.dofs();
-                let sum = DMatrix::from_fn(n, n, |i, k| {
-                    of_mass * full.mass[(i, k)] + s * full.damping[(i, k)] + full.stiffness[(i, k)]
-                });
-                let factor = sum.lu();
-                let weak = (0..n).find(|&i| factor.lu_internal()[(i, i)] == Complex64::ZERO);
-                if let Some(row) = weak {
-                    return Err(Singular { row });
-                }
-                Factor::Full(factor)
+                let entries = full.mass.iter().zip(full.damping.iter()).zip(full.stiffness.iter());
+                let sum = entries.map(|((m, c), k)| of_mass * m + s * c + k).collect();
+                Factor::Full(ComplexLu::new(sum, n).map_err(|row| Singular { row })?)
             }
             Form::Sparse { mass, damping, stiffness, analysis, .. } => {
                 let analysis = analysis.get_or_init(|| Analysis::new(&[mass, damping, stiffness]));
@@ -59,13 +53,7 @@ impl DynamicStiffness {
     /// If the length of `loads` is no multiple of n.
     pub fn solve(&self, loads: &mut [Complex64]) {
         match &self.factor {
-            Factor::Full(factor) => {
-                let n = factor.lu_internal().nrows();
-                if n > 0 {
-                    let columns = loads.len() / n;
-                    factor.solve_mut(&mut DMatrixViewMut::from_slice(loads, n, columns));
-                }
-            }
+            Factor::Full(factor) => factor.solve(loads),
             Factor::Sparse(factor) => factor.solve(loads),
         }
     }

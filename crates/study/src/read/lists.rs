@@ -6,7 +6,7 @@ use crate::error::{Place, Problem};
 use crate::expression::is_reserved;
 use crate::near::shown;
 use crate::repeat::{Index, Repetition};
-use crate::schema::{FILE, Key, MOST_ELEMENTS, MOST_MASSES, Takes};
+use crate::schema::{FILE, Key, MOST_ELEMENTS, Takes};
 use crate::statement::StatedTable;
 use crate::study::Lists;
 use stickslip::model::is_identifier;
@@ -31,7 +31,6 @@ impl Reader {
                     self.wrong_type(key, node);
                 }
                 (Takes::List(keys), Content::List(list)) => {
-                    let most = if name == "mass" { MOST_MASSES } else { MOST_ELEMENTS };
                     let mut elements = 0;
                     for (i, node) in list.iter().enumerate() {
                         match &node.value {
@@ -39,8 +38,8 @@ impl Reader {
                                 let owner = format!("{name} {}", i + 1);
                                 let Some(repetition) = self.repetition(table, &owner) else { continue };
                                 elements = repetition.count().saturating_add(elements);
-                                if elements > most {
-                                    let message = format!("{elements} elements; the limit is {most}");
+                                if elements > MOST_ELEMENTS {
+                                    let message = format!("{elements} elements; the limit is {MOST_ELEMENTS}");
                                     self.problems.push(Problem::new(&node.place, name, message));
                                     break;
                                 }

@@ -1,8 +1,8 @@
 //! The linear rest of a structure: what its places do under harmonic forces, in closed form for every frequency.
 //!
 //! With the modes `(λ, φ)` of `M x'' + C x' + K x`, computed once, the response to `Re(F e^{st})` is a sum of `φ (ψᵀF) / (s - λ)`.
-//! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored. Structures that are sparse
-//! are not taken apart into modes: their dynamic stiffness is factored at every frequency.
+//! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored. Structures that are sparse, or
+//! so large that their modes would take seconds, are not taken apart into these: their dynamic stiffness is factored at every frequency.
 
 use super::hold::HOLD;
 use super::ports::Ports;
@@ -20,6 +20,9 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Share of the largest static receptance below which springs hold a direction, if any is held by [`HOLD`] alone.
 const HELD: f64 = 1e-5;
 
+/// Degrees of freedom beyond which full matrices are not taken apart into modes: at 200 that takes a second, with the third power.
+const MODES: usize = 200;
+
 /// Harmonics that nobody samples.
 const HIGHEST: f64 = 1e6;
 
@@ -28,7 +31,7 @@ const HIGHEST: f64 = 1e6;
 pub(super) struct Rest {
     n: usize,
     modal: Option<Modal>,
-    /// Dynamic stiffnesses of sparse structures at the last drive frequency, by their rates.
+    /// Dynamic stiffnesses of large structures at the last drive frequency, by their rates.
     factors: RefCell<Vec<(Complex64, f64, Option<Arc<DynamicStiffness>>)>>,
     structure: Structure,
     /// Directions of the axes: rows, rising, with their weights.
@@ -62,7 +65,7 @@ impl Rest {
             .collect::<Vec<Vec<(usize, f64)>>>();
         Rest {
             n,
-            modal: if system.structure().is_sparse() { None } else { modal(system, &columns(n, &directions)) },
+            modal: if is_factored(system.structure()) { None } else { modal(system, &columns(n, &directions)) },
             factors: RefCell::default(),
             structure: system.structure().clone(),
             directions,
@@ -77,7 +80,7 @@ impl Rest {
     /// The same at any `s`; on the positive real axis it has no resonances.
     pub fn receptance_at(&self, s: Complex64, omega: f64) -> DMatrix<Complex64> {
         let q = self.directions.len();
-        if self.structure.is_sparse() {
+        if self.is_factored() {
             let Some(factor) = self.factor(s, omega) else { return DMatrix::from_element(q, q, ZERO) };
             let mut moved = columns(self.n, &self.directions).map(|w| Complex64::new(w, 0.0));
             factor.solve(moved.as_mut_slice());
@@ -112,7 +115,7 @@ impl Rest {
     /// Displacements of all places under the complex forces `force` (length n, N), m.
     pub fn respond(&self, harmonic: usize, omega: f64, force: &DVector<Complex64>) -> DVector<Complex64> {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
-        if self.structure.is_sparse() {
+        if self.is_factored() {
             let Some(factor) = self.factor(s, omega) else { return DVector::from_element(self.n, ZERO) };
             let mut x = force.clone();
             factor.solve(x.as_mut_slice());
@@ -186,13 +189,17 @@ impl Rest {
         force
     }
 
-    /// Of a full structure.
+    /// Of a small structure.
     fn dynamic(&self, s: Complex64) -> DMatrix<Complex64> {
         let Matrices { mass, damping, stiffness } = &**self.structure.full();
         DMatrix::from_fn(self.n, self.n, |i, k| s * s * mass[(i, k)] + s * damping[(i, k)] + stiffness[(i, k)])
     }
 
-    /// Of a sparse structure: kept as long as the drive frequency stays. `None` at a resonance without damping.
+    fn is_factored(&self) -> bool {
+        is_factored(&self.structure)
+    }
+
+    /// Of a large structure: kept as long as the drive frequency stays. `None` at a resonance without damping.
     fn factor(&self, s: Complex64, omega: f64) -> Option<Arc<DynamicStiffness>> {
         let mut factors = self.factors.borrow_mut();
         factors.retain(|(_, driven, _)| *driven == omega);
@@ -205,6 +212,11 @@ impl Rest {
         factors.push((s, omega, found.clone()));
         found
     }
+}
+
+/// Whether the dynamic stiffness is factored at every frequency.
+fn is_factored(structure: &Structure) -> bool {
+    structure.is_sparse() || structure.dofs() > MODES
 }
 
 /// Directions as columns, n × q.
