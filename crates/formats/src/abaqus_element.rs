@@ -19,10 +19,10 @@
 use std::rc::Rc;
 
 use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::names::direction;
-use crate::text::{Line, Lines, integer};
-use crate::{Format, Item};
+use crate::text::{Line, Lines, integer, shown};
 
 pub(crate) const FORMAT: Format = Format {
     name: "abaqus-element",
@@ -85,10 +85,13 @@ impl Element {
 
     fn add_dofs(&mut self, line: &Line) -> Result<(), Error> {
         let mut numbers = fields(line.text).map(|field| line.integer(field)).collect::<Result<Vec<_>, _>>()?;
-        let position = if self.dofs.is_empty() { 1 } else { numbers.remove(0) };
-        match usize::try_from(position) {
-            Ok(position) if position >= 1 && !numbers.is_empty() => self.dofs.push((position, numbers)),
-            _ => return Err(line.malformed("the position of a node and its degrees of freedom", &position.to_string())),
+        if self.dofs.is_empty() {
+            // The first line begins with the first node.
+            numbers.insert(0, 1);
+        }
+        match numbers.split_first().map(|(&position, dofs)| (usize::try_from(position), dofs)) {
+            Some((Ok(position @ 1..), dofs @ [_, ..])) => self.dofs.push((position, dofs.to_vec())),
+            _ => return Err(line.malformed("the position of a node and its degrees of freedom", &shown(line.text))),
         }
         Ok(())
     }
@@ -252,6 +255,8 @@ mod tests {
         check("*USER ELEMENT,NODES=999999999999\n1\n*MATRIX\n1\n", Kind::Malformed, Place::Line(1));
         check("*USER ELEMENT,NODES=1000000\n1,2\n*MATRIX\n1\n", Kind::Malformed, Place::Line(3));
         check("*USER ELEMENT,NODES=1\n1\n0,1\n", Kind::Malformed, Place::Line(3));
+        check("*USER ELEMENT,NODES=1\n1\n , ,\n", Kind::Malformed, Place::Line(3));
+        check("*USER ELEMENT,NODES=1\n,\n", Kind::Malformed, Place::Line(2));
         check("*USER ELEMENT,NODES=1\n1\n", Kind::Choice, Place::File);
     }
 }

@@ -7,10 +7,10 @@
 use std::collections::HashMap;
 
 use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::names::direction;
 use crate::text::{Line, Lines, integer, real, shown};
-use crate::{Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "abaqus-matrix-input",

@@ -9,9 +9,9 @@ use std::rc::Rc;
 
 use crate::bytes::{Bytes, Order};
 use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::names::direction;
-use crate::{Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "ansys-full",

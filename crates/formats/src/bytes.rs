@@ -57,6 +57,13 @@ impl<'a> Bytes<'a> {
         self.at = self.at.saturating_add(count).min(self.all.len());
     }
 
+    /// A cursor so many bytes ahead, at the end at most.
+    pub fn ahead(&self, count: usize) -> Self {
+        let mut ahead = self.clone();
+        ahead.skip(count);
+        ahead
+    }
+
     /// Moves to a byte, from zero.
     pub fn seek(&mut self, at: usize) -> Result<(), Error> {
         self.at = 0;

@@ -5,9 +5,9 @@
 //! Source: CalculiX CrunchiX manual, `*FREQUENCY, SOLVER=MATRIXSTORAGE`; Abaqus Analysis User's Guide, Generating matrices.
 
 use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::text::{Line, Lines, integer, real};
-use crate::{Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "coordinate",

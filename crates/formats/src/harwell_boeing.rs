@@ -11,10 +11,9 @@
 //! Command Reference, HBMAT.
 
 use crate::error::{Error, Place};
-use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::npz::compressed;
+use crate::format::{COMPLEX, Format, Item};
+use crate::matrix::{Matrix, Symmetry, Triplets, compressed};
 use crate::text::{Line, Lines, shown};
-use crate::{COMPLEX, Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "harwell-boeing",

@@ -11,10 +11,9 @@ use std::rc::Rc;
 use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 
 use crate::error::{Error, Kind, Place};
+use crate::format::{COMPLEX, Format, Item};
 use crate::inflate::Limit;
-use crate::matrix::{Symmetry, Triplets};
-use crate::npz::compressed;
-use crate::{COMPLEX, Format, Item};
+use crate::matrix::{Along, Symmetry, Triplets, compressed, dense};
 
 pub(crate) const FORMAT: Format = Format {
     name: "hdf5",
@@ -26,19 +25,26 @@ pub(crate) const FORMAT: Format = Format {
 
 const MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// Groups within groups that are followed: links may go in circles.
+/// Groups within groups that are followed.
 const DEPTH: usize = 8;
 
-/// Numbers that a chunk may have, even where its dataset has less: those of h5py have at most 2^17.
-const CHUNK: u64 = 1 << 20;
+/// Numbers that any dataset may have, stored or not, and any chunk: those of h5py have at most this many.
+const FEW: u64 = 1 << 17;
+
+/// Bytes that deflate can pack into one.
+const DEFLATE: u64 = 1032;
 
 /// Members of a file that are listed.
 const MEMBERS: usize = 10_000;
 
+/// Groups that are looked into: links may go in circles.
+const GROUPS: usize = 1000;
+
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let file = guarded(Place::File, || File::from_bytes(bytes.to_vec()))?;
     let mut items = Vec::new();
-    walk(&Rc::new(file.root()), "", Limit::of(bytes.len()), DEPTH, &mut items)?;
+    let root = Rc::new(file.root());
+    Walk { limit: Limit::of(bytes.len()), groups: 0, items: &mut items }.through(&root, "", DEPTH)?;
     Ok(items)
 }
 
@@ -56,37 +62,51 @@ fn guarded<T>(place: Place, ask: impl FnOnce() -> Result<T, hdf5_pure::Error>) -
     Err(Error::new(Kind::Malformed, place, problem, remedy))
 }
 
-/// Adds what a group and the groups in it hold.
-fn walk(group: &Rc<Group>, path: &str, limit: Limit, depth: usize, items: &mut Vec<Item>) -> Result<(), Error> {
-    let here = || Place::Variable(path.to_string());
-    // MATLAB keeps the parts of cells and objects in groups of its own, `#refs#` and `#subsystem#`.
-    let own = |name: &String| !name.starts_with('#');
-    let full = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
-    for name in guarded(here(), || group.datasets())?.into_iter().filter(own) {
-        if items.len() >= MEMBERS {
-            return Ok(());
+/// A walk through the groups of a file.
+struct Walk<'w, 'a> {
+    limit: Limit,
+    /// Groups looked into so far.
+    groups: usize,
+    items: &'w mut Vec<Item<'a>>,
+}
+
+impl Walk<'_, '_> {
+    /// Adds what a group and the groups in it hold.
+    fn through(&mut self, group: &Rc<Group>, path: &str, depth: usize) -> Result<(), Error> {
+        self.groups += 1;
+        let here = || Place::Variable(path.to_string());
+        // MATLAB keeps the parts of cells and objects in groups of its own, `#refs#` and `#subsystem#`.
+        let own = |name: &String| !name.starts_with('#');
+        let full = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
+        for name in guarded(here(), || group.datasets())?.into_iter().filter(own) {
+            if self.items.len() >= MEMBERS || self.groups >= GROUPS {
+                return Ok(());
+            }
+            let dataset = guarded(Place::Variable(full(&name)), || group.dataset(&name))?;
+            self.items.push(dense_item(dataset, full(&name), self.limit)?);
         }
-        let dataset = guarded(Place::Variable(full(&name)), || group.dataset(&name))?;
-        items.push(dense_item(dataset, full(&name), limit)?);
+        for name in guarded(here(), || group.groups())?.into_iter().filter(own) {
+            if self.items.len() >= MEMBERS || self.groups >= GROUPS {
+                return Ok(());
+            }
+            let place = || Place::Variable(full(&name));
+            let inner = Rc::new(guarded(place(), || group.group(&name))?);
+            let attributes = guarded(place(), || inner.attrs())?;
+            if attributes.contains_key("OCTAVE_NEW_FORMAT") {
+                // Its matrices are transposed, and nothing at them says so.
+                self.items.push(Item::other(full(&name), "in the form of Octave's `save -hdf5` (`save -v7` is read)"));
+            } else if let Some(rows) = attributes.get("MATLAB_sparse") {
+                let rows = whole(rows).ok_or_else(|| {
+                    let problem = "the attribute MATLAB_sparse is no number of rows".into();
+                    Error::new(Kind::Malformed, place(), problem, "save the file again")
+                })?;
+                self.items.push(sparse_item(inner, full(&name), rows, self.limit)?);
+            } else if depth > 0 {
+                self.through(&inner, &full(&name), depth - 1)?;
+            }
+        }
+        Ok(())
     }
-    for name in guarded(here(), || group.groups())?.into_iter().filter(own) {
-        if items.len() >= MEMBERS {
-            return Ok(());
-        }
-        let place = || Place::Variable(full(&name));
-        let inner = Rc::new(guarded(place(), || group.group(&name))?);
-        let attributes = guarded(place(), || inner.attrs())?;
-        if let Some(rows) = attributes.get("MATLAB_sparse") {
-            let rows = whole(rows).ok_or_else(|| {
-                let problem = "the attribute MATLAB_sparse is no number of rows".into();
-                Error::new(Kind::Malformed, place(), problem, "save the file again")
-            })?;
-            items.push(sparse_item(inner, full(&name), rows, limit)?);
-        } else if depth > 0 {
-            walk(&inner, &full(&name), limit, depth - 1, items)?;
-        }
-    }
-    Ok(())
 }
 
 /// A count in an attribute.
@@ -132,12 +152,8 @@ fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'stat
             let problem = format!("{} numbers for {rows} x {columns}", values.len());
             return Err(Error::new(Kind::Count, Place::Variable(name.clone()), problem, "save the file again"));
         }
-        let mut triplets = Triplets::new(rows, columns, 0, Place::File)?;
-        for (at, &value) in values.iter().enumerate() {
-            let (row, column) = if matlab { (at % rows, at / rows) } else { (at / columns, at % columns) };
-            triplets.push(row, column, value, Place::Variable(name.clone()))?;
-        }
-        triplets.finish(Symmetry::General)
+        let along = if matlab { Along::Columns } else { Along::Rows };
+        dense((rows, columns), along, &Place::Variable(name.clone()), |at| Ok(values[at]))
     }))
 }
 
@@ -175,9 +191,16 @@ fn numbers<T>(
     let chunk = guarded(place.clone(), || dataset.chunk_shape())?.unwrap_or_default();
     let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
     let shape = guarded(place.clone(), || dataset.shape())?;
-    let count = product(&shape).filter(|&count| count <= limit.numbers());
-    let most = count.map(|count| count.max(CHUNK));
-    if most.is_none_or(|most| product(&chunk).is_none_or(|chunk| chunk > most)) {
+    // Of a dataset in chunks, what is in the file; the index of some kinds of chunks cannot be asked.
+    let stored = match chunk[..] {
+        [] => None,
+        _ => guarded(place.clone(), || dataset.chunks())
+            .ok()
+            .map(|chunks| chunks.iter().map(|one| one.storage_size).sum()),
+    };
+    let room = stored.map_or(u64::MAX, |stored: u64| stored.saturating_mul(DEFLATE)).max(FEW).min(limit.numbers());
+    let count = product(&shape).filter(|&count| count <= room);
+    if count.is_none_or(|count| product(&chunk).is_none_or(|chunk| chunk > count.max(FEW))) {
         return Err(too_large(place));
     }
     guarded(place, || read(dataset))

@@ -24,6 +24,8 @@ mod ansys_full;
 mod bytes;
 mod coordinate;
 mod error;
+mod file;
+mod format;
 mod harwell_boeing;
 mod hdf5;
 mod inflate;
@@ -38,25 +40,16 @@ mod npz;
 mod report;
 mod text;
 
-use std::fmt;
 use std::path::Path;
 
+use file::{io, load};
+use format::Item;
+
 pub use error::{Error, Kind, Place};
+pub use format::{Format, Variable};
 pub use inflate::{EXPANSION, UNPACKED_ALWAYS};
 pub use matrix::{Entry, Matrix, Origin, Symmetry};
 pub use report::Report;
-
-/// A format of files that hold matrices.
-pub struct Format {
-    /// What `format = "…"` calls it.
-    pub name: &'static str,
-    /// What it is, and which programs write it.
-    pub summary: &'static str,
-    /// Whether a file looks like it, by its content.
-    pub(crate) sniff: fn(&[u8]) -> bool,
-    /// The matrices in a file, not yet read.
-    pub(crate) open: for<'a> fn(&'a [u8]) -> Result<Vec<Item<'a>>, Error>,
-}
 
 /// All formats. The first whose sniff is right reads a file.
 pub const TABLE: &[Format] = &[
@@ -68,68 +61,12 @@ pub const TABLE: &[Format] = &[
     abaqus_element::FORMAT,
     abaqus_input::FORMAT,
     nastran_op4::FORMAT,
-    nastran_dmig::FORMAT,
     ansys_full::FORMAT,
     harwell_boeing::FORMAT,
     coordinate::FORMAT,
+    // Its cards may stand anywhere in a file, so that it looks through all of it.
+    nastran_dmig::FORMAT,
 ];
-
-/// What a matrix of complex numbers is noted as.
-pub(crate) const COMPLEX: &str = "complex";
-
-/// A matrix that waits in a file.
-pub(crate) struct Item<'a> {
-    pub variable: Variable,
-    pub read: Box<dyn Fn() -> Result<Matrix, Error> + 'a>,
-}
-
-impl<'a> Item<'a> {
-    pub fn new(
-        name: impl Into<String>,
-        rows: usize,
-        columns: usize,
-        read: impl Fn() -> Result<Matrix, Error> + 'a,
-    ) -> Self {
-        Self { variable: Variable { name: name.into(), rows, columns, note: None }, read: Box::new(read) }
-    }
-
-    /// Something that is no real matrix: `note` says what it is instead.
-    pub fn other(name: impl Into<String>, note: impl Into<String>) -> Self {
-        let (name, note) = (name.into(), note.into());
-        let error = Error::new(
-            if note == COMPLEX { Kind::Complex } else { Kind::Unsupported },
-            if name.is_empty() { Place::File } else { Place::Variable(name.clone()) },
-            format!("a real matrix was expected, this is {note}"),
-            "name another one",
-        );
-        let variable = Variable { name, rows: 0, columns: 0, note: Some(note) };
-        Self { variable, read: Box::new(move || Err(error.clone())) }
-    }
-}
-
-/// What a file holds under one name.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Variable {
-    /// Its name; empty in formats that hold one matrix without a name.
-    pub name: String,
-    /// Number of rows.
-    pub rows: usize,
-    /// Number of columns.
-    pub columns: usize,
-    /// What it is, if it is no real matrix.
-    pub note: Option<String>,
-}
-
-impl fmt::Display for Variable {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, rows, columns, note } = self;
-        match note {
-            Some(note) => write!(f, "{name} ({note})"),
-            None if name.is_empty() => write!(f, "{rows} x {columns}"),
-            None => write!(f, "{name} ({rows} x {columns})"),
-        }
-    }
-}
 
 /// Reads one matrix.
 ///
@@ -197,14 +134,6 @@ pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     std::fs::write(path, bytes).map_err(|error| io(path, &error))
 }
 
-fn load(path: &Path) -> Result<Vec<u8>, Error> {
-    std::fs::read(path).map_err(|error| io(path, &error))
-}
-
-fn io(path: &Path, error: &std::io::Error) -> Error {
-    Error::new(Kind::Io, Place::File, error.to_string(), "check the path and its permissions").of(path)
-}
-
 /// The format of that name, or the one that the content is of.
 fn find(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
     let names = || TABLE.iter().map(|format| format.name).collect::<Vec<_>>().join(", ");
@@ -232,7 +161,8 @@ fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> R
         [] => "nothing".to_string(),
         items => items.iter().map(|item| item.variable.to_string()).collect::<Vec<_>>().join(", "),
     };
-    let matrices: Vec<_> = items.iter().filter(|item| item.variable.note.is_none()).collect();
+    let filled = |variable: &Variable| variable.note.is_none() && variable.rows.min(variable.columns) > 0;
+    let matrices: Vec<_> = items.iter().filter(|item| filled(&item.variable)).collect();
     match (name, matrices.as_slice()) {
         (Some(name), _) => match items.iter().find(|item| item.variable.name == name && !name.is_empty()) {
             Some(item) => Ok(item),

@@ -8,10 +8,9 @@ use std::borrow::Cow;
 
 use crate::bytes::{Bytes, Number, Order};
 use crate::error::{Error, Kind, Place};
+use crate::format::{COMPLEX, Format, Item};
 use crate::inflate::{Limit, Wrapping, beginning, inflate};
-use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::npz::compressed;
-use crate::{COMPLEX, Format, Item};
+use crate::matrix::{Along, Matrix, Symmetry, Triplets, compressed, dense};
 
 pub(crate) const FORMAT: Format = Format {
     name: "matlab",
@@ -285,17 +284,13 @@ fn matrix(bytes: &[u8], order: Order) -> Result<Matrix, Error> {
     }
     let Element { kind, data, .. } = element(&mut parts)?;
     let number = number(kind).ok_or_else(|| parts.malformed("numbers", format!("an element of type {kind}")))?;
-    let mut data = Bytes::new(data, order);
+    let data = Bytes::new(data, order);
     let there = data.left() / number.size();
     if rows.checked_mul(columns) != Some(there) {
         let problem = format!("{rows} x {columns} numbers were expected, {there} are there");
         return Err(Error::new(Kind::Count, Place::File, problem, "save or copy the file again"));
     }
-    let mut triplets = Triplets::new(rows, columns, 0, Place::File)?;
-    for at in 0..there {
-        triplets.push(at % rows, at / rows, number.real(&mut data)?, Place::File)?;
-    }
-    triplets.finish(Symmetry::General)
+    dense((rows, columns), Along::Columns, &Place::File, |at| number.real(&mut data.ahead(at * number.size())))
 }
 
 #[cfg(test)]

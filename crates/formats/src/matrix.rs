@@ -32,7 +32,7 @@ pub enum Symmetry {
 /// Where a matrix came from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
-    /// Name of the format, of [`TABLE`](crate::TABLE).
+    /// Name of the format, of the list of formats.
     pub format: &'static str,
     /// Name of the matrix in its file; empty where the format has none.
     pub variable: String,
@@ -472,6 +472,63 @@ impl Triplets {
         }
         Ok(())
     }
+}
+
+/// How the numbers of a full matrix follow each other.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Along {
+    Rows,
+    Columns,
+}
+
+/// A full matrix whose numbers, as many as its size says, `value` gives by their place in the file.
+pub(crate) fn dense(
+    (rows, columns): (usize, usize),
+    along: Along,
+    place: &Place,
+    value: impl Fn(usize) -> Result<f64, Error>,
+) -> Result<Matrix, Error> {
+    let count = rows.saturating_mul(columns);
+    // Memory for what is not zero: full matrices of structures are mostly zeros.
+    let filled = (0..count).map(&value).filter(|value| value.as_ref().is_ok_and(|&value| value != 0.0)).count();
+    let mut triplets = Triplets::new(rows, columns, filled, place.clone())?;
+    // In the order of a matrix, so that nothing is left to sort.
+    for column in 0..columns {
+        for row in 0..rows {
+            let at = match along {
+                Along::Rows => row * columns + column,
+                Along::Columns => column * rows + row,
+            };
+            triplets.push(row, column, value(at)?, place.clone())?;
+        }
+    }
+    triplets.finish(Symmetry::General)
+}
+
+/// The entries of a matrix stored by columns (or rows): `pointers` say where each one begins.
+pub(crate) fn compressed(
+    pointers: &[usize],
+    inner: &[usize],
+    values: &[f64],
+    outer: usize,
+    mut push: impl FnMut(usize, usize, f64) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let fault = |problem| Err(Error::new(Kind::Count, Place::File, problem, "the file is damaged: export it again"));
+    if Some(pointers.len()) != outer.checked_add(1) {
+        return fault(format!("{} pointers for {outer} columns or rows, one more was expected", pointers.len()));
+    }
+    let stored = inner.len().min(values.len());
+    let sorted = pointers.first() == Some(&0) && pointers.is_sorted();
+    match pointers.last() {
+        Some(&last) if sorted && last <= stored => {}
+        last => return fault(format!("pointers up to {last:?} for {stored} entries, ascending ones were expected")),
+    }
+    for (outer, pair) in pointers.windows(2).enumerate() {
+        for at in pair[0]..pair[1] {
+            push(outer, inner[at], values[at])?;
+        }
+    }
+    Ok(())
 }
 
 /// Sorts entries and sums those of one place, in the order of the file.

@@ -10,9 +10,9 @@
 //! Symmetric and skew-symmetric matrices store their lower triangle.
 
 use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::text::{Line, Lines, shown, truncated};
-use crate::{Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "matrix-market",

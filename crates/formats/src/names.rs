@@ -15,8 +15,9 @@
 use std::path::Path;
 
 use crate::error::{Error, Kind, Place};
+use crate::file::{io, load};
+use crate::matrix::Matrix;
 use crate::text::{Line, Lines, integer, shown};
-use crate::{Matrix, io, load};
 
 /// A format of files that name rows.
 pub struct NameFormat {

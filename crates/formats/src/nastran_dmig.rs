@@ -14,10 +14,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::error::{Error, Kind, Place};
+use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::names::direction;
 use crate::text::{Line, Lines};
-use crate::{COMPLEX, Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "nastran-dmig",
@@ -27,9 +27,8 @@ pub(crate) const FORMAT: Format = Format {
 };
 
 fn is_dmig(line: &Line) -> bool {
-    let name: Vec<u8> = line.text.iter().take(8).map(u8::to_ascii_uppercase).collect();
-    let rest = name.strip_prefix(b"DMIG");
-    rest.is_some_and(|rest| matches!(rest.first(), None | Some(b' ' | b'*' | b',' | b'\t')))
+    let named = line.text.get(..4).is_some_and(|name| name.eq_ignore_ascii_case(b"DMIG"));
+    named && matches!(line.text.get(4), None | Some(b' ' | b'*' | b',' | b'\t'))
 }
 
 /// The fields of one line of bulk data behind its first one: 4 of 16 characters, 8 of 8, or those between commas.

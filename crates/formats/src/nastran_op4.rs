@@ -7,9 +7,9 @@
 
 use crate::bytes::{Bytes, Order};
 use crate::error::{Error, Kind, Place};
+use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::text::{Line, Lines, integer, shown};
-use crate::{COMPLEX, Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "nastran-op4",
@@ -337,6 +337,20 @@ mod tests {
         // 327681 = 1 + 65536 (4 + 1): from row 1, 4 words; 196611 = 3 + 65536 (2 + 1).
         let m = read_bytes(both.as_bytes(), None, Some("M"))?;
         assert_eq!((m.get(0, 0), m.get(1, 0), m.get(2, 0), m.get(1, 1)), (1.5, 2.5, 3.5, 4.5));
+        Ok(())
+    }
+
+    #[test]
+    fn single_precision_and_a_matrix_without_entries() -> Result<(), Error> {
+        // As MSC Nastran writes them: a number of single precision has one word; a null matrix only the column that ends it.
+        let text = "       3      -3       6       2NULL    1P,3E22.15\n       4       1       1\n 1.000000000000000E+00\n       \
+            2      -9       2       1STRINGS 1P,3E22.15\n       1       0      10\n       4       3\n \
+            1.000000000000000E+00 2.000000000000000E+00 3.000000000000000E+00\n       4       7\n \
+            4.000000000000000E+00 5.000000000000000E+00 6.000000000000000E+00\n       3       1       1\n 1.000000000000000E+00\n";
+        let null = read_bytes(text.as_bytes(), None, Some("NULL"))?;
+        assert_eq!((null.rows(), null.entries().len()), (3, 0));
+        let strings = read_bytes(text.as_bytes(), None, Some("STRINGS"))?;
+        assert_eq!((strings.get(2, 0), strings.get(8, 0), strings.entries().len()), (1.0, 6.0, 6));
         Ok(())
     }
 

@@ -7,9 +7,9 @@
 
 use crate::bytes::{Bytes, Number, Order};
 use crate::error::{Error, Kind, Place};
-use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::format::{COMPLEX, Format, Item};
+use crate::matrix::{Along, Matrix, dense};
 use crate::text::shown;
-use crate::{COMPLEX, Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "npy",
@@ -128,24 +128,20 @@ impl<'a> Array<'a> {
         }
     }
 
-    pub fn matrix(mut self) -> Result<Matrix, Error> {
+    pub fn matrix(self) -> Result<Matrix, Error> {
         let size = self.size().map_err(|note| {
             let kind = if self.element == Element::Complex { Kind::Complex } else { Kind::Unsupported };
             let remedy = "save a real array of two dimensions";
             Error::new(kind, Place::File, format!("a real matrix was expected, this is {note}"), remedy)
         });
-        let (rows, columns) = size?;
+        let size = size?;
         let Element::Number(number) = self.element else {
             return Err(self.data.malformed("an array of numbers", format!("{:?}", self.element)));
         };
-        let count = self.count(number)?;
-        let mut triplets = Triplets::new(rows, columns, 0, Place::File)?;
-        for at in 0..count {
-            let (row, column) = if self.fortran { (at % rows, at / rows) } else { (at / columns, at % columns) };
-            let place = self.data.place();
-            triplets.push(row, column, number.real(&mut self.data)?, place)?;
-        }
-        triplets.finish(Symmetry::General)
+        // Every number is there, so that no place is beyond the end.
+        self.count(number)?;
+        let along = if self.fortran { Along::Columns } else { Along::Rows };
+        dense(size, along, &self.data.place(), |at| number.real(&mut self.data.ahead(at * number.size())))
     }
 }
 

@@ -6,11 +6,11 @@ use std::borrow::Cow;
 
 use crate::bytes::{Bytes, Number, Order};
 use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
 use crate::inflate::{Limit, Wrapping, beginning, inflate};
-use crate::matrix::{Entry, Matrix, Symmetry, Triplets};
+use crate::matrix::{Entry, Matrix, Symmetry, Triplets, compressed};
 use crate::npy::{self, Array};
 use crate::text::shown;
-use crate::{Format, Item};
 
 pub(crate) const FORMAT: Format = Format {
     name: "npz",
@@ -117,32 +117,6 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
         }
     }
     triplets.finish(Symmetry::General)
-}
-
-/// The entries of a matrix stored by columns (or rows): `pointers` say where each one begins.
-pub(crate) fn compressed(
-    pointers: &[usize],
-    inner: &[usize],
-    values: &[f64],
-    outer: usize,
-    mut push: impl FnMut(usize, usize, f64) -> Result<(), Error>,
-) -> Result<(), Error> {
-    let fault = |problem| Err(Error::new(Kind::Count, Place::File, problem, "the file is damaged: export it again"));
-    if Some(pointers.len()) != outer.checked_add(1) {
-        return fault(format!("{} pointers for {outer} columns or rows, one more was expected", pointers.len()));
-    }
-    let stored = inner.len().min(values.len());
-    let sorted = pointers.first() == Some(&0) && pointers.is_sorted();
-    match pointers.last() {
-        Some(&last) if sorted && last <= stored => {}
-        last => return fault(format!("pointers up to {last:?} for {stored} entries, ascending ones were expected")),
-    }
-    for (outer, pair) in pointers.windows(2).enumerate() {
-        for at in pair[0]..pair[1] {
-            push(outer, inner[at], values[at])?;
-        }
-    }
-    Ok(())
 }
 
 /// A file in a zip.

@@ -51,6 +51,15 @@ fn every_file_is_found_and_every_format_has_a_file() {
 }
 
 #[test]
+fn every_format_stands_in_the_book() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/matrices.md");
+    let page = std::fs::read_to_string(page).expect("the page of the book");
+    for format in TABLE {
+        assert!(page.contains(&format!("`{}`", format.name)), "docs/src/matrices.md does not list {}", format.name);
+    }
+}
+
+#[test]
 fn a_file_cut_anywhere_is_refused_or_read_without_panic() {
     for (name, bytes) in files() {
         let (format, _) = read_all(&bytes, None).unwrap_or_else(|error| panic!("{name}: {error}"));

@@ -109,6 +109,20 @@ fn matlab_73_and_plain_hdf5() {
 }
 
 #[test]
+fn matlab_files_of_octave() {
+    for file in ["octave_v6.mat", "octave_v7.mat"] {
+        check(file, Some("K"), "matlab", "stiffness");
+        check(file, Some("M"), "matlab", "mass");
+        check(file, Some("G"), "matlab", "general");
+        check(file, Some("whole"), "matlab", "whole");
+        check(file, Some("model.inner.M"), "matlab", "mass");
+    }
+    let kind = |name| read(data("octave.h5"), None, Some(name)).map(|_| ()).map_err(|error| error.kind);
+    assert_eq!(kind("G"), Err(Kind::Unsupported));
+    check("octave.h5", Some("plain"), "hdf5", "stiffness");
+}
+
+#[test]
 fn calculix_matrices_and_names() {
     let stiffness = check("bricks.sti", None, "coordinate", "bricks.sti");
     let mass = check("bricks.mas", None, "coordinate", "bricks.mas");

@@ -37,8 +37,9 @@ pub struct Reference<'a> {
     pub lost: usize,
 }
 
-/// Velocity over which a law that has only a resolvent is made smooth, relative to that of the motion.
-const NARROW: f64 = 1e-3;
+/// Velocity over which a law that has only a resolvent is made smooth, relative to that of the motion, times the steps of a period: what they can
+/// resolve.
+const NARROW: f64 = 0.5;
 
 /// A displacement of the size that the loads cause, m.
 fn travel(system: &System, omega: f64) -> f64 {
@@ -65,7 +66,7 @@ impl<'a> Reference<'a> {
             let mut law = joint.law().clone();
             if law.step().is_none() && law.rate().is_none() && law.pieces().is_none() {
                 // set-valued, and no sum of sliders: its smooth neighbour, steeper than anything that the motion shows
-                law = law.regularised(NARROW * omega * travel(system, omega)).unwrap_or(law);
+                law = law.regularised(NARROW / steps as f64 * omega * travel(system, omega)).unwrap_or(law);
             }
             let pieces = if law.step().is_none() && law.rate().is_none() { law.pieces() } else { None };
             let states = law.step().map(|s| s.states()).or(law.rate().map(|r| r.states()));

@@ -1,7 +1,7 @@
 """Writes the files of this folder: the same matrices by as many programs as there are, and what must be read from each, bit by bit.
 
-    python3 -m venv /tmp/venv && /tmp/venv/bin/pip install numpy==2.4.6 scipy==1.17.1 h5py==3.16.0 pyyeti==1.4.10
-    apt-get install calculix-ccx          # 2.20
+    python3 -m venv /tmp/venv && /tmp/venv/bin/pip install numpy==2.4.6 scipy==1.17.1 h5py==3.16.0 pyyeti==1.4.7
+    apt-get install calculix-ccx octave   # 2.20, 7.3.0
     /tmp/venv/bin/python make.py
 
 Nothing but these programs writes a file here, except those of Abaqus, ANSYS and Nastran DMIG, which follow their documentation.
@@ -113,6 +113,17 @@ def matlab_73():
     with h5py.File(HERE / "plain.h5", "w", libver=("v110", "v110")) as file:
         file["K"] = STIFFNESS
         file.create_dataset("sub/G", data=GENERAL, chunks=(2, 3), compression="gzip", shuffle=True)
+
+
+def octave():
+    """Octave 7.3 loads what SciPy wrote and saves it again; it stores doubles that are whole numbers in smaller types."""
+    code = "load('v5.mat'); whole = double(bytes); {}"
+    save = "save('-v7', 'octave_v7.mat', 'K', 'M', 'G', 'whole', 'model'); save('-v6', 'octave_v6.mat', 'K', 'M', 'G', 'whole', 'model');"
+    # Octave stores HDF5 in a form of its own, transposed and without saying so, which is refused.
+    save += "save('-hdf5', 'octave.h5', 'G', 'whole'); W = K; save('-hdf5', '-append', 'octave.h5', 'W');"
+    subprocess.run(["octave-cli", "--no-gui", "--eval", code.format(save)], cwd=HERE, capture_output=True, check=False)
+    with h5py.File(HERE / "octave.h5", "a") as file:
+        file["plain"] = STIFFNESS
 
 
 def nastran():
@@ -269,6 +280,7 @@ def main():
     expect("whole", WHOLE)
     numpy_and_scipy()
     matlab_73()
+    octave()
     nastran()
     calculix()
     by_the_letter()

@@ -2,7 +2,7 @@
 //!
 //! No row of the table: it stands for other laws in the linear references, see [`super::Law::closed`].
 
-use super::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Rate, RateLaw, Relative, SharedLaw};
+use super::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Piece, Range, Rate, RateLaw, Relative, STUCK, SharedLaw};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
@@ -53,6 +53,14 @@ impl Law for Springs {
     fn scale(&self) -> f64 {
         if self.stiffness.iter().all(|k| *k == 0.0) { 0.0 } else { f64::INFINITY }
     }
+    /// Along one direction exact methods take it: as a slider that nothing moves, or as nothing.
+    fn pieces(&self) -> Option<Vec<Piece>> {
+        match (self.directions, self.stiffness[0]) {
+            (1, 0.0) => Some(Vec::new()),
+            (1, stiffness) => Some(vec![Piece::slider(Some(stiffness), STUCK)]),
+            _ => None,
+        }
+    }
     fn rate(&self) -> Option<&dyn Rate> {
         Some(self)
     }
@@ -85,5 +93,6 @@ mod tests {
         assert!(stuck.check().is_ok() && *(INFO.build)(&stuck.values()) == *stuck);
         let gap: &dyn Law = &Gap { gap: 1e-3, stiffness: 7.0 };
         assert_eq!((gap.stuck().unwrap().values()[0], gap.free().unwrap().is_free()), (7.0, true));
+        assert!(gap.free().unwrap().sliders().is_some_and(|sliders| sliders.is_empty()));
     }
 }

@@ -129,9 +129,9 @@ mod tests {
     #[test]
     fn a_state_beyond_slip_comes_back() {
         let law = Valanis { stiffness: 10.0, slip_stiffness: 2.0, lambda: 3.0, kappa: 0.98 };
-        for y in [1.0, 1.0 / 0.98, 1.1, 2.0] {
+        for y in [1.0, 1.0 / 0.98, 1.1, 2.0_f64] {
             for sign in [1.0, -1.0] {
-                let mut rate = [0.0f64];
+                let mut rate = [0.0_f64];
                 law.evaluate(&Relative::along(0.0, sign), &[sign * y], &mut rate);
                 assert!(rate[0] * sign < 0.0 && rate[0].is_finite(), "{y} {sign}: {}", rate[0]);
             }

@@ -12,10 +12,11 @@ use super::periodic::{Aim, Closed, ReturnMap, close};
 use crate::model::System;
 use crate::orbit::{Breakdown, Orbit, Symmetry};
 use nalgebra::{DMatrix, DVector};
+use stickslip_numerics::eigen;
 
-/// Rounds of the iteration on the places where springs are relaxed; without gaps one or two are enough, with them ten.
+/// Rounds of the iteration on the places where springs are relaxed; without gaps one or two are enough, with them a few more.
 const ROUNDS: usize = 40;
-/// Force by which a spring may miss its place, in slip limits: well below what orbits of equal steps are closed to.
+/// Force by which a spring may miss its place, in slip limits: a hundred times what orbits of equal steps are closed to.
 const RELAXED: f64 = 1e-8;
 /// Rounds that are looked back at to extrapolate: more than there are gaps that open and close is of no use.
 const LOOK_BACK: usize = 4;
@@ -206,9 +207,9 @@ impl Rounds {
             let column = |list: &[DVector<f64>], now: &DVector<f64>, k: usize| now - &list[count - 1 - k];
             let gaps = DMatrix::from_columns(&(0..back).map(|k| column(&self.gaps, &gap, k)).collect::<Vec<_>>());
             let moved = DMatrix::from_columns(&(0..back).map(|k| column(&self.places, &place, k)).collect::<Vec<_>>());
-            let svd = gaps.clone().svd(true, true);
-            let least = SAME * svd.singular_values.amax();
-            if let Ok(share) = svd.solve(&gap, least) {
+            let share =
+                eigen::singular(gaps.clone()).and_then(|svd| svd.solve(&gap, SAME * svd.singular_values.amax()).ok());
+            if let Some(share) = share {
                 next -= (moved + gaps) * share;
             }
         }

@@ -1,8 +1,9 @@
 //! Brute force: the motion is followed until its transient has died.
 //!
-//! Exact laws are followed by events, smooth ones by stiff integration, others and mixtures in equal steps. What is still missing when the search stops is estimated from the
-//! measured decay and reported as the orbit's truncation: a lightly damped structure needs hundreds of periods per digit, and a smooth law
-//! creeps for seconds. It needs no derivative and no luck, so it is an independent check of the other methods.
+//! Exact laws are followed by events, smooth ones by stiff integration, others and mixtures in equal steps. What is still missing when the search
+//! stops is estimated from the measured decay, and from the derivative of a return where the decay was measured over few, and reported as the
+//! orbit's truncation: a lightly damped structure needs hundreds of periods per digit, and a smooth law creeps for seconds. Which orbit that is,
+//! nothing but time tells, so it is an independent check of the other methods; in equal steps Newton's method then finds it again in finer ones.
 
 use super::event_driven::Exact;
 use super::followed::Kind;

@@ -4,7 +4,7 @@ use super::assembly::Assembly;
 use super::drive::Drive;
 use crate::law::{Contact, Relative};
 use crate::model::System;
-use crate::orbit::measure::{Signals, extremes};
+use crate::orbit::measure::{Signals, Slip, extremes};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
 use num_complex::Complex64;
 use std::convert::Infallible;
@@ -302,7 +302,7 @@ impl Signals for SteppedPath {
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(|step| self.relative_ends(step, axis)))
     }
-    fn slip(&self, joint: usize) -> (f64, usize) {
+    fn slip(&self, joint: usize) -> Slip {
         // both sums run in one order, so that a joint that always slips has a share of exactly one
         let time = |counts: &dyn Fn(&Node) -> bool| -> f64 {
             let nodes = self.steps.values.iter().enumerate();
@@ -318,6 +318,6 @@ impl Signals for SteppedPath {
             let before = if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last };
             switches += usize::from(before != at_end(0));
         }
-        (share, switches)
+        Slip { share, switches, rests: self.steps.values.iter().all(|node| node.contact[joint] == Contact::Stick) }
     }
 }

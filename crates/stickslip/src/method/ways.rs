@@ -27,8 +27,8 @@ pub struct Ways {
     pub methods: Vec<&'static str>,
     /// Those that take it only with a `width`, which smooths its laws.
     pub with_width: Vec<&'static str>,
-    /// What every method misses, where none takes it.
-    pub missing: Vec<String>,
+    /// What every method misses, where none takes it: methods, and what all of them say.
+    pub missing: Vec<(Vec<&'static str>, String)>,
 }
 
 /// A velocity, m/s, over which friction is smoothed to see whether it can be: laws have smooth neighbours of every width or of none.
@@ -51,7 +51,14 @@ impl Ways {
             match (refusal(row, &plain, system), refusal(row, last, system)) {
                 (None, _) => ways.methods.push(row.name),
                 (Some(_), None) => ways.with_width.push(row.name),
-                (Some(_), Some(refusal)) => ways.missing.push(refusal),
+                (Some(_), Some(refusal)) => {
+                    let said =
+                        refusal.strip_prefix(row.name).map(|rest| rest.trim_start().to_owned()).unwrap_or(refusal);
+                    match ways.missing.iter_mut().find(|(_, known)| *known == said) {
+                        Some((methods, _)) => methods.push(row.name),
+                        None => ways.missing.push((vec![row.name], said)),
+                    }
+                }
             }
         }
         if ways.any() {
@@ -90,7 +97,10 @@ impl fmt::Display for Ways {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let width = "with a `width` (m/s) over which friction changes its sign";
         match (&self.methods[..], &self.with_width[..]) {
-            ([], []) => write!(f, "no method takes it: {}", self.missing.join("; ")),
+            ([], []) => {
+                let one = |(methods, said): &(Vec<&str>, String)| format!("{} {said}", methods.join(" and "));
+                write!(f, "no method takes it: {}", self.missing.iter().map(one).collect::<Vec<_>>().join("; "))
+            }
             (methods, []) => write!(f, "use method {}", one_of(methods)),
             ([], smoothing) => write!(f, "use method {} {width}", one_of(smoothing)),
             (methods, smoothing) => write!(f, "use method {}, or {} {width}", one_of(methods), one_of(smoothing)),

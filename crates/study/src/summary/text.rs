@@ -2,6 +2,7 @@
 
 use super::{JointSummary, ModelSummary};
 use crate::words::{about, bytes_text, plural, quantity, significant};
+use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::fmt;
 use stickslip::model::{LinearMode, Modes};
@@ -103,7 +104,9 @@ impl ModelSummary {
 
 impl fmt::Display for ModelSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let joints = self.joints.len();
+        // of nodes each direction has a line of its own
+        let names: BTreeSet<&str> = self.joints.iter().filter_map(|joint| joint.name.split('.').next()).collect();
+        let joints = names.len();
         let dofs =
             if self.dofs == 1 { "1 degree of freedom".to_owned() } else { format!("{} degrees of freedom", self.dofs) };
         let shown = if self.case.is_empty() { String::new() } else { format!(", shown for {}", self.case) };
@@ -117,14 +120,15 @@ impl fmt::Display for ModelSummary {
         }
         // those that the excitation loads most come first where there are many
         let mut order: Vec<&JointSummary> = self.joints.iter().collect();
-        if joints > LISTED {
+        let lines = self.joints.len();
+        if lines > LISTED {
             let load = |joint: &JointSummary| joint.onset.as_ref().map_or(0.0, |onset| onset.largest);
             order.sort_by(|a, b| load(b).total_cmp(&load(a)));
         }
         for joint in order.iter().take(LISTED) {
             line(&joint.name, &self.joint(joint))?;
         }
-        if let Some(more @ 1..) = joints.checked_sub(LISTED) {
+        if let Some(more @ 1..) = lines.checked_sub(LISTED) {
             line("", &format!("and {more} more joint{}", plural(more)))?;
         }
         let Self { size, cases, .. } = self;

@@ -7,7 +7,7 @@ use crate::law::Contact;
 use crate::method::Breakdown;
 use crate::method::periodic::Closed;
 use crate::model::{Axis, System};
-use crate::orbit::measure::{NO_WORK, Signals, measure};
+use crate::orbit::measure::{NO_WORK, Signals, Slip, measure};
 use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -16,8 +16,8 @@ use stickslip_numerics::signal::{Basis, Begin, FirstZero, FourierIntegrals, Prod
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Work below this fraction of the stored energy is no yardstick for the energy gap: an orbit that is closed to `CLOSED` of its state may have gained or lost that
-/// much, and the gap that this makes must stay below what is allowed.
+/// Work below this fraction of the stored energy is no yardstick for the energy gap: an orbit that is closed to `CLOSED` of its state may have
+/// gained or lost that much, and the gap that this makes must stay below what is allowed.
 const STORED: f64 = super::CLOSED / super::ENERGY_GAP;
 
 /// The closed-form segments of one return, with all that is needed to evaluate them.
@@ -314,10 +314,23 @@ impl Signals for Measuring<'_> {
         let signal = self.relative(axis);
         self.range_of(&signal, &self.derivative(&signal))
     }
-    fn slip(&self, joint: usize) -> (f64, usize) {
+    /// The sliders' alone: springs and stops give back what they take, to the last digit.
+    fn dissipation(&self, axis: usize, _force: &Vec<Complex64>) -> f64 {
+        let u = self.relative(axis);
+        let mut sum = 0.0;
+        for (piece, range) in self.pieces() {
+            let u = &u[range];
+            let travel = real_dot(u, &piece.at_end) - piece.basis().beginning(u);
+            for part in self.path.of_joint(axis) {
+                sum += piece.segment.contacts[part].sign() * self.path.parts[part].limit() * travel;
+            }
+        }
+        sum
+    }
+    fn slip(&self, joint: usize) -> Slip {
         let path = self.path;
         if path.of_joint(joint).next().is_none() {
-            return (1.0, 0); // a joint that holds nothing slips all the time
+            return Slip { share: 1.0, switches: 0, rests: false }; // a joint that holds nothing slips all the time
         }
         // both sums run in one order, so that a joint that always slips has a share of exactly one
         let time = |counts: &dyn Fn(&Segment) -> bool| -> f64 {
@@ -331,7 +344,8 @@ impl Signals for Measuring<'_> {
             let (first, last) = (&first.segment.contacts, &last.segment.contacts);
             switches += path.of_joint(joint).filter(|&s| path.next_of(last[s]) != first[s]).count();
         }
-        (time(&slips) / time(&|_| true), switches)
+        let rests = !path.pieces.iter().any(|piece| slips(&piece.segment));
+        Slip { share: time(&slips) / time(&|_| true), switches, rests }
     }
 }
 

@@ -590,7 +590,9 @@ impl Balance<'_> {
             if (self.ports.has_forces() || self.ports.has_steep()) && top > self.first {
                 error = error.max(CHANCE * estimate);
             }
-            if error <= tolerance {
+            // where friction falls with velocity chance is frequent: the first distance has none before it that would show it
+            let shown = top > self.first || !self.ports.has_falling();
+            if error <= tolerance && shown {
                 return self.finish(top, omega, motion, x, Some(error));
             }
             (checked, estimate) = (top, error);

@@ -122,6 +122,17 @@ impl Port {
         }
     }
 
+    /// The law, if the velocity alone decides its bounded force, which is sampled.
+    fn steep(&self) -> Option<&SharedLaw> {
+        match &self.kernel {
+            Kernel::Prox(law) => Some(law),
+            Kernel::Rate(law) if law.rate().is_some_and(|rate| rate.states() == 0) => {
+                self.scale.is_finite().then_some(law)
+            }
+            _ => None,
+        }
+    }
+
     fn prox(&self) -> Option<&dyn Prox> {
         match &self.kernel {
             Kernel::Rigid(rigid) => Some(rigid),
@@ -244,11 +255,12 @@ impl Ports {
 
     /// Whether the velocity alone decides a bounded force that is sampled: friction that is steep, falls with velocity, or turns in a plane.
     pub fn has_steep(&self) -> bool {
-        self.list.iter().any(|port| match &port.kernel {
-            Kernel::Prox(_) => true,
-            Kernel::Rate(law) => port.scale.is_finite() && law.rate().is_some_and(|rate| rate.states() == 0),
-            _ => false,
-        })
+        self.list.iter().any(|port| port.steep().is_some())
+    }
+
+    /// Whether such a force falls with velocity.
+    pub fn has_falling(&self) -> bool {
+        self.list.iter().filter_map(Port::steep).any(|law| !law.is_incrementally_passive())
     }
 }
 
