@@ -6,7 +6,7 @@ use crate::error::{Place, Problem};
 use crate::expression::is_reserved;
 use crate::near::shown;
 use crate::repeat::{Index, Repetition};
-use crate::schema::{FILE, Key, MOST_ELEMENTS, Takes};
+use crate::schema::{FILE, Key, MOST_ELEMENTS, MOST_MASSES, Takes};
 use crate::statement::StatedTable;
 use crate::study::Lists;
 use stickslip::model::is_identifier;
@@ -31,6 +31,7 @@ impl Reader {
                     self.wrong_type(key, node);
                 }
                 (Takes::List(keys), Content::List(list)) => {
+                    let most = if name == "mass" { MOST_MASSES } else { MOST_ELEMENTS };
                     let mut elements = 0;
                     for (i, node) in list.iter().enumerate() {
                         match &node.value {
@@ -38,8 +39,8 @@ impl Reader {
                                 let owner = format!("{name} {}", i + 1);
                                 let Some(repetition) = self.repetition(table, &owner) else { continue };
                                 elements = repetition.count().saturating_add(elements);
-                                if elements > MOST_ELEMENTS {
-                                    let message = format!("{elements} elements; the limit is {MOST_ELEMENTS}");
+                                if elements > most {
+                                    let message = format!("{elements} elements; the limit is {most}");
                                     self.problems.push(Problem::new(&node.place, name, message));
                                     break;
                                 }
