@@ -1,5 +1,7 @@
 //! The linear part of a system: the only owner of mass, damping and stiffness.
 
+pub mod reduction;
+
 use nalgebra::DMatrix;
 use stickslip_numerics::eigen;
 
