@@ -268,7 +268,7 @@ fn print_json(dataset: &Dataset) -> Ending {
 /// Points that failed or are not what was asked for, on standard error.
 fn complain(dataset: &Dataset) {
     for failure in dataset.failures.iter().take(NAMED_FAILURES) {
-        complain!("{}: failed at {}: {}", dataset.name, failure.at, failure.reason);
+        complain!("{}: {failure}", dataset.name);
     }
     for status in [Accuracy::Truncated, Accuracy::Unchecked].map(Accuracy::status) {
         if let Some(points) = dataset.record.points.get(status) {

@@ -2,6 +2,7 @@
 //!
 //! Source: Higham, "Accuracy and Stability of Numerical Algorithms" (2002), Sec. 10.3.
 
+use crate::sparse::{Analysis, Matrix};
 use nalgebra::DMatrix;
 
 /// Rounding of a row per entry, relative to its diagonal: sums of springs cancel to this, and so does the elimination.
@@ -61,6 +62,43 @@ pub fn semidefinite(matrix: &DMatrix<f64>) -> Option<usize> {
     left.iter().all(|&i| left.iter().all(|&k| rest[(i, k)].abs() <= zero)).then_some(rank)
 }
 
+/// Whether a sparse symmetric matrix is positive definite, or if not, at least semidefinite; `None` if it is neither, or not symmetric. The
+/// signs of the pivots tell, with the diagonal moved by rounding to either side.
+///
+/// # Example
+/// ```
+/// use stickslip_numerics::{definite::sparse_definite, sparse::Matrix};
+/// let spring = |ground: f64| Matrix::from_triplets(2, [(0, 0, 2.0 + ground), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]);
+/// let definite = [1.0, 0.0, -1.0].map(|ground| sparse_definite(&spring(ground).unwrap()));
+/// assert_eq!(definite, [Some(true), Some(false), None]);
+/// ```
+pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
+    let n = matrix.n();
+    // above what a factor takes for rounding of a pivot
+    let rounding = ROUNDING * n.max(16) as f64;
+    let diagonal: Vec<f64> = (0..n).map(|i| matrix.get(i, i)).collect();
+    let beside_zero = |(i, k, _): (usize, usize, f64)| i != k && (diagonal[i] == 0.0 || diagonal[k] == 0.0);
+    if diagonal.iter().any(|d| *d < 0.0) || matrix.entries().any(beside_zero) {
+        return None;
+    }
+    // rows of ones on the diagonal, so that a small negative entry counts beside large ones; rows of zeros have no part in the signs
+    let scale: Vec<f64> = diagonal.iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
+    let scaled = matrix.entries().map(|(i, k, value)| (i, k, value / scale[i] / scale[k]));
+    let empty = (0..n).filter(|i| diagonal[*i] == 0.0).map(|i| (i, i, 1.0));
+    let scaled = Matrix::from_triplets(n, scaled.chain(empty)).ok()?;
+    if scaled.asymmetry(rounding).is_some() {
+        return None;
+    }
+    let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).ok()?;
+    let analysis = Analysis::new(&[&scaled, &one]);
+    let positive =
+        |shift: f64| analysis.factor(&[(1.0, &scaled), (shift, &one)]).is_ok_and(|factor| factor.negative() == 0);
+    if diagonal.iter().all(|d| *d > 0.0) && positive(-rounding) {
+        return Some(true);
+    }
+    positive(rounding).then_some(false)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -87,6 +125,12 @@ mod tests {
             assert_eq!(semidefinite(&chain(n, 0.3, [0.0, 0.0])), Some(n - 1));
             assert_eq!(semidefinite(&chain(n, 0.3, [0.7, -0.7])), None);
             assert_eq!(semidefinite(&(chain(n, 0.3, [0.0, 0.0]) * -1.0)), None);
+            let sparse = |ends: [f64; 2]| {
+                let full = chain(n, 0.3, ends);
+                let all = (0..n * n).map(|at| (at / n, at % n, full[(at / n, at % n)]));
+                sparse_definite(&Matrix::from_triplets(n, all).unwrap())
+            };
+            assert_eq!([sparse([0.7, 0.0]), sparse([0.0, 0.0]), sparse([0.7, -0.7])], [Some(true), Some(false), None]);
         }
         // softer than rounding beside a stiff neighbour
         assert_eq!(semidefinite(&chain(2, 1e9, [1e-3, -2e-3])), None);

@@ -1,9 +1,14 @@
 //! Dense linear equations in memory that the caller owns.
 
-use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn};
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::lu::partial_pivoting::factor::{PartialPivLuParams, lu_in_place, lu_in_place_scratch};
+use faer::linalg::lu::partial_pivoting::solve::{
+    solve_in_place, solve_in_place_scratch, solve_transpose_in_place, solve_transpose_in_place_scratch,
+};
+use faer::perm::PermRef;
+use faer::{MatMut, MatRef, Par, Spec};
+use num_complex::Complex64;
 
-/// Columns that are eliminated together before the rest is updated by one product: the block and its rows then stay in the cache.
-const BLOCK: usize = 32;
 /// Size from which elimination in blocks is the faster one.
 const LARGE: usize = 96;
 
@@ -24,15 +29,10 @@ pub fn solve(matrix: &mut [f64], n: usize, right: &mut [f64]) -> bool {
 
 /// As [`solve`], with the sign of the determinant of A, ±1; `None` where it returns false.
 pub fn solve_signed(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
-    let mut exchanges = 0;
-    let block = if n < LARGE { n.max(1) } else { BLOCK };
-    for start in (0..n).step_by(block) {
-        let end = (start + block).min(n);
-        exchanges += panel(matrix, n, (start, end), right)?;
-        if end < n {
-            update(matrix, n, (start, end));
-        }
+    if n >= LARGE {
+        return in_blocks(&mut matrix[..n * n], n, &mut right[..n]);
     }
+    let exchanges = eliminate(matrix, n, right)?;
     for k in (0..n).rev() {
         let row = &matrix[k * n..(k + 1) * n];
         let sum: f64 = row[k + 1..].iter().zip(&right[k + 1..n]).map(|(a, x)| a * x).sum();
@@ -43,10 +43,10 @@ pub fn solve_signed(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f
     right[..n].iter().all(|x| x.is_finite()).then_some(sign)
 }
 
-/// Eliminates the columns `start..end`; below the diagonal they keep the factors. Rows are exchanged whole; returns how often.
-fn panel(matrix: &mut [f64], n: usize, (start, end): (usize, usize), right: &mut [f64]) -> Option<usize> {
+/// Eliminates all columns. Rows are exchanged whole; returns how often.
+fn eliminate(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<usize> {
     let mut exchanges = 0;
-    for k in start..end {
+    for k in 0..n {
         let mut pivot = k;
         for i in k + 1..n {
             if matrix[i * n + k].abs() > matrix[pivot * n + k].abs() {
@@ -64,13 +64,13 @@ fn panel(matrix: &mut [f64], n: usize, (start, end): (usize, usize), right: &mut
             right.swap(k, pivot);
         }
         let (top, bottom) = matrix.split_at_mut((k + 1) * n);
-        let pivot_row = &top[k * n + k..k * n + end];
+        let pivot_row = &top[k * n + k..];
         let inverse = 1.0 / largest;
-        for (i, row) in bottom.chunks_exact_mut(n).enumerate() {
+        for (i, row) in bottom.chunks_exact_mut(n).take(n - 1 - k).enumerate() {
             let factor = row[k] * inverse;
             row[k] = factor;
             if factor != 0.0 {
-                for (x, p) in row[k + 1..end].iter_mut().zip(&pivot_row[1..]) {
+                for (x, p) in row[k + 1..].iter_mut().zip(&pivot_row[1..]) {
                     *x -= factor * p;
                 }
                 right[k + 1 + i] -= factor * right[k];
@@ -80,32 +80,154 @@ fn panel(matrix: &mut [f64], n: usize, (start, end): (usize, usize), right: &mut
     Some(exchanges)
 }
 
-/// What the elimination of the columns `start..end` does to those after them.
-fn update(matrix: &mut [f64], n: usize, (start, end): (usize, usize)) {
-    let (width, rest) = (end - start, n - end);
-    let (top, bottom) = matrix.split_at_mut(end * n);
-    let top = &mut top[start * n..];
-    for k in 0..width {
-        let (done, open) = top.split_at_mut((k + 1) * n);
-        let row = &done[k * n + end..];
-        for below in open.chunks_exact_mut(n) {
-            let factor = below[start + k];
-            for (x, p) in below[end..].iter_mut().zip(row) {
-                *x -= factor * p;
+/// The same as [`solve_signed`] in blocks that stay in the cache. Row after row, the memory holds what is the transpose to who reads it
+/// column by column: that is factored, and the transposed equations solved.
+fn in_blocks(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
+    let params = Spec::<PartialPivLuParams, f64>::default();
+    let mut memory = MemBuffer::new(StackReq::any_of(&[
+        lu_in_place_scratch::<u32, f64>(n, n, Par::Seq, params),
+        solve_transpose_in_place_scratch::<u32, f64>(n, 1, Par::Seq),
+    ]));
+    let stack = MemStack::new(&mut memory);
+    let (mut order, mut inverse) = (vec![0u32; n], vec![0u32; n]);
+    let mut factors = MatMut::from_column_major_slice_mut(matrix, n, n);
+    let (info, exchanges) = lu_in_place(factors.as_mut(), &mut order, &mut inverse, Par::Seq, stack, params);
+    let mut negative = info.transposition_count;
+    for k in 0..n {
+        let pivot = factors[(k, k)];
+        if pivot == 0.0 || !pivot.is_finite() {
+            return None;
+        }
+        negative += usize::from(pivot < 0.0);
+    }
+    let right_column = MatMut::from_column_major_slice_mut(right, n, 1);
+    solve_transpose_in_place(factors.as_ref(), factors.as_ref(), exchanges, right_column, Par::Seq, stack);
+    let sign = if negative.is_multiple_of(2) { 1.0 } else { -1.0 };
+    right.iter().all(|x| x.is_finite()).then_some(sign)
+}
+
+/// Rows and columns of a product that are summed side by side, in registers.
+const TILE: usize = 4;
+
+/// `C = A B` of column-major matrices: A is `rows × inner`, B `inner × columns`. Every entry is summed in rising order of the inner index, without
+/// fused operations: the same bits on every processor, which `gemm` of nalgebra does not promise from some size upward.
+///
+/// # Example
+/// ```
+/// let mut c = [0.0; 2];
+/// stickslip_numerics::dense::multiply(&[1.0, 2.0, 3.0, 4.0], &[5.0, 6.0], &mut c, (2, 2, 1));
+/// assert_eq!(c, [23.0, 34.0]);
+/// ```
+pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (usize, usize, usize)) {
+    if rows == 0 || columns == 0 {
+        return;
+    }
+    let c = &mut c[..rows * columns];
+    if inner == 0 {
+        c.fill(0.0);
+        return;
+    }
+    let whole = rows - rows % TILE;
+    for (b, c) in b[..inner * columns].chunks(TILE * inner).zip(c.chunks_mut(TILE * rows)) {
+        let wide = c.len() == TILE * rows;
+        for row in (0..if wide { whole } else { 0 }).step_by(TILE) {
+            let mut sums = [[0.0; TILE]; TILE];
+            for (k, a) in a.chunks_exact(rows).enumerate().take(inner) {
+                let a: [f64; TILE] = std::array::from_fn(|r| a[row + r]);
+                for (j, sum) in sums.iter_mut().enumerate() {
+                    let factor = b[j * inner + k];
+                    sum.iter_mut().zip(a).for_each(|(sum, a)| *sum += a * factor);
+                }
+            }
+            sums.iter().enumerate().for_each(|(j, sum)| c[j * rows + row..j * rows + row + TILE].copy_from_slice(sum));
+        }
+        let from = if wide { whole } else { 0 };
+        for (b, c) in b.chunks_exact(inner).zip(c.chunks_exact_mut(rows)) {
+            let rest = &mut c[from..];
+            rest.fill(0.0);
+            for (a, factor) in a.chunks_exact(rows).zip(b) {
+                rest.iter_mut().zip(&a[from..]).for_each(|(sum, a)| *sum += a * factor);
             }
         }
     }
-    // memory is row-major, which to nalgebra is the transpose
-    let factors = DMatrix::from_fn(width, rest, |k, i| bottom[i * n + start + k]);
-    let rows = DMatrixView::from_slice_with_strides_generic(&top[end..], Dyn(rest), Dyn(width), nalgebra::U1, Dyn(n));
-    let mut open =
-        DMatrixViewMut::from_slice_with_strides_generic(&mut bottom[end..], Dyn(rest), Dyn(rest), nalgebra::U1, Dyn(n));
-    open.gemm(-1.0, &rows, &factors, 1.0);
+}
+
+/// `P A = L U` of a complex matrix, in blocks that stay in the cache, for many right sides.
+///
+/// # Example
+/// ```
+/// use num_complex::Complex64;
+/// use stickslip_numerics::dense::ComplexLu;
+/// let j = Complex64::I;
+/// // columns (0, j) and (2, 0)
+/// let factor = ComplexLu::new(vec![0.0 * j, j, 2.0 + 0.0 * j, 0.0 * j], 2).unwrap();
+/// let mut x = [Complex64::ONE, Complex64::ONE];
+/// factor.solve(&mut x);
+/// assert_eq!(x, [-j, 0.5 + 0.0 * j]);
+/// ```
+#[derive(Debug, Clone)]
+pub struct ComplexLu {
+    n: usize,
+    factors: Vec<Complex64>,
+    order: Vec<u32>,
+    inverse: Vec<u32>,
+}
+
+impl ComplexLu {
+    /// Of a matrix column after column, n × n.
+    ///
+    /// # Errors
+    /// The column in which no pivot is left.
+    pub fn new(mut matrix: Vec<Complex64>, n: usize) -> Result<Self, usize> {
+        let params = Spec::<PartialPivLuParams, Complex64>::default();
+        let mut memory = MemBuffer::new(lu_in_place_scratch::<u32, Complex64>(n, n, Par::Seq, params));
+        let (mut order, mut inverse) = (vec![0; n], vec![0; n]);
+        let mut factors = MatMut::from_column_major_slice_mut(&mut matrix, n, n);
+        lu_in_place(factors.as_mut(), &mut order, &mut inverse, Par::Seq, MemStack::new(&mut memory), params);
+        let weak = (0..n).find(|&k| factors[(k, k)] == Complex64::ZERO || !factors[(k, k)].is_finite());
+        weak.map_or(Ok(ComplexLu { n, factors: matrix, order, inverse }), Err)
+    }
+
+    /// Solves in place for right sides of length n, one after the other.
+    ///
+    /// # Panics
+    /// If the length of `right` is no multiple of n.
+    pub fn solve(&self, right: &mut [Complex64]) {
+        let n = self.n;
+        if n == 0 || right.is_empty() {
+            return;
+        }
+        assert!(right.len().is_multiple_of(n), "{} numbers are no columns of {n}", right.len());
+        let columns = right.len() / n;
+        let mut memory = MemBuffer::new(solve_in_place_scratch::<u32, Complex64>(n, columns, Par::Seq));
+        let factors = MatRef::from_column_major_slice(&self.factors, n, n);
+        let exchanges = PermRef::new_checked(&self.order, &self.inverse, n);
+        let right = MatMut::from_column_major_slice_mut(right, n, columns);
+        solve_in_place(factors, factors, exchanges, right, Par::Seq, MemStack::new(&mut memory));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The product in tiles has the bits of the plain sums, at every size beside the tile's.
+    #[test]
+    fn products_have_the_bits_of_plain_sums() {
+        let entry = |at: usize| ((at * 7919 + 13) as f64).sin();
+        for (rows, inner, columns) in [(1, 1, 1), (4, 3, 4), (5, 7, 9), (8, 0, 2), (0, 3, 2), (13, 6, 3), (16, 40, 21)]
+        {
+            let a: Vec<f64> = (0..rows * inner).map(entry).collect();
+            let b: Vec<f64> = (0..inner * columns).map(|at| entry(at + 1000)).collect();
+            let mut c = vec![f64::NAN; rows * columns];
+            multiply(&a, &b, &mut c, (rows, inner, columns));
+            for (at, c) in c.iter().enumerate() {
+                let (i, j) = (at % rows, at / rows);
+                let sum = (0..inner).fold(0.0, |sum, k| sum + a[k * rows + i] * b[j * inner + k]);
+                assert_eq!(c.to_bits(), sum.to_bits(), "{rows} {inner} {columns}: {i}, {j}");
+            }
+        }
+    }
 
     /// In blocks or not, the solution is the one that the matrix was multiplied with.
     #[test]
@@ -133,5 +255,25 @@ mod tests {
         }
         let mut singular = vec![1.0; 4];
         assert!(!solve(&mut singular, 2, &mut [1.0, 2.0]));
+    }
+
+    /// The product of the matrix and what was solved for is the right side, in every column.
+    #[test]
+    fn complex_systems_with_many_right_sides() {
+        for n in [1, 5, 130] {
+            let entry =
+                |i: usize, k: usize| Complex64::new(((i * 7919 + k * 31) as f64).sin(), ((i + 5 * k) as f64).cos());
+            let matrix: Vec<Complex64> = (0..n * n).map(|at| entry(at % n, at / n)).collect();
+            let right: Vec<Complex64> = (0..3 * n).map(|i| entry(i, 7)).collect();
+            let mut x = right.clone();
+            ComplexLu::new(matrix.clone(), n).unwrap().solve(&mut x);
+            for (x, right) in x.chunks(n).zip(right.chunks(n)) {
+                for i in 0..n {
+                    let product: Complex64 = (0..n).map(|k| matrix[k * n + i] * x[k]).sum();
+                    assert!((product - right[i]).norm() < 1e-9, "{n}: {product} {}", right[i]);
+                }
+            }
+        }
+        assert_eq!(ComplexLu::new(vec![Complex64::ONE; 4], 2).unwrap_err(), 1);
     }
 }

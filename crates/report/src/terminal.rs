@@ -80,7 +80,7 @@ impl Terminal {
             let _ = writeln!(out, "note: {more} more note{}; all are in record.json", plural(more));
         }
         for failure in dataset.failures.iter().take(FAILURES) {
-            let text = format!("failed at {}: {}", clean(&failure.at), clean(&failure.reason));
+            let text = clean(&failure.to_string());
             for (i, line) in self.wrapped(&text, "  ").iter().enumerate() {
                 match line.strip_prefix("failed").filter(|_| i == 0) {
                     Some(rest) => writeln!(out, "{}{rest}", self.paint("31", "failed")),

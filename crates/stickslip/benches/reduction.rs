@@ -1,6 +1,7 @@
 //! A block of steel of 61,000 degrees of freedom: time and memory of its analysis, factor, modes and reduction, beside SciPy.
 //!
-//! `cargo bench -p stickslip --bench reduction [-- 50 20 18]`, elements along each edge. Times are those of one processor, so that other work on the
+//! `cargo bench -p stickslip --bench reduction [-- 50 20 18]`, elements along each edge. Times are those of one processor, so that other
+//! work on the
 //! machine does not count where the system tells them.
 
 #![allow(clippy::print_stdout)]

@@ -5,6 +5,7 @@
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// The result of one study.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -299,10 +300,20 @@ pub enum Style {
 /// A point that did not converge: where, and why.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Failure {
-    /// The place in words, for example `Ft = 2 N, frequency = 121.25 Hz`.
+    /// The place in words, for example `Ft = 2 N, frequency = 121.25 Hz`; empty in a study that has but one.
     pub at: String,
     /// The reason and what to try.
     pub reason: String,
+}
+
+impl fmt::Display for Failure {
+    /// `failed at PLACE: REASON`; of a study that has but one place, without it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.at.as_str() {
+            "" => write!(f, "failed: {}", self.reason),
+            at => write!(f, "failed at {at}: {}", self.reason),
+        }
+    }
 }
 
 /// How a run was made, so that it can be repeated.

@@ -1,6 +1,7 @@
 //! The table `[figure]`: what in it can only be judged with a model and a kind.
 
 use crate::info::{Complaint, KindInfo};
+use crate::names::Names;
 use crate::near;
 use crate::units;
 use crate::values::Values;
@@ -8,11 +9,9 @@ use stickslip::model::Model;
 
 /// What is wrong in `[figure]`.
 pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(), Complaint> {
-    let places: Vec<String> = model.masses.iter().flat_map(|mass| mass.places()).collect();
-    let masses = places.iter().map(String::as_str);
-    let known: Vec<&str> = masses.chain(model.joints.iter().map(|joint| joint.name.as_str())).collect();
-    if let Some(name) = figure.names("only").unwrap_or_default().iter().find(|name| !known.contains(&name.as_str())) {
-        return Err(Complaint::unknown("only", "mass or joint", name, &known));
+    let known = Names::of_masses(model).and_joints(model);
+    for name in figure.names("only").unwrap_or_default() {
+        known.all("only", "mass or joint", name)?;
     }
     for (key, axis) in [("x_unit", kind.axes[0]), ("y_unit", kind.axes[1])] {
         let Some(text) = figure.text(key) else { continue };

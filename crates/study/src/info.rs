@@ -4,7 +4,7 @@ use crate::key::Key;
 use crate::near;
 use crate::values::Values;
 use stickslip::dimension::Dimension;
-use stickslip::method::MethodError;
+use stickslip::method::{MethodError, Options};
 use stickslip::model::{Model, System};
 
 /// What a study kind says of itself; a study knows of its kind no more than this.
@@ -23,8 +23,8 @@ pub struct KindInfo {
     pub axes: [Option<Dimension>; 2],
     /// Whether it finds its orbits with the method of `[method]`, which must then be able to take the model.
     pub uses_method: bool,
-    /// What it needs of a system, beside what its method needs.
-    pub needs: fn(&Values, &System) -> Result<(), MethodError>,
+    /// What it needs of a system, beside what its method needs; a kind that uses no method may read options of `[method]` all the same.
+    pub needs: fn(&Values, &Options, &System) -> Result<(), MethodError>,
     /// Whether it can place its frequencies where the curve bends.
     pub adapts: bool,
     /// Its tables, the most important first.

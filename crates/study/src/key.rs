@@ -74,6 +74,8 @@ pub enum Takes {
     Repeat,
     /// A list of tables with these keys: `[[mass]]`.
     List(&'static [Key]),
+    /// Nothing, and why: what is looked for under this name cannot be stated. The key's line says what to do instead.
+    Refused(&'static str),
 }
 
 /// The range of a quantity.
@@ -115,6 +117,18 @@ impl Within {
             Within::Positive => "more than zero",
         }
     }
+}
+
+impl Key {
+    /// Whether it takes anything.
+    pub fn is_taken(&self) -> bool {
+        !matches!(self.takes, Takes::Refused(_))
+    }
+}
+
+/// A key that is looked for and cannot be: why, and what to do instead.
+pub const fn refused(name: &'static str, why: &'static str, instead: &'static str) -> Key {
+    Key { name, takes: Takes::Refused(why), presence: Presence::Optional, doc: instead, example: "" }
 }
 
 /// A key that must be there.

@@ -3,6 +3,7 @@
 //! [`read_study`] turns a text into a [`Study`]: tree ([`toml`]), statements (every expression compiled, every place known), then every
 //! case once, so that whatever is wrong is found before anything is written. [`schema`] describes all tables and keys as data.
 
+pub mod book;
 mod columns;
 pub mod cost;
 pub mod dataset;
@@ -19,6 +20,7 @@ mod key;
 mod kind;
 pub mod kinds;
 pub mod memory;
+mod names;
 mod near;
 mod note;
 mod point;
@@ -40,6 +42,6 @@ mod words;
 pub mod work;
 
 pub use error::StudyError;
-pub use read::{read_bytes, read_file, read_study};
+pub use read::{TemplateParameter, read_bytes, read_file, read_study};
 pub use study::{Case, MethodChoice, Study, VariedValue};
 pub use values::{Frequencies, Values, hertz};

@@ -16,6 +16,8 @@ pub enum Note {
     Unchecked(usize),
     /// Points whose orbit is unstable.
     Unstable(usize),
+    /// Points at which something sticks all the time in a motion that is not its own mirror image.
+    History(usize),
     /// Of one case (its varied parameters in words): points at which a joint sticks for the whole period, of so many.
     Stuck {
         /// The case.
@@ -28,7 +30,8 @@ pub enum Note {
 }
 
 impl Note {
-    /// What an orbit asks for: that it is unstable, if that is known (see [`Orbit::is_stable`]), and how accurate its series is.
+    /// What an orbit asks for: that it is unstable, if that is known (see [`Orbit::is_stable`]), how accurate its series is, and that it is one of
+    /// many.
     pub(crate) fn of_orbit(orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
         let unstable = (stable == Some(false)).then_some(Note::Unstable(1));
         let accuracy = match orbit.evidence.accuracy {
@@ -36,7 +39,8 @@ impl Note {
             Accuracy::Unchecked => Some(Note::Unchecked(1)),
             Accuracy::Converged => None,
         };
-        unstable.into_iter().chain(accuracy).collect()
+        let history = (!orbit.evidence.history.is_empty()).then_some(Note::History(1));
+        unstable.into_iter().chain(accuracy).chain(history).collect()
     }
 
     /// Adds it to `notes`, to one of its sort if there is one.
@@ -48,7 +52,9 @@ impl Note {
                     *largest = largest.max(*other);
                     return;
                 }
-                (Note::Unchecked(points), Note::Unchecked(more)) | (Note::Unstable(points), Note::Unstable(more)) => {
+                (Note::Unchecked(points), Note::Unchecked(more))
+                | (Note::Unstable(points), Note::Unstable(more))
+                | (Note::History(points), Note::History(more)) => {
                     *points += more;
                     return;
                 }
@@ -86,6 +92,13 @@ impl Note {
                  look for it with kind = \"transient\"",
                 points(*count)
             )),
+            Note::History(count) => Some(format!(
+                "At {} a joint or a part of one sticks for the whole period, in a motion that is not its own mirror image: where it sticks \
+                 depends on how the motion began, and with it the means, and the amplitudes too if a gap or another law knows positions. \
+                 Shown is the motion in which a spring that never slips carries no mean force, as in joints that creep; method \
+                 `transient` shows the one that it was led to.",
+                points(*count)
+            )),
             Note::Stuck { points: 0, .. } => None,
             Note::Stuck { case, points: count, of } => {
                 let label = if case.is_empty() { String::new() } else { format!("{case}: ") };
@@ -112,15 +125,18 @@ mod tests {
             Note::Truncated(1, 1e-2),
             stuck("Ft = 1 N", 3),
             Note::Truncated(2, 5e-2),
+            Note::History(1),
+            Note::History(1),
             stuck("Ft = 2 N", 0),
             Note::Said("It is so.".to_owned()),
         ] {
             note.join(&mut notes);
         }
         let texts: Vec<String> = notes.iter().filter_map(Note::text).collect();
-        assert_eq!(texts.len(), 3, "{texts:?}");
+        assert_eq!(texts.len(), 4, "{texts:?}");
         assert!(texts[0].starts_with("Ft = 1 N: at 3 of 20 points a joint sticks"), "{}", texts[0]);
         assert!(texts[1].starts_with("At 3 points") && texts[1].contains("5.0e-2"), "{}", texts[1]);
-        assert_eq!(texts[2], "It is so.");
+        assert!(texts[2].starts_with("At 2 points a joint or a part of one sticks"), "{}", texts[2]);
+        assert_eq!(texts[3], "It is so.");
     }
 }

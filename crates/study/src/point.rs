@@ -6,7 +6,7 @@ use crate::rows::Rows;
 use crate::study::Case;
 use crate::work::Prepared;
 use stickslip::method::OrbitError;
-use stickslip::orbit::Orbit;
+use stickslip::orbit::{Orbit, Symmetry};
 
 /// The place of a point in words: the varied parameters and the frequency.
 pub(crate) fn place_of(case: &Case, omega: f64) -> String {
@@ -59,7 +59,7 @@ impl Summary {
             iterations: orbit.evidence.iterations as u64,
             status: orbit.evidence.accuracy.status().to_owned(),
             failure: None,
-            stuck: orbit.is_one_of_many(),
+            stuck: orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod,
             extra: extra::values(prepared, orbit),
         }
     }

@@ -9,13 +9,10 @@ use serde_json::{Map, Value, json};
 use stickslip::dimension::Dimension;
 use stickslip::{law, method};
 
-pub use crate::key::{Key, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, required};
+pub use crate::key::{Key, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, refused, required};
 
-/// Most elements in one list (`[[spring]]`, …), repetitions counted.
+/// Most elements in one list (`[[mass]]`, `[[spring]]`, …), repetitions counted.
 pub const MOST_ELEMENTS: usize = 10_000;
-
-/// Most masses, repetitions counted: the matrices are dense.
-pub const MOST_MASSES: usize = 2_000;
 
 /// Most bytes of a study file.
 pub const MOST_BYTES: u64 = 4 * 1024 * 1024;
@@ -158,6 +155,12 @@ const MOTION: &[Key] = &[
     required("amplitude", Takes::Quantity(Dimension::LENGTH, Within::Finite), "amplitude", "\"2 mm\""),
     default("phase", Takes::Quantity(Dimension::ANGLE, Within::Finite), "0 deg", "phase lead", "\"90 deg\""),
     default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
+    refused(
+        "velocity",
+        "a place that moves on at a constant velocity, such as a belt, cannot be stated: every motion repeats with the drive",
+        "for a belt of velocity v take kind = \"transient\" and a motion that is slow and long: amplitude A, phase = \"-90 deg\" and a \
+         drive frequency of v/A rad/s begin with v, and keep it as long as the duration is short beside A/v",
+    ),
     REPEAT,
 ];
 
@@ -223,7 +226,8 @@ pub fn described(takes: &Takes) -> String {
         Takes::Frequencies => "a frequency (Hz or rad/s), a list of them, or { from, to, points }; in a response also { from, to, tolerance }".to_owned(),
         Takes::ByName(dimension) => format!("a table from names to {}", crate::expression::described(*dimension)),
         Takes::Table(keys) | Takes::List(keys) => {
-            let names = crate::near::one_of(keys.iter().map(|key| key.name)).replace(" or ", ", ");
+            let taken = keys.iter().filter(|key| key.is_taken());
+            let names = crate::near::one_of(taken.map(|key| key.name)).replace(" or ", ", ");
             let many = matches!(takes, Takes::List(_));
             format!("{} with the keys {names}", if many { "a list of tables" } else { "a table" })
         }
@@ -234,6 +238,7 @@ pub fn described(takes: &Takes) -> String {
         Takes::Vary => "a table from parameters to a value, a list of values, or { from, to, points }".to_owned(),
         Takes::Method => "a table with `kind` and the options of that method".to_owned(),
         Takes::Study => "a table with `kind` and the keys of that kind".to_owned(),
+        Takes::Refused(why) => format!("nothing: {why}"),
     }
 }
 
@@ -299,6 +304,7 @@ fn takes_schema(takes: &Takes) -> Value {
         Takes::ByName(_) | Takes::Parameters => json!({
             "type": "object", "additionalProperties": quantity(), "propertyNames": { "pattern": NAME_PATTERN },
         }),
+        Takes::Refused(_) => json!({ "not": {} }),
         Takes::Table(keys) => object(keys),
         Takes::List(keys) => json!({ "type": "array", "items": object(keys), "maxItems": MOST_ELEMENTS }),
         Takes::Repeat => json!({
@@ -378,71 +384,4 @@ fn kind_object(
         "type": "object", "description": summary, "properties": properties, "required": required,
         "additionalProperties": false,
     })
-}
-
-// ---------------------------------------------------------------------------------------------- the book
-
-/// The reference of study files, key by key, as Markdown tables.
-pub fn markdown() -> String {
-    let mut book = String::new();
-    let rows = |book: &mut String, heading: &str, intro: &str, keys: &[Key]| {
-        book.push_str(&format!("## {heading}\n\n"));
-        if !intro.is_empty() {
-            book.push_str(&format!("{intro}\n\n"));
-        }
-        book.push_str("| key | takes | without it | what it is | example |\n| --- | --- | --- | --- | --- |\n");
-        for key in keys {
-            let absent = match key.presence {
-                Presence::Required => "error".to_owned(),
-                Presence::Optional => String::new(),
-                Presence::Default(value) => format!("`{value}`"),
-            };
-            let example = if key.example == "[]" { String::new() } else { format!("`{} = {}`", key.name, key.example) };
-            let cells = [format!("`{}`", key.name), described(&key.takes), absent, key.doc.to_owned(), example];
-            book.push_str(&format!("| {} |\n", cells.map(|cell| cell.replace('|', "\\|")).join(" | ")));
-        }
-        book.push('\n');
-    };
-    rows(&mut book, "Top of the file", "", FILE);
-    for key in FILE {
-        match key.takes {
-            Takes::List(keys) => rows(&mut book, &format!("`[[{}]]`", key.name), key.doc, keys),
-            Takes::Table(keys) => rows(&mut book, &format!("`[{}]`", key.name), key.doc, keys),
-            _ => {}
-        }
-    }
-    rows(&mut book, "`[study]`", "The keys of every kind; each kind adds its own.", STUDY);
-    for Kind { info: kind, .. } in kinds::TABLE {
-        rows(&mut book, &format!("`[study]` with `kind = \"{}\"`", kind.name), kind.summary, kind.keys);
-        for key in kind.keys {
-            if let Takes::Table(keys) = key.takes {
-                rows(&mut book, &format!("`{}` of `{}`", key.name, kind.name), key.doc, keys);
-            }
-        }
-    }
-    let named = |book: &mut String, name: &str, summary: &str, keys: &[(&str, String, &str)]| {
-        book.push_str(&format!("- `{name}`: {summary}\n"));
-        for (key, takes, doc) in keys {
-            book.push_str(&format!("  - `{key}` ({takes}): {doc}\n"));
-        }
-    };
-    let described = crate::expression::described;
-    book.push_str("## Laws\n\n");
-    for row in law::TABLE {
-        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.takes(), p.doc)).collect();
-        named(&mut book, row.name, row.summary, &keys);
-    }
-    book.push_str("\n## Methods\n\n");
-    for row in method::TABLE {
-        let keys: Vec<_> = row.options.iter().map(|o| (o.key, described(o.dimension), o.doc)).collect();
-        named(&mut book, row.name, row.summary, &keys);
-    }
-    book.push_str("\n## Templates\n\n");
-    for row in templates::TABLE {
-        let parameters = row.parameters();
-        let keys: Vec<_> =
-            parameters.iter().map(|p| (p.key.as_str(), described(p.dimension), p.doc.as_str())).collect();
-        named(&mut book, row.name, row.summary(), &keys);
-    }
-    book
 }

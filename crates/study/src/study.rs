@@ -7,6 +7,7 @@ use crate::immovable::immovable;
 use crate::info::{Complaint, KindInfo};
 use crate::key::VERSION;
 use crate::memory;
+use crate::names::Names;
 use crate::near::{nearest, one_of, shown};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
 use crate::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
@@ -638,14 +639,18 @@ impl Study {
             }
         };
         let places = model.place_names();
+        let nodes = Names::of_masses(model);
         let help = match &error.wrong_name {
-            Some(wrong) => Some(match nearest(wrong, places.iter().map(String::as_str)) {
-                Some(near) => format!("did you mean `{near}`?"),
-                None => format!(
-                    "the places are {}",
-                    one_of(places.iter().take(20).map(String::as_str)).replace(" or ", ", ")
-                ),
-            }),
+            Some(wrong) => {
+                Some(match (nodes.directions_of(wrong), nearest(wrong, places.iter().map(String::as_str))) {
+                    (Some(directions), _) => format!("say {}", one_of(directions.iter().map(String::as_str))),
+                    (None, Some(near)) => format!("did you mean `{near}`?"),
+                    (None, None) => format!(
+                        "the places are {}",
+                        one_of(places.iter().take(20).map(String::as_str)).replace(" or ", ", ")
+                    ),
+                })
+            }
             None if error.element == Element::Whole => Some("add a [[mass]] or a [[motion]]".to_owned()),
             None if error.key == "name" => Some("choose another name".to_owned()),
             None => None,

@@ -52,6 +52,9 @@ pub struct JointSummary {
     pub limit: f64,
     /// Relative displacement at which it gives way, m; `None` if it holds rigidly until then.
     pub displacement: Option<f64>,
+    /// Of the direction along which faces press on each other: the force with which they do at rest, N, zero if they are
+    /// apart. `None` along those that slip.
+    pub pressed: Option<f64>,
     /// What the excitation does to it while all joints stick; `None` where the study has no drive or the model is too
     /// large for a quick answer.
     pub onset: Option<Onset>,
@@ -95,6 +98,7 @@ impl ModelSummary {
             name: slip.joint,
             limit: slip.limit,
             displacement: slip.displacement,
+            pressed: slip.pressed,
             onset: onsets.as_ref().map(|onsets| onsets[index].clone()),
         });
         let joints = joints.collect();
@@ -129,8 +133,9 @@ impl ModelSummary {
         let joint = |joint: &JointSummary| {
             json!({
                 "name": joint.name,
-                "limit_N": joint.limit,
-                "slip_displacement_m": joint.displacement,
+                "limit_N": Some(joint.limit).filter(|limit| limit.is_finite()),
+                "pressed_N": joint.pressed,
+                "slip_displacement_m": joint.displacement.filter(|displacement| displacement.is_finite()),
                 "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / onset.largest).filter(|x| x.is_finite()),
                 "most_loaded_at_Hz": joint.onset.as_ref().map(|onset| onset.at / TAU),
                 "slips_Hz": joint.onset.as_ref()

@@ -5,6 +5,7 @@
 //! are the same bit for bit however the work was divided.
 
 use crate::error::StudyError;
+use crate::expression::displayed;
 use crate::note::Note;
 use crate::rows::Rows;
 use crate::study::{Case, Study};
@@ -14,7 +15,8 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stickslip::curve::sweep::BLOCK;
-use stickslip::method::{self, Method, MethodError};
+use stickslip::dimension::Dimension;
+use stickslip::method::{self, Method, MethodError, Options, WIDTH, Ways};
 use stickslip::model::System;
 
 /// How a study is run.
@@ -73,7 +75,8 @@ impl Prepared {
         if study.kind().uses_method {
             method.solver(&system).map_err(|error| refused(study, &case, &error))?;
         }
-        (study.kind().needs)(&case.values, &system).map_err(|error| refused(study, &case, &error))?;
+        (study.kind().needs)(&case.values, &case.method.options, &system)
+            .map_err(|error| refused(study, &case, &error))?;
         Ok(Prepared { case, system, method })
     }
 }
@@ -82,25 +85,51 @@ impl Prepared {
 pub(crate) fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyError {
     let model = &case.model;
     // a method looks at the first case first: what it refuses later is a matter of that case
+    let refusal = error.clone().alone();
     let message = match case.index {
-        0 => error.to_string(),
-        index => format!("{error} ({})", study.case_words(index)),
+        0 => refusal.to_string(),
+        index => format!("{refusal} ({})", study.case_words(index)),
     };
+    let help = error.ways().map(|ways| advice(study, case, ways));
     match error {
-        MethodError::Law { joint, instead, .. } => {
+        MethodError::Law { joint, .. } => {
             let index = model.joints.iter().position(|j| j.name == *joint).unwrap_or(0);
-            study.error_at("joint", index, "law", message, Some(format!("use {instead}")))
+            study.error_at("joint", index, "law", message, help)
         }
         MethodError::NeedsMass { place, .. } => {
-            let index = model.masses.iter().position(|m| m.name == *place).unwrap_or(0);
-            study.error_at("mass", index, "mass", message, None)
+            let index = model.masses.iter().position(|mass| mass.places().contains(place)).unwrap_or(0);
+            study.error_at("mass", index, "mass", message, help)
         }
         // a kind that needs no method has the method's options among its own keys
         MethodError::Option { key, .. } => {
             let table = if study.kind().uses_method { "method" } else { "study" };
             study.error_at(table, 0, key, message, None)
         }
-        _ => study.error_at("method", 0, "kind", message, None),
+        MethodError::NotPositive { .. } | MethodError::TooLarge { .. } => {
+            study.error_at("method", 0, "kind", message, help)
+        }
+    }
+}
+
+/// A velocity, m/s, over which laws are smoothed to see whether that would help.
+const ANY_WIDTH: f64 = 1e-3;
+
+/// What to do about a refused model: a kind that uses no method knows no way but its own.
+fn advice(study: &Study, case: &Case, ways: &Ways) -> String {
+    let kind = study.kind();
+    if kind.uses_method || !ways.any() {
+        return ways.to_string();
+    }
+    let smoothed = Options::from([(WIDTH.to_owned(), ANY_WIDTH)]);
+    let helps = case.model.assemble().is_ok_and(|system| (kind.needs)(&case.values, &smoothed, &system).is_ok());
+    let smoothing = method::TABLE.iter().find(|row| row.options.iter().any(|option| option.key == WIDTH));
+    match smoothing.filter(|_| helps) {
+        Some(row) => format!(
+            "give a velocity over which friction changes its sign: [method] with kind = \"{}\" and {WIDTH} = \"{}\"",
+            row.name,
+            displayed(ANY_WIDTH, Some(Dimension::VELOCITY))
+        ),
+        None => format!("a study of the kind `{}` chooses no method; where one is chosen, {ways}", kind.name),
     }
 }
 

@@ -155,6 +155,21 @@ fn frequencies() {
     check(&format!("frequency = {range}\n"), "", (44, 1), "frequency", &["`frequency` is missing"]);
 }
 
+/// A belt is looked for under `velocity`: the words say why there is none and what to do.
+#[test]
+fn a_velocity_is_no_motion() {
+    let belt = "[[motion]]\non = \"belt\"\namplitude = \"1 m\"\nvelocity = \"50 mm/s\"\n[[force]]";
+    check("[[force]]", belt, (43, 12), "velocity", &["constant velocity, such as a belt", "transient", "v/A"]);
+    // no list of keys names it
+    check(
+        "[[force]]",
+        &belt.replace("velocity", "speed"),
+        (43, 1),
+        "speed",
+        &["the keys of motion 1 are `on`, `amplitude`, `phase`, `harmonic`, `repeat`"],
+    );
+}
+
 #[test]
 fn kinds() {
     let swap = |study: &str| format!("{}{study}", &EXAMPLE[..EXAMPLE.find("[study]").unwrap()]);

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::{law, method};
-use stickslip_study::{read_study, run, schema};
+use stickslip_study::{book, read_study, run};
 
 const UPDATE: &str = "STICKSLIP_UPDATE_BOOK";
 const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-study --test book";
@@ -81,7 +81,7 @@ fn the_reference_of_keys_is_up_to_date() {
     let head = "<!-- Generated from the schema by crates/study/tests/book.rs; do not edit. -->\n\n# Every key\n\n\
                 What the columns mean: *takes* says what may stand there (a quantity is a string with a unit, an expression over \
                 `[parameters]`, or a bare number in SI); *without it* says what holds when the key is absent.\n\n";
-    up_to_date(&root().join("docs/src/study_file_keys.md"), &format!("{head}{}", schema::markdown()));
+    up_to_date(&root().join("docs/src/study_file_keys.md"), &format!("{head}{}", book::markdown()));
 }
 
 const BEGIN: &str = "<!-- begin generated: methods x laws -->\n";

@@ -262,3 +262,58 @@ frequency = { from = "14 Hz", to = "19 Hz", points = 101 }
     let found = dataset(&damped);
     assert_eq!(found.record.points.keys().collect::<Vec<_>>(), ["converged"]);
 }
+
+/// Theory 11.13: over a stop without a gap, driven at 2.6 times the natural frequency, the motion that repeats with the drive is unstable; with
+/// `period = 2` every method gives the one that repeats after two periods, in the same columns.
+#[test]
+fn motions_of_two_periods_from_a_study_file() {
+    let orbit = |method: &str| {
+        dataset(&format!(
+            r#"
+schema = 1
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "1 N/m"
+damping = "0.1 N s/m"
+[[joint]]
+name = "stop"
+between = ["m", "ground"]
+law = {{ kind = "gap", gap = "0 m", stiffness = "4 N/m" }}
+[[force]]
+on = "m"
+amplitude = "1 N"
+[study]
+kind = "orbit"
+frequency = "2.6 rad/s"
+samples = 64
+[method]
+{method}
+"#
+        ))
+    };
+    let summary = |dataset: &Dataset, column: &str| numbers(dataset, "orbits", column)[0];
+    let exact = orbit("kind = \"event-driven\"\nperiod = 2");
+    let single = orbit("kind = \"event-driven\"");
+    let amplitude = summary(&exact, "m_amplitude_m");
+    assert!((amplitude / summary(&single, "m_amplitude_m") - 1.0).abs() > 0.1, "it repeats after one period");
+    for (method, allowed) in [("harmonic-balance", 2e-3), ("shooting", 1e-5), ("transient", 1e-5)] {
+        let found = orbit(&format!("kind = \"{method}\"\nperiod = 2"));
+        let off = (summary(&found, "m_amplitude_m") / amplitude - 1.0).abs();
+        assert!(off < allowed, "{method}: {off:.1e}");
+        let names = |dataset: &Dataset| -> Vec<String> {
+            let columns = table(dataset, "orbits").columns.iter().map(|column| column.name.clone());
+            // evidence that harmonic balance alone has
+            columns.filter(|name| name != "return_defect").collect()
+        };
+        assert_eq!(names(&found), names(&exact), "{method}");
+        // the table of the motion covers both periods
+        for dataset in [&found, &exact] {
+            let time = numbers(dataset, "orbit", "time_s");
+            let last = time[time.len() - 1] / (TAU / 2.6);
+            assert!((1.9..2.0 + 1e-9).contains(&last), "{method}: {last}");
+        }
+    }
+}

@@ -161,7 +161,7 @@ fn a_case_in_which_the_joints_hold_is_shown() {
     let values = |values: &str| template("blade-couple", &[("\"2 N\", \"4 N\", \"6 N\", \"8 N\"", values)]);
     let text = summary(&values("\"0 N\", \"2 N\", \"4 N\"")).to_string();
     assert!(text.contains("shown for Ft = 2 N") && text.contains("slips at 2 N"), "{text}");
-    assert!(summary(&values("\"0 N\"")).to_string().contains("limit 0: free"));
+    assert!(summary(&values("\"0 N\"")).to_string().contains("free: carries nothing"));
 }
 
 #[test]

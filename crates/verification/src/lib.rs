@@ -10,9 +10,9 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use stickslip::law::{Coulomb, Jenkins, SharedLaw};
+use stickslip::law::{Coulomb, Jenkins, LawInfo, SharedLaw, TABLE};
 use stickslip::method::{Method, event_driven::EventDriven};
-use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
+use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Orbit, Sample};
 use stickslip::structure::{Structure, StructureError};
 use stickslip_study::templates;
@@ -43,6 +43,67 @@ impl Random {
     pub fn below(&mut self, n: usize) -> usize {
         (self.unit() * n as f64) as usize
     }
+}
+
+/// A symmetric matrix with eigenvalues from `least` up.
+fn definite(random: &mut Random, n: usize, least: f64, size: f64) -> DMatrix<f64> {
+    let b = DMatrix::from_fn(n, n, |_, _| random.between(-1.0, 1.0));
+    DMatrix::identity(n, n) * least + &b * b.transpose() * size
+}
+
+/// One of these laws with parameters up to twice or half of its sample's.
+pub fn random_law(random: &mut Random, among: &[&'static LawInfo]) -> SharedLaw {
+    let row = among[(random.unit() * among.len() as f64) as usize];
+    for _ in 0..20 {
+        let values: Vec<f64> = row
+            .sample
+            .iter()
+            .zip(row.parameters)
+            .map(|(value, p)| if p.default.is_some() { *value } else { value * 2f64.powf(random.between(-1.0, 1.0)) })
+            .collect();
+        let keys = row.parameters.iter().map(|p| p.key).zip(values).collect();
+        if let Ok(law) = row.build(&keys) {
+            return law;
+        }
+    }
+    row.sample()
+}
+
+/// A system of up to four degrees of freedom with full matrices and up to two joints of any laws of the table, and a drive frequency, rad/s.
+pub fn random_system(seed: u64) -> (System, f64) {
+    random_system_of(seed, TABLE)
+}
+
+/// The same with joints of these laws.
+pub fn random_system_of(seed: u64, among: &[&'static LawInfo]) -> (System, f64) {
+    let mut random = Random::new(seed);
+    let n = 1 + (random.unit() * 4.0) as usize;
+    let mass = definite(&mut random, n, 0.5, 1.0);
+    let stiffness = definite(&mut random, n, 1e4, 1e4);
+    let natural = (stiffness[(0, 0)] / mass[(0, 0)]).sqrt();
+    // damping ratios of some percent, so that transients die
+    let damping = definite(&mut random, n, 0.1 * natural, 0.05 * natural);
+    let places = (0..n).map(|i| format!("p{i}")).collect();
+    let structure = Structure::new(places, mass, damping, stiffness).unwrap();
+    let mut builder = System::builder(structure);
+    for j in 0..1 + (random.unit() * 2.0) as usize {
+        let law = random_law(&mut random, among);
+        let axes = (0..law.directions()).map(|_| {
+            let one = (random.unit() * n as f64) as usize;
+            let other = (random.unit() * n as f64) as usize;
+            Axis::new(if one == other { vec![(one, 1.0)] } else { vec![(one, 1.0), (other, -0.7)] })
+        });
+        let axes = axes.collect();
+        builder = builder.joint(format!("j{j}"), law, axes);
+    }
+    builder = builder.force(0, 1, Complex64::from_polar(random.between(2.0, 20.0), random.between(0.0, 6.0)));
+    if random.unit() < 0.3 {
+        builder = builder.force(n - 1, 0, Complex64::new(random.between(-5.0, 5.0), 0.0));
+    }
+    if random.unit() < 0.2 {
+        builder = builder.force(n - 1, 2, Complex64::from_polar(random.between(0.5, 4.0), random.between(0.0, 6.0)));
+    }
+    (builder.build().unwrap(), natural * random.between(0.4, 1.6))
 }
 
 /// A random structure and a drive frequency (rad/s): 1 to 4 masses, 1 to 3 joints of exact laws between any two places, light

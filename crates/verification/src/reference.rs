@@ -37,8 +37,9 @@ pub struct Reference<'a> {
     pub lost: usize,
 }
 
-/// Velocity over which a law that has only a resolvent is made smooth, relative to that of the motion.
-const NARROW: f64 = 1e-3;
+/// Velocity over which a law that has only a resolvent is made smooth, relative to that of the motion, times the steps of a period: what they can
+/// resolve.
+const NARROW: f64 = 0.5;
 
 /// A displacement of the size that the loads cause, m.
 fn travel(system: &System, omega: f64) -> f64 {
@@ -49,6 +50,8 @@ fn travel(system: &System, omega: f64) -> f64 {
 
 /// Stiffness of the spring in front of a rigid slider, in masses over the square of a step.
 const RIGID: f64 = 100.0;
+/// The longest change of a state in an iteration, in sizes of states.
+const STRIDE: f64 = 2.0;
 /// Newton iterations of a step.
 const ITERATIONS: usize = 40;
 /// Residual relative to the forces at which a step is solved.
@@ -63,7 +66,7 @@ impl<'a> Reference<'a> {
             let mut law = joint.law().clone();
             if law.step().is_none() && law.rate().is_none() && law.pieces().is_none() {
                 // set-valued, and no sum of sliders: its smooth neighbour, steeper than anything that the motion shows
-                law = law.regularised(NARROW * omega * travel(system, omega)).unwrap_or(law);
+                law = law.regularised(NARROW / steps as f64 * omega * travel(system, omega)).unwrap_or(law);
             }
             let pieces = if law.step().is_none() && law.rate().is_none() { law.pieces() } else { None };
             let states = law.step().map(|s| s.states()).or(law.rate().map(|r| r.states()));
@@ -88,6 +91,40 @@ impl<'a> Reference<'a> {
             (reference.contacts[j].u, reference.contacts[j].v) = (u, v);
         }
         reference
+    }
+
+    /// Begins with the states of joints that an orbit begins with, if these are all: forces of sliders behind springs, and those of steps and rates.
+    #[must_use]
+    pub fn with_states(mut self, states: &[f64]) -> Self {
+        let mut left = states;
+        let mut take = |count: usize| -> Option<&[f64]> {
+            let (now, rest) = left.split_at_checked(count)?;
+            left = rest;
+            Some(now)
+        };
+        let mut found = Vec::new();
+        for contact in &self.contacts {
+            let mut z = contact.z.clone();
+            let elastic =
+                |piece: &Piece| matches!(piece, Piece::Slider(s) if s.stiffness.is_some() && s.static_limit > 0.0);
+            match &contact.pieces {
+                Some(pieces) => {
+                    for (z, _) in z.iter_mut().zip(pieces).filter(|(_, piece)| elastic(piece)) {
+                        let Some(one) = take(1) else { return self };
+                        *z = one[0];
+                    }
+                }
+                None => {
+                    let Some(all) = take(z.len()) else { return self };
+                    z.copy_from_slice(all);
+                }
+            }
+            found.push(z);
+        }
+        if left.is_empty() {
+            self.contacts.iter_mut().zip(found).for_each(|(contact, z)| contact.z = z);
+        }
+        self
     }
 
     fn motion(&self, j: usize, x: &DVector<f64>, v: &DVector<f64>, time: f64) -> (Along, Along) {
@@ -221,7 +258,10 @@ impl Contact {
                     let jacobian = DMatrix::from_fn(s, s, |i, l| {
                         f64::from(u8::from(i == l)) - 0.5 * h * point.rate_slope(i)[2 * directions + l]
                     });
-                    let Some(change) = jacobian.lu().solve(&residual) else { break };
+                    let Some(mut change) = jacobian.lu().solve(&residual) else { break };
+                    // some states are logarithms of what they stand for
+                    let far = change.amax() / (STRIDE * rate.state_scale());
+                    change /= far.max(1.0);
                     z.iter_mut().zip(change.iter()).for_each(|(z, d)| *z -= d);
                     if change.amax() <= SOLVED * (1.0 + z.iter().fold(0.0f64, |a, z| a.max(z.abs()))) {
                         break;

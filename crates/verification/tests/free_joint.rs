@@ -10,7 +10,11 @@ use stickslip::orbit::{Contact, Orbit};
 /// Tolerance of the methods in time, relative; harmonic balance and event-driven are far below.
 const NEAR: f64 = 1e-6;
 
-/// The laws that act along one direction and have a slip limit, with their name: as sampled, and with the limit zero.
+/// What an elastic joint may seem to lose, as a share of the work of a period: its force goes in and out with a thousand times of that work, and
+/// equal steps close their orbits to 1e-10.
+const LOSSLESS: f64 = 1e-8;
+
+/// The laws that act along one direction and have a slip limit or faces that part, with their name: as sampled, and with the limit zero.
 fn laws() -> Vec<(&'static str, SharedLaw, SharedLaw)> {
     let rows = law::TABLE.iter().map(|row| (row.name, row.sample()));
     rows.filter(|(_, law)| law.directions() == 1)
@@ -91,7 +95,7 @@ fn beside_another_joint_it_is_not_there() {
             let (a, b) = (with.places[0].amplitude(), without.places[0].amplitude());
             assert!((a / b - 1.0).abs() < NEAR, "{}, {name}: {a} {b}", law);
             let (a, b) = (with.joints[1].dissipation, without.joints[0].dissipation);
-            assert!((a - b).abs() <= 1e2 * NEAR * b, "{}, {name}: {a} {b}", law);
+            assert!((a - b).abs() <= 1e2 * NEAR * b + LOSSLESS * without.energy.work_in, "{}, {name}: {a} {b}", law);
         }
     }
 }

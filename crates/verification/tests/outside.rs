@@ -206,15 +206,10 @@ impl Method for Linear {
     fn name(&self) -> &'static str {
         "linear"
     }
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         match system.joints().first() {
             None => Ok(Box::new(LinearSolver(system))),
-            Some(joint) => Err(MethodError::Law {
-                method: "linear",
-                joint: joint.name().to_owned(),
-                law: joint.law().name(),
-                instead: "any other method",
-            }),
+            Some(joint) => Err(MethodError::law("linear", joint, "joints are none of its matters")),
         }
     }
 }

@@ -3,7 +3,8 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use stickslip::law::{Coulomb, Jenkins, SharedLaw};
+use stickslip::dimension::Dimension;
+use stickslip::law::{Coulomb, FrictionContact, Jenkins, Parameter, SharedLaw, TABLE};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Modes, Motion, Onset, Spring, Survey};
 use stickslip_study::templates;
 
@@ -325,4 +326,58 @@ fn models_that_are_too_large_say_so() {
     let survey = chain(701, 1.0, 1.0).survey().unwrap();
     assert!(survey.is_too_large() && survey.onset(1.0, 2.0).is_none());
     assert_eq!((survey.free().elastic.len(), survey.free().lost), (0, 701));
+}
+
+/// A node with the directions of a law, on springs of 1000 N/m, and the law between it and the ground.
+fn on_springs(law: SharedLaw) -> Model {
+    let names: Vec<String> = ["x", "y", "z"].iter().take(law.directions()).map(|name| (*name).to_owned()).collect();
+    let several = names.len() > 1;
+    let places = if several { names.iter().map(|d| format!("a.{d}")).collect() } else { vec!["a".to_owned()] };
+    Model {
+        masses: vec![Mass { name: "a".to_owned(), mass: 1.0, directions: if several { names } else { Vec::new() } }],
+        springs: places.iter().map(|place: &String| spring(place.clone(), GROUND, 1000.0, 0.1)).collect(),
+        joints: vec![joint("j", "a", GROUND, law)],
+        forces: places.iter().map(|place| force(place, 3.0, 0.0, 1)).collect(),
+        ..Model::default()
+    }
+}
+
+#[test]
+fn no_law_is_stiffer_at_rest_than_its_stiffnesses() {
+    for row in TABLE {
+        let law = row.sample();
+        let is_stiffness = |p: &&Parameter| p.dimension == Dimension::STIFFNESS;
+        let most: f64 = row.parameters.iter().filter(is_stiffness).map(|p| law.value(p.key).unwrap()).sum();
+        let survey = on_springs(law.clone()).survey().unwrap();
+        let bound = (1000.0 + most).sqrt() * (1.0 + ROUNDING);
+        for omega in omegas(survey.stuck()) {
+            assert!(omega <= bound, "{}: {omega} rad/s of at most {bound}", row.name);
+        }
+        let onsets = survey.onset(20.0, 40.0).unwrap();
+        for (axis, (slip, onset)) in survey.first_slip().iter().zip(&onsets).enumerate() {
+            // what presses neither slips nor has a limit, what does not has no load that presses
+            assert_eq!(law.normal() == Some(axis), slip.pressed.is_some(), "{}", row.name);
+            if slip.pressed.is_some() {
+                assert_eq!((onset.largest, onset.slips.len()), (0.0, 0), "{}", row.name);
+            }
+            // a displacement at which it gives way is no longer than its limit over what it can be stiff
+            if let Some(displacement) = slip.displacement.filter(|u| u.is_finite()) {
+                assert!(displacement * most >= slip.limit * (1.0 - ROUNDING), "{}: {slip:?}", row.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pressed_contact_holds_as_its_springs() {
+    let contact = |preload| FrictionContact { tangential: 300.0, normal: 800.0, friction: 0.4, preload, tangents: 1 };
+    let survey = on_springs(Arc::new(contact(5.0))).survey().unwrap();
+    close(&omegas(survey.stuck()), &[1300f64.sqrt(), 1800f64.sqrt()], ROUNDING);
+    let slips = survey.first_slip();
+    close(&[slips[0].limit, slips[0].displacement.unwrap()], &[2.0, 2.0 / 300.0], ROUNDING);
+    assert_eq!((slips[0].pressed, slips[1].pressed), (None, Some(5.0)));
+    // apart, it holds nothing
+    let survey = on_springs(Arc::new(contact(-5.0))).survey().unwrap();
+    close(&omegas(survey.stuck()), &[1000f64.sqrt(); 2], ROUNDING);
+    assert_eq!(survey.first_slip()[1].pressed, Some(0.0));
 }

@@ -1,6 +1,6 @@
 //! Factors of sparse matrices, and what they solve.
 
-use super::analysis::{Pattern, Symbolic};
+use super::pattern::{Pattern, Symbolic};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor::LbltParams;
 use faer::linalg::lu::partial_pivoting::factor::PartialPivLuParams;

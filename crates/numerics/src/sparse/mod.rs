@@ -13,6 +13,7 @@ pub mod columns;
 mod factor;
 mod matrix;
 mod modes;
+mod pattern;
 
 pub use analysis::Analysis;
 pub use factor::{ComplexFactor, Factor, Singular};

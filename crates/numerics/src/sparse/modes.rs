@@ -12,7 +12,8 @@
 //!
 //! Sources: Ericsson and Ruhe (1980), "The spectral transformation Lanczos method for the numerical solution of large sparse generalized
 //! symmetric eigenvalue problems"; Nour-Omid, Parlett, Ericsson and Jensen (1987), "How to implement the spectral transformation", for singular
-//! M; Grimes, Lewis and Simon (1994), "A shifted block Lanczos algorithm for solving sparse symmetric generalized eigenproblems", for blocks, shifts
+//! M; Grimes, Lewis and Simon (1994), "A shifted block Lanczos algorithm for solving sparse symmetric generalized eigenproblems", for
+//! blocks, shifts
 //! and counts.
 
 use super::{Analysis, Factor, Matrix, Singular, columns};
@@ -515,7 +516,8 @@ impl<'a> Lanczos<'a> {
         coefficients
     }
 
-    /// Makes the columns of a cleared block orthonormal, one after the other, and adds those that are not rounding beside their former `sizes`. Returns the
+    /// Makes the columns of a cleared block orthonormal, one after the other, and adds those that are not rounding beside their former
+    /// `sizes`. Returns the
     /// block's components along the new vectors.
     fn append(&mut self, block: Vec<f64>, sizes: &[f64]) -> Result<DMatrix<f64>, ModesError> {
         let n = self.n;
@@ -699,7 +701,8 @@ mod tests {
         }
     }
 
-    /// A chain between walls, `λ = 4 sin²(π i / 2 (n + 1))`; alone in the space, `4 sin²(π i / 2 n)` from zero; as a ring, `4 sin²(π i / n)`, twice.
+    /// A chain between walls, `λ = 4 sin²(π i / 2 (n + 1))`; alone in the space, `4 sin²(π i / 2 n)` from zero; as a ring, `4 sin²(π i /
+    /// n)`, twice.
     #[test]
     fn chains_and_rings() {
         for n in [1, 2, 3, 5, 40, 900] {
@@ -773,6 +776,9 @@ mod tests {
         let found = modes(&k, &m, Wanted::Lowest(401)).unwrap();
         check(&k, &m, &found, &expected, 1e-13);
         assert!(found.effort.factors > 2, "{:?}", found.effort);
+        let bound = 0.5 * (expected[350] + expected[351]);
+        let found = modes(&k, &m, Wanted::UpTo { value: bound, most: 400 }).unwrap();
+        check(&k, &m, &found, &expected[..351], 1e-13);
     }
 
     /// A slender beam is softer than its elements by many orders: `λ = (β / L)⁴ EI / (ρA)` of a cantilever, β = 1.8751, 4.6941, 7.8548.

@@ -158,7 +158,12 @@ struct Path {
 /// # Errors
 /// A place without mass, or a law that cannot be followed.
 pub fn check(system: &System) -> Result<(), MethodError> {
-    ModeEquations::new(system, 1, 8).map(drop)
+    equations(system, 1, 8).map(drop)
+}
+
+/// The equations of the modes of a system, or what else takes it.
+fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEquations<'_>, MethodError> {
+    ModeEquations::new(system, harmonics, samples).map_err(|error| error.with_ways(system))
 }
 
 /// Follows a mode from an amplitude at which friction hardly matters downwards.
@@ -178,7 +183,7 @@ pub fn check(system: &System) -> Result<(), MethodError> {
 /// assert!((mode.points[0].omega / stuck - 1.0).abs() < 1e-6);
 /// ```
 pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> {
-    let mut equations = ModeEquations::new(system, request.harmonics, request.samples)?;
+    let mut equations = equations(system, request.harmonics, request.samples)?;
     let (low, high) = request.range;
     let path = Path::follow(&mut equations, request.mode, low);
     let last = request.points.max(2) - 1;
@@ -207,7 +212,7 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
 /// # Errors
 /// As [`mode()`].
 pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoint>, MethodError> {
-    let mut equations = ModeEquations::new(system, request.harmonics, request.samples)?;
+    let mut equations = equations(system, request.harmonics, request.samples)?;
     let path = Path::follow(&mut equations, request.mode, request.range.0);
     let mut orbits = Vec::new();
     for pair in path.within(&mut equations, request.range).windows(2) {

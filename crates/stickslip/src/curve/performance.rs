@@ -44,8 +44,31 @@ pub struct Row {
 pub struct PerformanceCurve {
     /// One row per value, in the order given.
     pub rows: Vec<Row>,
-    /// The value with the lowest peak, refined between its neighbours; `None` if the lowest row stands at an end.
+    /// The value with the lowest peak, refined between its neighbours; `None` if the lowest row stands at an end, or others are as low.
     pub optimum: Option<Row>,
+}
+
+/// Peaks that differ by less than this share of the highest are the same: orbits are known to about 1e-10, and a share above that of no value
+/// matters to a design.
+const SAME: f64 = 1e-9;
+
+/// Height of a row; one without a peak is no candidate.
+fn height(row: &Row) -> f64 {
+    row.peak.map_or(f64::INFINITY, |peak| peak.value)
+}
+
+/// The rows whose peaks are as low as the lowest.
+fn lowest(rows: &[Row]) -> Vec<usize> {
+    let heights = || rows.iter().map(height).filter(|height| height.is_finite());
+    let (least, most) = (heights().fold(f64::INFINITY, f64::min), heights().fold(0.0, f64::max));
+    (0..rows.len()).filter(|row| height(&rows[*row]) <= least + SAME * most).filter(|_| least.is_finite()).collect()
+}
+
+impl PerformanceCurve {
+    /// The rows whose peaks are as low as the lowest: more than one where the parameter makes no difference, or where nothing moves.
+    pub fn lowest(&self) -> Vec<usize> {
+        lowest(&self.rows)
+    }
 }
 
 /// Why no curve was made.
@@ -131,12 +154,8 @@ impl<E: Send> Performance<'_, E> {
     /// ```
     pub fn curve(&self, values: &[f64]) -> Result<PerformanceCurve, PerformanceError<E>> {
         let rows: Vec<Row> = values.par_iter().map(|value| self.peak(*value)).collect::<Result<_, _>>()?;
-        let height = |row: &Row| row.peak.map_or(f64::INFINITY, |peak| peak.value);
-        let lowest = (0..rows.len()).min_by(|&a, &b| height(&rows[a]).total_cmp(&height(&rows[b])));
-        let optimum = match lowest {
-            Some(i) if i > 0 && i + 1 < rows.len() && rows[i].peak.is_some() => {
-                Some(self.refine(rows[i - 1].value, rows[i], rows[i + 1].value)?)
-            }
+        let optimum = match lowest(&rows)[..] {
+            [i] if i > 0 && i + 1 < rows.len() => Some(self.refine(rows[i - 1].value, rows[i], rows[i + 1].value)?),
             _ => None,
         };
         Ok(PerformanceCurve { rows, optimum })
@@ -144,7 +163,6 @@ impl<E: Send> Performance<'_, E> {
 
     /// Golden-section search: the lowest of two rising branches is a kink as often as it is smooth.
     fn refine(&self, low: f64, middle: Row, high: f64) -> Result<Row, PerformanceError<E>> {
-        let height = |row: &Row| row.peak.map_or(f64::INFINITY, |peak| peak.value);
         let mut best = middle;
         let close = |a: f64, b: f64| b - a <= BRACKET * (a.abs() + b.abs());
         maximum((low, high), close, |value| {

@@ -2,8 +2,11 @@
 //!
 //! The frequencies are cut into blocks of fixed length; a block starts cold and runs in order, and blocks run in parallel. The
 //! start of every point is thus the same on any number of threads, and so are its bits.
+//!
+//! Where a curve has a fold, the points beyond it have no orbit near the last one: they are sought again from behind, from the first orbit
+//! that is found after them.
 
-use crate::method::{Method, MethodError, OrbitError};
+use crate::method::{Method, MethodError, OrbitError, Solver};
 use crate::model::System;
 use crate::orbit::Orbit;
 use rayon::prelude::*;
@@ -68,8 +71,8 @@ pub fn sweep<R: Send>(
 /// Looks at an outcome at a frequency (rad/s); `None` if the sweep was stopped before.
 pub type See<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
 
-/// Runs `system` over some frequencies (rad/s), one after the other, each started from the one before; `see` looks at each outcome as soon
-/// as it is there.
+/// Runs `system` over some frequencies (rad/s), one after the other, each started from the one before, and those that have no orbit from
+/// there from the one behind; `see` looks at each outcome, in order.
 ///
 /// # Errors
 /// The method cannot take the system.
@@ -82,16 +85,113 @@ pub fn stretch(
 ) -> Result<(), MethodError> {
     let mut solver = method.solver(system)?;
     let mut start: Option<Vec<f64>> = None;
-    for omega in omegas {
+    // points that were not found, until an orbit is found behind them
+    let mut missing: Vec<(f64, Result<Orbit, OrbitError>)> = Vec::new();
+    let mut omegas = omegas.peekable();
+    while let Some(omega) = omegas.next() {
         if watch.stop.load(Ordering::Relaxed) {
+            missing.drain(..).for_each(|(omega, outcome)| see(omega, Some(outcome.as_ref())));
             see(omega, None);
             continue;
         }
         let outcome = solver.orbit(omega, start.as_deref());
-        see(omega, Some(outcome.as_ref()));
-        // after a failure the next point starts cold: the last good orbit may be far away
-        start = outcome.ok().map(|orbit| orbit.start);
         (watch.finished)();
+        // after a failure the next point starts cold: the last good orbit may be far away
+        start = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
+        if outcome.is_err() && omegas.peek().is_some() {
+            missing.push((omega, outcome));
+            continue;
+        }
+        if let Ok(orbit) = &outcome {
+            from_behind(&mut *solver, &orbit.start, &mut missing, watch);
+        }
+        missing.drain(..).for_each(|(omega, outcome)| see(omega, Some(outcome.as_ref())));
+        see(omega, Some(outcome.as_ref()));
     }
     Ok(())
+}
+
+/// Seeks the missing points from the orbit behind them, the last one first, until one is not found from there either.
+fn from_behind(
+    solver: &mut dyn Solver,
+    behind: &[f64],
+    missing: &mut [(f64, Result<Orbit, OrbitError>)],
+    watch: Watch<'_>,
+) {
+    let mut start = behind.to_vec();
+    for (omega, outcome) in missing.iter_mut().rev() {
+        if watch.stop.load(Ordering::Relaxed) {
+            return;
+        }
+        match solver.orbit(*omega, Some(&start)) {
+            Ok(orbit) => {
+                start.clone_from(&orbit.start);
+                *outcome = Ok(orbit);
+            }
+            Err(_) => return,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::event_driven::EventDriven;
+
+    /// Finds nothing between the frequencies of `fold` unless it comes from above.
+    #[derive(Debug)]
+    struct Folded {
+        fold: (f64, f64),
+    }
+
+    struct FoldedSolver<'a> {
+        solver: Box<dyn Solver + Send + 'a>,
+        fold: (f64, f64),
+        last: Option<f64>,
+    }
+
+    impl Method for Folded {
+        fn name(&self) -> &'static str {
+            "folded"
+        }
+        fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+            Ok(Box::new(FoldedSolver { solver: EventDriven.solver(system)?, fold: self.fold, last: None }))
+        }
+    }
+
+    impl Solver for FoldedSolver<'_> {
+        fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+            let from_above = start.is_some() && self.last.is_some_and(|last| last > omega);
+            if omega > self.fold.0 && omega < self.fold.1 && !from_above {
+                return Err(OrbitError::NotConverged { method: "folded", omega, iterations: 1, residual: 1.0 });
+            }
+            self.last = Some(omega);
+            self.solver.orbit(omega, start)
+        }
+    }
+
+    fn outcomes(fold: (f64, f64), omegas: &[f64]) -> Vec<(f64, bool)> {
+        let system = crate::model::example::blade_couple().assemble().unwrap();
+        let watch = Watch { finished: &|| (), stop: &AtomicBool::new(false) };
+        let mut seen = Vec::new();
+        stretch(&Folded { fold }, &system, &mut omegas.iter().copied(), watch, &mut |omega, outcome| {
+            let outcome = outcome.expect("not stopped");
+            if let Ok(orbit) = outcome {
+                assert_eq!(orbit.omega, omega);
+            }
+            seen.push((omega, outcome.is_ok()));
+        })
+        .unwrap();
+        seen
+    }
+
+    #[test]
+    fn points_beyond_a_fold_are_found_from_behind_and_seen_in_order() {
+        let omegas: Vec<f64> = (0..8).map(|i| 750.0 + 5.0 * f64::from(i)).collect();
+        let found = outcomes((757.0, 773.0), &omegas);
+        assert_eq!(found, omegas.iter().map(|omega| (*omega, true)).collect::<Vec<_>>());
+        // nothing lies behind the last one
+        let lost = outcomes((777.0, 1e3), &omegas);
+        assert_eq!(lost, omegas.iter().map(|omega| (*omega, *omega < 777.0)).collect::<Vec<_>>());
+    }
 }

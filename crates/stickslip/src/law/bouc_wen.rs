@@ -15,8 +15,9 @@ use stickslip_numerics::dual::Real;
 /// The key of the exponent, to which the dimensions of beta and gamma are raised.
 const EXPONENT: &str = "exponent";
 
-/// The highest exponent: the knee is then a corner, within a thousandth of the force.
-const SHARPEST: f64 = 1000.0;
+/// The highest exponent: units are written up to the 9th power. At the corner of the bilinear loop that higher ones tend to, the force is then
+/// 0.930 of its bound; for a sharper knee there is `jenkins`.
+const SHARPEST: f64 = 9.0;
 
 /// The row of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
@@ -94,8 +95,8 @@ impl RateLaw for BoucWen {
     fn states(&self) -> usize {
         1
     }
-    fn state_under(&self, force: f64, z: &mut [f64]) -> bool {
-        z.fill((force / self.scale()).clamp(-1.0, 1.0));
+    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
+        z.fill((force[0] / self.scale()).clamp(-1.0, 1.0));
         true
     }
     #[inline]

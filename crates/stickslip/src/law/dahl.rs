@@ -59,8 +59,8 @@ impl RateLaw for Dahl {
     fn states(&self) -> usize {
         usize::from(self.limit > 0.0) // what holds nothing carries no force
     }
-    fn state_under(&self, force: f64, z: &mut [f64]) -> bool {
-        z.fill((force / self.limit).clamp(-1.0, 1.0));
+    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
+        z.fill((force[0] / self.limit).clamp(-1.0, 1.0));
         true
     }
     #[inline]

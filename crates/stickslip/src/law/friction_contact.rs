@@ -88,6 +88,12 @@ impl Law for FrictionContact {
     fn directions(&self) -> usize {
         self.tangents + 1
     }
+    fn normal(&self) -> Option<usize> {
+        Some(self.tangents)
+    }
+    fn closed(&self) -> Option<Vec<f64>> {
+        Some((0..self.tangents).map(|_| self.tangential).chain([self.normal]).collect())
+    }
     /// The slip limit at rest; infinite if there is none.
     fn scale(&self) -> f64 {
         let limit = self.friction * self.preload;

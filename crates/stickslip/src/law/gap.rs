@@ -51,6 +51,12 @@ impl Law for Gap {
     fn values(&self) -> Vec<f64> {
         vec![self.gap, self.stiffness]
     }
+    fn normal(&self) -> Option<usize> {
+        Some(0)
+    }
+    fn closed(&self) -> Option<Vec<f64>> {
+        Some(vec![self.stiffness])
+    }
     fn pieces(&self) -> Option<Vec<Piece>> {
         Some(vec![Piece::Stop { gap: self.gap, stiffness: self.stiffness }])
     }

@@ -4,7 +4,7 @@
 //! Source: Pust, Pesek, Radolfova (2015), Sec. 3, turned around the axis.
 
 use super::plane::dot;
-use super::{Jenkins, Law, LawInfo, Parameter, Rate, RateLaw, Relative};
+use super::{Coulomb2dArctan, Jenkins, Law, LawInfo, Parameter, Prox, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
@@ -64,6 +64,10 @@ impl Law for Jenkins2dArctan {
     fn rate(&self) -> Option<&dyn Rate> {
         Some(self)
     }
+    /// The slider without its spring.
+    fn prox(&self) -> Option<&dyn Prox> {
+        if self.limit > 0.0 { Some(self) } else { None }
+    }
     fn is_incrementally_passive(&self) -> bool {
         true // the spring keeps |δf|²/(2 kt), and the slider's velocity is the gradient of a convex function of the force
     }
@@ -96,15 +100,26 @@ fn even<S: Real>(square: S) -> [S; 3] {
     [gudermann, sinh / size, (size.cosh() - gudermann.recip()) / square]
 }
 
+impl Prox for Jenkins2dArctan {
+    fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
+        Coulomb2dArctan { limit: self.limit, alpha: self.alpha }.resolve(y, penalty, force, slope);
+    }
+    fn compliance(&self) -> f64 {
+        1.0 / self.stiffness
+    }
+}
+
 impl RateLaw for Jenkins2dArctan {
     #[inline]
     fn states(&self) -> usize {
         if self.limit > 0.0 { 2 } else { 0 } // a slider that holds nothing leaves its spring without force
     }
-    fn state_under(&self, force: f64, z: &mut [f64]) -> bool {
-        let share = (force / self.limit).clamp(-BELOW, BELOW);
-        z.fill(0.0);
-        z[..1].fill((share / FRAC_2_PI).tan().asinh());
+    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
+        let size = force[0].hypot(force[1]);
+        // forces beyond the limit count as just below it
+        let rho = ((size / self.limit).min(BELOW) / FRAC_2_PI).tan().asinh();
+        let share = if size > 0.0 { rho / size } else { 0.0 };
+        z.iter_mut().zip(force).for_each(|(z, force)| *z = force * share);
         true
     }
     #[inline]
@@ -129,6 +144,17 @@ impl RateLaw for Jenkins2dArctan {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_force_decides_the_state() {
+        let law = Jenkins2dArctan { stiffness: 3.0, limit: 2.0, alpha: 5.0 };
+        for force in [[0.0, 0.0], [0.5, -1.2], [1e-9, 0.0], [-1.9, 0.6]] {
+            let mut z = [0.0; 2];
+            assert!(RateLaw::state_under(&law, &force, &mut z));
+            let found = law.evaluate(&Relative::along(0.0, 0.0), &z, &mut [0.0; 2]);
+            assert!((found[0] - force[0]).abs() < 1e-12 && (found[1] - force[1]).abs() < 1e-12, "{force:?} {found:?}");
+        }
+    }
 
     #[test]
     fn series_join_the_closed_forms() {

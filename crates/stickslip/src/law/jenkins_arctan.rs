@@ -105,9 +105,9 @@ impl RateLaw for JenkinsArctan {
     fn states(&self) -> usize {
         usize::from(self.limit > 0.0) // a slider that holds nothing leaves its spring without force
     }
-    fn state_under(&self, force: f64, z: &mut [f64]) -> bool {
+    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
         // forces beyond the limit count as just below it
-        let share = (force / self.limit).clamp(-BELOW, BELOW);
+        let share = (force[0] / self.limit).clamp(-BELOW, BELOW);
         z.fill((share / FRAC_2_PI).tan().asinh());
         true
     }

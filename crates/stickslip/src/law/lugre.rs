@@ -111,8 +111,8 @@ impl RateLaw for LuGre {
     fn states(&self) -> usize {
         usize::from(self.static_limit > 0.0) // bristles that hold nothing are none
     }
-    fn state_under(&self, force: f64, z: &mut [f64]) -> bool {
-        z.fill((force / self.static_limit).clamp(-1.0, 1.0));
+    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
+        z.fill((force[0] / self.static_limit).clamp(-1.0, 1.0));
         true
     }
     #[inline]

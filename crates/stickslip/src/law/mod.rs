@@ -41,6 +41,7 @@ mod plane;
 mod prox;
 mod rate;
 mod slopes;
+mod springs;
 mod step;
 mod stribeck;
 mod stribeck_arctan;
@@ -72,6 +73,7 @@ pub use valanis::Valanis;
 
 use num_complex::Complex64;
 use serde::ser::{Serialize, SerializeMap, Serializer};
+use springs::Springs;
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -159,6 +161,14 @@ pub trait Law: Debug + Send + Sync {
     fn directions(&self) -> usize {
         1
     }
+    /// The direction along which its faces press on each other, if it knows one: that opens and closes, where the others slip.
+    fn normal(&self) -> Option<usize> {
+        None
+    }
+    /// The stiffness (N/m) along every direction while its faces stay closed and stick, of a law whose faces can part.
+    fn closed(&self) -> Option<Vec<f64>> {
+        None
+    }
     /// The size of its forces, N, for tolerances and guesses: a slip limit, or infinity if nothing bounds them.
     fn scale(&self) -> f64 {
         f64::INFINITY
@@ -243,6 +253,11 @@ impl Piece {
         Piece::Slider(Slider { stiffness, limit, static_limit: limit })
     }
 
+    /// Whether it is a slider that holds more than it carries in slip.
+    pub fn drops(&self) -> bool {
+        matches!(self, Piece::Slider(slider) if slider.static_limit > slider.limit)
+    }
+
     /// Whether it never carries a force.
     fn is_nothing(&self) -> bool {
         match self {
@@ -304,14 +319,21 @@ impl dyn Law + '_ {
         Some(law.with(STATIC_LIMIT, limit).unwrap_or(law))
     }
 
-    /// The same joint free of friction, a linear reference: its slip limit is zero. `None` if the law has no limit.
+    /// The same joint free of friction, a linear reference: its slip limit is zero, or its faces stay apart. `None` if the law has neither a
+    /// limit nor faces that part.
     pub fn free(&self) -> Option<SharedLaw> {
-        self.limited(0.0)
+        match self.closed() {
+            Some(along) => Some(Springs::shared(&vec![0.0; along.len()])),
+            None => self.limited(0.0),
+        }
     }
 
-    /// The same joint stuck, a linear reference: no force reaches its slip limit. `None` if the law has no limit.
+    /// The same joint stuck, a linear reference: no force reaches its slip limit, and its faces stay closed. `None` as for [`Self::free`].
     pub fn stuck(&self) -> Option<SharedLaw> {
-        self.limited(STUCK)
+        match self.closed() {
+            Some(along) => Some(Springs::shared(&along)),
+            None => self.limited(STUCK),
+        }
     }
 
     /// Whether the law can never carry a force: the size of its forces is zero.

@@ -182,11 +182,16 @@ pub(super) fn check(info: &LawInfo, values: &[f64]) -> Result<(), LawError> {
     Ok(())
 }
 
+/// A dimension in words; what has none is a number.
+fn measured(dimension: Dimension) -> String {
+    if dimension == Dimension::NONE { "number".to_owned() } else { dimension.to_string() }
+}
+
 /// Why a law's parameters are refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LawError {
     /// A value is out of its range.
-    #[error("{law}: `{key}` must be a finite {dimension}, {range}, found {value}")]
+    #[error("{law}: `{key}` must be a finite {}, {range}, found {value}", measured(*.dimension))]
     Value {
         /// Name of the law.
         law: &'static str,

@@ -33,8 +33,8 @@ pub trait RateLaw {
     fn state_scale(&self) -> f64 {
         1.0
     }
-    /// The states with which it carries `force` (N) along its first direction, into `z`; false if a force does not decide them.
-    fn state_under(&self, _force: f64, _z: &mut [f64]) -> bool {
+    /// The states with which it carries a `force` (N) along its directions, into `z`; false if a force does not decide them.
+    fn state_under(&self, _force: &[f64], _z: &mut [f64]) -> bool {
         false
     }
     /// Force (N) and rates at one instant. `z` and `rate` have length [`RateLaw::states`]; units belong to the law.
@@ -48,7 +48,7 @@ pub trait Rate: Debug + Send + Sync {
     /// Their size in motion, see [`RateLaw::state_scale`].
     fn state_scale(&self) -> f64;
     /// The states with which it carries a force, see [`RateLaw::state_under`].
-    fn state_under(&self, force: f64, z: &mut [f64]) -> bool;
+    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool;
     /// Force (N) and rates at one instant.
     fn value(&self, motion: &Relative<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MOST_DIRECTIONS];
     /// The same with exact derivatives, along the first `directions`.
@@ -90,7 +90,7 @@ impl<L: RateLaw + Debug + Send + Sync> Rate for L {
     fn state_scale(&self) -> f64 {
         RateLaw::state_scale(self)
     }
-    fn state_under(&self, force: f64, z: &mut [f64]) -> bool {
+    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
         RateLaw::state_under(self, force, z)
     }
     #[inline]

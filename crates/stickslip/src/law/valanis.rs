@@ -66,8 +66,7 @@ impl Law for Valanis {
     }
     /// What the force beyond the spring Et tends to in slip.
     fn scale(&self) -> f64 {
-        let (stick, slip) = (self.stiffness, self.slip_stiffness);
-        stick / self.lambda * (stick - slip) / (stick - self.kappa * slip)
+        self.stiffness / self.lambda * self.sliding()
     }
     fn rate(&self) -> Option<&dyn Rate> {
         Some(self)
@@ -83,6 +82,14 @@ impl Law for Valanis {
     }
 }
 
+impl Valanis {
+    /// The state that slip tends to and never passes.
+    fn sliding(&self) -> f64 {
+        let (stick, slip) = (self.stiffness, self.slip_stiffness);
+        (stick - slip) / (stick - self.kappa * slip)
+    }
+}
+
 impl RateLaw for Valanis {
     fn states(&self) -> usize {
         1
@@ -90,7 +97,12 @@ impl RateLaw for Valanis {
     #[inline]
     fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let (u, v, y) = (motion.displacement[0], motion.velocity[0], z[0]);
-        let knee = S::from(1.0) - y * (self.kappa * sign(v.re()));
+        let mut knee = S::from(1.0) - y * (self.kappa * sign(v.re()));
+        // beyond slip no motion leads, but iterations do: there the pole at `|y| = 1/kappa` would have them find another solution
+        let least = 1.0 - self.kappa * self.sliding();
+        if knee.re() < least {
+            knee = S::from(least);
+        }
         rate[0] = ((v - size(v) * y) / knee - v * (self.slip_stiffness / self.stiffness)) * self.lambda;
         [u * self.slip_stiffness + y * (self.stiffness / self.lambda), S::from(0.0), S::from(0.0)]
     }
@@ -111,6 +123,18 @@ mod tests {
             let q = law.lambda / law.stiffness * v.signum() * (law.slip_stiffness * u - force);
             let expected = law.stiffness * v * (1.0 + q) / (1.0 + law.kappa * q);
             assert!((found - force).abs() < 1e-14 && (slope - expected).abs() < 1e-12, "{u} {force} {v}");
+        }
+    }
+
+    #[test]
+    fn a_state_beyond_slip_comes_back() {
+        let law = Valanis { stiffness: 10.0, slip_stiffness: 2.0, lambda: 3.0, kappa: 0.98 };
+        for y in [1.0, 1.0 / 0.98, 1.1, 2.0_f64] {
+            for sign in [1.0, -1.0] {
+                let mut rate = [0.0_f64];
+                law.evaluate(&Relative::along(0.0, sign), &[sign * y], &mut rate);
+                assert!(rate[0] * sign < 0.0 && rate[0].is_finite(), "{y} {sign}: {}", rate[0]);
+            }
         }
     }
 

@@ -4,17 +4,19 @@ use super::MethodError;
 use super::drive::Drive;
 use crate::law::SharedLaw;
 use crate::model::{Axis, System};
+use crate::structure::Matrices;
 use nalgebra::DMatrix;
+use std::ops::Deref;
+use std::sync::Arc;
 
 /// Matrices, axes and laws; independent of the drive.
 #[derive(Debug, Clone)]
 pub(crate) struct Assembly {
     /// Degrees of freedom.
     pub n: usize,
-    pub mass: DMatrix<f64>,
+    /// Of the structure, shared with it.
+    matrices: Arc<Matrices>,
     pub inverse_mass: DMatrix<f64>,
-    pub damping: DMatrix<f64>,
-    pub stiffness: DMatrix<f64>,
     /// The axes of all joints, in their order.
     pub axes: Vec<Axis>,
     /// The same as columns, n × axes.
@@ -48,8 +50,16 @@ impl PlacedLaw {
     }
 }
 
+/// Mass, damping and stiffness are read as its own.
+impl Deref for Assembly {
+    type Target = Matrices;
+    fn deref(&self) -> &Matrices {
+        &self.matrices
+    }
+}
+
 impl Assembly {
-    /// `states` tells the law that a joint is followed with, the number of its states and their size; or what to use instead.
+    /// `states` tells the law that a joint is followed with, the number of its states and their size; or what is missed in it.
     ///
     /// # Errors
     /// A joint that is refused by `states`; a place without mass; a mass matrix that has no inverse.
@@ -59,19 +69,18 @@ impl Assembly {
         mut states: impl FnMut(&SharedLaw) -> Result<(SharedLaw, usize, f64), &'static str>,
     ) -> Result<Self, MethodError> {
         let (structure, n) = (system.structure(), system.dofs());
-        if let Some(i) = (0..n).find(|&i| structure.mass()[(i, i)] <= 0.0) {
-            return Err(MethodError::NeedsMass { method, place: system.places()[i].clone() });
+        if let Some(error) = MethodError::too_large(method, system) {
+            return Err(error);
+        }
+        if let Some(i) = (0..n).find(|&i| structure.own_mass(i) <= 0.0) {
+            return Err(MethodError::needs_mass(method, system, i));
         }
         let inverse_mass =
-            structure.mass().clone().try_inverse().ok_or(MethodError::NotPositive { method, matrix: "mass" })?;
+            structure.mass().clone().try_inverse().ok_or_else(|| MethodError::mass_not_positive(method))?;
         let (mut joints, mut first_axis, mut internal) = (Vec::new(), 0, 0);
         for joint in system.joints() {
-            let (law, count, state_scale) = states(joint.law()).map_err(|instead| MethodError::Law {
-                method,
-                joint: joint.name().to_owned(),
-                law: joint.law().name(),
-                instead,
-            })?;
+            let (law, count, state_scale) =
+                states(joint.law()).map_err(|misses| MethodError::law(method, joint, misses))?;
             let directions = joint.axes().len();
             joints.push(PlacedLaw { law, first_axis, directions, first_state: internal, states: count, state_scale });
             first_axis += directions;
@@ -80,10 +89,8 @@ impl Assembly {
         let axes: Vec<_> = system.axes().map(|(_, axis)| axis.dense(n)).collect();
         Ok(Assembly {
             n,
-            mass: structure.mass().clone(),
+            matrices: structure.full().clone(),
             inverse_mass,
-            damping: structure.damping().clone(),
-            stiffness: structure.stiffness().clone(),
             axes: system.axes().map(|(_, axis)| axis.clone()).collect(),
             directions: DMatrix::from_fn(n, first_axis, |row, axis| axes[axis][row]),
             joints,
@@ -107,9 +114,10 @@ impl Assembly {
     pub fn accelerate(&self, state: &[f64], left: &mut [f64], force: &[f64], out: &mut [f64]) {
         let n = self.n;
         let (x, v) = state.split_at(n);
+        let Matrices { stiffness, damping, .. } = &*self.matrices;
         for i in 0..n {
             for k in 0..n {
-                left[i] -= self.stiffness[(i, k)] * x[k] + self.damping[(i, k)] * v[k];
+                left[i] -= stiffness[(i, k)] * x[k] + damping[(i, k)] * v[k];
             }
         }
         for (axis, force) in self.axes.iter().zip(force) {
@@ -122,10 +130,27 @@ impl Assembly {
         }
     }
 
-    /// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia, internal states with the scale of the
-    /// motion, `rest` (√J).
-    pub fn weights(&self, omega: f64, rest: f64) -> Vec<f64> {
-        let n = self.n;
+    /// The largest acceleration that forces along the axes give to the masses, m/s².
+    pub fn pushed(&self, force: &[f64]) -> f64 {
+        let on_masses = &self.directions * nalgebra::DVectorView::from_slice(force, force.len());
+        if self.n == 0 { 0.0 } else { (&self.inverse_mass * on_masses).amax() }
+    }
+
+    /// The excitation at `omega` (rad/s) along the axes; at zero only constant forces are left.
+    pub fn drive(&self, system: &System, omega: f64) -> Drive {
+        let axes: Vec<usize> = (0..self.axes.len()).collect();
+        Drive::at(system, &axes, omega)
+    }
+
+    /// Square root of an energy that the loads can give, √J.
+    pub fn energy_scale(&self, drive: &Drive) -> f64 {
+        drive.energy_scale(&self.mass, &self.stiffness)
+    }
+
+    /// Weights of the energy norm under a drive: each displacement with the larger of its stiffness and its inertia, internal states with the
+    /// scale of the motion.
+    pub fn weights(&self, drive: &Drive) -> Vec<f64> {
+        let (n, omega, rest) = (self.n, drive.omega, NEAR_REST * self.energy_scale(drive));
         let mut weights = vec![1.0; self.states()];
         for i in 0..n {
             let inertia = omega * omega * self.mass[(i, i)];
@@ -148,7 +173,7 @@ impl Assembly {
         let x = state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs()));
         let v = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
         let mobility = if n == 0 { 0.0 } else { self.inverse_mass.amax().sqrt() };
-        let loads = drive.energy_scale(&self.mass, &self.stiffness) * mobility;
+        let loads = self.energy_scale(drive) * mobility;
         let velocity = v.max(x * rate).max(drive.imposed_velocity()).max(NEAR_REST * loads).max(f64::MIN_POSITIVE);
         (velocity / rate, velocity)
     }

@@ -10,8 +10,10 @@ use super::followed::{self, Kind};
 use super::incremental::flow::IncrementalFlow;
 use super::periodic::norm;
 use crate::model::System;
+use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// Degrees of freedom up to which orbits are judged without being asked: the return map is dense, and its cost grows with the cube.
 const LARGEST: usize = 24;
@@ -19,6 +21,8 @@ const LARGEST: usize = 24;
 const JOINTS: usize = 12;
 /// Relative error per step of the integration of smooth laws.
 const TOLERANCE: f64 = 1e-8;
+/// Returns after which a motion is near the one that it comes to.
+const APPROACH: usize = 60;
 /// Equal steps per return for laws that know only steps: they follow the motion to about 1e-6.
 const STEPS: usize = 4096;
 
@@ -65,6 +69,26 @@ impl Judge {
     /// Whether stability is proven.
     pub fn proves(&self) -> bool {
         self.proven
+    }
+
+    /// The motion to which one from `start` comes after a while, over one period; `None` where no flow follows the system, or where all motions come
+    /// to those that repeat with the drive, because none of two separate.
+    pub fn approach(&mut self, system: &System, omega: f64, mut start: Vec<f64>) -> Option<Arc<dyn Path>> {
+        let flow = self.flow.as_mut().filter(|_| !self.proven)?;
+        let period = TAU / omega;
+        flow.set_drive(system, omega);
+        start.resize(flow.states(), 0.0);
+        for _ in 0..APPROACH {
+            flow.run(&mut start, period, None).ok()?;
+            if start.iter().any(|z| !z.is_finite()) {
+                return None;
+            }
+        }
+        flow.keep(true);
+        let run = flow.run(&mut start, period, None);
+        flow.keep(false);
+        run.ok()?;
+        Some(flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period))
     }
 
     /// Follows the return, over the half period if `odd`, from the state at t = 0, which begins with `start`.

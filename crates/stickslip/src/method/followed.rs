@@ -74,7 +74,7 @@ mod tests {
     use crate::method::shooting::Shooting;
     use crate::method::{Method, event_driven, settling::Settling};
     use crate::model::Axis;
-    use crate::orbit::Orbit;
+    use crate::orbit::{Orbit, Symmetry};
     use crate::structure::Structure;
     use nalgebra::DMatrix;
     use nalgebra::{DVector, dmatrix};
@@ -340,6 +340,40 @@ mod tests {
         let largest = |orbit: &Orbit| orbit.multipliers().unwrap()[0].norm();
         // in the exact system the motion returns after half a period, in the other after a whole one
         near(largest(&orbit), largest(&exact), 1e-3);
+    }
+
+    /// A transient in equal steps goes as the exact one: at the ends of the periods, within the error of a period each, and between them.
+    #[test]
+    fn transients_in_equal_steps_go_as_the_exact_one() {
+        let along = |row: usize| vec![Axis::new(vec![(row, 1.0)])];
+        let jenkins = |stiffness, limit| -> SharedLaw { Arc::new(Jenkins { stiffness, limit }) };
+        let stop: SharedLaw = Arc::new(Gap { gap: 0.4, stiffness: 2.0 });
+        let system = system(&[(jenkins(4.0, 0.3), along(0)), (jenkins(1.5, 0.6), along(1)), (stop, along(1))]);
+        let shared = Arc::new(system.clone());
+        let omega = 1.3;
+        let period = TAU / omega;
+        let mut exact = of(&system, None, 1e-9, "test").unwrap();
+        let mut steps = IncrementalFlow::new(&system, None, "test").unwrap();
+        let mut states = [vec![0.0; exact.states()], vec![0.0; steps.states()]];
+        exact.set_drive(&system, omega);
+        steps.set_drive(&system, omega);
+        steps.keep(true);
+        for cycle in 1..=12 {
+            exact.follow(&mut states[0], period).unwrap();
+            steps.follow(&mut states[1], period).unwrap();
+            assert!(steps.count <= 4096, "{} steps", steps.count);
+            let size = states[0].iter().fold(0.0, |a: f64, z| a.max(z.abs()));
+            for (a, b) in states[0].iter().zip(&states[1]) {
+                assert!((a - b).abs() < 1e-6 * f64::from(cycle) * size, "{cycle}: {states:?}");
+            }
+            let paths =
+                [exact.path(&shared, Symmetry::FullPeriod, period), steps.path(&shared, Symmetry::FullPeriod, period)];
+            for i in 0..50 {
+                let [a, b] = [0, 1].map(|k| paths[k].sample(period * (f64::from(i) + 0.3) / 50.0));
+                assert!((a.displacement[0] - b.displacement[0]).abs() < 2e-6 * f64::from(cycle) * size);
+                assert!((a.velocity[1] - b.velocity[1]).abs() < 2e-5 * f64::from(cycle) * size);
+            }
+        }
     }
 
     #[test]

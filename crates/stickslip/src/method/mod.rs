@@ -15,17 +15,21 @@ mod guess;
 pub mod harmonic_balance;
 mod incremental;
 mod periodic;
+mod relaxed;
 pub mod settling;
 pub mod shooting;
 mod smooth;
 mod stepped;
 pub mod transient;
+mod ways;
 
 use crate::dimension::Dimension;
-use crate::model::System;
+use crate::model::{System, SystemJoint};
 use crate::orbit::Orbit;
 pub use crate::orbit::{Breakdown, OrbitError};
+use crate::structure::MOST_IN_FULL;
 use std::collections::BTreeMap;
+pub use ways::Ways;
 
 /// Turns systems into orbits.
 pub trait Method: Send + Sync + std::fmt::Debug {
@@ -42,8 +46,15 @@ pub trait Method: Send + Sync + std::fmt::Debug {
     /// Prepares for one system.
     ///
     /// # Errors
-    /// The system is none that this method can take: [`MethodError`] names the joint or place and what to use instead.
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError>;
+    /// The system is none that this method can take: [`MethodError`] names the joint or place, and what the method misses.
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError>;
+    /// The same for who is to be told what to use instead.
+    ///
+    /// # Errors
+    /// As [`Method::prepare`], with the methods that take the system.
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        self.prepare(system).map_err(|error| error.with_ways(system))
+    }
 }
 
 /// The method that finds the orbits of a system.
@@ -86,7 +97,7 @@ pub trait Solver {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MethodError {
     /// A law lacks the view that the method needs.
-    #[error("{method} cannot take the law `{law}` of joint `{joint}`; use {instead}")]
+    #[error("{method} cannot take the law `{law}` of joint `{joint}`: {misses}{}", .ways.behind())]
     Law {
         /// The method.
         method: &'static str,
@@ -94,24 +105,42 @@ pub enum MethodError {
         joint: String,
         /// Its law.
         law: &'static str,
+        /// What the method misses in it.
+        misses: &'static str,
         /// What to use instead.
-        instead: &'static str,
+        ways: Box<Ways>,
     },
     /// A place has no mass.
-    #[error("{method} needs a mass above zero at `{place}`; for a massless contact point use the law `jenkins`")]
+    #[error("{method} needs a mass above zero at `{place}` (the law `jenkins` stands for a spring, a massless place and a slider){}", .ways.behind())]
     NeedsMass {
         /// The method.
         method: &'static str,
         /// The place.
         place: String,
+        /// What to use instead.
+        ways: Box<Ways>,
+    },
+    /// More degrees of freedom than the method's full matrices may have.
+    #[error("{method} carries full matrices over at most {most} places, and there are {dofs}{}", .ways.behind())]
+    TooLarge {
+        /// The method.
+        method: &'static str,
+        /// Degrees of freedom of the system.
+        dofs: usize,
+        /// Most that the method takes.
+        most: usize,
+        /// What to use instead.
+        ways: Box<Ways>,
     },
     /// A matrix is not positive definite.
-    #[error("{method} needs a positive definite {matrix} matrix")]
+    #[error("{method} needs a positive definite {matrix} matrix{}", .ways.behind())]
     NotPositive {
         /// The method.
         method: &'static str,
         /// Which matrix.
         matrix: &'static str,
+        /// What to use instead.
+        ways: Box<Ways>,
     },
     /// An option has an impossible value.
     #[error("option `{key}` of {method}: {message}")]
@@ -123,6 +152,66 @@ pub enum MethodError {
         /// What is expected.
         message: String,
     },
+}
+
+impl MethodError {
+    /// `method` misses something in the law of a joint.
+    pub fn law(method: &'static str, joint: &SystemJoint, misses: &'static str) -> Self {
+        let (joint, law) = (joint.name().to_owned(), joint.law().name());
+        MethodError::Law { method, joint, law, misses, ways: Box::default() }
+    }
+
+    /// `method` needs a mass where a system has none.
+    pub(crate) fn needs_mass(method: &'static str, system: &System, place: usize) -> Self {
+        MethodError::NeedsMass { method, place: system.places()[place].clone(), ways: Box::default() }
+    }
+
+    /// `method` carries full matrices: whether those of a system are too large for it.
+    pub(crate) fn too_large(method: &'static str, system: &System) -> Option<Self> {
+        let (dofs, most) = (system.dofs(), MOST_IN_FULL);
+        (dofs > most).then(|| MethodError::TooLarge { method, dofs, most, ways: Box::default() })
+    }
+
+    /// `method` needs a positive definite mass matrix.
+    pub(crate) fn mass_not_positive(method: &'static str) -> Self {
+        MethodError::NotPositive { method, matrix: "mass", ways: Box::default() }
+    }
+
+    /// What to use instead; `None` where another value of an option is all that is needed.
+    pub fn ways(&self) -> Option<&Ways> {
+        match self {
+            MethodError::Law { ways, .. }
+            | MethodError::NeedsMass { ways, .. }
+            | MethodError::TooLarge { ways, .. }
+            | MethodError::NotPositive { ways, .. } => Some(&**ways),
+            MethodError::Option { .. } => None,
+        }
+    }
+
+    /// The same refusal of this system, with the methods that take it.
+    #[must_use]
+    pub fn with_ways(self, system: &System) -> MethodError {
+        self.with(Ways::of(system))
+    }
+
+    /// The same refusal, without what to use instead.
+    #[must_use]
+    pub fn alone(self) -> MethodError {
+        self.with(Ways::default())
+    }
+
+    fn with(mut self, instead: Ways) -> MethodError {
+        match &mut self {
+            MethodError::Law { ways, .. }
+            | MethodError::NeedsMass { ways, .. }
+            | MethodError::TooLarge { ways, .. }
+            | MethodError::NotPositive { ways, .. } => {
+                **ways = instead;
+            }
+            MethodError::Option { .. } => {}
+        }
+        self
+    }
 }
 
 /// An option of a method: a key in `[method]`.
@@ -150,6 +239,9 @@ const PERIOD: MethodOption = MethodOption {
 fn periods(options: &Options) -> usize {
     options.get(PERIOD.key).map_or(1, |periods| *periods as usize)
 }
+
+/// The key of the velocity over which exact laws are smoothed, of the methods that can do so.
+pub const WIDTH: &str = "width";
 
 /// Options of a method that were given, by key, SI.
 pub type Options = BTreeMap<String, f64>;

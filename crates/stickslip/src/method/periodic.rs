@@ -95,11 +95,31 @@ impl Search {
     }
 }
 
+/// Returns by which a motion comes near an orbit that repeats after several periods, before Newton's method begins: it would find one that
+/// repeats after one period first.
+const APPROACH: usize = 60;
+
+/// The state to which one comes by itself after a while.
+pub(crate) fn approached(map: &mut dyn ReturnMap, mut state: Vec<f64>, sign: f64) -> Vec<f64> {
+    for _ in 0..APPROACH {
+        let mut next = state.clone();
+        if map.returned(&mut next, None).is_err() || next.iter().any(|z| !z.is_finite()) {
+            break;
+        }
+        state = next.iter().map(|z| sign * z).collect();
+    }
+    state
+}
+
 /// Returns over which the rate of decay is measured: beats of neighbouring modes average out.
 const DECAY_WINDOW: usize = 256;
+/// The first, short window, and by how much windows grow: who has died early is not waited for. Beats do not average out over it, so that the
+/// derivative of the return is asked too.
+const FIRST_WINDOW: usize = 8;
 
 /// Iterates the return map. "The period changed by little" proves nothing where a motion creeps: with the decay rate `ρ` per return, measured
-/// over a window, a change `d` leaves about `d ρ / (1 - ρ)` to go, and that is what must be small.
+/// over a window, a change `d` leaves about `d ρ / (1 - ρ)` to go, and that is what must be small. Windows grow up to [`DECAY_WINDOW`]; what a
+/// shorter one says must also be what the derivative of the return says, which knows of beats and of creeping.
 fn settle(
     map: &mut dyn ReturnMap,
     start: &[f64],
@@ -110,8 +130,8 @@ fn settle(
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     let n = start.len();
     let mut state = start.to_vec();
-    let mut sums = Vec::new(); // changes summed over windows
-    let (mut sum, mut smallest) = (0.0, f64::INFINITY);
+    let mut changes = Vec::new(); // of every return, relative to the state
+    let mut smallest = f64::INFINITY;
     for count in 1..=returns {
         let before = state.clone();
         map.returned(&mut state, None).map_err(broke)?;
@@ -123,25 +143,39 @@ fn settle(
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
         let residual = norm(map.weights(), &change) / size;
         smallest = f64::min(smallest, residual);
-        sum += residual;
-        if count % DECAY_WINDOW != 0 {
-            continue;
-        }
-        sums.push(std::mem::take(&mut sum));
-        let [.., earlier, last] = sums[..] else { continue };
+        changes.push(residual);
+        let Some(window) = window(count) else { continue };
+        let of = |last: usize| changes[count - last - window..count - last].iter().sum::<f64>();
+        let (earlier, last) = (of(window), of(0));
         // the decay of a whole window; all later windows together move the state by a geometric series of this one
         let decay: f64 = if earlier > 0.0 { last / earlier } else { 0.0 };
-        let missing = if decay < 1.0 { last * decay / (1.0 - decay) } else { f64::INFINITY };
-        let at_rounding = last <= DECAY_WINDOW as f64 * ROUNDING;
-        if at_rounding || missing <= tolerance {
-            let mut derivative = DMatrix::identity(n, n);
-            let gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
-            let residual = norm(map.weights(), gap.as_slice()) / size;
-            let missing = if at_rounding { ROUNDING } else { missing };
-            return Ok(Closed { state, derivative, residual, iterations: count, missing: Some(missing) });
+        let mut missing = if decay < 1.0 { last * decay / (1.0 - decay) } else { f64::INFINITY };
+        let at_rounding = last <= window as f64 * ROUNDING;
+        if !at_rounding && (missing.is_nan() || missing > tolerance) {
+            continue;
         }
+        let mut derivative = DMatrix::identity(n, n);
+        let gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
+        if window < DECAY_WINDOW && !at_rounding {
+            let to_go = newton_step(&derivative, &gap, aim.sign, map.weights());
+            missing = missing.max(norm(map.weights(), to_go.as_slice()) / size);
+            if missing.is_nan() || missing > tolerance {
+                continue;
+            }
+        }
+        let residual = norm(map.weights(), gap.as_slice()) / size;
+        let missing = if at_rounding { ROUNDING } else { missing };
+        return Ok(Closed { state, derivative, residual, iterations: count, missing: Some(missing) });
     }
     Err(OrbitError::NotConverged { method: aim.method, omega: aim.omega, iterations: returns, residual: smallest })
+}
+
+/// The window over which the decay is measured after so many returns: half of them while they are few, and then every [`DECAY_WINDOW`].
+fn window(count: usize) -> Option<usize> {
+    if count >= 2 * DECAY_WINDOW {
+        return count.is_multiple_of(DECAY_WINDOW).then_some(DECAY_WINDOW);
+    }
+    count.is_multiple_of(2 * FIRST_WINDOW).then_some(count / 2)
 }
 
 /// A change per return below this is rounding.

@@ -1,14 +1,15 @@
 //! Brute force: the motion is followed until its transient has died.
 //!
-//! Exact laws are followed by events, smooth ones by stiff integration, others and mixtures in equal steps. What is still missing when the search stops is estimated from the
-//! measured decay and reported as the orbit's truncation: a lightly damped structure needs hundreds of periods per digit, and a smooth law
-//! creeps for seconds. It needs no derivative and no luck, so it is an independent check of the other methods.
+//! Exact laws are followed by events, smooth ones by stiff integration, others and mixtures in equal steps. What is still missing when the search
+//! stops is estimated from the measured decay, and from the derivative of a return where the decay was measured over few, and reported as the
+//! orbit's truncation: a lightly damped structure needs hundreds of periods per digit, and a smooth law creeps for seconds. Which orbit that is,
+//! nothing but time tells, so it is an independent check of the other methods; in equal steps Newton's method then finds it again in finer ones.
 
 use super::event_driven::Exact;
 use super::followed::Kind;
 use super::periodic::Search;
 use super::shooting::{Shooter, Shooting};
-use super::{Method, MethodError, MethodInfo, MethodOption, PERIOD, Solver, periods};
+use super::{Method, MethodError, MethodInfo, MethodOption, PERIOD, Solver, WIDTH, periods};
 use crate::dimension::Dimension;
 use crate::model::System;
 
@@ -37,7 +38,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             doc: "periods after which the search is given up; 50000 when absent",
         },
         MethodOption {
-            key: "width",
+            key: WIDTH,
             dimension: Dimension::VELOCITY,
             count: false,
             doc: "replaces exact laws by smooth ones that change sign over this velocity; exact laws are followed exactly when absent",
@@ -51,7 +52,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             return Err(MethodError::Option { method: NAME, key: "tolerance", message });
         }
         let most = options.get("periods").map_or(PERIODS, |periods| *periods as usize);
-        let (width, period) = (options.get("width").copied(), periods(options));
+        let (width, period) = (options.get(WIDTH).copied(), periods(options));
         Ok(Box::new(Settling { tolerance, periods: most, width, period }))
     },
 };
@@ -89,7 +90,7 @@ impl Method for Settling {
     fn name(&self) -> &'static str {
         NAME
     }
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         let returns = self.periods.div_ceil(self.period);
         let search = Search::Settle { tolerance: self.tolerance, returns };
         if Kind::of(system, self.width) == Kind::Exact {

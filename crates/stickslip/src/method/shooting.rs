@@ -10,14 +10,15 @@ use super::flow::Flow;
 use super::followed::Kind;
 use super::guess::Guess;
 use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
-use super::periodic::{Aim, Closed, ReturnMap, Search, close, newton_step, norm};
+use super::periodic::{Aim, Closed, ReturnMap, Search, approached, close, newton_step, norm};
+use super::relaxed::{Closing, Spring, relaxed};
 use super::smooth::flow::SmoothFlow;
 use super::stepped::SteppedPath;
-use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, periods};
+use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, WIDTH, periods};
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::measure::measure;
-use crate::orbit::{Accuracy, Evidence, Orbit, Symmetry};
+use crate::orbit::{Accuracy, Evidence, Orbit, Symmetry, history};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -42,9 +43,13 @@ const ENERGY_GAP: f64 = 1e-5;
 const EQUAL_STEPS: f64 = 1e3;
 /// Residual at which an orbit in equal steps is closed.
 const CLOSED_STEPS: f64 = 1e-10;
-/// Returns by which a motion comes near an orbit that repeats after several periods, before Newton's method begins: it would find one that
-/// repeats after one period first.
-const APPROACH: usize = 60;
+/// Relative error per step, and distance to the orbit, with which a motion is waited for at first: no digits are needed on the way.
+const COARSE: f64 = 1e-5;
+/// Returns for which it is waited so. What is not near the orbit by then is followed as exactly as the orbit from the start.
+const COARSE_RETURNS: usize = 1024;
+/// Orbits in steps of twice the length differ by less than this share of the motion where they are the same one: 256 steps of a period err by 1e-3
+/// at a Q of ten, and in proportion to it.
+const NEIGHBOUR: f64 = 0.1;
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -58,7 +63,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             doc: "relative error per step of the integration, a thousandth of that of orbits in equal steps; 1e-8 when absent",
         },
         MethodOption {
-            key: "width",
+            key: WIDTH,
             dimension: Dimension::VELOCITY,
             count: false,
             doc: "replaces exact laws by smooth ones that change sign over this velocity; exact laws are refused when absent",
@@ -71,7 +76,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             let message = format!("must lie between 1e-13 and 1e-3, found {tolerance}");
             return Err(MethodError::Option { method: NAME, key: "tolerance", message });
         }
-        Ok(Box::new(Shooting { tolerance, width: options.get("width").copied(), period: periods(options) }))
+        Ok(Box::new(Shooting { tolerance, width: options.get(WIDTH).copied(), period: periods(options) }))
     },
 };
 
@@ -108,7 +113,7 @@ impl Method for Shooting {
     fn name(&self) -> &'static str {
         NAME
     }
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         Ok(Box::new(Shooter::new(system, *self, NAME, Search::Newton)?))
     }
 }
@@ -168,6 +173,25 @@ impl ReturnMap for Shooter<'_> {
     }
 }
 
+impl Closing for Shooter<'_> {
+    fn springs(&self) -> Vec<Spring> {
+        match &self.stepping {
+            Stepping::Smooth(_) => Vec::new(),
+            Stepping::Incremental(flow) => flow.springs(),
+        }
+    }
+    fn limit(&mut self, springs: &[Spring]) {
+        if let Stepping::Incremental(flow) = &mut self.stepping {
+            flow.limit(springs);
+        }
+    }
+    fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError> {
+        self.record(&closed)?;
+        let symmetry = self.search.symmetry(self.system, self.periods);
+        Ok(self.orbit_of(self.omega, symmetry, closed))
+    }
+}
+
 impl<'a> Shooter<'a> {
     /// # Errors
     /// A law that no integration takes, a place without mass.
@@ -203,19 +227,6 @@ impl<'a> Shooter<'a> {
         state
     }
 
-    /// A state near a motion of several periods: that to which the first guess comes by itself.
-    fn approached(&mut self, omega: f64, sign: f64) -> Vec<f64> {
-        let mut state = self.first_state(omega);
-        for _ in 0..APPROACH {
-            let mut next = state.clone();
-            if self.returned(&mut next, None).is_err() || next.iter().any(|z| !z.is_finite()) {
-                break;
-            }
-            state = next.iter().map(|z| sign * z).collect();
-        }
-        state
-    }
-
     fn broke(&self, omega: f64) -> impl Fn(Breakdown) -> OrbitError {
         let method = self.name;
         move |cause| OrbitError::Breakdown { method, omega, cause }
@@ -225,9 +236,14 @@ impl<'a> Shooter<'a> {
     fn smooth_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
         let search = self.search;
         self.freeze(false);
-        if search != Search::Newton {
+        if let Search::Settle { tolerance, returns } = search {
+            let fine = self.set_tolerance(self.tolerance.max(COARSE));
+            let coarsely = Search::Settle { tolerance: tolerance.max(COARSE), returns: returns.min(COARSE_RETURNS) };
+            let near = coarsely.find(self, start, |shooter| shooter.first_state(aim.omega), aim);
+            self.set_tolerance(fine);
+            let near = near.ok().map(|near| near.state);
             // a settled motion is left as it is: nothing but time has found it
-            let closed = search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
+            let closed = search.find(self, near.as_deref().or(start), |shooter| shooter.first_state(aim.omega), aim)?;
             self.record(&closed)?;
             return Ok(closed);
         }
@@ -303,6 +319,14 @@ impl<'a> Shooter<'a> {
         }
     }
 
+    /// Sets the relative error per step; returns what it was.
+    fn set_tolerance(&mut self, tolerance: f64) -> f64 {
+        match &mut self.stepping {
+            Stepping::Smooth(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
+            Stepping::Incremental(_) => self.tolerance,
+        }
+    }
+
     fn set_count(&mut self, count: usize) {
         if let Stepping::Incremental(flow) = &mut self.stepping {
             flow.count = count;
@@ -331,10 +355,11 @@ impl<'a> Shooter<'a> {
             count *= 2;
             self.set_count(count);
             let state = coarse.state.clone();
-            let fine = search.find(self, Some(&state), |shooter| shooter.first_state(aim.omega), aim)?;
-            let change: Vec<f64> = fine.state.iter().zip(&coarse.state).map(|(a, b)| a - b).collect();
-            let size = norm(&self.weights, &fine.state).max(aim.rest).max(f64::MIN_POSITIVE);
-            let last = norm(&self.weights, &change) / size;
+            let fine = match self.refined(&coarse, aim) {
+                Some(fine) => fine,
+                None => search.find(self, Some(&state), |shooter| shooter.first_state(aim.omega), aim)?,
+            };
+            let last = self.apart(&fine.state, &coarse.state, aim);
             let error = estimate(earlier, last);
             let iterations = coarse.iterations + fine.iterations;
             if error <= tolerance {
@@ -351,11 +376,27 @@ impl<'a> Shooter<'a> {
         }
     }
 
+    /// The orbit to which a motion has settled, in finer steps: Newton's method takes it there, and not to another one.
+    fn refined(&mut self, settled: &Closed, aim: Aim) -> Option<Closed> {
+        if self.search == Search::Newton {
+            return None;
+        }
+        let fine = close(self, &settled.state, aim).ok()?;
+        (self.apart(&fine.state, &settled.state, aim) <= NEIGHBOUR).then_some(fine)
+    }
+
+    /// Distance of two states, relative to the first.
+    fn apart(&self, state: &[f64], other: &[f64], aim: Aim) -> f64 {
+        let change: Vec<f64> = state.iter().zip(other).map(|(a, b)| a - b).collect();
+        norm(&self.weights, &change) / self.size(state, aim)
+    }
+
     /// Puts the orbit together from its last, kept run.
     fn orbit_of(&self, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
         let period = self.periods as f64 * std::f64::consts::TAU / omega;
         let path = self.stepping.path(&self.shared, symmetry, period);
         let Ok(measured) = measure(self.system, &path, omega, (symmetry, period));
+        let laws = self.stepping.assembly().joints.iter().map(|joint| &joint.law);
         Orbit {
             method: self.name,
             omega,
@@ -364,12 +405,13 @@ impl<'a> Shooter<'a> {
             start: closed.state,
             evidence: Evidence {
                 residual: closed.residual,
-                energy_gap: measured.energy_gap(),
+                energy_gap: measured.energy_gap(0.0),
                 switches: measured.joints.iter().map(|joint| joint.switches).sum(),
                 iterations: closed.iterations,
                 truncation: closed.missing,
                 accuracy: Accuracy::Converged,
                 return_defect: Some(closed.residual),
+                history: history(laws, &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
             },
             places: measured.places,
@@ -397,13 +439,14 @@ impl Solver for Shooter<'_> {
         self.omega = omega;
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
         let aim = Aim { method: self.name, omega, residual: NEAR, sign, rest };
-        let approached;
+        let near;
         let known = start.filter(|state| state.len() == self.weights.len());
         let start = if self.periods > 1 && known.is_none() {
             self.freeze(false);
             self.set_count(FIRST * self.periods);
-            approached = self.approached(omega, sign);
-            Some(approached.as_slice())
+            let first = self.first_state(omega);
+            near = approached(self, first, sign);
+            Some(near.as_slice())
         } else {
             known
         };
@@ -411,7 +454,11 @@ impl Solver for Shooter<'_> {
             Stepping::Smooth(_) => self.smooth_orbit(start, aim)?,
             Stepping::Incremental(_) => self.stepped_orbit(start, aim)?,
         };
-        let orbit = self.orbit_of(omega, symmetry, closed);
+        let mut orbit = self.orbit_of(omega, symmetry, closed);
+        if self.search == Search::Newton {
+            let system = self.system;
+            orbit = relaxed(self, system, orbit, Aim { residual: CLOSED_STEPS, ..aim });
+        }
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
             return Err(OrbitError::Evidence { method: self.name, omega, energy_gap: orbit.evidence.energy_gap });

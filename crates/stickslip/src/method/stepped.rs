@@ -4,7 +4,7 @@ use super::assembly::Assembly;
 use super::drive::Drive;
 use crate::law::{Contact, Relative};
 use crate::model::System;
-use crate::orbit::measure::{Signals, extremes};
+use crate::orbit::measure::{Signals, Slip, extremes};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
 use num_complex::Complex64;
 use std::convert::Infallible;
@@ -46,11 +46,34 @@ pub(crate) struct Node {
     pub contact: Vec<Contact>,
 }
 
+/// What two solutions of second order, the finer one in half the steps, say of the limit: `fine + (fine - coarse) / 3`, into `coarse`.
+pub(crate) fn extrapolate(coarse: &mut [f64], fine: &[f64]) {
+    coarse.iter_mut().zip(fine).for_each(|(coarse, fine)| *coarse = fine + (fine - *coarse) / 3.0);
+}
+
 impl Steps {
     pub fn clear(&mut self) {
         self.spans.clear();
         self.instants.clear();
         self.values.clear();
+    }
+
+    /// The record of a run in steps of this length with what one in halves of them, `fine`, says of their error.
+    pub fn extrapolated(mut self, fine: &Steps) -> Steps {
+        for (i, instant) in self.instants.iter_mut().enumerate() {
+            let fine = &fine.instants[2 * i];
+            extrapolate(&mut instant.state, &fine.state);
+            extrapolate(&mut instant.acceleration, &fine.acceleration);
+            extrapolate(&mut instant.force, &fine.force);
+        }
+        for (i, node) in self.values.iter_mut().enumerate() {
+            let fine = &fine.values[2 * i + 1]; // at the end of the same step
+            extrapolate(&mut node.state, &fine.state);
+            extrapolate(&mut node.velocity, &fine.velocity);
+            extrapolate(&mut node.force, &fine.force);
+            node.contact.clone_from(&fine.contact);
+        }
+        self
     }
 
     /// Time and weight of a node, s.
@@ -279,7 +302,7 @@ impl Signals for SteppedPath {
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(|step| self.relative_ends(step, axis)))
     }
-    fn slip(&self, joint: usize) -> (f64, usize) {
+    fn slip(&self, joint: usize) -> Slip {
         // both sums run in one order, so that a joint that always slips has a share of exactly one
         let time = |counts: &dyn Fn(&Node) -> bool| -> f64 {
             let nodes = self.steps.values.iter().enumerate();
@@ -295,6 +318,6 @@ impl Signals for SteppedPath {
             let before = if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last };
             switches += usize::from(before != at_end(0));
         }
-        (share, switches)
+        Slip { share, switches, rests: self.steps.values.iter().all(|node| node.contact[joint] == Contact::Stick) }
     }
 }

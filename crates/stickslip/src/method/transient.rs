@@ -3,6 +3,7 @@
 //! Exact laws are followed by events, smooth laws by stiff integration, others and mixtures in equal steps, all in stretches of one drive
 //! period. In a run-up every cycle has its own frequency, constant over the cycle and continuous in phase, as in a stepped-sine test.
 
+use super::flow::Flow;
 use super::{Breakdown, MethodError, followed};
 use crate::model::System;
 use crate::orbit::{Sample, Symmetry};
@@ -99,7 +100,7 @@ impl Transient {
         sample: &mut dyn FnMut(f64, f64, &Sample) -> bool,
     ) -> Result<(), TransientError> {
         let shared = Arc::new(system.clone());
-        let mut flow = followed::of(system, self.width, TOLERANCE, NAME)?;
+        let mut flow = Transient::flow(system, self.width)?;
         flow.keep(true);
         let mut state = [self.displacement.as_slice(), &self.velocity].concat();
         state.resize(flow.states(), 0.0);
@@ -109,6 +110,8 @@ impl Transient {
         while next <= samples {
             let omega = self.frequency(begin);
             let length = if omega > 0.0 { TAU / omega } else { STRETCH as f64 * self.step };
+            // of a cycle that outlasts the motion only what is asked for
+            let length = if length > self.duration { self.duration + self.step } else { length };
             flow.set_drive(system, omega);
             flow.follow(&mut state, length).map_err(|cause| TransientError::Breakdown { time: begin, cause })?;
             let path = flow.path(&shared, Symmetry::FullPeriod, length);
@@ -123,6 +126,18 @@ impl Transient {
             begin = end;
         }
         Ok(())
+    }
+
+    /// Whether such motions of a system can be followed, with laws smoothed over `width` (m/s) if it is given.
+    ///
+    /// # Errors
+    /// [`MethodError`], as [`Transient::run`].
+    pub fn check(system: &System, width: Option<f64>) -> Result<(), MethodError> {
+        Transient::flow(system, width).map(drop)
+    }
+
+    fn flow(system: &System, width: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
+        followed::of(system, width, TOLERANCE, NAME).map_err(|error| error.with_ways(system))
     }
 
     /// Drive frequency of the cycle that begins at `time`: of a run-up the one with which the cycle ends when that of the frequency that
@@ -154,7 +169,45 @@ impl Transient {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Force, GROUND, Mass, Model, Spring};
+    use crate::law::{FrictionContact, SharedLaw};
+    use crate::model::{Axis, Force, GROUND, Mass, Model, Spring};
+    use crate::structure::Structure;
+    use nalgebra::dmatrix;
+
+    /// A contact that is pressed before anything moves sets off from rest. While it stays closed and its tangent is not moved, its normal is
+    /// a spring: `x = x₀ (1 - cos ωt)` with `x₀ = preload/(k + kn)` about the static position.
+    #[test]
+    fn a_pressed_contact_sets_off_from_rest() {
+        let (mass, k, kn, preload) = (2.0, 3e4, 5e3, 40.0);
+        let law: SharedLaw =
+            Arc::new(FrictionContact { tangential: 1e3, normal: kn, friction: 0.3, preload, tangents: 1 });
+        let structure = Structure::new(
+            vec!["x".into(), "y".into()],
+            dmatrix![mass, 0.0; 0.0, mass],
+            dmatrix![0.0, 0.0; 0.0, 0.0],
+            dmatrix![k, 0.0; 0.0, k],
+        );
+        let axes = vec![Axis::new(vec![(0, 1.0)]), Axis::new(vec![(1, 1.0)])];
+        let system = System::builder(structure.unwrap()).joint("j", law, axes).build().unwrap();
+        let omega = ((k + kn) / mass).sqrt();
+        let motion = Transient {
+            displacement: vec![0.0; 2],
+            velocity: vec![0.0; 2],
+            excitation: Excitation::Free,
+            duration: 3.0 * TAU / omega,
+            step: TAU / omega / 40.0,
+            width: None,
+        };
+        let static_position = -preload / (k + kn); // its force pushes against the direction of closing
+        let mut worst = 0.0f64;
+        let run = motion.run(&system, &mut |time, _, sample| {
+            let expected = static_position * (1.0 - (omega * time).cos());
+            worst = worst.max((sample.displacement[1] - expected).abs() / static_position.abs());
+            assert_eq!(sample.displacement[0], 0.0);
+            true
+        });
+        assert!(run.is_ok() && worst < 1e-4, "{run:?} {worst}");
+    }
 
     /// A linear oscillator run up through its resonance, against the classical Runge-Kutta method with the phase of a frequency that
     /// changes all the time.

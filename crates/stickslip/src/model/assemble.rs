@@ -1,12 +1,13 @@
 //! From a model to a system: checks, and the matrices of `M x'' + C x' + K x + Σ W f = F(t)`.
 
-use super::system::{Axis, MovedPlace, System};
+use super::system::{Axis, MovedPlace, System, SystemBuilder};
 use super::{GROUND, Joint, Mass, Model};
 use crate::structure::Structure;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
+use stickslip_numerics::sparse::Matrix;
 
 /// The element of a model that an error is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -108,10 +109,12 @@ impl Places {
             let message = format!("`{name}` moves in several directions; name one of them: {}", places.join(", "));
             return Err(ModelError::new(element, key, message));
         }
-        Err(ModelError {
-            wrong_name: Some(name.to_owned()),
-            ..ModelError::new(element, key, format!("there is no place `{name}`"))
-        })
+        let node = name.split_once('.').filter(|(node, _)| self.directions.contains_key(*node));
+        let message = match node {
+            Some((node, along)) => format!("there is no place `{name}`: `{node}` has no direction {along}"),
+            None => format!("there is no place `{name}`"),
+        };
+        Err(ModelError { wrong_name: Some(name.to_owned()), ..ModelError::new(element, key, message) })
     }
 
     /// Where both ends of a joint lead, along each of `count` directions.
@@ -199,141 +202,16 @@ impl Model {
     /// ```
     pub fn assemble(&self) -> Result<System, ModelError> {
         let places = self.check_places()?;
-        let n = places.count(|end| matches!(end, End::Free(_)));
-        let moved_count = places.count(|end| matches!(end, End::Moved(_)));
-
-        // one matrix over free and moved places; it is cut into blocks below
-        let total = n + moved_count;
-        let index = |end: End| match end {
-            End::Ground => None,
-            End::Free(i) => Some(i),
-            End::Moved(i) => Some(n + i),
-        };
-        let (mut mass, mut damping, mut stiffness) =
-            (DVector::zeros(total), DMatrix::zeros(total, total), DMatrix::zeros(total, total));
-        let mut names = vec![String::new(); total];
-        for (name, end) in &places.ends {
-            if let Some(i) = index(*end) {
-                names[i].clone_from(name);
-            }
-        }
-        for (i, m) in self.masses.iter().enumerate() {
-            finite_at_least_zero(m.mass, Element::Mass(i), "mass", "kg")?;
-            for place in m.places() {
-                if let Some(row) = index(places.ends[&place]) {
-                    mass[row] = m.mass;
-                }
-            }
-        }
-        for (i, spring) in self.springs.iter().enumerate() {
-            let element = Element::Spring(i);
-            finite_at_least_zero(spring.stiffness, element, "stiffness", "N/m")?;
-            if !spring.damping.is_finite() {
-                return Err(ModelError::new(
-                    element,
-                    "damping",
-                    format!("must be a finite number in kg/s, found {}", spring.damping),
-                ));
-            }
-            let a = places.find(&spring.between[0], element, "between")?;
-            let b = places.find(&spring.between[1], element, "between")?;
-            differ(&spring.between, element)?;
-            for (matrix, value) in [(&mut stiffness, spring.stiffness), (&mut damping, spring.damping)] {
-                add_between(matrix, index(a), index(b), value);
-            }
-        }
-
-        let mut motion_of = vec![BTreeMap::<u32, Complex64>::new(); moved_count];
-        for (i, motion) in self.motions.iter().enumerate() {
-            let element = Element::Motion(i);
-            let value = harmonic_amplitude(motion.amplitude, motion.phase, element)?;
-            if let End::Moved(k) = places.find(&motion.on, element, "on")? {
-                *motion_of[k].entry(motion.harmonic).or_default() += value;
-            }
-        }
-
-        let block = |matrix: &DMatrix<f64>| matrix.view((0, 0), (n, n)).into_owned();
-        let structure = Structure::new(
-            names[..n].to_vec(),
-            DMatrix::from_diagonal(&mass.rows(0, n).into_owned()),
-            block(&damping),
-            block(&stiffness),
-        );
-        let whole = |error: &dyn fmt::Display| ModelError::new(Element::Whole, "mass", error.to_string());
-        let mut builder = System::builder(structure.map_err(|error| whole(&error))?);
-
-        let zero = Complex64::new(0.0, 0.0);
-        for (i, force) in self.forces.iter().enumerate() {
-            let element = Element::Force(i);
-            let value = harmonic_amplitude(force.amplitude, force.phase, element)?;
-            match places.find(&force.on, element, "on")? {
-                End::Free(row) => builder = builder.force(row, force.harmonic, value),
-                End::Ground => {
-                    return Err(ModelError::new(element, "on", "a force on `ground` moves nothing; name a mass"));
-                }
-                End::Moved(_) => {
-                    let message = format!("`{}` has an imposed motion, a force on it changes nothing", force.on);
-                    return Err(ModelError::new(element, "on", message));
-                }
-            }
-        }
-        for (k, motion) in motion_of.iter().enumerate() {
-            for (&harmonic, &amplitude) in motion {
-                for row in 0..n {
-                    let at = (row, n + k);
-                    builder =
-                        builder.load(row, harmonic, zero - amplitude * stiffness[at], zero - amplitude * damping[at]);
-                }
-            }
-        }
-
-        let mut signs = vec![Vec::new(); moved_count];
-        for (j, joint) in self.joints.iter().enumerate() {
-            let element = Element::Joint(j);
-            joint.law.check().map_err(|error| ModelError::new(element, "law", error.to_string()))?;
-            differ(&joint.between, element)?;
-            let mut axes = Vec::new();
-            for (along, ends) in places.axes(&joint.between, joint.law.directions(), element)? {
-                signs.iter_mut().for_each(|signs| signs.push(0.0));
-                let mut rows = Vec::new();
-                let mut imposed = Vec::new();
-                for (end, sign) in ends.into_iter().zip([1.0, -1.0]) {
-                    match end {
-                        End::Ground => {}
-                        End::Free(row) => rows.push((row, sign)),
-                        End::Moved(k) => {
-                            if let Some(last) = signs[k].last_mut() {
-                                *last += sign;
-                            }
-                            imposed.extend(
-                                motion_of[k].iter().map(|(&harmonic, &amplitude)| (harmonic, amplitude * sign)),
-                            );
-                        }
-                    }
-                }
-                let axis = Axis::new(rows).moved(imposed);
-                axes.push(if let Some(along) = along { axis.named(along) } else { axis });
-            }
-            builder = builder.joint(joint.name.clone(), joint.law.clone(), axes);
-        }
-
-        for k in 0..moved_count {
-            let row = |matrix: &DMatrix<f64>| {
-                (
-                    DVector::from_fn(n, |i, _| matrix[(n + k, i)]),
-                    (0..moved_count).map(|i| matrix[(n + k, n + i)]).collect(),
-                )
-            };
-            builder = builder.moved(MovedPlace {
-                name: names[n + k].clone(),
-                motion: motion_of[k].iter().map(|(h, a)| (*h, *a)).collect(),
-                mass: mass[n + k],
-                stiffness: row(&stiffness),
-                damping: row(&damping),
-                joints: signs[k].clone(),
-            });
-        }
-        builder.build().map_err(|error| whole(&error))
+        let free = places.count(|end| matches!(end, End::Free(_)));
+        let moved = places.count(|end| matches!(end, End::Moved(_)));
+        let assembler = Assembler { model: self, places, free, moved };
+        let matrices = assembler.matrices()?;
+        let motions = assembler.motions()?;
+        let mut builder = System::builder(assembler.structure(&matrices)?);
+        builder = assembler.forces(builder)?;
+        builder = assembler.loads_of_motions(builder, &matrices, &motions);
+        let (builder, signs) = assembler.joints(builder, &motions)?;
+        assembler.moved(builder, &matrices, &motions, &signs).build().map_err(|error| whole(&error))
     }
 
     /// Every name once, an identifier, and where it leads. Moved masses are no degrees of freedom.
@@ -426,6 +304,207 @@ impl Model {
     }
 }
 
+/// What is wrong with the structure as a whole.
+fn whole(error: &dyn fmt::Display) -> ModelError {
+    ModelError::new(Element::Whole, "mass", error.to_string())
+}
+
+/// A model while it becomes a system.
+struct Assembler<'a> {
+    model: &'a Model,
+    places: Places,
+    /// How many places are free.
+    free: usize,
+    /// How many have an imposed motion.
+    moved: usize,
+}
+
+/// Matrices over free and then moved places.
+struct Matrices {
+    names: Vec<String>,
+    mass: Vec<f64>,
+    damping: Matrix,
+    stiffness: Matrix,
+}
+
+/// Harmonics of an imposed motion.
+type Harmonics = BTreeMap<u32, Complex64>;
+
+impl Assembler<'_> {
+    /// The row of a place among free and then moved ones.
+    fn row(&self, end: End) -> Option<usize> {
+        match end {
+            End::Ground => None,
+            End::Free(i) => Some(i),
+            End::Moved(i) => Some(self.free + i),
+        }
+    }
+
+    fn matrices(&self) -> Result<Matrices, ModelError> {
+        let total = self.free + self.moved;
+        let mut names = vec![String::new(); total];
+        for (name, end) in &self.places.ends {
+            if let Some(row) = self.row(*end) {
+                names[row].clone_from(name);
+            }
+        }
+        let mut mass = vec![0.0; total];
+        for (i, m) in self.model.masses.iter().enumerate() {
+            finite_at_least_zero(m.mass, Element::Mass(i), "mass", "kg")?;
+            for place in m.places() {
+                if let Some(row) = self.row(self.places.ends[&place]) {
+                    mass[row] = m.mass;
+                }
+            }
+        }
+        let (mut damping, mut stiffness) = (Vec::new(), Vec::new());
+        for (i, spring) in self.model.springs.iter().enumerate() {
+            let element = Element::Spring(i);
+            finite_at_least_zero(spring.stiffness, element, "stiffness", "N/m")?;
+            if !spring.damping.is_finite() {
+                let message = format!("must be a finite number in kg/s, found {}", spring.damping);
+                return Err(ModelError::new(element, "damping", message));
+            }
+            let a = self.places.find(&spring.between[0], element, "between")?;
+            let b = self.places.find(&spring.between[1], element, "between")?;
+            differ(&spring.between, element)?;
+            for (matrix, value) in [(&mut stiffness, spring.stiffness), (&mut damping, spring.damping)] {
+                add_between(matrix, self.row(a), self.row(b), value);
+            }
+        }
+        let sum = |entries| Matrix::from_triplets(total, entries).map_err(|error| whole(&error));
+        Ok(Matrices { names, mass, damping: sum(damping)?, stiffness: sum(stiffness)? })
+    }
+
+    /// What of the matrices belongs to free places.
+    fn structure(&self, matrices: &Matrices) -> Result<Structure, ModelError> {
+        let n = self.free;
+        let block = |matrix: &Matrix| {
+            let free = matrix.entries().filter(|(row, column, _)| *row < n && *column < n);
+            Matrix::from_triplets(n, free).map_err(|error| whole(&error))
+        };
+        let mass = Matrix::from_triplets(n, (0..n).map(|i| (i, i, matrices.mass[i]))).map_err(|error| whole(&error))?;
+        let names = matrices.names[..n].to_vec();
+        Structure::sparse(names, mass, block(&matrices.damping)?, block(&matrices.stiffness)?)
+            .map_err(|error| whole(&error))
+    }
+
+    /// The motion of every moved place.
+    fn motions(&self) -> Result<Vec<Harmonics>, ModelError> {
+        let mut motions = vec![Harmonics::new(); self.moved];
+        for (i, motion) in self.model.motions.iter().enumerate() {
+            let element = Element::Motion(i);
+            let value = harmonic_amplitude(motion.amplitude, motion.phase, element)?;
+            if let End::Moved(k) = self.places.find(&motion.on, element, "on")? {
+                *motions[k].entry(motion.harmonic).or_default() += value;
+            }
+        }
+        Ok(motions)
+    }
+
+    fn forces(&self, mut builder: SystemBuilder) -> Result<SystemBuilder, ModelError> {
+        for (i, force) in self.model.forces.iter().enumerate() {
+            let element = Element::Force(i);
+            let value = harmonic_amplitude(force.amplitude, force.phase, element)?;
+            match self.places.find(&force.on, element, "on")? {
+                End::Free(row) => builder = builder.force(row, force.harmonic, value),
+                End::Ground => {
+                    return Err(ModelError::new(element, "on", "a force on `ground` moves nothing; name a mass"));
+                }
+                End::Moved(_) => {
+                    let message = format!("`{}` has an imposed motion, a force on it changes nothing", force.on);
+                    return Err(ModelError::new(element, "on", message));
+                }
+            }
+        }
+        Ok(builder)
+    }
+
+    /// What moved places do to free ones by springs and dampers.
+    fn loads_of_motions(
+        &self,
+        mut builder: SystemBuilder,
+        matrices: &Matrices,
+        motions: &[Harmonics],
+    ) -> SystemBuilder {
+        let (n, zero) = (self.free, Complex64::new(0.0, 0.0));
+        for (k, motion) in motions.iter().enumerate() {
+            for (&harmonic, &amplitude) in motion {
+                for row in 0..n {
+                    let [stiffness, damping] =
+                        [&matrices.stiffness, &matrices.damping].map(|matrix| matrix.get(row, n + k));
+                    builder = builder.load(row, harmonic, zero - amplitude * stiffness, zero - amplitude * damping);
+                }
+            }
+        }
+        builder
+    }
+
+    /// The joints, and for every moved place its sign along each of their axes.
+    fn joints(
+        &self,
+        mut builder: SystemBuilder,
+        motions: &[Harmonics],
+    ) -> Result<(SystemBuilder, Vec<Vec<f64>>), ModelError> {
+        let mut signs = vec![Vec::new(); self.moved];
+        for (j, joint) in self.model.joints.iter().enumerate() {
+            let element = Element::Joint(j);
+            joint.law.check().map_err(|error| ModelError::new(element, "law", error.to_string()))?;
+            differ(&joint.between, element)?;
+            let mut axes = Vec::new();
+            for (along, ends) in self.places.axes(&joint.between, joint.law.directions(), element)? {
+                signs.iter_mut().for_each(|signs| signs.push(0.0));
+                let (mut rows, mut imposed) = (Vec::new(), Vec::new());
+                for (end, sign) in ends.into_iter().zip([1.0, -1.0]) {
+                    match end {
+                        End::Ground => {}
+                        End::Free(row) => rows.push((row, sign)),
+                        End::Moved(k) => {
+                            if let Some(last) = signs[k].last_mut() {
+                                *last += sign;
+                            }
+                            imposed
+                                .extend(motions[k].iter().map(|(&harmonic, &amplitude)| (harmonic, amplitude * sign)));
+                        }
+                    }
+                }
+                let axis = Axis::new(rows).moved(imposed);
+                axes.push(if let Some(along) = along { axis.named(along) } else { axis });
+            }
+            builder = builder.joint(joint.name.clone(), joint.law.clone(), axes);
+        }
+        Ok((builder, signs))
+    }
+
+    /// The moved places, for the forces that move them.
+    fn moved(
+        &self,
+        mut builder: SystemBuilder,
+        matrices: &Matrices,
+        motions: &[Harmonics],
+        signs: &[Vec<f64>],
+    ) -> SystemBuilder {
+        let n = self.free;
+        for k in 0..self.moved {
+            let row = |matrix: &Matrix| {
+                (
+                    DVector::from_fn(n, |i, _| matrix.get(n + k, i)),
+                    (0..self.moved).map(|i| matrix.get(n + k, n + i)).collect(),
+                )
+            };
+            builder = builder.moved(MovedPlace {
+                name: matrices.names[n + k].clone(),
+                motion: motions[k].iter().map(|(h, a)| (*h, *a)).collect(),
+                mass: matrices.mass[n + k],
+                stiffness: row(&matrices.stiffness),
+                damping: row(&matrices.damping),
+                joints: signs[k].clone(),
+            });
+        }
+        builder
+    }
+}
+
 fn differ(between: &[String; 2], element: Element) -> Result<(), ModelError> {
     if between[0] == between[1] {
         let message = format!("both ends are `{}`; two different places are needed", between[0]);
@@ -450,12 +529,12 @@ fn harmonic_amplitude(amplitude: f64, phase: f64, element: Element) -> Result<Co
     Ok(Complex64::from_polar(1.0, phase) * amplitude)
 }
 
-fn add_between(matrix: &mut DMatrix<f64>, a: Option<usize>, b: Option<usize>, value: f64) {
+fn add_between(entries: &mut Vec<(usize, usize, f64)>, a: Option<usize>, b: Option<usize>, value: f64) {
     for (row, other) in [(a, b), (b, a)] {
         if let Some(row) = row {
-            matrix[(row, row)] += value;
+            entries.push((row, row, value));
             if let Some(column) = other {
-                matrix[(row, column)] -= value;
+                entries.push((row, column, -value));
             }
         }
     }

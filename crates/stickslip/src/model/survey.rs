@@ -44,6 +44,9 @@ pub struct FirstSlip {
     /// Relative displacement from the unloaded state at which it gives way, m; `None` if it holds rigidly until the
     /// limit.
     pub displacement: Option<f64>,
+    /// Of the direction along which faces press on each other, which opens and closes and never slips: the force with
+    /// which they do at rest, N, zero if they are apart. `None` along the others.
+    pub pressed: Option<f64>,
 }
 
 /// How much of its limit a stuck joint needs under the model's excitation, over a range of drive frequencies.
@@ -88,6 +91,8 @@ struct Stuck {
     /// `W`, by its entries.
     at: Vec<(usize, f64)>,
     hold: Hold,
+    /// The force that presses the faces at rest, N, of a normal direction.
+    pressed: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,6 +125,16 @@ impl Hold {
         first.map_or(Hold::Nothing, |(k, limit)| Hold::Spring { stiffness, limit, displacement: limit / k })
     }
 
+    /// Faces pressed on each other: the spring that they are at rest, which no load makes slip.
+    fn pressed(law: &dyn Law, axis: usize) -> Hold {
+        let stiffness = small_stiffness(law, axis);
+        if stiffness > 0.0 {
+            Hold::Spring { stiffness, limit: f64::INFINITY, displacement: f64::INFINITY }
+        } else {
+            Hold::Nothing
+        }
+    }
+
     /// A smooth law: the spring that it is in small motion, or rigid where its resistance is viscous. The steeper its
     /// slope, the nearer it is to that.
     fn smooth(law: &dyn Law, axis: usize) -> Hold {
@@ -136,7 +151,11 @@ impl Hold {
 
 /// Stiffness in motion that is small in every direction, N/m.
 fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
-    if law.directions() == 1 {
+    // what velocity alone decides is as stiff as the spring before it, however it is regularised
+    if let Some(prox) = law.prox() {
+        return if prox.compliance() > 0.0 { prox.compliance().recip() } else { 0.0 };
+    }
+    if law.pieces().is_some() {
         return law.linearised(SMALL, 1.0).re;
     }
     let (count, rest) = (law.directions(), [0.0; MOST_DIRECTIONS]);
@@ -153,6 +172,19 @@ fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
     rate.linearise(count, &Relative { displacement: rest, velocity: rest }, &z, &mut point);
     let by_states = (0..z.len()).map(|s| point.force_slope(axis)[2 * count + s] * point.rate_slope(s)[count + axis]);
     point.force_slope(axis)[axis] + by_states.sum::<f64>()
+}
+
+/// The force along an axis of a law that has not moved, N.
+fn force_at_rest(law: &dyn Law, axis: usize) -> f64 {
+    let rest = [0.0; MOST_DIRECTIONS];
+    match (law.step(), law.rate()) {
+        (Some(step), _) => step.value(&rest, &rest, &mut vec![0.0; step.states()])[axis],
+        (None, Some(rate)) => {
+            let mut z = vec![0.0; rate.states()];
+            rate.value(&Relative { displacement: rest, velocity: rest }, &z.clone(), &mut z)[axis]
+        }
+        (None, None) => 0.0,
+    }
 }
 
 /// An amplitude (m) so small that no law slips, whose square is still a normal number.
@@ -220,7 +252,7 @@ impl Model {
             .filter(|link| !link.at.is_empty())
             .collect();
         let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(Stuck::of_joint).collect();
-        let mass: Vec<f64> = system.structure().mass().diagonal().iter().copied().collect();
+        let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().own_mass(i)).collect();
         let loose = self.loose(&joints);
         if system.dofs() > LARGEST {
             let unknown = || Linear { modes: Modes { lost: mass.len(), ..Modes::default() }, shapes: None };
@@ -297,8 +329,12 @@ impl Stuck {
     fn of_joint((index, joint): (usize, &SystemJoint)) -> Vec<Self> {
         let axes = joint.labels().zip(joint.axes()).enumerate();
         axes.map(|(axis, (name, along))| {
-            let hold = Hold::of(&**joint.law(), axis);
-            Stuck { joint: index, axis, name, at: along.rows().to_vec(), hold }
+            let law = &**joint.law();
+            let (hold, pressed) = match law.normal() == Some(axis) {
+                true => (Hold::pressed(law, axis), Some(force_at_rest(law, axis))),
+                false => (Hold::of(law, axis), None),
+            };
+            Stuck { joint: index, axis, name, at: along.rows().to_vec(), hold, pressed }
         })
         .collect()
     }
@@ -655,7 +691,7 @@ impl Survey {
                 Hold::Spring { limit, displacement, .. } => (limit, Some(displacement)),
                 Hold::Rigid { limit } => (limit, None),
             };
-            FirstSlip { joint: joint.name.clone(), limit, displacement }
+            FirstSlip { joint: joint.name.clone(), limit, displacement, pressed: joint.pressed }
         };
         self.joints.iter().map(one).collect()
     }

@@ -99,6 +99,11 @@ impl Axis {
         self
     }
 
+    /// Name of the direction, of joints that act along several.
+    pub fn name(&self) -> Option<&str> {
+        self.name.as_deref()
+    }
+
     /// The same with imposed relative motion `g(t) = Re Σ_h G_h e^{j h Ω t}`: (harmonic, complex amplitude in m).
     pub fn moved(mut self, imposed: impl IntoIterator<Item = (u32, Complex64)>) -> Self {
         let mut sum: BTreeMap<u32, Complex64> = self.imposed.into_iter().collect();
@@ -322,6 +327,17 @@ impl System {
             ..System::builder(structure)
         };
         builder.build()
+    }
+
+    /// The same system, driven by harmonics of a frequency that is so many times lower: harmonic h becomes `h · periods`, and what repeats after
+    /// so many periods of the drive repeats after one.
+    pub(crate) fn slowed(&self, periods: u32) -> System {
+        let mut system = self.clone();
+        system.loads.iter_mut().for_each(|load| load.harmonic *= periods);
+        let axes = system.joints.iter_mut().flat_map(|joint| &mut joint.axes);
+        axes.flat_map(|axis| &mut axis.imposed).for_each(|(h, _)| *h *= periods);
+        system.moved.iter_mut().flat_map(|place| &mut place.motion).for_each(|(h, _)| *h *= periods);
+        system
     }
 
     /// Number of degrees of freedom.

@@ -36,8 +36,22 @@ pub(crate) trait Signals {
     fn range(&self, row: usize) -> Result<(f64, f64), Self::Error>;
     /// Least and largest relative displacement along an axis, m.
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Self::Error>;
-    /// In which share of the return a joint slips, and how often that, or its direction, changes.
-    fn slip(&self, joint: usize) -> (f64, usize);
+    /// When a joint slips.
+    fn slip(&self, joint: usize) -> Slip;
+    /// What the `force` along an axis takes from the motion in the return, J.
+    fn dissipation(&self, axis: usize, force: &Self::Signal) -> f64 {
+        self.product(force, &self.relative_velocity(axis))
+    }
+}
+
+/// When a joint slips in a return.
+pub(crate) struct Slip {
+    /// In which share of it.
+    pub share: f64,
+    /// How often that, or its direction, changes.
+    pub switches: usize,
+    /// Whether it sticks all the time; one that is open all the time neither slips nor sticks.
+    pub rests: bool,
 }
 
 /// The numbers of a periodic motion.
@@ -82,18 +96,17 @@ pub(crate) fn measure<S: Signals>(
     for (j, joint) in system.joints().iter().enumerate() {
         let axes = first..first + joint.axes().len();
         first = axes.end;
-        let dissipation: f64 =
-            axes.clone().map(|axis| signals.product(&forces[axis], &signals.relative_velocity(axis))).sum();
+        let dissipation: f64 = axes.clone().map(|axis| signals.dissipation(axis, &forces[axis])).sum();
         let displacement = axes.map(|axis| signals.relative_range(axis).map(mirrored)).collect::<Result<_, _>>()?;
-        let (slipping, switches) = signals.slip(j);
+        let Slip { share, switches, rests } = signals.slip(j);
         // a law without a limit never slips: it is not stuck, and its orbit is none of many
-        if slipping == 0.0 && joint.law().scale().is_finite() {
+        if rests && joint.law().scale().is_finite() {
             stuck.push(joint.name().to_owned());
         }
         joints.push(JointMotion {
             name: joint.name().to_owned(),
             dissipation: times * dissipation,
-            slip_fraction: slipping,
+            slip_fraction: share,
             displacement,
             switches: switches * if half { 2 } else { 1 },
         });
@@ -209,13 +222,14 @@ pub(crate) fn extremes(spans: impl Iterator<Item = (f64, [f64; 3], [f64; 3])>) -
 }
 
 /// Work below this fraction of what the loads could do is no yardstick for the energy gap: the motion is conservative.
-const NO_WORK: f64 = 1e-6;
+pub(crate) const NO_WORK: f64 = 1e-6;
 
 impl Measured {
-    /// `|work in - viscous - friction|` relative to the work.
-    pub fn energy_gap(&self) -> f64 {
+    /// `|work in - viscous - friction|` relative to the work, or to what is the least yardstick, J.
+    pub fn energy_gap(&self, least: f64) -> f64 {
         let balance = (self.energy.work_in - self.energy.viscous - self.energy.friction).abs();
-        let reference = self.energy.work_in.abs().max(NO_WORK * (self.possible + self.energy.friction.abs()));
+        let reference =
+            self.energy.work_in.abs().max(NO_WORK * (self.possible + self.energy.friction.abs())).max(least);
         if reference > 0.0 { balance / reference } else { balance }
     }
 }

@@ -9,7 +9,7 @@ mod sampled;
 mod stability;
 
 pub use crate::law::Contact;
-use crate::law::MOST_DIRECTIONS;
+use crate::law::{MOST_DIRECTIONS, Piece, SharedLaw, Slider};
 use crate::model::System;
 pub use error::{Breakdown, OrbitError};
 use nalgebra::DMatrix;
@@ -158,6 +158,39 @@ pub struct Evidence {
     /// Names of joints that stick for the whole period: their offset is not unique, the orbit is one of a continuum
     /// (the symmetric one, with [`Symmetry::HalfPeriod`]).
     pub stuck: Vec<String>,
+    /// Names of joints of which a part, a slider behind a spring or all, sticks for the whole period of a motion that is not its own mirror image:
+    /// where it is relaxed depends on how the motion began, and with it the means, and the amplitudes too where a law knows positions. The orbit
+    /// is then the one in which what sticks behind a spring carries no mean force, as it is where joints creep; with method `transient`
+    /// the one that its motion led to.
+    pub history: Vec<String>,
+}
+
+/// The laws of a system's joints.
+pub(crate) fn laws(system: &System) -> impl Iterator<Item = &SharedLaw> {
+    system.joints().iter().map(|joint| joint.law())
+}
+
+/// Names of joints whose past an orbit keeps: see [`Evidence::history`]. The laws are those by which the orbit was found.
+pub(crate) fn history<'a>(
+    laws: impl Iterator<Item = &'a SharedLaw>,
+    joints: &[JointMotion],
+    stuck: &[String],
+    symmetry: Symmetry,
+) -> Vec<String> {
+    if symmetry == Symmetry::HalfPeriod {
+        return Vec::new();
+    }
+    let holds = |law: &SharedLaw, motion: &JointMotion| {
+        let travel = motion.displacement.first().map_or(0.0, |(low, high)| high - low);
+        let sliders = law.pieces().into_iter().flatten().filter_map(|piece| match piece {
+            Piece::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => Some((stiffness, limit)),
+            _ => None,
+        });
+        let mut reaches = sliders.filter(|(_, limit)| *limit > 0.0).map(|(stiffness, limit)| limit / stiffness);
+        stuck.contains(&motion.name) || reaches.any(|reach| travel <= 2.0 * reach)
+    };
+    let kept = laws.zip(joints).filter(|(law, motion)| holds(law, motion));
+    kept.map(|(_, motion)| motion.name.clone()).collect()
 }
 
 /// The state of a motion at one instant.
@@ -324,7 +357,7 @@ impl Orbit {
         if symmetry == Symmetry::HalfPeriod && apart(&begin, -1.0, &rated(path.sample(0.5 * period))) {
             return Err(wrong("is not mirrored after half of its period"));
         }
-        let energy_gap = measured.energy_gap();
+        let energy_gap = measured.energy_gap(0.0);
         if energy_gap > LARGEST_GAP {
             return Err(OrbitError::Evidence { method, omega, energy_gap });
         }
@@ -342,6 +375,7 @@ impl Orbit {
                 truncation,
                 accuracy,
                 return_defect: None,
+                history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
             },
             places: measured.places,

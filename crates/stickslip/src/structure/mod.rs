@@ -1,20 +1,63 @@
 //! The linear part of a system: the only owner of mass, damping and stiffness.
 
+mod dynamic;
 pub mod reduction;
 
+pub use dynamic::DynamicStiffness;
+
 use nalgebra::DMatrix;
+use std::sync::{Arc, OnceLock};
+use stickslip_numerics::definite::{semidefinite, sparse_definite};
 use stickslip_numerics::eigen;
+use stickslip_numerics::sparse::{Analysis, Asymmetry, Matrix, MatrixError};
 
 /// `M x'' + C x' + K x`, over places that are free to move.
 ///
-/// Masses need not stand on the diagonal alone.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Structure {
+/// Masses need not stand on the diagonal alone. A copy is a reference to the same matrices. They are kept full where there are few degrees of
+/// freedom, or where each touches many others; else as the entries that are not zero. What a structure is asked does not depend on that,
+/// only how long it takes.
+#[derive(Debug, Clone)]
+pub struct Structure(Arc<Kept>);
+
+#[derive(Debug)]
+struct Kept {
     places: Vec<String>,
-    mass: DMatrix<f64>,
-    damping: DMatrix<f64>,
-    stiffness: DMatrix<f64>,
+    form: Form,
+    /// Largest magnitude of an entry of mass, damping, stiffness.
+    largest: [f64; 3],
+    dissipates: OnceLock<bool>,
 }
+
+#[derive(Debug)]
+enum Form {
+    Full(Arc<Matrices>),
+    Sparse {
+        mass: Matrix,
+        damping: Matrix,
+        stiffness: Matrix,
+        analysis: OnceLock<Analysis>,
+        /// Written out when a method first asks for it.
+        full: OnceLock<Arc<Matrices>>,
+    },
+}
+
+/// Mass (kg), damping (kg/s) and stiffness (N/m), each n × n, with all their zeros.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matrices {
+    /// `M`.
+    pub mass: DMatrix<f64>,
+    /// `C`.
+    pub damping: DMatrix<f64>,
+    /// `K`.
+    pub stiffness: DMatrix<f64>,
+}
+
+/// Degrees of freedom up to which methods take full matrices: a product of two then takes seconds, and each has 32 MB.
+pub const MOST_IN_FULL: usize = 2000;
+/// Degrees of freedom from which matrices are kept sparse.
+pub const SPARSE: usize = 40;
+/// Share of the entries that are not zero from which they are kept full all the same.
+const FULL: f64 = 0.3;
 
 /// Why matrices make no structure.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -73,7 +116,7 @@ pub enum StructureError {
 const SYMMETRIC: f64 = 1e-9;
 
 impl Structure {
-    /// Of places and matrices (kg, kg/s, N/m), n × n. Mass and stiffness are symmetric; damping may have a gyroscopic part.
+    /// Of places and full matrices (kg, kg/s, N/m), n × n. Mass and stiffness are symmetric; damping may have a gyroscopic part.
     ///
     /// # Errors
     /// [`StructureError`]: a size that does not fit, an entry that is not finite, mass or stiffness that is not symmetric, a mass matrix that
@@ -94,16 +137,269 @@ impl Structure {
         stiffness: DMatrix<f64>,
     ) -> Result<Self, StructureError> {
         let n = places.len();
-        for (i, place) in places.iter().enumerate() {
-            if places[..i].contains(place) {
-                return Err(StructureError::Twice(place.clone()));
-            }
-        }
         for (matrix, values) in [("mass", &mass), ("damping", &damping), ("stiffness", &stiffness)] {
             let (rows, columns) = values.shape();
             if (rows, columns) != (n, n) {
                 return Err(StructureError::Size { matrix, rows, columns, places: n });
             }
+        }
+        let full = Matrices { mass, damping, stiffness };
+        let filled = [&full.mass, &full.damping, &full.stiffness]
+            .map(|matrix| matrix.iter().filter(|value| **value != 0.0).count());
+        if is_full(n, filled) {
+            return Structure::checked(places, Form::Full(Arc::new(full)));
+        }
+        let entries = |matrix: &DMatrix<f64>| {
+            let all = (0..n).flat_map(|column| (0..n).map(move |row| (row, column)));
+            Matrix::from_triplets(n, all.map(|at| (at.0, at.1, matrix[at])).filter(|entry| entry.2 != 0.0))
+        };
+        let [mass, damping, stiffness] =
+            [("mass", &full.mass), ("damping", &full.damping), ("stiffness", &full.stiffness)]
+                .map(|(name, matrix)| entries(matrix).map_err(|error| StructureError::of(name, &error)));
+        Structure::sparse(places, mass?, damping?, stiffness?)
+    }
+
+    /// The same of matrices by their entries.
+    ///
+    /// # Errors
+    /// As [`Structure::new`].
+    ///
+    /// # Example
+    /// A chain of 50,000 masses, which as full matrices would need 60 GB.
+    /// ```
+    /// use num_complex::Complex64;
+    /// use stickslip::structure::Structure;
+    /// use stickslip_numerics::sparse::Matrix;
+    /// let n = 50_000;
+    /// let places = (0..n).map(|i| format!("m{i}")).collect();
+    /// let diagonal = |value: f64| Matrix::from_triplets(n, (0..n).map(|i| (i, i, value))).unwrap();
+    /// let springs = (1..n).flat_map(|i| [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)]);
+    /// let stiffness = Matrix::from_triplets(n, springs.chain([(0, 0, 1.0)])).unwrap();
+    /// let chain = Structure::sparse(places, diagonal(1.0), diagonal(0.1), stiffness).unwrap();
+    /// // pulled at its end, each of the springs carries the force
+    /// let mut x = vec![Complex64::ZERO; n];
+    /// x[n - 1].re = 2.0;
+    /// chain.dynamic_stiffness(Complex64::ZERO).unwrap().solve(&mut x);
+    /// assert!((x[n - 1].re - 2.0 * n as f64).abs() < 1e-3);
+    /// ```
+    pub fn sparse(
+        places: Vec<String>,
+        mass: Matrix,
+        damping: Matrix,
+        stiffness: Matrix,
+    ) -> Result<Self, StructureError> {
+        let n = places.len();
+        for (name, matrix) in [("mass", &mass), ("damping", &damping), ("stiffness", &stiffness)] {
+            if matrix.n() != n {
+                let (rows, columns) = (matrix.n(), matrix.n());
+                return Err(StructureError::Size { matrix: name, rows, columns, places: n });
+            }
+        }
+        let (analysis, full) = (OnceLock::new(), OnceLock::new());
+        let form = if is_full(n, [&mass, &damping, &stiffness].map(Matrix::len)) {
+            Form::Full(Arc::new(written_out(&mass, &damping, &stiffness)))
+        } else {
+            let [mass, stiffness] = [("mass", mass), ("stiffness", stiffness)].map(|(name, matrix)| {
+                symmetric(matrix).map_err(|off| StructureError::NotSymmetric {
+                    matrix: name,
+                    row: off.row + 1,
+                    column: off.column + 1,
+                    value: off.value,
+                    mirrored: off.mirrored,
+                })
+            });
+            Form::Sparse { mass: mass?, damping, stiffness: stiffness?, analysis, full }
+        };
+        Structure::checked(places, form)
+    }
+
+    fn checked(places: Vec<String>, form: Form) -> Result<Self, StructureError> {
+        let mut names: Vec<&String> = places.iter().collect();
+        names.sort_unstable();
+        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(StructureError::Twice(pair[0].clone()));
+        }
+        let largest = match &form {
+            Form::Full(full) => {
+                full.check()?;
+                [&full.mass, &full.damping, &full.stiffness]
+                    .map(|matrix| if matrix.is_empty() { 0.0 } else { matrix.amax() })
+            }
+            Form::Sparse { mass, damping, stiffness, .. } => {
+                let is_diagonal = mass.entries().all(|(row, column, _)| row == column);
+                let negative = mass.entries().any(|(row, column, value)| row == column && value < 0.0);
+                if negative || (!is_diagonal && sparse_definite(mass).is_none()) {
+                    return Err(StructureError::NegativeMass);
+                }
+                [mass, damping, stiffness].map(Matrix::largest)
+            }
+        };
+        Ok(Structure(Arc::new(Kept { places, form, largest, dissipates: OnceLock::new() })))
+    }
+
+    /// Number of degrees of freedom, n.
+    pub fn dofs(&self) -> usize {
+        self.0.places.len()
+    }
+
+    /// Names of the degrees of freedom, length n.
+    pub fn places(&self) -> &[String] {
+        &self.0.places
+    }
+
+    /// Whether only the entries that are not zero are kept.
+    pub fn is_sparse(&self) -> bool {
+        matches!(self.0.form, Form::Sparse { .. })
+    }
+
+    /// All matrices in full, for methods whose cost grows with the cube of n anyway: of a sparse structure they are written out at the first
+    /// call, 24 n² bytes. Who can do with entries, products or solutions asks for [`Structure::entries`] or
+    /// [`Structure::dynamic_stiffness`].
+    pub fn full(&self) -> &Arc<Matrices> {
+        match &self.0.form {
+            Form::Full(full) => full,
+            Form::Sparse { mass, damping, stiffness, full, .. } => {
+                full.get_or_init(|| Arc::new(written_out(mass, damping, stiffness)))
+            }
+        }
+    }
+
+    /// Mass matrix `M` in full, n × n, kg; see [`Structure::full`].
+    pub fn mass(&self) -> &DMatrix<f64> {
+        &self.full().mass
+    }
+
+    /// Damping matrix `C` in full, n × n, kg/s; see [`Structure::full`].
+    pub fn damping(&self) -> &DMatrix<f64> {
+        &self.full().damping
+    }
+
+    /// Stiffness matrix `K` in full, n × n, N/m; see [`Structure::full`].
+    pub fn stiffness(&self) -> &DMatrix<f64> {
+        &self.full().stiffness
+    }
+
+    /// The mass on the diagonal in a row, kg.
+    pub fn own_mass(&self, row: usize) -> f64 {
+        match &self.0.form {
+            Form::Full(full) => full.mass[(row, row)],
+            Form::Sparse { mass, .. } => mass.get(row, row),
+        }
+    }
+
+    /// The largest magnitudes in the matrices of mass (kg), damping (kg/s) and stiffness (N/m).
+    pub fn largest(&self) -> [f64; 3] {
+        self.0.largest
+    }
+
+    /// `K x` of displacements `x` (m), N.
+    pub fn spring_forces(&self, x: &[f64]) -> Vec<f64> {
+        match &self.0.form {
+            Form::Full(full) => (&full.stiffness * nalgebra::DVector::from_column_slice(x)).as_slice().to_vec(),
+            Form::Sparse { stiffness, .. } => stiffness.times(x),
+        }
+    }
+
+    /// The entries of (mass, damping, stiffness) that are not all zero: row, column, values. Full matrices row by row, others column by column.
+    pub fn entries(&self) -> Box<dyn Iterator<Item = (usize, usize, [f64; 3])> + '_> {
+        let n = self.dofs();
+        match &self.0.form {
+            Form::Full(full) => Box::new(
+                (0..n)
+                    .flat_map(move |i| (0..n).map(move |k| (i, k)))
+                    .map(|at| (at.0, at.1, [full.mass[at], full.damping[at], full.stiffness[at]]))
+                    .filter(|(_, _, values)| values.iter().any(|v| *v != 0.0)),
+            ),
+            Form::Sparse { mass, damping, stiffness, .. } => Box::new((0..n).flat_map(move |column| {
+                let mut rows: Vec<(usize, [f64; 3])> = Vec::new();
+                for (kind, matrix) in [mass, damping, stiffness].into_iter().enumerate() {
+                    for (row, value) in matrix.column(column) {
+                        match rows.binary_search_by_key(&row, |entry| entry.0) {
+                            Ok(at) => rows[at].1[kind] = value,
+                            Err(at) => {
+                                rows.insert(at, (row, [0.0; 3]));
+                                rows[at].1[kind] = value;
+                            }
+                        }
+                    }
+                }
+                rows.into_iter().map(move |(row, values)| (row, column, values))
+            })),
+        }
+    }
+
+    /// Whether masses, dampers and springs alone give no energy to a motion, and every motion has one of them: `M`, `K` and the symmetric part of
+    /// `C` are positive semidefinite, and their sum, each in its unit, is definite.
+    pub fn dissipates(&self) -> bool {
+        *self.0.dissipates.get_or_init(|| match &self.0.form {
+            Form::Full(full) => full.dissipates(),
+            Form::Sparse { mass, damping, stiffness, .. } => {
+                let n = self.dofs();
+                // a part of the damping that only turns velocities takes no power
+                let halves = damping.entries().flat_map(|(i, k, c)| [(i, k, 0.5 * c), (k, i, 0.5 * c)]);
+                let Ok(damping) = Matrix::from_triplets(n, halves) else { return false };
+                let matrices = [mass, &damping, stiffness];
+                let [Some(definite), Some(_), Some(_)] = matrices.map(sparse_definite) else { return false };
+                definite || {
+                    let share = |matrix: &Matrix| 1.0 / matrix.largest().max(f64::MIN_POSITIVE);
+                    let all = matrices
+                        .into_iter()
+                        .flat_map(|matrix| matrix.entries().map(move |(i, k, v)| (i, k, v * share(matrix))));
+                    Matrix::from_triplets(n, all).is_ok_and(|sum| sparse_definite(&sum) == Some(true))
+                }
+            }
+        })
+    }
+
+    /// `√(φᵀMφ)` of mode `index`, scaled to a largest displacement of one: the modal amplitude (m √kg) of a metre at the place that moves
+    /// most. Modes count by rising frequency from 0; zero if there is no such mode.
+    pub fn modal_unit(&self, index: usize) -> f64 {
+        let Matrices { mass, stiffness, .. } = &**self.full();
+        let Some(factor) = mass.clone().cholesky() else { return 0.0 };
+        let n = self.dofs();
+        let Some(inverse) = factor.l().solve_lower_triangular(&DMatrix::identity(n, n)) else { return 0.0 };
+        let Some(eigen) = eigen::symmetric(&inverse * stiffness * inverse.transpose()) else { return 0.0 };
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+        // an M-normalised shape has φᵀMφ = 1
+        order.get(index).map_or(0.0, |&k| 1.0 / (inverse.transpose() * eigen.eigenvectors.column(k)).amax())
+    }
+}
+
+impl PartialEq for Structure {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+            || (self.0.places == other.0.places
+                && match (&self.0.form, &other.0.form) {
+                    (Form::Full(a), Form::Full(b)) => a == b,
+                    (
+                        Form::Sparse { mass: a, damping: b, stiffness: c, .. },
+                        Form::Sparse { mass: d, damping: e, stiffness: f, .. },
+                    ) => a == d && b == e && c == f,
+                    _ => false,
+                })
+    }
+}
+
+impl StructureError {
+    /// Of entries that make no matrix.
+    fn of(matrix: &'static str, error: &MatrixError) -> Self {
+        match *error {
+            MatrixError::NotFinite { row, column, value } => {
+                StructureError::NotFinite { matrix, row: row + 1, column: column + 1, value }
+            }
+            MatrixError::OutOfRange { row, column, n } => {
+                StructureError::Size { matrix, rows: row + 1, columns: column + 1, places: n }
+            }
+            MatrixError::TooLarge { n, .. } => StructureError::Size { matrix, rows: n, columns: n, places: n },
+        }
+    }
+}
+
+impl Matrices {
+    fn check(&self) -> Result<(), StructureError> {
+        let n = self.mass.nrows();
+        for (matrix, values) in [("mass", &self.mass), ("damping", &self.damping), ("stiffness", &self.stiffness)] {
             let symmetric = matrix != "damping";
             let rounding = SYMMETRIC * values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
             for column in 0..n {
@@ -119,66 +415,65 @@ impl Structure {
                 }
             }
         }
-        // a diagonal needs no factor, and lumped models of thousands of masses have nothing else
-        let off_diagonal = (0..n).any(|i| (0..i).any(|k| mass[(i, k)] != 0.0));
-        let negative = (0..n).any(|i| mass[(i, i)] < 0.0);
-        if negative || (off_diagonal && stickslip_numerics::definite::semidefinite(&mass).is_none()) {
+        // a diagonal needs no factor
+        let off_diagonal = (0..n).any(|i| (0..i).any(|k| self.mass[(i, k)] != 0.0));
+        let negative = (0..n).any(|i| self.mass[(i, i)] < 0.0);
+        if negative || (off_diagonal && semidefinite(&self.mass).is_none()) {
             return Err(StructureError::NegativeMass);
         }
-        Ok(Structure { places, mass, damping, stiffness })
+        Ok(())
     }
 
-    /// Number of degrees of freedom, n.
-    pub fn dofs(&self) -> usize {
-        self.places.len()
+    fn dissipates(&self) -> bool {
+        // a part of the damping that only turns velocities takes no power
+        let damping = (&self.damping + self.damping.transpose()) * 0.5;
+        let (Some(rank), Some(_), Some(_)) =
+            (semidefinite(&self.mass), semidefinite(&damping), semidefinite(&self.stiffness))
+        else {
+            return false;
+        };
+        let n = self.mass.nrows();
+        rank == n || {
+            // each with its own unit: what one of them holds is held
+            let share = |matrix: &DMatrix<f64>| matrix / matrix.amax().max(f64::MIN_POSITIVE);
+            semidefinite(&(share(&self.mass) + share(&damping) + share(&self.stiffness))) == Some(n)
+        }
     }
+}
 
-    /// Names of the degrees of freedom, length n.
-    pub fn places(&self) -> &[String] {
-        &self.places
-    }
+/// Whether matrices with so many entries are kept full.
+fn is_full(n: usize, entries: [usize; 3]) -> bool {
+    let most = entries.into_iter().max().unwrap_or(0);
+    n < SPARSE || most as f64 > FULL * (n as f64) * (n as f64)
+}
 
-    /// Mass matrix `M`, n × n, kg.
-    pub fn mass(&self) -> &DMatrix<f64> {
-        &self.mass
-    }
+fn written_out(mass: &Matrix, damping: &Matrix, stiffness: &Matrix) -> Matrices {
+    let full = |matrix: &Matrix| {
+        let mut full = DMatrix::zeros(matrix.n(), matrix.n());
+        matrix.entries().for_each(|(row, column, value)| full[(row, column)] = value);
+        full
+    };
+    Matrices { mass: full(mass), damping: full(damping), stiffness: full(stiffness) }
+}
 
-    /// Damping matrix `C`, n × n, kg/s.
-    pub fn damping(&self) -> &DMatrix<f64> {
-        &self.damping
+/// The mean of both triangles, if they differ by rounding only.
+fn symmetric(matrix: Matrix) -> Result<Matrix, Asymmetry> {
+    if matrix.asymmetry(0.0).is_none() {
+        return Ok(matrix);
     }
-
-    /// Stiffness matrix `K`, n × n, N/m.
-    pub fn stiffness(&self) -> &DMatrix<f64> {
-        &self.stiffness
+    if let Some(off) = matrix.asymmetry(SYMMETRIC * matrix.largest()) {
+        return Err(off);
     }
-
-    /// The entries of (mass, damping, stiffness) that are not all zero: row, column, values.
-    pub fn entries(&self) -> impl Iterator<Item = (usize, usize, [f64; 3])> + '_ {
-        let n = self.dofs();
-        let all = (0..n).flat_map(move |i| (0..n).map(move |k| (i, k)));
-        all.map(|at| (at.0, at.1, [self.mass[at], self.damping[at], self.stiffness[at]]))
-            .filter(|(_, _, values)| values.iter().any(|v| *v != 0.0))
-    }
-
-    /// `√(φᵀMφ)` of mode `index`, scaled to a largest displacement of one: the modal amplitude (m √kg) of a metre at the place that moves
-    /// most. Modes count by rising frequency from 0; zero if there is no such mode.
-    pub fn modal_unit(&self, index: usize) -> f64 {
-        let Some(factor) = self.mass.clone().cholesky() else { return 0.0 };
-        let n = self.dofs();
-        let Some(inverse) = factor.l().solve_lower_triangular(&DMatrix::identity(n, n)) else { return 0.0 };
-        let Some(eigen) = eigen::symmetric(&inverse * &self.stiffness * inverse.transpose()) else { return 0.0 };
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-        // an M-normalised shape has φᵀMφ = 1
-        order.get(index).map_or(0.0, |&k| 1.0 / (inverse.transpose() * eigen.eigenvectors.column(k)).amax())
-    }
+    let halves = matrix.entries().flat_map(|(i, k, value)| [(i, k, 0.5 * value), (k, i, 0.5 * value)]);
+    // halves of finite numbers that are nearly equal have finite sums, and their places are those of the matrix
+    Ok(Matrix::from_triplets(matrix.n(), halves).unwrap_or(matrix))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use nalgebra::dmatrix;
+    use num_complex::Complex64;
 
     fn names() -> Vec<String> {
         vec!["a".into(), "b".into()]
@@ -200,5 +495,109 @@ mod tests {
         assert!(Structure::new(names(), massless, one.clone(), k.clone()).is_ok());
         let twice = vec!["a".to_owned(), "a".to_owned()];
         assert_eq!(Structure::new(twice, one.clone(), one, k).unwrap_err(), StructureError::Twice("a".into()));
+    }
+
+    /// A chain between walls with dampers to the ground, a gyroscopic pair and unequal masses, as full matrices.
+    fn chain(n: usize) -> [DMatrix<f64>; 3] {
+        let k = DMatrix::from_fn(n, n, |i, l| [2.0, -1.0, 0.0][i.abs_diff(l).min(2)]);
+        let m = DMatrix::from_fn(n, n, |i, l| [1.0 + 0.1 * (i as f64).sin(), 0.2, 0.0][i.abs_diff(l).min(2)]);
+        let mut c = DMatrix::identity(n, n) * 0.05;
+        (c[(0, n - 1)], c[(n - 1, 0)]) = (0.3, -0.3);
+        [m, c, k]
+    }
+
+    fn numbered(n: usize) -> Vec<String> {
+        (0..n).map(|i| i.to_string()).collect()
+    }
+
+    /// Full or sparse, a structure answers the same.
+    #[test]
+    fn the_form_does_not_matter() {
+        let n = SPARSE + 3;
+        let [m, c, k] = chain(n);
+        let sparse = Structure::new(numbered(n), m.clone(), c.clone(), k.clone()).unwrap();
+        assert!(sparse.is_sparse());
+        assert_eq!((sparse.mass(), sparse.damping(), sparse.stiffness()), (&m, &c, &k));
+        let full =
+            Structure::checked(numbered(n), Form::Full(Arc::new(Matrices { mass: m, damping: c, stiffness: k })))
+                .unwrap();
+        assert_eq!(sparse.largest(), full.largest());
+        assert_eq!((sparse.own_mass(7), sparse.dissipates()), (full.own_mass(7), full.dissipates()));
+        assert!(sparse.dissipates());
+        let sorted = |structure: &Structure| {
+            let mut all: Vec<_> = structure.entries().collect();
+            all.sort_by_key(|entry| (entry.0, entry.1));
+            all
+        };
+        assert_eq!(sorted(&sparse), sorted(&full));
+        let x: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
+        for (a, b) in sparse.spring_forces(&x).iter().zip(full.spring_forces(&x)) {
+            assert!((a - b).abs() < 1e-14);
+        }
+        for s in [Complex64::ZERO, Complex64::new(0.0, 0.7), Complex64::new(0.4, 0.0)] {
+            let [mut a, mut b] = [(); 2].map(|()| vec![Complex64::new(1.0, -0.5); 2 * n]);
+            sparse.dynamic_stiffness(s).unwrap().solve(&mut a);
+            full.dynamic_stiffness(s).unwrap().solve(&mut b);
+            let size = b.iter().fold(0.0f64, |size, b| size.max(b.norm()));
+            assert!(a.iter().zip(&b).all(|(a, b)| (a - b).norm() < 1e-11 * size));
+        }
+        assert_eq!(sparse, sparse.clone());
+        assert_ne!(sparse, full, "kept differently");
+    }
+
+    /// What is refused of small structures is refused of large ones, in the same words.
+    #[test]
+    fn wrong_entries_are_refused_as_wrong_matrices_are() {
+        let n = 2 * SPARSE;
+        let [m, c, k] = chain(n);
+        let error = |change: &dyn Fn(&mut DMatrix<f64>, &mut DMatrix<f64>, &mut DMatrix<f64>)| {
+            let (mut m, mut c, mut k) = (m.clone(), c.clone(), k.clone());
+            change(&mut m, &mut c, &mut k);
+            Structure::new(numbered(n), m, c, k).unwrap_err().to_string()
+        };
+        assert!(error(&|_, c, _| c[(2, 5)] = f64::NAN).contains("damping matrix has NaN in row 3, column 6"));
+        assert!(error(&|_, _, k| k[(2, 3)] = -0.9).contains("stiffness matrix is not symmetric"));
+        assert!(error(&|m, _, _| m[(4, 4)] = 0.01).contains("semidefinite"), "beside 0.2");
+        assert!(error(&|m, _, _| m[(4, 4)] = -1.0).contains("semidefinite"));
+        // ten digits of a matrix in a file: the mean of both triangles counts
+        let mut rounded = k.clone();
+        rounded[(2, 3)] += 1e-10;
+        let structure = Structure::new(numbered(n), m.clone(), c.clone(), rounded.clone()).unwrap();
+        let mean = 0.5 * (rounded[(2, 3)] + rounded[(3, 2)]);
+        assert_eq!([(2, 3), (3, 2)].map(|at| structure.stiffness()[at]), [mean, mean]);
+        // masses that some motions have none of
+        let mut semi = m.clone();
+        semi.fill_row(5, 0.0);
+        semi.fill_column(5, 0.0);
+        assert!(Structure::new(numbered(n), semi, c.clone(), k.clone()).is_ok());
+        // a damper that drives
+        let mut driven = c;
+        driven[(3, 3)] = -0.05;
+        assert!(!Structure::new(numbered(n), m, driven, k).unwrap().dissipates());
+    }
+
+    /// A hundred thousand degrees of freedom are checked and answered in seconds.
+    #[test]
+    fn large_structures() {
+        let n = 100_000;
+        let triple = |own: f64, beside: f64| {
+            let all = (0..n).flat_map(|i: usize| {
+                let below = (i > 0).then(|| [(i, i - 1, beside), (i - 1, i, beside)]);
+                below.into_iter().flatten().chain([(i, i, own)])
+            });
+            Matrix::from_triplets(n, all).unwrap()
+        };
+        let structure = Structure::sparse(numbered(n), triple(1.0, 0.2), triple(0.02, 0.0), triple(2.0, -1.0)).unwrap();
+        assert!(structure.dissipates());
+        // of a wave that fits between the walls: k = 2 - 2 cos θ, m = 1 + 0.4 cos θ, θ = π/2 nearly; whole turns are left out before they round
+        let (half_waves, walls) = (50_000, n + 1);
+        let angle = |number: usize| std::f64::consts::PI * (number % (2 * walls)) as f64 / walls as f64;
+        let wave = angle(half_waves);
+        let shape = |i: usize| angle(half_waves * (i + 1)).sin();
+        let mut x: Vec<Complex64> = (0..n).map(|i| Complex64::new(shape(i), 0.0)).collect();
+        let omega = 1.3;
+        structure.dynamic_stiffness(Complex64::new(0.0, omega)).unwrap().solve(&mut x);
+        let z = Complex64::new(2.0 - 2.0 * wave.cos() - omega * omega * (1.0 + 0.4 * wave.cos()), omega * 0.02);
+        assert!((0..n).all(|i| (x[i] - shape(i) / z).norm() < 1e-10));
     }
 }

@@ -15,7 +15,8 @@ fn brick(elements: [usize; 3], held: bool) -> Brick {
     Brick::new(elements, elements.map(|e| EDGE * e as f64), held)
 }
 
-/// rad²/s², by `benches/peers/scipy_brick.py` of `{"elements": [16, 8, 7], "modes": 20}` (SciPy 1.17.1: eigsh with sigma = 0 and SuperLU), which assembles the block
+/// rad²/s², by `benches/peers/scipy_brick.py` of `{"elements": [16, 8, 7], "modes": 20}` (SciPy 1.17.1: eigsh with sigma = 0 and SuperLU),
+/// which assembles the block
 /// in its own way.
 const HELD: [f64; 20] = [
     6.747094462738e+08,
@@ -66,7 +67,8 @@ fn modes_are_those_of_scipy() {
     }
 }
 
-/// 16 nodes of the free face are ports. Frequencies of the reduced block agree with those of the whole far better than 0.1 %, receptances as the modes that
+/// 16 nodes of the free face are ports. Frequencies of the reduced block agree with those of the whole far better than 0.1 %, receptances
+/// as the modes that
 /// are left out let expect.
 #[test]
 fn reductions_of_the_block() {
@@ -82,7 +84,8 @@ fn reductions_of_the_block() {
     let free = Free::new(&whole, &modes, 0.0, 2).unwrap();
     let [one, two] = [1, 2].map(|order| free.reduced(modes.count(), order).unwrap());
     let held = whole.craig_bampton(BEYOND_HELD * up_to).unwrap();
-    // the share of the first mode left out, `(ω² / λ)²ᴶ`, times its own share of the answer; with the ports held, a frequency that is off by 3e-4 is a sixteenth of the
+    // the share of the first mode left out, `(ω² / λ)²ᴶ`, times its own share of the answer; with the ports held, a frequency that is off
+    // by 3e-4 is a sixteenth of the
     // distance of a sample from its mode
     let share: f64 = BEYOND.powi(-4);
     for (reduced, tolerance) in [(&one, share), (&two, share * share), (&held, 0.1)] {

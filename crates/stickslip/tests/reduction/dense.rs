@@ -72,7 +72,8 @@ const ABOVE_ALL: f64 = 4.0;
 
 const UNDAMPED: Damping = Damping::Rayleigh { mass: 0.0, stiffness: 0.0 };
 
-/// A reduction errs where its size says so: with residual vectors of J orders like `(ω² / λ)²ᴶ⁺¹` of the first mode left out, of which the answer at
+/// A reduction errs where its size says so: with residual vectors of J orders like `(ω² / λ)²ᴶ⁺¹` of the first mode left out, of which the
+/// answer at
 /// rest is exact, for held and for free structures.
 #[test]
 fn residual_vectors_make_low_frequencies_exact() {

@@ -53,7 +53,7 @@ pub(super) const KIND: Kind = Kind {
         axes: [None, Some(Dimension::LENGTH)],
         // harmonic balance is what branches are made of
         uses_method: false,
-        needs: |values, system| method(values).solver(system).map(drop),
+        needs: |values, _, system| method(values).solver(system).map(drop),
         adapts: false,
         tables: &["branch", "peaks", "turns"],
     },

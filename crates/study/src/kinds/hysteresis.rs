@@ -15,13 +15,16 @@ use crate::info::Complaint;
 use crate::info::KindInfo;
 use crate::key::{Takes, default, optional};
 use crate::kind::Kind;
+use crate::names::Names;
 use crate::rows::Rows;
 use crate::values::{Values, hertz};
 use crate::warnings::driven;
 use crate::words::shown_hertz;
 use crate::work::{Computed, Grain, Part, Prepared, Work};
+use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
-use stickslip::model::Model;
+use stickslip::law::MOST_DIRECTIONS;
+use stickslip::model::{Joint, Model};
 use stickslip::orbit::{Orbit, Sample};
 
 pub(super) const KIND: Kind = Kind {
@@ -42,7 +45,13 @@ pub(super) const KIND: Kind = Kind {
                 "the mass whose displacement is the abscissa of the loops; absent: the relative displacement of the joint",
                 "\"blade1\"",
             ),
-            default("sum", Takes::Flag, "false", "adds the forces of the joints up to one loop", "true"),
+            default(
+                "sum",
+                Takes::Flag,
+                "false",
+                "adds the forces of the joints up to one loop, or to one for each direction that they have",
+                "true",
+            ),
             SAMPLES,
         ],
         check,
@@ -62,10 +71,9 @@ pub(super) const KIND: Kind = Kind {
 fn cost(costing: &Costing<'_>) -> Cost {
     let (values, points) = (&costing.case.values, costing.points());
     let loops = match values.names("loop") {
-        _ if values.flag("sum") == Some(true) => 1.0,
-        Some(names) => names.len() as f64,
-        None if costing.joints > 0.0 => costing.joints,
-        None => costing.case.model.motions.len() as f64,
+        _ if values.flag("sum") == Some(true) => MOST_DIRECTIONS as f64,
+        None if costing.joints == 0.0 => costing.case.model.motions.len() as f64,
+        _ => wanted(values, &costing.case.model).len() as f64,
     };
     let rows = points * loops * costing.instants();
     let keys = costing.varied + costing.several();
@@ -82,22 +90,17 @@ fn cost(costing: &Costing<'_>) -> Cost {
 }
 
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
-    let labels: Vec<String> = model.joints.iter().flat_map(|joint| model.joint_labels(joint)).collect();
-    let mut known: Vec<&str> = labels.iter().map(String::as_str).collect();
-    known.extend(model.motions.iter().map(|motion| motion.on.as_str()));
+    let known = known(model);
     for name in values.names("loop").unwrap_or_default() {
-        if !known.contains(&name.as_str()) {
-            return Err(Complaint::unknown("loop", "joint or moved place", name, &known));
-        }
+        known.all("loop", "joint or moved place", name)?;
     }
-    let places: Vec<String> = model.masses.iter().flat_map(|mass| mass.places()).collect();
-    let places: Vec<&str> = places.iter().map(String::as_str).collect();
-    if let Some(name) = values.text("against").filter(|name| !places.contains(name)) {
-        return Err(Complaint::unknown("against", "mass", name, &places));
+    if let Some(name) = values.text("against") {
+        Names::of_masses(model).one("against", "mass", name)?;
     }
     if values.flag("sum") == Some(true) && values.text("against").is_none() {
-        let summed = |name: &str| values.names("loop").is_none_or(|names| names.iter().any(|n| n == name));
-        let mut ends = model.joints.iter().filter(|joint| summed(&joint.name)).map(|joint| &joint.between);
+        let wanted = wanted(values, model);
+        let summed = |joint: &&Joint| model.joint_labels(joint).iter().any(|label| wanted.contains(label));
+        let mut ends = model.joints.iter().filter(summed).map(|joint| &joint.between);
         let first = ends.next();
         if ends.any(|between| Some(between) != first) {
             let message =
@@ -110,6 +113,25 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
         return Err(Complaint::new("kind", "the model has no joint and no moved place, so it has no loop", help));
     }
     Ok(())
+}
+
+/// What can have a loop.
+fn known(model: &Model) -> Names {
+    Names::default().and_joints(model).and_moved(model)
+}
+
+/// The joints, along each of their directions, and moved places whose loops are wanted: those that are named, or every joint.
+fn wanted(values: &Values, model: &Model) -> Vec<String> {
+    let known = known(model);
+    let meant =
+        |name: &String| known.all("loop", "joint or moved place", name).map(<[String]>::to_vec).unwrap_or_default();
+    let every = || model.joints.iter().flat_map(|joint| model.joint_labels(joint)).collect();
+    let mut wanted: Vec<String> =
+        values.names("loop").map_or_else(every, |names| names.iter().flat_map(meant).collect());
+    // a joint and one of its directions may both be named
+    let mut seen = BTreeSet::new();
+    wanted.retain(|name| seen.insert(name.clone()));
+    wanted
 }
 
 /// Where the force and displacement of a loop stand in a sample.
@@ -194,23 +216,39 @@ fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
         .enumerate()
         .flat_map(|(j, joint)| joint.labels().enumerate().map(move |(axis, label)| (label, (j, axis))))
         .collect();
-    let all = || axes.iter().map(|(label, _)| label.clone()).collect::<Vec<_>>();
-    let mut names = values.names("loop").map_or_else(all, <[String]>::to_vec);
+    let mut names = wanted(values, &prepared.case.model);
     if names.is_empty() {
         names = system.moved().iter().map(|place| place.name.clone()).collect();
     }
     let joint = |name: &String| axes.iter().find(|(label, _)| label == name).map(|(_, at)| *at);
     if values.flag("sum") == Some(true) {
-        let joints: Vec<(usize, usize)> = names.iter().filter_map(joint).collect();
-        let name = names.iter().filter(|name| joint(name).is_some()).cloned().collect::<Vec<_>>().join(" + ");
-        let sum = (name, Source { force: Of::Joints(joints.clone()), against });
-        return if joints.is_empty() { Vec::new() } else { vec![sum] };
+        // forces along different directions are no sum: each direction has its own
+        let mut sums: Vec<Sum> = Vec::new();
+        for (name, (j, axis)) in names.into_iter().filter_map(|name| Some((name.clone(), joint(&name)?))) {
+            let direction = system.joints()[j].axes()[axis].name();
+            let at = sums.iter().position(|sum| sum.direction == direction).unwrap_or_else(|| {
+                sums.push(Sum { direction, names: Vec::new(), joints: Vec::new() });
+                sums.len() - 1
+            });
+            sums[at].names.push(name);
+            sums[at].joints.push((j, axis));
+        }
+        let one = |sum: Sum| (sum.names.join(" + "), Source { force: Of::Joints(sum.joints), against });
+        return sums.into_iter().map(one).collect();
     }
     let find = |name: &String| {
         let joint = joint(name).map(|joint| Of::Joints(vec![joint]));
         joint.or_else(|| system.moved().iter().position(|place| place.name == *name).map(Of::Moved))
     };
     names.iter().filter_map(|name| Some((name.clone(), Source { force: find(name)?, against }))).collect()
+}
+
+/// The joints whose forces along one direction are added up.
+struct Sum<'a> {
+    /// Name of the direction; none of joints that have but one.
+    direction: Option<&'a str>,
+    names: Vec<String>,
+    joints: Vec<(usize, usize)>,
 }
 
 /// Loss per period where the orbit knows it in closed form: of joints over their own displacement, and of the only source of work.

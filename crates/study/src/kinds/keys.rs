@@ -4,7 +4,7 @@ use crate::extra;
 use crate::info::Complaint;
 use crate::key::{Key, Takes, default, optional, required};
 use crate::values::Values;
-use stickslip::method::MethodError;
+use stickslip::method::{MethodError, Options};
 use stickslip::model::{Model, System};
 
 /// Whether there is a mass whose peak could count.
@@ -17,7 +17,7 @@ pub(super) fn check_masses(model: &Model) -> Result<(), Complaint> {
 }
 
 /// Of a kind that needs nothing of a system beside what its method needs.
-pub(super) fn anything(_: &Values, _: &System) -> Result<(), MethodError> {
+pub(super) fn anything(_: &Values, _: &Options, _: &System) -> Result<(), MethodError> {
     Ok(())
 }
 

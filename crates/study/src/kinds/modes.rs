@@ -49,7 +49,7 @@ pub(super) const KIND: Kind = Kind {
         axes: [Some(Dimension::LENGTH), None],
         // free vibration has no drive frequency: harmonic balance with an unknown frequency and damping is solved
         uses_method: false,
-        needs: |_, system| stickslip::curve::modes::check(system),
+        needs: |_, _, system| stickslip::curve::modes::check(system),
         adapts: false,
         tables: &["modes", "modes_summary"],
     },
@@ -87,7 +87,8 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
         return Err(Complaint::new("amplitude", "the range is empty", "`from` must be below `to`"));
     }
     check_samples(values)?;
-    let (number, masses) = (values.count("mode").unwrap_or(1), model.masses.len() as u64);
+    let (number, masses): (u64, u64) =
+        (values.count("mode").unwrap_or(1), model.masses.iter().map(|mass| mass.places().len() as u64).sum());
     if number > masses {
         let message = format!("there is no mode {number}: the structure has {masses}");
         return Err(Complaint::new("mode", message, "count modes from 1, by rising frequency"));

@@ -110,15 +110,11 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
-/// Which orbit of a continuum is shown.
+/// That the orbit of a joint that sticks is one of a continuum; where it is not its own mirror image, [`Note::History`] says so.
 fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
-    let which = match orbit.symmetry {
-        Symmetry::HalfPeriod => "the symmetric one is shown",
-        Symmetry::FullPeriod => "the one nearest to the first guess is shown",
-    };
-    orbit.is_one_of_many().then(|| {
+    (orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
         Note::Said(format!(
-            "{}: {} sticks for the whole period; the orbit is one of a continuum, {which}.",
+            "{}: {} sticks for the whole period; the orbit is one of a continuum, the symmetric one is shown.",
             place_of(&prepared.case, orbit.omega),
             orbit.evidence.stuck.join(", ")
         ))

@@ -2,6 +2,7 @@
 
 use crate::info::Complaint;
 use crate::key::{Key, Takes, optional};
+use crate::names::Names;
 use crate::values::Values;
 use crate::work::Prepared;
 use stickslip::model::Model;
@@ -20,14 +21,9 @@ pub(super) const PEAK_OF: Key = optional(
 
 /// Whether it names masses of the model.
 pub(super) fn check_peak_of(values: &Values, model: &Model) -> Result<(), Complaint> {
-    let places: Vec<String> = model.masses.iter().flat_map(|mass| mass.places()).collect();
-    let masses: Vec<&str> = places.iter().map(String::as_str).collect();
-    for name in values.names("peak_of").unwrap_or_default() {
-        if name != ALL && !masses.contains(&name.as_str()) {
-            return Err(Complaint::unknown("peak_of", "mass", name, &masses));
-        }
-    }
-    Ok(())
+    let masses = Names::of_masses(model);
+    let mut named = values.names("peak_of").unwrap_or_default().iter().filter(|name| *name != ALL);
+    named.try_for_each(|name| masses.all(PEAK_OF.name, "mass", name).map(drop))
 }
 
 /// The places that the key names; none if it is absent.
@@ -37,7 +33,16 @@ pub(super) fn named_places(prepared: &Prepared) -> Vec<usize> {
     if names.iter().any(|name| name == ALL) && !places.iter().any(|place| place == ALL) {
         return (0..places.len()).collect();
     }
-    names.iter().filter_map(|name| places.iter().position(|place| place == name)).collect()
+    let masses = Names::of_masses(&prepared.case.model);
+    let meant = names.iter().filter_map(|name| masses.all(PEAK_OF.name, "mass", name).ok()).flatten();
+    let mut found: Vec<usize> = Vec::new();
+    for place in meant.filter_map(|name| places.iter().position(|place| place == name)) {
+        // a place and its node may both be named
+        if !found.contains(&place) {
+            found.push(place);
+        }
+    }
+    found
 }
 
 /// The places whose peak counts: the named ones, or the first that a force acts on.

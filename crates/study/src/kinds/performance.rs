@@ -23,7 +23,7 @@ use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
-use stickslip::model::Model;
+use stickslip::model::{Model, System};
 use stickslip::orbit::Accuracy;
 
 pub(super) const KIND: Kind = Kind {
@@ -90,7 +90,7 @@ fn compute(work: &Work<'_>) -> Computed {
         part.count(|| prepared.case.label(), status, failed.then(reason));
         if row.inaccurate > 0 {
             part.notes.push(Note::Said(format!(
-                "{}: at {} frequencies of the grid the series is too short for the `tolerance` of the method; look at one with                  kind = \"response\".",
+                "{}: at {} frequencies of the grid the series is too short for the `tolerance` of the method; look at one with kind = \"response\".",
                 prepared.case.label(),
                 row.inaccurate
             )));
@@ -115,14 +115,47 @@ fn compute(work: &Work<'_>) -> Computed {
         optima.end();
         if best.is_none() {
             let at = if outer.is_empty() { String::new() } else { format!(" at {}", varied_text(outer)) };
-            part.notes.push(Note::Said(format!(
-                "{WARNING}the lowest peak stands at an end of the values of {}{at}: widen them",
-                inner.name
-            )));
+            part.notes.push(Note::Said(format!("{WARNING}{}", no_optimum(work, &curve, &inner.name, &at))));
         }
     }
     part.tables = vec![rows, optima];
     Ok(part)
+}
+
+/// Why no value of the parameter is the best one.
+fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, parameter: &str, at: &str) -> String {
+    let level = curve.lowest();
+    let height = |row: &usize| curve.rows[*row].peak.map_or(f64::NAN, |peak| peak.value);
+    let text = |row: Option<&usize>| {
+        let value = row.and_then(|row| work.cases[*row].case.varied.last());
+        value.map_or_else(String::new, |value| value.text.clone())
+    };
+    match level[..] {
+        [] => format!("no peak was found at any value of {parameter}{at}"),
+        [_] => format!("the lowest peak stands at an end of the values of {parameter}{at}: widen them"),
+        _ if level.len() == curve.rows.len() && level.iter().all(|row| height(row) == 0.0) => format!(
+            "nothing whose peak counts moves at any value of {parameter}{at}, so none is the best: friction holds it, or no force reaches it; raise \
+             the excitation, or look at other values"
+        ),
+        _ => format!(
+            "{} values of {parameter}{at} have the same lowest peak, from {} to {}: none of them is the best",
+            level.len(),
+            text(level.first()),
+            text(level.last())
+        ),
+    }
+}
+
+/// Amplitudes below this share of what the loads would do to a mass by itself are rounding: friction holds it.
+const HELD: f64 = 1e-10;
+
+/// The amplitude (m) below which a place counts as held at a frequency: a share of `F / (k + Ω²m)`, the largest there is.
+fn held(system: &System, omega: f64) -> f64 {
+    let (mass, stiffness) = (system.structure().mass(), system.structure().stiffness());
+    let alone = |i: usize, force: f64| force / (stiffness[(i, i)].abs() + omega * omega * mass[(i, i)]);
+    let loads = system.excitation(omega);
+    let sizes = loads.iter().flat_map(|(_, force)| force.iter().enumerate().map(|(i, f)| alone(i, f.norm())));
+    HELD * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
 }
 
 /// How far the orbits behind a peak may be trusted.
@@ -155,7 +188,10 @@ fn curve(work: &Work<'_>) -> Result<PerformanceCurve, MethodError> {
         method: &*first.method,
         range,
         points: frequencies.len(),
-        quantity: &|orbit| worst(orbit, &places),
+        quantity: &|orbit| {
+            let amplitude = worst(orbit, &places);
+            if amplitude > held(&first.system, orbit.omega) { amplitude } else { 0.0 }
+        },
     };
     let values: Vec<f64> = work.cases.iter().map(|p| split(p).map_or(0.0, |(_, inner)| inner.si)).collect();
     let result = performance.curve(&values);

@@ -14,7 +14,7 @@ use crate::drawing::{Drawing, Layout, MOST_CURVES, MOST_PANELS, Stretch, largest
 use crate::info::KindInfo;
 use crate::key::{Key, Takes, default};
 use crate::kind::Kind;
-use crate::note::Note;
+use crate::note::{Note, WARNING};
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
 use crate::study::varied_text;
@@ -26,7 +26,7 @@ use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::peak::{self, Peak, Point};
 use stickslip::dimension::Dimension;
 use stickslip::law::{Law, SharedLaw};
-use stickslip::method::{MethodError, OrbitError};
+use stickslip::method::{self, MethodError, Options, OrbitError, Solver};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
 
@@ -145,7 +145,9 @@ fn compute(work: &Work<'_>) -> Computed {
         part.tables.push(Rows::default());
     }
     if work.study.wants_references() && case.index == 0 {
-        part.tables.push(references(work, &stretch.omegas).map_err(|error| (case.index, error))?);
+        let (rows, absent) = references(work, &stretch.omegas);
+        part.tables.push(rows);
+        part.notes.extend(absent.into_iter().map(Note::Said));
     }
     Ok(part)
 }
@@ -321,40 +323,57 @@ fn ends_a_level(points: &[Point], quantity: usize, peak: &Peak) -> bool {
     at >= 2 && points[at - 2..at].iter().all(as_high)
 }
 
-/// The responses of the same structure with all joints free and with all joints stuck.
-fn references(work: &Work<'_>, omegas: &[f64]) -> Result<Rows, MethodError> {
+/// The same model with every joint as its linear reference, or why there is none.
+fn linear(prepared: &Prepared, change: impl Fn(&dyn Law) -> Option<SharedLaw>) -> Result<System, String> {
+    let mut model = prepared.case.model.clone();
+    for joint in &mut model.joints {
+        let none = || format!("the law `{}` of joint `{}` has no slip limit", joint.law.name(), joint.name);
+        joint.law = change(&*joint.law).ok_or_else(none)?;
+    }
+    model.assemble().map_err(|error| error.to_string())
+}
+
+/// A solver of a linear reference: its joints have other laws than those for which the method was chosen, so that any may do.
+fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    prepared.method.solver(system).or_else(|error| {
+        let others = error.ways().into_iter().flat_map(|ways| &ways.methods).filter_map(|name| method::find(name));
+        let mut takes = others.filter_map(|row| (row.build)(&Options::new()).ok()?.solver(system).ok());
+        takes.next().ok_or(error)
+    })
+}
+
+/// The responses of the same structure with all joints free and with all joints stuck, and why one of them is absent.
+fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>) {
     let prepared = work.case();
     let between = omegas.windows(2).flat_map(|pair| {
         (0..REFERENCE_POINTS).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / REFERENCE_POINTS as f64)
     });
     let omegas: Vec<f64> = between.chain(omegas.last().copied()).collect();
-    // laws without a slip limit have neither reference
-    let with = |change: &dyn Fn(&dyn Law) -> Option<SharedLaw>| {
-        let mut model = prepared.case.model.clone();
-        for joint in &mut model.joints {
-            joint.law = change(&*joint.law)?;
-        }
-        model.assemble().ok()
+    let follow = |system: Result<System, String>| -> Result<Vec<Option<Orbit>>, String> {
+        let system = system?;
+        let mut solver = solver(prepared, &system).map_err(|error| error.to_string())?;
+        Ok(omegas.iter().map(|omega| solver.orbit(*omega, None).ok()).collect())
     };
-    let mut systems = [with(&|law| law.free()), with(&|law| law.stuck())].map(|system| (system, Vec::new()));
-    for (system, curve) in &mut systems {
-        let Some(system) = system else { continue };
-        let mut solver = prepared.method.solver(system)?;
-        curve.extend(omegas.iter().map(|omega| solver.orbit(*omega, None).ok()));
-    }
+    let free = follow(linear(prepared, |law| law.free()));
+    let stuck = follow(linear(prepared, |law| law.stuck()));
+    let absent = [("free", &free), ("stuck", &stuck)].into_iter().filter_map(|(what, curve)| {
+        let why = curve.as_ref().err()?;
+        Some(format!("{WARNING}there is no reference curve with all joints {what}: {why}"))
+    });
+    let absent = absent.collect();
     let mut rows = Rows::default();
     for (i, omega) in omegas.iter().enumerate() {
         rows.number(DRIVE, hertz(*omega));
-        for (what, (_, curve)) in ["free", "stuck"].iter().zip(&systems) {
+        for (what, curve) in [("free", &free), ("stuck", &stuck)] {
             for (place, name) in prepared.system.places().iter().enumerate() {
-                let orbit = curve.get(i).and_then(|orbit| orbit.as_ref());
+                let orbit = curve.as_ref().ok().and_then(|curve| curve[i].as_ref());
                 let amplitude = orbit.map_or(f64::NAN, |orbit| orbit.places[place].amplitude());
                 rows.number(&amplitude_of(&format!("{name}_{what}")), amplitude);
             }
         }
         rows.end();
     }
-    Ok(rows)
+    (rows, absent)
 }
 
 /// What is drawn.
@@ -442,10 +461,13 @@ impl Drawn<'_> {
                     .map(|name| numbers(table, &amplitude_of(&format!("{name}_{what}")), 0..table.rows()))
                     .collect();
                 let y = (0..x.len()).map(|i| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max) * self.factor.1);
+                let y: Vec<f64> = y.collect();
                 let of = if names.len() > 1 { ", largest" } else { "" };
-                let line = Series::line(format!("all joints {what}{of}"), x.clone(), y.collect(), 0);
+                let line = Series::line(format!("all joints {what}{of}"), x.clone(), y, 0);
                 Series { style, ..line.reference() }
             })
+            // why one is absent stands in the notes
+            .filter(|line| line.y.iter().any(|y| y.is_finite()))
             .collect()
     }
 }
@@ -553,11 +575,11 @@ impl Drawn<'_> {
         let (mut panel, names) = (self.panel(stretch.label()), self.names());
         panel.series.extend(self.references(&names));
         if self.single() {
-            let mass = self.system.structure().mass();
-            let heaviest = mass.diagonal().max();
+            let mass = |place: usize| self.system.structure().own_mass(place);
+            let heaviest = (0..self.system.dofs()).map(mass).fold(0.0, f64::max);
             for (name, place) in &self.shown {
                 let (x, y) = self.line(stretch, name);
-                let light = mass[(*place, *place)] < LIGHT * heaviest;
+                let light = mass(*place) < LIGHT * heaviest;
                 let style = if light { Style::Dashed } else { Style::Solid };
                 panel.series.push(Series { style, ..Series::line(name, x, y, *place) });
             }

@@ -1,6 +1,6 @@
 //! Transients: the motion in time from rest or from given displacements; free decay, switched-on drive, or run-up.
 
-use super::keys::{MOST_SAMPLES, anything};
+use super::keys::MOST_SAMPLES;
 use super::orbit::write_sample;
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Figure, Panel, Series};
@@ -10,6 +10,7 @@ use crate::info::Complaint;
 use crate::info::KindInfo;
 use crate::key::{Key, Takes, Within, default, optional, required};
 use crate::kind::Kind;
+use crate::names::Names;
 use crate::note::Note;
 use crate::point::place_of;
 use crate::rows::Rows;
@@ -19,7 +20,8 @@ use crate::words::shown_hertz;
 use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
-use stickslip::method::transient::{Excitation, Transient};
+use stickslip::method::WIDTH;
+use stickslip::method::transient::{Excitation, Transient, TransientError};
 use stickslip::model::Model;
 
 const FREQUENCY: Takes = Takes::Quantity(Dimension::FREQUENCY, Within::Positive);
@@ -88,7 +90,7 @@ pub(super) const KIND: Kind = Kind {
         axes: [Some(Dimension::TIME), Some(Dimension::LENGTH)],
         // exact and smooth laws alike are followed in time; there is no orbit to be found
         uses_method: false,
-        needs: anything,
+        needs: |_, options, system| Transient::check(system, options.get(WIDTH).copied()),
         adapts: false,
         tables: &["motion", "motion_summary", "decay", "decay_summary"],
     },
@@ -136,17 +138,10 @@ fn cost(costing: &Costing<'_>) -> Cost {
 }
 
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
-    let places: Vec<String> = model.masses.iter().flat_map(|mass| mass.places()).collect();
-    let free: Vec<&str> = places
-        .iter()
-        .map(String::as_str)
-        .filter(|name| !model.motions.iter().any(|motion| motion.on == *name))
-        .collect();
+    let free = Names::of_free_masses(model);
     for key in ["start", "start_velocity"] {
         for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
-            if !free.contains(&name.as_str()) {
-                return Err(Complaint::unknown(key, "free mass", name, &free));
-            }
+            free.one(key, "free mass", name)?;
         }
     }
     let (drive, run_up) = (values.frequencies("frequency"), values.table("run_up"));
@@ -232,7 +227,7 @@ fn compute(work: &Work<'_>) -> Computed {
             excitation,
             duration,
             step,
-            width: case.method.options.get("width").copied(),
+            width: case.method.options.get(WIDTH).copied(),
         };
         let mut stopped = false;
         // of every mass the largest displacement, and when
@@ -275,6 +270,7 @@ fn compute(work: &Work<'_>) -> Computed {
         match end {
             Ok(()) if stopped => part.count(at, NOT_REACHED, None),
             Ok(()) => part.count(at, CONVERGED, None),
+            Err(TransientError::Method(error)) => return Err((case.index, error)),
             Err(error) => part.count(at, "breakdown", Some(error.to_string())),
         }
     }

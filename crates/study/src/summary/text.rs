@@ -2,6 +2,7 @@
 
 use super::{JointSummary, ModelSummary};
 use crate::words::{about, bytes_text, plural, quantity, significant};
+use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::fmt;
 use stickslip::model::{LinearMode, Modes};
@@ -54,8 +55,16 @@ impl ModelSummary {
     }
 
     fn joint(&self, joint: &JointSummary) -> String {
+        match joint.pressed {
+            Some(0.0) => return "apart at rest: it closes and opens".to_owned(),
+            Some(force) => return format!("pressed with {} at rest: it opens and closes", quantity(force, "N")),
+            None => {}
+        }
         if joint.limit == 0.0 {
-            return "limit 0: free".to_owned();
+            return "free: carries nothing at rest".to_owned();
+        }
+        if joint.limit.is_infinite() {
+            return "a spring at rest, never slips".to_owned();
         }
         let mut text = match joint.displacement {
             Some(displacement) => {
@@ -95,7 +104,9 @@ impl ModelSummary {
 
 impl fmt::Display for ModelSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let joints = self.joints.len();
+        // of nodes each direction has a line of its own
+        let names: BTreeSet<&str> = self.joints.iter().filter_map(|joint| joint.name.split('.').next()).collect();
+        let joints = names.len();
         let dofs =
             if self.dofs == 1 { "1 degree of freedom".to_owned() } else { format!("{} degrees of freedom", self.dofs) };
         let shown = if self.case.is_empty() { String::new() } else { format!(", shown for {}", self.case) };
@@ -109,14 +120,15 @@ impl fmt::Display for ModelSummary {
         }
         // those that the excitation loads most come first where there are many
         let mut order: Vec<&JointSummary> = self.joints.iter().collect();
-        if joints > LISTED {
+        let lines = self.joints.len();
+        if lines > LISTED {
             let load = |joint: &JointSummary| joint.onset.as_ref().map_or(0.0, |onset| onset.largest);
             order.sort_by(|a, b| load(b).total_cmp(&load(a)));
         }
         for joint in order.iter().take(LISTED) {
             line(&joint.name, &self.joint(joint))?;
         }
-        if let Some(more @ 1..) = joints.checked_sub(LISTED) {
+        if let Some(more @ 1..) = lines.checked_sub(LISTED) {
             line("", &format!("and {more} more joint{}", plural(more)))?;
         }
         let Self { size, cases, .. } = self;

@@ -1,7 +1,7 @@
 //! The motion over a stretch of time: closed-form segments joined at the switches, with its exact sensitivity.
 
 use super::decide::{AT_LIMIT, Decision};
-use super::mechanics::{Kind, Mechanics, REST};
+use super::mechanics::{Kind, Mechanics, Part, REST};
 use super::memory::Memory;
 use super::pattern::{Beginning, Driven, Pattern, Work};
 use crate::law::Contact;
@@ -79,6 +79,8 @@ pub(crate) struct Flow {
     signals: Vec<Complex64>,
     begins: Vec<Begin>,
     watched: Vec<usize>,
+    /// Of every part, whether it is watched for what ends its pattern forward and backward.
+    nearest: Vec<[bool; 2]>,
     before: DVector<f64>,
     after: DVector<f64>,
     row: DVector<f64>,
@@ -112,6 +114,7 @@ impl Flow {
             signals: Vec::new(),
             begins: Vec::new(),
             watched: Vec::new(),
+            nearest: Vec::new(),
             before: DVector::zeros(states),
             after: DVector::zeros(states),
             row: DVector::zeros(states),
@@ -160,7 +163,7 @@ impl Flow {
                 })?;
             self.start_segment(time, &pattern, driven, state);
             let eased = idle > EASED_AFTER * (1 + self.mechanics.parts.len());
-            self.watch(&pattern, velocity_scale, eased);
+            self.watch(&pattern, &state[2 * n..], velocity_scale, eased);
             self.from.copy_from_slice(&state[..2 * n]);
             let rest = end - time;
             let basis = self.segments[self.used].basis();
@@ -312,8 +315,9 @@ impl Flow {
 
     /// The signals whose zeros are switches: `static limit ∓ f` in stick, the velocity in slip direction in slip, the depth of a stop or what is
     /// missing of it. If `eased`, those that begin at zero may pass it by as much as counts as zero.
-    fn watch(&mut self, shape: &Pattern, velocity_scale: f64, eased: bool) {
+    fn watch(&mut self, shape: &Pattern, springs: &[f64], velocity_scale: f64, eased: bool) {
         let segment = &self.segments[self.used];
+        nearest(&self.mechanics.parts, &segment.contacts, springs, &mut self.nearest);
         let driven = &segment.driven;
         let (n, nb) = (self.mechanics.n, driven.basis.len());
         let (constant, modes) = (driven.basis.constant(), shape.lambda.len());
@@ -330,7 +334,8 @@ impl Flow {
                 }
                 let force = &segment.force[i * nb..(i + 1) * nb];
                 let (now, limit) = (real_dot(force, &self.values), part.holds());
-                for side in [1.0, -1.0] {
+                let sides = [1.0, -1.0].into_iter().zip(self.nearest[i]);
+                for side in sides.filter_map(|(side, nearest)| nearest.then_some(side)) {
                     let at = self.signals.len();
                     self.signals.extend(force.iter().map(|f| f * -side));
                     self.signals[at + constant].re += limit;
@@ -342,6 +347,9 @@ impl Flow {
             }
             if !part.is_slider() && shape.frozen[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
                 continue;
+            }
+            if !self.nearest[i][usize::from(contact == Contact::SlipBackward)] {
+                continue; // it stops with another one of its joint
             }
             let at = self.signals.len();
             self.signals.resize(at + nb, ZERO);
@@ -480,6 +488,35 @@ impl Flow {
     }
 }
 
+/// Which parts are watched, forward and backward, where the sliders behind springs have the forces `springs`. Those of one joint share its
+/// displacement: of the ones that stick only that is watched which reaches its limit first, of the ones that slip only one.
+fn nearest(parts: &[Part], contacts: &[Contact], springs: &[f64], out: &mut Vec<[bool; 2]>) {
+    out.clear();
+    out.resize(parts.len(), [true; 2]);
+    let mut first = 0;
+    for joint in parts.chunk_by(|a, b| a.joint == b.joint) {
+        let range = first..first + joint.len();
+        first = range.end;
+        if joint.len() == 1 {
+            continue;
+        }
+        for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+            let (mut room, mut sticking, mut slipping) = (f64::INFINITY, None, None);
+            for i in range.clone() {
+                let Kind::Elastic { stiffness, limit, state } = parts[i].kind else { continue };
+                out[i][side] = false;
+                let left = (limit - sign * springs[state]) / stiffness;
+                if contacts[i] == Contact::Stick && left < room {
+                    (room, sticking) = (left, Some(i));
+                } else if contacts[i].sign() == sign {
+                    slipping.get_or_insert(i);
+                }
+            }
+            sticking.into_iter().chain(slipping).for_each(|i| out[i][side] = true);
+        }
+    }
+}
+
 /// Adds a multiple of a signal.
 #[inline]
 fn add(sum: &mut [Complex64], signal: &[Complex64], factor: f64) {
@@ -505,7 +542,7 @@ fn begin(constant: &mut Complex64, value: f64, zero: f64, eased: bool) -> Begin 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Coulomb, Gap, Jenkins, SharedLaw, Stribeck};
+    use crate::law::{Coulomb, Gap, Iwan, Jenkins, SharedLaw, Stribeck};
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
     use std::sync::Arc;
 
@@ -533,6 +570,45 @@ mod tests {
         let mut flow = Flow::new(mechanics, Drive::default());
         flow.set_drive(drive);
         flow
+    }
+
+    /// Many sliders side by side, beside few: the derivative of the motion is what a small change of the start does to the end, and what those
+    /// that are not watched do is what the force of each says.
+    #[test]
+    fn sensitivities_pass_many_sliders() {
+        let many: SharedLaw = Arc::new(Iwan { stiffness: 2.0, limit: 0.6, chi: -0.5, beta: 0.3, elements: 24 });
+        let spring: SharedLaw = Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 });
+        let mut flow = flow([many.clone(), spring, many]);
+        let states = flow.mechanics.states();
+        assert!(states > 50);
+        let mut start = vec![0.0; states];
+        start[..4].copy_from_slice(&[0.5, -0.3, 0.4, -0.6]);
+        let mut derivative = DMatrix::identity(states, states);
+        let mut end = start.clone();
+        flow.run(&mut end, 0.0, 9.0, Some(&mut derivative)).unwrap();
+        assert!(flow.segments().len() > 30);
+        for segment in flow.segments() {
+            let nb = segment.basis().len();
+            let mut values = vec![ZERO; nb];
+            segment.basis().evaluate(segment.length, &mut values);
+            for (i, part) in flow.mechanics.parts.iter().enumerate() {
+                let force = real_dot(&segment.force[i * nb..(i + 1) * nb], &values);
+                assert!(force.abs() <= part.limit() * (1.0 + 1e-9), "{i}: {force} of {}", part.limit());
+            }
+        }
+        let step = 1e-7;
+        for column in (0..states).step_by(3) {
+            let mut ends = [start.clone(), start.clone()];
+            ends[0][column] += step;
+            ends[1][column] -= step;
+            for end in &mut ends {
+                flow.run(end, 0.0, 9.0, None).unwrap();
+            }
+            for row in 0..states {
+                let (slope, exact) = ((ends[0][row] - ends[1][row]) / (2.0 * step), derivative[(row, column)]);
+                assert!((slope - exact).abs() < 1e-5 * (1.0 + exact.abs()), "{row} by {column}: {exact} and {slope}");
+            }
+        }
     }
 
     /// The derivative of the motion through stops that open and close and through sliders that drop their force, behind held ones, springs and

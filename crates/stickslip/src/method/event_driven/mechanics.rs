@@ -3,7 +3,9 @@
 use crate::law::{Contact, Law, Piece};
 use crate::method::MethodError;
 use crate::model::System;
+use crate::structure::Matrices;
 use nalgebra::{DMatrix, DVector};
+use std::ops::Deref;
 use std::sync::Arc;
 
 /// A relative velocity below this fraction of the largest one is rest. Switch instants are found to 1e-15 of the velocity scale;
@@ -90,14 +92,14 @@ impl Part {
     }
 }
 
-/// Why the method cannot take a law: what to use instead.
+/// Why the method cannot take a law: what it misses.
 fn refusal(law: &dyn Law) -> Option<&'static str> {
-    let Some(pieces) = law.pieces() else { return Some("method `shooting`, or the exact law") };
+    let Some(pieces) = law.pieces() else { return Some("it is not made of ideal sliders, springs and stops") };
     let drops = |piece: &Piece| matches!(piece, Piece::Slider(s) if s.stiffness.is_some() && s.static_limit > s.limit);
     if law.directions() != 1 {
-        Some("a law with one direction")
+        Some("it acts along several directions")
     } else if pieces.iter().any(drops) {
-        Some("equal static and dynamic limits where a slider is behind a spring")
+        Some("the slider behind its spring holds more than it carries in slip")
     } else {
         None
     }
@@ -112,10 +114,9 @@ pub(crate) fn takes(law: &dyn Law) -> bool {
 #[derive(Debug, Clone)]
 pub(crate) struct Mechanics {
     pub n: usize,
-    pub mass: DMatrix<f64>,
+    /// Of the structure, shared with it.
+    matrices: Arc<Matrices>,
     pub inverse_mass: DMatrix<f64>,
-    pub damping: DMatrix<f64>,
-    pub stiffness: DMatrix<f64>,
     /// Sliders and stops of all joints, those that carry nothing left out.
     pub parts: Arc<[Part]>,
     /// Number of sliders behind springs.
@@ -124,24 +125,30 @@ pub(crate) struct Mechanics {
     pub fastest: f64,
 }
 
+/// Mass, damping and stiffness are read as its own.
+impl Deref for Mechanics {
+    type Target = Matrices;
+    fn deref(&self) -> &Matrices {
+        &self.matrices
+    }
+}
+
 impl Mechanics {
     /// # Errors
     /// A joint whose law has no exact view, or none that can be followed ([`refusal`]); a place without mass.
     pub fn new(system: &System) -> Result<Self, MethodError> {
         let n = system.dofs();
-        if let Some(i) = (0..n).find(|&i| system.structure().mass()[(i, i)] <= 0.0) {
-            return Err(MethodError::NeedsMass { method: super::NAME, place: system.places()[i].clone() });
+        if let Some(error) = MethodError::too_large(super::NAME, system) {
+            return Err(error);
+        }
+        if let Some(i) = (0..n).find(|&i| system.structure().own_mass(i) <= 0.0) {
+            return Err(MethodError::needs_mass(super::NAME, system, i));
         }
         let mut parts = Vec::new();
         let mut elastic = 0;
         for (j, joint) in system.joints().iter().enumerate() {
-            if let Some(instead) = refusal(joint.law().as_ref()) {
-                return Err(MethodError::Law {
-                    method: super::NAME,
-                    joint: joint.name().to_owned(),
-                    law: joint.law().name(),
-                    instead,
-                });
+            if let Some(misses) = refusal(joint.law().as_ref()) {
+                return Err(MethodError::law(super::NAME, joint, misses));
             }
             let axis = &joint.axes()[0];
             for piece in joint.law().pieces().unwrap_or_default() {
@@ -168,17 +175,15 @@ impl Mechanics {
             .clone()
             .try_inverse()
             .filter(|inverse| positive && inverse.iter().all(|x| x.is_finite()))
-            .ok_or(MethodError::NotPositive { method: super::NAME, matrix: "mass" })?;
+            .ok_or_else(|| MethodError::mass_not_positive(super::NAME))?;
         let fastest = (0..n)
             .map(|i| (system.structure().stiffness()[(i, i)] / system.structure().mass()[(i, i)]).sqrt())
             .fold(0.0, f64::max);
         Ok(Mechanics {
             n,
             fastest,
-            mass: system.structure().mass().clone(),
+            matrices: system.structure().full().clone(),
             inverse_mass,
-            damping: system.structure().damping().clone(),
-            stiffness: system.structure().stiffness().clone(),
             parts: parts.into(),
             elastic,
         })

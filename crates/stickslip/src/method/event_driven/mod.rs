@@ -18,12 +18,14 @@ mod path;
 mod pattern;
 
 pub(crate) use flow::Flow;
+use mechanics::Kind;
 pub(crate) use mechanics::{Mechanics, takes};
 pub(crate) use path::ExactPath;
 
 use super::drive::Drive;
 use super::guess::Guess;
-use super::periodic::{Aim, ReturnMap, Search, norm};
+use super::periodic::{Aim, Closed, ReturnMap, Search, approached, norm};
+use super::relaxed::{Closing, Spring, relaxed};
 use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, PERIOD, Solver, periods};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
@@ -74,7 +76,7 @@ impl Method for EventDriven {
     fn name(&self) -> &'static str {
         NAME
     }
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         Ok(Box::new(Exact::new(system, NAME, Search::Newton, 1)?))
     }
 }
@@ -90,7 +92,7 @@ impl Method for Subharmonic {
     fn name(&self) -> &'static str {
         NAME
     }
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         Ok(Box::new(Exact::new(system, NAME, Search::Newton, self.period)?))
     }
 }
@@ -134,6 +136,42 @@ impl ReturnMap for Exact<'_> {
     }
     fn weights(&self) -> &[f64] {
         &self.weights
+    }
+}
+
+impl Closing for Exact<'_> {
+    fn springs(&self) -> Vec<Spring> {
+        let mechanics = &self.flow.mechanics;
+        let springs = mechanics.parts.iter().filter_map(|part| match part.kind {
+            Kind::Elastic { stiffness, limit, state } => {
+                Some(Spring { joint: part.joint, state: 2 * mechanics.n + state, stiffness, limit })
+            }
+            _ => None,
+        });
+        springs.collect()
+    }
+    fn limit(&mut self, springs: &[Spring]) {
+        let mut springs = springs.iter();
+        let mechanics = &mut self.flow.mechanics;
+        let mut parts = mechanics.parts.to_vec();
+        for part in &mut parts {
+            if let Kind::Elastic { limit, .. } = &mut part.kind
+                && let Some(spring) = springs.next()
+            {
+                *limit = spring.limit;
+            }
+        }
+        mechanics.parts = parts.into();
+    }
+    /// The last run of the iteration was that of the closed state: its segments are the orbit.
+    fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError> {
+        let omega = self.flow.drive.omega;
+        let size = norm(&self.weights, &closed.state);
+        let symmetry = self.search.symmetry(self.system, self.periods);
+        let (at, closed) = ((omega, self.periods), (closed, size * size));
+        let orbit = path::orbit(&self.shared, self.contracts, &self.flow, at, symmetry, closed)
+            .map_err(|cause| OrbitError::Breakdown { method: self.name, omega, cause })?;
+        Ok(Orbit { method: self.name, ..orbit })
     }
 }
 
@@ -190,16 +228,24 @@ impl Solver for Exact<'_> {
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
         let (name, search) = (self.name, self.search);
         let aim = Aim { method: name, omega, residual: CLOSED, sign, rest: NEAR_REST * self.flow.energy_scale };
+        let near;
+        let known = start.filter(|state| state.len() == self.weights.len());
+        let start = if self.periods > 1 && search == Search::Newton && known.is_none() {
+            let first = self.first_state(omega);
+            near = approached(self, first, sign);
+            Some(near.as_slice())
+        } else {
+            known
+        };
         let closed = search.find(self, start, |exact| exact.first_state(omega), aim).map_err(|error| match error {
             OrbitError::NotConverged { .. } if self.drifts() => OrbitError::Drift { method: name, omega },
             error => error,
         })?;
-        let size = norm(&self.weights, &closed.state);
-        let closed = (closed, size * size);
-        // the last run of the iteration was that of the closed state: its segments are the orbit
-        let mut orbit = path::orbit(&self.shared, self.contracts, &self.flow, (omega, self.periods), symmetry, closed)
-            .map_err(|cause| OrbitError::Breakdown { method: name, omega, cause })?;
-        orbit.method = name;
+        let mut orbit = self.finish(closed)?;
+        if search == Search::Newton {
+            let system = self.system;
+            orbit = relaxed(self, system, orbit, aim);
+        }
         // a motion that has settled but for an estimated rest is out of balance by that rest
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {

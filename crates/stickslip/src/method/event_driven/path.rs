@@ -5,21 +5,19 @@ use super::flow::{Flow, Segment};
 use super::mechanics::Part;
 use crate::law::Contact;
 use crate::method::Breakdown;
-use crate::method::drive::Drive;
 use crate::method::periodic::Closed;
-use crate::model::System;
-use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
+use crate::model::{Axis, System};
+use crate::orbit::measure::{NO_WORK, Signals, Slip, measure};
+use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use num_complex::Complex64;
+use std::cell::RefCell;
 use std::sync::Arc;
 use stickslip_numerics::signal::{Basis, Begin, FirstZero, FourierIntegrals, Products, Scratch, real_dot, size_of};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Work below this fraction of (force times velocity) of the period is no yardstick for the energy gap: the motion is conservative.
-const NO_WORK: f64 = 1e-6;
-
-/// Work below this fraction of the stored energy is none either: an orbit that is closed to `CLOSED` of its state may have gained or lost that
-/// much, and the gap that this makes must stay below what is allowed.
+/// Work below this fraction of the stored energy is no yardstick for the energy gap: an orbit that is closed to `CLOSED` of its state may have
+/// gained or lost that much, and the gap that this makes must stay below what is allowed.
 const STORED: f64 = super::CLOSED / super::ENERGY_GAP;
 
 /// The closed-form segments of one return, with all that is needed to evaluate them.
@@ -52,20 +50,10 @@ pub(super) fn orbit(
     symmetry: Symmetry,
     (closed, stored): (Closed, f64),
 ) -> Result<Orbit, Breakdown> {
-    let path = ExactPath::new(system.clone(), flow, symmetry, periods as f64 * std::f64::consts::TAU / omega);
-    let places = path.places(omega)?;
-    let joints = path.joints()?;
-    let energy = path.energy(flow, &joints);
-    let stuck = joints
-        .iter()
-        .zip(system.joints())
-        .enumerate()
-        .filter(|(j, (motion, _))| motion.slip_fraction == 0.0 && path.of_joint(*j).any(|s| path.parts[s].is_slider()))
-        .map(|(_, (_, joint))| joint.name().to_owned());
+    let period = periods as f64 * std::f64::consts::TAU / omega;
+    let path = ExactPath::new(system.clone(), flow, symmetry, period);
+    let measured = measure(system, &Measuring::new(&path), omega, (symmetry, period))?;
     let rest = super::NEAR_REST * flow.energy_scale;
-    let reference =
-        energy.work_in.abs().max(NO_WORK * path.exchanged(&flow.drive)).max(NO_WORK * rest * rest).max(STORED * stored);
-    let balance = energy.work_in - energy.viscous - energy.friction;
     Ok(Orbit {
         method: NAME,
         omega,
@@ -74,17 +62,18 @@ pub(super) fn orbit(
         start: closed.state,
         evidence: Evidence {
             residual: closed.residual,
-            energy_gap: if reference > 0.0 { balance.abs() / reference } else { balance.abs() },
-            switches: joints.iter().map(|joint| joint.switches).sum(),
+            energy_gap: measured.energy_gap(f64::max(NO_WORK * rest * rest, STORED * stored)),
+            switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
             truncation: closed.missing,
             return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,
-            stuck: stuck.collect(),
+            history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
+            stuck: measured.stuck,
         },
-        places,
-        joints,
-        energy,
+        places: measured.places,
+        joints: measured.joints,
+        energy: measured.energy,
         return_map: closed.derivative,
         contracts,
         path: Arc::new(path),
@@ -108,55 +97,6 @@ impl ExactPath {
         ExactPath { system, pieces, parts: flow.mechanics.parts.clone(), symmetry, period, rates, omega }
     }
 
-    /// How often the segments are run through in a period.
-    fn times(&self) -> f64 {
-        if self.symmetry == Symmetry::HalfPeriod { 2.0 } else { 1.0 }
-    }
-
-    fn places(&self, omega: f64) -> Result<Vec<PlaceMotion>, Breakdown> {
-        let n = self.system.dofs();
-        let mut memory = Memory::default();
-        let at = |piece: &Piece, nu| FourierIntegrals::new(piece.basis(), &piece.at_end, nu, piece.segment.length);
-        // of the drive frequency, what it has turned by the start of the piece, and of the mean where there is one
-        let integrals: Vec<_> = self
-            .pieces
-            .iter()
-            .map(|piece| {
-                let turn = Complex64::new(0.0, -omega * piece.segment.start).exp();
-                (at(piece, omega), turn, (self.symmetry == Symmetry::FullPeriod).then(|| at(piece, 0.0)))
-            })
-            .collect();
-        (0..n)
-            .map(|i| {
-                let (mut maximum, mut minimum) = (f64::NEG_INFINITY, f64::INFINITY);
-                let (mut integral, mut first_harmonic) = (0.0, ZERO);
-                for (piece, (fourier, turn, mean)) in self.pieces.iter().zip(&integrals) {
-                    let basis = piece.basis();
-                    let nb = basis.len();
-                    let (x, v) =
-                        (&piece.segment.displacement[i * nb..(i + 1) * nb], &piece.velocity[i * nb..(i + 1) * nb]);
-                    let (low, high) = piece.extremes(x, v, &mut memory)?;
-                    (maximum, minimum) = (maximum.max(high), minimum.min(low));
-                    if let Some(mean) = mean {
-                        integral += mean.integral(basis, x).re;
-                    }
-                    first_harmonic += fourier.integral(basis, x) * turn;
-                }
-                if self.symmetry == Symmetry::HalfPeriod {
-                    maximum = maximum.max(-minimum);
-                    minimum = -maximum;
-                }
-                Ok(PlaceMotion {
-                    name: self.system.places()[i].clone(),
-                    maximum,
-                    minimum,
-                    mean: integral / self.period,
-                    first_harmonic: first_harmonic * (2.0 * self.times() / self.period),
-                })
-            })
-            .collect()
-    }
-
     /// The parts of a joint.
     fn of_joint(&self, joint: usize) -> impl Iterator<Item = usize> {
         self.parts.iter().enumerate().filter(move |(_, part)| part.joint == joint).map(|(s, _)| s)
@@ -167,147 +107,33 @@ impl ExactPath {
         if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last }
     }
 
-    fn joints(&self) -> Result<Vec<JointMotion>, Breakdown> {
-        let n = self.system.dofs();
-        let mut memory = Memory::default();
-        let (mut u, mut velocity) = (Vec::new(), Vec::new());
-        self.system
-            .joints()
-            .iter()
-            .enumerate()
-            .map(|(j, joint)| {
-                let parts: Vec<usize> = self.of_joint(j).collect();
-                let (mut dissipation, mut slipping, mut switches) = (0.0, 0.0, 0);
-                let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-                let mut before: Option<&Piece> = None;
-                for piece in &self.pieces {
-                    let nb = piece.basis().len();
-                    u.clear();
-                    u.resize(nb, ZERO);
-                    for i in 0..n {
-                        let w = joint.axes()[0].dense(n)[i];
-                        if w != 0.0 {
-                            let x = &piece.segment.displacement[i * nb..(i + 1) * nb];
-                            u.iter_mut().zip(x).for_each(|(u, x)| *u += x * w);
-                        }
-                    }
-                    self.add_imposed(piece, joint.axes()[0].imposed(), &mut u);
-                    velocity.resize(nb, ZERO);
-                    piece.basis().differentiate(&u, &mut velocity);
-                    let travel = real_dot(&u, &piece.at_end) - piece.basis().beginning(&u);
-                    let (least, most) = piece.extremes(&u, &velocity, &mut memory)?;
-                    (low, high) = (low.min(least), high.max(most));
-                    for &s in &parts {
-                        dissipation += piece.segment.contacts[s].sign() * self.parts[s].limit() * travel;
-                    }
-                    if parts.iter().any(|&s| piece.segment.contacts[s].slips()) {
-                        slipping += piece.segment.length;
-                    }
-                    if let Some(before) = before {
-                        switches +=
-                            parts.iter().filter(|&&s| before.segment.contacts[s] != piece.segment.contacts[s]).count();
-                    }
-                    before = Some(piece);
-                }
-                if let (Some(first), Some(last)) = (self.pieces.first(), self.pieces.last()) {
-                    switches += parts
-                        .iter()
-                        .filter(|&&s| self.next_of(last.segment.contacts[s]) != first.segment.contacts[s])
-                        .count();
-                }
-                if self.symmetry == Symmetry::HalfPeriod {
-                    high = high.max(-low);
-                    low = -high;
-                }
-                Ok(JointMotion {
-                    name: joint.name().to_owned(),
-                    dissipation: self.times() * dissipation,
-                    // a joint that holds nothing slips all the time
-                    slip_fraction: if parts.is_empty() { 1.0 } else { self.times() * slipping / self.period },
-                    displacement: vec![(low, high)],
-                    switches: self.times() as usize * switches,
-                })
-            })
-            .collect()
-    }
-
     /// Adds `Re Σ G_h e^{jhΩt}` to a signal of the piece.
     fn add_imposed(&self, piece: &Piece, imposed: &[(u32, Complex64)], signal: &mut [Complex64]) {
-        let omega = self.omega;
         for &(harmonic, amplitude) in imposed {
-            if harmonic == 0 {
-                signal[piece.basis().constant()].re += amplitude.re;
-                continue;
-            }
-            let rate = f64::from(harmonic) * omega;
-            let Some(h) = self.rates.iter().position(|r| (r - rate).abs() < 0.5 * omega) else {
-                continue; // without a drive nothing moves the place
-            };
-            signal[piece.segment.driven.modes + h] += amplitude * Complex64::new(0.0, rate * piece.segment.start).exp();
+            self.add_harmonic(piece, (f64::from(harmonic) * self.omega, amplitude), signal);
         }
     }
 
-    /// The force and the force-velocity product as they enter the energy balance; see [`System`] for the meaning of the parts.
-    fn energy(&self, flow: &Flow, joints: &[JointMotion]) -> Energy {
-        let n = self.system.dofs();
-        let (mut work, mut viscous) = (0.0, 0.0);
-        let mut force = Vec::new();
-        for piece in &self.pieces {
-            let basis = piece.basis();
-            let nb = basis.len();
-            let products = Products::new(basis, &piece.at_end, piece.segment.length);
-            let product = |a: &[Complex64], b: &[Complex64]| products.integral(basis, a, b);
-            let velocity = |i: usize| &piece.velocity[i * nb..(i + 1) * nb];
-            for i in 0..n {
-                if self.load(piece, &flow.drive, i, &mut force) {
-                    work += product(&force, velocity(i));
-                }
-                for k in 0..=i {
-                    let c = self.system.structure().damping()[(i, k)];
-                    if c != 0.0 {
-                        viscous += if k == i { c } else { 2.0 * c } * product(velocity(i), velocity(k));
-                    }
-                }
-            }
-            for (m, place) in self.system.moved().iter().enumerate() {
-                let (motion, speed) = self.moved_motion(piece, m);
-                work += product(&self.reaction(piece, m), &speed);
-                for i in 0..n {
-                    let (k, c) = (place.stiffness.0[i], place.damping.0[i]);
-                    // the load on the masses contains what the moved place does to them: that is no work from outside
-                    let coupling: Vec<Complex64> = motion.iter().zip(&speed).map(|(u, v)| u * k + v * c).collect();
-                    if k != 0.0 || c != 0.0 {
-                        work += product(&coupling, velocity(i));
-                        viscous += 2.0 * c * product(&speed, velocity(i));
-                    }
-                }
-                for (other, c) in place.damping.1.iter().enumerate() {
-                    if *c != 0.0 {
-                        viscous += c * product(&speed, &self.moved_motion(piece, other).1);
-                    }
-                }
-            }
+    /// Adds `Re a e^{jωt}` of (ω, a) to a signal of the piece.
+    fn add_harmonic(&self, piece: &Piece, (rate, amplitude): (f64, Complex64), signal: &mut [Complex64]) {
+        if rate == 0.0 {
+            signal[piece.basis().constant()].re += amplitude.re;
+            return;
         }
-        Energy {
-            work_in: self.times() * work,
-            viscous: self.times() * viscous,
-            friction: joints.iter().map(|joint| joint.dissipation).sum(),
-        }
+        let Some(h) = self.rates.iter().position(|r| (r - rate).abs() < 0.5 * self.omega) else {
+            return; // without a drive nothing moves the place
+        };
+        signal[piece.segment.driven.modes + h] += amplitude * Complex64::new(0.0, rate * piece.segment.start).exp();
     }
 
-    /// Load on degree of freedom `i` as a signal, into `force`; whether there is any.
-    fn load(&self, piece: &Piece, drive: &Drive, i: usize, force: &mut Vec<Complex64>) -> bool {
-        if drive.constant[i] == 0.0 && drive.forces.iter().all(|f| f[i] == ZERO) {
-            return false;
+    /// Adds the relative displacement along an axis to a signal of the piece.
+    fn add_relative(&self, piece: &Piece, axis: &Axis, signal: &mut [Complex64]) {
+        let nb = piece.basis().len();
+        for &(row, w) in axis.rows() {
+            let x = &piece.segment.displacement[row * nb..(row + 1) * nb];
+            signal.iter_mut().zip(x).for_each(|(u, x)| *u += x * w);
         }
-        force.clear();
-        force.resize(piece.basis().len(), ZERO);
-        force[piece.basis().constant()].re = drive.constant[i];
-        for (h, rate) in drive.rates.iter().enumerate() {
-            force[piece.segment.driven.modes + h] =
-                drive.forces[h][i] * Complex64::new(0.0, rate * piece.segment.start).exp();
-        }
-        true
+        self.add_imposed(piece, axis.imposed(), signal);
     }
 
     /// Displacement and velocity of a moved place as signals.
@@ -348,36 +174,178 @@ impl ExactPath {
         force
     }
 
-    /// Force amplitude times velocity amplitude times period: what could be exchanged.
-    fn exchanged(&self, drive: &Drive) -> f64 {
-        let fastest = |i: usize| {
-            let sizes = self.pieces.iter().map(|piece| {
-                let nb = piece.basis().len();
-                piece.velocity[i * nb..(i + 1) * nb].iter().map(size_of).sum::<f64>()
-            });
-            sizes.fold(0.0, f64::max)
-        };
-        let loads: f64 =
-            (0..self.system.dofs()).map(|i| drive.forces.iter().map(|f| f[i].norm()).sum::<f64>() * fastest(i)).sum();
-        let joints: f64 = self
-            .system
-            .joints()
-            .iter()
-            .enumerate()
-            .map(|(j, joint)| {
-                let limit: f64 = self.of_joint(j).map(|s| self.parts[s].limit()).sum();
-                limit * joint.axes()[0].imposed().iter().map(|(h, g)| f64::from(*h) * g.norm()).sum::<f64>()
-                    / self.period
-            })
-            .sum();
-        self.period * (loads + joints)
-    }
-
     /// The piece at a time within the first return, and the time since its start.
     fn piece(&self, time: f64) -> (&Piece, f64) {
         let index = self.pieces.partition_point(|piece| piece.segment.start <= time).max(1) - 1;
         let piece = &self.pieces[index];
         (piece, (time - piece.segment.start).clamp(0.0, piece.segment.length))
+    }
+}
+
+/// A path that is measured: with what the integrals of all its signals share.
+struct Measuring<'a> {
+    path: &'a ExactPath,
+    axes: Vec<&'a Axis>,
+    /// Where the coefficients of each piece begin in a signal, and where the last one's end.
+    cuts: Vec<usize>,
+    products: Vec<Products>,
+    /// By frequency, rad/s: what it has turned by the start of each piece, and the integrals over it.
+    fourier: RefCell<Vec<(f64, Turning)>>,
+    memory: RefCell<Memory>,
+}
+
+type Turning = Vec<(Complex64, FourierIntegrals)>;
+
+impl<'a> Measuring<'a> {
+    fn new(path: &'a ExactPath) -> Self {
+        let mut cuts = vec![0];
+        for piece in &path.pieces {
+            cuts.push(cuts[cuts.len() - 1] + piece.basis().len());
+        }
+        let products = |piece: &Piece| Products::new(piece.basis(), &piece.at_end, piece.segment.length);
+        Measuring {
+            path,
+            axes: path.system.axes().map(|(_, axis)| axis).collect(),
+            cuts,
+            products: path.pieces.iter().map(products).collect(),
+            fourier: RefCell::default(),
+            memory: RefCell::default(),
+        }
+    }
+
+    fn turning(&self, omega: f64) -> Turning {
+        let of = |piece: &Piece| {
+            let turn = Complex64::new(0.0, -omega * piece.segment.start).exp();
+            (turn, FourierIntegrals::new(piece.basis(), &piece.at_end, omega, piece.segment.length))
+        };
+        self.path.pieces.iter().map(of).collect()
+    }
+
+    /// The pieces with the range of their coefficients in a signal.
+    fn pieces(&self) -> impl Iterator<Item = (&'a Piece, std::ops::Range<usize>)> {
+        self.path.pieces.iter().zip(self.cuts.windows(2)).map(|(piece, cut)| (piece, cut[0]..cut[1]))
+    }
+
+    /// A signal that is made piece by piece.
+    fn made(&self, mut make: impl FnMut(&Piece, &mut [Complex64])) -> Vec<Complex64> {
+        let mut signal = vec![ZERO; self.cuts[self.cuts.len() - 1]];
+        self.pieces().for_each(|(piece, range)| make(piece, &mut signal[range]));
+        signal
+    }
+
+    /// A row of coefficients that the pieces keep.
+    fn kept(&self, row: usize, of: impl Fn(&Piece) -> &[Complex64]) -> Vec<Complex64> {
+        self.made(|piece, out| out.copy_from_slice(&of(piece)[row * out.len()..(row + 1) * out.len()]))
+    }
+
+    /// Least and largest value of a signal with this derivative.
+    fn range_of(&self, signal: &[Complex64], slope: &[Complex64]) -> Result<(f64, f64), Breakdown> {
+        let mut memory = self.memory.borrow_mut();
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (piece, range) in self.pieces() {
+            let (least, most) = piece.extremes(&signal[range.clone()], &slope[range], &mut memory)?;
+            (low, high) = (low.min(least), high.max(most));
+        }
+        Ok((low, high))
+    }
+
+    fn derivative(&self, signal: &[Complex64]) -> Vec<Complex64> {
+        let mut slope = signal.to_vec();
+        self.pieces().for_each(|(piece, range)| piece.basis().differentiate(&signal[range.clone()], &mut slope[range]));
+        slope
+    }
+
+    fn relative(&self, axis: usize) -> Vec<Complex64> {
+        self.made(|piece, out| self.path.add_relative(piece, self.axes[axis], out))
+    }
+}
+
+/// Signals are their coefficients, piece after piece. Laws act along one axis each, so that axes count like joints.
+impl Signals for Measuring<'_> {
+    type Signal = Vec<Complex64>;
+    type Error = Breakdown;
+
+    fn displacement(&self, row: usize) -> Vec<Complex64> {
+        self.kept(row, |piece| &piece.segment.displacement)
+    }
+    fn velocity(&self, row: usize) -> Vec<Complex64> {
+        self.kept(row, |piece| &piece.velocity)
+    }
+    fn relative_velocity(&self, axis: usize) -> Vec<Complex64> {
+        self.derivative(&self.relative(axis))
+    }
+    fn force(&self, axis: usize) -> Vec<Complex64> {
+        self.made(|piece, out| {
+            let nb = out.len();
+            for part in self.path.of_joint(axis) {
+                let force = &piece.segment.force[part * nb..(part + 1) * nb];
+                out.iter_mut().zip(force).for_each(|(sum, f)| *sum += f);
+            }
+        })
+    }
+    fn harmonics(&self, parts: &[(f64, Complex64)]) -> Vec<Complex64> {
+        self.made(|piece, out| parts.iter().for_each(|part| self.path.add_harmonic(piece, *part, out)))
+    }
+    fn add(&self, to: &mut Vec<Complex64>, signal: &Vec<Complex64>, factor: f64) {
+        to.iter_mut().zip(signal).for_each(|(to, value)| *to += value * factor);
+    }
+    fn product(&self, a: &Vec<Complex64>, b: &Vec<Complex64>) -> f64 {
+        let integral = |((piece, range), products): ((&Piece, std::ops::Range<usize>), &Products)| {
+            products.integral(piece.basis(), &a[range.clone()], &b[range])
+        };
+        self.pieces().zip(&self.products).map(integral).sum()
+    }
+    fn fourier(&self, signal: &Vec<Complex64>, omega: f64) -> Complex64 {
+        let mut known = self.fourier.borrow_mut();
+        let at = known.iter().position(|(nu, _)| *nu == omega).unwrap_or_else(|| {
+            known.push((omega, self.turning(omega)));
+            known.len() - 1
+        });
+        let mut sum = ZERO;
+        for ((piece, range), (turn, integrals)) in self.pieces().zip(&known[at].1) {
+            sum += integrals.integral(piece.basis(), &signal[range]) * turn;
+        }
+        sum
+    }
+    fn range(&self, row: usize) -> Result<(f64, f64), Breakdown> {
+        self.range_of(&self.displacement(row), &self.velocity(row))
+    }
+    fn relative_range(&self, axis: usize) -> Result<(f64, f64), Breakdown> {
+        let signal = self.relative(axis);
+        self.range_of(&signal, &self.derivative(&signal))
+    }
+    /// The sliders' alone: springs and stops give back what they take, to the last digit.
+    fn dissipation(&self, axis: usize, _force: &Vec<Complex64>) -> f64 {
+        let u = self.relative(axis);
+        let mut sum = 0.0;
+        for (piece, range) in self.pieces() {
+            let u = &u[range];
+            let travel = real_dot(u, &piece.at_end) - piece.basis().beginning(u);
+            for part in self.path.of_joint(axis) {
+                sum += piece.segment.contacts[part].sign() * self.path.parts[part].limit() * travel;
+            }
+        }
+        sum
+    }
+    fn slip(&self, joint: usize) -> Slip {
+        let path = self.path;
+        if path.of_joint(joint).next().is_none() {
+            return Slip { share: 1.0, switches: 0, rests: false }; // a joint that holds nothing slips all the time
+        }
+        // both sums run in one order, so that a joint that always slips has a share of exactly one
+        let time = |counts: &dyn Fn(&Segment) -> bool| -> f64 {
+            path.pieces.iter().map(|piece| if counts(&piece.segment) { piece.segment.length } else { 0.0 }).sum()
+        };
+        let slips = |segment: &Segment| path.of_joint(joint).any(|s| segment.contacts[s].slips());
+        let pairs = path.pieces.windows(2).map(|pair| (&pair[0].segment.contacts, &pair[1].segment.contacts));
+        let mut switches: usize =
+            pairs.map(|(before, after)| path.of_joint(joint).filter(|&s| before[s] != after[s]).count()).sum();
+        if let (Some(first), Some(last)) = (path.pieces.first(), path.pieces.last()) {
+            let (first, last) = (&first.segment.contacts, &last.segment.contacts);
+            switches += path.of_joint(joint).filter(|&s| path.next_of(last[s]) != first[s]).count();
+        }
+        let rests = !path.pieces.iter().any(|piece| slips(&piece.segment));
+        Slip { share: time(&slips) / time(&|_| true), switches, rests }
     }
 }
 

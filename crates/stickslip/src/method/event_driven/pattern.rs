@@ -11,6 +11,7 @@ use crate::law::Contact;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use stickslip_numerics::dense::multiply;
 use stickslip_numerics::eigen;
 use stickslip_numerics::modes::{Defective, Modes};
 use stickslip_numerics::signal::Basis;
@@ -24,7 +25,7 @@ const STILL: f64 = 1e-13;
 /// A harmonic this close to a mode (relative) is integrated as a resonant pair; nearer than this the plain particular solution
 /// would lose more than the last five digits.
 const RESONANT: f64 = 1e-5;
-/// States from which packing the factors of a product for the cache costs less than it saves.
+/// States from which the derivative is carried joint by joint, in a product that is cut for the cache.
 const LARGE: usize = 24;
 
 /// The closed-form motion of one pattern.
@@ -441,7 +442,6 @@ impl Pattern {
         if states == 0 {
             return;
         }
-        let drifts = self.drifts();
         for (k, value) in values[..count].iter().enumerate() {
             let (real, imaginary) = work.moved[4 * n * k..4 * n * (k + 1)].split_at_mut(2 * n);
             for row in 0..n {
@@ -451,25 +451,14 @@ impl Pattern {
                 (imaginary[row], imaginary[n + row]) = (now.im, rate.im);
             }
         }
+        if states >= LARGE {
+            self.carry_by_joints(mechanics, length, sensitivity, work);
+            return;
+        }
         // one column of the derivative of the end state with respect to the initial one after the other
-        for (j, column) in work.transition.as_mut_slice().chunks_exact_mut(states).enumerate() {
+        for (j, column) in work.transition.chunks_exact_mut(states).enumerate() {
             let (motion, springs) = column.split_at_mut(2 * n);
-            motion[..n].copy_from_slice(&self.place.as_slice()[j * n..(j + 1) * n]);
-            motion[n..].fill(0.0);
-            if drifts {
-                for row in 0..n {
-                    let (drift, fall) = (self.drift[(row, j)], self.fall[(row, j)]);
-                    motion[row] += drift * length + 0.5 * fall * length * length;
-                    motion[n + row] += drift + fall * length;
-                }
-            }
-            let starts = &self.start.as_slice()[j * count..(j + 1) * count];
-            for (start, moved) in starts.iter().zip(work.moved.chunks_exact(4 * n.max(1))) {
-                let (real, imaginary) = moved.split_at(2 * n);
-                for ((motion, re), im) in motion.iter_mut().zip(real).zip(imaginary) {
-                    *motion += re * start.re - im * start.im;
-                }
-            }
+            self.moved_by(j, length, &work.moved, motion);
             for (part, stuck) in mechanics.parts.iter().zip(&self.stuck) {
                 if let Kind::Elastic { stiffness: kt, state, .. } = part.kind {
                     springs[state] = if *stuck {
@@ -482,19 +471,103 @@ impl Pattern {
                 }
             }
         }
-        if states >= LARGE {
-            work.product.gemm(1.0, &work.transition, sensitivity, 0.0);
-        } else {
-            let columns = sensitivity.as_slice().chunks_exact(states);
-            for (to, from) in work.product.as_mut_slice().chunks_exact_mut(states).zip(columns) {
-                to.fill(0.0);
-                for (column, factor) in work.transition.as_slice().chunks_exact(states).zip(from) {
-                    to.iter_mut().zip(column).for_each(|(to, x)| *to += x * factor);
-                }
+        let columns = sensitivity.as_slice().chunks_exact(states);
+        for (to, from) in work.product.chunks_exact_mut(states).zip(columns) {
+            to.fill(0.0);
+            for (column, factor) in work.transition.chunks_exact(states).zip(from) {
+                to.iter_mut().zip(column).for_each(|(to, x)| *to += x * factor);
             }
         }
-        sensitivity.copy_from(&work.product);
+        sensitivity.copy_from_slice(&work.product);
     }
+
+    /// Displacements and velocities at the end of a stretch per unit of state `j` at its start, into `motion` (2n).
+    fn moved_by(&self, j: usize, length: f64, moved: &[f64], motion: &mut [f64]) {
+        let (n, count) = (motion.len() / 2, self.lambda.len());
+        motion[..n].copy_from_slice(&self.place.as_slice()[j * n..(j + 1) * n]);
+        motion[n..].fill(0.0);
+        if self.drifts() {
+            for row in 0..n {
+                let (drift, fall) = (self.drift[(row, j)], self.fall[(row, j)]);
+                motion[row] += drift * length + 0.5 * fall * length * length;
+                motion[n + row] += drift + fall * length;
+            }
+        }
+        let starts = &self.start.as_slice()[j * count..(j + 1) * count];
+        for (start, moved) in starts.iter().zip(moved.chunks_exact(4 * n.max(1))) {
+            let (real, imaginary) = moved.split_at(2 * n);
+            for ((motion, re), im) in motion.iter_mut().zip(real).zip(imaginary) {
+                *motion += re * start.re - im * start.im;
+            }
+        }
+    }
+
+    /// [`Pattern::carry`] of many states: the springs of one joint that stick push together and are stretched together, so that the motion
+    /// depends on them by one number, and they on the motion by another.
+    fn carry_by_joints(&self, mechanics: &Mechanics, length: f64, sensitivity: &mut DMatrix<f64>, work: &mut Work) {
+        let (n, states) = (mechanics.n, mechanics.states());
+        // springs of one joint have their states side by side; those that slip count with a stiffness of zero, and are forgotten
+        work.springs.clear();
+        work.stiffness.clear();
+        work.kept.clear();
+        for (i, part) in mechanics.parts.iter().enumerate() {
+            let Kind::Elastic { stiffness, state, .. } = part.kind else { continue };
+            match work.springs.last_mut() {
+                Some(springs) if mechanics.parts[springs.part].joint == part.joint => springs.states.end = state + 1,
+                _ => work.springs.push(Springs { part: i, states: state..state + 1, sticking: None }),
+            }
+            if let (true, Some(springs)) = (self.stuck[i], work.springs.last_mut()) {
+                springs.sticking.get_or_insert(state);
+            }
+            work.stiffness.push(if self.stuck[i] { stiffness } else { 0.0 });
+            work.kept.push(if self.stuck[i] { 1.0 } else { 0.0 });
+        }
+        let inner = 2 * n + work.springs.len();
+        work.transition.resize(2 * n * inner, 0.0);
+        for (column, motion) in work.transition.chunks_exact_mut((2 * n).max(1)).enumerate() {
+            match column.checked_sub(2 * n).map(|joint| work.springs[joint].sticking) {
+                None => self.moved_by(column, length, &work.moved, motion),
+                Some(Some(state)) => self.moved_by(2 * n + state, length, &work.moved, motion),
+                Some(None) => motion.fill(0.0),
+            }
+        }
+        work.rows.resize(inner * states, 0.0);
+        let columns = sensitivity.as_slice().chunks_exact(states);
+        for (row, from) in work.rows.chunks_exact_mut(inner.max(1)).zip(columns) {
+            let (motion, pushes) = row.split_at_mut(2 * n);
+            let (from, springs) = from.split_at(2 * n);
+            motion.copy_from_slice(from);
+            for (push, Springs { states, .. }) in pushes.iter_mut().zip(&work.springs) {
+                *push = sum_of_products(&work.kept[states.clone()], &springs[states.clone()]);
+            }
+        }
+        work.product.resize(2 * n * states, 0.0);
+        multiply(&work.transition, &work.rows, &mut work.product, (2 * n, inner, states));
+        for (c, column) in sensitivity.as_mut_slice().chunks_exact_mut(states).enumerate() {
+            let moved = &work.product[c * 2 * n..(c + 1) * 2 * n];
+            let (motion, springs) = column.split_at_mut(2 * n);
+            for Springs { part, states, .. } in &work.springs {
+                let part = &mechanics.parts[*part];
+                let stretch = part.along(&moved[..n]) - part.along(&motion[..n]);
+                let of_joint = work.stiffness[states.clone()].iter().zip(&work.kept[states.clone()]);
+                for (force, (stiffness, kept)) in springs[states.clone()].iter_mut().zip(of_joint) {
+                    *force = kept * *force + stiffness * stretch;
+                }
+            }
+            motion.copy_from_slice(moved);
+        }
+    }
+}
+
+/// `Σ a b`, in four sums side by side.
+fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (whole, rest) = (a.chunks_exact(4).zip(b.chunks_exact(4)), a.len() - a.len() % 4);
+    for (a, b) in whole {
+        (0..4).for_each(|k| sums[k] += a[k] * b[k]);
+    }
+    let last: f64 = a[rest..].iter().zip(&b[rest..]).map(|(a, b)| a * b).sum();
+    sums[0] + sums[1] + sums[2] + sums[3] + last
 }
 
 /// Scratch memory of the pattern's formulas.
@@ -509,13 +582,32 @@ pub(crate) struct Work {
     fixed: Vec<Complex64>,
     /// Displacements and velocities at the end of a stretch per unit of a modal coordinate: 2n real parts and 2n imaginary parts of every mode.
     moved: Vec<f64>,
-    transition: DMatrix<f64>,
-    product: DMatrix<f64>,
+    /// Derivative of the end of a stretch by its start, column after column, and what becomes of the sensitivity.
+    transition: Vec<f64>,
+    product: Vec<f64>,
+    /// Of [`Pattern::carry_by_joints`]: the springs of each joint, with stiffness and whether they stick (1 or 0); what the sensitivity moves and
+    /// pushes by.
+    springs: Vec<Springs>,
+    stiffness: Vec<f64>,
+    kept: Vec<f64>,
+    rows: Vec<f64>,
+}
+
+/// The springs before the sliders of one joint.
+#[derive(Debug, Clone)]
+struct Springs {
+    /// The first part.
+    part: usize,
+    /// Their forces among those of all springs.
+    states: std::ops::Range<usize>,
+    /// The first that sticks.
+    sticking: Option<usize>,
 }
 
 impl Work {
     pub fn new(mechanics: &Mechanics, harmonics: usize) -> Self {
-        let (n, states) = (mechanics.n, mechanics.states());
+        let n = mechanics.n;
+        let small = if mechanics.states() < LARGE { mechanics.states() } else { 0 };
         Work {
             force: vec![0.0; n],
             held: Vec::with_capacity(mechanics.parts.len()),
@@ -524,8 +616,12 @@ impl Work {
             eta: vec![ZERO; 2 * n],
             fixed: vec![ZERO; 2 * n],
             moved: vec![0.0; 8 * n * n],
-            transition: DMatrix::zeros(states, states),
-            product: DMatrix::zeros(states, states),
+            transition: vec![0.0; small * small],
+            product: vec![0.0; small * small],
+            springs: Vec::new(),
+            stiffness: Vec::new(),
+            kept: Vec::new(),
+            rows: Vec::new(),
         }
     }
 

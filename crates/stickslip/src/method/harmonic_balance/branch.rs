@@ -3,6 +3,7 @@
 use super::equations::{Level, Motion, transfer};
 use super::ports::Ports;
 use super::rest::Rest;
+use super::sparse::LARGE;
 use super::{Compared, HarmonicBalance, Kept, LARGEST, TOLERANCE, estimate, path};
 use crate::method::evidence::Judge;
 use crate::method::guess::Guess;
@@ -56,10 +57,10 @@ impl<'a> BranchEquations<'a> {
         let kept = Kept::new(&system, |_| true);
         method.check(kept.highest)?;
         let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
-        let ports = Ports::new(&system)?;
+        let ports = Ports::new(&system).map_err(|error| error.with_ways(&system))?;
         let rest = Rest::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
-        let level = |top: usize| Level::new(kept.up_to(top), method.samples_at(top), &ports, None);
+        let level = |top: usize| Level::new(kept.up_to(top), method.samples_at(top, &ports), &ports, None);
         super::check_size(2 * ports.count() * kept.up_to(top).len())?;
         let few = 2 * ports.count() * kept.up_to(kept.double(top)).len() <= LARGEST;
         let (finer, level) = (few.then(|| level(kept.double(top))), level(top));
@@ -100,9 +101,7 @@ impl<'a> BranchEquations<'a> {
             }
             _ => return false,
         }
-        let same = system.structure().mass() == self.rest_of.structure().mass()
-            && system.structure().damping() == self.rest_of.structure().damping()
-            && system.structure().stiffness() == self.rest_of.structure().stiffness();
+        let same = system.structure() == self.rest_of.structure();
         if !same {
             self.rest = Rest::new(&system, &self.ports);
             self.rest_of = system.clone();
@@ -124,8 +123,9 @@ impl<'a> BranchEquations<'a> {
         if !self.set(value) {
             return Err(OrbitError::Frequency { omega: self.omega });
         }
-        let guess = Guess::new(&self.system, self.omega);
-        let start = self.level.begin(&self.system, &self.ports, Some(&guess), self.omega);
+        // as in a point: the guess solves the whole structure, and large ones begin without friction
+        let guess = (self.system.dofs() < LARGE).then(|| Guess::new(&self.system, self.omega));
+        let start = self.level.begin(&self.system, &self.ports, guess.as_ref(), self.omega);
         let solved = self.level.solve(&self.ports, self.omega, start);
         self.motion = solved.map_err(|lost| self.lost(lost.iterations, lost.residual))?;
         let norm = |c: &[Complex64]| c.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
@@ -156,6 +156,7 @@ impl<'a> BranchEquations<'a> {
             system: &self.system,
             ports: &self.ports,
             omega: self.omega,
+            first: 1,
             odd: self.kept.half_period(),
             truncation,
             tolerance: self.tolerance,

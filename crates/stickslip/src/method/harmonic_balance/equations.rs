@@ -72,6 +72,8 @@ pub(super) struct Level {
     pub(super) best: Motion,
     pub(super) step: Vec<f64>,
     image: Vec<Complex64>,
+    /// Motions along the axes at one harmonic.
+    moved: Vec<Complex64>,
     product: Vec<f64>,
 }
 
@@ -137,6 +139,7 @@ impl Level {
             best: Motion::rest(nh * axes),
             step: vec![0.0; size],
             image: vec![ZERO; nh * widest],
+            moved: vec![ZERO; axes],
             product: vec![0.0; (2 * nh * widest).pow(2)],
         }
     }
@@ -192,8 +195,8 @@ impl Level {
             return;
         }
         let top = self.alternation.harmonics[nh - 1].max(1);
-        let structure = system.structure();
-        let stiff = structure.stiffness().amax().max(omega * omega * structure.mass().amax());
+        let [mass, _, stiffness] = system.structure().largest();
+        let stiff = stiffness.max(omega * omega * mass);
         let soft = 1.0 / stiff.max(f64::MIN_POSITIVE);
         // on the real axis: the impedance of the highest harmonic without the resonances that it may meet
         let rate = top as f64 * omega;
@@ -283,9 +286,14 @@ impl Level {
                     sparse.receive(k, |q| force[q * nh + k], follow);
                 }
                 None => {
-                    for q in 0..count {
-                        follow(q, (0..count).map(|p| self.receptance[k][(q, p)] * force[p * nh + k]).sum());
+                    // column by column, as the matrix lies in memory
+                    self.moved.fill(ZERO);
+                    for p in 0..count {
+                        let f = force[p * nh + k];
+                        let column = self.receptance[k].column(p);
+                        self.moved.iter_mut().zip(column.iter()).for_each(|(u, r)| *u += r * f);
                     }
+                    self.moved.iter().enumerate().for_each(|(q, u)| follow(q, *u));
                 }
             }
         }

@@ -23,7 +23,7 @@ mod solve;
 mod sparse;
 
 use super::guess::Guess;
-use super::{Method, MethodError, MethodInfo, MethodOption, Options, OrbitError, Solver};
+use super::{Method, MethodError, MethodInfo, MethodOption, Options, OrbitError, PERIOD, Solver, periods};
 use crate::dimension::Dimension;
 use crate::method::evidence::Judge;
 use crate::model::System;
@@ -38,9 +38,12 @@ use ports::Ports;
 use rest::Rest;
 use solve::Lost;
 use sparse::Sparse;
+use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
+use std::f64::consts::TAU;
 
-pub(crate) const NAME: &str = "harmonic-balance";
+/// Its name in study files.
+pub const NAME: &str = "harmonic-balance";
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -58,7 +61,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             dimension: Dimension::NONE,
             count: true,
             doc: "samples per period, even, at least 4 (harmonics + 1), and 16 per harmonic if `harmonics` is absent; absent: 16 per \
-                  harmonic, at least 1024",
+                  harmonic, at least 1024, and 128 per harmonic for steep laws and for friction in a plane",
         },
         MethodOption {
             key: "tolerance",
@@ -67,8 +70,15 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             doc: "error of the motion relative to the largest amplitude: aimed at when `harmonics` is absent, and beyond it a \
                   point is `truncated`; 0.001",
         },
+        PERIOD,
     ],
-    build: |options| Ok(Box::new(HarmonicBalance::from_options(options)?)),
+    build: |options| {
+        let balance = HarmonicBalance::from_options(options)?;
+        Ok(match periods(options) {
+            1 => Box::new(balance),
+            period => Box::new(Subharmonic { balance, period }),
+        })
+    },
 };
 
 /// Tolerance when none is given.
@@ -89,13 +99,21 @@ const POSSIBLE: usize = 8192;
 /// known.
 const COLD: usize = 15;
 /// The error relative to the distance from the solution with twice the harmonics. Where rigid friction makes accelerations jump, the
-/// doubling leaves four tenths of the error, between order 1 (one half) and 3/2 (a third): both are observed. Without rigid friction
-/// it leaves next to nothing.
+/// doubling leaves four tenths of the error, between order 1 (one half) and 3/2 (a third): both are observed.
 const RIGID_SHARE: f64 = 1.7;
-/// Samples per period, at least, and per harmonic. Sliders and stops need them to tell turning points apart only; sampled laws have errors of
+/// The same of laws that are steep: until the series resolves their layer they leave half of it, as order 1 does, and where friction falls with
+/// velocity no less. Elsewhere the doubling leaves next to nothing.
+const STEEP_SHARE: f64 = 2.0;
+/// Where friction is rigid or steep, one doubling is not believed to have left less than this share of the distance of the one before: two
+/// motions may be near each other by chance, as 1.3e-3 where the error is 1e-2.
+const CHANCE: f64 = 0.1;
+/// Samples per period, at least, and per harmonic. Sliders and stops need them to tell turning points apart only; laws with rates have errors of
 /// about 1e-6 of their force.
 const SAMPLES: usize = 1024;
 const SAMPLES_PER_HARMONIC: usize = 16;
+/// The same for laws that are steep or turn in a plane, whose samples place a change of sign to a sample only: they then grow with the
+/// harmonics, so that the longer series sees what the samples of the shorter one missed.
+const SAMPLES_OF_STEEP: usize = 128;
 
 /// Harmonic balance.
 ///
@@ -133,8 +151,9 @@ impl HarmonicBalance {
 
     /// Samples at a number of harmonics: what the user gave holds for the user's harmonics; the solution that checks it takes as many as
     /// it needs, so that too few are seen in the estimate.
-    fn samples_at(&self, top: usize) -> usize {
-        let needed = (SAMPLES_PER_HARMONIC * (top + 1)).next_power_of_two();
+    fn samples_at(&self, top: usize, ports: &Ports) -> usize {
+        let each = if ports.has_steep() { SAMPLES_OF_STEEP } else { SAMPLES_PER_HARMONIC };
+        let needed = (each * (top + 1)).next_power_of_two();
         match (self.samples, self.harmonics) {
             (Some(samples), Some(harmonics)) if top <= harmonics => samples,
             (Some(samples), Some(_)) => samples.max(needed).max(SAMPLES),
@@ -184,27 +203,52 @@ impl Method for HarmonicBalance {
     fn closes_motions(&self, _system: &System) -> bool {
         false
     }
-    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        let kept = Kept::new(system, |z| z != Complex64::new(0.0, 0.0));
-        self.check(kept.highest)?;
-        let ports = Ports::new(system)?;
-        let rest = Rest::new(system, &ports);
-        let first = (FIRST * kept.unit).max(kept.highest);
-        let harmonics = kept.up_to(self.harmonics.unwrap_or(first));
-        if Sparse::new(system, &ports, &[1]).is_none() {
-            check_size(2 * ports.count() * harmonics.len())?;
-        }
-        Ok(Box::new(Balance {
-            system,
-            method: *self,
-            ports,
-            rest,
-            kept,
-            first,
-            judge: Judge::new(system),
-            levels: BTreeMap::new(),
-            recent: VecDeque::new(),
-        }))
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        Ok(Box::new(Balance::new(Cow::Borrowed(system), *self, 1)?))
+    }
+}
+
+/// Harmonic balance for motions that repeat after several periods of the drive: a series of its fraction.
+///
+/// # Example
+/// Friction at a constant limit allows no other motion than one that repeats with the drive, and that is found.
+/// ```
+/// use stickslip::method::{Method, harmonic_balance::{HarmonicBalance, Subharmonic}};
+/// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
+/// let method = Subharmonic { balance: HarmonicBalance { harmonics: Some(7), ..HarmonicBalance::default() }, period: 3 };
+/// let orbit = method.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.0, None).unwrap();
+/// assert_eq!(orbit.periods, 3);
+/// assert!((orbit.place("blade1").unwrap().first_harmonic.norm() / orbit.places[0].amplitude() - 1.0).abs() < 0.01);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Subharmonic {
+    /// Its options; harmonics and samples count for one period of the drive.
+    pub balance: HarmonicBalance,
+    /// Periods of the drive after which the motion repeats.
+    pub period: usize,
+}
+
+impl Method for Subharmonic {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+    fn closes_motions(&self, _system: &System) -> bool {
+        false
+    }
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        let highest = Kept::new(system, |z| z != Complex64::new(0.0, 0.0)).highest;
+        self.balance.check(highest)?;
+        let (period, times) = (self.period.max(1), |count: usize| count.saturating_mul(self.period.max(1)));
+        let too_high = |_| MethodError::Option {
+            method: NAME,
+            key: PERIOD.key,
+            message: format!("{period} periods of harmonic {highest} are more than can be counted"),
+        };
+        u32::try_from(times(highest)).map_err(too_high)?;
+        let HarmonicBalance { harmonics, samples, tolerance } = self.balance;
+        let balance = HarmonicBalance { harmonics: harmonics.map(times), samples: samples.map(times), tolerance };
+        let slowed = system.slowed(u32::try_from(period).map_err(too_high)?);
+        Ok(Box::new(Balance::new(Cow::Owned(slowed), balance, period)?))
     }
 }
 
@@ -213,6 +257,8 @@ impl Method for HarmonicBalance {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Kept {
     unit: usize,
+    /// The harmonic of the slowest excitation: what one drive frequency is among harmonics.
+    scale: usize,
     odd: bool,
     /// The excitation's highest.
     highest: usize,
@@ -223,9 +269,21 @@ impl Kept {
     fn new(system: &System, counts: impl Fn(Complex64) -> bool) -> Self {
         let present: Vec<usize> = system.harmonics_of_excitation(counts).into_iter().map(|h| h as usize).collect();
         let unit = present.iter().fold(0, |a, &b| common_divisor(a, b)).max(1);
+        Kept::by(system, &present, (unit, unit))
+    }
+
+    /// Of a motion that may repeat after `periods` periods of the drive only: all harmonics of its own frequency, but for what the laws' symmetry
+    /// leaves out.
+    fn slowed(system: &System, periods: usize) -> Self {
+        let present = system.harmonics_of_excitation(|z| z != Complex64::new(0.0, 0.0));
+        let present: Vec<usize> = present.into_iter().map(|h| h as usize).collect();
+        Kept::by(system, &present, (1, periods))
+    }
+
+    fn by(system: &System, present: &[usize], (unit, scale): (usize, usize)) -> Self {
         let highest = present.iter().copied().max().unwrap_or(0);
         let laws = system.joints().iter().all(|joint| joint.law().is_odd());
-        Kept { unit, odd: laws && present.iter().all(|h| (h / unit) % 2 == 1), highest }
+        Kept { unit, scale, odd: laws && present.iter().all(|h| (h / unit) % 2 == 1), highest }
     }
 
     /// The harmonics up to `top`.
@@ -290,7 +348,13 @@ fn estimate(
     for q in ports.iter().filter(|port| port.series > 0.0).flat_map(|port| port.range()) {
         compare(&|k| coarse.along[q * few + k], &|k| fine.along[q * many + k], 0.0);
     }
-    let share = if ports.has_rigid() { RIGID_SHARE } else { 1.0 };
+    let share = if ports.has_steep() {
+        STEEP_SHARE
+    } else if ports.has_forces() {
+        RIGID_SHARE
+    } else {
+        1.0
+    };
     if size > 0.0 { share * (distance / size).sqrt() } else { 0.0 }
 }
 
@@ -314,8 +378,12 @@ fn above(
 }
 
 struct Balance<'a> {
-    system: &'a System,
+    system: Cow<'a, System>,
     method: HarmonicBalance,
+    /// Periods of the drive in one of the motion; harmonics count those of the motion.
+    periods: usize,
+    /// The drive's frequency, rad/s; that of the motion is `omega` everywhere here.
+    drive: f64,
     ports: Ports,
     rest: Rest,
     kept: Kept,
@@ -326,17 +394,48 @@ struct Balance<'a> {
     recent: VecDeque<(Vec<f64>, usize, Motion)>,
 }
 
+impl<'a> Balance<'a> {
+    fn new(system: Cow<'a, System>, method: HarmonicBalance, periods: usize) -> Result<Self, MethodError> {
+        let kept = if periods > 1 {
+            Kept::slowed(&system, periods)
+        } else {
+            Kept::new(&system, |z| z != Complex64::new(0.0, 0.0))
+        };
+        method.check(kept.highest)?;
+        let ports = Ports::new(&system)?;
+        let rest = Rest::new(&system, &ports);
+        let first = (FIRST * kept.scale).max(kept.highest);
+        let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
+        if Sparse::new(&system, &ports, &[1]).is_none() {
+            check_size(2 * ports.count() * harmonics.len())?;
+        }
+        Ok(Balance {
+            method,
+            periods,
+            drive: 0.0,
+            ports,
+            rest,
+            kept,
+            first,
+            judge: Judge::new(&system),
+            system,
+            levels: BTreeMap::new(),
+            recent: VecDeque::new(),
+        })
+    }
+}
+
 impl Balance<'_> {
     /// The level of highest harmonic `top`, ready for `omega`.
     fn level(&mut self, top: usize, omega: f64) -> &mut Level {
         let harmonics = self.kept.up_to(top);
-        let samples = self.method.samples_at(top);
-        let (system, ports) = (self.system, &self.ports);
+        let samples = self.method.samples_at(top, &self.ports);
+        let (system, ports) = (&self.system, &self.ports);
         let level = self.levels.entry(top).or_insert_with(|| {
             let sparse = Sparse::new(system, ports, &harmonics);
             Level::new(harmonics, samples, ports, sparse)
         });
-        level.drive(self.system, &self.ports, &self.rest, omega);
+        level.drive(&self.system, &self.ports, &self.rest, omega);
         level
     }
 
@@ -351,23 +450,56 @@ impl Balance<'_> {
                 let harmonics = self.levels[&other].harmonics().to_vec();
                 equations::transfer(motion, &harmonics, self.level(top, omega).harmonics())
             }
-            None if self.ports.has_forces() && top > COLD * self.kept.unit && top / 2 >= self.first => {
+            None if self.ports.has_forces() && top > COLD * self.kept.scale && top / 2 >= self.first => {
                 let coarse = self.solve(top / 2, omega, None)?;
                 return self.solve(top, omega, Some((top / 2, &coarse)));
             }
             None => {
                 // the guess solves the whole structure densely: large systems begin without friction
-                let guess = (self.system.dofs() < sparse::LARGE).then(|| Guess::new(self.system, omega));
+                let guess = (self.system.dofs() < sparse::LARGE).then(|| Guess::new(&self.system, omega));
                 self.level(top, omega);
-                self.levels[&top].begin(self.system, &self.ports, guess.as_ref(), omega)
+                let begun = self.levels[&top].begin(&self.system, &self.ports, guess.as_ref(), omega);
+                self.approached(top, omega, guess.as_ref()).unwrap_or(begun)
             }
         };
         let level = self.levels.get_mut(&top).expect("made above");
         level.solve(&self.ports, omega, start)
     }
 
-    fn lost(&self, omega: f64, lost: Lost) -> OrbitError {
-        OrbitError::NotConverged { method: NAME, omega, iterations: lost.iterations, residual: lost.residual }
+    /// A start near a motion that repeats after several periods: the describing functions know none, and Newton's method would never leave those
+    /// that repeat after one. So the motion is followed in time for a while, if some flow follows the system; where motions do not separate there is
+    /// none to be found.
+    fn approached(&mut self, top: usize, omega: f64, guess: Option<&Guess>) -> Option<Motion> {
+        let start = guess.filter(|_| self.periods > 1)?.state(self.system.dofs());
+        let path = self.judge.approach(&self.system, omega, start)?;
+        let level = &self.levels[&top];
+        let (harmonics, n) = (level.harmonics(), level.alternation.samples());
+        let mut motion = Motion::rest(level.linear.len());
+        for i in 0..n {
+            let sample = path.sample(TAU / omega * i as f64 / n as f64);
+            for (k, &h) in harmonics.iter().enumerate() {
+                let turn = Complex64::cis(-TAU * (h * i % n) as f64 / n as f64);
+                let share = turn * if h == 0 { 1.0 } else { 2.0 } / n as f64;
+                for port in self.ports.iter() {
+                    for q in port.range() {
+                        let (joint, axis) = self.ports.place(q);
+                        let (u, force) = (sample.joints[joint].displacement[axis], sample.joints[joint].force[axis]);
+                        motion.c[q * harmonics.len() + k] += share * (u - force * port.series);
+                        motion.force[q * harmonics.len() + k] += share * force;
+                    }
+                }
+            }
+        }
+        Some(motion)
+    }
+
+    fn lost(&self, lost: Lost) -> OrbitError {
+        OrbitError::NotConverged {
+            method: NAME,
+            omega: self.drive,
+            iterations: lost.iterations,
+            residual: lost.residual,
+        }
     }
 
     /// Harmonics of the places.
@@ -384,23 +516,25 @@ impl Balance<'_> {
         truncation: Option<f64>,
     ) -> Result<Orbit, OrbitError> {
         let context = path::Context {
-            system: self.system,
+            system: &self.system,
             ports: &self.ports,
             omega,
+            first: self.periods,
             odd: self.kept.half_period(),
             truncation,
             tolerance: self.method.tolerance.unwrap_or(TOLERANCE),
             judge: Some(&mut self.judge),
         };
         let level = self.levels.get_mut(&top).expect("solved");
-        let orbit = path::orbit(context, level, &motion, x).ok_or(OrbitError::Drift { method: NAME, omega })?;
-        if !path::balances(self.system, &orbit) {
+        let orbit =
+            path::orbit(context, level, &motion, x).ok_or(OrbitError::Drift { method: NAME, omega: self.drive })?;
+        if !path::balances(&self.system, &orbit) {
             let lost = Lost { iterations: motion.iterations, residual: orbit.evidence.energy_gap };
-            return Err(self.lost(omega, lost));
+            return Err(self.lost(lost));
         }
         self.recent.truncate(RECENT - 1);
         self.recent.push_front((orbit.start.clone(), top, motion));
-        Ok(orbit)
+        Ok(Orbit { omega: self.drive, periods: self.periods, ..orbit })
     }
 
     /// The solution near another one, without an estimate of its error, and without the long ways of [`Level::solve`]: a search that asks
@@ -409,14 +543,14 @@ impl Balance<'_> {
         self.level(top, omega);
         let mut motion = Motion { iterations: 0, ..near.clone() };
         let level = self.levels.get_mut(&top).expect("made above");
-        level.polish(&self.ports, omega, &mut motion, NEARBY).map_err(|l| self.lost(omega, l))?;
+        level.polish(&self.ports, omega, &mut motion, NEARBY).map_err(|l| self.lost(l))?;
         let x = self.places(top, omega, &motion);
         self.finish(top, omega, motion, x, None)
     }
 
     /// The user's number of harmonics, with an estimate of its error.
     fn fixed(&mut self, top: usize, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
-        let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(omega, l))?;
+        let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
         let x = self.places(top, omega, &motion);
         let sparse = self.levels[&top].sparse.is_some();
         let known = sparse || self.unknowns(self.kept.double(top)) <= LARGEST;
@@ -446,21 +580,26 @@ impl Balance<'_> {
     fn chosen(&mut self, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
         let tolerance = self.method.tolerance.unwrap_or(TOLERANCE);
         let mut top = self.first;
-        let mut motion =
-            self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(omega, l))?;
+        let mut motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
         let mut x = self.places(top, omega, &motion);
         // nothing is known of the error until two solutions can be compared
         let (mut checked, mut estimate) = (top, 1.0);
         let sparse = self.levels[&top].sparse.is_some();
-        while top <= MOST * self.kept.unit && (sparse || self.unknowns(self.kept.double(top)) <= LARGEST) {
-            let (error, finer, y) = self.compare(top, omega, &motion, &x).map_err(|l| self.lost(omega, l))?;
-            if error <= tolerance {
+        while top <= MOST * self.kept.scale && (sparse || self.unknowns(self.kept.double(top)) <= LARGEST) {
+            let (mut error, finer, y) = self.compare(top, omega, &motion, &x).map_err(|l| self.lost(l))?;
+            if (self.ports.has_forces() || self.ports.has_steep()) && top > self.first {
+                error = error.max(CHANCE * estimate);
+            }
+            // where friction falls with velocity chance is frequent: the first distance has none before it that would show it
+            let shown = top > self.first || !self.ports.has_falling();
+            if error <= tolerance && shown {
                 return self.finish(top, omega, motion, x, Some(error));
             }
             (checked, estimate) = (top, error);
             (top, motion, x) = (self.kept.double(top), finer, y);
         }
-        Err(OrbitError::Truncation { method: NAME, omega, harmonics: checked, estimate, tolerance })
+        let harmonics = checked / self.periods;
+        Err(OrbitError::Truncation { method: NAME, omega: self.drive, harmonics, estimate, tolerance })
     }
 }
 
@@ -478,6 +617,8 @@ impl Solver for Balance<'_> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
+        self.drive = omega;
+        let omega = omega / self.periods as f64;
         let warm = self.warm(start);
         match self.method.harmonics {
             Some(top) => self.fixed(top, omega, warm),
@@ -488,7 +629,10 @@ impl Solver for Balance<'_> {
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         match self.warm(start) {
             // the harmonics that the neighbour needed are enough
-            Some((top, motion)) if omega.is_finite() && omega > 0.0 => self.nearby(top, omega, &motion),
+            Some((top, motion)) if omega.is_finite() && omega > 0.0 => {
+                self.drive = omega;
+                self.nearby(top, omega / self.periods as f64, &motion)
+            }
             _ => self.orbit(omega, start),
         }
     }

@@ -84,11 +84,14 @@ impl<'a> ModeEquations<'a> {
     /// # Errors
     /// A law with several directions, a place without mass, a mass matrix that is not positive definite.
     pub fn new(system: &'a System, harmonics: usize, samples: usize) -> Result<Self, MethodError> {
-        if let Some(massless) = (0..system.dofs()).find(|&i| system.structure().mass()[(i, i)] == 0.0) {
-            return Err(MethodError::NeedsMass { method: super::NAME, place: system.places()[massless].clone() });
+        if let Some(error) = MethodError::too_large("modes", system) {
+            return Err(error);
+        }
+        if let Some(massless) = (0..system.dofs()).find(|&i| system.structure().own_mass(i) == 0.0) {
+            return Err(MethodError::needs_mass(super::NAME, system, massless));
         }
         if system.structure().mass().clone().cholesky().is_none() {
-            return Err(MethodError::NotPositive { method: super::NAME, matrix: "mass" });
+            return Err(MethodError::mass_not_positive(super::NAME));
         }
         let (mut elastic, mut contacts): (Vec<Placed>, Vec<Placed>) = (Vec::new(), Vec::new());
         let ports = Ports::new(system)?;
@@ -106,7 +109,8 @@ impl<'a> ModeEquations<'a> {
         }
         let odd = system.joints().iter().all(|joint| joint.law().is_odd());
         let list: Vec<usize> = if odd { (1..=harmonics).step_by(2).collect() } else { (0..=harmonics).collect() };
-        let alternation = Alternation::new(list, samples);
+        let mut alternation = Alternation::new(list, samples);
+        alternation.by_frequency = Some(Vec::new());
         Ok(ModeEquations { system, elastic, contacts, alternation, first: usize::from(!odd) })
     }
 
@@ -338,9 +342,6 @@ impl<'a> ModeEquations<'a> {
     }
 
     /// Forces of motion ports on the places.
-    ///
-    /// The derivative leaves out what ω itself does to a law whose force depends on how fast a motion is run through, such as one with a
-    /// viscous part: Newton's method then gains a constant factor at a time.
     fn add_elastic_forces(&mut self, state: &ModeState, residual: &mut [f64], mut jacobian: Option<&mut [f64]>) {
         let (n, size, nh) = (self.system.dofs(), self.size(), self.alternation.harmonics.len());
         for placed in &self.elastic {
@@ -357,6 +358,10 @@ impl<'a> ModeEquations<'a> {
                         residual[row] += w[i] * force[a * nh + k].re;
                         residual[row + 1] += w[i] * force[a * nh + k].im;
                         let Some(jacobian) = jacobian.as_deref_mut() else { continue };
+                        if let Some(by_frequency) = &self.alternation.by_frequency {
+                            jacobian[row * size + size - 2] += w[i] * by_frequency[a * nh + k].re;
+                            jacobian[(row + 1) * size + size - 2] += w[i] * by_frequency[a * nh + k].im;
+                        }
                         for part in 0..2 {
                             let from = &tangent[(2 * (a * nh + k) + part) * wide..];
                             for (b, v) in placed.w.iter().enumerate() {
@@ -512,7 +517,7 @@ impl<'a> ModeEquations<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Coulomb, CoulombArctan, Cubic, Gap, Jenkins, JenkinsArctan, SharedLaw};
+    use crate::law::{Coulomb, CoulombArctan, Cubic, Dahl, Gap, Jenkins, JenkinsArctan, LuGre, SharedLaw};
     use crate::model::{GROUND, Joint, Mass, Model, Spring};
     use std::sync::Arc;
 
@@ -534,6 +539,63 @@ mod tests {
             model.joints.push(Joint { name: format!("j{i}"), between: [name(i), name(i + 1)], law });
         }
         model.assemble().unwrap()
+    }
+
+    /// One mass on a spring with a law of rates; no viscous damping but the law's.
+    fn rated(law: SharedLaw) -> System {
+        let between = || ["m".to_owned(), GROUND.to_owned()];
+        let model = Model {
+            masses: vec![Mass::new("m", 1.0)],
+            springs: vec![Spring { between: between(), stiffness: 1.0, damping: 0.02 }],
+            joints: vec![Joint { name: "j".into(), between: between(), law }],
+            ..Model::default()
+        };
+        model.assemble().unwrap()
+    }
+
+    /// Newton's method squares its residual also where forces depend on how fast a motion is run through: bristles with dampers, creep, viscous parts.
+    #[test]
+    fn newton_is_quadratic_for_laws_of_rates() {
+        let laws: [SharedLaw; 3] = [
+            Arc::new(LuGre {
+                stiffness: 3.0,
+                damping: 0.3,
+                viscous: 0.2,
+                limit: 0.3,
+                static_limit: 0.4,
+                velocity: 0.5,
+            }),
+            Arc::new(Dahl { stiffness: 3.0, limit: 0.3 }),
+            Arc::new(JenkinsArctan { stiffness: 3.0, limit: 0.3, alpha: 4.0 }),
+        ];
+        for law in laws {
+            let system = rated(law.clone());
+            let mut equations = ModeEquations::new(&system, 5, 1024).unwrap();
+            let linear = equations.linear(&equations.linear_modes()[0], 1.0).unwrap();
+            let start = equations.solve(&linear, 1.0, 1.0).unwrap();
+            let mut state = start.clone();
+            state.omega *= 1.02;
+            state.damping += 0.01;
+            let size = equations.size();
+            let scale = equations.units(&start, 1.0);
+            let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * size]);
+            let mut norms = Vec::new();
+            for _ in 0..5 {
+                equations.evaluate(&state, (&start, 1.0), &mut residual, Some(&mut jacobian));
+                norms.push(residual.iter().zip(&scale).map(|(r, s)| (r / s) * (r / s)).sum::<f64>().sqrt());
+                assert!(dense::solve(&mut jacobian, size, &mut residual));
+                for (value, d) in state.x.iter_mut().chain(&mut state.force).zip(residual.chunks_exact(2)) {
+                    *value -= Complex64::new(d[0], d[1]);
+                }
+                state.omega -= residual[size - 2];
+                state.damping -= residual[size - 1];
+            }
+            // from a percent to rounding in four steps; without the derivative by ω each left a share of the one before
+            for pair in norms.windows(2) {
+                assert!(pair[1] <= 30.0 * pair[0] * pair[0] + 1e-11, "{law:?}: {norms:?}");
+            }
+            assert!(norms[0] > 1e-3 && norms[4] < 1e-10, "{law:?}: {norms:?}");
+        }
     }
 
     /// The derivative agrees with differences by every unknown. By ω, the equations of the forces are left out: their derivative takes ε

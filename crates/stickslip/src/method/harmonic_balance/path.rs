@@ -5,11 +5,14 @@ use super::ports::Ports;
 use super::rest::Rest;
 use crate::law::{Contact, MOST_DIRECTIONS};
 use crate::method::evidence::{Judge, Judged};
-use crate::model::{MovedPlace, System};
-use crate::orbit::{Accuracy, Energy, Evidence, JointMotion, JointSample, Orbit, Path, PlaceMotion, Sample, Symmetry};
+use crate::model::{Axis, MovedPlace, System};
+use crate::orbit::measure::{Signals, Slip, measure};
+use crate::orbit::{Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use std::f64::consts::{PI, TAU};
+use std::cell::RefCell;
+use std::convert::Infallible;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -59,11 +62,10 @@ pub(super) fn stays(context: &Context, level: &Level, motion: &Motion, x: &[DVec
         left -= direction.map(|w| Complex64::new(w * force, 0.0));
         size += direction.norm() * force.abs();
     }
-    let held = system.structure().stiffness() * x[0].map(|z| z.re);
+    let held = system.structure().spring_forces(x[0].map(|z| z.re).as_slice());
     // positions far away have forces that are rounding
-    let rounding =
-        f64::EPSILON * system.structure().stiffness().amax() * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
-    (left.map(|z| z.re) - held).norm() <= UNHELD * size + 1e3 * rounding
+    let rounding = f64::EPSILON * system.structure().largest()[2] * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+    (left.map(|z| z.re) - DVector::from_vec(held)).norm() <= UNHELD * size + 1e3 * rounding
 }
 
 #[derive(Debug, Clone)]
@@ -82,6 +84,8 @@ pub(super) struct Context<'a> {
     pub system: &'a System,
     pub ports: &'a Ports,
     pub omega: f64,
+    /// The harmonic that has the drive's frequency.
+    pub first: usize,
     pub odd: bool,
     pub truncation: Option<f64>,
     /// The error that it is compared with.
@@ -95,27 +99,82 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
     if !stays(&context, level, motion, &x) {
         return None;
     }
-    let Context { system, ports, omega, odd, truncation, tolerance, judge } = context;
-    let (n, nh) = (system.dofs(), level.harmonics().len());
+    let harmonics = level.harmonics().to_vec();
+    let Samples { force, contact, states } = sampled(&context, level, motion, &x);
+    let Context { system, ports, omega, first, odd, truncation, tolerance, judge } = context;
+    let symmetry = if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod };
+    let period = TAU / omega;
+    let measuring = Measuring {
+        axes: system.axes().map(|(_, axis)| axis).collect(),
+        ports: ports_of_axes(system, ports),
+        motion,
+        x: &x,
+        harmonics: &harmonics,
+        contact: &contact,
+        omega,
+        halves: if odd { 2 } else { 1 },
+        level: RefCell::new(level),
+    };
+    let Ok(mut measured) = measure(system, &measuring, omega, (symmetry, period));
+    for (i, place) in measured.places.iter_mut().enumerate() {
+        place.first_harmonic = harmonics.binary_search(&first).map_or(ZERO, |k| x[k][i]);
+    }
+    let n = system.dofs();
+    let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
+    start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
+    start.extend(states);
+    let contracts = judge.as_ref().is_some_and(|judge| judge.proves());
+    let Judged { derivative, defect } =
+        judge.map_or_else(Judged::default, |judge| judge.judge(system, omega, odd, &start));
+    Some(Orbit {
+        method: super::NAME,
+        omega,
+        periods: 1,
+        symmetry,
+        start,
+        evidence: Evidence {
+            residual: motion.residual,
+            energy_gap: measured.energy_gap(0.0),
+            switches: measured.joints.iter().map(|joint| joint.switches).sum(),
+            iterations: motion.iterations,
+            truncation,
+            return_defect: defect,
+            accuracy: match truncation {
+                Some(error) if error <= tolerance => Accuracy::Converged,
+                Some(_) => Accuracy::Truncated,
+                None => Accuracy::Unchecked,
+            },
+            history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
+            stuck: measured.stuck,
+        },
+        places: measured.places,
+        joints: measured.joints,
+        energy: measured.energy,
+        return_map: derivative.unwrap_or_else(|| DMatrix::zeros(0, 0)),
+        contracts,
+        path: Arc::new(Series { system: system.clone(), omega, harmonics, x, force, contact }),
+    })
+}
+
+/// What the joints do at the samples of a period, and the states of their laws at its start.
+struct Samples {
+    force: Vec<Vec<[f64; MOST_DIRECTIONS]>>,
+    contact: Vec<Vec<Contact>>,
+    states: Vec<f64>,
+}
+
+fn sampled(context: &Context, level: &mut Level, motion: &Motion, x: &[DVector<Complex64>]) -> Samples {
+    let Context { system, ports, omega, .. } = *context;
     let harmonics = level.harmonics().to_vec();
     let samples = level.alternation.samples();
     let mut force = vec![vec![[0.0; MOST_DIRECTIONS]; samples]; system.joints().len()];
     let mut contact = vec![vec![Contact::Stick; samples]; system.joints().len()];
-    let mut joints = Vec::new();
     let mut states = Vec::new();
-    let mut stuck = Vec::new();
     for (j, joint) in system.joints().iter().enumerate() {
         let (axes, force, contact) = (joint.axes(), &mut force[j], &mut contact[j]);
-        // ∮ f du with the projected force: for the series it is the integral itself
-        let mut dissipation = 0.0;
         // no port: what holds nothing slips all the time
         let mut told = false;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.joint == j) {
-            for q in port.range() {
-                let range = q * nh..(q + 1) * nh;
-                let (c, f) = (&motion.c[range.clone()], &motion.force[range]);
-                dissipation += (0..nh).map(|k| cycle_work(harmonics[k], f[k], c[k])).sum::<f64>();
-            }
             level.sample(ports, p, omega, motion);
             let alternation = &level.alternation;
             for (i, force) in force.iter_mut().enumerate() {
@@ -131,96 +190,155 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
                 Some(rate) if port.is_force() => {
                     let mut z = vec![0.0; rate.states()];
                     // the sampled force is within the law's bounds, which that of the series may pass
-                    rate.state_under(alternation.force[0][0], &mut z);
+                    let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| alternation.force[a][0]);
+                    rate.state_under(&now[..port.axes], &mut z);
                     states.extend(z);
                 }
                 _ if port.is_force() => {}
                 _ => states.extend(&alternation.state),
             }
         }
-        let along: Vec<Vec<(usize, Complex64)>> = axes
+        if told {
+            continue;
+        }
+        let velocity: Vec<Vec<f64>> = axes
             .iter()
             .map(|axis| {
-                let series = harmonics.iter().zip(&x);
-                series.map(|(&h, x)| (h, axis.imposed_at(h as u32) + axis.along_complex(x))).collect()
+                let u = relative(axis, &harmonics, x);
+                let velocity: Vec<_> =
+                    harmonics.iter().zip(u).map(|(&h, c)| (h, Complex64::new(0.0, h as f64 * omega) * c)).collect();
+                level.alternation.fourier.synthesise(&velocity, &mut level.alternation.signal);
+                level.alternation.signal.clone()
             })
             .collect();
-        if !told {
-            let velocity: Vec<Vec<f64>> = along
-                .iter()
-                .map(|u| {
-                    let velocity: Vec<_> =
-                        u.iter().map(|(h, c)| (*h, Complex64::new(0.0, *h as f64 * omega) * c)).collect();
-                    level.alternation.fourier.synthesise(&velocity, &mut level.alternation.signal);
-                    level.alternation.signal.clone()
-                })
-                .collect();
-            for (i, (contact, force)) in contact.iter_mut().zip(force.iter()).enumerate() {
-                let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| velocity.get(a).map_or(0.0, |v| v[i]));
-                *contact = joint.law().contact(&now[..axes.len()], &force[..axes.len()]);
+        for (i, (contact, force)) in contact.iter_mut().zip(force.iter()).enumerate() {
+            let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| velocity.get(a).map_or(0.0, |v| v[i]));
+            *contact = joint.law().contact(&now[..axes.len()], &force[..axes.len()]);
+        }
+    }
+    Samples { force, contact, states }
+}
+
+/// Harmonics of the relative displacement along an axis.
+fn relative(axis: &Axis, harmonics: &[usize], x: &[DVector<Complex64>]) -> Vec<Complex64> {
+    harmonics.iter().zip(x).map(|(&h, x)| axis.imposed_at(h as u32) + axis.along_complex(x)).collect()
+}
+
+/// The unknowns that act along each axis, among those of all ports.
+fn ports_of_axes(system: &System, ports: &Ports) -> Vec<Vec<usize>> {
+    let mut firsts = Vec::with_capacity(system.joints().len());
+    let mut count = 0;
+    for joint in system.joints() {
+        firsts.push(count);
+        count += joint.axes().len();
+    }
+    let mut of = vec![Vec::new(); count];
+    for q in 0..ports.count() {
+        let (joint, axis) = ports.place(q);
+        of[firsts[joint] + axis].push(q);
+    }
+    of
+}
+
+/// A solution that is measured.
+struct Measuring<'a> {
+    axes: Vec<&'a Axis>,
+    /// The unknowns along each axis.
+    ports: Vec<Vec<usize>>,
+    motion: &'a Motion,
+    x: &'a [DVector<Complex64>],
+    harmonics: &'a [usize],
+    /// Per joint and sample of the whole period.
+    contact: &'a [Vec<Contact>],
+    omega: f64,
+    /// Returns in a period.
+    halves: usize,
+    /// Memory of the transforms.
+    level: RefCell<&'a mut Level>,
+}
+
+impl Measuring<'_> {
+    /// Length of the return, s.
+    fn length(&self) -> f64 {
+        TAU / (self.omega * self.halves as f64)
+    }
+
+    fn range_of(&self, signal: &[Complex64]) -> (f64, f64) {
+        let series: Vec<(usize, Complex64)> = self.harmonics.iter().copied().zip(signal.iter().copied()).collect();
+        extremes(&series, &mut self.level.borrow_mut())
+    }
+
+    fn derivative(&self, mut signal: Vec<Complex64>) -> Vec<Complex64> {
+        for (c, &h) in signal.iter_mut().zip(self.harmonics) {
+            *c *= Complex64::new(0.0, h as f64 * self.omega);
+        }
+        signal
+    }
+
+    /// The harmonic of a frequency, rad/s, where the series has it.
+    fn harmonic(&self, rate: f64) -> Option<usize> {
+        self.harmonics.binary_search(&((rate / self.omega).round() as usize)).ok()
+    }
+}
+
+/// Signals are their harmonics. Where there is a half period, all of them are odd, and over it they are orthogonal too.
+impl Signals for Measuring<'_> {
+    type Signal = Vec<Complex64>;
+    type Error = Infallible;
+
+    fn displacement(&self, row: usize) -> Vec<Complex64> {
+        self.x.iter().map(|x| x[row]).collect()
+    }
+    fn velocity(&self, row: usize) -> Vec<Complex64> {
+        self.derivative(self.displacement(row))
+    }
+    fn relative_velocity(&self, axis: usize) -> Vec<Complex64> {
+        // the unknown itself, and not what the forces do to the structure: the energies then balance only as well as the equations hold
+        let nh = self.harmonics.len();
+        let unknown = self.ports[axis].first().map(|q| self.motion.c[q * nh..(q + 1) * nh].to_vec());
+        self.derivative(unknown.unwrap_or_else(|| relative(self.axes[axis], self.harmonics, self.x)))
+    }
+    fn force(&self, axis: usize) -> Vec<Complex64> {
+        let nh = self.harmonics.len();
+        (0..nh).map(|k| self.ports[axis].iter().map(|q| self.motion.force[q * nh + k]).sum()).collect()
+    }
+    fn harmonics(&self, parts: &[(f64, Complex64)]) -> Vec<Complex64> {
+        let mut signal = vec![ZERO; self.harmonics.len()];
+        for (rate, a) in parts {
+            if let Some(k) = self.harmonic(*rate) {
+                signal[k] += a;
             }
         }
-        let displacement = along.iter().map(|u| extremes(u, level)).collect();
-        let slipping = contact.iter().filter(|c| c.slips()).count();
-        let moving = contact.iter().filter(|c| **c != Contact::Stick).count();
-        let switches = (0..samples).filter(|&i| contact[i] != contact[(i + 1) % samples]).count();
-        // a law that bounds no force never slips, and is one of no continuum
-        if moving == 0 && joint.law().scale().is_finite() {
-            stuck.push(joint.name().to_owned());
-        }
-        joints.push(JointMotion {
-            name: joint.name().to_owned(),
-            dissipation,
-            slip_fraction: slipping as f64 / samples as f64,
-            displacement,
-            switches,
-        });
+        signal
     }
-    let places = (0..n)
-        .map(|i| {
-            let series: Vec<(usize, Complex64)> = (0..nh).map(|k| (harmonics[k], x[k][i])).collect();
-            let (minimum, maximum) = extremes(&series, level);
-            let at = |h: usize| harmonics.binary_search(&h).map_or(ZERO, |k| x[k][i]);
-            PlaceMotion { name: system.places()[i].clone(), maximum, minimum, mean: at(0).re, first_harmonic: at(1) }
-        })
-        .collect();
-    let energy = energy(system, ports, omega, &harmonics, &x, motion, &joints);
-    let possible = possible_work(system, omega, &harmonics, &x) + energy.friction.abs();
-    let reference = energy.work_in.abs().max(NO_WORK * possible);
-    let balance = energy.work_in - energy.viscous - energy.friction;
-    let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
-    start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
-    start.extend(states);
-    let contracts = judge.as_ref().is_some_and(|judge| judge.proves());
-    let Judged { derivative, defect } =
-        judge.map_or_else(Judged::default, |judge| judge.judge(system, omega, odd, &start));
-    Some(Orbit {
-        method: super::NAME,
-        omega,
-        periods: 1,
-        symmetry: if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod },
-        start,
-        places,
-        evidence: Evidence {
-            residual: motion.residual,
-            energy_gap: if reference > 0.0 { balance.abs() / reference } else { balance.abs() },
-            switches: joints.iter().map(|j| j.switches).sum(),
-            iterations: motion.iterations,
-            truncation,
-            return_defect: defect,
-            accuracy: match truncation {
-                Some(error) if error <= tolerance => Accuracy::Converged,
-                Some(_) => Accuracy::Truncated,
-                None => Accuracy::Unchecked,
-            },
-            stuck,
-        },
-        joints,
-        energy,
-        return_map: derivative.unwrap_or_else(|| DMatrix::zeros(0, 0)),
-        contracts,
-        path: Arc::new(Series { system: system.clone(), omega, harmonics, x, force, contact }),
-    })
+    fn add(&self, to: &mut Vec<Complex64>, signal: &Vec<Complex64>, factor: f64) {
+        to.iter_mut().zip(signal).for_each(|(to, value)| *to += value * factor);
+    }
+    fn product(&self, a: &Vec<Complex64>, b: &Vec<Complex64>) -> f64 {
+        let terms = self.harmonics.iter().zip(a.iter().zip(b));
+        let sum: f64 = terms.map(|(&h, (a, b))| if h == 0 { a.re * b.re } else { 0.5 * (a.conj() * b).re }).sum();
+        self.length() * sum
+    }
+    fn fourier(&self, signal: &Vec<Complex64>, omega: f64) -> Complex64 {
+        let share = if omega == 0.0 { 1.0 } else { 0.5 };
+        self.harmonic(omega).map_or(ZERO, |k| signal[k] * (share * self.length()))
+    }
+    fn range(&self, row: usize) -> Result<(f64, f64), Infallible> {
+        Ok(self.range_of(&self.displacement(row)))
+    }
+    fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
+        Ok(self.range_of(&relative(self.axes[axis], self.harmonics, self.x)))
+    }
+    fn slip(&self, joint: usize) -> Slip {
+        let contact = &self.contact[joint];
+        let samples = contact.len();
+        let switches = (0..samples).filter(|&i| contact[i] != contact[(i + 1) % samples]).count();
+        Slip {
+            share: contact.iter().filter(|contact| contact.slips()).count() as f64 / samples as f64,
+            switches: switches / self.halves,
+            rests: contact.iter().all(|contact| *contact == Contact::Stick),
+        }
+    }
 }
 
 /// Energy gap beyond which a solution is no orbit: where the equations hold, energies balance to the residual, but for a resonance without
@@ -231,81 +349,17 @@ const STILL: f64 = 1e-9;
 
 /// Whether the energies of an orbit balance, or are none.
 pub(super) fn balances(system: &System, orbit: &Orbit) -> bool {
-    let structure = system.structure();
-    let stiff = structure.stiffness().amax().max(orbit.omega * orbit.omega * structure.mass().amax());
+    let [mass, _, stiffness] = system.structure().largest();
+    let stiff = stiffness.max(orbit.omega * orbit.omega * mass);
     let loads: f64 = system.excitation(orbit.omega).iter().map(|(_, load)| load.norm_squared()).sum();
     let Energy { work_in, viscous, friction } = orbit.energy;
     let balance = (work_in - viscous - friction).abs();
     orbit.evidence.energy_gap <= UNBALANCED || balance <= STILL * loads / stiff.max(f64::MIN_POSITIVE)
 }
 
-/// Work below this fraction of what the loads could do is no yardstick for the energy gap: the motion is conservative.
-const NO_WORK: f64 = 1e-6;
-
-/// `∫ f u' dt` over a period of `Re(F e^{jhΩt})` and `Re(U e^{jhΩt})`.
-fn cycle_work(h: usize, f: Complex64, u: Complex64) -> f64 {
-    -PI * h as f64 * (f.conj() * u).im
-}
-
 /// Loads and imposed motion by harmonic.
 fn moved(place: &MovedPlace, h: usize) -> Complex64 {
     place.motion.iter().find(|(k, _)| *k as usize == h).map_or(ZERO, |(_, g)| *g)
-}
-
-fn energy(
-    system: &System,
-    ports: &Ports,
-    omega: f64,
-    harmonics: &[usize],
-    x: &[DVector<Complex64>],
-    motion: &Motion,
-    joints: &[JointMotion],
-) -> Energy {
-    let n = system.dofs();
-    let nh = harmonics.len();
-    let (mut work, mut viscous) = (0.0, 0.0);
-    let excitation = system.excitation(omega);
-    for (k, &h) in harmonics.iter().enumerate() {
-        let s = Complex64::new(0.0, h as f64 * omega);
-        let x = &x[k];
-        if let Some((_, load)) = excitation.iter().find(|(number, _)| *number as usize == h) {
-            work += (0..n).map(|i| cycle_work(h, load[i], x[i])).sum::<f64>();
-        }
-        for i in 0..n {
-            for l in 0..n {
-                let c = system.structure().damping()[(i, l)];
-                if c != 0.0 {
-                    viscous += cycle_work(h, s * x[l] * c, x[i]);
-                }
-            }
-        }
-        for (m, place) in system.moved().iter().enumerate() {
-            let g = moved(place, h);
-            let numbers: Vec<(usize, usize)> = system
-                .joints()
-                .iter()
-                .enumerate()
-                .flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)))
-                .collect();
-            let joint_part: Complex64 = (0..ports.count())
-                .map(|q| {
-                    let number = numbers.binary_search(&ports.place(q)).unwrap_or(0);
-                    motion.force[q * nh + k] * place.joints[number]
-                })
-                .sum();
-            work += cycle_work(h, linear_reaction(system, m, h, s, x) + joint_part, g);
-            for i in 0..n {
-                let (stiffness, damping) = (place.stiffness.0[i], place.damping.0[i]);
-                // the load on the masses contains what the moved place does to them: that is no work from outside
-                work += cycle_work(h, g * (stiffness + s * damping), x[i]);
-                viscous += 2.0 * cycle_work(h, s * g * damping, x[i]);
-            }
-            for (other, c) in place.damping.1.iter().enumerate() {
-                viscous += cycle_work(h, s * moved(&system.moved()[other], h) * *c, g);
-            }
-        }
-    }
-    Energy { work_in: work, viscous, friction: joints.iter().map(|joint| joint.dissipation).sum() }
 }
 
 /// The force that moves a place, without that of the joints.
@@ -319,17 +373,6 @@ fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVecto
         force += x[i] * (place.stiffness.0[i] + s * place.damping.0[i]);
     }
     force
-}
-
-/// What the loads could do: force amplitude times displacement amplitude.
-fn possible_work(system: &System, omega: f64, harmonics: &[usize], x: &[DVector<Complex64>]) -> f64 {
-    let mut sum = 0.0;
-    for (number, load) in system.excitation(omega) {
-        if let Ok(k) = harmonics.binary_search(&(number as usize)) {
-            sum += PI * number as f64 * (0..load.len()).map(|i| load[i].norm() * x[k][i].norm()).sum::<f64>();
-        }
-    }
-    sum
 }
 
 /// Least and largest value of a series: the extremes of its samples, moved to the zero of the slope.

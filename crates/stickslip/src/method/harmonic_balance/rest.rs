@@ -1,20 +1,27 @@
 //! The linear rest of a structure: what its places do under harmonic forces, in closed form for every frequency.
 //!
 //! With the modes `(λ, φ)` of `M x'' + C x' + K x`, computed once, the response to `Re(F e^{st})` is a sum of `φ (ψᵀF) / (s - λ)`.
-//! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored.
+//! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored. Structures that are sparse, or
+//! so large that their modes would take seconds, are not taken apart into these: their dynamic stiffness is factored at every frequency.
 
 use super::hold::HOLD;
 use super::ports::Ports;
-use super::sparse::Sparse;
 use crate::model::System;
+use crate::structure::{DynamicStiffness, Matrices, Structure};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 use stickslip_numerics::modes::Modes;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Share of the largest static receptance below which springs hold a direction, if any is held by [`HOLD`] alone.
 const HELD: f64 = 1e-5;
+
+/// Degrees of freedom beyond which full matrices are not taken apart into modes: at 200 that takes a second, with the third power.
+const MODES: usize = 200;
 
 /// Harmonics that nobody samples.
 const HIGHEST: f64 = 1e6;
@@ -24,11 +31,11 @@ const HIGHEST: f64 = 1e6;
 pub(super) struct Rest {
     n: usize,
     modal: Option<Modal>,
-    mass: DMatrix<f64>,
-    damping: DMatrix<f64>,
-    stiffness: DMatrix<f64>,
-    /// Directions of the axes, n × q.
-    direction: DMatrix<f64>,
+    /// Dynamic stiffnesses of large structures at the last drive frequency, by their rates.
+    factors: RefCell<Vec<(Complex64, f64, Option<Arc<DynamicStiffness>>)>>,
+    structure: Structure,
+    /// Directions of the axes: rows, rising, with their weights.
+    directions: Vec<Vec<(usize, f64)>>,
 }
 
 /// Modes, and what they are at the joints.
@@ -49,16 +56,19 @@ struct Modal {
 impl Rest {
     pub fn new(system: &System, ports: &Ports) -> Self {
         let n = system.dofs();
-        let columns: Vec<DVector<f64>> = (0..ports.count()).map(|q| ports.axis(system, q).dense(n)).collect();
-        let direction = if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) };
+        let directions = (0..ports.count())
+            .map(|q| {
+                let mut rows = BTreeMap::new();
+                ports.axis(system, q).rows().iter().for_each(|(i, w)| *rows.entry(*i).or_insert(0.0) += w);
+                rows.into_iter().collect()
+            })
+            .collect::<Vec<Vec<(usize, f64)>>>();
         Rest {
             n,
-            // where the banded form takes over, the modes are not needed
-            modal: if Sparse::new(system, ports, &[1]).is_some() { None } else { modal(system, &direction) },
-            mass: system.structure().mass().clone(),
-            damping: system.structure().damping().clone(),
-            stiffness: system.structure().stiffness().clone(),
-            direction,
+            modal: if is_factored(system.structure()) { None } else { modal(system, &columns(n, &directions)) },
+            factors: RefCell::default(),
+            structure: system.structure().clone(),
+            directions,
         }
     }
 
@@ -69,10 +79,16 @@ impl Rest {
 
     /// The same at any `s`; on the positive real axis it has no resonances.
     pub fn receptance_at(&self, s: Complex64, omega: f64) -> DMatrix<Complex64> {
-        let q = self.direction.ncols();
+        let q = self.directions.len();
+        if self.is_factored() {
+            let Some(factor) = self.factor(s, omega) else { return DMatrix::from_element(q, q, ZERO) };
+            let mut moved = columns(self.n, &self.directions).map(|w| Complex64::new(w, 0.0));
+            factor.solve(moved.as_mut_slice());
+            return DMatrix::from_fn(q, q, |a, b| self.directions[a].iter().map(|&(i, w)| moved[(i, b)] * w).sum());
+        }
         let Some(modal) = &self.modal else {
             let Some(inverse) = self.dynamic(s).try_inverse() else { return DMatrix::from_element(q, q, ZERO) };
-            let direction = self.direction.map(|w| Complex64::new(w, 0.0));
+            let direction = columns(self.n, &self.directions).map(|w| Complex64::new(w, 0.0));
             return direction.transpose() * inverse * direction;
         };
         let mut sum = DMatrix::from_element(q, q, ZERO);
@@ -99,6 +115,12 @@ impl Rest {
     /// Displacements of all places under the complex forces `force` (length n, N), m.
     pub fn respond(&self, harmonic: usize, omega: f64, force: &DVector<Complex64>) -> DVector<Complex64> {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
+        if self.is_factored() {
+            let Some(factor) = self.factor(s, omega) else { return DVector::from_element(self.n, ZERO) };
+            let mut x = force.clone();
+            factor.solve(x.as_mut_slice());
+            return x;
+        }
         let Some(modal) = &self.modal else {
             return self.dynamic(s).lu().solve(force).unwrap_or_else(|| DVector::from_element(self.n, ZERO));
         };
@@ -128,13 +150,12 @@ impl Rest {
     /// Moves the mean positions `x` (length n) so that they are `along` the axes what the ports know. Where only laws hold a direction, positions
     /// are the small difference of large ones, and rounding of the forces would move them.
     pub fn settle(&self, omega: f64, x: &mut DVector<Complex64>, along: impl Fn(usize) -> f64) {
-        let q = self.direction.ncols();
-        let off = DVector::from_fn(q, |a, _| {
-            along(a) - self.direction.column(a).iter().zip(x.iter()).map(|(w, x)| w * x.re).sum::<f64>()
-        });
+        let q = self.directions.len();
+        let off =
+            DVector::from_fn(q, |a, _| along(a) - self.directions[a].iter().map(|&(i, w)| w * x[i].re).sum::<f64>());
         let receptance = self.receptance(0, omega).map(|r| r.re);
         let largest = receptance.amax();
-        let unheld = free_fraction(ZERO, omega).re / self.mass.amax();
+        let unheld = free_fraction(ZERO, omega).re / self.structure.largest()[0];
         if largest == 0.0 || largest < HELD * unheld {
             return; // springs hold all that moves, or nothing does
         }
@@ -161,20 +182,50 @@ impl Rest {
     /// `W f`: forces on all places from forces along the axes.
     pub fn spread(&self, along: impl Fn(usize) -> Complex64) -> DVector<Complex64> {
         let mut force = DVector::from_element(self.n, ZERO);
-        for q in 0..self.direction.ncols() {
+        for (q, rows) in self.directions.iter().enumerate() {
             let f = along(q);
-            for i in 0..self.n {
-                force[i] += f * self.direction[(i, q)];
-            }
+            rows.iter().for_each(|&(i, w)| force[i] += f * w);
         }
         force
     }
 
+    /// Of a small structure.
     fn dynamic(&self, s: Complex64) -> DMatrix<Complex64> {
-        DMatrix::from_fn(self.n, self.n, |i, k| {
-            s * s * self.mass[(i, k)] + s * self.damping[(i, k)] + self.stiffness[(i, k)]
-        })
+        let Matrices { mass, damping, stiffness } = &**self.structure.full();
+        DMatrix::from_fn(self.n, self.n, |i, k| s * s * mass[(i, k)] + s * damping[(i, k)] + stiffness[(i, k)])
     }
+
+    fn is_factored(&self) -> bool {
+        is_factored(&self.structure)
+    }
+
+    /// Of a large structure: kept as long as the drive frequency stays. `None` at a resonance without damping.
+    fn factor(&self, s: Complex64, omega: f64) -> Option<Arc<DynamicStiffness>> {
+        let mut factors = self.factors.borrow_mut();
+        factors.retain(|(_, driven, _)| *driven == omega);
+        if let Some((.., found)) = factors.iter().find(|(rate, ..)| *rate == s) {
+            return found.clone();
+        }
+        // as in the modal form, what nothing holds has a mean position by a soft spring
+        let hold = if s == ZERO { (HOLD * omega).powi(2) } else { 0.0 };
+        let found = self.structure.held_stiffness(s, hold).ok().map(Arc::new);
+        factors.push((s, omega, found.clone()));
+        found
+    }
+}
+
+/// Whether the dynamic stiffness is factored at every frequency.
+fn is_factored(structure: &Structure) -> bool {
+    structure.is_sparse() || structure.dofs() > MODES
+}
+
+/// Directions as columns, n × q.
+fn columns(n: usize, directions: &[Vec<(usize, f64)>]) -> DMatrix<f64> {
+    let mut columns = DMatrix::zeros(n, directions.len());
+    for (q, rows) in directions.iter().enumerate() {
+        rows.iter().for_each(|&(i, w)| columns[(i, q)] = w);
+    }
+    columns
 }
 
 /// `1/(s - λ)` and `1/(s - λ*)`.
@@ -213,4 +264,83 @@ fn modal(system: &System, direction: &DMatrix<f64>) -> Option<Modal> {
         left,
         free,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::Jenkins;
+    use crate::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
+    use std::f64::consts::PI;
+
+    /// Equal masses of a kilogram on equal springs between walls, pulled at the first, two joints on the ground.
+    fn chain(n: usize, stiffness: f64, damping: f64) -> System {
+        let name = |i: usize| if i == 0 || i > n { GROUND.to_owned() } else { format!("m{i}") };
+        let mut model = Model::default();
+        for i in 1..=n {
+            model.masses.push(Mass::new(name(i), 1.0));
+        }
+        for i in 0..=n {
+            model.springs.push(Spring { between: [name(i), name(i + 1)], stiffness, damping });
+        }
+        model.forces.push(Force { on: name(1), amplitude: 1.0, phase: 0.3, harmonic: 1 });
+        for i in [3, n - 1] {
+            let law = Arc::new(Jenkins { stiffness: 0.5 * stiffness, limit: 0.05 });
+            model.joints.push(Joint { name: format!("j{i}"), between: [name(i), GROUND.into()], law });
+        }
+        model.assemble().unwrap()
+    }
+
+    /// A structure that is too large for its modes responds as the sum of the modes that it would have: `sin(π k i/(n + 1))` with the
+    /// frequencies `2 √(k/m) sin(π k/(2 (n + 1)))`.
+    #[test]
+    fn receptances_without_modes() {
+        let (n, stiffness, damping) = (60, 40.0, 0.02);
+        let system = chain(n, stiffness, damping);
+        assert!(system.structure().is_sparse());
+        let ports = Ports::new(&system).unwrap();
+        let rest = Rest::new(&system, &ports);
+        let walls = (n + 1) as f64;
+        for (h, omega) in [(1, 0.7), (3, 0.7), (1, 2.9), (0, 0.7)] {
+            let s = Complex64::new(0.0, h as f64 * omega);
+            let exact = |i: f64, l: f64| -> Complex64 {
+                let one = |k: usize| {
+                    let shape = |i: f64| (2.0 / walls).sqrt() * (PI * k as f64 * i / walls).sin();
+                    let square = 4.0 * (0.5 * PI * k as f64 / walls).sin().powi(2);
+                    shape(i) * shape(l) / (s * s + s * damping * square + stiffness * square)
+                };
+                (1..=n).map(one).sum()
+            };
+            let at = [3.0, (n - 1) as f64];
+            let receptance = rest.receptance(h, omega);
+            for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let expected = exact(at[a], at[b]);
+                assert!((receptance[(a, b)] - expected).norm() < 1e-9 * exact(at[0], at[0]).norm(), "{a} {b}: {h}");
+            }
+            let mut force = DVector::from_element(n, ZERO);
+            force[9] = Complex64::new(0.0, 2.0);
+            let x = rest.respond(h, omega, &force);
+            for i in [1, 10, n] {
+                let expected = exact(i as f64, 10.0) * Complex64::new(0.0, 2.0);
+                assert!((x[i - 1] - expected).norm() < 1e-9 * exact(10.0, 10.0).norm());
+            }
+        }
+    }
+
+    /// Few joints on a large structure: the series against the exact motion.
+    #[test]
+    fn few_joints_on_a_large_structure() {
+        let system = chain(60, 400.0, 0.5);
+        let omega = 1.03;
+        assert!(super::super::sparse::Sparse::new(&system, &Ports::new(&system).unwrap(), &[1]).is_none());
+        let method = HarmonicBalance { harmonics: Some(21), ..HarmonicBalance::default() };
+        let series = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+        let exact = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+        assert!(exact.joints.iter().any(|joint| joint.slip_fraction > 0.1), "{:?}", exact.joints);
+        let largest = exact.places.iter().map(|place| place.amplitude()).fold(0.0, f64::max);
+        for (a, b) in series.places.iter().zip(&exact.places) {
+            assert!((a.amplitude() - b.amplitude()).abs() < 1e-3 * largest, "{} {}", a.amplitude(), b.amplitude());
+        }
+    }
 }

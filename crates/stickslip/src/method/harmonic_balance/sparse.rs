@@ -45,7 +45,8 @@ pub(super) struct Sparse {
 }
 
 impl Sparse {
-    /// `None` if the system is small, has joints with inner motions, or is coupled all over.
+    /// `None` if the system is small, has joints with inner motions, or if its joints are so few, or coupled all over, that a full matrix
+    /// over them is eliminated faster.
     pub fn new(system: &System, ports: &Ports, harmonics: &[usize]) -> Option<Self> {
         let n = system.dofs();
         if n < LARGE || ports.iter().any(|port| port.series > 0.0) {
@@ -71,7 +72,9 @@ impl Sparse {
         let whole = n + unknown;
         let position = order(whole, &links);
         let band = links.iter().map(|&(a, b)| position[a].abs_diff(position[b])).max().unwrap_or(0);
-        if band * 4 > n {
+        // eliminations in the band and along the joints, both without the cube of twice the harmonics
+        let along = (ends.len() as f64).powi(3) / 3.0;
+        if whole as f64 * ((band + 1) as f64).powi(2) > along {
             return None;
         }
         let nh = harmonics.len();

@@ -2,12 +2,13 @@
 
 use super::law;
 use super::step::{Eliminated, Step};
-use crate::law::Contact;
+use crate::law::{Contact, Piece};
 use crate::method::assembly::{Assembly, NEAR_REST};
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
 use crate::method::periodic::norm;
-use crate::method::stepped::{Instant, Node, SteppedPath, Steps};
+use crate::method::relaxed::Spring;
+use crate::method::stepped::{Instant, Node, SteppedPath, Steps, extrapolate};
 use crate::method::{Breakdown, MethodError};
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
@@ -18,10 +19,16 @@ use std::sync::Arc;
 pub(crate) const FIRST: usize = 256;
 /// Steps of a stretch at most: linear motion is then within 1e-9 of the truth, and a run takes about 0.1 s for one joint.
 pub(crate) const MOST: usize = 1 << 16;
-/// Error of a stretch of a transient, relative to its motion.
+/// Error of a stretch of a transient, relative to its motion: by how much the limit that two step lengths promise changes when both are halved.
 const TOLERANCE: f64 = 1e-6;
-/// Steps are doubled only where they must be: the next stretch tries half as many when the error is below this share of the tolerance.
-const EASY: f64 = 0.1;
+/// Steps are doubled only where they must be: the next stretch tries half as many when the error is below this share of the tolerance, which
+/// without kinks falls to a sixteenth and at kinks to a quarter.
+const EASY: f64 = 0.05;
+/// Steps of a stretch of a transient at least.
+const FIRST_FOLLOWED: usize = 64;
+
+/// What is missed in a law of which no smooth neighbour is left either.
+const DROPS: &str = "its friction drops at once when slip begins; that of a law that falls over a `velocity` above zero can be smoothed";
 
 /// Runs the motion of a structure with any laws but rigid sliders.
 pub(crate) struct IncrementalFlow {
@@ -51,10 +58,9 @@ impl IncrementalFlow {
             let chosen = regular.unwrap_or_else(|| joint.clone());
             match law::states(&chosen) {
                 Some((states, scale)) => Ok((chosen, states, scale)),
-                None if joint.pieces().is_some() => Err(
-                    "a law with a spring before its slider, or give the method a `width` (m/s), beside laws that are not exact",
-                ),
-                None => Err("a law with a step or rate view"),
+                None if chosen.pieces().is_some_and(|pieces| pieces.iter().any(Piece::drops)) => Err(DROPS),
+                None if chosen.pieces().is_some() => Err("its slider is rigid, with no spring before it"),
+                None => Err("it has neither a step nor a rate view"),
             }
         })?;
         Ok(IncrementalFlow {
@@ -66,6 +72,31 @@ impl IncrementalFlow {
             eliminated: None,
             assembly,
         })
+    }
+
+    /// The sliders behind springs whose forces are among the states.
+    pub fn springs(&self) -> Vec<Spring> {
+        let mut springs = Vec::new();
+        for (joint, placed) in self.assembly.joints.iter().enumerate() {
+            let first = 2 * self.assembly.n + placed.first_state;
+            let sliders = law::springs(&placed.law).into_iter().enumerate();
+            springs.extend(sliders.map(|(s, (stiffness, limit))| Spring { joint, state: first + s, stiffness, limit }));
+        }
+        springs
+    }
+
+    /// Gives all of [`IncrementalFlow::springs`] the limits that these state.
+    pub fn limit(&mut self, springs: &[Spring]) {
+        let mut limits = springs.iter().map(|spring| spring.limit);
+        self.step.laws.iter_mut().for_each(|law| law.limit(&mut limits));
+    }
+
+    /// The end of a run from `state` with its record.
+    fn tried(&mut self, state: &[f64], duration: f64) -> Result<(Vec<f64>, Steps), Breakdown> {
+        let mut end = state.to_vec();
+        self.run(&mut end, duration, None)?;
+        let empty = Steps { nodes: self.steps.nodes.clone(), ..Steps::default() };
+        Ok((end, std::mem::replace(&mut self.steps, empty)))
     }
 
     fn keep_instant(&mut self, state: &[f64], time: f64) {
@@ -107,16 +138,15 @@ impl Flow for IncrementalFlow {
     }
 
     fn set_drive(&mut self, system: &System, omega: f64) {
-        let axes: Vec<usize> = (0..self.assembly.axes.len()).collect();
-        self.drive = Drive::at(system, &axes, omega);
+        self.drive = self.assembly.drive(system, omega);
     }
 
     fn weights(&self) -> Vec<f64> {
-        self.assembly.weights(self.drive.omega, NEAR_REST * self.energy_scale())
+        self.assembly.weights(&self.drive)
     }
 
     fn energy_scale(&self) -> f64 {
-        self.drive.energy_scale(&self.assembly.mass, &self.assembly.stiffness)
+        self.assembly.energy_scale(&self.drive)
     }
 
     fn run(
@@ -130,9 +160,11 @@ impl Flow for IncrementalFlow {
             self.eliminated = Eliminated::new(&self.assembly, h);
         }
         let eliminated = self.eliminated.take().ok_or(Breakdown::OutOfRange { time: 0.0 })?;
-        let (_, scale) = self.assembly.scales(state, &self.drive);
         self.steps.clear();
         self.step.start(&self.assembly, state, &self.drive, sensitivity.as_deref());
+        // joints that are pressed at rest set in motion what neither moves nor is loaded
+        let pushed = NEAR_REST * duration * self.assembly.pushed(self.step.force.as_slice());
+        let scale = self.assembly.scales(state, &self.drive).1.max(pushed);
         if self.keep {
             self.keep_instant(state, 0.0);
         }
@@ -156,29 +188,36 @@ impl Flow for IncrementalFlow {
     }
 
     fn follow(&mut self, state: &mut [f64], duration: f64) -> Result<(), Breakdown> {
-        let weights = self.weights();
-        let rest = NEAR_REST * self.energy_scale();
-        let mut coarse = state.to_vec();
-        self.run(&mut coarse, duration, None)?;
-        let mut earlier = None;
+        let (weights, rest) = (self.weights(), NEAR_REST * self.energy_scale());
+        let mut coarse = loop {
+            match self.tried(state, duration) {
+                // steps that are too long for a law's states are no reason to give up
+                Err(Breakdown::Stalled { .. }) if self.count < MOST => self.count *= 2,
+                found => break found?,
+            }
+        };
+        let mut before: Option<Vec<f64>> = None;
         loop {
             self.count *= 2;
-            let mut fine = state.to_vec();
-            self.run(&mut fine, duration, None)?;
-            let change: Vec<f64> = fine.iter().zip(&coarse).map(|(a, b)| a - b).collect();
-            let size = norm(&weights, &fine).max(norm(&weights, state)).max(rest).max(f64::MIN_POSITIVE);
-            let last = norm(&weights, &change) / size;
-            let error = estimate(earlier, last);
-            if error <= TOLERANCE {
-                state.copy_from_slice(&fine);
-                // the next stretch begins with half as many again
-                self.count = (self.count / if error < EASY * TOLERANCE { 4 } else { 2 }).max(FIRST);
-                return Ok(());
+            let fine = self.tried(state, duration)?;
+            let mut end = coarse.0;
+            extrapolate(&mut end, &fine.0);
+            if let Some(before) = before {
+                let change: Vec<f64> = end.iter().zip(&before).map(|(a, b)| a - b).collect();
+                let size = norm(&weights, &end).max(norm(&weights, state)).max(rest).max(f64::MIN_POSITIVE);
+                let error = norm(&weights, &change) / size;
+                if error <= TOLERANCE {
+                    state.copy_from_slice(&end);
+                    self.steps = coarse.1.extrapolated(&fine.1);
+                    // the next stretch begins as this one did, or with half as many
+                    self.count = (self.count / if error < EASY * TOLERANCE { 8 } else { 4 }).max(FIRST_FOLLOWED);
+                    return Ok(());
+                }
+                if self.count >= MOST {
+                    return Err(Breakdown::Unresolved { steps: self.count, estimate: error, tolerance: TOLERANCE });
+                }
             }
-            if self.count >= MOST {
-                return Err(Breakdown::Unresolved { steps: self.count, estimate: error, tolerance: TOLERANCE });
-            }
-            (earlier, coarse) = (Some(last), fine);
+            (before, coarse) = (Some(end), fine);
         }
     }
 

@@ -40,6 +40,18 @@ fn pieces(law: &SharedLaw) -> Vec<Piece> {
     law.pieces().unwrap_or_default().into_iter().filter(carries).collect()
 }
 
+/// Stiffness (N/m) and limit (N) of the sliders whose forces are the states of a law that is asked by its pieces, in their order.
+pub(super) fn springs(law: &SharedLaw) -> Vec<(f64, f64)> {
+    if view(law) != Some(View::Pieces) {
+        return Vec::new();
+    }
+    let slider = |piece: Piece| match piece {
+        Piece::Slider(slider) => Some((slider.stiffness?, slider.limit)),
+        Piece::Stop { .. } => None,
+    };
+    pieces(law).into_iter().filter_map(slider).collect()
+}
+
 /// States that a law has here, and their size.
 pub(super) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
     match view(law)? {
@@ -112,6 +124,17 @@ impl Follower {
             after: RatePoint::new(directions, states),
             lu: Lu::default(),
             change: vec![0.0; states],
+        }
+    }
+
+    /// Gives its sliders the next of these limits, N.
+    pub fn limit(&mut self, limits: &mut impl Iterator<Item = f64>) {
+        for piece in &mut self.pieces {
+            if let (View::Pieces, Piece::Slider(slider)) = (self.view, piece)
+                && let Some(limit) = limits.next()
+            {
+                (slider.limit, slider.static_limit) = (limit, limit);
+            }
         }
     }
 

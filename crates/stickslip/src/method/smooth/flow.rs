@@ -6,7 +6,7 @@
 use super::step::{Eliminated, StageLoads, Step, points};
 use crate::law::{RatePoint, Relative};
 use crate::method::Breakdown;
-use crate::method::assembly::{Assembly, NEAR_REST};
+use crate::method::assembly::Assembly;
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
 use crate::method::stepped::{Instant, Node, SteppedPath, Steps};
@@ -345,16 +345,15 @@ impl Flow for SmoothFlow {
     }
 
     fn set_drive(&mut self, system: &System, omega: f64) {
-        let axes: Vec<usize> = (0..self.assembly.axes.len()).collect();
-        self.drive = Drive::at(system, &axes, omega);
+        self.drive = self.assembly.drive(system, omega);
     }
 
     fn weights(&self) -> Vec<f64> {
-        self.assembly.weights(self.drive.omega, NEAR_REST * self.energy_scale())
+        self.assembly.weights(&self.drive)
     }
 
     fn energy_scale(&self) -> f64 {
-        self.drive.energy_scale(&self.assembly.mass, &self.assembly.stiffness)
+        self.assembly.energy_scale(&self.drive)
     }
 
     fn run(

@@ -51,7 +51,8 @@ pub struct Chosen {
 }
 
 impl Reduce {
-    /// The smallest of the reductions tried whose error is small enough: free modes with residual vectors of one to three orders, and if none of them will do, Craig-Bampton.
+    /// The smallest of the reductions tried whose error is small enough: free modes with residual vectors of one to three orders, and if
+    /// none of them will do, Craig-Bampton.
     ///
     /// # Errors
     /// [`ReductionError::OutOfReach`] with the best error, or whatever keeps modes from being computed.

@@ -1,9 +1,12 @@
 //! How far a reduction is from the whole structure: receptances of the ports at sample frequencies.
 //!
-//! Samples stand in the middle between modes, where anti-resonances are, next to modes, where a shifted frequency shows, and at the end of the range. Modal and
-//! Rayleigh damping are the same function of mass and stiffness before and after the reduction and add no error of their own, so that both are compared
+//! Samples stand in the middle between modes, where anti-resonances are, next to modes, where a shifted frequency shows, and at the end of
+//! the range. Modal and
+//! Rayleigh damping are the same function of mass and stiffness before and after the reduction and add no error of their own, so that both
+//! are compared
 //! without: the whole takes real factors then, a fourth of the memory. With a damping matrix both are compared with it.
-//! The error at a frequency is the norm of the difference relative to the norm, each port scaled by its usual receptance, so that units do not count.
+//! The error at a frequency is the norm of the difference relative to the norm, each port scaled by its usual receptance, so that units do
+//! not count.
 
 use super::{Damping, Reduced, ReductionError, Series, Whole};
 use nalgebra::{Complex, DMatrix};

@@ -1,7 +1,8 @@
 //! Free modes with residual vectors at the ports: Rubin's method, with vectors of higher order if asked for.
 //!
 //! One set of modes and residual vectors makes reductions of any smaller size: a mode that is left out goes back into the residual
-//! vectors, `Xⱼ + φ φᵀF / (λ - σ)ʲ⁺¹`. Coordinates are those of the modes (of unit mass), then of the residual vectors (of unit stiffness, independent of each
+//! vectors, `Xⱼ + φ φᵀF / (λ - σ)ʲ⁺¹`. Coordinates are those of the modes (of unit mass), then of the residual vectors (of unit stiffness,
+//! independent of each
 //! other, without mass between them). MacNeal's method is Rubin's without the mass of the residual vectors; here they keep it.
 //! Of order J the receptance agrees with that of the whole structure at σ in the first 2 J terms of its series, beside the modes.
 //!
@@ -12,7 +13,8 @@ use nalgebra::DMatrix;
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{Matrix, NaturalModes, columns};
 
-/// Residual vectors whose stiffness is below this share of the others', each of unit size, depend on them: ports that see the same motion, and what rounding
+/// Residual vectors whose stiffness is below this share of the others', each of unit size, depend on them: ports that see the same motion,
+/// and what rounding
 /// makes of it.
 const DEPENDENT: f64 = 1e-11;
 
@@ -36,7 +38,8 @@ pub struct Free<'a> {
 }
 
 impl<'a> Free<'a> {
-    /// Of complete modes from the lowest on and residual vectors of orders below `order`, around `shift` (rad²/s²): zero, or anywhere but at an eigenvalue.
+    /// Of complete modes from the lowest on and residual vectors of orders below `order`, around `shift` (rad²/s²): zero, or anywhere but
+    /// at an eigenvalue.
     ///
     /// # Errors
     /// [`ReductionError::Singular`] if the modes lack a free motion, or the shift stays at an eigenvalue.

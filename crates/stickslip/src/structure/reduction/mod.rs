@@ -11,7 +11,8 @@
 //! and harmonic balance, which wants receptances only, may take modes and a series of residuals (`series`). Every reduction can be held against the
 //! whole structure (`evidence`), and [`Reduce`] takes as many modes as a given error asks for.
 //!
-//! Damping is a part of the whole structure and is reduced like the other matrices; [`Damping`] says what a modal damping ratio means beyond the modes that
+//! Damping is a part of the whole structure and is reduced like the other matrices; [`Damping`] says what a modal damping ratio means
+//! beyond the modes that
 //! are kept.
 
 mod choice;
@@ -43,7 +44,8 @@ const SHIFT: f64 = 1e-6;
 /// Damping of the whole structure.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Damping {
-    /// Every mode up to a frequency has the same share of critical damping. What is above, and with it the residual and constraint vectors, is damped in
+    /// Every mode up to a frequency has the same share of critical damping. What is above, and with it the residual and constraint vectors,
+    /// is damped in
     /// proportion to its stiffness, continuously: `2 ratio / up_to`, so that a mode at ω has the ratio `ratio ω / up_to`.
     Ratio {
         /// Share of critical damping, 1.
@@ -163,8 +165,8 @@ pub enum ReductionError {
     SeriesDamping,
     /// No reduction is close enough.
     #[error(
-        "the best of the reductions tried errs by {best:.1e} at {at:.6e} rad/s with {dofs} coordinates, and {tolerance:.1e} was asked for; ask for less, or for a lower \
-         frequency"
+        "the best of the reductions tried errs by {best:.1e} at {at:.6e} rad/s with {dofs} coordinates, and {tolerance:.1e} was \
+         asked for; ask for less, or for a lower frequency"
     )]
     OutOfReach {
         /// The least relative error.

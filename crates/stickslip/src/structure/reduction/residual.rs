@@ -5,7 +5,8 @@
 //! `Σ φ φᵀ F / (λₖ - λ) = Σⱼ (λ - σ)ʲ Xⱼ`, `X₀ = R F`, `Xⱼ₊₁ = R M Xⱼ`, `R = (K - σM)⁻¹` without the modes that are kept.
 //!
 //! `X₀` at σ = 0 is the residual flexibility. A structure that can move freely has no `K⁻¹`: forces are made self-equilibrated by the
-//! inertia of that motion, and as many degrees of freedom are held as it has directions. Holding them takes no force then, so that it may be done by springs of any stiffness.
+//! inertia of that motion, and as many degrees of freedom are held as it has directions. Holding them takes no force then, so that it may
+//! be done by springs of any stiffness.
 //!
 //! Sources: MacNeal (1971), "A hybrid method of component mode synthesis"; Rubin (1975), "Improved component-mode representation for structural
 //! dynamic analysis"; Hansteen and Bell (1979), "On the accuracy of mode superposition analysis in structural dynamics"; Dickens, Nakagawa and
@@ -67,7 +68,8 @@ fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(Factor, f6
     Err(failed.unwrap_or(ReductionError::OutOfRange))
 }
 
-/// Springs that hold every free motion once: at the degree of freedom that moves most, then at that which moves most with the first one held, and so on.
+/// Springs that hold every free motion once: at the degree of freedom that moves most, then at that which moves most with the first one
+/// held, and so on.
 fn supports(whole: &Whole, modes: &NaturalModes) -> Result<Matrix, ReductionError> {
     let n = whole.dofs();
     let (stiffness, mass) = (&whole.stiffness, &whole.mass);

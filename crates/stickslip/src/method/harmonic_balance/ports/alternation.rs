@@ -24,6 +24,9 @@ pub(in super::super) struct Alternation {
     pub(super) velocity: [Vec<f64>; MOST_DIRECTIONS],
     /// Per sample of a port whose kernel tells slip: it moves.
     pub slips: Vec<bool>,
+    /// The derivative of the force by ω in rad/s, [axis][harmonic], of the motion port evaluated last with its derivative: of a law that knows how
+    /// fast a motion is run through. Kept where ω is unknown.
+    pub by_frequency: Option<Vec<Complex64>>,
     /// Internal states at t = 0 of the port evaluated last.
     pub state: Vec<f64>,
     /// `e^{2πji/N}`.
@@ -55,6 +58,7 @@ impl Alternation {
             displacement: three(),
             velocity: three(),
             slips: vec![false; samples],
+            by_frequency: None,
             state: Vec::new(),
             turns: (0..samples).map(|i| Complex64::cis(i as f64 * TAU / samples as f64)).collect(),
             argument: Vec::new(),
@@ -101,6 +105,16 @@ impl Alternation {
         let sums = self.fourier.sums(&mut self.work);
         for (f, &h) in force.iter_mut().zip(&self.harmonics) {
             *f += sums[h] * share(h, n);
+        }
+    }
+
+    /// Adds the harmonics of a signal along an axis to the derivative by ω, if that is kept. The signal is used up.
+    pub(super) fn add_by_frequency(&mut self, axis: usize, signal: &mut [f64]) {
+        let (n, nh) = (self.samples(), self.harmonics.len());
+        let Some(by_frequency) = &mut self.by_frequency else { return };
+        let sums = self.fourier.sums(signal);
+        for (by, &h) in by_frequency[axis * nh..(axis + 1) * nh].iter_mut().zip(&self.harmonics) {
+            *by += sums[h] * share(h, n);
         }
     }
 

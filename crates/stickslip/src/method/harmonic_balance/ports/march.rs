@@ -6,7 +6,7 @@
 //! sticks all the time, `1 - Π` is singular: there states and derivatives stay what they were when the joint was first moved
 //! from its mean position.
 
-use super::alternation::{Alternation, share};
+use super::alternation::{Alternation, ZERO, share};
 use super::memory::Memory;
 use crate::law::MOST_DIRECTIONS;
 use nalgebra::{DMatrix, DVector};
@@ -30,12 +30,17 @@ pub(super) trait March {
     fn axes(&self) -> usize;
     /// Inputs of a step for each axis; they are ordered by kind, then by axis.
     fn inputs(&self) -> usize;
+    /// Whether the last of the derivatives of a step is that by ω, at the same displacements.
+    fn knows_frequency(&self) -> bool {
+        false
+    }
     /// What the inputs along an axis are when its motion is `Re(U e^{jhθ})`, by U, in the step that ends where `e^{jhθ}` is `at`; steps
     /// have the length `angle`.
     fn waves(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4];
     /// The same for the first movement.
     fn first_waves(&self, h: usize) -> [Complex64; 4];
-    /// The step that ends at sample `i`. `rows`: derivatives of the states after it, then of the forces, by inputs and states before.
+    /// The step that ends at sample `i`. `rows`: derivatives of the states after it, then of the forces, by inputs and states before, and by ω if
+    /// it is known.
     /// False if it has no solution.
     fn step(
         &mut self,
@@ -114,7 +119,7 @@ impl Alternation {
     ) -> Option<DVector<f64>> {
         let n = self.samples();
         let (m, d) = (march.states(), march.axes());
-        let size = (m + d) * (march.inputs() * d + m);
+        let size = (m + d) * width(march);
         if let Some(rows) = rows.as_deref_mut() {
             rows.resize(n * size, 0.0);
         }
@@ -144,8 +149,7 @@ impl Alternation {
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let n = self.samples();
         let (m, d) = (march.states(), march.axes());
-        let inputs = march.inputs() * d;
-        let width = inputs + m;
+        let (inputs, width) = (march.inputs() * d, width(march));
         let after = self.period(march, z, Some(&mut memory.rows))?;
         let mut product = DMatrix::<f64>::identity(m, m);
         let mut next = product.clone();
@@ -155,7 +159,7 @@ impl Alternation {
             let rows = &memory.rows[i * (m + d) * width..(i + 1) * (m + d) * width];
             for t in 0..m {
                 for s in 0..m + d {
-                    let row = &rows[s * width + inputs..(s + 1) * width];
+                    let row = &rows[s * width + inputs..s * width + inputs + m];
                     let value: f64 = row.iter().enumerate().map(|(r, x)| x * product[(r, t)]).sum();
                     match s.checked_sub(m) {
                         None => next[(s, t)] = value,
@@ -178,9 +182,7 @@ impl Alternation {
     ) -> bool {
         let (n, nh) = (self.samples(), self.harmonics.len());
         let (m, d) = (march.states(), march.axes());
-        let (kinds, inputs) = (march.inputs(), march.inputs() * d);
-        let width = inputs + m;
-        let (size, angle) = (2 * nh * d, TAU / n as f64);
+        let size = 2 * nh * d;
         let open = DMatrix::identity(m, m) - product;
         let neutral = m > 0 && open.clone().singular_values().min() <= NEUTRAL;
         let inverse = pseudo_inverse(open);
@@ -190,58 +192,22 @@ impl Alternation {
             let rows = self.first_period(march, &mut first);
             memory.first = first;
             match rows {
-                Some(rows) => rows,
+                Some(rows) => Some(rows),
                 None => return false,
             }
         } else {
-            Vec::new()
+            None
         };
-        let zero = Complex64::new(0.0, 0.0);
-        memory.columns.resize(n * d, zero);
+        memory.columns.resize(n * d, ZERO);
         memory.re.resize(n, 0.0);
         memory.im.resize(n, 0.0);
-        let (mut s, mut next) = (vec![zero; m], vec![zero; m]);
         for b in 0..d {
             for k in 0..nh {
                 let h = self.harmonics[k];
-                // by the motion, from states that do not change
-                let mut start = vec![zero; m];
-                if neutral {
-                    let waves = march.first_waves(h);
-                    for (r, start) in start.iter_mut().enumerate() {
-                        *start = (0..kinds).map(|kind| waves[kind] * memory.first[r * width + kind * d + b]).sum();
-                    }
-                    for step in 1..=n {
-                        let i = step % n;
-                        let waves = march.waves(h, angle, self.turns[i * h % n]);
-                        let rows = &beginning[i * (m + d) * width..(i + 1) * (m + d) * width];
-                        advance(&rows[..m * width], (width, kinds, d, b), &waves, &start, &mut next);
-                        std::mem::swap(&mut start, &mut next);
-                    }
-                }
-                s.copy_from_slice(&start);
-                for step in 1..=n {
-                    let i = step % n;
-                    let waves = march.waves(h, angle, self.turns[i * h % n]);
-                    let rows = &memory.rows[i * (m + d) * width..(i + 1) * (m + d) * width];
-                    advance(
-                        &rows[m * width..],
-                        (width, kinds, d, b),
-                        &waves,
-                        &s,
-                        &mut memory.columns[i * d..(i + 1) * d],
-                    );
-                    advance(&rows[..m * width], (width, kinds, d, b), &waves, &s, &mut next);
-                    std::mem::swap(&mut s, &mut next);
-                }
-                // the states at t = 0 follow so that they repeat
-                let shift: Vec<Complex64> =
-                    (0..m).map(|r| (0..m).map(|t| (s[t] - start[t]) * inverse[(r, t)]).sum()).collect();
+                self.follow(march, memory, (beginning.as_deref(), &inverse), Input::Motion { axis: b, harmonic: h });
                 for a in 0..d {
                     for i in 0..n {
-                        let by_state = &memory.by_state[(i * d + a) * m..(i * d + a + 1) * m];
-                        let follow: Complex64 = by_state.iter().zip(&shift).map(|(x, z)| z * x).sum();
-                        let value = memory.columns[i * d + a] + follow;
+                        let value = memory.columns[i * d + a];
                         (memory.re[i], memory.im[i]) = (value.re, -value.im);
                     }
                     for (part, signal) in [&mut memory.re, &mut memory.im].into_iter().enumerate() {
@@ -261,13 +227,70 @@ impl Alternation {
                 }
             }
         }
+        if march.knows_frequency() {
+            self.follow(march, memory, (beginning.as_deref(), &inverse), Input::Frequency);
+            for a in 0..d {
+                for i in 0..n {
+                    memory.re[i] = memory.columns[i * d + a].re;
+                }
+                self.add_by_frequency(a, &mut memory.re);
+            }
+        }
         true
+    }
+
+    /// The derivative of the sampled forces by an input, with states that follow it so that they repeat, into `memory.columns`. `beginning`: the steps
+    /// of the first period, if something is never forgotten.
+    fn follow(
+        &self,
+        march: &dyn March,
+        memory: &mut Memory,
+        (beginning, inverse): (Option<&[f64]>, &DMatrix<f64>),
+        input: Input,
+    ) {
+        let n = self.samples();
+        let (m, d) = (march.states(), march.axes());
+        let (width, angle) = (width(march), TAU / n as f64);
+        let by = |waves: [Complex64; 4]| By { input, waves, width, kinds: march.inputs(), axes: d };
+        let at = |i: usize| match input {
+            Input::Motion { harmonic, .. } => by(march.waves(harmonic, angle, self.turns[i * harmonic % n])),
+            Input::Frequency => by([ZERO; 4]),
+        };
+        let (mut start, mut next) = (vec![ZERO; m], vec![ZERO; m]);
+        if let Some(beginning) = beginning {
+            let first = match input {
+                Input::Motion { harmonic, .. } => by(march.first_waves(harmonic)),
+                Input::Frequency => by([ZERO; 4]),
+            };
+            first.advance(&memory.first[..m * width], &next, &mut start);
+            for step in 1..=n {
+                let i = step % n;
+                let rows = &beginning[i * (m + d) * width..(i + 1) * (m + d) * width];
+                at(i).advance(&rows[..m * width], &start, &mut next);
+                std::mem::swap(&mut start, &mut next);
+            }
+        }
+        // from states that do not change
+        let mut s = start.clone();
+        for step in 1..=n {
+            let i = step % n;
+            let rows = &memory.rows[i * (m + d) * width..(i + 1) * (m + d) * width];
+            let by = at(i);
+            by.advance(&rows[m * width..], &s, &mut memory.columns[i * d..(i + 1) * d]);
+            by.advance(&rows[..m * width], &s, &mut next);
+            std::mem::swap(&mut s, &mut next);
+        }
+        // the states at t = 0 follow so that they repeat
+        let shift: Vec<Complex64> = (0..m).map(|r| (0..m).map(|t| (s[t] - start[t]) * inverse[(r, t)]).sum()).collect();
+        for (column, by_state) in memory.columns.iter_mut().zip(memory.by_state.chunks_exact(m.max(1))) {
+            *column += by_state.iter().zip(&shift).map(|(x, z)| z * x).sum::<Complex64>();
+        }
     }
 
     /// Derivatives of the steps of the first period; those of the first movement into `first`. The forces stay those of the last.
     fn first_period(&mut self, march: &mut dyn March, first: &mut Vec<f64>) -> Option<Vec<f64>> {
         let (m, d) = (march.states(), march.axes());
-        first.resize((m + d) * (march.inputs() * d + m), 0.0);
+        first.resize((m + d) * width(march), 0.0);
         let mut z = DVector::zeros(m);
         let mut force = [0.0; MOST_DIRECTIONS];
         if !march.first(&vec![0.0; m], z.as_mut_slice(), &mut force, Some(first)) {
@@ -281,19 +304,43 @@ impl Alternation {
     }
 }
 
-/// `rows` times inputs and states, into `out`.
-#[inline]
-fn advance(
-    rows: &[f64],
-    (width, kinds, d, b): (usize, usize, usize, usize),
-    waves: &[Complex64; 4],
-    states: &[Complex64],
-    out: &mut [Complex64],
-) {
-    for (row, out) in rows.chunks_exact(width).zip(out) {
-        let moved: Complex64 = (0..kinds).map(|kind| waves[kind] * row[kind * d + b]).sum();
-        let kept: Complex64 = row[kinds * d..].iter().zip(states).map(|(x, z)| z * x).sum();
-        *out = moved + kept;
+/// Derivatives of a step: by its inputs, by the states before it, and by ω if that is known.
+fn width(march: &dyn March) -> usize {
+    march.inputs() * march.axes() + march.states() + usize::from(march.knows_frequency())
+}
+
+/// By what a derivative is taken.
+#[derive(Clone, Copy)]
+enum Input {
+    /// A harmonic of the motion along an axis.
+    Motion { axis: usize, harmonic: usize },
+    /// The frequency ω.
+    Frequency,
+}
+
+/// How an input enters one step.
+struct By {
+    input: Input,
+    waves: [Complex64; 4],
+    width: usize,
+    kinds: usize,
+    axes: usize,
+}
+
+impl By {
+    /// `rows` times the input and states, into `out`.
+    #[inline]
+    fn advance(&self, rows: &[f64], states: &[Complex64], out: &mut [Complex64]) {
+        for (row, out) in rows.chunks_exact(self.width).zip(out) {
+            let moved: Complex64 = match self.input {
+                Input::Motion { axis, .. } => {
+                    (0..self.kinds).map(|kind| self.waves[kind] * row[kind * self.axes + axis]).sum()
+                }
+                Input::Frequency => row[self.width - 1].into(),
+            };
+            let kept: Complex64 = row[self.kinds * self.axes..].iter().zip(states).map(|(x, z)| z * x).sum();
+            *out = moved + kept;
+        }
     }
 }
 

@@ -122,6 +122,17 @@ impl Port {
         }
     }
 
+    /// The law, if the velocity alone decides its bounded force, which is sampled.
+    fn steep(&self) -> Option<&SharedLaw> {
+        match &self.kernel {
+            Kernel::Prox(law) => Some(law),
+            Kernel::Rate(law) if law.rate().is_some_and(|rate| rate.states() == 0) => {
+                self.scale.is_finite().then_some(law)
+            }
+            _ => None,
+        }
+    }
+
     fn prox(&self) -> Option<&dyn Prox> {
         match &self.kernel {
             Kernel::Rigid(rigid) => Some(rigid),
@@ -153,12 +164,7 @@ impl Ports {
         let mut ports = Ports { list: Vec::new(), axes: Vec::new() };
         for (j, joint) in system.joints().iter().enumerate() {
             let law = joint.law();
-            let unsupported = |instead| MethodError::Law {
-                method: super::NAME,
-                joint: joint.name().to_owned(),
-                law: law.name(),
-                instead,
-            };
+            let unsupported = |misses| MethodError::law(super::NAME, joint, misses);
             if law.is_free() {
                 continue;
             }
@@ -166,9 +172,8 @@ impl Ports {
             if axes == 1
                 && let Some(pieces) = law.pieces()
             {
-                let holds_more = |piece: &Piece| matches!(piece, Piece::Slider(s) if s.static_limit > s.limit);
-                if pieces.iter().any(holds_more) {
-                    return Err(unsupported("method `event-driven`: its limit jumps when slip begins"));
+                if pieces.iter().any(Piece::drops) {
+                    return Err(unsupported("its limit jumps when slip begins"));
                 }
                 ports.add_pieces(j, &pieces);
                 continue;
@@ -180,11 +185,13 @@ impl Ports {
             } else if law.rate().is_some() {
                 (Kernel::Rate(law.clone()), 0.0, 0.0)
             } else {
-                return Err(unsupported("a law with one of the views prox, step, rate, or pieces along one direction"));
+                return Err(unsupported(
+                    "it has none of the views prox, step and rate, nor pieces along one direction",
+                ));
             };
             let scale = law.scale();
             if matches!(kernel, Kernel::Prox(_)) && !(scale.is_finite() && scale > 0.0) {
-                return Err(unsupported("a resolvent with a finite scale of forces"));
+                return Err(unsupported("its resolvent has no finite scale of forces"));
             }
             ports.add(j, axes, kernel, (series, scale, least));
         }
@@ -246,9 +253,14 @@ impl Ports {
         self.list.iter().any(Port::is_force)
     }
 
-    /// Whether something holds rigidly.
-    pub fn has_rigid(&self) -> bool {
-        self.list.iter().any(Port::is_rigid)
+    /// Whether the velocity alone decides a bounded force that is sampled: friction that is steep, falls with velocity, or turns in a plane.
+    pub fn has_steep(&self) -> bool {
+        self.list.iter().any(|port| port.steep().is_some())
+    }
+
+    /// Whether such a force falls with velocity.
+    pub fn has_falling(&self) -> bool {
+        self.list.iter().filter_map(Port::steep).any(|law| !law.is_incrementally_passive())
     }
 }
 
@@ -274,6 +286,10 @@ impl Alternation {
         force.fill(ZERO);
         if let Some(tangent) = tangent.as_deref_mut() {
             tangent.fill(0.0);
+            if let Some(by_frequency) = &mut self.by_frequency {
+                by_frequency.clear();
+                by_frequency.resize(c.len(), ZERO);
+            }
         }
         match &port.kernel {
             Kernel::Sliders(parts) => self.slide(parts, &motion, force, tangent),
@@ -290,6 +306,7 @@ impl Alternation {
             Kernel::Rigid(_) | Kernel::Prox(_) => {}
         }
         force.iter_mut().for_each(|f| *f *= share);
+        self.by_frequency.iter_mut().flatten().for_each(|f| *f *= share);
         self.argument = motion;
     }
 

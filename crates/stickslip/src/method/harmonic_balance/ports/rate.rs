@@ -74,6 +74,17 @@ impl Alternation {
             self.add_force(a, &mut force[a * nh..(a + 1) * nh]);
         }
         let Some(tangent) = tangent else { return };
+        if self.by_frequency.is_some() {
+            for a in 0..axes {
+                let mut by = vec![0.0; self.samples()];
+                for b in 0..axes {
+                    let slope = &self.slopes[2 * axes * a + axes + b];
+                    let speeds = slope.iter().zip(&self.velocity[b]);
+                    by.iter_mut().zip(speeds).for_each(|(by, (slope, v))| *by += slope * v / omega);
+                }
+                self.add_by_frequency(a, &mut by);
+            }
+        }
         for a in 0..axes {
             for b in 0..axes {
                 if self.slope_spectrum(2 * axes * a + b, 0) {
@@ -122,6 +133,7 @@ impl Alternation {
             mean: std::array::from_fn(|a| if a < axes { mean(a) } else { 0.0 }),
             points: [RatePoint::new(axes, states), RatePoint::new(axes, states)],
             stage: DVector::zeros(2 * states),
+            frequency: self.by_frequency.is_some(),
         };
         self.march(&mut march, force, tangent);
         (self.displacement, self.velocity) = (displacement, velocity);
@@ -145,6 +157,8 @@ struct RateMarch<'a> {
     mean: [f64; MOST_DIRECTIONS],
     points: [RatePoint; 2],
     stage: DVector<f64>,
+    /// The derivative by ω is wanted.
+    frequency: bool,
 }
 
 impl RateMarch<'_> {
@@ -201,12 +215,20 @@ impl RateMarch<'_> {
         self.rate.linearise(d, &motions[1], after, &mut self.points[1]);
         *force = self.points[1].force;
         let inputs = 4 * d;
-        let width = inputs + m;
-        let points = &self.points;
+        let width = inputs + m + usize::from(self.frequency);
+        let (points, omega) = (&self.points, self.omega);
+        // velocities grow with ω, and the time of a step falls
+        let faster = |slope: &[f64], stage: usize| -> f64 {
+            (0..d).map(|a| slope[d + a] * motions[stage].velocity[a] / omega).sum()
+        };
         // stages by inputs and by the states before
         let right = DMatrix::from_fn(2 * m, width, |row, column| {
             let (i, s) = (row / m, row % m);
             match column.checked_sub(inputs) {
+                Some(t) if t == m => {
+                    let by = |k: usize| faster(points[k].rate_slope(s), k) - points[k].rate[s] / omega;
+                    length * (0..2).map(|k| RADAU[i][k] * by(k)).sum::<f64>()
+                }
                 Some(t) => f64::from(u8::from(s == t)),
                 None => length * RADAU[i][column / (2 * d)] * points[column / (2 * d)].rate_slope(s)[column % (2 * d)],
             }
@@ -219,6 +241,7 @@ impl RateMarch<'_> {
             for a in 0..d {
                 let slope = points[1].force_slope(a);
                 let own = match column.checked_sub(2 * d) {
+                    _ if column == inputs + m => faster(slope, 1),
                     Some(at) if column < inputs => slope[at],
                     _ => 0.0,
                 };
@@ -242,6 +265,9 @@ impl March for RateMarch<'_> {
     }
     fn inputs(&self) -> usize {
         4
+    }
+    fn knows_frequency(&self) -> bool {
+        self.frequency
     }
     fn waves(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4] {
         let turn = Complex64::new(0.0, h as f64 * self.omega);

@@ -141,7 +141,7 @@ fn ports_of(law: &SharedLaw) -> Ports {
 fn refusals_name_the_law_and_what_would_do() {
     let jump = Arc::new(Stribeck { limit: 1.0, static_limit: 1.5, velocity: 0.0 });
     for (law, words) in
-        [(jump as SharedLaw, "`event-driven`"), (Arc::new(Plane::Unknown), "prox, step, rate, or pieces")]
+        [(jump as SharedLaw, "`event-driven`"), (Arc::new(Plane::Unknown), "none of the views prox, step and rate")]
     {
         let d = law.directions();
         let places = (0..d).map(|i| format!("p{i}")).collect();

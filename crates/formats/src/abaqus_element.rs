@@ -1,0 +1,262 @@
+//! Matrices of a linear user element: Abaqus and CalculiX write substructures and element matrices in this way.
+//!
+//! ```text
+//! *USER ELEMENT, NODES=2, LINEAR
+//! ** ELEMENT NODES
+//! ** 7, 9
+//! 1, 2
+//! 2, 1
+//! *MATRIX, TYPE=STIFFNESS
+//! 1.0,
+//! 0.5, 2.0,
+//! 0.0, 0.0, 3.0
+//! ```
+//! The first line of data has the degrees of freedom of the first node; a further one the position of a node from which on others
+//! hold, here the second, with degree of freedom 1. Symmetric matrices are written row by row up to the diagonal, others (`UNSYMM`)
+//! column by column. The numbers of the nodes stand in a comment.
+//! Source: Abaqus Keywords Reference Guide, `*USER ELEMENT`, `*MATRIX`, `*SUBSTRUCTURE MATRIX OUTPUT`.
+
+use std::rc::Rc;
+
+use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
+use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::names::direction;
+use crate::text::{Line, Lines, integer, shown};
+
+pub(crate) const FORMAT: Format = Format {
+    name: "abaqus-element",
+    summary: "`*USER ELEMENT` with `*MATRIX`: substructures and elements of Abaqus (.mtx), substructures of CalculiX",
+    sniff,
+    open,
+};
+
+/// Lines before the first keyword, all of them comments.
+const COMMENTS: usize = 1000;
+
+/// Rows of an element: a matrix of more would have terabytes.
+const ROWS: usize = 1 << 20;
+
+fn sniff(bytes: &[u8]) -> bool {
+    let keyword = Lines::new(bytes)
+        .take(COMMENTS)
+        .find(|line| !line.text.starts_with(b"**") && !line.text.trim_ascii().is_empty());
+    keyword.is_some_and(|line| is_keyword(&line, "*USERELEMENT"))
+}
+
+/// A keyword line without blanks, in capitals.
+fn keyword(line: &Line) -> Option<String> {
+    let starts = line.text.starts_with(b"*") && !line.text.starts_with(b"**");
+    starts.then(|| String::from_utf8_lossy(line.text).to_uppercase().split_whitespace().collect())
+}
+
+fn is_keyword(line: &Line, name: &str) -> bool {
+    keyword(line).is_some_and(|text| text.split(',').next() == Some(name))
+}
+
+/// The value of `NAME=value` on a keyword line.
+fn parameter<'t>(text: &'t str, name: &str) -> Option<&'t str> {
+    text.split(',').find_map(|part| part.strip_prefix(name)?.strip_prefix('='))
+}
+
+/// The fields between commas of a line of data, or of a comment.
+fn fields(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    text.split(|&byte| byte == b',').map(<[u8]>::trim_ascii).filter(|field| !field.is_empty())
+}
+
+/// An element on its way.
+#[derive(Default)]
+struct Element {
+    nodes: usize,
+    general: bool,
+    /// Numbers of the nodes, from the comment.
+    labels: Vec<i64>,
+    /// Position from which on these degrees of freedom hold.
+    dofs: Vec<(usize, Vec<i64>)>,
+}
+
+impl Element {
+    fn new(line: &Line) -> Result<Self, Error> {
+        let text = keyword(line).unwrap_or_default();
+        let nodes = parameter(&text, "NODES").and_then(|count| count.parse().ok()).filter(|&nodes| nodes <= ROWS);
+        let nodes = nodes.ok_or_else(|| line.malformed(&format!("NODES=number up to {ROWS}"), "none"))?;
+        Ok(Self { nodes, general: text.split(',').any(|part| part == "UNSYMM"), ..Self::default() })
+    }
+
+    fn add_dofs(&mut self, line: &Line) -> Result<(), Error> {
+        let mut numbers = fields(line.text).map(|field| line.integer(field)).collect::<Result<Vec<_>, _>>()?;
+        if self.dofs.is_empty() {
+            // The first line begins with the first node.
+            numbers.insert(0, 1);
+        }
+        match numbers.split_first().map(|(&position, dofs)| (usize::try_from(position), dofs)) {
+            Some((Ok(position @ 1..), dofs @ [_, ..])) => self.dofs.push((position, dofs.to_vec())),
+            _ => return Err(line.malformed("the position of a node and its degrees of freedom", &shown(line.text))),
+        }
+        Ok(())
+    }
+
+    /// Node and degree of freedom of every row; nodes by position from one if their numbers are not known.
+    fn rows(&self, line: &Line) -> Result<(Vec<String>, usize), Error> {
+        let mut changes = self.dofs.clone();
+        changes.sort_by_key(|(from, _)| *from);
+        let labels = Some(&self.labels).filter(|labels| labels.len() == self.nodes);
+        let (mut names, mut count) = (Vec::new(), 0);
+        for (at, (from, dofs)) in changes.iter().enumerate() {
+            let end = changes.get(at + 1).map_or(self.nodes + 1, |(next, _)| *next).min(self.nodes + 1);
+            let positions = (*from).min(end)..end;
+            count += positions.len() * dofs.len();
+            if count > ROWS {
+                return Err(line.malformed(&format!("at most {ROWS} rows"), "more"));
+            }
+            let labels = labels.map_or(&[][..], |labels| &labels[positions.start - 1..positions.end - 1]);
+            names.extend(
+                labels.iter().flat_map(|label| dofs.iter().map(move |dof| format!("{label}.{}", direction(*dof)))),
+            );
+        }
+        Ok((names, count))
+    }
+}
+
+/// Where the numbers of a matrix begin, and how they are to be read.
+struct Block<'a> {
+    lines: Lines<'a>,
+    rows: usize,
+    general: bool,
+    names: Rc<Vec<String>>,
+}
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let mut lines = Lines::new(bytes);
+    let mut element: Option<Element> = None;
+    let mut rows: Option<(Rc<Vec<String>>, usize)> = None;
+    let mut items: Vec<Item> = Vec::new();
+    let mut in_matrix = false;
+    while let Some(line) = lines.next() {
+        if line.text.starts_with(b"**") {
+            // Titles of the comment are no numbers, and what stands behind the matrix is no list of nodes.
+            if let Some(element) = element.as_mut().filter(|element| element.dofs.is_empty()) {
+                element.labels.extend(fields(&line.text[2..]).filter_map(integer));
+            }
+        } else if is_keyword(&line, "*USERELEMENT") {
+            (element, rows, in_matrix) = (Some(Element::new(&line)?), None, false);
+        } else if let Some(element) = element.as_ref().filter(|_| is_keyword(&line, "*MATRIX")) {
+            let (names, count) = match &rows {
+                Some(rows) => rows.clone(),
+                None => {
+                    let (names, count) = element.rows(&line)?;
+                    rows.insert((Rc::new(names), count)).clone()
+                }
+            };
+            let block = Block { lines: lines.clone(), rows: count, general: element.general, names };
+            let name = free_name(&line, &items);
+            items.push(Item::new(name, count, count, move || read(&block)));
+            in_matrix = true;
+        } else if keyword(&line).is_some() {
+            (element, in_matrix) = (None, false);
+        } else if let Some(element) = element.as_mut().filter(|_| !in_matrix && !line.text.trim_ascii().is_empty()) {
+            element.add_dofs(&line)?;
+        }
+    }
+    Ok(items)
+}
+
+/// `stiffness`, or `stiffness 2` for the second one of a file.
+fn free_name(line: &Line, items: &[Item]) -> String {
+    let text = keyword(line).unwrap_or_default();
+    let kind = parameter(&text, "TYPE").unwrap_or("matrix").to_lowercase();
+    let taken = |name: &str| items.iter().filter(|item| item.variable.name.split(' ').next() == Some(name)).count();
+    match taken(&kind) {
+        0 => kind,
+        before => format!("{kind} {}", before + 1),
+    }
+}
+
+fn read(block: &Block) -> Result<Matrix, Error> {
+    let Block { rows, general, .. } = *block;
+    let expected = if general { rows * rows } else { rows * (rows + 1) / 2 };
+    let mut triplets = Triplets::new(rows, rows, 0, Place::File)?;
+    let (mut row, mut column, mut count) = (0, 0, 0);
+    let mut lines = block.lines.clone();
+    for line in lines.by_ref() {
+        if line.text.starts_with(b"**") {
+            continue;
+        }
+        if line.text.starts_with(b"*") {
+            break;
+        }
+        for field in fields(line.text) {
+            count += 1;
+            if count > expected {
+                return Err(wrong_count(line.place(), expected, "more"));
+            }
+            triplets.push(row, column, line.real(field)?, line.place())?;
+            if general {
+                row += 1;
+                (row, column) = if row == rows { (0, column + 1) } else { (row, column) };
+            } else {
+                column += 1;
+                (row, column) = if column > row { (row + 1, 0) } else { (row, column) };
+            }
+        }
+    }
+    if count < expected {
+        return Err(wrong_count(lines.place(), expected, &count.to_string()));
+    }
+    let matrix = triplets.finish(if general { Symmetry::General } else { Symmetry::Symmetric })?;
+    if block.names.len() == rows { matrix.with_names(block.names.to_vec()) } else { Ok(matrix) }
+}
+
+fn wrong_count(place: Place, expected: usize, found: &str) -> Error {
+    let problem = format!("{expected} numbers were expected for the rows of this element, {found} are there");
+    Error::new(Kind::Count, place, problem, "export the file again")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{list_bytes, read_bytes};
+
+    const TWO: &str = "**\n*User Element, NODES = 2, LINEAR\n** ELEMENT NODES\n** 7,\n** 9\n1, 2\n2, 1\n\
+        *MATRIX,TYPE=STIFFNESS\n1.0,\n0.5, 2.0,\n0.0,\n 0.25, 3.0\n*MATRIX,TYPE=MASS\n1.,0.,1.,0.,0.,1.\n";
+
+    #[test]
+    fn stiffness_and_mass_with_the_names_of_rows() -> Result<(), Error> {
+        let listed: Vec<_> = list_bytes(TWO.as_bytes(), None)?.iter().map(ToString::to_string).collect();
+        assert_eq!(listed, ["stiffness (3 x 3)", "mass (3 x 3)"]);
+        let stiffness = read_bytes(TWO.as_bytes(), None, Some("stiffness"))?;
+        assert_eq!(stiffness.names(), Some(&["7.x", "7.y", "9.x"].map(String::from)[..]));
+        assert_eq!((stiffness.get(0, 1), stiffness.get(2, 1), stiffness.get(2, 0)), (0.5, 0.25, 0.0));
+        assert!(stiffness.is_symmetric());
+        assert_eq!(read_bytes(TWO.as_bytes(), None, Some("mass"))?.get(2, 2), 1.0);
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_not_symmetric_goes_down_the_columns() -> Result<(), Error> {
+        let text = "*USER ELEMENT,NODES=2,LINEAR,UNSYMM\n1\n*MATRIX,TYPE=STIFFNESS\n1,2,3,4\n";
+        let matrix = read_bytes(text.as_bytes(), None, None)?;
+        assert_eq!((matrix.get(1, 0), matrix.get(0, 1)), (2.0, 3.0));
+        assert_eq!(matrix.names(), None);
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        let check = |text: &str, kind, place| {
+            let found = read_bytes(text.as_bytes(), None, None).map(|_| ()).map_err(|e| (e.kind, e.place));
+            assert_eq!(found, Err((kind, place)), "{text}");
+        };
+        let one = "*USER ELEMENT,NODES=1\n1,2\n*MATRIX,TYPE=MASS\n";
+        check(&format!("{one}1,2\n"), Kind::Count, Place::Line(4));
+        check(&format!("{one}1,2,3,4\n"), Kind::Count, Place::Line(4));
+        check(&format!("{one}1,x,3\n"), Kind::Malformed, Place::Line(4));
+        check("*USER ELEMENT\n1\n", Kind::Malformed, Place::Line(1));
+        check("*USER ELEMENT,NODES=999999999999\n1\n*MATRIX\n1\n", Kind::Malformed, Place::Line(1));
+        check("*USER ELEMENT,NODES=1000000\n1,2\n*MATRIX\n1\n", Kind::Malformed, Place::Line(3));
+        check("*USER ELEMENT,NODES=1\n1\n0,1\n", Kind::Malformed, Place::Line(3));
+        check("*USER ELEMENT,NODES=1\n1\n , ,\n", Kind::Malformed, Place::Line(3));
+        check("*USER ELEMENT,NODES=1\n,\n", Kind::Malformed, Place::Line(2));
+        check("*USER ELEMENT,NODES=1\n1\n", Kind::Choice, Place::File);
+    }
+}

@@ -1,0 +1,141 @@
+//! Abaqus `FORMAT=MATRIX INPUT` and `LABELS`: lines `node, dof, node, dof, value`. CalculiX writes substructures in the same way.
+//!
+//! One triangle or both. Rows are sorted by node, then direction, and have the names `node.direction`. A constrained row has 1e36 on
+//! its diagonal. Numbers of nodes below zero are inner variables of Abaqus.
+//! Source: Abaqus Keywords Reference Guide, `*MATRIX INPUT`, `*MATRIX OUTPUT`; CalculiX manual, `*SUBSTRUCTURE MATRIX OUTPUT`.
+
+use std::collections::HashMap;
+
+use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
+use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::names::direction;
+use crate::text::{Line, Lines, integer, real, shown};
+
+pub(crate) const FORMAT: Format = Format {
+    name: "abaqus-matrix-input",
+    summary: "lines `node, dof, node, dof, value`: Abaqus with FORMAT=MATRIX INPUT (.mtx), CalculiX substructures",
+    sniff,
+    open,
+};
+
+/// A node: its number, or its label.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+enum Node<'a> {
+    Number(i64),
+    Label(&'a [u8]),
+}
+
+/// A row or column: a node and its degree of freedom.
+type Row<'a> = (Node<'a>, i64);
+
+fn fields<'a>(line: &Line<'a>) -> Option<[&'a [u8]; 5]> {
+    let mut fields = [&[][..]; 5];
+    let mut parts = line.text.split(|&byte| byte == b',');
+    for field in &mut fields {
+        *field = parts.next()?.trim_ascii();
+    }
+    // A comma at the end is common.
+    parts.all(|rest| rest.trim_ascii().is_empty()).then_some(fields)
+}
+
+fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
+    Lines::new(bytes).filter(|line| !line.text.starts_with(b"*") && !line.text.trim_ascii().is_empty())
+}
+
+fn sniff(bytes: &[u8]) -> bool {
+    let first = lines(bytes).next().as_ref().and_then(fields);
+    first.is_some_and(|[_, row, _, column, value]| {
+        integer(row).is_some() && integer(column).is_some() && real(value).is_some()
+    })
+}
+
+/// Row, column and value of every line.
+fn entries(bytes: &[u8]) -> impl Iterator<Item = Result<(Row<'_>, Row<'_>, f64, Line<'_>), Error>> {
+    let row = |line: &Line, [node, dof]: [&'_ [u8]; 2]| line.integer(dof).map(|dof| (integer(node), dof));
+    lines(bytes).map(move |line| {
+        let found = fields(&line).ok_or_else(|| line.malformed("`node, dof, node, dof, value`", &shown(line.text)))?;
+        let [row_node, row_dof, column_node, column_dof, value] = found;
+        let node = |text, number: Option<i64>| number.map_or(Node::Label(text), Node::Number);
+        let (row_number, row_dof) = row(&line, [row_node, row_dof])?;
+        let (column_number, column_dof) = row(&line, [column_node, column_dof])?;
+        let row = (node(row_node, row_number), row_dof);
+        Ok((row, (node(column_node, column_number), column_dof), line.real(value)?, line))
+    })
+}
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let mut places: HashMap<Row, usize> = HashMap::new();
+    let mut count = 0;
+    for entry in entries(bytes) {
+        let (row, column, ..) = entry?;
+        places.insert(row, 0);
+        places.insert(column, 0);
+        count += 1;
+    }
+    if count == 0 {
+        let problem = "the file has no entry, lines `node, dof, node, dof, value` were expected".into();
+        return Err(Error::new(Kind::Truncated, Place::File, problem, "export it again"));
+    }
+    let mut rows: Vec<Row> = places.keys().copied().collect();
+    rows.sort_unstable();
+    for (at, row) in rows.iter().enumerate() {
+        places.insert(*row, at);
+    }
+    let size = rows.len();
+    Ok(vec![Item::new("", size, size, move || read(bytes, &rows, &places, count))])
+}
+
+fn read(bytes: &[u8], rows: &[Row], places: &HashMap<Row, usize>, count: usize) -> Result<Matrix, Error> {
+    let mut triplets = Triplets::new(rows.len(), rows.len(), count, Place::File)?;
+    for entry in entries(bytes) {
+        let (row, column, value, line) = entry?;
+        triplets.push(places[&row], places[&column], value, line.place())?;
+    }
+    let name = |(node, dof): &Row| match node {
+        Node::Number(number) => format!("{number}.{}", direction(*dof)),
+        Node::Label(label) => format!("{}.{}", String::from_utf8_lossy(label), direction(*dof)),
+    };
+    triplets.finish(Symmetry::Unsaid)?.with_names(rows.iter().map(name).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read_bytes;
+
+    fn read(text: &str) -> Result<Matrix, Error> {
+        read_bytes(text.as_bytes(), Some("abaqus-matrix-input"), None)
+    }
+
+    #[test]
+    fn rows_are_sorted_by_node_and_named() -> Result<(), Error> {
+        let matrix = read("** a comment\n10,1, 9,2, -1.5\n9,2, 9,2, 3.e0,\n10,1, 10,1, 1.000000000000000e+36\n")?;
+        assert_eq!(matrix.names(), Some(&["9.y".to_string(), "10.x".into()][..]));
+        assert!(matrix.is_symmetric());
+        assert_eq!((matrix.get(0, 0), matrix.get(0, 1), matrix.get(1, 1)), (3.0, -1.5, 1e36));
+        let labels = read("Part-1.7, 3, Part-1.7, 3, 2.0\n-1, 6, -1, 6, 1.0\n")?;
+        assert_eq!(labels.names(), Some(&["-1.rz".to_string(), "Part-1.7.z".into()][..]));
+        Ok(())
+    }
+
+    #[test]
+    fn both_triangles_stay_as_they_are() -> Result<(), Error> {
+        let matrix = read("1,1,2,1,5\n2,1,1,1,6\n")?;
+        assert!(!matrix.is_symmetric());
+        assert_eq!((matrix.get(0, 1), matrix.get(1, 0)), (5.0, 6.0));
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        let check = |text, kind, place| {
+            assert_eq!(read(text).map(|_| ()).map_err(|e| (e.kind, e.place)), Err((kind, place)), "{text}");
+        };
+        check("", Kind::Truncated, Place::File);
+        check("1,1,1,1,1\n1,1,1,1\n", Kind::Malformed, Place::Line(2));
+        check("1,1,1,1,1\n1,1,1,1,1,1\n", Kind::Malformed, Place::Line(2));
+        check("1,x,1,1,1\n", Kind::Malformed, Place::Line(1));
+        check("1,1,1,1,1e999\n", Kind::NotFinite, Place::Line(1));
+    }
+}

@@ -1,0 +1,308 @@
+//! ANSYS `.full`: the assembled matrices of an analysis, in binary records.
+//!
+//! A record is its length in words of 4 bytes, a word of flags, its data, and a word behind it. The file begins with a standard header
+//! of 100 words and, at word 103, the header of the matrices, which points to their first records. A matrix is two records for
+//! every row: the columns, and the values. Constrained rows are in the file and left out here; the others have names `node.direction`.
+//! Source: ANSYS Mechanical APDL Programmer's Reference, chapter 1: the standard header and the full stiffness-mass file (fdfull).
+
+use std::rc::Rc;
+
+use crate::bytes::{Bytes, Order};
+use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
+use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::names::direction;
+
+pub(crate) const FORMAT: Format = Format {
+    name: "ansys-full",
+    summary: "ANSYS (.full), binary: stiffness, mass and damping of a modal analysis",
+    sniff: |bytes| order(bytes).is_some(),
+    open,
+};
+
+/// Words of the standard header, and its item that says which kind of file this is: 4 for `.full`.
+const STANDARD: u32 = 100;
+const FULL: u32 = 4;
+
+/// Word at which the header of the matrices begins.
+const HEADER: usize = 103;
+
+/// Flags of a record.
+const INTEGERS: u32 = 1 << 31;
+const SHORT: u32 = 1 << 30;
+const PACKED: u32 = 0x3f << 24;
+
+/// Items of the header of the matrices, from zero.
+mod item {
+    pub const ORIGIN: usize = 0;
+    pub const EQUATIONS: usize = 1;
+    pub const LUMPED: usize = 10;
+    pub const UNSYMMETRIC: usize = 13;
+    pub const STIFFNESS: usize = 18;
+    pub const CONSTRAINTS: usize = 20;
+    pub const MASS: usize = 26;
+    pub const DAMPING: usize = 28;
+    pub const DOFS: usize = 35;
+    pub const COUNT: usize = 37;
+}
+
+fn order(bytes: &[u8]) -> Option<Order> {
+    [Order::Little, Order::Big].into_iter().find(|&order| {
+        let mut words = Bytes::new(bytes, order);
+        let mut word = || words.u32().ok();
+        (word(), word().is_some(), word()) == (Some(STANDARD), true, Some(FULL))
+    })
+}
+
+/// Moves to a word of the file.
+fn seek(file: &mut Bytes, word: usize) -> Result<(), Error> {
+    file.seek(word.saturating_mul(4))
+}
+
+/// The next record: its flags, and its data.
+fn record<'a>(file: &mut Bytes<'a>) -> Result<(u32, Bytes<'a>), Error> {
+    let place = file.clone();
+    let words = file.u32()? as usize;
+    let flags = file.u32()?;
+    if flags & PACKED != 0 {
+        let problem = format!("the record is compressed (flags {flags:#x}), which is not read");
+        let remedy = "switch compression off by /FCOMP before the solution, or export by HBMAT";
+        return Err(Error::new(Kind::Unsupported, place.place(), problem, remedy));
+    }
+    let data = file.take(words.saturating_mul(4))?;
+    file.skip(4);
+    Ok((flags, Bytes::new(data, file.order)))
+}
+
+/// The next record, of whole numbers.
+fn integers(file: &mut Bytes) -> Result<Vec<i64>, Error> {
+    let place = file.clone();
+    let (flags, mut data) = record(file)?;
+    if flags & INTEGERS == 0 {
+        return Err(place.malformed("a record of whole numbers", format!("one with flags {flags:#x}")));
+    }
+    match flags & SHORT {
+        0 => (0..data.left() / 4).map(|_| data.i32().map(i64::from)).collect(),
+        _ => (0..data.left() / 2).map(|_| data.i16().map(i64::from)).collect(),
+    }
+}
+
+/// The next record, of real numbers.
+fn reals(file: &mut Bytes) -> Result<Vec<f64>, Error> {
+    let place = file.clone();
+    let (flags, mut data) = record(file)?;
+    if flags & INTEGERS != 0 {
+        return Err(place.malformed("a record of real numbers", format!("one with flags {flags:#x}")));
+    }
+    match flags & SHORT {
+        0 => (0..data.left() / 8).map(|_| data.f64()).collect(),
+        _ => (0..data.left() / 4).map(|_| data.f32().map(f64::from)).collect(),
+    }
+}
+
+/// What the matrices of a file have in common.
+struct System<'a> {
+    file: Bytes<'a>,
+    /// Equations in the file, constrained ones among them.
+    equations: usize,
+    /// Equations that are constrained.
+    constrained: Vec<usize>,
+    /// Names of all equations; none if the numbers of degrees of freedom do not match.
+    names: Option<Vec<String>>,
+    lumped: bool,
+}
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let order = order(bytes).unwrap_or(Order::Little);
+    let mut file = Bytes::new(bytes, order);
+    seek(&mut file, HEADER)?;
+    let header = integers(&mut file)?;
+    if header.len() < item::COUNT {
+        return Err(file.malformed(&format!("a header of at least {} items", item::COUNT), header.len()));
+    }
+    let refuse =
+        |problem: &str| Err(Error::new(Kind::Unsupported, file.place(), problem.into(), "export by HBMAT instead"));
+    if header[item::ORIGIN] > 0 {
+        return refuse("the file was assembled by the frontal solver, which is not read");
+    }
+    if header[item::UNSYMMETRIC] != 0 {
+        return refuse("the matrices are unsymmetric, which is not read");
+    }
+    if header[item::CONSTRAINTS] != 0 {
+        return refuse("the file has constraint equations that are not applied to its matrices");
+    }
+    let long = |at: usize| {
+        let value = (header[at] as u32 as u64) | ((header[at + 1] as u32 as u64) << 32);
+        usize::try_from(value).ok().filter(|&value| value > 0)
+    };
+    let equations =
+        usize::try_from(header[item::EQUATIONS]).map_err(|_| file.malformed("a number of equations", "less than 0"))?;
+    let labels = integers(&mut file)?;
+    let nodes = integers(&mut file)?;
+    let (mut constrained, mut names) = (Vec::new(), None);
+    if let Some(at) = long(item::DOFS) {
+        seek(&mut file, at)?;
+        let counts = integers(&mut file)?;
+        let dofs = integers(&mut file)?;
+        if dofs.len() != equations {
+            return Err(file.malformed(&format!("{equations} degrees of freedom"), dofs.len()));
+        }
+        constrained = (0..equations).filter(|&equation| dofs[equation] < 0).collect();
+        names = names_of(&labels, &nodes, &counts, &dofs);
+    }
+    let left = equations - constrained.len();
+    let system = Rc::new(System { file, equations, constrained, names, lumped: header[item::LUMPED] != 0 });
+    let kinds = [("stiffness", item::STIFFNESS), ("mass", item::MASS), ("damping", item::DAMPING)];
+    let items = kinds.into_iter().filter_map(|(name, at)| {
+        let (start, system) = (long(at)?, system.clone());
+        Some(Item::new(name, left, left, move || read(&system, name, start)))
+    });
+    Ok(items.collect())
+}
+
+/// Names of all equations, which are those of the first node, then of the second, and so on.
+fn names_of(labels: &[i64], nodes: &[i64], counts: &[i64], dofs: &[i64]) -> Option<Vec<String>> {
+    // A degree of freedom is stated by its number, or by its place among those of the analysis.
+    let label = |dof: i64| {
+        let place = usize::try_from(dof - 1).ok();
+        if labels.contains(&dof) { Some(dof) } else { labels.get(place?).copied() }
+    };
+    let mut left = dofs.iter();
+    let mut names = Vec::with_capacity(dofs.len());
+    for (node, &count) in nodes.iter().zip(counts) {
+        for _ in 0..count {
+            names.push(format!("{node}.{}", direction(label(left.next()?.checked_abs()?)?)));
+        }
+    }
+    (left.next().is_none()).then_some(names)
+}
+
+fn read(system: &System, name: &str, start: usize) -> Result<Matrix, Error> {
+    let mut file = system.file.clone();
+    seek(&mut file, start)?;
+    let mut triplets = Triplets::new(system.equations, system.equations, 0, Place::File)?;
+    if name == "mass" && system.lumped {
+        let place = file.place();
+        let diagonal = reals(&mut file)?;
+        if diagonal.len() != system.equations {
+            let problem = format!("{} masses for {} equations", diagonal.len(), system.equations);
+            return Err(Error::new(
+                Kind::Count,
+                place,
+                problem,
+                "switch lumped masses off (LUMPM), or export by HBMAT",
+            ));
+        }
+        for (at, value) in diagonal.into_iter().enumerate() {
+            triplets.push(at, at, value, place.clone())?;
+        }
+    } else {
+        for row in 0..system.equations {
+            let place = file.clone();
+            let (columns, values) = (integers(&mut file)?, reals(&mut file)?);
+            if columns.len() != values.len() {
+                let problem = format!("{} columns and {} values in row {}", columns.len(), values.len(), row + 1);
+                return Err(Error::new(Kind::Count, place.place(), problem, "the file is damaged: solve again"));
+            }
+            for (column, value) in columns.into_iter().zip(values) {
+                let column = usize::try_from(column - 1).map_err(|_| place.malformed("a column from 1", column))?;
+                triplets.push(row, column, value, place.place())?;
+            }
+        }
+    }
+    let matrix = triplets.finish(Symmetry::Symmetric)?;
+    let matrix = match &system.names {
+        Some(names) => matrix.with_names(names.clone())?,
+        None => matrix,
+    };
+    matrix.without(&system.constrained)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{list_bytes, read_bytes};
+
+    /// A file written record by record, and where each record began, in words.
+    #[derive(Default)]
+    struct Writer(Vec<u8>);
+
+    impl Writer {
+        fn record(&mut self, flags: u32, data: &[u8]) -> i32 {
+            let start = self.0.len() / 4;
+            self.0.extend((data.len() as u32 / 4).to_le_bytes());
+            self.0.extend(flags.to_le_bytes());
+            self.0.extend(data);
+            self.0.extend([0; 4]);
+            start as i32
+        }
+
+        fn integers(&mut self, values: &[i32]) -> i32 {
+            self.record(INTEGERS, &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>())
+        }
+
+        fn reals(&mut self, values: &[f64]) -> i32 {
+            self.record(0, &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>())
+        }
+    }
+
+    /// Two nodes, 7 and 5, with directions 1 and 6; the first equation is constrained. `change` edits the header.
+    fn file(change: impl Fn(&mut [i32])) -> Vec<u8> {
+        let mut file = Writer::default();
+        let mut standard = [0; 100];
+        standard[0] = 4;
+        file.integers(&standard);
+        file.integers(&[0; 100]);
+        file.integers(&[1, 6]);
+        file.integers(&[7, 5]);
+        let mut header = [0; 100];
+        (header[item::ORIGIN], header[item::EQUATIONS]) = (-4, 4);
+        header[item::STIFFNESS] = file.integers(&[1]);
+        file.reals(&[1.0]);
+        for (columns, values) in [(&[3, 2][..], &[-5.0, 9.0][..]), (&[4, 3], &[0.5, 8.0]), (&[4], &[7.0])] {
+            file.integers(columns);
+            file.reals(values);
+        }
+        header[item::MASS] = file.reals(&[1.0, 2.0, 3.0, 4.0]);
+        header[item::LUMPED] = 1;
+        header[item::DOFS] = file.integers(&[2, 2]);
+        // Stated by place and by number.
+        file.integers(&[-1, 2, 1, 6]);
+        change(&mut header);
+        let at = (HEADER + 2) * 4;
+        for (word, value) in header.iter().enumerate() {
+            file.0[at + 4 * word..at + 4 * word + 4].copy_from_slice(&value.to_le_bytes());
+        }
+        file.0
+    }
+
+    #[test]
+    fn constrained_rows_are_left_out_and_others_named() -> Result<(), Error> {
+        let bytes = file(|_| ());
+        let listed: Vec<_> = list_bytes(&bytes, None)?.iter().map(ToString::to_string).collect();
+        assert_eq!(listed, ["stiffness (3 x 3)", "mass (3 x 3)"]);
+        let stiffness = read_bytes(&bytes, None, Some("stiffness"))?;
+        assert_eq!(stiffness.names(), Some(&["7.rz", "5.x", "5.rz"].map(String::from)[..]));
+        let expected = [(0, 0, 9.0), (1, 0, -5.0), (1, 1, 8.0), (2, 1, 0.5), (2, 2, 7.0)];
+        assert_eq!(stiffness.entries(), Matrix::new(3, 3, Symmetry::Symmetric, expected)?.entries());
+        assert_eq!(read_bytes(&bytes, None, Some("mass"))?.get(2, 2), 4.0);
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_not_read_is_said() {
+        let check = |change: fn(&mut [i32]), kind| {
+            let found = read_bytes(&file(change), None, Some("stiffness")).map(|_| ());
+            assert_eq!(found.map_err(|e| e.kind), Err(kind));
+        };
+        check(|header| header[item::ORIGIN] = 4, Kind::Unsupported);
+        check(|header| header[item::UNSYMMETRIC] = 1, Kind::Unsupported);
+        check(|header| header[item::CONSTRAINTS] = 1, Kind::Unsupported);
+        check(|header| header[item::STIFFNESS + 1] = 1, Kind::Truncated);
+        check(|header| header[item::EQUATIONS] = 5, Kind::Malformed);
+        check(|header| header[item::EQUATIONS] = -5, Kind::Malformed);
+        let mut packed = file(|_| ());
+        packed[HEADER * 4 + 7] = 0xa0;
+        assert_eq!(read_bytes(&packed, None, None).map_err(|e| e.kind), Err(Kind::Unsupported));
+    }
+}

@@ -1,0 +1,175 @@
+//! Binary files: a cursor that never reads beyond the end, in either order of bytes.
+
+use crate::error::{Error, Kind, Place};
+
+/// Order of the bytes of a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Order {
+    Little,
+    Big,
+}
+
+/// A cursor over bytes.
+#[derive(Clone)]
+pub(crate) struct Bytes<'a> {
+    all: &'a [u8],
+    at: usize,
+    pub order: Order,
+}
+
+macro_rules! number {
+    ($($name:ident: $type:ty),*) => {$(
+        pub fn $name(&mut self) -> Result<$type, Error> {
+            let mut bytes = [0; size_of::<$type>()];
+            bytes.copy_from_slice(self.take(size_of::<$type>())?);
+            Ok(match self.order {
+                Order::Little => <$type>::from_le_bytes(bytes),
+                Order::Big => <$type>::from_be_bytes(bytes),
+            })
+        }
+    )*};
+}
+
+impl<'a> Bytes<'a> {
+    pub fn new(all: &'a [u8], order: Order) -> Self {
+        Self { all, at: 0, order }
+    }
+
+    number! { i8: i8, u8: u8, i16: i16, u16: u16, i32: i32, u32: u32, i64: i64, u64: u64, f32: f32, f64: f64 }
+
+    pub fn take(&mut self, count: usize) -> Result<&'a [u8], Error> {
+        let end = self.at.checked_add(count).filter(|&end| end <= self.all.len());
+        let end = end.ok_or_else(|| {
+            Error::new(
+                Kind::Truncated,
+                self.place(),
+                format!("{count} bytes were expected, the file ends after {}", self.left()),
+                "it is not complete: export or copy it again",
+            )
+        })?;
+        let taken = &self.all[self.at..end];
+        self.at = end;
+        Ok(taken)
+    }
+
+    /// Steps over bytes, to the end at most.
+    pub fn skip(&mut self, count: usize) {
+        self.at = self.at.saturating_add(count).min(self.all.len());
+    }
+
+    /// A cursor so many bytes ahead, at the end at most.
+    pub fn ahead(&self, count: usize) -> Self {
+        let mut ahead = self.clone();
+        ahead.skip(count);
+        ahead
+    }
+
+    /// Moves to a byte, from zero.
+    pub fn seek(&mut self, at: usize) -> Result<(), Error> {
+        self.at = 0;
+        self.take(at).map(|_| ())
+    }
+
+    pub fn left(&self) -> usize {
+        self.all.len() - self.at
+    }
+
+    pub fn place(&self) -> Place {
+        Place::Byte(self.at)
+    }
+
+    pub fn malformed(&self, expected: &str, found: impl std::fmt::Display) -> Error {
+        Error::new(
+            Kind::Malformed,
+            self.place(),
+            format!("{expected} was expected, {found} is there"),
+            "the file is damaged or of another format: export it again, or state its format",
+        )
+    }
+}
+
+/// Kinds of numbers in binary files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Number {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+impl Number {
+    pub fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+
+    /// The next number, as a real one: exact up to 2^53.
+    pub fn real(self, bytes: &mut Bytes) -> Result<f64, Error> {
+        Ok(match self {
+            Self::I8 => bytes.i8()?.into(),
+            Self::U8 => bytes.u8()?.into(),
+            Self::I16 => bytes.i16()?.into(),
+            Self::U16 => bytes.u16()?.into(),
+            Self::I32 => bytes.i32()?.into(),
+            Self::U32 => bytes.u32()?.into(),
+            Self::I64 => bytes.i64()? as f64,
+            Self::U64 => bytes.u64()? as f64,
+            Self::F32 => bytes.f32()?.into(),
+            Self::F64 => bytes.f64()?,
+        })
+    }
+
+    /// The next number, as an index or count from zero.
+    pub fn index(self, bytes: &mut Bytes) -> Result<usize, Error> {
+        let before = bytes.clone();
+        let value = match self {
+            Self::I8 => bytes.i8()?.into(),
+            Self::U8 => bytes.u8()?.into(),
+            Self::I16 => bytes.i16()?.into(),
+            Self::U16 => bytes.u16()?.into(),
+            Self::I32 => bytes.i32()?.into(),
+            Self::U32 => bytes.u32()?.into(),
+            Self::I64 => bytes.i64()?,
+            Self::U64 => i64::try_from(bytes.u64()?).unwrap_or(-1),
+            Self::F32 | Self::F64 => -1,
+        };
+        usize::try_from(value).map_err(|_| before.malformed("an index from zero", value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cursor_reads_both_orders_and_stops_at_the_end() -> Result<(), Error> {
+        let bytes = [0, 0, 1, 0, 7];
+        assert_eq!(Bytes::new(&bytes, Order::Big).u32()?, 256);
+        let mut cursor = Bytes::new(&bytes, Order::Little);
+        assert_eq!(cursor.u32()?, 65536);
+        assert_eq!(cursor.u16().map_err(|e| (e.kind, e.place)), Err((Kind::Truncated, Place::Byte(4))));
+        assert_eq!(cursor.u8()?, 7);
+        assert_eq!(cursor.take(usize::MAX).map_err(|e| e.kind), Err(Kind::Truncated));
+        assert_eq!(cursor.seek(6).map_err(|e| e.kind), Err(Kind::Truncated));
+        cursor.seek(4)?;
+        assert_eq!(cursor.left(), 1);
+        Ok(())
+    }
+
+    #[test]
+    fn a_negative_index_is_refused_where_it_stands() {
+        let bytes = [255; 8];
+        let found = Number::I64.index(&mut Bytes::new(&bytes, Order::Little));
+        assert_eq!(found.map_err(|e| e.place), Err(Place::Byte(0)));
+    }
+}

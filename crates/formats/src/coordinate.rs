@@ -1,0 +1,87 @@
+//! Lines of `row column value`, counted from one, without a header: CalculiX (`.sti`, `.mas`) and Abaqus (`FORMAT=COORDINATE`).
+//!
+//! CalculiX writes the upper triangle, Abaqus both. One triangle alone stands for a symmetric matrix, and so does a diagonal.
+//! The size is the largest row or column there is.
+//! Source: CalculiX CrunchiX manual, `*FREQUENCY, SOLVER=MATRIXSTORAGE`; Abaqus Analysis User's Guide, Generating matrices.
+
+use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
+use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::text::{Line, Lines, integer, real};
+
+pub(crate) const FORMAT: Format = Format {
+    name: "coordinate",
+    summary: "lines `row column value`: CalculiX (.sti, .mas), Abaqus with FORMAT=COORDINATE (.mtx)",
+    sniff,
+    open,
+};
+
+fn sniff(bytes: &[u8]) -> bool {
+    let first = Lines::new(bytes).find(|line| !line.text.trim_ascii().is_empty());
+    first.and_then(|line| line.exactly::<3>("").ok()).is_some_and(|[row, column, value]| {
+        [row, column].iter().all(|field| integer(field).is_some_and(|index| index > 0)) && real(value).is_some()
+    })
+}
+
+/// Row, column, value of every line.
+fn entries(bytes: &[u8]) -> impl Iterator<Item = Result<(usize, usize, f64, Line<'_>), Error>> {
+    Lines::new(bytes).filter(|line| !line.text.trim_ascii().is_empty()).map(|line| {
+        let [row, column, value] = line.exactly("row, column and value")?;
+        Ok((line.index(row)?, line.index(column)?, line.real(value)?, line))
+    })
+}
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let (mut size, mut count) = (0, 0);
+    for entry in entries(bytes) {
+        let (row, column, ..) = entry?;
+        size = size.max(row + 1).max(column + 1);
+        count += 1;
+    }
+    if count == 0 {
+        let problem = "the file has no entry, lines `row column value` were expected".into();
+        return Err(Error::new(Kind::Truncated, Place::File, problem, "export it again"));
+    }
+    Ok(vec![Item::new("", size, size, move || read(bytes, size, count))])
+}
+
+fn read(bytes: &[u8], size: usize, count: usize) -> Result<Matrix, Error> {
+    let mut triplets = Triplets::new(size, size, count, Place::File)?;
+    for entry in entries(bytes) {
+        let (row, column, value, line) = entry?;
+        triplets.push(row, column, value, line.place())?;
+    }
+    triplets.finish(Symmetry::Unsaid)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read_bytes;
+
+    #[test]
+    fn a_triangle_is_symmetric_and_so_are_both_if_they_are_equal() -> Result<(), Error> {
+        let upper = read_bytes(b"1 1  2.0e+00\n1 2 -1.0e+00\n2 2  0.0\n3 3 1\n", None, None)?;
+        assert!(upper.is_symmetric());
+        assert_eq!((upper.rows(), upper.get(1, 0), upper.origin().zeros), (3, -1.0, 1));
+        let both = read_bytes(b"1 1 2\n1 2 -1\n2 1 -1\n", None, None)?;
+        assert_eq!(both.entries(), &upper.entries()[..2]);
+        assert!(!read_bytes(b"1 1 2\n1 2 -1\n2 1 -2\n", None, None)?.is_symmetric());
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        let check = |text: &str, kind, place| {
+            let error =
+                read_bytes(text.as_bytes(), Some("coordinate"), None).map(|_| ()).map_err(|e| (e.kind, e.place));
+            assert_eq!(error, Err((kind, place)), "{text}");
+        };
+        check("", Kind::Truncated, Place::File);
+        check("1 1 1\n2 2\n", Kind::Malformed, Place::Line(2));
+        check("1 1 1\n2 x 1\n", Kind::Malformed, Place::Line(2));
+        check("1 1 inf\n", Kind::NotFinite, Place::Line(1));
+        check("1 4000000000 1\n", Kind::TooLarge, Place::File);
+        check("1 1 1\n\n0 1 1\n", Kind::Malformed, Place::Line(3));
+    }
+}

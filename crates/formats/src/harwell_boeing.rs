@@ -1,0 +1,230 @@
+//! Harwell-Boeing: a header of four or five lines, then pointers, rows and values in fixed Fortran formats. ANSYS writes it by `HBMAT`.
+//!
+//! ```text
+//! title                                                                   key
+//!              5             1             1             2             1
+//! RSA                        3             3             4             0
+//! (8I10)          (8I10)          (4E20.12)           (4E20.12)
+//! ```
+//! Columns are compressed, and a symmetric matrix (`RSA`) has its lower triangle. Fields may touch, so their widths come from the formats.
+//! Source: Duff, Grimes, Lewis, Users' Guide for the Harwell-Boeing Sparse Matrix Collection, TR/PA/92/86 (1992); ANSYS Mechanical APDL
+//! Command Reference, HBMAT.
+
+use crate::error::{Error, Place};
+use crate::format::{COMPLEX, Format, Item};
+use crate::matrix::{Matrix, Symmetry, Triplets, compressed};
+use crate::text::{Line, Lines, shown};
+
+pub(crate) const FORMAT: Format = Format {
+    name: "harwell-boeing",
+    summary: "Harwell-Boeing, as text: ANSYS HBMAT (.matrix), `scipy.io.hb_write`",
+    sniff,
+    open,
+};
+
+fn sniff(bytes: &[u8]) -> bool {
+    let mut lines = Lines::new(bytes);
+    let (Some(_), Some(cards), Some(kind), Some(formats)) = (lines.next(), lines.next(), lines.next(), lines.next())
+    else {
+        return false;
+    };
+    cards.words().next().is_some_and(|word| crate::text::integer(word).is_some())
+        && kind.words().next().is_some_and(|word| type_of(word).is_some())
+        && formats.text.trim_ascii_start().starts_with(b"(")
+}
+
+/// The three letters of a type: of the values, of the symmetry, of the assembly.
+fn type_of(word: &[u8]) -> Option<[u8; 3]> {
+    let [values, symmetry, assembly] = *word.to_ascii_uppercase().first_chunk()?;
+    let known = b"RCPI".contains(&values) && b"SUHZR".contains(&symmetry) && b"AE".contains(&assembly);
+    (known && word.len() == 3).then_some([values, symmetry, assembly])
+}
+
+/// Fields of a line: so many, so wide each.
+#[derive(Clone, Copy)]
+struct Fixed {
+    count: usize,
+    width: usize,
+}
+
+/// Wider lines than any Fortran writes.
+const WIDEST: usize = 10_000;
+
+impl Fixed {
+    /// Of `(8I10)`, `(1P,4E20.12)`, `(4D25.16E3)`.
+    fn new(text: &str) -> Option<Self> {
+        let inner: String = text.strip_prefix('(')?.strip_suffix(')')?.to_uppercase().split_whitespace().collect();
+        // A scale factor changes how many digits stand before the point, not the value, as there is an exponent.
+        let inner = inner.split_once('P').map_or(inner.as_str(), |(_, rest)| rest.trim_start_matches(','));
+        let letter = inner.find(['I', 'E', 'D', 'F', 'G'])?;
+        let count = if letter == 0 { 1 } else { inner[..letter].parse().ok()? };
+        let width = inner[letter + 1..].trim_start_matches(['S', 'N', 'X']);
+        let width = width.split('.').next()?.parse().ok()?;
+        (count > 0 && width > 0 && count <= WIDEST && width <= WIDEST).then_some(Self { count, width })
+    }
+
+    /// Reads `count` fields from as many lines as they take.
+    fn read<'a, T>(
+        self,
+        lines: &mut Lines<'a>,
+        count: usize,
+        what: &str,
+        mut read: impl FnMut(&Line<'a>, &'a [u8]) -> Result<T, Error>,
+    ) -> Result<Vec<T>, Error> {
+        // A field has a digit and something that parts it from the next one, or a line its end.
+        let mut found = Vec::with_capacity(count.min(lines.left() / 2 + 1));
+        while found.len() < count {
+            let line = lines.expect(what)?;
+            for at in 0..self.count.min(count - found.len()) {
+                let field = line.columns(at * self.width, (at + 1) * self.width);
+                if field.is_empty() {
+                    return Err(line.malformed(what, "less"));
+                }
+                found.push(read(&line, field)?);
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// The header, with the lines behind it.
+struct Header<'a> {
+    rows: usize,
+    columns: usize,
+    entries: usize,
+    kind: [u8; 3],
+    pointers: Fixed,
+    indices: Fixed,
+    values: Fixed,
+    lines: Lines<'a>,
+}
+
+fn header(bytes: &[u8]) -> Result<Header<'_>, Error> {
+    let mut lines = Lines::new(bytes);
+    lines.expect("a title")?;
+    let cards = lines.expect("the numbers of lines")?;
+    // The last one, lines of right-hand sides, may be missing.
+    let right_sides = cards.words().nth(4).map_or(Ok(0), |word| cards.count(word))?;
+    let sizes = lines.expect("type and size")?;
+    let words: Vec<_> = sizes.words().collect();
+    let [kind, rows, columns, entries, ..] = words[..] else {
+        return Err(sizes.malformed("type, rows, columns and number of entries", &shown(sizes.text)));
+    };
+    let kind = type_of(kind).ok_or_else(|| sizes.malformed("a type such as RSA", &shown(kind)))?;
+    let (rows, columns, entries) = (sizes.count(rows)?, sizes.count(columns)?, sizes.count(entries)?);
+    let line = lines.expect("the formats")?;
+    let text = String::from_utf8_lossy(line.text).into_owned();
+    let mut formats = text.split_inclusive(')').map(str::trim);
+    let mut format = |what: &str| {
+        let found = formats.next().unwrap_or_default();
+        Fixed::new(found).ok_or_else(|| line.malformed(&format!("the format of {what}"), &shown(found.as_bytes())))
+    };
+    let (pointers, indices) = (format("pointers")?, format("rows")?);
+    let values = if kind[0] == b'P' { indices } else { format("values")? };
+    if right_sides > 0 {
+        lines.expect("the line of right-hand sides")?;
+    }
+    Ok(Header { rows, columns, entries, kind, pointers, indices, values, lines })
+}
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let header = header(bytes)?;
+    Ok(vec![match header.kind {
+        [b'C', ..] => Item::other("", COMPLEX),
+        [_, _, b'E'] => Item::other("", "a matrix of elements that are not assembled"),
+        _ => Item::new("", header.rows, header.columns, move || read(bytes)),
+    }])
+}
+
+fn read(bytes: &[u8]) -> Result<Matrix, Error> {
+    let Header { rows, columns, entries, kind, pointers, indices, values, mut lines } = header(bytes)?;
+    let count = columns.saturating_add(1);
+    let pointers = pointers.read(&mut lines, count, "a pointer of every column", |line, field| line.index(field))?;
+    let indices = indices.read(&mut lines, entries, "a row of every entry", |line, field| line.index(field))?;
+    let values = match kind[0] {
+        b'P' => vec![1.0; indices.len()],
+        _ => values.read(&mut lines, entries, "a value of every entry", |line, field| line.real(field))?,
+    };
+    let symmetry = match kind[1] {
+        // What is real and Hermitian is symmetric.
+        b'S' | b'H' => Symmetry::Symmetric,
+        b'Z' => Symmetry::Skew,
+        _ => Symmetry::General,
+    };
+    let mut triplets = Triplets::new(rows, columns, indices.len(), Place::File)?;
+    compressed(&pointers, &indices, &values, columns, |column, row, value| {
+        triplets.push(row, column, value, Place::File)
+    })?;
+    triplets.finish(symmetry)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Kind;
+    use crate::read_bytes;
+
+    fn file(kind: &str, formats: &str, body: &str) -> String {
+        let rest = "             5             1             1             2             1";
+        format!(
+            "{:72}{:8}\n{rest}\n{kind}             3             3             4             0\n{formats}\n{body}",
+            "blade", "K"
+        )
+    }
+
+    const FORMATS: &str = "(8I3)           (8I3)           (1P,2D19.12)        (4E20.12)";
+    const BODY: &str = "F              1             0\n  1  3  4  5\n  1  3  2  3\n\
+        -1.000000000000D+03-5.000000000000D+02\n 2.000000000000D+00 3.000000000000-101\n";
+
+    #[test]
+    fn touching_fields_of_a_symmetric_matrix() -> Result<(), Error> {
+        let matrix = read_bytes(file("RSA", FORMATS, BODY).as_bytes(), None, None)?;
+        assert!(matrix.is_symmetric());
+        assert_eq!((matrix.get(0, 0), matrix.get(0, 2), matrix.get(1, 1), matrix.get(2, 2)), (-1e3, -5e2, 2.0, 3e-101));
+        let general = read_bytes(file("RUA", FORMATS, BODY).as_bytes(), None, None)?;
+        assert_eq!((general.get(2, 0), general.get(0, 2)), (-5e2, 0.0));
+        Ok(())
+    }
+
+    #[test]
+    fn a_symmetric_matrix_with_both_triangles() -> Result<(), Error> {
+        // ANSYS 9 wrote full matrices of superelements as RSA.
+        let body = "F\n  1  3  5  5\n  1  2  1  2\n 1.0D0               2.0D0\n 2.0D0               3.0D0\n";
+        let matrix = read_bytes(file("RSA", FORMATS, body).as_bytes(), None, None)?;
+        assert_eq!((matrix.is_symmetric(), matrix.get(0, 1), matrix.entries().len()), (true, 2.0, 3));
+        Ok(())
+    }
+
+    #[test]
+    fn formats_of_fortran() {
+        let check = |text, expected: Option<(usize, usize)>| {
+            assert_eq!(Fixed::new(text).map(|fixed| (fixed.count, fixed.width)), expected, "{text}");
+        };
+        check("(8I10)", Some((8, 10)));
+        check("(1P,4E20.12)", Some((4, 20)));
+        check("(1p4d25.16e3)", Some((4, 25)));
+        check("(I14)", Some((1, 14)));
+        check("( 3 F 12.4 )", Some((3, 12)));
+        for wrong in ["(8A10)", "8I10", "(8I)", "(0I4)", "(4I0)", "(99999999999I4)", "()", "(é)"] {
+            check(wrong, None);
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        let check = |kind: &str, formats: &str, body: &str, fault, place| {
+            let text = file(kind, formats, body);
+            let found = read_bytes(text.as_bytes(), Some("harwell-boeing"), None).map(|_| ());
+            assert_eq!(found.map_err(|e| (e.kind, e.place)), Err((fault, place)), "{text}");
+        };
+        check("RSA", FORMATS, "F\n  1  3  4  5\n  1  3  2  3\n", Kind::Truncated, Place::Line(8));
+        check("RSA", FORMATS, "F\n  1  3  4\n", Kind::Malformed, Place::Line(6));
+        check("RSA", FORMATS, &BODY.replace("1  3  2  3", "1  3  2  9"), Kind::Count, Place::File);
+        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "1  3  2  5"), Kind::Count, Place::File);
+        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "0  3  4  5"), Kind::Malformed, Place::Line(6));
+        check("RSA", "(8I3)           (8I3)           (2A20.12)", BODY, Kind::Malformed, Place::Line(4));
+        check("CSA", FORMATS, BODY, Kind::Complex, Place::File);
+        check("RSE", FORMATS, BODY, Kind::Unsupported, Place::File);
+        check("XYZ", FORMATS, BODY, Kind::Malformed, Place::Line(3));
+    }
+}

@@ -1,0 +1,243 @@
+//! MATLAB `.mat` of version 7.3, which is HDF5, and plain HDF5 of h5py: full matrices as datasets, sparse ones as groups.
+//!
+//! MATLAB stores columns first, so that HDF5 sees its matrices transposed; what has the attribute `MATLAB_class` is turned back.
+//! A sparse matrix is a group with the parts `data`, `ir`, `jc` and the number of its rows as attribute `MATLAB_sparse`.
+//! Source: HDF5 File Format Specification 3.0 (by the crate `hdf5-pure`); MathWorks documentation of `save`, `-v7.3`.
+
+use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::rc::Rc;
+
+use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
+
+use crate::error::{Error, Kind, Place};
+use crate::format::{COMPLEX, Format, Item};
+use crate::inflate::Limit;
+use crate::matrix::{Along, Symmetry, Triplets, compressed, dense};
+
+pub(crate) const FORMAT: Format = Format {
+    name: "hdf5",
+    summary: "MATLAB (.mat) of version 7.3, `save -v7.3`, and datasets of h5py (.h5)",
+    // The superblock stands at the beginning or, behind a block of the user such as MATLAB's, at 512, 1024, 2048.
+    sniff: |bytes| [0, 512, 1024, 2048].iter().any(|&at| bytes.get(at..).is_some_and(|rest| rest.starts_with(MAGIC))),
+    open,
+};
+
+const MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
+
+/// Groups within groups that are followed.
+const DEPTH: usize = 8;
+
+/// Numbers that any dataset may have, stored or not, and any chunk: those of h5py have at most this many.
+const FEW: u64 = 1 << 17;
+
+/// Bytes that deflate can pack into one.
+const DEFLATE: u64 = 1032;
+
+/// Members of a file that are listed.
+const MEMBERS: usize = 10_000;
+
+/// Groups that are looked into: links may go in circles.
+const GROUPS: usize = 1000;
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let file = guarded(Place::File, || File::from_bytes(bytes.to_vec()))?;
+    let mut items = Vec::new();
+    let root = Rc::new(file.root());
+    Walk { limit: Limit::of(bytes.len()), groups: 0, items: &mut items }.through(&root, "", DEPTH)?;
+    Ok(items)
+}
+
+/// What the crate `hdf5-pure` answers. It adds up numbers of damaged files without a check (0.47, positions of chunks), and may panic.
+fn guarded<T>(place: Place, ask: impl FnOnce() -> Result<T, hdf5_pure::Error>) -> Result<T, Error> {
+    // What it was working on is dropped with the error: nobody sees a half-made state.
+    let answer = catch_unwind(AssertUnwindSafe(ask));
+    let problem = match answer {
+        Ok(Ok(answer)) => return Ok(answer),
+        Ok(Err(error)) => error.to_string(),
+        Err(_) => "its numbers contradict each other".into(),
+    };
+    let problem = format!("the HDF5 file cannot be read: {problem}");
+    let remedy = "save or copy it again, in MATLAB without -v7.3 if that does not help";
+    Err(Error::new(Kind::Malformed, place, problem, remedy))
+}
+
+/// A walk through the groups of a file.
+struct Walk<'w, 'a> {
+    limit: Limit,
+    /// Groups looked into so far.
+    groups: usize,
+    items: &'w mut Vec<Item<'a>>,
+}
+
+impl Walk<'_, '_> {
+    /// Adds what a group and the groups in it hold.
+    fn through(&mut self, group: &Rc<Group>, path: &str, depth: usize) -> Result<(), Error> {
+        self.groups += 1;
+        let here = || Place::Variable(path.to_string());
+        // MATLAB keeps the parts of cells and objects in groups of its own, `#refs#` and `#subsystem#`.
+        let own = |name: &String| !name.starts_with('#');
+        let full = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
+        for name in guarded(here(), || group.datasets())?.into_iter().filter(own) {
+            if self.items.len() >= MEMBERS || self.groups >= GROUPS {
+                return Ok(());
+            }
+            let dataset = guarded(Place::Variable(full(&name)), || group.dataset(&name))?;
+            self.items.push(dense_item(dataset, full(&name), self.limit)?);
+        }
+        for name in guarded(here(), || group.groups())?.into_iter().filter(own) {
+            if self.items.len() >= MEMBERS || self.groups >= GROUPS {
+                return Ok(());
+            }
+            let place = || Place::Variable(full(&name));
+            let inner = Rc::new(guarded(place(), || group.group(&name))?);
+            let attributes = guarded(place(), || inner.attrs())?;
+            if attributes.contains_key("OCTAVE_NEW_FORMAT") {
+                // Its matrices are transposed, and nothing at them says so.
+                self.items.push(Item::other(full(&name), "in the form of Octave's `save -hdf5` (`save -v7` is read)"));
+            } else if let Some(rows) = attributes.get("MATLAB_sparse") {
+                let rows = whole(rows).ok_or_else(|| {
+                    let problem = "the attribute MATLAB_sparse is no number of rows".into();
+                    Error::new(Kind::Malformed, place(), problem, "save the file again")
+                })?;
+                self.items.push(sparse_item(inner, full(&name), rows, self.limit)?);
+            } else if depth > 0 {
+                self.through(&inner, &full(&name), depth - 1)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A count in an attribute.
+fn whole(value: &AttrValue) -> Option<usize> {
+    match value {
+        AttrValue::U64(value) => usize::try_from(*value).ok(),
+        AttrValue::I64(value) => usize::try_from(*value).ok(),
+        AttrValue::U64Array(values) => usize::try_from(*values.first()?).ok(),
+        AttrValue::I64Array(values) => usize::try_from(*values.first()?).ok(),
+        AttrValue::U32(value) => usize::try_from(*value).ok(),
+        AttrValue::I32(value) => usize::try_from(*value).ok(),
+        _ => None,
+    }
+}
+
+fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'static>, Error> {
+    let place = Place::Variable(name.clone());
+    let note = match guarded(place.clone(), || dataset.dtype())? {
+        DType::Compound(fields) if fields.iter().any(|(field, _)| field == "imag" || field == "i") => Some(COMPLEX),
+        DType::F32 | DType::F64 => None,
+        DType::I8 | DType::I16 | DType::I32 | DType::I64 | DType::U8 | DType::U16 | DType::U32 | DType::U64 => None,
+        DType::String | DType::VariableLengthString => Some("text"),
+        DType::ObjectReference => Some("a cell array or an object"),
+        _ => Some("of a type that is no number"),
+    };
+    let attributes = guarded(place.clone(), || dataset.attrs())?;
+    let note = note.or_else(|| of_matlab(&attributes));
+    if let Some(note) = note {
+        return Ok(Item::other(name, note));
+    }
+    let matlab = attributes.contains_key("MATLAB_class");
+    let shape = sizes(&dataset, &place)?;
+    let (rows, columns) = match shape[..] {
+        [] => (1, 1),
+        [rows] => (rows, 1),
+        [columns, rows] if matlab => (rows, columns),
+        [rows, columns] => (rows, columns),
+        _ => return Ok(Item::other(name, format!("an array of {} dimensions", shape.len()))),
+    };
+    Ok(Item::new(name.clone(), rows, columns, move || {
+        let values = numbers(&dataset, limit, &name, Dataset::read_f64)?;
+        if rows.checked_mul(columns) != Some(values.len()) {
+            let problem = format!("{} numbers for {rows} x {columns}", values.len());
+            return Err(Error::new(Kind::Count, Place::Variable(name.clone()), problem, "save the file again"));
+        }
+        let along = if matlab { Along::Columns } else { Along::Rows };
+        dense((rows, columns), along, &Place::Variable(name.clone()), |at| Ok(values[at]))
+    }))
+}
+
+/// What MATLAB says that a dataset of numbers is, if that is no matrix.
+fn of_matlab(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
+    if attributes.contains_key("MATLAB_empty") {
+        return Some("empty");
+    }
+    match attributes.get("MATLAB_class")? {
+        AttrValue::AsciiString(class) | AttrValue::String(class) if class == "char" => Some("text"),
+        AttrValue::AsciiString(class) | AttrValue::String(class) if class == "cell" => Some("a cell array"),
+        _ => None,
+    }
+}
+
+fn sizes(dataset: &Dataset, place: &Place) -> Result<Vec<usize>, Error> {
+    let shape = guarded(place.clone(), || dataset.shape())?;
+    shape.into_iter().map(usize::try_from).collect::<Result<_, _>>().map_err(|_| too_large(place.clone()))
+}
+
+fn too_large(place: Place) -> Error {
+    let problem = "the dataset states more numbers than a file of this length can hold".into();
+    Error::new(Kind::TooLarge, place, problem, "save the file again, without compression if it is right")
+}
+
+/// All numbers of a dataset.
+fn numbers<T>(
+    dataset: &Dataset,
+    limit: Limit,
+    name: &str,
+    read: impl Fn(&Dataset) -> Result<Vec<T>, hdf5_pure::Error>,
+) -> Result<Vec<T>, Error> {
+    let place = Place::Variable(name.to_string());
+    // A chunk is unpacked as a whole, even where the dataset ends within it.
+    let chunk = guarded(place.clone(), || dataset.chunk_shape())?.unwrap_or_default();
+    let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
+    let shape = guarded(place.clone(), || dataset.shape())?;
+    // Of a dataset in chunks, what is in the file; the index of some kinds of chunks cannot be asked.
+    let stored = match chunk[..] {
+        [] => None,
+        _ => guarded(place.clone(), || dataset.chunks())
+            .ok()
+            .map(|chunks| chunks.iter().map(|one| one.storage_size).sum()),
+    };
+    let room = stored.map_or(u64::MAX, |stored: u64| stored.saturating_mul(DEFLATE)).max(FEW).min(limit.numbers());
+    let count = product(&shape).filter(|&count| count <= room);
+    if count.is_none_or(|count| product(&chunk).is_none_or(|chunk| chunk > count.max(FEW))) {
+        return Err(too_large(place));
+    }
+    guarded(place, || read(dataset))
+}
+
+fn sparse_item(group: Rc<Group>, name: String, rows: usize, limit: Limit) -> Result<Item<'static>, Error> {
+    let place = Place::Variable(name.clone());
+    let part = move |part: &str| guarded(place.clone(), || group.dataset(part));
+    let pointers = sizes(&part("jc")?, &Place::Variable(name.clone()))?;
+    let columns = pointers.first().copied().unwrap_or_default().saturating_sub(1);
+    Ok(Item::new(name.clone(), rows, columns, move || {
+        let whole = |name_of: &str| -> Result<Vec<usize>, Error> {
+            let found = numbers(&part(name_of)?, limit, &name, Dataset::read_u64)?;
+            Ok(found.into_iter().map(|index| usize::try_from(index).unwrap_or(usize::MAX)).collect())
+        };
+        let pointers = whole("jc")?;
+        let mut triplets = Triplets::new(rows, columns, 0, Place::File)?;
+        // A matrix without entries has neither rows nor values.
+        if pointers.last().is_some_and(|&count| count > 0) {
+            let (inner, values) = (whole("ir")?, numbers(&part("data")?, limit, &name, Dataset::read_f64)?);
+            compressed(&pointers, &inner, &values, columns, |column, row, value| {
+                triplets.push(row, column, value, Place::Variable(name.clone()))
+            })?;
+        }
+        triplets.finish(Symmetry::General)
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_of_the_library_is_an_error() {
+        let found = guarded::<()>(Place::Byte(3), || panic!("attempt to add with overflow, on purpose"));
+        assert_eq!(found.map_err(|error| (error.kind, error.place)), Err((Kind::Malformed, Place::Byte(3))));
+        let found = guarded(Place::File, || File::from_bytes(vec![0; 600])).map(|_| ());
+        assert_eq!(found.map_err(|error| error.kind), Err(Kind::Malformed));
+    }
+}

@@ -1,0 +1,370 @@
+//! MATLAB `.mat` of version 5 to 7: tagged elements, each variable perhaps compressed. MATLAB's `save` without `-v7.3`, SciPy's `savemat`.
+//!
+//! Numbers may be stored in a smaller type than their class has (a `double` of whole numbers as `uint8`), and small elements within
+//! their tag. Matrices in structures have names such as `model.K`.
+//! Source: MathWorks, MAT-File Format (R2023a), chapter 1.
+
+use std::borrow::Cow;
+
+use crate::bytes::{Bytes, Number, Order};
+use crate::error::{Error, Kind, Place};
+use crate::format::{COMPLEX, Format, Item};
+use crate::inflate::{Limit, Wrapping, beginning, inflate};
+use crate::matrix::{Along, Matrix, Symmetry, Triplets, compressed, dense};
+
+pub(crate) const FORMAT: Format = Format {
+    name: "matlab",
+    summary: "MATLAB (.mat) up to version 7: `save`, `scipy.io.savemat`; full, sparse, in structures",
+    sniff: |bytes| order(bytes).is_some(),
+    open,
+};
+
+/// Bytes before the first element: a text, an offset, a version, the order of bytes.
+const HEADER: usize = 128;
+
+/// Bytes of a compressed variable that surely hold its class, size and name.
+const BEGINNING: usize = 4096;
+
+/// Structures within structures that are followed.
+const DEPTH: usize = 8;
+
+/// Types of elements.
+const MATRIX: u32 = 14;
+const COMPRESSED: u32 = 15;
+
+/// Classes of variables.
+const STRUCTURE: u8 = 2;
+const SPARSE: u8 = 5;
+
+fn order(bytes: &[u8]) -> Option<Order> {
+    let [major_or_minor @ .., a, b] = bytes.get(HEADER - 4..HEADER)? else { return None };
+    match (major_or_minor, [*a, *b]) {
+        ([_, 1], [b'I', b'M']) => Some(Order::Little),
+        ([1, _], [b'M', b'I']) => Some(Order::Big),
+        _ => None,
+    }
+}
+
+/// An element: its type and its bytes.
+struct Element<'a> {
+    kind: u32,
+    data: &'a [u8],
+    place: Place,
+}
+
+/// The next element, within `bytes`, and the cursor behind it.
+fn element<'a>(bytes: &mut Bytes<'a>) -> Result<Element<'a>, Error> {
+    let place = bytes.place();
+    let kind = bytes.u32()?;
+    // A small element has its length in the upper half of its type, and its data in place of the length.
+    if kind >> 16 != 0 {
+        let length = (kind >> 16) as usize;
+        let data = bytes.take(4)?;
+        let data = data.get(..length).ok_or_else(|| bytes.malformed("a small element of at most 4 bytes", length))?;
+        return Ok(Element { kind: kind & 0xffff, data, place });
+    }
+    let length = bytes.u32()? as usize;
+    let data = bytes.take(length)?;
+    if kind != COMPRESSED {
+        bytes.skip(length.next_multiple_of(8) - length);
+    }
+    Ok(Element { kind, data, place })
+}
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let order =
+        order(bytes).ok_or_else(|| Bytes::new(bytes, Order::Little).malformed("the header of MATLAB 5", "none"))?;
+    let mut file = Bytes::new(bytes, order);
+    file.skip(HEADER);
+    let limit = Limit::of(bytes.len());
+    let mut items = Vec::new();
+    while file.left() >= 8 {
+        let Element { kind, data, place } = element(&mut file)?;
+        let found = match kind {
+            MATRIX => variable(Source { data: Cow::Borrowed(data), packed: None, order, place }),
+            COMPRESSED => {
+                let start = beginning(data, Wrapping::Zlib, BEGINNING);
+                variable(Source { data: start.into(), packed: Some((data, limit)), order, place })
+            }
+            _ => continue,
+        };
+        items.extend(found?);
+    }
+    Ok(items)
+}
+
+/// Where a variable stands: its bytes, or the beginning of its bytes and the packed whole.
+#[derive(Clone)]
+struct Source<'a> {
+    data: Cow<'a, [u8]>,
+    packed: Option<(&'a [u8], Limit)>,
+    order: Order,
+    place: Place,
+}
+
+impl<'a> Source<'a> {
+    /// All of its bytes, from its first part on.
+    fn whole(&self) -> Result<Cow<'_, [u8]>, Error> {
+        let Some((packed, limit)) = self.packed else { return Ok(Cow::Borrowed(&self.data)) };
+        let mut all = inflate(packed, Wrapping::Zlib, limit, &self.place)?;
+        // Past the tag of the matrix within.
+        all.drain(..all.len().min(8));
+        Ok(Cow::Owned(all))
+    }
+}
+
+/// What every variable begins with.
+struct Head {
+    class: u8,
+    complex: bool,
+    rows: usize,
+    columns: usize,
+    dimensions: usize,
+    name: String,
+}
+
+fn head(parts: &mut Bytes) -> Result<Head, Error> {
+    let flags = element(parts)?;
+    let [class, bits] = match (parts.order, flags.data) {
+        (Order::Little, [class, bits, ..]) => [*class, *bits],
+        (Order::Big, [_, _, bits, class, ..]) => [*class, *bits],
+        _ => return Err(parts.malformed("the flags of a variable", "less")),
+    };
+    let sizes = element(parts)?;
+    let mut cursor = Bytes::new(sizes.data, parts.order);
+    let sizes: Vec<usize> =
+        (0..sizes.data.len() / 4).map(|_| Number::I32.index(&mut cursor)).collect::<Result<_, _>>()?;
+    let name = String::from_utf8_lossy(element(parts)?.data).into_owned();
+    let [rows, columns, ..] = sizes[..] else {
+        return Err(parts.malformed("at least two dimensions", sizes.len()));
+    };
+    Ok(Head { class, complex: bits & 8 != 0, rows, columns, dimensions: sizes.len(), name })
+}
+
+/// What a class that is no matrix is called.
+fn class_name(class: u8) -> Option<&'static str> {
+    match class {
+        SPARSE..=15 => None,
+        1 => Some("a cell array"),
+        STRUCTURE => Some("a structure"),
+        3 | 17 => Some("an object"),
+        4 => Some("text"),
+        16 => Some("a function"),
+        _ => Some("of an unknown class"),
+    }
+}
+
+/// The items of one variable: itself, or the matrices of a structure.
+fn variable(mut source: Source) -> Result<Vec<Item>, Error> {
+    if source.packed.is_some() {
+        let mut inside = Bytes::new(&source.data, source.order);
+        let kind = inside.u32().map_err(|_| damaged(&source.place))?;
+        if kind != MATRIX {
+            return Err(damaged(&source.place));
+        }
+        let rest = source.data.get(8..).unwrap_or_default().to_vec();
+        source.data = rest.into();
+    }
+    let head = head(&mut Bytes::new(&source.data, source.order)).map_err(|error| error_in(error, &source))?;
+    if head.class == STRUCTURE {
+        return structure(&source, &head.name, DEPTH);
+    }
+    Ok(vec![item(source, head)])
+}
+
+fn damaged(place: &Place) -> Error {
+    let problem = "a compressed variable was expected, its beginning is damaged".into();
+    Error::new(Kind::Malformed, place.clone(), problem, "save or copy the file again")
+}
+
+/// An error whose byte counts from the beginning of a variable, at the place of the variable in the file.
+fn error_in(error: Error, source: &Source) -> Error {
+    Error { place: source.place.clone(), ..error }
+}
+
+fn item(source: Source, head: Head) -> Item {
+    let name = head.name.clone();
+    if let Some(note) = class_name(head.class) {
+        return Item::other(name, note);
+    }
+    if head.complex {
+        return Item::other(name, COMPLEX);
+    }
+    if head.dimensions != 2 {
+        return Item::other(name, format!("an array of {} dimensions", head.dimensions));
+    }
+    Item::new(name, head.rows, head.columns, move || {
+        let bytes = source.whole()?;
+        matrix(&bytes, source.order).map_err(|error| match error.place {
+            Place::Byte(_) => error_in(error, &source),
+            _ => error,
+        })
+    })
+}
+
+/// The matrices of a structure of one element, as `name.field`.
+fn structure<'a>(source: &Source<'a>, name: &str, depth: usize) -> Result<Vec<Item<'a>>, Error> {
+    let whole = source.whole()?;
+    let mut parts = Bytes::new(&whole, source.order);
+    let head = head(&mut parts).map_err(|error| error_in(error, source))?;
+    if (head.rows, head.columns, head.dimensions) != (1, 1, 2) || depth == 0 {
+        return Ok(vec![Item::other(name, "an array of structures")]);
+    }
+    let fields = (|| -> Result<_, Error> {
+        let length = element(&mut parts)?;
+        let length = Number::I32.index(&mut Bytes::new(length.data, source.order))?;
+        let names = element(&mut parts)?.data;
+        if length == 0 {
+            return Ok(Vec::new());
+        }
+        let field = |name: &[u8]| {
+            let end = name.iter().position(|&byte| byte == 0).unwrap_or(name.len());
+            let name = String::from_utf8_lossy(&name[..end]).into_owned();
+            Ok((name, element(&mut parts)?))
+        };
+        names.chunks(length).map(field).collect()
+    })();
+    let mut items = Vec::new();
+    for (field, found) in fields.map_err(|error| error_in(error, source))? {
+        let name = format!("{name}.{field}");
+        if found.kind != MATRIX || found.data.is_empty() {
+            items.push(Item::other(name, "empty"));
+            continue;
+        }
+        // The bytes of a compressed structure were unpacked here and go with the item.
+        let inner =
+            Source { data: found.data.to_vec().into(), packed: None, order: source.order, place: source.place.clone() };
+        let head = self::head(&mut Bytes::new(&inner.data, inner.order)).map_err(|error| error_in(error, source))?;
+        if head.class == STRUCTURE {
+            items.extend(structure(&inner, &name, depth - 1)?);
+        } else {
+            items.push(item(inner, Head { name, ..head }));
+        }
+    }
+    Ok(items)
+}
+
+/// The type of numbers that an element of this type stores.
+fn number(kind: u32) -> Option<Number> {
+    Some(match kind {
+        1 => Number::I8,
+        2 => Number::U8,
+        3 => Number::I16,
+        4 => Number::U16,
+        5 => Number::I32,
+        6 => Number::U32,
+        7 => Number::F32,
+        9 => Number::F64,
+        12 => Number::I64,
+        13 => Number::U64,
+        _ => return None,
+    })
+}
+
+/// All numbers of the next element.
+fn numbers<T>(parts: &mut Bytes, read: impl Fn(Number, &mut Bytes) -> Result<T, Error>) -> Result<Vec<T>, Error> {
+    let Element { kind, data, .. } = element(parts)?;
+    let number = number(kind).ok_or_else(|| parts.malformed("numbers", format!("an element of type {kind}")))?;
+    let mut data = Bytes::new(data, parts.order);
+    (0..data.left() / number.size()).map(|_| read(number, &mut data)).collect()
+}
+
+fn matrix(bytes: &[u8], order: Order) -> Result<Matrix, Error> {
+    let mut parts = Bytes::new(bytes, order);
+    let Head { class, rows, columns, .. } = head(&mut parts)?;
+    if class == SPARSE {
+        let inner = numbers(&mut parts, Number::index)?;
+        let pointers = numbers(&mut parts, Number::index)?;
+        let values = numbers(&mut parts, Number::real)?;
+        let mut triplets = Triplets::new(rows, columns, values.len(), Place::File)?;
+        compressed(&pointers, &inner, &values, columns, |column, row, value| {
+            triplets.push(row, column, value, Place::File)
+        })?;
+        return triplets.finish(Symmetry::General);
+    }
+    let Element { kind, data, .. } = element(&mut parts)?;
+    let number = number(kind).ok_or_else(|| parts.malformed("numbers", format!("an element of type {kind}")))?;
+    let data = Bytes::new(data, order);
+    let there = data.left() / number.size();
+    if rows.checked_mul(columns) != Some(there) {
+        let problem = format!("{rows} x {columns} numbers were expected, {there} are there");
+        return Err(Error::new(Kind::Count, Place::File, problem, "save or copy the file again"));
+    }
+    dense((rows, columns), Along::Columns, &Place::File, |at| number.real(&mut data.ahead(at * number.size())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{list_bytes, read_bytes};
+
+    /// An element with its tag and padding.
+    fn tagged(kind: u32, data: &[u8]) -> Vec<u8> {
+        let mut bytes = [kind.to_le_bytes(), (data.len() as u32).to_le_bytes()].concat();
+        bytes.extend(data);
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+        bytes
+    }
+
+    fn words(values: &[i32]) -> Vec<u8> {
+        values.iter().flat_map(|value| value.to_le_bytes()).collect()
+    }
+
+    /// A variable: class and flags, sizes, name, then its own parts.
+    fn variable(class: i32, sizes: &[i32], name: &str, parts: &[Vec<u8>]) -> Vec<u8> {
+        let head = [tagged(6, &words(&[class, 0])), tagged(5, &words(sizes)), tagged(1, name.as_bytes())];
+        tagged(MATRIX, &[head.concat(), parts.concat()].concat())
+    }
+
+    fn file(variables: &[Vec<u8>]) -> Vec<u8> {
+        let mut bytes = vec![b' '; 124];
+        bytes.extend([0, 1, b'I', b'M']);
+        bytes.extend(variables.concat());
+        bytes
+    }
+
+    #[test]
+    fn doubles_stored_as_bytes_and_small_elements() -> Result<(), Error> {
+        // 4 numbers of type uint8 within the tag: type 2, length 4.
+        let small = [[2, 0, 4, 0], [1, 2, 3, 4]].concat();
+        let bytes = file(&[variable(6, &[2, 2], "K", &[small])]);
+        let matrix = read_bytes(&bytes, None, None)?;
+        assert_eq!((matrix.get(1, 0), matrix.get(0, 1)), (2.0, 3.0));
+        assert_eq!(matrix.origin().variable, "K");
+        Ok(())
+    }
+
+    #[test]
+    fn a_structure_gives_the_matrices_in_it() -> Result<(), Error> {
+        let one = |value: f64| variable(6, &[1, 1], "", &[tagged(9, &value.to_le_bytes())]);
+        let inner = variable(2, &[1, 1], "", &[tagged(5, &words(&[2])), tagged(1, b"M\0"), one(7.0)]);
+        let names = [tagged(5, &words(&[4])), tagged(1, b"K\0\0\0sub\0")];
+        let bytes = file(&[variable(2, &[1, 1], "model", &[names.concat(), one(5.0), inner])]);
+        let listed: Vec<_> = list_bytes(&bytes, None)?.iter().map(ToString::to_string).collect();
+        assert_eq!(listed, ["model.K (1 x 1)", "model.sub.M (1 x 1)"]);
+        assert_eq!(read_bytes(&bytes, None, Some("model.sub.M"))?.get(0, 0), 7.0);
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_wrong_is_said() {
+        let check = |variable: Vec<u8>, kind| {
+            let found = read_bytes(&file(&[variable]), None, Some("K")).map(|_| ());
+            assert_eq!(found.map_err(|e| e.kind), Err(kind));
+        };
+        let double = |value: f64| tagged(9, &value.to_le_bytes());
+        check(variable(6, &[2, 1], "K", &[double(1.0)]), Kind::Count);
+        check(variable(6, &[-1, 1], "K", &[double(1.0)]), Kind::Malformed);
+        check(variable(6, &[1, 1], "K", &[double(f64::INFINITY)]), Kind::NotFinite);
+        check(variable(6 + 0x800, &[1, 1], "K", &[double(1.0)]), Kind::Complex);
+        check(variable(4, &[1, 1], "K", &[double(1.0)]), Kind::Unsupported);
+        check(variable(6, &[1, 1, 1], "K", &[double(1.0)]), Kind::Unsupported);
+        check(variable(6, &[2_000_000_000, 2_000_000_000], "K", &[double(1.0)]), Kind::TooLarge);
+        check(variable(6, &[1, 1], "K", &[]), Kind::Truncated);
+        let sparse = [tagged(5, &words(&[0])), tagged(5, &words(&[0, 2])), double(1.0)];
+        check(variable(5, &[1, 1], "K", &sparse), Kind::Count);
+        let mut short = file(&[variable(6, &[1, 1], "K", &[double(1.0)])]);
+        short.truncate(short.len() - 4);
+        assert_eq!(read_bytes(&short, None, None).map_err(|e| e.kind), Err(Kind::Truncated));
+    }
+}

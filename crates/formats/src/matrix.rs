@@ -1,0 +1,690 @@
+//! One matrix, whatever file it came from: sorted entries, summed and checked.
+//!
+//! An entry stands once, is finite and is not zero; a symmetric matrix keeps its lower triangle only. So two files of the same
+//! matrix in two formats give equal matrices.
+
+use crate::error::{Error, Kind, Place};
+
+/// A number of a matrix and where it stands, rows and columns counted from zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entry {
+    /// Row, from zero.
+    pub row: u32,
+    /// Column, from zero.
+    pub column: u32,
+    /// Value, in the unit of the file.
+    pub value: f64,
+}
+
+/// What the entries of a file stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Symmetry {
+    /// Every entry that is not zero is in the file.
+    General,
+    /// One triangle is in the file, no matter which, or both, which must then be equal.
+    Symmetric,
+    /// One triangle is in the file, the other one is its negative.
+    Skew,
+    /// The file does not say: one triangle if no entry stands beside its mirror image, both otherwise.
+    Unsaid,
+}
+
+/// Where a matrix came from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// Name of the format, of the list of formats.
+    pub format: &'static str,
+    /// Name of the matrix in its file; empty where the format has none.
+    pub variable: String,
+    /// Entries that the file states although they are zero, and that are left out here.
+    pub zeros: usize,
+}
+
+/// A real matrix with its entries sorted by column, then row.
+///
+/// # Example
+/// ```
+/// use stickslip_formats::{Matrix, Symmetry};
+///
+/// let k = Matrix::new(2, 2, Symmetry::Symmetric, [(0, 0, 2.0), (0, 1, -1.0), (1, 1, 1.0)])?;
+/// assert_eq!(k.get(1, 0), -1.0);
+/// assert_eq!(k.get(0, 1), -1.0);
+/// assert_eq!(k.entries().len(), 3);
+/// # Ok::<(), stickslip_formats::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Matrix {
+    rows: usize,
+    columns: usize,
+    entries: Vec<Entry>,
+    symmetric: bool,
+    names: Option<Vec<String>>,
+    origin: Origin,
+}
+
+impl Matrix {
+    /// A matrix of `(row, column, value)` from zero; what stands twice is summed, zeros are left out.
+    ///
+    /// # Errors
+    /// An entry beyond the size, a value that is not finite, or triangles that contradict [`Symmetry::Symmetric`].
+    pub fn new(
+        rows: usize,
+        columns: usize,
+        symmetry: Symmetry,
+        entries: impl IntoIterator<Item = (usize, usize, f64)>,
+    ) -> Result<Self, Error> {
+        let mut triplets = Triplets::new(rows, columns, 0, Place::File)?;
+        for (row, column, value) in entries {
+            triplets.push(row, column, value, Place::File)?;
+        }
+        triplets.finish(symmetry)
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// The entries, sorted by column, then row; of a symmetric matrix those with `row >= column`.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// Whether the matrix equals its transpose to the last bit; then only its lower triangle is kept.
+    pub fn is_symmetric(&self) -> bool {
+        self.symmetric
+    }
+
+    /// Names of the rows, such as `1353.y`, if the file or a second one has them; an empty one where a row has no name.
+    pub fn names(&self) -> Option<&[String]> {
+        self.names.as_deref()
+    }
+
+    /// Where the matrix came from.
+    pub fn origin(&self) -> &Origin {
+        &self.origin
+    }
+
+    /// One value, zero where the matrix has no entry, or none of that row or column.
+    pub fn get(&self, row: usize, column: usize) -> f64 {
+        let (row, column) = if self.symmetric { (row.max(column), row.min(column)) } else { (row, column) };
+        let found = self.entries.binary_search_by_key(&(column, row), |e| (e.column as usize, e.row as usize));
+        found.map_or(0.0, |at| self.entries[at].value)
+    }
+
+    /// The entries of both triangles: of a symmetric matrix each beside its mirror image.
+    pub fn both_triangles(&self) -> impl Iterator<Item = Entry> + '_ {
+        self.entries.iter().flat_map(|&e| {
+            let mirror =
+                (self.symmetric && e.row != e.column).then_some(Entry { row: e.column, column: e.row, value: e.value });
+            std::iter::once(e).chain(mirror)
+        })
+    }
+
+    /// Largest `|a_ij - a_ji|`, in the unit of the matrix; infinite unless the matrix is square.
+    pub fn asymmetry(&self) -> f64 {
+        if self.symmetric {
+            return 0.0;
+        }
+        if self.rows != self.columns {
+            return f64::INFINITY;
+        }
+        let gap = |e: &Entry| (e.value - self.get(e.column as usize, e.row as usize)).abs();
+        self.entries.iter().map(gap).fold(0.0, f64::max)
+    }
+
+    /// Largest absolute value; zero without entries.
+    pub fn largest(&self) -> f64 {
+        self.entries.iter().map(|e| e.value.abs()).fold(0.0, f64::max)
+    }
+
+    /// The same matrix as a symmetric one, with the mean of both triangles.
+    ///
+    /// `tolerance` is the largest `|a_ij - a_ji|` allowed, relative to the largest value: zero where both triangles come from the same
+    /// numbers, 1e-9 for files of ten digits.
+    ///
+    /// # Errors
+    /// [`Kind::NotSquare`] and [`Kind::NotSymmetric`].
+    pub fn into_symmetric(self, tolerance: f64) -> Result<Self, Error> {
+        self.must_be_square()?;
+        let (asymmetry, largest) = (self.asymmetry(), self.largest());
+        if asymmetry > tolerance * largest {
+            return Err(Error::new(
+                Kind::NotSymmetric,
+                Place::File,
+                format!(
+                    "the matrix is not symmetric: its triangles differ by {asymmetry:e}, its largest value is {largest:e}"
+                ),
+                "export the symmetric matrix of the structure without rotation, follower loads or friction",
+            ));
+        }
+        if self.symmetric {
+            return Ok(self);
+        }
+        // An entry that only one triangle has counts by half, as if the other one stated its zero.
+        let mean = |e: &Entry| {
+            let other = self.get(e.column as usize, e.row as usize);
+            // Halves of both, each exact: the sum of two large ones may not be finite.
+            (e.row.max(e.column), e.row.min(e.column), 0.5 * e.value + 0.5 * other, other != 0.0)
+        };
+        let mut entries = Vec::with_capacity(self.entries.len() / 2 + 1);
+        for e in &self.entries {
+            let (row, column, value, twice) = mean(e);
+            if e.row >= e.column || !twice {
+                entries.push(Entry { row, column, value });
+            }
+        }
+        entries.sort_by_key(|e| (e.column, e.row));
+        entries.retain(|e| e.value != 0.0);
+        Ok(Self { entries, symmetric: true, ..self })
+    }
+
+    /// Refuses what is not square.
+    ///
+    /// # Errors
+    /// [`Kind::NotSquare`].
+    pub fn must_be_square(&self) -> Result<(), Error> {
+        if self.rows == self.columns {
+            return Ok(());
+        }
+        Err(Error::new(
+            Kind::NotSquare,
+            Place::File,
+            format!("the matrix has {} rows and {} columns, a square one was expected", self.rows, self.columns),
+            "name the matrix of the structure: stiffness, mass or damping",
+        ))
+    }
+
+    /// The matrix with names for its rows (and columns, where it is square).
+    ///
+    /// # Errors
+    /// [`Kind::Names`] if there are not as many names as rows, or one stands twice.
+    pub fn with_names(mut self, names: Vec<String>) -> Result<Self, Error> {
+        check_names(&names, self.rows)?;
+        self.names = Some(names);
+        Ok(self)
+    }
+
+    /// The same square matrix with its rows in the order of `names`; those it does not have become empty.
+    ///
+    /// Formats that name rows write a row only where it has an entry, so that a mass matrix may lack the rotations that its stiffness has.
+    ///
+    /// # Errors
+    /// [`Kind::Names`] if the matrix has no names, has one that is not in `names`, or `names` has one twice.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip_formats::{Matrix, Symmetry};
+    ///
+    /// let name = |name: &str| name.to_string();
+    /// let mass = Matrix::new(1, 1, Symmetry::Symmetric, [(0, 0, 3.0)])?.with_names(vec![name("7.x")])?;
+    /// let mass = mass.in_order_of(&[name("5.x"), name("7.x")])?;
+    /// assert_eq!((mass.rows(), mass.get(1, 1)), (2, 3.0));
+    /// # Ok::<(), stickslip_formats::Error>(())
+    /// ```
+    pub fn in_order_of(self, names: &[String]) -> Result<Self, Error> {
+        self.must_be_square()?;
+        check_names(names, names.len())?;
+        let places: std::collections::BTreeMap<&str, usize> =
+            names.iter().enumerate().map(|(place, name)| (name.as_str(), place)).collect();
+        let own = self.names.as_deref().ok_or_else(|| {
+            Error::new(
+                Kind::Names,
+                Place::File,
+                "the rows of the matrix have no names".into(),
+                "give the file of names that belongs to it",
+            )
+        })?;
+        let place_of = |row: u32| {
+            places.get(own[row as usize].as_str()).copied().ok_or_else(|| {
+                Error::new(
+                    Kind::Names,
+                    Place::File,
+                    format!(
+                        "row `{}` of the matrix is not among the {} names it shall follow",
+                        own[row as usize],
+                        names.len()
+                    ),
+                    "take both matrices from the same export of the same model",
+                )
+            })
+        };
+        let symmetry = if self.symmetric { Symmetry::Symmetric } else { Symmetry::General };
+        let mut triplets = Triplets::new(names.len(), names.len(), self.entries.len(), Place::File)?;
+        for e in &self.entries {
+            triplets.push(place_of(e.row)?, place_of(e.column)?, e.value, Place::File)?;
+        }
+        let mut matrix = triplets.finish(symmetry)?;
+        matrix.names = Some(names.to_vec());
+        matrix.origin = self.origin;
+        Ok(matrix)
+    }
+
+    /// The matrix without some of its rows and the columns of the same numbers: constrained ones, say.
+    ///
+    /// # Errors
+    /// [`Kind::NotSquare`].
+    pub fn without(mut self, rows: &[usize]) -> Result<Self, Error> {
+        self.must_be_square()?;
+        let mut left = vec![true; self.rows];
+        for &row in rows {
+            if let Some(left) = left.get_mut(row) {
+                *left = false;
+            }
+        }
+        let places: Vec<u32> = (left.iter())
+            .scan(0, |next, &left| {
+                let place = *next;
+                *next += u32::from(left);
+                Some(place)
+            })
+            .collect();
+        self.entries.retain(|e| left[e.row as usize] && left[e.column as usize]);
+        for e in &mut self.entries {
+            (e.row, e.column) = (places[e.row as usize], places[e.column as usize]);
+        }
+        self.rows = left.iter().filter(|&&left| left).count();
+        self.columns = self.rows;
+        if let Some(names) = &mut self.names {
+            let mut left = left.iter();
+            names.retain(|_| left.next() == Some(&true));
+        }
+        Ok(self)
+    }
+
+    /// Whether both triangles are there and equal to the last bit.
+    fn equals_its_transpose(&self) -> bool {
+        if self.rows != self.columns {
+            return false;
+        }
+        // Entries above the diagonal of column i are met in the order in which those of row i are, left of it.
+        let mut above: Vec<usize> = Vec::with_capacity(self.columns);
+        let mut at = 0;
+        for column in 0..self.columns {
+            while self.entries.get(at).is_some_and(|e| (e.column as usize) < column) {
+                at += 1;
+            }
+            above.push(at);
+        }
+        for (at, e) in self.entries.iter().enumerate() {
+            if e.row > e.column {
+                let place = &mut above[e.row as usize];
+                let mirror = self.entries.get(*place);
+                if mirror.is_none_or(|m| (m.column, m.row, m.value) != (e.row, e.column, e.value)) {
+                    return false;
+                }
+                *place += 1;
+            } else if e.row < e.column && at >= above[e.column as usize] {
+                // Met before its mirror image, which stands in an earlier column: there is none.
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Whether any entry off the diagonal stands beside its mirror image.
+    fn has_mirror_images(&self) -> bool {
+        let mirror = |e: &Entry| self.entries.binary_search_by_key(&(e.row, e.column), |e| (e.column, e.row)).is_ok();
+        self.entries.iter().any(|e| e.row != e.column && mirror(e))
+    }
+
+    pub(crate) fn set_origin(&mut self, format: &'static str, variable: &str) {
+        self.origin.format = format;
+        self.origin.variable = variable.to_string();
+    }
+}
+
+/// Refuses names that stand twice, and a number of them other than `rows`; empty ones may repeat, they name nothing.
+fn check_names(names: &[String], rows: usize) -> Result<(), Error> {
+    let fault = |problem| {
+        Err(Error::new(Kind::Names, Place::File, problem, "give the file of names that was written with the matrix"))
+    };
+    if names.len() != rows {
+        return fault(format!("{} names for {rows} rows", names.len()));
+    }
+    let mut sorted: Vec<&str> = names.iter().map(String::as_str).filter(|name| !name.is_empty()).collect();
+    sorted.sort_unstable();
+    match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => fault(format!("the name `{}` stands twice", pair[0])),
+        None => Ok(()),
+    }
+}
+
+/// Entries on their way from a file into a matrix.
+pub(crate) struct Triplets {
+    rows: usize,
+    columns: usize,
+    entries: Vec<Entry>,
+    zeros: usize,
+}
+
+impl Triplets {
+    /// Room for `expected` entries, which must be bounded by the size of the file, not by what its header says.
+    pub fn new(rows: usize, columns: usize, expected: usize, place: Place) -> Result<Self, Error> {
+        if rows.max(columns) > u32::MAX as usize {
+            return Err(Error::new(
+                Kind::TooLarge,
+                place,
+                format!("{rows} rows and {columns} columns, at most {} were expected", u32::MAX),
+                "check the size in the header of the file",
+            ));
+        }
+        Ok(Self { rows, columns, entries: Vec::with_capacity(expected), zeros: 0 })
+    }
+
+    /// Adds one entry, from zero.
+    pub fn push(&mut self, row: usize, column: usize, value: f64, place: Place) -> Result<(), Error> {
+        if row >= self.rows || column >= self.columns {
+            return Err(Error::new(
+                Kind::Count,
+                place,
+                format!(
+                    "an entry in row {}, column {} of a matrix of {} rows and {} columns",
+                    row.saturating_add(1),
+                    column.saturating_add(1),
+                    self.rows,
+                    self.columns
+                ),
+                "the file is damaged or its header belongs to another matrix: export it again",
+            ));
+        }
+        if !value.is_finite() {
+            return Err(Error::new(
+                Kind::NotFinite,
+                place,
+                format!("the value in row {}, column {} is {value}", row + 1, column + 1),
+                "a structure has finite numbers only: look for elements without material or with negative volume",
+            ));
+        }
+        if value == 0.0 {
+            self.zeros += 1;
+        } else {
+            // Both are below the size, which `new` holds to 32 bits.
+            self.entries.push(Entry { row: row as u32, column: column as u32, value });
+        }
+        Ok(())
+    }
+
+    /// Sorts, sums and checks.
+    pub fn finish(mut self, symmetry: Symmetry) -> Result<Matrix, Error> {
+        let square = matches!(symmetry, Symmetry::Symmetric | Symmetry::Skew);
+        if square && self.rows != self.columns {
+            return Err(Error::new(
+                Kind::NotSquare,
+                Place::File,
+                format!("a symmetric matrix with {} rows and {} columns", self.rows, self.columns),
+                "the header of the file is damaged: export it again",
+            ));
+        }
+        if symmetry == Symmetry::Skew {
+            self.add_negative()?;
+        }
+        sum_equal(&mut self.entries)?;
+        let mut matrix = Matrix {
+            rows: self.rows,
+            columns: self.columns,
+            entries: self.entries,
+            symmetric: false,
+            names: None,
+            origin: Origin { zeros: self.zeros, ..Origin::default() },
+        };
+        if matches!(symmetry, Symmetry::Symmetric | Symmetry::Unsaid) && !matrix.has_mirror_images() {
+            for e in &mut matrix.entries {
+                (e.row, e.column) = (e.row.max(e.column), e.row.min(e.column));
+            }
+            sum_equal(&mut matrix.entries)?;
+            matrix.symmetric = true;
+        } else if matrix.equals_its_transpose() {
+            matrix.entries.retain(|e| e.row >= e.column);
+            matrix.symmetric = true;
+        } else if symmetry == Symmetry::Symmetric {
+            // Both triangles in a file of one: they say the same, or one of them is wrong.
+            matrix = matrix.into_symmetric(0.0)?;
+        }
+        matrix.entries.shrink_to_fit();
+        Ok(matrix)
+    }
+}
+
+impl Triplets {
+    /// Adds the other triangle of a skew-symmetric matrix.
+    fn add_negative(&mut self) -> Result<(), Error> {
+        let lower = self.entries.iter().any(|e| e.row > e.column);
+        let upper = self.entries.iter().any(|e| e.row < e.column);
+        if (lower && upper) || self.entries.iter().any(|e| e.row == e.column) {
+            return Err(Error::new(
+                Kind::NotSymmetric,
+                Place::File,
+                "a skew-symmetric matrix with entries in both triangles or on its diagonal".into(),
+                "store one triangle only",
+            ));
+        }
+        let count = self.entries.len();
+        self.entries.reserve_exact(count);
+        for at in 0..count {
+            let Entry { row, column, value } = self.entries[at];
+            self.entries.push(Entry { row: column, column: row, value: -value });
+        }
+        Ok(())
+    }
+}
+
+/// How the numbers of a full matrix follow each other.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Along {
+    Rows,
+    Columns,
+}
+
+/// A full matrix whose numbers, as many as its size says, `value` gives by their place in the file.
+pub(crate) fn dense(
+    (rows, columns): (usize, usize),
+    along: Along,
+    place: &Place,
+    value: impl Fn(usize) -> Result<f64, Error>,
+) -> Result<Matrix, Error> {
+    let count = rows.saturating_mul(columns);
+    // Memory for what is not zero: full matrices of structures are mostly zeros.
+    let filled = (0..count).map(&value).filter(|value| value.as_ref().is_ok_and(|&value| value != 0.0)).count();
+    let mut triplets = Triplets::new(rows, columns, filled, place.clone())?;
+    // In the order of a matrix, so that nothing is left to sort.
+    for column in 0..columns {
+        for row in 0..rows {
+            let at = match along {
+                Along::Rows => row * columns + column,
+                Along::Columns => column * rows + row,
+            };
+            triplets.push(row, column, value(at)?, place.clone())?;
+        }
+    }
+    triplets.finish(Symmetry::General)
+}
+
+/// The entries of a matrix stored by columns (or rows): `pointers` say where each one begins.
+pub(crate) fn compressed(
+    pointers: &[usize],
+    inner: &[usize],
+    values: &[f64],
+    outer: usize,
+    mut push: impl FnMut(usize, usize, f64) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let fault = |problem| Err(Error::new(Kind::Count, Place::File, problem, "the file is damaged: export it again"));
+    if Some(pointers.len()) != outer.checked_add(1) {
+        return fault(format!("{} pointers for {outer} columns or rows, one more was expected", pointers.len()));
+    }
+    let stored = inner.len().min(values.len());
+    let sorted = pointers.first() == Some(&0) && pointers.is_sorted();
+    match pointers.last() {
+        Some(&last) if sorted && last <= stored => {}
+        last => return fault(format!("pointers up to {last:?} for {stored} entries, ascending ones were expected")),
+    }
+    for (outer, pair) in pointers.windows(2).enumerate() {
+        for at in pair[0]..pair[1] {
+            push(outer, inner[at], values[at])?;
+        }
+    }
+    Ok(())
+}
+
+/// Sorts entries and sums those of one place, in the order of the file.
+fn sum_equal(entries: &mut Vec<Entry>) -> Result<(), Error> {
+    let key = |e: &Entry| (e.column, e.row);
+    if !entries.is_sorted_by_key(key) {
+        entries.sort_by_key(key);
+    }
+    entries.dedup_by(|next, kept| {
+        let same = key(next) == key(kept);
+        if same {
+            kept.value += next.value;
+        }
+        same
+    });
+    entries.retain(|e| e.value != 0.0);
+    match entries.iter().find(|e| !e.value.is_finite()) {
+        None => Ok(()),
+        Some(e) => Err(Error::new(
+            Kind::NotFinite,
+            Place::File,
+            format!("the entries in row {}, column {} sum up to {}", e.row + 1, e.column + 1, e.value),
+            "a structure has finite numbers only: check its units",
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_twice_is_summed_and_what_cancels_is_gone() -> Result<(), Error> {
+        let entries = [(1, 0, 2.0), (0, 0, 1.0), (1, 0, 0.5), (0, 1, 4.0), (0, 1, -4.0), (1, 1, 0.0)];
+        let matrix = Matrix::new(2, 2, Symmetry::General, entries)?;
+        let expected = [Entry { row: 0, column: 0, value: 1.0 }, Entry { row: 1, column: 0, value: 2.5 }];
+        assert_eq!(matrix.entries(), expected);
+        assert_eq!(matrix.origin().zeros, 1);
+        Ok(())
+    }
+
+    #[test]
+    fn a_triangle_is_the_same_matrix_as_the_other_or_both() -> Result<(), Error> {
+        let lower = Matrix::new(2, 2, Symmetry::Symmetric, [(0, 0, 1.0), (1, 0, 2.0)])?;
+        let upper = Matrix::new(2, 2, Symmetry::Symmetric, [(0, 1, 2.0), (0, 0, 1.0)])?;
+        let both = Matrix::new(2, 2, Symmetry::Symmetric, [(0, 1, 2.0), (0, 0, 1.0), (1, 0, 2.0)])?;
+        assert_eq!(lower, upper);
+        assert_eq!(lower, both);
+        assert_eq!(lower.both_triangles().count(), 3);
+        let general = Matrix::new(2, 2, Symmetry::General, [(0, 1, 2.0), (0, 0, 1.0), (1, 0, 2.0)])?;
+        assert_eq!(general, lower);
+        Ok(())
+    }
+
+    #[test]
+    fn a_general_matrix_is_symmetric_only_if_it_is() -> Result<(), Error> {
+        let check = |entries: &[(usize, usize, f64)], symmetric| -> Result<(), Error> {
+            let matrix = Matrix::new(3, 3, Symmetry::General, entries.iter().copied())?;
+            assert_eq!(matrix.is_symmetric(), symmetric, "{entries:?}");
+            let total: f64 = entries.iter().map(|entry| entry.2).sum();
+            assert_eq!(matrix.both_triangles().map(|e| e.value).sum::<f64>(), total, "{entries:?}");
+            Ok(())
+        };
+        check(&[], true)?;
+        check(&[(1, 1, 2.0)], true)?;
+        check(&[(0, 1, 2.0), (1, 0, 2.0), (2, 1, 3.0), (1, 2, 3.0), (2, 2, 1.0)], true)?;
+        check(&[(0, 1, 2.0)], false)?;
+        check(&[(1, 0, 2.0)], false)?;
+        check(&[(0, 1, 2.0), (1, 0, 4.0)], false)?;
+        check(&[(0, 1, 2.0), (1, 0, 2.0), (1, 2, 3.0)], false)?;
+        check(&[(0, 2, 2.0), (2, 0, 2.0), (1, 2, 3.0), (2, 0, 1.0)], false)?;
+        Ok(())
+    }
+
+    #[test]
+    fn triangles_that_differ_are_refused_or_averaged() -> Result<(), Error> {
+        let entries = [(0, 1, 2.0), (1, 0, 2.0 + 1e-9), (1, 1, 4.0)];
+        let refused = Matrix::new(2, 2, Symmetry::Symmetric, entries).map(|_| ()).map_err(|e| e.kind);
+        assert_eq!(refused, Err(Kind::NotSymmetric));
+        let general = Matrix::new(2, 2, Symmetry::General, entries)?;
+        assert_eq!(general.clone().into_symmetric(1e-10).map_err(|e| e.kind), Err(Kind::NotSymmetric));
+        let mean = general.into_symmetric(1e-9)?;
+        assert_eq!(mean.get(0, 1), 0.5 * 2.0 + 0.5 * (2.0 + 1e-9));
+        Ok(())
+    }
+
+    #[test]
+    fn an_entry_of_one_triangle_only_counts_by_half() -> Result<(), Error> {
+        let upper_only = Matrix::new(2, 2, Symmetry::General, [(0, 1, 1e-12), (0, 0, 1.0)])?;
+        let lower_only = Matrix::new(2, 2, Symmetry::General, [(1, 0, 1e-12), (0, 0, 1.0)])?;
+        let mean = upper_only.into_symmetric(1e-9)?;
+        assert_eq!(mean.get(1, 0), 0.5e-12);
+        assert_eq!(mean.entries(), lower_only.into_symmetric(1e-9)?.entries());
+        Ok(())
+    }
+
+    #[test]
+    fn one_triangle_in_any_order_is_symmetric() -> Result<(), Error> {
+        // As a file lists it that orders its nodes otherwise: (0, 1) and (2, 1), but never a mirror image.
+        let entries = [(0, 1, 2.0), (2, 1, 3.0), (0, 0, 1.0)];
+        for symmetry in [Symmetry::Symmetric, Symmetry::Unsaid] {
+            let matrix = Matrix::new(3, 3, symmetry, entries)?;
+            assert!(matrix.is_symmetric());
+            assert_eq!((matrix.get(1, 0), matrix.get(1, 2)), (2.0, 3.0));
+        }
+        let both = Matrix::new(3, 3, Symmetry::Unsaid, [(0, 1, 2.0), (1, 0, 2.5)])?;
+        assert!(!both.is_symmetric());
+        Ok(())
+    }
+
+    #[test]
+    fn rows_can_be_left_out_with_their_names() -> Result<(), Error> {
+        let names = ["a", "b", "c"].map(String::from).to_vec();
+        let matrix = Matrix::new(3, 3, Symmetry::Symmetric, [(0, 0, 1.0), (2, 0, 2.0), (1, 1, 1e36), (2, 1, 4.0)])?;
+        let left = matrix.with_names(names)?.without(&[1])?;
+        assert_eq!((left.rows(), left.get(1, 0), left.entries().len()), (2, 2.0, 2));
+        assert_eq!(left.names(), Some(&["a", "c"].map(String::from)[..]));
+        Ok(())
+    }
+
+    #[test]
+    fn a_skew_triangle_gives_both() -> Result<(), Error> {
+        let skew = Matrix::new(2, 2, Symmetry::Skew, [(1, 0, 3.0)])?;
+        assert!(!skew.is_symmetric());
+        assert_eq!((skew.get(1, 0), skew.get(0, 1)), (3.0, -3.0));
+        assert_eq!(Matrix::new(2, 2, Symmetry::Skew, [(0, 0, 3.0)]).map_err(|e| e.kind), Err(Kind::NotSymmetric));
+        Ok(())
+    }
+
+    #[test]
+    fn wrong_entries_are_refused() {
+        let check = |entry, kind| {
+            assert_eq!(Matrix::new(2, 3, Symmetry::General, [entry]).map_err(|e| e.kind), Err(kind));
+        };
+        check((2, 0, 1.0), Kind::Count);
+        check((0, 3, 1.0), Kind::Count);
+        check((0, 0, f64::NAN), Kind::NotFinite);
+        check((0, 0, f64::NEG_INFINITY), Kind::NotFinite);
+        let huge = Matrix::new(2, 2, Symmetry::General, [(0, 0, f64::MAX), (0, 0, f64::MAX)]);
+        assert_eq!(huge.map_err(|e| e.kind), Err(Kind::NotFinite));
+        assert_eq!(Matrix::new(2, 3, Symmetry::Symmetric, []).map_err(|e| e.kind), Err(Kind::NotSquare));
+        assert_eq!(Matrix::new(1 << 40, 3, Symmetry::General, []).map_err(|e| e.kind), Err(Kind::TooLarge));
+    }
+
+    #[test]
+    fn names_must_match_the_rows() -> Result<(), Error> {
+        let matrix = || Matrix::new(2, 2, Symmetry::General, [(0, 1, 1.0)]);
+        let names = |names: &[&str]| names.iter().map(|name| name.to_string()).collect::<Vec<_>>();
+        assert_eq!(matrix()?.with_names(names(&["a"])).map_err(|e| e.kind), Err(Kind::Names));
+        assert_eq!(matrix()?.with_names(names(&["a", "a"])).map_err(|e| e.kind), Err(Kind::Names));
+        assert!(matrix()?.with_names(names(&["", ""])).is_ok());
+        let named = matrix()?.with_names(names(&["a", "b"]))?;
+        let moved = named.clone().in_order_of(&names(&["b", "c", "a"]))?;
+        assert_eq!((moved.rows(), moved.get(2, 0)), (3, 1.0));
+        assert_eq!(named.in_order_of(&names(&["a", "c"])).map_err(|e| e.kind), Err(Kind::Names));
+        assert_eq!(matrix()?.in_order_of(&names(&["a", "b"])).map_err(|e| e.kind), Err(Kind::Names));
+        Ok(())
+    }
+}

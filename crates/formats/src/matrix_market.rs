@@ -1,0 +1,283 @@
+//! Matrix Market: a banner, comments, a line of sizes, then a line for every entry, or all numbers column by column.
+//!
+//! ```text
+//! %%MatrixMarket matrix coordinate real symmetric
+//! 3 3 2
+//! 1 1 2.5
+//! 3 1 -1.0
+//! ```
+//! Source: Boisvert, Pozo, Remington, The Matrix Market Exchange Formats: Initial Design, NISTIR 5935 (1996).
+//! Symmetric and skew-symmetric matrices store their lower triangle.
+
+use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
+use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::text::{Line, Lines, shown, truncated};
+
+pub(crate) const FORMAT: Format = Format {
+    name: "matrix-market",
+    summary: "Matrix Market (.mtx): coordinate or array; SciPy `mmwrite`, MATLAB, Julia, most sparse libraries",
+    sniff: |bytes| bytes.get(..BANNER.len()).is_some_and(|start| start.eq_ignore_ascii_case(BANNER)),
+    open,
+};
+
+const BANNER: &[u8] = b"%%MatrixMarket";
+
+/// What the banner says.
+struct Header {
+    coordinate: bool,
+    pattern: bool,
+    symmetry: Symmetry,
+    rows: usize,
+    columns: usize,
+    /// Entries in the file.
+    entries: usize,
+}
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let mut lines = Lines::new(bytes);
+    let header = header(&mut lines)?;
+    let (rows, columns) = (header.rows, header.columns);
+    Ok(vec![Item::new("", rows, columns, move || read(bytes))])
+}
+
+fn header(lines: &mut Lines) -> Result<Header, Error> {
+    let banner = lines.expect("the banner `%%MatrixMarket matrix …`")?;
+    let words: Vec<String> = banner.words().map(|word| String::from_utf8_lossy(word).to_lowercase()).collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let [_, "matrix", layout, field, symmetry] = words[..] else {
+        return Err(banner.malformed("`%%MatrixMarket matrix LAYOUT FIELD SYMMETRY`", &shown(banner.text)));
+    };
+    let coordinate = match layout {
+        "coordinate" => true,
+        "array" => false,
+        other => return Err(banner.malformed("coordinate or array", &format!("`{other}`"))),
+    };
+    let pattern = match field {
+        "real" | "double" | "integer" | "unsigned-integer" => false,
+        "pattern" if coordinate => true,
+        "complex" => {
+            return Err(Error::new(
+                Kind::Complex,
+                banner.place(),
+                "the matrix is complex, a real one was expected".into(),
+                "write its real part; structural damping is no matrix of a real structure",
+            ));
+        }
+        other => return Err(banner.malformed("real, integer or pattern", &format!("`{other}`"))),
+    };
+    let symmetry = match symmetry {
+        "general" => Symmetry::General,
+        // What is real and Hermitian is symmetric.
+        "symmetric" | "hermitian" => Symmetry::Symmetric,
+        "skew-symmetric" => Symmetry::Skew,
+        other => return Err(banner.malformed("general, symmetric or skew-symmetric", &format!("`{other}`"))),
+    };
+    let sizes = loop {
+        let line = lines.expect_filled("the line of sizes")?;
+        if !line.text.starts_with(b"%") {
+            break line;
+        }
+    };
+    let (rows, columns, entries) = if coordinate {
+        let [rows, columns, entries] = sizes.exactly("rows, columns and number of entries")?;
+        (sizes.count(rows)?, sizes.count(columns)?, Some(sizes.count(entries)?))
+    } else {
+        let [rows, columns] = sizes.exactly("rows and columns")?;
+        (sizes.count(rows)?, sizes.count(columns)?, None)
+    };
+    if symmetry != Symmetry::General && rows != columns {
+        return Err(sizes.malformed("a square symmetric matrix", &format!("{rows} x {columns}")));
+    }
+    let entries = entries.map_or_else(|| stored(rows, columns, symmetry, &sizes), Ok)?;
+    Ok(Header { coordinate, pattern, symmetry, rows, columns, entries })
+}
+
+/// Numbers that an array of this size stores.
+fn stored(rows: usize, columns: usize, symmetry: Symmetry, line: &Line) -> Result<usize, Error> {
+    let all = rows.checked_mul(columns).ok_or_else(|| line.malformed("a size that a file can hold", "a larger one"))?;
+    Ok(match symmetry {
+        Symmetry::General | Symmetry::Unsaid => all,
+        Symmetry::Symmetric => (all - rows) / 2 + rows,
+        Symmetry::Skew => (all - rows) / 2,
+    })
+}
+
+fn read(bytes: &[u8]) -> Result<Matrix, Error> {
+    let mut lines = Lines::new(bytes);
+    let header = header(&mut lines)?;
+    // The shortest line of an entry is `1 1` and its end, of a number `0` and its end.
+    let shortest = if header.coordinate { 4 } else { 2 };
+    let room = header.entries.min(lines.left() / shortest + 1);
+    let mut triplets = Triplets::new(header.rows, header.columns, room, lines.place())?;
+    if header.coordinate {
+        coordinates(&mut lines, &header, &mut triplets)?;
+    } else {
+        array(&mut lines, &header, &mut triplets)?;
+    }
+    triplets.finish(header.symmetry)
+}
+
+fn coordinates(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<(), Error> {
+    let mut count = 0;
+    for line in lines.by_ref() {
+        if line.text.trim_ascii().is_empty() || line.text.starts_with(b"%") {
+            continue;
+        }
+        count += 1;
+        if count > header.entries {
+            return Err(too_many(line.place(), header.entries));
+        }
+        let (row, column, value) = if header.pattern {
+            let [row, column] = line.exactly("row and column")?;
+            (row, column, 1.0)
+        } else {
+            let [row, column, value] = line.exactly("row, column and value")?;
+            (row, column, line.real(value)?)
+        };
+        triplets.push(line.index(row)?, line.index(column)?, value, line.place())?;
+    }
+    if count == header.entries { Ok(()) } else { Err(too_few(lines.place(), count, header.entries)) }
+}
+
+fn array(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<(), Error> {
+    let first = |column: usize| match header.symmetry {
+        Symmetry::General | Symmetry::Unsaid => 0,
+        Symmetry::Symmetric => column,
+        Symmetry::Skew => column + 1,
+    };
+    let (mut row, mut column, mut count) = (first(0), 0, 0);
+    for line in lines.by_ref().filter(|line| !line.text.starts_with(b"%")) {
+        for word in line.words() {
+            count += 1;
+            if count > header.entries {
+                return Err(too_many(line.place(), header.entries));
+            }
+            // The last column of a skew-symmetric matrix has nothing below its diagonal.
+            while row >= header.rows {
+                column += 1;
+                row = first(column);
+            }
+            triplets.push(row, column, line.real(word)?, line.place())?;
+            row += 1;
+        }
+    }
+    if count == header.entries { Ok(()) } else { Err(too_few(lines.place(), count, header.entries)) }
+}
+
+fn too_many(place: Place, expected: usize) -> Error {
+    Error::new(
+        Kind::Count,
+        place,
+        format!("more than the {expected} entries that the header states"),
+        "correct the line of sizes, or export the file again",
+    )
+}
+
+fn too_few(place: Place, found: usize, expected: usize) -> Error {
+    let error = truncated(place, &format!("entry {} of {expected}", found + 1));
+    Error { kind: Kind::Truncated, ..error }
+}
+
+/// The file of a matrix, in coordinates.
+pub(crate) fn write(matrix: &Matrix) -> Vec<u8> {
+    let symmetry = if matrix.is_symmetric() { "symmetric" } else { "general" };
+    let (rows, columns, count) = (matrix.rows(), matrix.columns(), matrix.entries().len());
+    let mut text = format!("%%MatrixMarket matrix coordinate real {symmetry}\n{rows} {columns} {count}\n");
+    for e in matrix.entries() {
+        // `{:e}` writes as many digits as the last bit needs.
+        text.push_str(&format!("{} {} {:e}\n", e.row + 1, e.column + 1, e.value));
+    }
+    text.into_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read_bytes;
+
+    fn read(text: &str) -> Result<Matrix, Error> {
+        read_bytes(text.as_bytes(), None, None)
+    }
+
+    fn check(text: &str, expected: &[(usize, usize, f64)]) -> Result<Matrix, Error> {
+        let matrix = read(text)?;
+        let expected = Matrix::new(matrix.rows(), matrix.columns(), Symmetry::General, expected.iter().copied())?;
+        assert_eq!(matrix.both_triangles().count(), expected.both_triangles().count(), "{text}");
+        for e in expected.entries() {
+            assert_eq!(matrix.get(e.row as usize, e.column as usize), e.value, "{text}");
+        }
+        Ok(matrix)
+    }
+
+    #[test]
+    fn coordinates_of_every_field_and_symmetry() -> Result<(), Error> {
+        let full = [(0, 0, 2.0), (1, 0, -1.0), (0, 1, -1.0)];
+        // Blanks at the end of the banner, upper case, comments and blank lines between: all met in real files.
+        let text =
+            "%%MatrixMarket MATRIX coordinate Real symmetric  \r\n% a comment\n\n2 2 3\n1 1 2\n\n2 1 -1.0e0\n2 2 0\n";
+        let matrix = check(text, &full)?;
+        assert!(matrix.is_symmetric());
+        assert_eq!(matrix.origin().zeros, 1);
+        check("%%MatrixMarket matrix coordinate integer symmetric\n2 2 2\n1 1 2\n2 1 -1\n", &full)?;
+        check("%%MatrixMarket matrix coordinate real general\n2 2 3\n1 1 2\n2 1 -1\n1 2 -1\n", &full)?;
+        let pattern = "%%MatrixMarket matrix coordinate pattern general\n2 3 2\n1 1\n2 3\n";
+        check(pattern, &[(0, 0, 1.0), (1, 2, 1.0)])?;
+        let skew = "%%MatrixMarket matrix coordinate real skew-symmetric\n2 2 1\n2 1 3\n";
+        check(skew, &[(1, 0, 3.0), (0, 1, -3.0)])?;
+        Ok(())
+    }
+
+    #[test]
+    fn arrays_go_down_the_columns() -> Result<(), Error> {
+        let general = "%%MatrixMarket matrix array real general\n2 3\n1\n2\n3\n4\n5\n6\n";
+        let expected = [(0, 0, 1.0), (1, 0, 2.0), (0, 1, 3.0), (1, 1, 4.0), (0, 2, 5.0), (1, 2, 6.0)];
+        check(general, &expected)?;
+        let lower = "%%MatrixMarket matrix array real symmetric\n2 2\n1\n2\n3\n";
+        check(lower, &[(0, 0, 1.0), (1, 0, 2.0), (0, 1, 2.0), (1, 1, 3.0)])?;
+        let skew = "%%MatrixMarket matrix array real skew-symmetric\n3 3\n1\n2\n3\n";
+        let expected = [(1, 0, 1.0), (2, 0, 2.0), (2, 1, 3.0), (0, 1, -1.0), (0, 2, -2.0), (1, 2, -3.0)];
+        check(skew, &expected)?;
+        check("%%MatrixMarket matrix array real general\n0 0\n", &[])?;
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        let check = |text: &str, kind, place| {
+            let error = read(text).map(|_| ()).map_err(|e| (e.kind, e.place));
+            assert_eq!(error, Err((kind, place)), "{text}");
+        };
+        let real = "%%MatrixMarket matrix coordinate real general\n";
+        check(&format!("{real}2 2 2\n1 1 1\n"), Kind::Truncated, Place::Line(3));
+        check(&format!("{real}2 2 1\n1 1 1\n2 2 1\n"), Kind::Count, Place::Line(4));
+        check(&format!("{real}2 2 1\n3 1 1\n"), Kind::Count, Place::Line(3));
+        check(&format!("{real}2 2 1\n0 1 1\n"), Kind::Malformed, Place::Line(3));
+        check(&format!("{real}2 2 1\n1 1 nan\n"), Kind::NotFinite, Place::Line(3));
+        check(&format!("{real}2 2 1\n1 1 1 0\n"), Kind::Malformed, Place::Line(3));
+        check(&format!("{real}2 2\n1 1 1\n"), Kind::Malformed, Place::Line(2));
+        check(real, Kind::Truncated, Place::Line(2));
+        check(&format!("{real}99999999999 1 0\n"), Kind::TooLarge, Place::File);
+        check("%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0\n", Kind::Complex, Place::Line(1));
+        check("%%MatrixMarket vector coordinate real general\n1 1 1\n", Kind::Malformed, Place::Line(1));
+        check("%%MatrixMarket matrix coordinate real symmetric\n1 2 1\n", Kind::Malformed, Place::Line(2));
+        // A header that asks for more memory than there is.
+        check(&format!("{real}1000000 1000000 999999999999\n1 1 1\n"), Kind::Truncated, Place::Line(3));
+        let array = "%%MatrixMarket matrix array real general\n";
+        check(&format!("{array}4000000000 4000000000\n1\n"), Kind::TooLarge, Place::File);
+        check(&format!("{array}4000000000000 4000000000000\n1\n"), Kind::Malformed, Place::Line(2));
+    }
+
+    #[test]
+    fn what_is_written_reads_back_to_the_last_bit() -> Result<(), Error> {
+        let values = [1.0 / 3.0, f64::MIN_POSITIVE / 3.0, -f64::MAX, 1e22 + 2e6];
+        let entries = values.iter().enumerate().map(|(row, &value)| (row, row / 2, value));
+        for symmetry in [Symmetry::General, Symmetry::Symmetric] {
+            let matrix = Matrix::new(4, 4, symmetry, entries.clone())?;
+            let back = read_bytes(&write(&matrix), None, None)?;
+            assert_eq!(back.entries(), matrix.entries());
+            assert_eq!(back.is_symmetric(), matrix.is_symmetric());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,253 @@
+//! Names of the rows of a matrix: a second file, since most formats of matrices have none.
+//!
+//! A name is `node.direction`, such as `1353.y`; directions are `x y z rx ry rz`, others keep their number.
+//!
+//! ```
+//! use stickslip_formats::names;
+//!
+//! let csv = "row,name\n1,root\n2,tip.x\n";
+//! assert_eq!(names::read_bytes(csv.as_bytes(), 2)?, ["root", "tip.x"]);
+//! // CalculiX: node 10, direction 1, which no floating-point number can tell from 10.10.
+//! assert_eq!(names::read_bytes(b"10.1\n10.2\n", 2)?, ["10.x", "10.y"]);
+//! # Ok::<(), stickslip_formats::Error>(())
+//! ```
+
+use std::path::Path;
+
+use crate::error::{Error, Kind, Place};
+use crate::file::{io, load};
+use crate::matrix::Matrix;
+use crate::text::{Line, Lines, integer, shown};
+
+/// A format of files that name rows.
+pub struct NameFormat {
+    /// What it is called.
+    pub name: &'static str,
+    /// What it is, and which programs write it.
+    pub summary: &'static str,
+    /// Whether a file is of it, by its first line.
+    sniff: fn(&Line) -> bool,
+    /// The name in a line, of which this many came before; `None` for titles.
+    line: fn(&Line, usize) -> Result<Option<Named>, Error>,
+}
+
+/// A row, from zero, and its name.
+type Named = (usize, String);
+
+/// All formats of names.
+pub const TABLE: &[NameFormat] = &[
+    NameFormat {
+        name: "csv",
+        summary: "CSV with the columns `row,name`, rows from 1; rows without a line have no name",
+        sniff: |line| String::from_utf8_lossy(line.text).trim().replace(' ', "").eq_ignore_ascii_case("row,name"),
+        line: csv_line,
+    },
+    NameFormat {
+        name: "calculix",
+        summary: "CalculiX (.dof): a line `node.direction` for every row",
+        sniff: |line| dof(line.text.trim_ascii()).is_some(),
+        line: dof_line,
+    },
+    NameFormat {
+        name: "ansys",
+        summary: "ANSYS (.mapping): a line `equation node label` for every row, from HBMAT",
+        sniff: |line| String::from_utf8_lossy(line.text).to_lowercase().contains("node") || mapping(line).is_some(),
+        line: mapping_line,
+    },
+];
+
+/// The names of `rows` rows, empty where a row has none.
+///
+/// # Errors
+/// [`Kind::Names`] if they do not match the rows, [`Kind::Format`] if the file is of no format of [`TABLE`].
+pub fn read(path: impl AsRef<Path>, rows: usize) -> Result<Vec<String>, Error> {
+    let path = path.as_ref();
+    read_bytes(&load(path)?, rows).map_err(|error| error.of(path))
+}
+
+/// As [`read`], from a file in memory.
+///
+/// # Errors
+/// As [`read`], without the name of a file.
+pub fn read_bytes(bytes: &[u8], rows: usize) -> Result<Vec<String>, Error> {
+    let mut lines = Lines::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+    let first = lines.expect_filled("names of rows")?;
+    let format = TABLE.iter().find(|format| (format.sniff)(&first)).ok_or_else(|| {
+        let problem = format!("names of rows were expected, {} is there", shown(first.text));
+        let known = TABLE.iter().map(|format| format.summary).collect::<Vec<_>>().join("; ");
+        Error::new(Kind::Format, first.place(), problem, format!("give one of these: {known}"))
+    })?;
+    let mut names = Names { names: Vec::new(), rows };
+    for (at, line) in std::iter::once(first).chain(lines).filter(|line| !line.text.trim_ascii().is_empty()).enumerate()
+    {
+        if let Some((row, name)) = (format.line)(&line, at)? {
+            names.put(row, name, &line)?;
+        }
+    }
+    names.finish(format.name == "csv")
+}
+
+/// Writes the names of a matrix as CSV `row,name`.
+///
+/// # Errors
+/// [`Kind::Names`] if it has none, [`Kind::Io`].
+pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
+    let path = path.as_ref();
+    let names = matrix.names().ok_or_else(|| {
+        let problem = "the rows of the matrix have no names".into();
+        Error::new(Kind::Names, Place::File, problem, "give it names first").of(path)
+    })?;
+    let mut text = String::from("row,name\n");
+    for (at, name) in names.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
+        text.push_str(&format!("{},{}\n", at + 1, quoted(name)));
+    }
+    std::fs::write(path, text).map_err(|error| io(path, &error))
+}
+
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.into() }
+}
+
+/// The name of a degree of freedom by its number: 1 to 6 are `x y z rx ry rz`.
+pub(crate) fn direction(number: i64) -> String {
+    match number {
+        1..=6 => ["x", "y", "z", "rx", "ry", "rz"][number as usize - 1].into(),
+        other => other.to_string(),
+    }
+}
+
+/// Names on their way into a list.
+struct Names {
+    names: Vec<String>,
+    rows: usize,
+}
+
+impl Names {
+    fn put(&mut self, row: usize, name: String, line: &Line) -> Result<(), Error> {
+        let fault = |problem| {
+            let remedy = "give the file of names that was written with the matrix";
+            Err(Error::new(Kind::Names, line.place(), problem, remedy))
+        };
+        if row >= self.rows {
+            return fault(format!("a name for row {} of a matrix of {} rows", row + 1, self.rows));
+        }
+        if name.is_empty() {
+            return fault(format!("row {} has an empty name", row + 1));
+        }
+        if self.names.len() <= row {
+            self.names.resize(row + 1, String::new());
+        }
+        if !self.names[row].is_empty() {
+            return fault(format!("row {} has two names: `{}` and `{name}`", row + 1, self.names[row]));
+        }
+        self.names[row] = name;
+        Ok(())
+    }
+
+    fn finish(mut self, gaps: bool) -> Result<Vec<String>, Error> {
+        let named = self.names.iter().filter(|name| !name.is_empty()).count();
+        if named != self.rows && !gaps {
+            return Err(Error::new(
+                Kind::Names,
+                Place::File,
+                format!("{named} names for {} rows", self.rows),
+                "give the file of names that was written with the matrix",
+            ));
+        }
+        self.names.resize(self.rows, String::new());
+        Ok(self.names)
+    }
+}
+
+fn csv_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
+    if at == 0 {
+        return Ok(None);
+    }
+    let text = std::str::from_utf8(line.text).map_err(|_| line.malformed("`row,name` in UTF-8", &shown(line.text)))?;
+    let (row, name) = text.split_once(',').ok_or_else(|| line.malformed("`row,name`", &shown(line.text)))?;
+    let name = name.trim();
+    let name = match name.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')) {
+        Some(inner) => inner.replace("\"\"", "\""),
+        None => name.to_string(),
+    };
+    Ok(Some((line.index(row.trim().as_bytes())?, name)))
+}
+
+/// Node and direction of `10.1`.
+fn dof(text: &[u8]) -> Option<(i64, i64)> {
+    let dot = text.iter().position(|&byte| byte == b'.')?;
+    Some((integer(&text[..dot])?, integer(&text[dot + 1..])?))
+}
+
+fn dof_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
+    let text = line.text.trim_ascii();
+    let (node, number) = dof(text).ok_or_else(|| line.malformed("`node.direction`", &shown(text)))?;
+    Ok(Some((at, format!("{node}.{}", direction(number)))))
+}
+
+/// Equation, node and label of a line of HBMAT's mapping.
+fn mapping(line: &Line) -> Option<(usize, i64, String)> {
+    let [equation, node, label] = line.exactly("").ok()?;
+    let equation = usize::try_from(integer(equation)?.checked_sub(1)?).ok()?;
+    let label = std::str::from_utf8(label).ok()?.to_uppercase();
+    let label = match label.strip_prefix("ROT") {
+        Some(axis) => format!("r{}", axis.to_lowercase()),
+        None => match label.as_str() {
+            "UX" | "UY" | "UZ" => label[1..].to_lowercase(),
+            _ => label,
+        },
+    };
+    Some((equation, integer(node)?, label))
+}
+
+fn mapping_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
+    match mapping(line) {
+        Some((equation, node, label)) => Ok(Some((equation, format!("{node}.{label}")))),
+        // The titles of the columns.
+        None if at == 0 => Ok(None),
+        None => Err(line.malformed("`equation node label`", &shown(line.text))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(text: &str, rows: usize, expected: Result<&[&str], (Kind, Place)>) {
+        let found = read_bytes(text.as_bytes(), rows).map_err(|e| (e.kind, e.place));
+        assert_eq!(found, expected.map(|names| names.iter().map(ToString::to_string).collect()), "{text}");
+    }
+
+    #[test]
+    fn csv_may_leave_rows_without_a_name() {
+        check("row,name\n3,tip\n1,\"a, \"\"b\"\"\"\n", 3, Ok(&["a, \"b\"", "", "tip"]));
+        check("\u{feff}Row, Name\r\n1,x\r\n", 1, Ok(&["x"]));
+        check("row,name\n1,a\n1,b\n", 2, Err((Kind::Names, Place::Line(3))));
+        check("row,name\n3,a\n", 2, Err((Kind::Names, Place::Line(2))));
+        check("row,name\n0,a\n", 2, Err((Kind::Malformed, Place::Line(2))));
+        check("row,name\n1,\n", 2, Err((Kind::Names, Place::Line(2))));
+        check("row,name\nx\n", 2, Err((Kind::Malformed, Place::Line(2))));
+    }
+
+    #[test]
+    fn calculix_directions_are_no_decimals() {
+        check("10.1\n10.10\n7.4\n", 3, Ok(&["10.x", "10.10", "7.rx"]));
+        check("10.1\n10.2\n", 3, Err((Kind::Names, Place::File)));
+        check("10.1\n10.2\n", 1, Err((Kind::Names, Place::Line(2))));
+        check("10.1\nx\n", 2, Err((Kind::Malformed, Place::Line(2))));
+    }
+
+    #[test]
+    fn ansys_labels_become_directions() {
+        let text = "   Matrix Eqn      Node      DOF\n       2         7     ROTZ\n       1         7     UX\n";
+        check(text, 2, Ok(&["7.x", "7.rz"]));
+        check("1 7 UX\n2 7 TEMP\n", 2, Ok(&["7.x", "7.TEMP"]));
+        check("1 7 UX\nmore\n", 2, Err((Kind::Malformed, Place::Line(2))));
+    }
+
+    #[test]
+    fn what_is_no_list_of_names_is_refused() {
+        check("hello\n", 1, Err((Kind::Format, Place::Line(1))));
+        check("", 1, Err((Kind::Truncated, Place::Line(1))));
+    }
+}

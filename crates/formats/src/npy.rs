@@ -1,0 +1,256 @@
+//! NumPy `.npy`: a header in Python's own notation, then the numbers.
+//!
+//! ```text
+//! \x93NUMPY 1 0 <length> {'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }
+//! ```
+//! Source: NumPy Enhancement Proposal 1, A Simple File Format for NumPy Arrays.
+
+use crate::bytes::{Bytes, Number, Order};
+use crate::error::{Error, Kind, Place};
+use crate::format::{COMPLEX, Format, Item};
+use crate::matrix::{Along, Matrix, dense};
+use crate::text::shown;
+
+pub(crate) const FORMAT: Format = Format {
+    name: "npy",
+    summary: "NumPy (.npy): a dense array of one or two dimensions, `numpy.save`",
+    sniff: |bytes| bytes.starts_with(MAGIC),
+    open,
+};
+
+pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// A longer header is damaged: ours have one type and few dimensions.
+const LONGEST_HEADER: usize = 4096;
+
+/// What the elements of an array are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Element {
+    Number(Number),
+    Complex,
+    /// Bytes of text, so many each.
+    Text(usize),
+    /// Anything else, by NumPy's name for it.
+    Other(String),
+}
+
+/// An array with its header read and its numbers not.
+pub(crate) struct Array<'a> {
+    pub element: Element,
+    pub shape: Vec<usize>,
+    fortran: bool,
+    data: Bytes<'a>,
+}
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let item = match Array::new(bytes)?.size() {
+        Ok((rows, columns)) => Item::new("", rows, columns, move || Array::new(bytes)?.matrix()),
+        Err(note) => Item::other("", note),
+    };
+    Ok(vec![item])
+}
+
+impl<'a> Array<'a> {
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
+        let mut data = Bytes::new(bytes, Order::Little);
+        if data.take(MAGIC.len())? != MAGIC {
+            return Err(data.malformed("the magic of NumPy", "something else"));
+        }
+        let major = data.u8()?;
+        data.skip(1);
+        let length = match major {
+            1 => data.u16()?.into(),
+            2 | 3 => data.u32()? as usize,
+            other => return Err(data.malformed("version 1, 2 or 3", other)),
+        };
+        if length > LONGEST_HEADER {
+            return Err(data.malformed(&format!("a header of at most {LONGEST_HEADER} bytes"), length));
+        }
+        let at = data.clone();
+        let header = data.take(length)?;
+        let (element, fortran, shape) = std::str::from_utf8(header)
+            .ok()
+            .and_then(|text| {
+                let shape = shape(text)?;
+                Some((value(text, "descr")?, value(text, "fortran_order")?.starts_with("True"), shape))
+            })
+            .ok_or_else(|| at.malformed("a header with descr, fortran_order and shape", shown(header)))?;
+        let (element, order) = element_of(element);
+        data.order = order;
+        Ok(Self { element, shape, fortran, data })
+    }
+
+    /// Rows and columns, or why it is no matrix.
+    pub fn size(&self) -> Result<(usize, usize), String> {
+        match &self.element {
+            Element::Number(_) => {}
+            Element::Complex => return Err(COMPLEX.into()),
+            Element::Text(_) => return Err("text".into()),
+            Element::Other(name) => return Err(format!("of type {name}")),
+        }
+        match self.shape[..] {
+            [] => Ok((1, 1)),
+            [rows] => Ok((rows, 1)),
+            [rows, columns] => Ok((rows, columns)),
+            _ => Err(format!("an array of {} dimensions", self.shape.len())),
+        }
+    }
+
+    /// The numbers one by one, in the order of the file.
+    pub fn numbers<T>(mut self, read: impl Fn(Number, &mut Bytes) -> Result<T, Error>) -> Result<Vec<T>, Error> {
+        let Element::Number(number) = self.element else {
+            return Err(self.data.malformed("an array of numbers", format!("{:?}", self.element)));
+        };
+        let count = self.count(number)?;
+        (0..count).map(|_| read(number, &mut self.data)).collect()
+    }
+
+    /// The bytes of an array of one text.
+    pub fn text(mut self) -> Result<&'a [u8], Error> {
+        match self.element {
+            Element::Text(length) => self.data.take(length),
+            ref other => Err(self.data.malformed("a text", format!("{other:?}"))),
+        }
+    }
+
+    /// How many numbers there are; never more than the file has bytes for.
+    fn count(&self, number: Number) -> Result<usize, Error> {
+        let count = self.shape.iter().try_fold(1_usize, |product, &size| product.checked_mul(size));
+        let room = self.data.left() / number.size();
+        match count {
+            Some(count) if count <= room => Ok(count),
+            _ => Err(Error::new(
+                Kind::Truncated,
+                self.data.place(),
+                format!("the header states the shape {:?}, the file has {room} numbers", self.shape),
+                "it is not complete: export or copy it again",
+            )),
+        }
+    }
+
+    pub fn matrix(self) -> Result<Matrix, Error> {
+        let size = self.size().map_err(|note| {
+            let kind = if self.element == Element::Complex { Kind::Complex } else { Kind::Unsupported };
+            let remedy = "save a real array of two dimensions";
+            Error::new(kind, Place::File, format!("a real matrix was expected, this is {note}"), remedy)
+        });
+        let size = size?;
+        let Element::Number(number) = self.element else {
+            return Err(self.data.malformed("an array of numbers", format!("{:?}", self.element)));
+        };
+        // Every number is there, so that no place is beyond the end.
+        self.count(number)?;
+        let along = if self.fortran { Along::Columns } else { Along::Rows };
+        dense(size, along, &self.data.place(), |at| number.real(&mut self.data.ahead(at * number.size())))
+    }
+}
+
+/// What follows a key of the header.
+fn value<'t>(header: &'t str, key: &str) -> Option<&'t str> {
+    let (_, rest) = header.split_once(&format!("'{key}'"))?;
+    Some(rest.trim_start().strip_prefix(':')?.trim_start())
+}
+
+fn shape(header: &str) -> Option<Vec<usize>> {
+    let (inside, _) = value(header, "shape")?.strip_prefix('(')?.split_once(')')?;
+    // Python 2 wrote its long integers with an L.
+    let sizes = inside.split(',').map(|size| size.trim().trim_end_matches('L')).filter(|size| !size.is_empty());
+    sizes.map(|size| size.parse().ok()).collect()
+}
+
+/// The type behind a descr such as `'<f8'`, and its order of bytes.
+fn element_of(descr: &str) -> (Element, Order) {
+    let other = |name: &str| (Element::Other(name.chars().take(20).collect()), Order::Little);
+    let Some(name) = descr.strip_prefix('\'').and_then(|rest| rest.split_once('\'')).map(|(name, _)| name) else {
+        return other("a record");
+    };
+    let order = if name.starts_with('>') { Order::Big } else { Order::Little };
+    let element = match name.trim_start_matches(['<', '>', '|', '=']) {
+        "b1" | "u1" => Element::Number(Number::U8),
+        "i1" => Element::Number(Number::I8),
+        "i2" => Element::Number(Number::I16),
+        "u2" => Element::Number(Number::U16),
+        "i4" => Element::Number(Number::I32),
+        "u4" => Element::Number(Number::U32),
+        "i8" => Element::Number(Number::I64),
+        "u8" => Element::Number(Number::U64),
+        "f4" => Element::Number(Number::F32),
+        "f8" => Element::Number(Number::F64),
+        "c8" | "c16" | "c32" => Element::Complex,
+        text => match (text.strip_prefix('S'), text.strip_prefix('U')) {
+            (Some(length), _) if length.parse::<usize>().is_ok() => Element::Text(length.parse().unwrap_or(0)),
+            // Four bytes a character.
+            (_, Some(length)) if length.parse::<u32>().is_ok() => {
+                Element::Text(length.parse::<u32>().map_or(0, |length| length as usize * 4))
+            }
+            _ => return other(text),
+        },
+    };
+    (element, order)
+}
+
+/// The file of an array: `descr` and `shape` in NumPy's notation.
+pub(crate) fn write(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let mut header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
+    // Magic, version and length take 10 bytes; the data begins at a multiple of 64, after a line break.
+    let length = (10 + header.len() + 1).next_multiple_of(64) - 10;
+    header.push_str(&" ".repeat(length - header.len() - 1));
+    header.push('\n');
+    let mut bytes = [MAGIC, &[1, 0], &(length as u16).to_le_bytes(), header.as_bytes()].concat();
+    bytes.extend_from_slice(data);
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read_bytes;
+
+    fn doubles(values: &[f64]) -> Vec<u8> {
+        values.iter().flat_map(|value| value.to_le_bytes()).collect()
+    }
+
+    #[test]
+    fn rows_or_columns_come_first() -> Result<(), Error> {
+        let values = doubles(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        let c = read_bytes(&write("<f8", "(2, 3)", &values), None, None)?;
+        assert_eq!((c.get(0, 1), c.get(1, 0)), (2.0, 4.0));
+        let fortran = String::from_utf8_lossy(&write("<f8", "(2, 3)", &[])[10..]).replace("False", "True ");
+        let file = [&write("<f8", "(2, 3)", &[])[..10], fortran.as_bytes(), &values].concat();
+        let f = read_bytes(&file, None, None)?;
+        assert_eq!((f.get(1, 0), f.get(0, 1)), (2.0, 3.0));
+        Ok(())
+    }
+
+    #[test]
+    fn types_and_orders() -> Result<(), Error> {
+        let check = |descr, shape, data: &[u8], value| -> Result<(), Error> {
+            let matrix = read_bytes(&write(descr, shape, data), None, None)?;
+            assert_eq!(matrix.get(matrix.rows() - 1, matrix.columns() - 1), value, "{descr}");
+            Ok(())
+        };
+        check(">f8", "(1, 1)", &1.5_f64.to_be_bytes(), 1.5)?;
+        check("<f4", "(2,)", &[0, 0, 0, 0, 0, 0, 0xc0, 0x3f], 1.5)?;
+        check(">i2", "()", &[0xff, 0xfe], -2.0)?;
+        check("|b1", "(1L, 2L)", &[0, 1], 1.0)?;
+        check("<u8", "(1, 1)", &7_u64.to_le_bytes(), 7.0)?;
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_wrong_is_said() {
+        let check = |descr, shape, data: &[u8], kind| {
+            let found = read_bytes(&write(descr, shape, data), Some("npy"), None).map(|_| ());
+            assert_eq!(found.map_err(|e| e.kind), Err(kind), "{descr} {shape}");
+        };
+        check("<f8", "(2, 3)", &doubles(&[1.0; 5]), Kind::Truncated);
+        check("<f8", "(1, 1)", &doubles(&[f64::NAN]), Kind::NotFinite);
+        check("<c16", "(1, 1)", &doubles(&[1.0; 2]), Kind::Complex);
+        check("<f8", "(1, 1, 1)", &doubles(&[1.0]), Kind::Unsupported);
+        check("|O", "(1, 1)", &doubles(&[1.0]), Kind::Unsupported);
+        check("<f8", "(99999999999, 99999999999)", &doubles(&[1.0]), Kind::TooLarge);
+        check("<f8", "(-1, 2)", &[], Kind::Malformed);
+        check("<f8", "2, 2", &[], Kind::Malformed);
+        assert_eq!(read_bytes(MAGIC, None, None).map_err(|e| e.kind), Err(Kind::Truncated));
+    }
+}

@@ -1,0 +1,404 @@
+//! NumPy `.npz`: a zip of `.npy` files. One that SciPy's `save_npz` wrote holds the parts of one sparse matrix.
+//!
+//! Source: APPNOTE.TXT - .ZIP File Format Specification (PKWARE); SciPy reference, `scipy.sparse.save_npz`.
+
+use std::borrow::Cow;
+
+use crate::bytes::{Bytes, Number, Order};
+use crate::error::{Error, Kind, Place};
+use crate::format::{Format, Item};
+use crate::inflate::{Limit, Wrapping, beginning, inflate};
+use crate::matrix::{Entry, Matrix, Symmetry, Triplets, compressed};
+use crate::npy::{self, Array};
+use crate::text::shown;
+
+pub(crate) const FORMAT: Format = Format {
+    name: "npz",
+    summary: "NumPy and SciPy (.npz): `numpy.savez`, `scipy.sparse.save_npz` (csc, csr, coo)",
+    sniff: |bytes| bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06"),
+    open,
+};
+
+/// Bytes of a member that surely hold the header of an array.
+const HEADER: usize = 8192;
+
+/// Layouts of SciPy that are read.
+const LAYOUTS: &str = "csc, csr or coo";
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let members = members(bytes)?;
+    let sparse = |name| members.iter().any(|member| member.name == name);
+    if sparse("format") && sparse("shape") && sparse("data") {
+        let size = array(&find(&members, "shape")?.contents()?)?.numbers(Number::index)?;
+        let [rows, columns] = size[..] else {
+            let place = Place::Variable("shape".into());
+            let problem = format!("{} sizes, rows and columns were expected", size.len());
+            return Err(Error::new(Kind::Unsupported, place, problem, "save a matrix of two dimensions"));
+        };
+        return Ok(vec![Item::new("", rows, columns, move || read_sparse(&members, rows, columns))]);
+    }
+    members.into_iter().map(item).collect()
+}
+
+/// A member as an item: an array, or something else.
+fn item(member: Member) -> Result<Item, Error> {
+    let start = member.beginning();
+    if !start.starts_with(npy::MAGIC) {
+        return Ok(Item::other(member.name.clone(), "no array"));
+    }
+    let array = Array::new(&start).map_err(|error| error.at(Place::Variable(member.name.clone())))?;
+    Ok(match array.size() {
+        Ok((rows, columns)) => {
+            Item::new(member.name.clone(), rows, columns, move || self::array(&member.contents()?)?.matrix())
+        }
+        Err(note) => Item::other(member.name.clone(), note),
+    })
+}
+
+fn array(contents: &[u8]) -> Result<Array<'_>, Error> {
+    Array::new(contents)
+}
+
+fn find<'m, 'a>(members: &'m [Member<'a>], name: &str) -> Result<&'m Member<'a>, Error> {
+    members.iter().find(|member| member.name == name).ok_or_else(|| {
+        let problem = format!("the sparse matrix has no part `{name}`");
+        Error::new(Kind::Malformed, Place::File, problem, "write it by scipy.sparse.save_npz")
+    })
+}
+
+fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix, Error> {
+    let part = |name: &str| -> Result<Cow<[u8]>, Error> { find(members, name)?.contents() };
+    let indices = |name: &str| -> Result<Vec<usize>, Error> {
+        array(&part(name)?)?.numbers(Number::index).map_err(|error| error.at(Place::Variable(name.into())))
+    };
+    let layout = part("format")?;
+    let layout: Vec<u8> = array(&layout)?.text()?.iter().copied().filter(|&byte| byte != 0).collect();
+    let data = part("data")?;
+    let values = array(&data)?;
+    if values.element == npy::Element::Complex {
+        let place = Place::Variable("data".into());
+        return Err(Error::new(
+            Kind::Complex,
+            place,
+            "the matrix is complex, a real one was expected".into(),
+            "save its real part",
+        ));
+    }
+    let values = values.numbers(Number::real)?;
+    let mut triplets = Triplets::new(rows, columns, values.len(), Place::File)?;
+    match &layout[..] {
+        b"csc" | b"csr" => {
+            let (pointers, inner) = (indices("indptr")?, indices("indices")?);
+            let outer = if layout == b"csc" { columns } else { rows };
+            compressed(&pointers, &inner, &values, outer, |outer, inner, value| {
+                let (row, column) = if layout == b"csc" { (inner, outer) } else { (outer, inner) };
+                triplets.push(row, column, value, Place::Variable("data".into()))
+            })?;
+        }
+        b"coo" => {
+            let (row, column) = (indices("row")?, indices("col")?);
+            if row.len() != values.len() || column.len() != values.len() {
+                let problem = format!("{} rows, {} columns, {} values", row.len(), column.len(), values.len());
+                return Err(Error::new(Kind::Count, Place::File, problem, "write it again by scipy.sparse.save_npz"));
+            }
+            for ((row, column), value) in row.into_iter().zip(column).zip(values) {
+                triplets.push(row, column, value, Place::Variable("data".into()))?;
+            }
+        }
+        other => {
+            let problem = format!("the matrix is stored as {}, {LAYOUTS} was expected", shown(other));
+            let place = Place::Variable("format".into());
+            return Err(Error::new(
+                Kind::Unsupported,
+                place,
+                problem,
+                "save it as csc: save_npz(path, matrix.tocsc())",
+            ));
+        }
+    }
+    triplets.finish(Symmetry::General)
+}
+
+/// A file in a zip.
+struct Member<'a> {
+    /// Without `.npy`.
+    name: String,
+    deflated: bool,
+    packed: &'a [u8],
+    crc: u32,
+    limit: Limit,
+}
+
+impl<'a> Member<'a> {
+    fn place(&self) -> Place {
+        Place::Variable(self.name.clone())
+    }
+
+    fn beginning(&self) -> Cow<'a, [u8]> {
+        match self.deflated {
+            true => Cow::Owned(beginning(self.packed, Wrapping::Bare, HEADER)),
+            false => Cow::Borrowed(&self.packed[..self.packed.len().min(HEADER)]),
+        }
+    }
+
+    fn contents(&self) -> Result<Cow<'a, [u8]>, Error> {
+        let contents = match self.deflated {
+            true => Cow::Owned(inflate(self.packed, Wrapping::Bare, self.limit, &self.place())?),
+            false => Cow::Borrowed(self.packed),
+        };
+        let mut crc = flate2::Crc::new();
+        crc.update(&contents);
+        if crc.sum() == self.crc {
+            return Ok(contents);
+        }
+        let problem = "its checksum differs from the one the zip states".into();
+        Err(Error::new(Kind::Malformed, self.place(), problem, "the file is damaged: copy or export it again"))
+    }
+}
+
+/// Marks of the records of a zip.
+const LOCAL: u32 = 0x0403_4b50;
+const CENTRAL: u32 = 0x0201_4b50;
+const END: u32 = 0x0605_4b50;
+const END_64: u32 = 0x0606_4b50;
+const LOCATOR_64: u32 = 0x0706_4b50;
+
+/// What stands in a field of 32 bits whose value needs 64.
+const IN_EXTRA: usize = u32::MAX as usize;
+
+fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
+    let mut zip = Bytes::new(bytes, Order::Little);
+    zip.seek(directory(bytes)?)?;
+    let limit = Limit::of(bytes.len());
+    let mut members = Vec::new();
+    while zip.clone().u32().is_ok_and(|mark| mark == CENTRAL) {
+        zip.skip(8);
+        let flags = zip.u16()?;
+        let method = zip.u16()?;
+        zip.skip(4);
+        let crc = zip.u32()?;
+        let (packed, full) = (zip.u32()? as usize, zip.u32()? as usize);
+        let (name, extra, comment) = (zip.u16()?.into(), zip.u16()?.into(), zip.u16()?.into());
+        zip.skip(8);
+        let local = zip.u32()? as usize;
+        let name = String::from_utf8_lossy(zip.take(name)?).into_owned();
+        let extra = zip.take(extra)?;
+        zip.skip(comment);
+        let [_, packed, local] = sizes_64(extra, [full, packed, local])?;
+        let name = name.strip_suffix(".npy").map_or_else(|| name.clone(), str::to_string);
+        if flags & 1 != 0 || !matches!(method, 0 | 8) {
+            let problem = format!("the member is encrypted or packed by method {method}, deflate was expected");
+            let remedy = "write it by numpy.savez or savez_compressed";
+            return Err(Error::new(Kind::Unsupported, Place::Variable(name), problem, remedy));
+        }
+        let mut data = Bytes::new(bytes, Order::Little);
+        data.seek(local)?;
+        if data.u32()? != LOCAL {
+            return Err(data.malformed("the header of a member of a zip", "something else"));
+        }
+        data.skip(22);
+        let skip = usize::from(data.u16()?) + usize::from(data.u16()?);
+        data.skip(skip);
+        members.push(Member { name, deflated: method == 8, packed: data.take(packed)?, crc, limit });
+    }
+    Ok(members)
+}
+
+/// Replaces sizes that need 64 bits by those of the extra field.
+fn sizes_64<const N: usize>(extra: &[u8], mut sizes: [usize; N]) -> Result<[usize; N], Error> {
+    let mut extra = Bytes::new(extra, Order::Little);
+    while extra.left() >= 4 {
+        let (kind, length) = (extra.u16()?, usize::from(extra.u16()?));
+        let field = extra.take(length.min(extra.left()))?;
+        if kind == 1 {
+            let mut field = Bytes::new(field, Order::Little);
+            for size in sizes.iter_mut().filter(|size| **size == IN_EXTRA) {
+                *size = Number::U64.index(&mut field)?;
+            }
+        }
+    }
+    Ok(sizes)
+}
+
+/// Where the central directory of a zip begins.
+fn directory(bytes: &[u8]) -> Result<usize, Error> {
+    // The end record has 22 bytes and a comment of at most 65535 behind it.
+    let from = bytes.len().saturating_sub(22 + 65535);
+    let mark = END.to_le_bytes();
+    let end = bytes[from..].windows(4).rposition(|four| four == mark).map(|at| from + at).ok_or_else(|| {
+        let problem = "the zip has no directory at its end".into();
+        Error::new(Kind::Truncated, Place::Byte(bytes.len()), problem, "it is not complete: export or copy it again")
+    })?;
+    let mut zip = Bytes::new(bytes, Order::Little);
+    zip.seek(end + 16)?;
+    let start = zip.u32()? as usize;
+    if start != IN_EXTRA {
+        return Ok(start);
+    }
+    zip.seek(end.saturating_sub(20))?;
+    if zip.u32()? != LOCATOR_64 {
+        return Ok(start);
+    }
+    zip.skip(4);
+    let record = Number::U64.index(&mut zip)?;
+    zip.seek(record)?;
+    if zip.u32()? != END_64 {
+        return Err(zip.malformed("the 64-bit end record of a zip", "something else"));
+    }
+    zip.skip(44);
+    Number::U64.index(&mut zip)
+}
+
+/// The file of a matrix as SciPy's `load_npz` reads it: compressed columns, both triangles, not packed.
+pub(crate) fn write(matrix: &Matrix) -> Result<Vec<u8>, Error> {
+    let mut entries: Vec<Entry> = matrix.both_triangles().collect();
+    entries.sort_by_key(|e| (e.column, e.row));
+    let largest = i32::MAX as usize;
+    if matrix.rows().max(matrix.columns()).max(entries.len()) > largest {
+        let problem = format!("more than {largest} rows, columns or entries");
+        return Err(Error::new(Kind::TooLarge, Place::File, problem, "write it as Matrix Market"));
+    }
+    let mut pointers = vec![0_i32; matrix.columns() + 1];
+    for e in &entries {
+        pointers[e.column as usize + 1] += 1;
+    }
+    for column in 0..matrix.columns() {
+        pointers[column + 1] += pointers[column];
+    }
+    let shape = [matrix.rows() as i64, matrix.columns() as i64];
+    let count = format!("({},)", entries.len());
+    let le = |values: &mut dyn Iterator<Item = i32>| values.flat_map(i32::to_le_bytes).collect::<Vec<u8>>();
+    let parts = [
+        ("indices", npy::write("<i4", &count, &le(&mut entries.iter().map(|e| e.row as i32)))),
+        ("indptr", npy::write("<i4", &format!("({},)", pointers.len()), &le(&mut pointers.iter().copied()))),
+        ("format", npy::write("|S3", "()", b"csc")),
+        ("shape", npy::write("<i8", "(2,)", &shape.iter().flat_map(|size| size.to_le_bytes()).collect::<Vec<u8>>())),
+        ("data", npy::write("<f8", &count, &entries.iter().flat_map(|e| e.value.to_le_bytes()).collect::<Vec<u8>>())),
+    ];
+    zip(&parts)
+}
+
+/// A zip of members that are not packed.
+fn zip(parts: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, Error> {
+    let (mut bytes, mut directory) = (Vec::new(), Vec::new());
+    let small = |size: usize| {
+        let problem = format!("{size} bytes do not fit into a zip of 32 bits");
+        u32::try_from(size).map_err(|_| Error::new(Kind::TooLarge, Place::File, problem, "write it as Matrix Market"))
+    };
+    for (name, contents) in parts {
+        let name = format!("{name}.npy");
+        let mut crc = flate2::Crc::new();
+        crc.update(contents);
+        let size = small(contents.len())?.to_le_bytes();
+        // Version 2.0, no flags, not packed, at the first moment a zip knows: 1 January 1980.
+        let mut common = vec![20, 0, 0, 0, 0, 0, 0, 0, 0x21, 0];
+        common.extend([crc.sum().to_le_bytes(), size, size].concat());
+        common.extend([name.len() as u8, 0, 0, 0]);
+        let local = small(bytes.len())?;
+        bytes.extend(LOCAL.to_le_bytes());
+        bytes.extend(&common);
+        bytes.extend(name.as_bytes());
+        bytes.extend(contents);
+        directory.extend(CENTRAL.to_le_bytes());
+        directory.extend([20, 0]);
+        directory.extend(&common);
+        directory.extend([0; 10]);
+        directory.extend(local.to_le_bytes());
+        directory.extend(name.as_bytes());
+    }
+    let start = small(bytes.len())?.to_le_bytes();
+    let count = (parts.len() as u16).to_le_bytes();
+    let length = small(directory.len())?.to_le_bytes();
+    bytes.extend(directory);
+    bytes.extend(END.to_le_bytes());
+    bytes.extend([0; 4]);
+    bytes.extend([count, count].concat());
+    bytes.extend([length, start].concat());
+    bytes.extend([0; 2]);
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{list_bytes, read_bytes};
+
+    fn ints(values: &[i64]) -> Vec<u8> {
+        npy::write(
+            "<i8",
+            &format!("({},)", values.len()),
+            &values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>(),
+        )
+    }
+
+    fn doubles(values: &[f64]) -> Vec<u8> {
+        npy::write(
+            "<f8",
+            &format!("({},)", values.len()),
+            &values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>(),
+        )
+    }
+
+    fn csc(pointers: &[i64], rows: &[i64], values: &[f64], format: &[u8; 3]) -> Result<Vec<u8>, Error> {
+        zip(&[
+            ("format", npy::write("|S3", "()", format)),
+            ("shape", ints(&[2, 3])),
+            ("data", doubles(values)),
+            ("indptr", ints(pointers)),
+            ("indices", ints(rows)),
+        ])
+    }
+
+    #[test]
+    fn what_is_written_reads_back_with_both_triangles() -> Result<(), Error> {
+        let matrix = Matrix::new(3, 3, Symmetry::Symmetric, [(0, 0, 1.0 / 3.0), (2, 0, -1e-300), (2, 2, 5.0)])?;
+        let back = read_bytes(&write(&matrix)?, None, None)?;
+        assert_eq!((back.is_symmetric(), back.entries()), (true, matrix.entries()));
+        Ok(())
+    }
+
+    #[test]
+    fn several_arrays_are_listed_and_one_is_picked() -> Result<(), Error> {
+        let file =
+            zip(&[("K", doubles(&[1.0])), ("M", doubles(&[2.0, 3.0])), ("note", npy::write("|S2", "()", b"hi"))])?;
+        let listed: Vec<_> = list_bytes(&file, None)?.iter().map(ToString::to_string).collect();
+        assert_eq!(listed, ["K (1 x 1)", "M (2 x 1)", "note (text)"]);
+        assert_eq!(read_bytes(&file, None, Some("M"))?.get(1, 0), 3.0);
+        let several = read_bytes(&file, None, None).map(|_| ()).map_err(|e| e.to_string());
+        assert_eq!(several, Err("the file holds K (1 x 1), M (2 x 1), note (text); say which one by its name".into()));
+        assert_eq!(read_bytes(&file, None, Some("C")).map_err(|e| e.kind), Err(Kind::Choice));
+        assert_eq!(read_bytes(&file, None, Some("note")).map_err(|e| e.kind), Err(Kind::Unsupported));
+        Ok(())
+    }
+
+    #[test]
+    fn pointers_that_do_not_fit_are_refused() -> Result<(), Error> {
+        let good = read_bytes(&csc(&[0, 1, 1, 2], &[1, 0], &[5.0, 6.0], b"csc")?, None, None)?;
+        assert_eq!((good.get(1, 0), good.get(0, 2)), (5.0, 6.0));
+        let check = |pointers: &[i64], rows: &[i64], format, kind| -> Result<(), Error> {
+            let found = read_bytes(&csc(pointers, rows, &[5.0, 6.0], format)?, None, None);
+            assert_eq!(found.map_err(|e| e.kind), Err(kind), "{pointers:?} {rows:?}");
+            Ok(())
+        };
+        check(&[0, 1, 2], &[1, 0], b"csc", Kind::Count)?;
+        check(&[0, 1, 1, 3], &[1, 0], b"csc", Kind::Count)?;
+        check(&[0, 2, 1, 2], &[1, 0], b"csc", Kind::Count)?;
+        check(&[1, 1, 1, 2], &[1, 0], b"csc", Kind::Count)?;
+        check(&[0, 1, 1, 2], &[2, 0], b"csc", Kind::Count)?;
+        check(&[0, 1, 1, 2], &[-1, 0], b"csc", Kind::Malformed)?;
+        check(&[0, 1, 1, 2], &[1, 0], b"dia", Kind::Unsupported)?;
+        check(&[0, 1, 1, 2], &[1, 0], b"coo", Kind::Malformed)?;
+        Ok(())
+    }
+
+    #[test]
+    fn damage_is_found_by_the_checksum() -> Result<(), Error> {
+        let mut file = csc(&[0, 1, 1, 2], &[1, 0], &[5.0, 6.0], b"csc")?;
+        let at = file.windows(8).position(|eight| eight == 6.0_f64.to_le_bytes()).unwrap_or_default();
+        file[at] ^= 1;
+        assert_eq!(read_bytes(&file, None, None).map_err(|e| e.kind), Err(Kind::Malformed));
+        let half = &file[..file.len() / 2];
+        assert_eq!(read_bytes(half, None, None).map_err(|e| e.kind), Err(Kind::Truncated));
+        Ok(())
+    }
+}

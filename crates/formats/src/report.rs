@@ -1,0 +1,157 @@
+//! What a matrix is like, for a person to read before it is used.
+
+use std::fmt;
+
+use crate::matrix::Matrix;
+
+/// What Abaqus puts on the diagonal of a constrained row.
+const CLAMPED: f64 = 1e36;
+
+/// Names that a report shows.
+const SHOWN: usize = 6;
+
+/// Statistics of one matrix.
+///
+/// ```
+/// use stickslip_formats::{Matrix, Report, Symmetry};
+///
+/// let k = Matrix::new(2, 2, Symmetry::Symmetric, [(0, 0, 2e5), (1, 0, -1e5)])?;
+/// let report = Report::new(&k);
+/// assert_eq!((report.entries, &report.zero_diagonal[..]), (2, &[1][..]));
+/// assert!(report.to_string().contains("2 x 2, 2 entries"));
+/// # Ok::<(), stickslip_formats::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub columns: usize,
+    /// Entries that are kept: of a symmetric matrix those of one triangle.
+    pub entries: usize,
+    /// Zeros that the file states.
+    pub zeros: usize,
+    /// Largest absolute value.
+    pub largest: f64,
+    /// Smallest absolute value that is not zero; infinite without entries.
+    pub smallest: f64,
+    /// Largest `|a_ij - a_ji|` over the largest absolute value; infinite unless the matrix is square.
+    pub asymmetry: f64,
+    /// Rows whose diagonal is zero, from zero: massless ones in a mass matrix, unattached ones in a stiffness matrix.
+    pub zero_diagonal: Vec<usize>,
+    /// Rows whose diagonal is negative, from zero: no matrix with one is positive semidefinite.
+    pub negative_diagonal: Vec<usize>,
+    /// Rows without any entry, from zero.
+    pub empty: Vec<usize>,
+    /// Rows with 1e36 on their diagonal, from zero: constrained ones of Abaqus.
+    pub clamped: Vec<usize>,
+    /// The first names of rows, and how many there are.
+    pub names: Option<(Vec<String>, usize)>,
+    /// Format and variable.
+    pub origin: String,
+}
+
+impl Report {
+    /// Looks through a matrix once.
+    pub fn new(matrix: &Matrix) -> Self {
+        let mut diagonal = vec![0.0; matrix.rows()];
+        let mut filled = vec![false; matrix.rows()];
+        for e in matrix.both_triangles() {
+            filled[e.row as usize] = true;
+            if e.row == e.column {
+                diagonal[e.row as usize] = e.value;
+            }
+        }
+        // Only a square matrix has a diagonal that means anything.
+        let rows = if matrix.rows() == matrix.columns() { matrix.rows() } else { 0 };
+        let where_is = |test: fn(f64) -> bool| (0..rows).filter(|&row| test(diagonal[row])).collect();
+        let largest = matrix.largest();
+        let origin = matrix.origin();
+        Self {
+            rows: matrix.rows(),
+            columns: matrix.columns(),
+            entries: matrix.entries().len(),
+            zeros: origin.zeros,
+            largest,
+            smallest: matrix.entries().iter().map(|e| e.value.abs()).fold(f64::INFINITY, f64::min),
+            asymmetry: match matrix.asymmetry() {
+                0.0 => 0.0,
+                gap => gap / largest,
+            },
+            zero_diagonal: where_is(|value| value == 0.0),
+            negative_diagonal: where_is(|value| value < 0.0),
+            empty: (0..matrix.rows()).filter(|&row| !filled[row]).collect(),
+            clamped: where_is(|value| value == CLAMPED),
+            names: matrix.names().map(|names| (names.iter().take(SHOWN).cloned().collect(), names.len())),
+            origin: [origin.format, &origin.variable].map(str::trim).join(" ").trim().to_string(),
+        }
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { rows, columns, entries, zeros, largest, smallest, asymmetry, .. } = self;
+        write!(f, "{rows} x {columns}, {entries} entries")?;
+        if *zeros > 0 {
+            write!(f, " and {zeros} zeros")?;
+        }
+        if !self.origin.is_empty() {
+            write!(f, ", from {}", self.origin)?;
+        }
+        if *entries > 0 {
+            write!(f, "\nvalues from {smallest:.3e} to {largest:.3e}")?;
+        }
+        match *asymmetry {
+            0.0 => write!(f, "\nsymmetric")?,
+            gap if gap.is_finite() => {
+                write!(f, "\nnot symmetric: the triangles differ by {gap:.1e} of the largest value")?
+            }
+            _ => write!(f, "\nnot square")?,
+        }
+        let lists = [
+            ("a zero diagonal", &self.zero_diagonal),
+            ("a negative diagonal", &self.negative_diagonal),
+            ("no entry", &self.empty),
+            ("1e36 on the diagonal, constrained", &self.clamped),
+        ];
+        for (what, list) in lists.into_iter().filter(|(_, list)| !list.is_empty()) {
+            let first: Vec<String> = list.iter().take(SHOWN).map(|row| (row + 1).to_string()).collect();
+            let more = if list.len() > SHOWN { ", …" } else { "" };
+            let rows = if list.len() == 1 { "row with" } else { "rows with" };
+            write!(f, "\n{} {rows} {what}: {}{more}", list.len(), first.join(", "))?;
+        }
+        if let Some((names, count)) = &self.names {
+            let more = if *count > SHOWN { ", …" } else { "" };
+            write!(f, "\nrows are named {}{more}", names.join(", "))?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+    use crate::matrix::Symmetry;
+
+    #[test]
+    fn a_report_says_what_looks_wrong() -> Result<(), Error> {
+        let entries = [(0, 0, 1e36), (1, 1, -2.0), (2, 1, 4.0), (1, 2, 5.0), (3, 3, 0.0)];
+        let names = (1..=4).map(|row| format!("{row}.x")).collect();
+        let report = Report::new(&Matrix::new(4, 4, Symmetry::General, entries)?.with_names(names)?);
+        assert_eq!(report.clamped, [0]);
+        assert_eq!(report.negative_diagonal, [1]);
+        assert_eq!(report.zero_diagonal, [2, 3]);
+        assert_eq!(report.empty, [3]);
+        assert_eq!(report.asymmetry, 1e-36);
+        assert_eq!((report.smallest, report.zeros), (2.0, 1));
+        let text = "4 x 4, 4 entries and 1 zeros\nvalues from 2.000e0 to 1.000e36\n\
+            not symmetric: the triangles differ by 1.0e-36 of the largest value\n2 rows with a zero diagonal: 3, 4\n\
+            1 row with a negative diagonal: 2\n1 row with no entry: 4\n1 row with 1e36 on the diagonal, constrained: 1\n\
+            rows are named 1.x, 2.x, 3.x, 4.x";
+        assert_eq!(report.to_string(), text);
+        let wide = Report::new(&Matrix::new(1, 2, Symmetry::General, [])?);
+        assert_eq!(wide.to_string(), "1 x 2, 0 entries\nnot square\n1 row with no entry: 1");
+        Ok(())
+    }
+}

@@ -1,0 +1,220 @@
+//! Which orbit of a continuum: friction that holds all the time carries no mean force.
+//!
+//! A slider behind a spring that does not slip over the whole period, `kt (u_max - u_min) <= 2 limit`, remembers for ever where its spring is
+//! relaxed: the return map has a multiplier of one, and every such place `o` within reach has its orbit. Where the motion is its own mirror image
+//! `o` is zero; elsewhere the mean depends on it, and where a gap or another law knows positions so does everything else. Real joints creep: with
+//! any creep, however slow, the mean force dies out, and what is left is `o = ū`, the mean of the motion, or the nearest place at which the
+//! limit is not passed. This orbit is the one that harmonic balance finds by itself; Newton's method on a return map comes to any of them, and is
+//! led to this one here, with the rows of such sliders replaced by `z = kt (u - o)`, and `o` iterated.
+
+use super::OrbitError;
+use super::periodic::{Aim, Closed, ReturnMap, close};
+use crate::model::System;
+use crate::orbit::{Breakdown, Orbit, Symmetry};
+use nalgebra::{DMatrix, DVector};
+use stickslip_numerics::eigen;
+
+/// Rounds of the iteration on the places where springs are relaxed; without gaps one or two are enough, with them a few more.
+const ROUNDS: usize = 40;
+/// Force by which a spring may miss its place, in slip limits: a hundred times what orbits of equal steps are closed to.
+const RELAXED: f64 = 1e-8;
+/// Rounds that are looked back at to extrapolate: more than there are gaps that open and close is of no use.
+const LOOK_BACK: usize = 4;
+/// Differences between rounds below this fraction of the largest are no direction of their own.
+const SAME: f64 = 1e-8;
+/// While a slider is held its limit is so many times higher: on the way it may pass what it must not in the end.
+const HOLDS: f64 = 1e3;
+
+/// A slider behind a spring in a flow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Spring {
+    pub joint: usize,
+    /// Index of its force in the state of the flow.
+    pub state: usize,
+    /// N/m.
+    pub stiffness: f64,
+    /// N.
+    pub limit: f64,
+}
+
+/// A slider that is held for the whole period, and where its spring is relaxed.
+#[derive(Debug, Clone)]
+struct Pin {
+    spring: Spring,
+    /// Of the displacements onto the joint.
+    direction: DVector<f64>,
+    /// Displacement at which the spring is relaxed, less what is imposed at t = 0, m.
+    place: f64,
+}
+
+impl Pin {
+    fn force(&self, state: &[f64]) -> f64 {
+        let along: f64 = self.direction.iter().zip(state).map(|(w, x)| w * x).sum();
+        self.spring.stiffness * (along - self.place)
+    }
+}
+
+/// A return map with held sliders: instead of returning, their forces are what their places ask for.
+struct Pinned<'m> {
+    map: &'m mut dyn Closing,
+    pins: &'m [Pin],
+    /// The derivative of the last return as it is, without pins.
+    own: DMatrix<f64>,
+}
+
+impl ReturnMap for Pinned<'_> {
+    fn returned(&mut self, state: &mut [f64], mut derivative: Option<&mut DMatrix<f64>>) -> Result<(), Breakdown> {
+        let forces: Vec<f64> = self.pins.iter().map(|pin| pin.force(state)).collect();
+        self.map.returned(state, derivative.as_deref_mut())?;
+        if let Some(derivative) = derivative.as_deref() {
+            self.own.copy_from(derivative);
+        }
+        for (pin, force) in self.pins.iter().zip(forces) {
+            let row = pin.spring.state;
+            state[row] = force;
+            if let Some(derivative) = derivative.as_deref_mut() {
+                derivative.row_mut(row).fill(0.0);
+                for (i, w) in pin.direction.iter().enumerate() {
+                    derivative[(row, i)] = pin.spring.stiffness * w;
+                }
+            }
+        }
+        Ok(())
+    }
+    fn weights(&self) -> &[f64] {
+        self.map.weights()
+    }
+}
+
+/// A return map that can make orbits of closed states.
+pub(super) trait Closing: ReturnMap {
+    /// Its sliders behind springs.
+    fn springs(&self) -> Vec<Spring>;
+    /// Gives these, which are all of [`Closing::springs`], the limits that they state.
+    fn limit(&mut self, springs: &[Spring]);
+    /// The orbit of a state that was closed last.
+    fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError>;
+}
+
+/// The orbit of the continuum that `first` is of in which held sliders carry no mean force, closed with the same aim; `first` itself if it is alone, or
+/// if that orbit is not found.
+pub(super) fn relaxed(map: &mut dyn Closing, system: &System, first: Orbit, aim: Aim) -> Orbit {
+    if first.symmetry == Symmetry::HalfPeriod || first.evidence.history.is_empty() {
+        return first;
+    }
+    let springs = map.springs();
+    let found = iterate(map, system, &first, &springs, aim);
+    map.limit(&springs);
+    found.unwrap_or(first)
+}
+
+fn iterate(map: &mut dyn Closing, system: &System, first: &Orbit, springs: &[Spring], aim: Aim) -> Option<Orbit> {
+    let (mut orbit, mut rounds) = (first.clone(), Rounds::default());
+    for _ in 0..ROUNDS {
+        let held = held(system, &orbit, springs);
+        if held.iter().all(|slider| slider.gap().abs() <= RELAXED * slider.spring.limit / slider.spring.stiffness) {
+            return Some(orbit);
+        }
+        let places = rounds.next(&held);
+        let pins: Vec<Pin> = held
+            .iter()
+            .zip(&places)
+            .map(|(slider, place)| {
+                let direction = system.joints()[slider.spring.joint].axes()[0].dense(system.dofs());
+                let imposed = slider.begin - direction.iter().zip(&orbit.start).map(|(w, x)| w * x).sum::<f64>();
+                Pin { spring: slider.spring, direction, place: place - imposed }
+            })
+            .collect();
+        let mut state = orbit.start.clone();
+        pins.iter().for_each(|pin| state[pin.spring.state] = pin.force(&orbit.start));
+        let mut limits = springs.to_vec();
+        for spring in &mut limits {
+            if pins.iter().any(|pin| pin.spring.state == spring.state) {
+                spring.limit *= HOLDS;
+            }
+        }
+        map.limit(&limits);
+        let own = DMatrix::zeros(state.len(), state.len());
+        let mut pinned = Pinned { map: &mut *map, pins: &pins, own };
+        let closed = close(&mut pinned, &state, aim).ok()?;
+        let derivative = pinned.own;
+        let iterations = orbit.evidence.iterations + closed.iterations;
+        let missing = orbit.evidence.truncation;
+        orbit = map.finish(Closed { iterations, missing, derivative, ..closed }).ok()?;
+    }
+    None
+}
+
+/// A slider that is held in an orbit.
+struct Held {
+    spring: Spring,
+    /// Relative displacement at t = 0, m.
+    begin: f64,
+    /// Where its spring is relaxed, and where it ought to be, m.
+    is: f64,
+    ought: f64,
+}
+
+impl Held {
+    fn gap(&self) -> f64 {
+        self.ought - self.is
+    }
+}
+
+fn held(system: &System, orbit: &Orbit, springs: &[Spring]) -> Vec<Held> {
+    let begin = orbit.sample(0.0);
+    let means: Vec<f64> = orbit.places.iter().map(|place| place.mean).collect();
+    springs
+        .iter()
+        .filter_map(|&spring| {
+            let (low, high) = orbit.joints[spring.joint].displacement[0];
+            let reach = spring.limit / spring.stiffness;
+            if high - low > 2.0 * reach {
+                return None;
+            }
+            let axis = &system.joints()[spring.joint].axes()[0];
+            let mean = axis.along(&means) + axis.imposed_at(0).re;
+            let begin = begin.joints[spring.joint].displacement[0];
+            let is = begin - orbit.start[spring.state] / spring.stiffness;
+            Some(Held { spring, begin, is, ought: mean.max(high - reach).min(low + reach) })
+        })
+        .collect()
+}
+
+/// The rounds so far, for as long as the same sliders are held: places and gaps.
+#[derive(Default)]
+struct Rounds {
+    states: Vec<usize>,
+    places: Vec<DVector<f64>>,
+    gaps: Vec<DVector<f64>>,
+}
+
+impl Rounds {
+    /// The places to try next: where a linear map from places to gaps, as the last rounds show it, has none.
+    ///
+    /// Source: Walker and Ni (2011), "Anderson acceleration for fixed-point iterations".
+    fn next(&mut self, held: &[Held]) -> DVector<f64> {
+        let states: Vec<usize> = held.iter().map(|slider| slider.spring.state).collect();
+        if states != self.states {
+            *self = Rounds { states, ..Rounds::default() };
+        }
+        let place = DVector::from_iterator(held.len(), held.iter().map(|slider| slider.is));
+        let gap = DVector::from_iterator(held.len(), held.iter().map(Held::gap));
+        let mut next = &place + &gap;
+        let count = self.places.len();
+        if count > 0 {
+            let back = count.min(LOOK_BACK);
+            let column = |list: &[DVector<f64>], now: &DVector<f64>, k: usize| now - &list[count - 1 - k];
+            let gaps = DMatrix::from_columns(&(0..back).map(|k| column(&self.gaps, &gap, k)).collect::<Vec<_>>());
+            let moved = DMatrix::from_columns(&(0..back).map(|k| column(&self.places, &place, k)).collect::<Vec<_>>());
+            let share =
+                eigen::singular(gaps.clone()).and_then(|svd| svd.solve(&gap, SAME * svd.singular_values.amax()).ok());
+            if let Some(share) = share {
+                next -= (moved + gaps) * share;
+            }
+        }
+        self.places.push(place);
+        self.gaps.push(gap);
+        next
+    }
+}

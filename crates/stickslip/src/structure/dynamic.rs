@@ -1,0 +1,60 @@
+//! What a structure answers to harmonic forces: `(s² M + s C + K) x = F` at `s = jhΩ`.
+
+use super::{Form, Structure};
+use num_complex::Complex64;
+use stickslip_numerics::dense::ComplexLu;
+use stickslip_numerics::sparse::{Analysis, ComplexFactor, Singular};
+
+/// The dynamic stiffness of a structure at one rate, factored: it answers as many loads as one likes.
+#[derive(Debug, Clone)]
+pub struct DynamicStiffness {
+    factor: Factor,
+}
+
+#[derive(Debug, Clone)]
+enum Factor {
+    Full(ComplexLu),
+    Sparse(ComplexFactor),
+}
+
+impl Structure {
+    /// `s² M + s C + K` at any rate `s` (1/s), factored; harmonic h of the frequency Ω has `s = jhΩ`.
+    ///
+    /// # Errors
+    /// [`Singular`]: a resonance without damping, or at rest a structure that can drift.
+    pub fn dynamic_stiffness(&self, s: Complex64) -> Result<DynamicStiffness, Singular> {
+        self.held_stiffness(s, 0.0)
+    }
+
+    /// The same with springs of `hold` (1/s²) times every mass.
+    pub(crate) fn held_stiffness(&self, s: Complex64, hold: f64) -> Result<DynamicStiffness, Singular> {
+        let of_mass = s * s + hold;
+        let factor = match &self.0.form {
+            Form::Full(full) => {
+                let n = self.dofs();
+                let entries = full.mass.iter().zip(full.damping.iter()).zip(full.stiffness.iter());
+                let sum = entries.map(|((m, c), k)| of_mass * m + s * c + k).collect();
+                Factor::Full(ComplexLu::new(sum, n).map_err(|row| Singular { row })?)
+            }
+            Form::Sparse { mass, damping, stiffness, analysis, .. } => {
+                let analysis = analysis.get_or_init(|| Analysis::new(&[mass, damping, stiffness]));
+                let one = Complex64::new(1.0, 0.0);
+                Factor::Sparse(analysis.factor_complex(&[(of_mass, mass), (s, damping), (one, stiffness)])?)
+            }
+        };
+        Ok(DynamicStiffness { factor })
+    }
+}
+
+impl DynamicStiffness {
+    /// Displacements (m) from forces (N), in place: columns of length n, one after the other.
+    ///
+    /// # Panics
+    /// If the length of `loads` is no multiple of n.
+    pub fn solve(&self, loads: &mut [Complex64]) {
+        match &self.factor {
+            Factor::Full(factor) => factor.solve(loads),
+            Factor::Sparse(factor) => factor.solve(loads),
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! The reference of study files for the book, made of what the schema, the lists of laws and methods, and the templates say of themselves.
+
+use crate::kind::Kind;
+use crate::schema::{FILE, Key, Presence, STUDY, Takes, described};
+use crate::{kinds, templates};
+use stickslip::{law, method};
+
+/// The reference of study files, key by key, as Markdown tables.
+pub fn markdown() -> String {
+    let mut book = String::new();
+    let rows = |book: &mut String, heading: &str, intro: &str, keys: &[Key]| {
+        book.push_str(&format!("## {heading}\n\n"));
+        if !intro.is_empty() {
+            book.push_str(&format!("{intro}\n\n"));
+        }
+        book.push_str("| key | takes | without it | what it is | example |\n| --- | --- | --- | --- | --- |\n");
+        for key in keys.iter().filter(|key| key.is_taken()) {
+            let absent = match key.presence {
+                Presence::Required => "error".to_owned(),
+                Presence::Optional => String::new(),
+                Presence::Default(value) => format!("`{value}`"),
+            };
+            let example = if key.example == "[]" { String::new() } else { format!("`{} = {}`", key.name, key.example) };
+            let cells = [format!("`{}`", key.name), described(&key.takes), absent, key.doc.to_owned(), example];
+            book.push_str(&format!("| {} |\n", cells.map(|cell| cell.replace('|', "\\|")).join(" | ")));
+        }
+        book.push('\n');
+    };
+    rows(&mut book, "Top of the file", "", FILE);
+    for key in FILE {
+        match key.takes {
+            Takes::List(keys) => rows(&mut book, &format!("`[[{}]]`", key.name), key.doc, keys),
+            Takes::Table(keys) => rows(&mut book, &format!("`[{}]`", key.name), key.doc, keys),
+            _ => {}
+        }
+    }
+    rows(&mut book, "`[study]`", "The keys of every kind; each kind adds its own.", STUDY);
+    for Kind { info: kind, .. } in kinds::TABLE {
+        rows(&mut book, &format!("`[study]` with `kind = \"{}\"`", kind.name), kind.summary, kind.keys);
+        for key in kind.keys {
+            if let Takes::Table(keys) = key.takes {
+                rows(&mut book, &format!("`{}` of `{}`", key.name, kind.name), key.doc, keys);
+            }
+        }
+    }
+    let named = |book: &mut String, name: &str, summary: &str, keys: &[(&str, String, &str)]| {
+        book.push_str(&format!("- `{name}`: {summary}\n"));
+        for (key, takes, doc) in keys {
+            book.push_str(&format!("  - `{key}` ({takes}): {doc}\n"));
+        }
+    };
+    let described = crate::expression::described;
+    book.push_str("## Laws\n\n");
+    for row in law::TABLE {
+        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.takes(), p.doc)).collect();
+        named(&mut book, row.name, row.summary, &keys);
+    }
+    book.push_str("\n## Methods\n\n");
+    for row in method::TABLE {
+        let keys: Vec<_> = row.options.iter().map(|o| (o.key, described(o.dimension), o.doc)).collect();
+        named(&mut book, row.name, row.summary, &keys);
+    }
+    book.push_str("\n## Templates\n\n");
+    for row in templates::TABLE {
+        let parameters = row.parameters();
+        let keys: Vec<_> =
+            parameters.iter().map(|p| (p.key.as_str(), described(p.dimension), p.doc.as_str())).collect();
+        named(&mut book, row.name, row.summary(), &keys);
+    }
+    book
+}

@@ -1,0 +1,141 @@
+//! The names of a model in the values of a key: of places, of joints, of moved places. A node stands for all its directions, a joint of nodes
+//! likewise; where a key takes one place, it is refused with its directions named.
+
+use crate::info::Complaint;
+use crate::near::{nearest, one_of, shown};
+use stickslip::model::Model;
+
+/// Names that a message lists.
+const LISTED: usize = 12;
+
+/// The names that a key may take, and what each stands for.
+#[derive(Debug, Default)]
+pub(crate) struct Names {
+    known: Vec<(String, Vec<String>)>,
+}
+
+/// `a` itself, or under its name every one of several labels.
+fn entries(name: &str, labels: Vec<String>) -> Vec<(String, Vec<String>)> {
+    let mut entries: Vec<_> = labels.iter().map(|label| (label.clone(), vec![label.clone()])).collect();
+    if labels.iter().all(|label| label != name) {
+        entries.push((name.to_owned(), labels));
+    }
+    entries
+}
+
+impl Names {
+    /// The places of all masses, and their nodes.
+    pub fn of_masses(model: &Model) -> Names {
+        Names { known: model.masses.iter().flat_map(|mass| entries(&mass.name, mass.places())).collect() }
+    }
+
+    /// Those of masses whose motion is not imposed.
+    pub fn of_free_masses(model: &Model) -> Names {
+        let mut names = Names::of_masses(model);
+        names.known.retain(|(_, places)| !model.motions.iter().any(|motion| places.contains(&motion.on)));
+        names
+    }
+
+    /// The joints too, with their directions.
+    #[must_use]
+    pub fn and_joints(mut self, model: &Model) -> Names {
+        self.known.extend(model.joints.iter().flat_map(|joint| entries(&joint.name, model.joint_labels(joint))));
+        self
+    }
+
+    /// The places with an imposed motion too.
+    #[must_use]
+    pub fn and_moved(mut self, model: &Model) -> Names {
+        self.known.extend(model.motions.iter().map(|motion| (motion.on.clone(), vec![motion.on.clone()])));
+        self
+    }
+
+    /// Whether there are any.
+    pub fn is_empty(&self) -> bool {
+        self.known.is_empty()
+    }
+
+    /// What a name stands for: itself, or all its directions. `what` says what it should be, for the message.
+    pub fn all(&self, key: &'static str, what: &str, name: &str) -> Result<&[String], Complaint> {
+        let found = self.known.iter().find(|(known, _)| known == name).map(|(_, labels)| labels.as_slice());
+        found.ok_or_else(|| {
+            let words = || self.known.iter().map(|(known, _)| known.as_str());
+            let help = match self.directions_of(name) {
+                Some(directions) => format!("say {}", one_of(directions.iter().map(String::as_str))),
+                None => match nearest(name, words()) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None if self.is_empty() => format!("the model has no {what}"),
+                    None => format!("choose {}", one_of(words().take(LISTED))),
+                },
+            };
+            Complaint { name: Some(name.to_owned()), ..Complaint::new(key, self.missing(what, name), help) }
+        })
+    }
+
+    /// The one place or joint that a name stands for.
+    pub fn one(&self, key: &'static str, what: &str, name: &str) -> Result<&str, Complaint> {
+        match self.all(key, what, name)? {
+            [one] => Ok(one),
+            several => {
+                let message = format!("`{name}` has several directions, and one is needed");
+                let help = format!("say {}", one_of(several.iter().map(String::as_str)));
+                Err(Complaint { name: Some(name.to_owned()), ..Complaint::new(key, message, help) })
+            }
+        }
+    }
+
+    /// The directions that there are, of a name with one that there is not: those of `tip` for `tip.y`.
+    pub fn directions_of(&self, name: &str) -> Option<&[String]> {
+        let (node, _) = name.split_once('.')?;
+        let (_, labels) = self.known.iter().find(|(known, labels)| known == node && labels.len() > 1)?;
+        Some(labels)
+    }
+
+    /// That a name is none of them.
+    pub fn missing(&self, what: &str, name: &str) -> String {
+        let none = format!("there is no {what} `{}`", shown(name));
+        match name.split_once('.').filter(|_| self.directions_of(name).is_some()) {
+            Some((node, direction)) => format!("{none}: `{node}` has no direction {}", shown(direction)),
+            None => none,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+    use stickslip::law::FrictionContact;
+    use stickslip::model::{GROUND, Joint, Mass};
+
+    fn model() -> Model {
+        let law = FrictionContact { tangential: 1.0, normal: 1.0, friction: 0.1, preload: 1.0, tangents: 1 };
+        Model {
+            masses: vec![
+                Mass { name: "tip".into(), mass: 1.0, directions: vec!["x".into(), "z".into()] },
+                Mass::new("root", 1.0),
+            ],
+            joints: vec![Joint { name: "rub".into(), between: ["tip".into(), GROUND.into()], law: Arc::new(law) }],
+            ..Model::default()
+        }
+    }
+
+    #[test]
+    fn a_node_stands_for_its_directions_or_names_them() {
+        let names = Names::of_masses(&model()).and_joints(&model());
+        assert_eq!(names.all("only", "mass", "tip").unwrap(), ["tip.x", "tip.z"]);
+        assert_eq!(names.all("only", "mass", "rub").unwrap(), ["rub.x", "rub.z"]);
+        assert_eq!(
+            (names.one("start", "mass", "tip.z"), names.one("start", "mass", "root")),
+            (Ok("tip.z"), Ok("root"))
+        );
+        let help = |found: Result<&str, Complaint>| found.unwrap_err().help.unwrap();
+        for wrong in ["tip", "tip.y"] {
+            assert_eq!(help(names.one("start", "mass", wrong)), "say `tip.x` or `tip.z`", "{wrong}");
+        }
+        let wrong = names.one("start", "mass", "tip.y").unwrap_err();
+        assert_eq!(wrong.message, "there is no mass `tip.y`: `tip` has no direction y");
+        assert_eq!(help(names.one("start", "mass", "roof")), "did you mean `root`?");
+        assert!(help(names.one("start", "mass", "q")).contains("`root`"));
+    }
+}

@@ -1,0 +1,139 @@
+//! Tables whose `kind` says which keys they have: laws, `[method]`, `[study]`; and `[figure]`.
+
+use super::reader::Reader;
+use crate::document::{Content, Entry, Node, Table};
+use crate::error::{Place, Problem};
+use crate::info::KindInfo;
+use crate::kinds;
+use crate::near::one_of;
+use crate::schema::{self, FILE, Key, Presence, STUDY, Takes, Within};
+use crate::statement::{Stated, StatedTable};
+use stickslip::dimension::Dimension;
+use stickslip::law::{self, LawInfo};
+use stickslip::method;
+
+impl Reader {
+    /// The row named by `kind` in a table of laws, methods or study kinds.
+    fn kind<T: 'static>(
+        &mut self,
+        table: &Table,
+        (what, example): (&str, &str),
+        rows: &'static [T],
+        name: fn(&T) -> &'static str,
+    ) -> Option<&'static T> {
+        let words: Vec<&str> = rows.iter().map(name).collect();
+        let Some(entry) = table.get("kind") else {
+            let message = format!("`kind` is missing in {what}: one of {}", one_of(words));
+            self.problems.push(Problem::new(&table.place, "kind", message).help(format!("add kind = \"{example}\"")));
+            return None;
+        };
+        let place = &entry.node.place;
+        match &entry.node.value {
+            Content::Text { text, .. } => match rows.iter().find(|row| name(row) == text) {
+                Some(row) => Some(row),
+                None => {
+                    self.unknown_word("kind", text, place, words);
+                    None
+                }
+            },
+            other => {
+                let message = format!("expected one of {}, found {}", one_of(words), other.described());
+                self.problems.push(Problem::new(place, "kind", message));
+                None
+            }
+        }
+    }
+
+    pub(super) fn law(&mut self, table: &Table) -> Option<Stated> {
+        let row: &'static LawInfo = *self.kind(table, ("the law", "coulomb"), law::TABLE, |row| row.name)?;
+        let mut keys = vec![schema::required("kind", Takes::Text, "law", "\"coulomb\"")];
+        keys.extend(row.parameters.iter().map(|p| Key {
+            name: p.key,
+            takes: Takes::Quantity(p.dimension, crate::key::within(p.range)),
+            presence: if p.default.is_some() { Presence::Optional } else { Presence::Required },
+            doc: p.doc,
+            example: example_of(p.dimension),
+        }));
+        Some(Stated::Law(row, self.table(table, &keys, &format!("law `{}`", row.name))))
+    }
+
+    pub(super) fn method(&mut self, root: &Table) -> Option<StatedTable> {
+        let absent = Table::default();
+        let table = match root.get("method").map(|entry| &entry.node) {
+            None => &absent,
+            Some(Node { value: Content::Table(table), .. }) => table,
+            Some(node) => {
+                let message = format!("expected a table, found {}", node.value.described());
+                self.problems
+                    .push(Problem::new(&node.place, "method", message).help("write [method] and below it its kind"));
+                return None;
+            }
+        };
+        let row = match table.get("kind") {
+            None => method::find("auto")?,
+            Some(_) => self.kind(table, ("[method]", "auto"), method::TABLE, |row| row.name)?,
+        };
+        let mut keys = schema::METHOD.to_vec();
+        keys.extend(row.options.iter().map(|option| Key {
+            name: option.key,
+            takes: if option.count {
+                Takes::Count(1, 1_000_000)
+            } else {
+                Takes::Quantity(option.dimension, Within::Positive)
+            },
+            presence: Presence::Optional,
+            doc: option.doc,
+            example: if option.count { "15" } else { example_of(option.dimension) },
+        }));
+        Some(self.table(table, &keys, &format!("method `{}`", row.name)))
+    }
+
+    pub(super) fn request<'a>(
+        &mut self,
+        root: &'a Table,
+    ) -> Option<(&'static KindInfo, StatedTable, Option<&'a Entry>)> {
+        let node = &root.get("study")?.node;
+        let Content::Table(table) = &node.value else {
+            let message = format!("expected a table, found {}", node.value.described());
+            self.problems.push(Problem::new(&node.place, "study", message).help("write [study] and below it its kind"));
+            return None;
+        };
+        let kind = &self.kind(table, ("[study]", "response"), kinds::TABLE, |row| row.info.name)?.info;
+        let mut keys = STUDY.to_vec();
+        keys.extend(kind.keys);
+        // `vary` is not a value of the kind: it makes the cases
+        let owner = format!("a study of kind `{}`", kind.name);
+        self.check_keys(table, &keys, &owner);
+        let rest: Vec<Key> = keys.into_iter().filter(|key| !matches!(key.takes, Takes::Vary)).collect();
+        let stated = self.stated(table, &rest);
+        Some((kind, stated, table.get("vary")))
+    }
+
+    /// `[figure]`, empty if it is absent.
+    pub(super) fn figure(&mut self, root: &Table) -> StatedTable {
+        let key = FILE.iter().find(|key| key.name == "figure");
+        let stated = root.get("figure").zip(key).and_then(|(entry, key)| self.value(key, &entry.node));
+        match stated {
+            Some(Stated::Table(table)) => table,
+            _ => StatedTable { place: Place::default(), entries: Vec::new(), turn: Default::default() },
+        }
+    }
+}
+
+/// An example of a quantity, for messages.
+fn example_of(dimension: Dimension) -> &'static str {
+    match dimension {
+        Dimension::FORCE => "\"2 N\"",
+        Dimension::STIFFNESS => "\"10000 N/m\"",
+        Dimension::INVERSE_VELOCITY => "\"25 s/mm\"",
+        Dimension::VELOCITY => "\"0.1 mm/s\"",
+        Dimension::NONE => "1e-9",
+        Dimension::FREQUENCY => "\"121 Hz\"",
+        Dimension::TIME => "\"1 ms\"",
+        Dimension::LENGTH => "\"1 mm\"",
+        Dimension::MASS => "\"182 g\"",
+        Dimension::DAMPING => "\"0.2 kg/s\"",
+        Dimension::CUBIC_STIFFNESS => "\"4e9 N/m^3\"",
+        _ => "",
+    }
+}

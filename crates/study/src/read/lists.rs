@@ -1,0 +1,180 @@
+//! The lists of a model, `[[mass]]` and the others, with entries that `repeat` states many times.
+
+use super::reader::Reader;
+use crate::document::{Content, Entry, Node, Table};
+use crate::error::{Place, Problem};
+use crate::expression::is_reserved;
+use crate::near::shown;
+use crate::repeat::{Index, Repetition};
+use crate::schema::{FILE, Key, MOST_ELEMENTS, Takes};
+use crate::statement::StatedTable;
+use crate::study::Lists;
+use stickslip::model::is_identifier;
+
+/// Largest value of an index: names stay short, and sums of indices exact.
+const LARGEST_INDEX: u64 = 1_000_000;
+
+impl Reader {
+    pub(super) fn lists(&mut self, root: &Table) -> Option<Lists> {
+        let mut lists = Lists::default();
+        for key in FILE {
+            let (node, name) = match root.get(key.name) {
+                Some(entry) => (&entry.node, key.name),
+                None => continue,
+            };
+            match (key.takes, &node.value) {
+                // a template that is unknown, or no table at all
+                (Takes::Table(keys), Content::Table(table)) => {
+                    self.table(table, keys, &format!("[{name}]"));
+                }
+                (Takes::Table(_), _) => {
+                    self.wrong_type(key, node);
+                }
+                (Takes::List(keys), Content::List(list)) => {
+                    let mut elements = 0;
+                    for (i, node) in list.iter().enumerate() {
+                        match &node.value {
+                            Content::Table(table) => {
+                                let owner = format!("{name} {}", i + 1);
+                                let Some(repetition) = self.repetition(table, &owner) else { continue };
+                                elements = repetition.count().saturating_add(elements);
+                                if elements > MOST_ELEMENTS {
+                                    let message = format!("{elements} elements; the limit is {MOST_ELEMENTS}");
+                                    self.problems.push(Problem::new(&node.place, name, message));
+                                    break;
+                                }
+                                let stated = self.repeated(table, keys, &owner, repetition);
+                                lists.get_mut(name)?.extend(stated);
+                            }
+                            other => {
+                                let message = format!("expected a table, found {}", other.described());
+                                let problem = Problem::new(&node.place, name, message);
+                                self.problems.push(problem.help(format!("write [[{name}]] and its keys below")));
+                            }
+                        }
+                    }
+                }
+                (Takes::List(_), other) => {
+                    let message = format!("expected a list of tables, found {}", other.described());
+                    let problem = Problem::new(&node.place, name, message);
+                    self.problems.push(problem.help(format!("write [[{name}]] with two brackets")));
+                }
+                _ => {}
+            }
+        }
+        for spring in &lists.spring {
+            if spring.entry("stiffness").is_none() && spring.entry("damping").is_none() && self.problems.is_empty() {
+                let message = "a spring needs a stiffness, a damping, or both";
+                self.problems
+                    .push(Problem::new(&spring.place, "stiffness", message).help("add stiffness = \"105103 N/m\""));
+            }
+        }
+        Some(lists)
+    }
+
+    /// The entries that one entry states, up to the first that is wrong.
+    fn repeated(&mut self, table: &Table, keys: &[Key], owner: &str, repetition: Repetition) -> Vec<StatedTable> {
+        self.repetition = repetition;
+        let mut all = Vec::with_capacity(self.repetition.count());
+        for number in 0..self.repetition.count() {
+            self.number = number;
+            let before = self.problems.len();
+            let mut stated = self.table(table, keys, owner);
+            let turn = self.turn().words();
+            if !turn.is_empty() {
+                for problem in &mut self.problems[before..] {
+                    problem.message = format!("{} ({turn})", problem.message);
+                }
+                stated.turn = format!("{owner}, {turn}");
+            }
+            all.push(stated);
+            if self.problems.len() > before {
+                break;
+            }
+        }
+        (self.repetition, self.number) = (Repetition::default(), 0);
+        all
+    }
+
+    /// The indices of `repeat`; none if it is absent.
+    fn repetition(&mut self, table: &Table, owner: &str) -> Option<Repetition> {
+        let Some(entry) = table.get("repeat") else { return Some(Repetition::default()) };
+        let before = self.problems.len();
+        let mut refuse = |place: &Place, message: String, help: Option<&str>| {
+            let problem = Problem::new(place, "repeat", message);
+            self.problems.push(problem.maybe_help(help.map(str::to_owned)));
+        };
+        let example = Some("write it as in repeat = { i = 12 } or repeat = { i = [2, 11] }");
+        let Content::Table(repeat) = &entry.node.value else {
+            let message = format!("expected a table of indices in {owner}, found {}", entry.node.value.described());
+            refuse(&entry.node.place, message, example);
+            return None;
+        };
+        let mut indices = Vec::new();
+        for Entry { key, key_place, node } in repeat.entries.iter().filter(|entry| entry.key != "wrap") {
+            let whole = |node: &Node| match node.value {
+                Content::Number { whole, .. } => whole.filter(|whole| whole.unsigned_abs() <= LARGEST_INDEX),
+                _ => None,
+            };
+            let range = match &node.value {
+                Content::List(list) if list.len() == 2 => whole(&list[0]).zip(whole(&list[1])),
+                _ => whole(node).map(|times| (1, times)),
+            };
+            if !is_identifier(key) {
+                let message = format!("`{}` is no index: a letter first, then letters, digits and `_`", shown(key));
+                refuse(key_place, message, None);
+            } else if is_reserved(key) {
+                refuse(key_place, format!("`{key}` has a meaning of its own in expressions"), None);
+            } else if self.index.contains_key(key) {
+                let help = Some("give the index another name");
+                refuse(key_place, format!("`{key}` is a parameter already"), help);
+            } else {
+                match range.filter(|(from, to)| from <= to) {
+                    Some((from, to)) => indices.push(Index { name: key.clone(), from, to, wraps: false }),
+                    None => {
+                        let message = format!(
+                            "expected a whole number of times, or [first, last], found {}",
+                            match &node.value {
+                                Content::List(_) => "another list".to_owned(),
+                                other => other.described(),
+                            }
+                        );
+                        refuse(&node.place, message, example);
+                    }
+                }
+            }
+        }
+        if indices.is_empty() && self.problems.len() == before {
+            let problem = Problem::new(&entry.node.place, "repeat", format!("an index is missing in {owner}"));
+            self.problems.push(problem.maybe_help(example.map(str::to_owned)));
+        }
+        if let Some(wrap) = repeat.get("wrap") {
+            self.wrap(wrap, &mut indices);
+        }
+        (self.problems.len() == before).then_some(Repetition { indices })
+    }
+
+    /// Which indices wrap around: all, none, or those named.
+    fn wrap(&mut self, entry: &Entry, indices: &mut [Index]) {
+        let node = &entry.node;
+        let named: Vec<&Node> = match &node.value {
+            Content::Flag(flag) => return indices.iter_mut().for_each(|index| index.wraps = *flag),
+            Content::List(list) => list.iter().collect(),
+            _ => vec![node],
+        };
+        for node in named {
+            let Content::Text { text, .. } = &node.value else {
+                let message = format!("expected true, or the name of an index, found {}", node.value.described());
+                self.problems.push(Problem::new(&node.place, "wrap", message));
+                return;
+            };
+            match indices.iter_mut().find(|index| index.name == *text) {
+                Some(index) => index.wraps = true,
+                None => {
+                    let message = format!("there is no index `{}` in this entry", shown(text));
+                    self.problems.push(Problem::new(&node.place, "wrap", message));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! Templates: the model of one that a study names, and what each is by itself, its parameters and its model.
+
+use super::reader::Reader;
+use crate::document::{self, Content, Table};
+use crate::error::{Problem, Source, StudyError};
+use crate::expression::Value;
+use crate::near::nearest;
+use crate::schema::{FILE, Takes};
+use crate::statement::Environment;
+use crate::study::{Lists, NamedTemplate, Parameter, Structure, evaluate, model_of};
+use crate::templates::{self, Template, comment_behind};
+use std::collections::HashMap;
+use std::sync::Arc;
+use stickslip::dimension::Dimension;
+use stickslip::model::Model;
+
+/// What a template's file states, but for its study.
+pub(super) struct TemplateFile {
+    pub parameters: Vec<Parameter>,
+    pub lists: Lists,
+    /// The file among the sources.
+    pub source: usize,
+}
+
+/// The template of `[model]`, with its table.
+pub(super) fn named_template(root: &Table) -> Option<(&'static Template, &Table)> {
+    let Content::Table(table) = &root.get("model")?.node.value else { return None };
+    let Content::Text { text, .. } = &table.get("template")?.node.value else { return None };
+    Some((templates::find(text)?, table))
+}
+
+impl Reader {
+    /// Reads a template's file, first of all that has parameters: its texts know its own alone, whatever names a
+    /// study adds.
+    pub(super) fn template(&mut self, row: &Template) -> Option<TemplateFile> {
+        let source = self.text(format!("template {}", row.name), row.study.to_owned()).source;
+        let root = match document::parse(row.study, source) {
+            Ok(root) => root,
+            Err(problem) => {
+                self.problems.push(problem);
+                return None;
+            }
+        };
+        let mut parameters = self.parameters(&root, Vec::new(), &[])?;
+        self.settle_dimensions(&mut parameters, &(0..self.names.len()).collect::<Vec<_>>())?;
+        Some(TemplateFile { parameters, lists: self.lists(&root)?, source })
+    }
+
+    /// The model of a template, with the law that the study gives its joints.
+    pub(super) fn with_template(
+        &mut self,
+        root: &Table,
+        row: &Template,
+        mut lists: Lists,
+        table: &Table,
+        source: usize,
+    ) -> Option<Structure> {
+        for key in FILE.iter().filter(|key| matches!(key.takes, Takes::List(_))) {
+            if let Some(entry) = root.get(key.name) {
+                let message =
+                    format!("the template `{}` brings its own model, `{}` cannot be added to it", row.name, key.name);
+                let help = format!(
+                    "change its parameters, or start from `stickslip new {}`, which writes it out as lists",
+                    row.name
+                );
+                self.problems.push(Problem::new(&entry.node.place, key.name, message).help(help));
+            }
+        }
+        let Some(Takes::Table(keys)) = FILE.iter().find(|key| key.name == "model").map(|key| key.takes) else {
+            return None;
+        };
+        let table = self.table(table, keys, "[model]");
+        if let Some(law) = table.entry("law") {
+            for entry in lists.joint.iter_mut().flat_map(|joint| &mut joint.entries).filter(|e| e.key == law.key) {
+                entry.clone_from(law);
+            }
+        }
+        Some(Structure { lists, template: Some(NamedTemplate { table, source }) })
+    }
+}
+
+/// The model of a template with its parameters, compiled.
+struct CompiledTemplate {
+    names: Vec<String>,
+    /// Each has the dimension of its default, if that has any.
+    parameters: Vec<Parameter>,
+    order: Vec<usize>,
+    structure: Structure,
+    sources: Vec<Arc<Source>>,
+}
+
+impl CompiledTemplate {
+    /// The values of the parameters; those that are `fixed` have that value, SI.
+    fn values(&self, fixed: &[(usize, f64)]) -> Result<Vec<Value>, StudyError> {
+        let values = evaluate(&self.names, &self.parameters, &self.order, &HashMap::new(), fixed);
+        values.map_err(|problem| StudyError::at(&self.sources, problem))
+    }
+
+    /// The model; parameters that are `fixed` have that value, SI.
+    fn model(&self, fixed: &[(usize, f64)]) -> Result<Model, StudyError> {
+        let environment = Environment { names: &self.names, values: self.values(fixed)? };
+        let mut problems = Vec::new();
+        let model = model_of(&self.structure, &environment, &mut problems);
+        StudyError::all(&self.sources, problems).map_or(Ok(model), Err)
+    }
+}
+
+/// Compiles the model of a template's file.
+///
+/// # Errors
+/// [`StudyError`]: the file is wrong, which is none of a user's doing.
+fn compile_template(row: &Template) -> Result<CompiledTemplate, StudyError> {
+    let mut reader = Reader::default();
+    let stated = reader.template(row);
+    let order = stated.as_ref().and_then(|stated| reader.order(&stated.parameters, &[]));
+    match (stated, order) {
+        (Some(TemplateFile { parameters, lists, .. }), Some(order)) if reader.problems.is_empty() => {
+            let structure = Structure { lists, template: None };
+            Ok(CompiledTemplate { names: reader.names, parameters, order, structure, sources: reader.sources })
+        }
+        _ => Err(reader.error(row.name)),
+    }
+}
+
+/// A parameter of a template.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TemplateParameter {
+    /// Name.
+    pub key: String,
+    /// Physical dimension: that of the default; a bare number counts as a pure one.
+    pub dimension: Dimension,
+    /// Default as in the file: a quantity, or an expression over other parameters.
+    pub default: String,
+    /// The same number in SI, with the other parameters at their defaults.
+    pub value: f64,
+    /// One line.
+    pub doc: String,
+}
+
+impl Template {
+    /// Its parameters, in the order of the file.
+    ///
+    /// # Example
+    /// ```
+    /// let couple = stickslip_study::templates::find("blade-couple").unwrap();
+    /// let limit = couple.parameters().into_iter().find(|parameter| parameter.key == "Ft").unwrap();
+    /// assert_eq!((limit.default.as_str(), limit.value, limit.doc.as_str()), ("2 N", 2.0, "slip limit"));
+    /// ```
+    ///
+    /// # Panics
+    /// If the file is wrong; those of [`TABLE`] are tested.
+    pub fn parameters(&self) -> Vec<TemplateParameter> {
+        let compiled = compile_template(self).and_then(|compiled| Ok((compiled.values(&[])?, compiled)));
+        let (values, compiled) = compiled.unwrap_or_else(|error| panic!("template {}: {error}", self.name));
+        let mut parameters = Vec::with_capacity(values.len());
+        for (i, value) in values.iter().enumerate() {
+            let quantity = &compiled.parameters[i].quantity;
+            parameters.push(TemplateParameter {
+                key: compiled.names[i].clone(),
+                dimension: value.dimension.unwrap_or(Dimension::NONE),
+                default: quantity.text.clone(),
+                value: value.si,
+                doc: comment_behind(self.study, quantity.place.span.end).to_owned(),
+            });
+        }
+        parameters
+    }
+
+    /// The model with every parameter at its default.
+    ///
+    /// # Panics
+    /// If the file is wrong; those of [`TABLE`] are tested.
+    pub fn model(&self) -> Model {
+        self.model_with(&[]).unwrap_or_else(|error| panic!("template {}: {error}", self.name))
+    }
+
+    /// The model with some parameters changed (SI). A parameter whose default is an expression over changed ones
+    /// follows them, unless it is given too.
+    ///
+    /// # Errors
+    /// [`StudyError`]: a name that is no parameter of this template, or values that the model cannot have.
+    ///
+    /// # Example
+    /// ```
+    /// let couple = stickslip_study::templates::find("blade-couple").unwrap();
+    /// let model = couple.model_with(&[("Ft", 4.0), ("m", 0.2)]).unwrap();
+    /// assert_eq!(model.joints[0].law.values(), [4.0]);
+    /// assert_eq!(model.masses[1].mass, 0.002);   // m1 = m/100
+    /// let error = couple.model_with(&[("Fx", 4.0)]).unwrap_err();
+    /// assert!(error.message().contains("no parameter `Fx`"));
+    /// assert!(couple.model_with(&[("Ft", -1.0)]).is_err());
+    /// ```
+    pub fn model_with(&self, changes: &[(&str, f64)]) -> Result<Model, StudyError> {
+        let compiled = compile_template(self)?;
+        let mut fixed = Vec::with_capacity(changes.len());
+        for (name, si) in changes {
+            let Some(index) = compiled.names.iter().position(|known| known == name) else {
+                let help = nearest(name, compiled.names.iter().map(String::as_str));
+                let help = help.map(|near| format!("did you mean `{near}`?"));
+                return Err(StudyError::file(self.name, format!("there is no parameter `{name}`"), help));
+            };
+            fixed.push((index, *si));
+        }
+        compiled.model(&fixed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::templates::TABLE;
+
+    #[test]
+    fn every_template_says_what_it_and_each_of_its_parameters_is() {
+        for template in TABLE {
+            assert!(!template.summary().is_empty(), "{}: the first line is no comment", template.name);
+            for parameter in template.parameters() {
+                let place = format!("{}, {}", template.name, parameter.key);
+                assert!(!parameter.doc.is_empty(), "{place}: no comment stands behind it");
+                assert!(parameter.value.is_finite() && parameter.dimension != Dimension::NONE, "{place}");
+            }
+        }
+    }
+}

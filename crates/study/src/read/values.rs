@@ -1,0 +1,288 @@
+//! From a node of the document to a stated value: keys that are unknown or missing, types, names, quantities, ranges.
+
+use super::reader::Reader;
+use crate::document::{Content, Node, Table};
+use crate::error::{Place, Problem};
+use crate::expression::Expression;
+use crate::near::{nearest, one_of, shown};
+use crate::schema::{self, Key, MOST_POINTS, Presence, Takes};
+use crate::statement::{Quantity, Stated, StatedEntry, StatedTable};
+use crate::values::Given;
+use stickslip::model::{is_identifier, is_place};
+
+impl Reader {
+    /// Unknown and missing keys.
+    pub(super) fn check_keys(&mut self, table: &Table, keys: &[Key], owner: &str) {
+        for entry in &table.entries {
+            if !keys.iter().any(|key| key.name == entry.key) {
+                let help = match nearest(&entry.key, keys.iter().map(|key| key.name)) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => {
+                        let taken = keys.iter().filter(|key| key.is_taken()).map(|key| key.name);
+                        format!("the keys of {owner} are {}", one_of(taken).replace(" or ", ", "))
+                    }
+                };
+                let message = format!("{owner} has no key `{}`", shown(&entry.key));
+                self.problems.push(Problem::new(&entry.key_place, shown(&entry.key), message).help(help));
+            }
+        }
+        for key in keys.iter().filter(|key| key.presence == Presence::Required) {
+            if table.get(key.name).is_none() {
+                let message = format!("`{}` is missing in {owner}: {}", key.name, schema::described(&key.takes));
+                let help = match key.takes {
+                    Takes::Study => "add a table [study] with kind = \"response\" and a frequency".to_owned(),
+                    _ => format!("add {} = {}", key.name, key.example),
+                };
+                self.problems.push(Problem::new(&table.place, key.name, message).help(help));
+            }
+        }
+    }
+
+    pub(super) fn table(&mut self, table: &Table, keys: &[Key], owner: &str) -> StatedTable {
+        self.check_keys(table, keys, owner);
+        self.stated(table, keys)
+    }
+
+    /// The values of those keys that are known; unknown and missing ones are the matter of [`Reader::check_keys`].
+    pub(super) fn stated(&mut self, table: &Table, keys: &[Key]) -> StatedTable {
+        let mut entries = Vec::with_capacity(keys.len());
+        for key in keys {
+            let (place, value) = match (table.get(key.name), key.presence) {
+                (Some(entry), _) => (entry.node.place.clone(), self.value(key, &entry.node)),
+                (None, Presence::Default(text)) => (table.place.clone(), self.standing_for(key, text, &table.place)),
+                (None, _) => continue,
+            };
+            entries.extend(value.map(|value| StatedEntry { key: key.name, place, value }));
+        }
+        StatedTable { place: table.place.clone(), turn: String::new(), entries }
+    }
+
+    /// The value that stands for an absent key.
+    fn standing_for(&mut self, key: &Key, text: &str, place: &Place) -> Option<Stated> {
+        let value = match key.takes {
+            Takes::Count(..) => {
+                let whole = text.parse::<i64>().ok();
+                Content::Number { value: whole.unwrap_or(0) as f64, whole }
+            }
+            Takes::Flag => Content::Flag(text == "true"),
+            _ => Content::Text { text: text.to_owned(), inner: None },
+        };
+        self.value(key, &Node { place: place.clone(), value })
+    }
+
+    pub(super) fn wrong_type(&mut self, key: &Key, node: &Node) -> Option<Stated> {
+        let expected = schema::described(&key.takes);
+        self.problems.push(
+            Problem::new(&node.place, key.name, format!("expected {expected}, found {}", node.value.described()))
+                .help(format!("write it as in {} = {}", key.name, key.example)),
+        );
+        None
+    }
+
+    pub(super) fn value(&mut self, key: &Key, node: &Node) -> Option<Stated> {
+        match (&key.takes, &node.value) {
+            (Takes::Text, Content::Text { text, .. }) => Some(Stated::Fixed(Given::Text(text.clone()))),
+            (Takes::Name, Content::Text { text, inner }) => {
+                Some(Stated::Fixed(Given::Text(self.name(key.name, text, *inner, &node.place)?)))
+            }
+            (Takes::Names, Content::Text { text, inner }) => {
+                Some(Stated::Names(vec![(self.name(key.name, text, *inner, &node.place)?, node.place.clone())]))
+            }
+            (Takes::Refused(why), _) => {
+                self.problems.push(Problem::new(&node.place, key.name, *why).help(key.doc));
+                None
+            }
+            (Takes::Repeat, _) => None, // read before the other keys, whose values depend on it
+            (Takes::Names, Content::List(list)) if !list.is_empty() => self.names(key, list),
+            (Takes::Pair, Content::List(list)) if list.len() == 2 => self.names(key, list),
+            (Takes::Pair, Content::List(list)) => {
+                let message = format!("expected two names of places, found {}", list.len());
+                let help = format!("write it as in {} = {}", key.name, key.example);
+                self.problems.push(Problem::new(&node.place, key.name, message).help(help));
+                None
+            }
+            (Takes::Quantity(dimension, within), Content::Text { .. } | Content::Number { .. }) => {
+                let quantity = self.quantity(key.name, node)?;
+                let (dimension, within, example) = (*dimension, *within, key.example);
+                Some(Stated::Quantity { quantity, dimension, within, example })
+            }
+            (Takes::Count(from, to), Content::Number { whole: Some(whole), .. }) => {
+                if (*from..=*to).contains(whole) {
+                    return Some(Stated::Fixed(Given::Count(u64::try_from(*whole).unwrap_or(0))));
+                }
+                let message = format!("expected {}, found {whole}", schema::described(&key.takes));
+                let problem = Problem::new(&node.place, key.name, message);
+                let limit = key.name == "points" && *to == MOST_POINTS as i64 && whole > to;
+                let help = limit.then(|| format!("the limit of a study is {MOST_POINTS} points"));
+                self.problems.push(problem.maybe_help(help));
+                None
+            }
+            (Takes::Flag, Content::Flag(flag)) => Some(Stated::Fixed(Given::Flag(*flag))),
+            (Takes::Frequencies, Content::Text { .. } | Content::Number { .. }) => {
+                Some(Stated::List(vec![self.quantity(key.name, node)?]))
+            }
+            (Takes::Frequencies, Content::List(list)) => {
+                Some(Stated::List(self.quantities(key.name, list, &node.place)?))
+            }
+            (Takes::Frequencies, Content::Table(table)) if table.get("tolerance").is_some() => {
+                let before = self.problems.len();
+                let mut stated = self.table(table, schema::ADAPTIVE, &format!("the range of `{}`", shown(key.name)));
+                let mut take = |key: &str| {
+                    let at = stated.entries.iter().position(|entry| entry.key == key)?;
+                    match stated.entries.swap_remove(at).value {
+                        Stated::Quantity { quantity, .. } => Some(quantity),
+                        _ => None,
+                    }
+                };
+                let (from, to, tolerance) = (take("from"), take("to"), take("tolerance"));
+                if self.problems.len() > before {
+                    return None;
+                }
+                Some(Stated::Adaptive { from: from?, to: to?, tolerance: tolerance? })
+            }
+            (Takes::Frequencies, Content::Table(table)) => {
+                let (from, to, points) = self.range(table, key.name)?;
+                Some(Stated::Range { from, to, points })
+            }
+            (Takes::ByName(dimension), Content::Table(table)) => {
+                let mut names = Vec::new();
+                for entry in &table.entries {
+                    let quantity = self.quantity(&entry.key, &entry.node)?;
+                    names.push((entry.key.clone(), entry.key_place.clone(), quantity));
+                }
+                Some(Stated::ByName(names, *dimension))
+            }
+            (Takes::Table(keys), Content::Table(table)) => {
+                Some(Stated::Table(self.table(table, keys, &format!("`{}`", key.name))))
+            }
+            (Takes::Law, Content::Table(table)) => self.law(table),
+            (Takes::Choice(words), Content::Text { text, .. }) => {
+                let words = words();
+                if words.iter().any(|(word, _)| word == text) {
+                    return Some(Stated::Fixed(Given::Text(text.clone())));
+                }
+                self.unknown_word(key.name, text, &node.place, words.iter().map(|(word, _)| *word).collect());
+                None
+            }
+            _ => self.wrong_type(key, node),
+        }
+    }
+
+    pub(super) fn unknown_word(&mut self, key: &str, word: &str, place: &Place, words: Vec<&str>) {
+        let message = format!("there is no `{}`, expected {}", shown(word), one_of(words.iter().copied()));
+        let help = nearest(word, words).map(|near| format!("did you mean `{near}`?"));
+        self.problems.push(Problem::new(place, key, message).maybe_help(help));
+    }
+
+    /// A name, with the indices of a repetition filled in. What names a place may be a direction of a node, `node.direction`.
+    fn name(&mut self, key: &str, text: &str, inner: Option<usize>, place: &Place) -> Option<String> {
+        let problem = match self.turn().name(text) {
+            Ok(name) if is_identifier(&name) => return Some(name),
+            Ok(name) if !matches!(key, "name" | "directions") && is_place(&name) => return Some(name),
+            Ok(name) => {
+                let message = format!("`{}` is no name: a letter first, then letters, digits and `_`", shown(&name));
+                Problem::new(place, key, message)
+            }
+            Err(fault) if self.repetition.indices.is_empty() => {
+                let help = "braces are for entries of lists that have an index: repeat = { i = 12 }";
+                Problem::fault(place, inner, key, fault).help(help)
+            }
+            Err(fault) => Problem::fault(place, inner, key, fault),
+        };
+        self.problems.push(problem);
+        None
+    }
+
+    fn names(&mut self, key: &Key, list: &[Node]) -> Option<Stated> {
+        let mut names = Vec::with_capacity(list.len());
+        for node in list {
+            let Content::Text { text, inner } = &node.value else { return self.wrong_type(key, node) };
+            names.push((self.name(key.name, text, *inner, &node.place)?, node.place.clone()));
+        }
+        Some(Stated::Names(names))
+    }
+
+    pub(super) fn quantity(&mut self, key: &str, node: &Node) -> Option<Quantity> {
+        let before = self.problems.len();
+        let quantity = self.any_quantity(key, node);
+        if let (None, Content::Text { text, .. }) = (&quantity, &node.value)
+            && let Some((from, to)) = self.two_quantities(text)
+        {
+            self.problems.truncate(before);
+            let message = "a text holds one quantity, this reads like a range";
+            let help = format!(
+                "where a range can stand, write it as {{ from = \"{}\", to = \"{}\", points = 101 }}",
+                shown(from),
+                shown(to)
+            );
+            self.problems.push(Problem::new(&node.place, key, message).help(help));
+        }
+        quantity
+    }
+
+    /// The two quantities of `14 Hz to 19 Hz`, and of what else people write for it.
+    fn two_quantities<'a>(&self, text: &'a str) -> Option<(&'a str, &'a str)> {
+        [" to ", "...", "..", "…", "–", " - ", "; "].iter().find_map(|word| {
+            let (from, to) = text.split_once(word)?;
+            let (from, to) = (from.trim(), to.trim());
+            (self.compile(from).is_ok() && self.compile(to).is_ok()).then_some((from, to))
+        })
+    }
+
+    fn any_quantity(&mut self, key: &str, node: &Node) -> Option<Quantity> {
+        let place = &node.place;
+        let problem = match &node.value {
+            Content::Text { text, inner } => match self.compile(text) {
+                Ok(expression) => {
+                    return Some(Quantity { place: place.clone(), inner: *inner, text: text.clone(), expression });
+                }
+                Err(fault) => Problem::fault(place, *inner, key, fault),
+            },
+            Content::Number { value, .. } if value.is_finite() => {
+                let text = value.to_string();
+                return Some(Quantity {
+                    place: place.clone(),
+                    inner: None,
+                    text,
+                    expression: Expression::number(*value),
+                });
+            }
+            Content::Number { value, .. } => {
+                Problem::new(place, key, format!("a finite number is needed, found {value}"))
+            }
+            other => Problem::new(place, key, format!("expected a quantity, found {}", other.described()))
+                .help("write a number with its unit in quotes, as in \"2 N\""),
+        };
+        self.problems.push(problem);
+        None
+    }
+
+    pub(super) fn quantities(&mut self, key: &str, list: &[Node], place: &Place) -> Option<Vec<Quantity>> {
+        if list.is_empty() {
+            let problem = Problem::new(place, key, "the list is empty, at least one value is needed");
+            self.problems.push(problem);
+            return None;
+        }
+        list.iter().map(|node| self.quantity(key, node)).collect()
+    }
+
+    pub(super) fn range(&mut self, table: &Table, owner: &str) -> Option<(Quantity, Quantity, usize)> {
+        let before = self.problems.len();
+        let mut stated = self.table(table, schema::RANGE, &format!("the range of `{}`", shown(owner)));
+        if self.problems.len() > before {
+            return None;
+        }
+        let mut take = |key: &str| {
+            let at = stated.entries.iter().position(|entry| entry.key == key)?;
+            Some(stated.entries.swap_remove(at).value)
+        };
+        match (take("from")?, take("to")?, take("points")?) {
+            (
+                Stated::Quantity { quantity: from, .. },
+                Stated::Quantity { quantity: to, .. },
+                Stated::Fixed(Given::Count(points)),
+            ) => Some((from, to, usize::try_from(points).ok()?)),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! What is known before anything is computed is said before: a study that was checked is not refused when it runs.
+
+use std::collections::BTreeSet;
+use stickslip::law::{LawInfo, TABLE};
+use stickslip::method;
+use stickslip_study::dataset::Dataset;
+use stickslip_study::run::{Context, check, run};
+use stickslip_study::{StudyError, kinds, read_study};
+
+/// Of every kind a small study: its keys in `[study]`, which may vary the mass `m`, and `[figure]`.
+const STUDIES: &[(&str, &str)] = &[
+    ("orbit", "frequency = \"15 Hz\"\nsamples = 16"),
+    ("response", "frequency = [\"12 Hz\", \"15 Hz\"]\n[figure]\nreferences = true"),
+    ("hysteresis", "frequency = \"15 Hz\"\nsamples = 16"),
+    ("performance", "frequency = { from = \"14 Hz\", to = \"16 Hz\", points = 3 }\nvary = { m = [1, 2, 3] }"),
+    ("branch", "frequency = { from = \"12 Hz\", to = \"13 Hz\", points = 2 }\nsteps = 2\nharmonics = 3\nsamples = 64"),
+    ("modes", "amplitude = { from = \"1 um\", to = \"1 mm\", points = 3 }\nharmonics = 3\nsamples = 64"),
+    ("transient", "frequency = \"15 Hz\"\ncycles = 1"),
+];
+
+/// A node with the directions of the law, each held by a spring, and the law between it and the ground.
+fn model(row: &LawInfo, mass: &str) -> String {
+    let count = row.sample().directions();
+    let directions = &["x", "y", "z"][..count];
+    let places: Vec<String> =
+        directions.iter().map(|d| if count > 1 { format!("a.{d}") } else { "a".to_owned() }).collect();
+    let mut text = format!("schema = 1\n[parameters]\nm = {mass}\n[[mass]]\nname = \"a\"\nmass = \"m * 1 kg\"\n");
+    if count > 1 {
+        text += &format!("directions = {directions:?}\n");
+    }
+    for place in &places {
+        text += &format!("[[spring]]\nbetween = [\"{place}\", \"ground\"]\nstiffness = 1e4\ndamping = 20\n");
+        text += &format!("[[force]]\non = \"{place}\"\namplitude = 5\n");
+    }
+    let values: Vec<String> =
+        row.parameters.iter().zip(row.sample).map(|(p, value)| format!("{} = {value:?}", p.key)).collect();
+    // whole numbers are written as such
+    let values = values.join(", ").replace(".0,", ",");
+    let values = values.strip_suffix(".0").unwrap_or(&values);
+    text + &format!(
+        "[[joint]]\nname = \"j\"\nbetween = [\"a\", \"ground\"]\nlaw = {{ kind = \"{}\", {values} }}\n",
+        row.name
+    )
+}
+
+/// Whether a sentence is a refusal of a model.
+fn refuses(text: &str) -> bool {
+    ["cannot take", "needs a mass", "positive definite", "no method takes"].iter().any(|words| text.contains(words))
+}
+
+/// What a run says of a model that it cannot take.
+fn refusals(outcome: &Result<Dataset, StudyError>) -> Vec<String> {
+    match outcome {
+        Err(error) => vec![error.to_string()],
+        Ok(dataset) => {
+            let failures = dataset.failures.iter().map(ToString::to_string);
+            failures.chain(dataset.notes.clone()).filter(|text| refuses(text)).collect()
+        }
+    }
+}
+
+/// Checks and runs a study; whether it was taken.
+fn hold(what: &str, text: &str) -> bool {
+    let study = read_study("study.toml", text, &[]).unwrap_or_else(|error| panic!("{what}: {error}\n{text}"));
+    let (checked, run) = (check(&study), run(&study, &Context::unwatched(1)));
+    match checked {
+        Ok(_) => assert_eq!(refusals(&run), Vec::<String>::new(), "{what}: checked, and refused when it runs"),
+        // in the same words
+        Err(error) => {
+            assert!(error.help_text().is_some(), "{what}: {error}: and what to do?");
+            let late = run.err().unwrap_or_else(|| panic!("{what}: runs, and {error}"));
+            assert_eq!((error.message(), error.help_text()), (late.message(), late.help_text()), "{what}");
+            return false;
+        }
+    }
+    true
+}
+
+#[test]
+fn every_kind_has_a_study_here() {
+    let here: BTreeSet<&str> = STUDIES.iter().map(|(kind, _)| *kind).collect();
+    assert_eq!(here, kinds::TABLE.iter().map(|kind| kind.info.name).collect());
+}
+
+#[test]
+fn what_was_checked_is_not_refused_when_it_runs() {
+    let (mut taken, mut refused) = (0, 0);
+    for row in TABLE {
+        for (kind, keys) in STUDIES {
+            for mass in ["1", "0"] {
+                let text = format!("{}[study]\nkind = \"{kind}\"\n{keys}\n", model(row, mass));
+                match hold(&format!("{}, {kind}, mass {mass}", row.name), &text) {
+                    true => taken += 1,
+                    false => refused += 1,
+                }
+            }
+        }
+    }
+    assert!(taken > TABLE.len() * STUDIES.len() / 2 && refused > 0, "{taken} {refused}");
+}
+
+/// The same with every method by its name, on one orbit.
+#[test]
+fn a_method_is_refused_or_taken_when_it_is_checked() {
+    for row in TABLE {
+        for method in method::TABLE {
+            let (_, keys) = STUDIES[0];
+            // whether a motion that is waited for settles is no matter here
+            let waits = method.options.iter().any(|option| option.key == "periods");
+            let few = if waits { "\nperiods = 2" } else { "" };
+            let named = format!("{keys}\n[method]\nkind = \"{}\"{few}", method.name);
+            let text = format!("{}[study]\nkind = \"orbit\"\n{named}\n", model(row, "1"));
+            hold(&format!("{}, {}", row.name, method.name), &text);
+        }
+    }
+}
+
+/// A transient of a law that no flow follows is told to smooth it, and follows it then.
+#[test]
+fn a_transient_that_needs_a_width_says_so() {
+    let mut smoothed = 0;
+    for row in TABLE {
+        let (_, keys) = STUDIES.iter().find(|(kind, _)| *kind == "transient").unwrap();
+        let text = format!("{}[study]\nkind = \"transient\"\n{keys}\n", model(row, "1"));
+        let Err(error) = check(&read_study("study.toml", &text, &[]).unwrap()) else { continue };
+        let help = error.help_text().unwrap();
+        assert!(help.contains("width"), "{}: {help}", row.name);
+        // as the help says: [method] with kind = "…" and width = "…"
+        let words: Vec<&str> = help.split('"').collect();
+        let advised = format!("{text}[method]\nkind = \"{}\"\nwidth = \"{}\"\n", words[1], words[3]);
+        assert!(hold(row.name, &advised), "{}: {help}", row.name);
+        smoothed += 1;
+    }
+    assert!(smoothed > 0);
+}

@@ -1,0 +1,179 @@
+//! Nodes in a study: where a key takes the name of a place, that of a node is taken for all its directions, or refused with these named.
+
+use stickslip_study::dataset::{Dataset, Table};
+use stickslip_study::run::{Context, run};
+use stickslip_study::{Study, StudyError, read_study};
+
+/// A node with a tangent and a normal on springs, two contacts between it and the ground, and a place of one direction.
+fn text(study: &str) -> String {
+    format!(
+        r#"
+schema = 1
+[[mass]]
+name = "tip"
+mass = "1 kg"
+directions = ["x", "z"]
+[[mass]]
+name = "root"
+mass = "1 kg"
+[[spring]]
+between = ["tip.x", "ground"]
+stiffness = "100 N/m"
+damping = "2 N s/m"
+[[spring]]
+between = ["tip.z", "ground"]
+stiffness = "150 N/m"
+damping = "2 N s/m"
+[[spring]]
+between = ["tip.x", "root"]
+stiffness = "100 N/m"
+damping = "2 N s/m"
+[[spring]]
+between = ["root", "ground"]
+stiffness = "100 N/m"
+damping = "2 N s/m"
+[[joint]]
+name = "pad"
+between = ["tip", "ground"]
+law = {{ kind = "friction-contact", tangential = 50, normal = 80, friction = 0.2, preload = 3 }}
+[[joint]]
+name = "shoe"
+between = ["tip", "ground"]
+law = {{ kind = "friction-contact", tangential = 20, normal = 10, friction = 0.5, preload = 1 }}
+[[force]]
+on = "tip.x"
+amplitude = "2 N"
+[[force]]
+on = "tip.z"
+amplitude = "1 N"
+harmonic = 2
+{study}
+"#
+    )
+}
+
+fn read(study: &str) -> Result<Study, StudyError> {
+    read_study("study.toml", &text(study), &[])
+}
+
+fn dataset(study: &str) -> Dataset {
+    run(&read(study).unwrap(), &Context::unwatched(1)).unwrap()
+}
+
+fn table<'a>(dataset: &'a Dataset, name: &str) -> &'a Table {
+    dataset.tables.iter().find(|table| table.name == name).unwrap()
+}
+
+const RESPONSE: &str = "[study]\nkind = \"response\"\nfrequency = [\"1 Hz\", \"2 Hz\"]\n";
+const LOOPS: &str = "[study]\nkind = \"hysteresis\"\nfrequency = \"1.5 Hz\"\nsamples = 64\n";
+const DECAY: &str = "[study]\nkind = \"transient\"\nduration = \"1 s\"\ntime_step = \"0.1 s\"\n";
+
+#[test]
+fn a_node_is_taken_for_all_its_directions_or_they_are_named() {
+    // before, key, whether the node (or joint of nodes) is taken
+    let table = [
+        (format!("{RESPONSE}[figure]\n"), "only = [", "]", "tip", true),
+        (format!("{RESPONSE}[figure]\n"), "only = [", "]", "pad", true),
+        (RESPONSE.to_owned(), "peak_of = [", "]", "tip", true),
+        (LOOPS.to_owned(), "loop = [", "]", "pad", true),
+        (LOOPS.to_owned(), "against = ", "", "tip", false),
+        (DECAY.to_owned(), "start = { ", " = \"1 mm\" }", "tip", false),
+        (DECAY.to_owned(), "start_velocity = { ", " = \"1 mm/s\" }", "tip", false),
+    ];
+    for (study, before, after, node, taken) in &table {
+        let with = |name: &str| read(&format!("{study}{before}\"{name}\"{after}\n"));
+        for along in ["x", "z"] {
+            assert!(with(&format!("{node}.{along}")).is_ok(), "{before}{node}.{along}");
+        }
+        let directions = format!("say `{node}.x` or `{node}.z`");
+        match with(node) {
+            Ok(_) => assert!(taken, "{before}{node}"),
+            Err(error) => {
+                assert!(!taken, "{error}");
+                assert_eq!(error.help_text(), Some(directions.as_str()), "{error}");
+                assert_eq!(error.underlined().map(|text| text.trim_matches('"')), Some(*node), "{error}");
+            }
+        }
+        let error = with(&format!("{node}.y")).unwrap_err();
+        assert_eq!(error.help_text(), Some(directions.as_str()), "{error}");
+        assert!(error.message().contains(&format!("`{node}` has no direction y")), "{error}");
+    }
+    // where springs, joints and forces name a place
+    for (from, to) in [("on = \"tip.x\"", "on = \"tip.y\""), ("between = [\"tip.z\"", "between = [\"tip.y\"")] {
+        let error = read_study("study.toml", &text(RESPONSE).replace(from, to), &[]).unwrap_err();
+        assert_eq!(error.help_text(), Some("say `tip.x` or `tip.z`"), "{error}");
+        assert_eq!(error.underlined().map(|text| text.trim_matches('"')), Some("tip.y"), "{error}");
+    }
+}
+
+#[test]
+fn the_peak_of_a_node_is_the_worse_of_its_directions() {
+    let peak = |names: &str| {
+        let found = dataset(&format!(
+            "[study]\nkind = \"response\"\nfrequency = {{ from = \"1 Hz\", to = \"3 Hz\", points = 9 }}\npeak_of = {names}\n"
+        ));
+        table(&found, "peaks").numbers("amplitude_m").unwrap().iter().copied().fold(0.0, f64::max)
+    };
+    assert_eq!(peak("\"tip\""), peak("[\"tip.x\", \"tip.z\"]"));
+    assert_eq!(peak("[\"tip\", \"tip.z\"]"), peak("\"tip\""));
+}
+
+/// Forces are added along each direction by itself: those of the sum are those of the single loops, added up here.
+#[test]
+fn loops_are_summed_along_each_direction() {
+    let (single, sum) = (dataset(LOOPS), dataset(&format!("{LOOPS}sum = true\n")));
+    let force = |dataset: &Dataset, name: &str| -> Vec<f64> {
+        let loops = table(dataset, "loops");
+        let joints = loops.texts("joint").unwrap();
+        let rows = (0..loops.rows()).filter(|row| joints[*row] == name);
+        rows.map(|row| loops.numbers("force_N").unwrap()[row]).collect()
+    };
+    for along in ["x", "z"] {
+        let (pad, shoe) = (force(&single, &format!("pad.{along}")), force(&single, &format!("shoe.{along}")));
+        let summed = force(&sum, &format!("pad.{along} + shoe.{along}"));
+        assert!(pad.len() > 60 && summed.len() == pad.len(), "{along}: {} {}", pad.len(), summed.len());
+        let size = pad.iter().fold(0.0f64, |size, force| size.max(force.abs()));
+        assert!(size > 0.1, "{along}: {size}");
+        for (i, force) in summed.iter().enumerate() {
+            assert!((force - pad[i] - shoe[i]).abs() < 1e-12 * size, "{along} {i}");
+        }
+    }
+    let summary = table(&sum, "loops_summary");
+    assert_eq!(summary.rows(), 2);
+    // a joint by its name is a loop along each of its directions
+    let pad = dataset(&format!("{LOOPS}loop = \"pad\"\n"));
+    assert_eq!(force(&pad, "pad.z"), force(&single, "pad.z"));
+    assert_eq!(table(&pad, "loops_summary").rows(), 2);
+}
+
+/// With its faces closed for good a contact is its springs, and without them nothing.
+#[test]
+fn contacts_have_linear_references() {
+    let found = dataset(&format!("{RESPONSE}[figure]\nreferences = true\n"));
+    let references = table(&found, "references");
+    let column = |what: &str| references.numbers(&format!("tip_z_{what}_amplitude_m")).unwrap().to_vec();
+    for (i, hertz) in references.numbers("frequency_Hz").unwrap().iter().enumerate() {
+        // along z the node is an oscillator of 1 kg, 150 N/m and 2 N s/m by itself, under 1 N at twice the frequency
+        let omega = 2.0 * std::f64::consts::TAU * hertz;
+        let linear = |stiffness: f64| 1.0 / (stiffness - omega * omega).hypot(2.0 * omega);
+        for (what, stiffness) in [("free", 150.0), ("stuck", 150.0 + 80.0 + 10.0)] {
+            let ratio = column(what)[i] / linear(stiffness);
+            assert!((ratio - 1.0).abs() < 1e-7, "{what} {hertz} Hz: {ratio}");
+        }
+    }
+    assert!(!found.notes.iter().any(|note| note.contains("reference")), "{:?}", found.notes);
+}
+
+/// A law without a slip limit has no linear reference, and the notes say so.
+#[test]
+fn a_missing_reference_has_its_reason() {
+    let cubic =
+        "[[joint]]\nname = \"stop\"\nbetween = [\"root\", \"ground\"]\nlaw = { kind = \"cubic\", stiffness = 10 }\n";
+    let found = dataset(&format!("{cubic}{RESPONSE}[figure]\nreferences = true\n"));
+    for what in ["free", "stuck"] {
+        let said = |note: &String| note.contains(&format!("with all joints {what}")) && note.contains("`stop`");
+        assert!(found.notes.iter().any(said), "{:?}", found.notes);
+    }
+    let references = |series: &stickslip_study::dataset::Series| series.label.contains("all joints");
+    assert!(!found.figure.panels.iter().flat_map(|panel| &panel.series).any(references), "an empty line is drawn");
+}

@@ -1,0 +1,109 @@
+//! All methods give the same orbit where there is a continuum of them: that in which friction that never slips carries no mean force, and every method
+//! says so.
+
+use nalgebra::dmatrix;
+use num_complex::Complex64;
+use std::sync::Arc;
+use stickslip::law::{Gap, Iwan, Jenkins, SharedLaw};
+use stickslip::method::Method;
+use stickslip::method::event_driven::EventDriven;
+use stickslip::method::harmonic_balance::HarmonicBalance;
+use stickslip::method::settling::Settling;
+use stickslip::method::shooting::Shooting;
+use stickslip::model::{Axis, System};
+use stickslip::orbit::{Orbit, Symmetry};
+use stickslip::structure::Structure;
+
+/// A mass with joints to the ground, a drive and a constant force.
+fn mass(laws: &[SharedLaw], drive: f64, constant: f64) -> System {
+    let one = |value: f64| dmatrix![value];
+    let structure = Structure::new(vec!["m".into()], one(1.0), one(8.0), one(1e4)).unwrap();
+    let mut builder = System::builder(structure);
+    for (j, law) in laws.iter().enumerate() {
+        builder = builder.joint(format!("j{j}"), law.clone(), vec![Axis::new(vec![(0, 1.0)])]);
+    }
+    builder = builder.force(0, 1, Complex64::new(drive, 0.0)).force(0, 0, Complex64::new(constant, 0.0));
+    builder.build().unwrap()
+}
+
+fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
+    method.solver(system).unwrap().orbit(omega, None).unwrap()
+}
+
+/// Iwan's inner sliders that never slip, or a stuck Jenkins element, beside a gap that knows positions.
+#[test]
+fn methods_agree_where_parts_of_a_joint_never_slip() {
+    let iwan: SharedLaw = Arc::new(Iwan { stiffness: 4e3, limit: 3.0, chi: -0.5, beta: 0.3, elements: 16 });
+    let stuck: SharedLaw = Arc::new(Jenkins { stiffness: 2e4, limit: 40.0 });
+    let gap: SharedLaw = Arc::new(Gap { gap: 3e-4, stiffness: 6e3 });
+    let precise = HarmonicBalance { tolerance: Some(1e-5), ..HarmonicBalance::default() };
+    for (friction, drive, constant, omega) in
+        [(&iwan, 2.0, 5.0, 90.0), (&iwan, 1.5, -2.0, 118.0), (&stuck, 5.0, 4.0, 100.0), (&stuck, 5.0, 9.0, 190.0)]
+    {
+        let system = mass(&[friction.clone(), gap.clone()], drive, constant);
+        let exact = orbit(&EventDriven, &system, omega);
+        for (name, other, allowed) in [
+            ("harmonic balance", orbit(&precise, &system, omega), 2e-5),
+            // 1e-5 of a motion whose mean is some times its amplitude
+            ("shooting", orbit(&Shooting::default(), &system, omega), 1e-4),
+        ] {
+            let (a, b) = (&exact.places[0], &other.places[0]);
+            let off = (a.maximum - b.maximum).abs().max((a.minimum - b.minimum).abs()) / a.amplitude();
+            assert!(off < allowed, "{name} {friction:?} {omega}: {off:.1e}, {a:?} {b:?}");
+            assert_eq!(other.evidence.history, ["j0"], "{name}");
+            // the place where it is held is free: a multiplier of one, for the exact method whose map knows the slider
+            assert_eq!(exact.is_stable(), Some(true));
+            let one = exact.multipliers().unwrap()[0];
+            assert!((one.norm() - 1.0).abs() < 1e-6, "{one}");
+        }
+        assert_eq!(exact.evidence.history, ["j0"]);
+        // waiting leads to any of them, and says so; the mean force of what never slips is another
+        let waited = orbit(&Settling { tolerance: 1e-6, ..Settling::default() }, &system, omega);
+        assert_eq!(waited.evidence.history, ["j0"]);
+    }
+}
+
+/// What never slips behind a spring carries no mean force: the mean position is that of the structure alone under the constant force, `F/k`.
+#[test]
+fn a_stuck_spring_carries_no_mean_force() {
+    let system = mass(&[Arc::new(Jenkins { stiffness: 2e4, limit: 40.0 })], 5.0, 4.0);
+    for method in [&EventDriven as &dyn Method, &HarmonicBalance::default()] {
+        // an odd system but for its constant force
+        let found = orbit(method, &system, 100.0);
+        assert_eq!(found.symmetry, Symmetry::FullPeriod);
+        assert!((found.places[0].mean / (4.0 / 1e4) - 1.0).abs() < 1e-7, "{:?}", found.places[0]);
+    }
+}
+
+/// Where the limit would be passed by that, the spring is relaxed as near to the mean as it can be: the motion just reaches its limit.
+#[test]
+fn a_stuck_spring_at_its_limit() {
+    // a mean that is no mean of the extremes: with a second harmonic, which the gap makes
+    let stiffness = 2e4;
+    let gap: SharedLaw = Arc::new(Gap { gap: 0.0, stiffness: 8e4 });
+    let wide = mass(&[Arc::new(Jenkins { stiffness, limit: 1e3 }), gap.clone()], 20.0, 0.0);
+    let found = orbit(&EventDriven, &wide, 150.0);
+    let (low, high) = found.joints[0].displacement[0];
+    let mean = found.places[0].mean;
+    let furthest = (high - mean).max(mean - low);
+    assert!(furthest > 1.02 * 0.5 * (high - low), "{low} {mean} {high}");
+    // between half of the travel and the way to the further extreme it never slips in the orbit, and would on the way there
+    let limit = stiffness * 0.5 * (furthest + 0.5 * (high - low));
+    let system = mass(&[Arc::new(Jenkins { stiffness, limit }), gap], 20.0, 0.0);
+    let (a, b) = (orbit(&EventDriven, &system, 150.0), orbit(&HarmonicBalance::default(), &system, 150.0));
+    assert!((a.places[0].amplitude() / b.places[0].amplitude() - 1.0).abs() < 2e-3, "{:?} {:?}", a.places, b.places);
+    for found in [&a, &b] {
+        let largest = (0..4000).map(|i| found.sample(found.period() * f64::from(i) / 4000.0).joints[0].force[0].abs());
+        let largest = largest.fold(0.0, f64::max);
+        assert!((largest / limit - 1.0).abs() < 1e-2, "{}: {largest} of {limit}", found.method);
+    }
+}
+
+/// A symmetric motion is one, whatever sticks.
+#[test]
+fn a_mirrored_orbit_has_no_history() {
+    let system = mass(&[Arc::new(Jenkins { stiffness: 2e4, limit: 40.0 })], 5.0, 0.0);
+    let orbit = orbit(&EventDriven, &system, 100.0);
+    assert_eq!(orbit.symmetry, Symmetry::HalfPeriod);
+    assert!(orbit.evidence.history.is_empty());
+}

@@ -1,0 +1,124 @@
+//! A method that refuses a system names those that take it, and these do; where it names none, none does.
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use stickslip::law::{Range, SharedLaw, TABLE};
+use stickslip::method::{self, MethodError, MethodInfo, Options, WIDTH};
+use stickslip::model::{Axis, System};
+use stickslip::structure::Structure;
+
+const WIDTH_GIVEN: f64 = 2e-5;
+
+/// Every law of the table, and each again with one of those parameters at zero that may be.
+fn laws() -> Vec<SharedLaw> {
+    let mut laws = Vec::new();
+    for row in TABLE {
+        laws.push(row.sample());
+        for (i, _) in row.parameters.iter().enumerate().filter(|(_, p)| p.range == Range::ZeroOrMore) {
+            let mut values = row.sample.to_vec();
+            values[i] = 0.0;
+            let law = (row.build)(&values);
+            if law.check().is_ok() {
+                laws.push(law);
+            }
+        }
+    }
+    laws
+}
+
+/// Laws side by side, each between places of its own and the ground.
+fn system(laws: &[SharedLaw], mass: f64) -> System {
+    let n: usize = laws.iter().map(|law| law.directions()).sum();
+    let one = DMatrix::<f64>::identity(n, n);
+    let places = (0..n).map(|i| format!("p{i}")).collect();
+    let structure = Structure::new(places, &one * mass, &one * 2.0, &one * 1e4).unwrap();
+    let mut builder = System::builder(structure);
+    let mut row = 0;
+    for (j, law) in laws.iter().enumerate() {
+        let axes = (0..law.directions()).map(|a| Axis::new(vec![(row + a, 1.0)])).collect();
+        row += law.directions();
+        builder = builder.joint(format!("j{j}"), law.clone(), axes);
+    }
+    builder.force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap()
+}
+
+fn asked(row: &MethodInfo, width: bool, system: &System) -> Result<(), MethodError> {
+    let options = if width { Options::from([(WIDTH.to_owned(), WIDTH_GIVEN)]) } else { Options::new() };
+    (row.build)(&options).unwrap().solver(system).map(drop)
+}
+
+fn named(name: &str) -> &'static MethodInfo {
+    method::find(name).expect("a method of the table")
+}
+
+/// Holds the refusals of every method to what the methods do; the numbers of refusals, and of those that know no way.
+fn hold(system: &System) -> (usize, usize) {
+    let (mut refused, mut hopeless) = (0, 0);
+    for row in method::TABLE {
+        let Err(error) = asked(row, false, system) else { continue };
+        refused += 1;
+        let (text, ways) = (error.to_string(), error.ways().expect("a refusal that no option mends"));
+        for name in &ways.methods {
+            assert!(asked(named(name), false, system).is_ok(), "{text}: {name} refuses too");
+            assert!(text.contains(&format!("`{name}`")), "{text}");
+        }
+        for name in &ways.with_width {
+            assert!(asked(named(name), true, system).is_ok(), "{text}: {name} refuses with a width too");
+            assert!(asked(named(name), false, system).is_err(), "{text}: {name} needs no width");
+            assert!(text.contains(&format!("`{name}`")) && text.contains("`width`"), "{text}");
+        }
+        if ways.methods.is_empty() && ways.with_width.is_empty() {
+            hopeless += 1;
+            assert!(text.contains("no method takes it"), "{text}");
+            for other in method::TABLE {
+                assert!(asked(other, false, system).is_err(), "{text}: {} does", other.name);
+                if other.options.iter().any(|option| option.key == WIDTH) {
+                    assert!(asked(other, true, system).is_err(), "{text}: {} does with a width", other.name);
+                }
+                // each says what it misses, but for one that only picks another
+                let why = asked(other, true, system).unwrap_err().alone().to_string();
+                let said = |(methods, said): &(Vec<&str>, String)| {
+                    methods.contains(&other.name) && why == format!("{} {said}", other.name)
+                };
+                assert!(ways.missing.iter().any(said) || other.name == "auto", "{text}: {why}");
+            }
+        }
+    }
+    (refused, hopeless)
+}
+
+#[test]
+fn what_a_refusal_names_takes_the_system() {
+    let laws = laws();
+    let (mut refused, mut hopeless) = (0, 0);
+    for (i, law) in laws.iter().enumerate() {
+        for other in &laws[i..] {
+            let (refusals, without) = hold(&system(&[law.clone(), other.clone()], 1.0));
+            refused += refusals;
+            hopeless += without;
+        }
+    }
+    assert!(refused > laws.len() * laws.len() / 2 && hopeless > 0 && hopeless < refused / 4, "{refused} {hopeless}");
+}
+
+#[test]
+fn a_place_without_mass_has_ways_too() {
+    for law in laws() {
+        let (refused, hopeless) = hold(&system(std::slice::from_ref(&law), 0.0));
+        assert!(refused > 0, "{}", law.name());
+        // balanced harmonics need no mass, unless they cannot take the law at all
+        let alone = asked(named("harmonic-balance"), false, &system(std::slice::from_ref(&law), 1.0));
+        assert_eq!(hopeless > 0, alone.is_err(), "{}", law.name());
+    }
+}
+
+/// No method takes friction that drops at once beside a law that has no exact motion; the words say what would help, and it does.
+#[test]
+fn friction_that_drops_at_once_is_told_to_fall_over_a_velocity() {
+    let cubic = stickslip::law::find("cubic").unwrap().sample();
+    let stribeck = stickslip::law::find("stribeck").unwrap().sample();
+    let dropping = stribeck.with("velocity", 0.0).unwrap();
+    let error = asked(named("auto"), false, &system(&[dropping, cubic.clone()], 1.0)).unwrap_err().to_string();
+    assert!(error.contains("no method takes it") && error.contains("`velocity` above zero"), "{error}");
+    assert!(asked(named("shooting"), true, &system(&[stribeck, cubic], 1.0)).is_ok());
+}
