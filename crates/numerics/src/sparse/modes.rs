@@ -12,7 +12,8 @@
 //!
 //! Sources: Ericsson and Ruhe (1980), "The spectral transformation Lanczos method for the numerical solution of large sparse generalized
 //! symmetric eigenvalue problems"; Nour-Omid, Parlett, Ericsson and Jensen (1987), "How to implement the spectral transformation", for singular
-//! M; Grimes, Lewis and Simon (1994), "A shifted block Lanczos algorithm for solving sparse symmetric generalized eigenproblems", for blocks, shifts
+//! M; Grimes, Lewis and Simon (1994), "A shifted block Lanczos algorithm for solving sparse symmetric generalized eigenproblems", for
+//! blocks, shifts
 //! and counts.
 
 use super::{Analysis, Factor, Matrix, Singular, columns};
@@ -34,9 +35,7 @@ const CANCELLED: f64 = 1e-6;
 const MASSLESS: f64 = 1e-10;
 /// An eigenvalue counts as one up to a bound if it is above by less than this share.
 const ROUNDING: f64 = 1e-9;
-/// Vectors of a run: so many times the modes that are wanted and so many more, but no more than `MOST`.
-const TIMES: usize = 2;
-const MORE: usize = 60;
+/// Vectors of a run at most: memory is n numbers for each.
 const MOST: usize = 320;
 /// Runs at most. Each but the first starts where eigenvalues are known to be missing, and a run finds about a third of `MOST`.
 const RUNS: usize = 100;
@@ -54,6 +53,8 @@ const SLENDER: (f64, f64) = (1e-6, 0.1);
 const JUDGED: usize = 12;
 /// Blocks between two looks at what has converged.
 const CHECKED: usize = 4;
+/// The same as a share of the blocks before, where there are many: the projected problem grows with their cube.
+const CHECKED_SHARE: usize = 8;
 /// Gap between two eigenvalues, relative to their distance from the first shift, in which they can be counted.
 const GAP: f64 = 1e-5;
 /// How far beyond the last mode found eigenvalues are counted, and the next are looked for, relative to its distance from the first shift;
@@ -61,6 +62,11 @@ const GAP: f64 = 1e-5;
 const BEYOND: f64 = 0.1;
 /// Attempts to factor beside an eigenvalue, each further by `GAP`.
 const ATTEMPTS: usize = 8;
+
+/// Eigenvalues below this share of a usual `k_ii / m_ii` are those of free motions, in matrices of ten digits.
+const FREE: f64 = 1e-10;
+/// So many times as large is the first eigenvalue of another motion; those of a slender beam, as small as it may be, follow each other closer.
+const APART: f64 = 1e3;
 
 /// Which modes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,6 +92,8 @@ pub struct NaturalModes {
     /// Of every mode `‖φ - (λ - σ)(K - σM)⁻¹ M φ‖` in the norm of M: some eigenvalue has a distance from the shift σ that differs by no more
     /// than this share.
     pub residuals: Vec<f64>,
+    /// A usual `k_ii / m_ii`, rad²/s²: rounding of λ is far below it.
+    pub scale: f64,
     /// What they took.
     pub effort: Effort,
 }
@@ -179,16 +187,24 @@ impl NaturalModes {
         if mass.n() == 0 {
             return Ok(NaturalModes::none());
         }
-        Search { analysis, stiffness, mass, wanted, scale: usual(stiffness, mass), found: NaturalModes::none() }.run()
+        let scale = usual(stiffness, mass);
+        Search { analysis, stiffness, mass, wanted, scale, found: NaturalModes { scale, ..NaturalModes::none() } }.run()
     }
 
     fn none() -> Self {
-        NaturalModes { values: vec![], shapes: vec![], residuals: vec![], effort: Effort::default() }
+        NaturalModes { values: vec![], shapes: vec![], residuals: vec![], scale: 0.0, effort: Effort::default() }
     }
 
     /// How many.
     pub fn count(&self) -> usize {
         self.values.len()
+    }
+
+    /// How many of them are free motions: eigenvalues that are zero to the ten digits of a file, and far below the next.
+    pub fn free(&self) -> usize {
+        let values = &self.values;
+        let apart = |k: &usize| *k == 0 || *k == values.len() || values[*k] > APART * values[*k - 1].abs();
+        (0..=self.below(FREE * self.scale)).rev().find(apart).unwrap_or(0)
     }
 
     /// Shape φ of a mode, from 0.
@@ -363,17 +379,16 @@ impl Search<'_> {
             Wanted::Lowest(n) => missing.max((n + 1).saturating_sub(self.found.count())),
             Wanted::UpTo { .. } => MOST,
         };
-        let room = (TIMES * wanted + MORE).min(MOST);
         let value = |pair: &Pair| shift + 1.0 / pair.theta;
-        let mut blocks = 0;
+        let (mut blocks, mut next) = (0, CHECKED);
         loop {
             blocks += 1;
             let exhausted = !lanczos.expand()?;
-            let full = lanczos.expanded + BLOCK > room;
-            // the projected eigenvalue problem at every fourth block costs less than the blocks
-            if !(exhausted || full || blocks % CHECKED == 0) {
+            let full = lanczos.expanded + BLOCK > MOST;
+            if !(exhausted || full || blocks == next) {
                 continue;
             }
+            next += CHECKED.max(blocks / CHECKED_SHARE);
             let mut pairs = lanczos.pairs()?;
             let converged = |pair: &Pair| pair.residual <= CONVERGED * pair.theta.abs();
             let nearest = pairs.iter().take_while(|pair| converged(pair)).count();
@@ -501,7 +516,8 @@ impl<'a> Lanczos<'a> {
         coefficients
     }
 
-    /// Makes the columns of a cleared block orthonormal, one after the other, and adds those that are not rounding beside their former `sizes`. Returns the
+    /// Makes the columns of a cleared block orthonormal, one after the other, and adds those that are not rounding beside their former
+    /// `sizes`. Returns the
     /// block's components along the new vectors.
     fn append(&mut self, block: Vec<f64>, sizes: &[f64]) -> Result<DMatrix<f64>, ModesError> {
         let n = self.n;
@@ -623,7 +639,7 @@ impl<'a> Lanczos<'a> {
         let shapes = good.iter().flat_map(|&k| shapes[k * n..(k + 1) * n].iter().copied()).collect();
         let [values, residuals] = [values, residuals].map(|all| good.iter().map(|&k| all[k]).collect());
         let mut modes = NaturalModes::none();
-        modes.join(n, NaturalModes { values, shapes, residuals, effort: Effort::default() });
+        modes.join(n, NaturalModes { values, shapes, residuals, ..NaturalModes::none() });
         Ok(modes)
     }
 }
@@ -685,7 +701,8 @@ mod tests {
         }
     }
 
-    /// A chain between walls, `λ = 4 sin²(π i / 2 (n + 1))`; alone in the space, `4 sin²(π i / 2 n)` from zero; as a ring, `4 sin²(π i / n)`, twice.
+    /// A chain between walls, `λ = 4 sin²(π i / 2 (n + 1))`; alone in the space, `4 sin²(π i / 2 n)` from zero; as a ring, `4 sin²(π i /
+    /// n)`, twice.
     #[test]
     fn chains_and_rings() {
         for n in [1, 2, 3, 5, 40, 900] {
@@ -700,7 +717,9 @@ mod tests {
             }
             let free = springs(n, (1..n).map(|i| (i - 1, i)));
             let expected: Vec<f64> = (0..count).map(|i| sine(PI * i as f64 / (2 * n) as f64)).collect();
-            check(&free, &m, &modes(&free, &m, Wanted::Lowest(12)).unwrap(), &expected, 1e-14);
+            let found = modes(&free, &m, Wanted::Lowest(12)).unwrap();
+            check(&free, &m, &found, &expected, 1e-14);
+            assert_eq!(found.free(), 1);
             let ring = springs(n, (0..n).map(|i| (i, (i + 1) % n)));
             let expected: Vec<f64> = (0..count).map(|i| sine(PI * i.div_ceil(2) as f64 / n as f64)).collect();
             check(&ring, &m, &modes(&ring, &m, Wanted::Lowest(12)).unwrap(), &expected, 1e-14);
@@ -757,6 +776,9 @@ mod tests {
         let found = modes(&k, &m, Wanted::Lowest(401)).unwrap();
         check(&k, &m, &found, &expected, 1e-13);
         assert!(found.effort.factors > 2, "{:?}", found.effort);
+        let bound = 0.5 * (expected[350] + expected[351]);
+        let found = modes(&k, &m, Wanted::UpTo { value: bound, most: 400 }).unwrap();
+        check(&k, &m, &found, &expected[..351], 1e-13);
     }
 
     /// A slender beam is softer than its elements by many orders: `λ = (β / L)⁴ EI / (ρA)` of a cantilever, β = 1.8751, 4.6941, 7.8548.
@@ -786,6 +808,7 @@ mod tests {
         ];
         let (k, m) = (element(bending, h.powi(-3)), element(inertia, h / 420.0));
         let found = modes(&k, &m, Wanted::Lowest(8)).unwrap();
+        assert_eq!(found.free(), 0);
         // roots of cos β cosh β = -1, by Newton's method
         for (i, value) in found.values.iter().enumerate() {
             let mut beta = (i as f64 + 0.5) * PI;

@@ -1,6 +1,7 @@
 //! The linear part of a system: the only owner of mass, damping and stiffness.
 
 mod dynamic;
+pub mod reduction;
 
 pub use dynamic::DynamicStiffness;
 

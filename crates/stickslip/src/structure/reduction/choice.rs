@@ -1,0 +1,116 @@
+//! The smallest reduction of a given error.
+
+use super::{Deviation, Free, Reduced, ReductionError, Reference, Whole};
+use stickslip_numerics::sparse::NaturalModes;
+
+/// Modes are computed up to these multiples of the frequency of interest, one after the other until a reduction is close enough.
+const EXTENTS: [f64; 2] = [1.5, 3.0];
+/// Of these, up to these shares are tried.
+const SHARES: [f64; 4] = [0.67, 0.8, 0.9, 1.0];
+/// Orders of residual vectors that are tried.
+const ORDERS: usize = 3;
+
+/// What is asked of a reduction.
+///
+/// # Example
+/// ```
+/// use std::f64::consts::TAU;
+/// use stickslip::structure::reduction::{Damping, Reduce, Whole};
+/// use stickslip_numerics::sparse::Matrix;
+/// // a rod of 400 masses, held at one end and seen at the other
+/// let n = 400;
+/// let stiffness = (0..n).flat_map(|i| {
+///     let linked = if i > 0 { vec![(i - 1, i - 1, 1e6), (i - 1, i, -1e6), (i, i - 1, -1e6)] } else { vec![] };
+///     linked.into_iter().chain([(i, i, 1e6)])
+/// });
+/// let stiffness = Matrix::from_triplets(n, stiffness)?;
+/// let mass = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 0.001)))?;
+/// let up_to = TAU * 100.0;
+/// let whole = Whole::new(mass, Damping::Ratio { ratio: 0.005, up_to }, stiffness, vec![vec![(n - 1, 1.0)]])?;
+/// let chosen = Reduce { up_to, tolerance: 1e-4 }.of(&whole)?;
+/// assert!(chosen.reduced.dofs() < 12 && chosen.deviation.error < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reduce {
+    /// The largest frequency of interest, rad/s: of the drive with all harmonics that count.
+    pub up_to: f64,
+    /// The largest error of the ports' receptance up to there, relative.
+    pub tolerance: f64,
+}
+
+/// A reduction with its error.
+#[derive(Debug, Clone)]
+pub struct Chosen {
+    /// The structure in few coordinates.
+    pub reduced: Reduced,
+    /// How far it is from the whole.
+    pub deviation: Deviation,
+    /// Modes of the whole structure.
+    pub modes: NaturalModes,
+}
+
+impl Reduce {
+    /// The smallest of the reductions tried whose error is small enough: free modes with residual vectors of one to three orders, and if
+    /// none of them will do, Craig-Bampton.
+    ///
+    /// # Errors
+    /// [`ReductionError::OutOfReach`] with the best error, or whatever keeps modes from being computed.
+    pub fn of(self, whole: &Whole) -> Result<Chosen, ReductionError> {
+        for (what, value) in
+            [("the largest frequency of a reduction (rad/s)", self.up_to), ("its tolerance", self.tolerance)]
+        {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(ReductionError::Number { what, value, must: "positive" });
+            }
+        }
+        let mut best: Option<(Deviation, usize)> = None;
+        let mut reference = None;
+        for extent in EXTENTS {
+            let modes = whole.modes(extent * self.up_to)?;
+            let reference = match &mut reference {
+                Some(reference) => reference,
+                none => none.insert(Reference::new(whole, &modes, self.up_to)?),
+            };
+            let mut good = |reduced: &Reduced| {
+                let deviation = reference.deviation(reduced);
+                if best.is_none_or(|(least, _)| deviation.error < least.error) {
+                    best = Some((deviation, reduced.dofs()));
+                }
+                (deviation.error <= self.tolerance).then_some(deviation)
+            };
+            let free = Free::new(whole, &modes, 0.0, ORDERS)?;
+            for (count, order) in self.sizes(&modes, extent, whole.ports().len()) {
+                let reduced = free.reduced(count, order)?;
+                if let Some(deviation) = good(&reduced) {
+                    return Ok(Chosen { reduced, deviation, modes });
+                }
+            }
+            match whole.craig_bampton(extent * self.up_to) {
+                Ok(reduced) => {
+                    if let Some(deviation) = good(&reduced) {
+                        return Ok(Chosen { reduced, deviation, modes });
+                    }
+                }
+                // ports that do not hold the structure leave the free modes
+                Err(ReductionError::NotHeld { .. }) => {}
+                Err(other) => return Err(other),
+            }
+        }
+        let (least, dofs) = best.unwrap_or((Deviation { error: f64::INFINITY, omega: self.up_to }, 0));
+        Err(ReductionError::OutOfReach { best: least.error, at: least.omega, dofs, tolerance: self.tolerance })
+    }
+
+    /// Numbers of modes and orders of residual vectors to try, the smallest first.
+    fn sizes(self, modes: &NaturalModes, extent: f64, ports: usize) -> Vec<(usize, usize)> {
+        let count = |share: f64| {
+            let bound = (share * extent * self.up_to).powi(2);
+            if share < 1.0 { modes.values.partition_point(|value| *value <= bound) } else { modes.count() }
+        };
+        let mut sizes: Vec<(usize, usize)> =
+            (1..=ORDERS).flat_map(|order| SHARES.map(|share| (count(share), order))).collect();
+        sizes.sort_by_key(|&(count, order)| (count + order * ports, order));
+        sizes.dedup();
+        sizes
+    }
+}

@@ -1,0 +1,61 @@
+//! Modes with the ports held, and static answers to unit motions of the ports.
+//!
+//! The degrees of freedom that ports see stay themselves (`b`); the others (`i`) are `x_i = Φ q + Ψ x_b` with the modes Φ of `(K_ii, M_ii)` and
+//! `Ψ = -K_ii⁻¹ K_ib`. Exact at rest, whatever the modes.
+//!
+//! Source: Craig and Bampton (1968), "Coupling of substructures for dynamic analyses".
+
+use super::{MOST_MODES, Reduced, ReductionError, Whole};
+use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
+
+impl Whole {
+    /// The structure in the degrees of freedom that its ports see and all modes up to `omega` (rad/s) with these held.
+    ///
+    /// # Errors
+    /// [`ReductionError`]: ports that do not hold the structure, or no modes.
+    pub fn craig_bampton(&self, omega: f64) -> Result<Reduced, ReductionError> {
+        let n = self.dofs();
+        let mut boundary: Vec<usize> = self.ports.iter().flatten().map(|(at, _)| *at).collect();
+        boundary.sort_unstable();
+        boundary.dedup();
+        // the new row of every degree of freedom, with the interior first
+        let interior: Vec<usize> = (0..n).filter(|i| boundary.binary_search(i).is_err()).collect();
+        let mut row = vec![usize::MAX; n];
+        interior.iter().enumerate().for_each(|(at, &i)| row[i] = at);
+        let part = |matrix: &Matrix| {
+            let inner = matrix.entries().filter(|(i, k, _)| row[*i] != usize::MAX && row[*k] != usize::MAX);
+            Matrix::from_triplets(interior.len(), inner.map(|(i, k, v)| (row[i], row[k], v)))
+        };
+        let out_of_range = |_| ReductionError::OutOfRange;
+        let stiffness = part(&self.stiffness).map_err(out_of_range)?;
+        let mass = part(&self.mass).map_err(out_of_range)?;
+        let analysis = Analysis::new(&[&stiffness, &mass]);
+        let wanted = Wanted::UpTo { value: omega * omega, most: MOST_MODES };
+        let modes = NaturalModes::new(&analysis, &stiffness, &mass, wanted)?;
+        if modes.free() > 0 {
+            return Err(ReductionError::NotHeld { count: modes.free() });
+        }
+        let (inner, outer) = (interior.len(), boundary.len());
+        let mut answers = vec![0.0; inner * outer];
+        for (k, &column) in boundary.iter().enumerate() {
+            for (i, value) in self.stiffness.column(column).filter(|(i, _)| row[*i] != usize::MAX) {
+                answers[k * inner + row[i]] = -value;
+            }
+        }
+        let factor = analysis.factor(&[(1.0, &stiffness)]);
+        factor.map_err(|_| ReductionError::NotHeld { count: 1 })?.solve(&mut answers);
+        let mut basis = vec![0.0; n * (modes.count() + outer)];
+        for k in 0..modes.count() + outer {
+            let column = &mut basis[k * n..(k + 1) * n];
+            let from = match k.checked_sub(modes.count()) {
+                None => modes.shape(k),
+                Some(answer) => {
+                    column[boundary[answer]] = 1.0;
+                    &answers[answer * inner..(answer + 1) * inner]
+                }
+            };
+            interior.iter().zip(from).for_each(|(&i, x)| column[i] = *x);
+        }
+        Reduced::project(self, format!("Craig-Bampton: {} modes, {outer} held", modes.count()), basis)
+    }
+}

@@ -1,0 +1,161 @@
+//! Free modes with residual vectors at the ports: Rubin's method, with vectors of higher order if asked for.
+//!
+//! One set of modes and residual vectors makes reductions of any smaller size: a mode that is left out goes back into the residual
+//! vectors, `Xⱼ + φ φᵀF / (λ - σ)ʲ⁺¹`. Coordinates are those of the modes (of unit mass), then of the residual vectors (of unit stiffness,
+//! independent of each
+//! other, without mass between them). MacNeal's method is Rubin's without the mass of the residual vectors; here they keep it.
+//! Of order J the receptance agrees with that of the whole structure at σ in the first 2 J terms of its series, beside the modes.
+//!
+//! Sources: as in `residual`; Craig and Chang (1977), "On the use of attachment modes in substructure coupling for dynamic analysis".
+
+use super::{Damping, Reduced, ReductionError, Whole, damping, residual, symmetric};
+use nalgebra::DMatrix;
+use stickslip_numerics::eigen;
+use stickslip_numerics::sparse::{Matrix, NaturalModes, columns};
+
+/// Residual vectors whose stiffness is below this share of the others', each of unit size, depend on them: ports that see the same motion,
+/// and what rounding
+/// makes of it.
+const DEPENDENT: f64 = 1e-11;
+
+/// Modes and residual vectors, from which reductions are made.
+#[derive(Debug, Clone)]
+pub struct Free<'a> {
+    whole: &'a Whole,
+    /// λ of the modes, rad²/s².
+    pub(super) values: Vec<f64>,
+    /// Expansion point of the residual vectors, rad²/s².
+    pub(super) shift: f64,
+    /// Ports, orders of the residual vectors.
+    pub(super) counts: (usize, usize),
+    /// Modes, then the residual vectors order by order: n × (k + p J).
+    basis: Vec<f64>,
+    /// `Bᵀ M B`, `Bᵀ K B`, of a damping matrix `Bᵀ C B`, and the ports' rows over B.
+    pub(super) mass: DMatrix<f64>,
+    stiffness: DMatrix<f64>,
+    damping: Option<DMatrix<f64>>,
+    pub(super) ports: DMatrix<f64>,
+}
+
+impl<'a> Free<'a> {
+    /// Of complete modes from the lowest on and residual vectors of orders below `order`, around `shift` (rad²/s²): zero, or anywhere but
+    /// at an eigenvalue.
+    ///
+    /// # Errors
+    /// [`ReductionError::Singular`] if the modes lack a free motion, or the shift stays at an eigenvalue.
+    pub fn new(whole: &'a Whole, modes: &NaturalModes, shift: f64, order: usize) -> Result<Self, ReductionError> {
+        let n = whole.dofs();
+        let (blocks, shift) = residual::blocks(whole, modes, shift, order)?;
+        let mut basis = modes.shapes.clone();
+        blocks.iter().for_each(|block| basis.extend(block));
+        let square = |matrix: &Matrix| columns::products(n, &basis, &matrix.times_columns(&basis));
+        let own = match &whole.damping {
+            Damping::Matrix(c) => Some(square(c)),
+            _ => None,
+        };
+        let (mass, stiffness) = (symmetric(square(&whole.mass)), symmetric(square(&whole.stiffness)));
+        let ports = columns::products(n, &whole.forces(), &basis);
+        let counts = (whole.ports().len(), order);
+        Ok(Free { whole, values: modes.values.clone(), shift, counts, basis, mass, stiffness, damping: own, ports })
+    }
+
+    /// The whole structure.
+    pub(super) fn whole(&self) -> &Whole {
+        self.whole
+    }
+
+    /// How many modes there are.
+    pub fn modes(&self) -> usize {
+        self.values.len()
+    }
+
+    /// `Xⱼ` of fewer modes as a combination of the basis.
+    pub(super) fn block(&self, modes: usize, order: usize) -> DMatrix<f64> {
+        let (k, p) = (self.modes(), self.counts.0);
+        let mut combination = DMatrix::zeros(self.mass.nrows(), p);
+        for port in 0..p {
+            combination[(k + order * p + port, port)] = 1.0;
+            for mode in modes..k {
+                let distance = self.values[mode] - self.shift;
+                combination[(mode, port)] = self.ports[(port, mode)] / distance.powi(order as i32 + 1);
+            }
+        }
+        combination
+    }
+
+    /// The structure in its first `modes` modes and residual vectors of orders below `order`.
+    ///
+    /// # Errors
+    /// [`ReductionError::OutOfRange`].
+    ///
+    /// # Panics
+    /// If there are fewer modes or orders.
+    pub fn reduced(&self, modes: usize, order: usize) -> Result<Reduced, ReductionError> {
+        assert!(modes <= self.modes() && order <= self.counts.1, "of {} modes, {} orders", self.modes(), self.counts.1);
+        let small = self.combination(modes, order).ok_or(ReductionError::OutOfRange)?;
+        let project = |matrix: &DMatrix<f64>| symmetric(small.transpose() * matrix * &small);
+        let (mass, stiffness) = (project(&self.mass), project(&self.stiffness));
+        let own = self.damping.as_ref().map(|c| small.transpose() * c * &small);
+        let damping = damping(&self.whole.damping, &mass, &stiffness, own)?;
+        let n = self.whole.dofs();
+        let basis = columns::combination(n, &self.basis, &small);
+        let kind = format!("{modes} free modes, {} residual vectors of {order} orders", small.ncols() - modes);
+        Ok(Reduced { kind, mass, damping, stiffness, ports: &self.ports * small, basis, n })
+    }
+
+    /// Modes, then independent residual vectors of unit stiffness whose mass is diagonal.
+    fn combination(&self, modes: usize, order: usize) -> Option<DMatrix<f64>> {
+        let all = self.mass.nrows();
+        let mut vectors = DMatrix::zeros(all, 0);
+        // twice: the second time rounding of the first is projected out
+        for order in 0..order {
+            let mut block = self.block(modes, order);
+            for _ in 0..2 {
+                let along = vectors.transpose() * &self.stiffness * &block;
+                block -= &vectors * along;
+                block = independent(&block, &self.stiffness)?;
+            }
+            vectors = join(&vectors, &block);
+        }
+        if vectors.ncols() > 0 {
+            let mass = symmetric(vectors.transpose() * &self.mass * &vectors);
+            let eigen = eigen::symmetric(mass)?;
+            let mut rising: Vec<usize> = (0..vectors.ncols()).collect();
+            rising.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+            vectors *= eigen.eigenvectors.select_columns(&rising);
+        }
+        let chosen = DMatrix::from_fn(all, modes, |i, k| f64::from(u8::from(i == k)));
+        Some(join(&chosen, &vectors))
+    }
+}
+
+fn join(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(
+        b.nrows(),
+        a.ncols() + b.ncols(),
+        |i, k| {
+            if k < a.ncols() { a[(i, k)] } else { b[(i, k - a.ncols())] }
+        },
+    )
+}
+
+/// Combinations of columns that `stiffness` makes orthonormal, without those that depend on the others.
+fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let energies = symmetric(vectors.transpose() * stiffness * vectors);
+    let size = |i: usize| energies[(i, i)].max(0.0).sqrt();
+    let moving: Vec<usize> = (0..vectors.ncols()).filter(|&i| size(i) > 0.0).collect();
+    if moving.is_empty() {
+        return Some(DMatrix::zeros(vectors.nrows(), 0));
+    }
+    let unit = DMatrix::from_fn(moving.len(), moving.len(), |i, k| {
+        energies[(moving[i], moving[k])] / (size(moving[i]) * size(moving[k]))
+    });
+    let eigen = eigen::symmetric(unit)?;
+    let mut kept: Vec<usize> =
+        (0..moving.len()).filter(|&k| eigen.eigenvalues[k] > DEPENDENT * eigen.eigenvalues.amax()).collect();
+    kept.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let weights = DMatrix::from_fn(moving.len(), kept.len(), |i, k| {
+        eigen.eigenvectors[(i, kept[k])] / (eigen.eigenvalues[kept[k]].sqrt() * size(moving[i]))
+    });
+    Some(vectors.select_columns(&moving) * weights)
+}

@@ -1,0 +1,403 @@
+//! Large structures in a few coordinates `x = T q`, and how far their receptance is from that of the whole.
+//!
+//! A finite-element model moves in thousands of degrees of freedom and is touched in a few: at joints, where forces act, where one looks. These are
+//! its *ports*, weighted sums of rows. `M̂ = Tᵀ M T`, `Ĉ = Tᵀ C T`, `K̂ = Tᵀ K T` keep its symmetry and its signs, whatever the columns of `T` are:
+//!
+//! | kind | columns of T | file |
+//! | --- | --- | --- |
+//! | Rubin, MacNeal | free modes, and what the others add to the static answer at the ports | `free` |
+//! | Craig-Bampton | modes with the ports held, and static answers to unit motions of the ports | `craig_bampton` |
+//!
+//! and harmonic balance, which wants receptances only, may take modes and a series of residuals (`series`). Every reduction can be held against the
+//! whole structure (`evidence`), and [`Reduce`] takes as many modes as a given error asks for.
+//!
+//! Damping is a part of the whole structure and is reduced like the other matrices; [`Damping`] says what a modal damping ratio means
+//! beyond the modes that
+//! are kept.
+
+mod choice;
+mod craig_bampton;
+mod evidence;
+mod free;
+mod residual;
+mod series;
+
+pub use choice::{Chosen, Reduce};
+pub use evidence::{Deviation, Reference};
+pub use free::Free;
+pub use series::Series;
+
+use nalgebra::{Complex, DMatrix};
+use stickslip_numerics::eigen;
+use stickslip_numerics::sparse::{Analysis, Matrix, ModesError, NaturalModes, Singular, Wanted, columns};
+
+/// A weighted sum of degrees of freedom, as (index from 0, weight).
+pub type Row = Vec<(usize, f64)>;
+
+/// Modes beyond these are refused: as many numbers as degrees of freedom for each.
+const MOST_MODES: usize = 600;
+/// Kinetic energy of a reduced mode relative to its stiffness, in the units of the largest, below which it has no frequency.
+const MASSLESS: f64 = 1e-14;
+/// A negative shift, relative to the ratio of stiffness and mass, by which free motions have a factor.
+const SHIFT: f64 = 1e-6;
+
+/// Damping of the whole structure.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Damping {
+    /// Every mode up to a frequency has the same share of critical damping. What is above, and with it the residual and constraint vectors,
+    /// is damped in
+    /// proportion to its stiffness, continuously: `2 ratio / up_to`, so that a mode at ω has the ratio `ratio ω / up_to`.
+    Ratio {
+        /// Share of critical damping, 1.
+        ratio: f64,
+        /// Upper end of the frequencies of interest, rad/s.
+        up_to: f64,
+    },
+    /// `C = mass M + stiffness K`.
+    Rayleigh {
+        /// 1/s.
+        mass: f64,
+        /// s.
+        stiffness: f64,
+    },
+    /// `C`, kg/s; it may have a gyroscopic part.
+    Matrix(Matrix),
+}
+
+impl Damping {
+    /// `C = α M + β K` of what is not kept as a mode; none of a matrix.
+    fn proportional(&self) -> Option<(f64, f64)> {
+        match *self {
+            Damping::Ratio { ratio, up_to } => Some((0.0, 2.0 * ratio / up_to)),
+            Damping::Rayleigh { mass, stiffness } => Some((mass, stiffness)),
+            Damping::Matrix(_) => None,
+        }
+    }
+
+    /// `φᵀ C φ` of a mode of unit mass at ω (rad/s), in 1/s.
+    fn of_mode(&self, omega: f64) -> Option<f64> {
+        match *self {
+            Damping::Ratio { ratio, up_to } if omega < up_to => Some(2.0 * ratio * omega),
+            _ => self.proportional().map(|(alpha, beta)| alpha + beta * omega * omega),
+        }
+    }
+}
+
+/// A structure before its reduction, with its ports.
+#[derive(Debug, Clone)]
+pub struct Whole {
+    mass: Matrix,
+    damping: Damping,
+    stiffness: Matrix,
+    ports: Vec<Row>,
+    analysis: Analysis,
+}
+
+/// Why a structure is not reduced.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ReductionError {
+    /// Matrices of different sizes.
+    #[error("the {matrix} matrix has {rows} rows and the stiffness matrix {n}; they must have the same")]
+    Size {
+        /// Which.
+        matrix: &'static str,
+        /// Its rows.
+        rows: usize,
+        /// Rows of the stiffness.
+        n: usize,
+    },
+    /// A matrix that must be symmetric is not.
+    #[error("the {matrix} matrix is not symmetric: rows {row} and {column} (from 0) differ across the diagonal")]
+    NotSymmetric {
+        /// Which.
+        matrix: &'static str,
+        /// Row, from 0.
+        row: usize,
+        /// Column, from 0.
+        column: usize,
+    },
+    /// A port of nothing, outside, or not finite.
+    #[error(
+        "port {port} (from 0) is no motion of the structure: it needs finite weights, not all zero, of rows below {n}"
+    )]
+    Port {
+        /// Which, from 0.
+        port: usize,
+        /// Degrees of freedom.
+        n: usize,
+    },
+    /// Nothing is seen of the structure.
+    #[error("the structure has no port; name at least one joint, force or place that is observed")]
+    NoPorts,
+    /// A number that makes no damping or no range.
+    #[error("{what} is {value}, and must be {must}")]
+    Number {
+        /// Of what.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        must: &'static str,
+    },
+    /// No modes.
+    #[error(transparent)]
+    Modes(#[from] ModesError),
+    /// A dynamic stiffness has no inverse.
+    #[error("at {omega:.6e} rad/s {singular}")]
+    Singular {
+        /// Where, rad/s.
+        omega: f64,
+        /// Why.
+        singular: Singular,
+    },
+    /// The ports do not hold the structure.
+    #[error(
+        "with all ports held the structure can still move freely ({count} ways), so it has no static answers to them; take free modes instead of Craig-Bampton"
+    )]
+    NotHeld {
+        /// Free motions.
+        count: usize,
+    },
+    /// A series needs proportional or modal damping.
+    #[error(
+        "a series of residuals needs modal or Rayleigh damping, and the structure has a damping matrix; reduce it by free modes"
+    )]
+    SeriesDamping,
+    /// No reduction is close enough.
+    #[error(
+        "the best of the reductions tried errs by {best:.1e} at {at:.6e} rad/s with {dofs} coordinates, and {tolerance:.1e} was \
+         asked for; ask for less, or for a lower frequency"
+    )]
+    OutOfReach {
+        /// The least relative error.
+        best: f64,
+        /// Where, rad/s.
+        at: f64,
+        /// Its coordinates.
+        dofs: usize,
+        /// What was asked for.
+        tolerance: f64,
+    },
+    /// Numbers left the range.
+    #[error("the entries of the reduced matrices leave the range of numbers; choose other units")]
+    OutOfRange,
+}
+
+/// Difference of an entry and its mirror image, relative to the largest, that counts as rounding of a program that wrote ten digits.
+const SYMMETRIC: f64 = 1e-9;
+
+impl Whole {
+    /// Of sparse symmetric matrices (kg, N/m), damping, and ports: whatever a joint, a force or an observer sees.
+    ///
+    /// # Errors
+    /// [`ReductionError`]: sizes that differ, a matrix that is not symmetric, a port that is none, a negative damping ratio.
+    pub fn new(mass: Matrix, damping: Damping, stiffness: Matrix, ports: Vec<Row>) -> Result<Self, ReductionError> {
+        let n = stiffness.n();
+        let own = match &damping {
+            Damping::Matrix(c) => Some(c),
+            _ => None,
+        };
+        for (name, matrix) in [("mass", Some(&mass)), ("stiffness", Some(&stiffness)), ("damping", own)] {
+            let Some(matrix) = matrix else { continue };
+            if matrix.n() != n {
+                return Err(ReductionError::Size { matrix: name, rows: matrix.n(), n });
+            }
+            if name != "damping"
+                && let Some(pair) = matrix.asymmetry(SYMMETRIC * matrix.largest())
+            {
+                return Err(ReductionError::NotSymmetric { matrix: name, row: pair.row, column: pair.column });
+            }
+        }
+        if ports.is_empty() {
+            return Err(ReductionError::NoPorts);
+        }
+        let wrong = |row: &Row| {
+            row.iter().any(|(at, weight)| *at >= n || !weight.is_finite())
+                || row.iter().all(|(_, weight)| *weight == 0.0)
+        };
+        if let Some(port) = ports.iter().position(wrong) {
+            return Err(ReductionError::Port { port, n });
+        }
+        let number = |what, value: f64, must, holds: bool| match value.is_finite() && holds {
+            true => Ok(()),
+            false => Err(ReductionError::Number { what, value, must }),
+        };
+        match damping {
+            Damping::Ratio { ratio, up_to } => {
+                number("the damping ratio", ratio, "zero or more", ratio >= 0.0)?;
+                number("the upper end of the frequencies (rad/s)", up_to, "positive", up_to > 0.0)?;
+            }
+            Damping::Rayleigh { mass, stiffness } => {
+                number("the damping by mass (1/s)", mass, "zero or more", mass >= 0.0)?;
+                number("the damping by stiffness (s)", stiffness, "zero or more", stiffness >= 0.0)?;
+            }
+            Damping::Matrix(_) => {}
+        }
+        let analysed: Vec<&Matrix> = [Some(&stiffness), Some(&mass), own].into_iter().flatten().collect();
+        let analysis = Analysis::new(&analysed);
+        Ok(Whole { mass, damping, stiffness, ports, analysis })
+    }
+
+    /// Degrees of freedom.
+    pub fn dofs(&self) -> usize {
+        self.stiffness.n()
+    }
+
+    /// What is seen of the structure, p rows.
+    pub fn ports(&self) -> &[Row] {
+        &self.ports
+    }
+
+    /// All natural modes up to `omega`, rad/s.
+    ///
+    /// # Errors
+    /// [`ReductionError::Modes`].
+    pub fn modes(&self, omega: f64) -> Result<NaturalModes, ReductionError> {
+        let wanted = Wanted::UpTo { value: omega * omega, most: MOST_MODES };
+        Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, wanted)?)
+    }
+
+    /// Unit forces at the ports, n × p.
+    fn forces(&self) -> Vec<f64> {
+        let n = self.dofs();
+        let mut forces = vec![0.0; n * self.ports.len()];
+        for (port, row) in self.ports.iter().enumerate() {
+            row.iter().for_each(|(at, weight)| forces[port * n + at] += weight);
+        }
+        forces
+    }
+}
+
+/// A structure in few coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reduced {
+    /// How, for people.
+    pub kind: String,
+    /// `M̂`, r × r.
+    pub mass: DMatrix<f64>,
+    /// `Ĉ`, r × r.
+    pub damping: DMatrix<f64>,
+    /// `K̂`, r × r.
+    pub stiffness: DMatrix<f64>,
+    /// The ports' displacements as rows over the coordinates, p × r.
+    pub ports: DMatrix<f64>,
+    /// T, n × r, by columns.
+    basis: Vec<f64>,
+    n: usize,
+}
+
+impl Reduced {
+    /// Galerkin's projection on the columns of `basis`, n × r.
+    fn project(whole: &Whole, kind: String, basis: Vec<f64>) -> Result<Self, ReductionError> {
+        let n = whole.dofs();
+        let square = |matrix: &Matrix| columns::products(n, &basis, &matrix.times_columns(&basis));
+        let (mass, stiffness) = (symmetric(square(&whole.mass)), symmetric(square(&whole.stiffness)));
+        let own = match &whole.damping {
+            Damping::Matrix(c) => Some(square(c)),
+            _ => None,
+        };
+        let damping = damping(&whole.damping, &mass, &stiffness, own)?;
+        let mut reduced = Reduced { kind, mass, damping, stiffness, ports: DMatrix::zeros(0, 0), basis, n };
+        reduced.ports = reduced.rows(&whole.ports);
+        Ok(reduced)
+    }
+
+    /// Coordinates, r.
+    pub fn dofs(&self) -> usize {
+        self.mass.nrows()
+    }
+
+    /// Any weighted sums of the degrees of freedom of the whole structure, as rows over the coordinates.
+    ///
+    /// # Panics
+    /// If a row lies outside of the whole structure.
+    pub fn rows(&self, rows: &[Row]) -> DMatrix<f64> {
+        DMatrix::from_fn(rows.len(), self.dofs(), |i, k| {
+            rows[i].iter().map(|(at, weight)| weight * self.basis[k * self.n + at]).sum()
+        })
+    }
+
+    /// All displacements of the whole structure that belong to coordinates `q`.
+    ///
+    /// # Panics
+    /// If `q` has not r entries.
+    pub fn expand(&self, q: &[f64]) -> Vec<f64> {
+        columns::combination(self.n, &self.basis, &DMatrix::from_column_slice(q.len(), 1, q))
+    }
+
+    /// Natural frequencies of the reduced structure, rad/s, rising; those of coordinates without mass are infinite.
+    pub fn frequencies(&self) -> Option<Vec<f64>> {
+        Some(natural(&self.mass, &self.stiffness)?.0.iter().map(|v| v.max(0.0).sqrt()).collect())
+    }
+
+    /// Receptance of the ports at ω (rad/s): displacements by unit forces, p × p, m/N.
+    ///
+    /// # Errors
+    /// [`ReductionError::Singular`] at an undamped resonance.
+    pub fn receptance(&self, omega: f64) -> Result<DMatrix<Complex<f64>>, ReductionError> {
+        let stiffness = DMatrix::from_fn(self.dofs(), self.dofs(), |i, k| {
+            let (m, c, s) = (self.mass[(i, k)], self.damping[(i, k)], self.stiffness[(i, k)]);
+            Complex::new(s - omega * omega * m, omega * c)
+        });
+        let ports = self.ports.map(|v| Complex::new(v, 0.0));
+        let free = ReductionError::Singular { omega, singular: Singular { row: 0 } };
+        Ok(&ports * stiffness.lu().solve(&ports.transpose()).ok_or(free)?)
+    }
+}
+
+/// The mean of a matrix and its mirror image.
+fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    (&matrix + matrix.transpose()) * 0.5
+}
+
+/// Reduced damping: `own` if the structure has a matrix.
+fn damping(
+    damping: &Damping,
+    mass: &DMatrix<f64>,
+    stiffness: &DMatrix<f64>,
+    own: Option<DMatrix<f64>>,
+) -> Result<DMatrix<f64>, ReductionError> {
+    let Some((alpha, beta)) = damping.proportional() else {
+        return own.ok_or(ReductionError::OutOfRange);
+    };
+    let mut c = mass * alpha + stiffness * beta;
+    if let Damping::Ratio { up_to, .. } = *damping
+        && beta > 0.0
+    {
+        let (values, shapes) = natural(mass, stiffness).ok_or(ReductionError::OutOfRange)?;
+        for (k, value) in values.iter().enumerate().filter(|(_, value)| **value < up_to * up_to) {
+            let omega = value.max(0.0).sqrt();
+            let more = damping.of_mode(omega).unwrap_or(0.0) - beta * omega * omega;
+            let force = mass * shapes.column(k);
+            c += &force * force.transpose() * more;
+        }
+    }
+    Ok(c)
+}
+
+/// Eigenvalues λ (rad²/s², rising, infinite without mass) and shapes of unit mass (or unit stiffness without mass) of a small structure.
+fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+    let r = mass.nrows();
+    if r == 0 {
+        return Some((vec![], DMatrix::zeros(0, 0)));
+    }
+    let ratio = |i: usize| stiffness[(i, i)] / mass[(i, i)];
+    let mut ratios: Vec<f64> = (0..r).map(ratio).filter(|v| v.is_finite() && *v > 0.0).collect();
+    ratios.sort_by(f64::total_cmp);
+    let shift = SHIFT * ratios.get(ratios.len() / 2).copied().unwrap_or(1.0);
+    let held = stiffness + mass * shift;
+    // ones on the diagonal, so that coordinates of any unit count alike
+    let unit = DMatrix::from_diagonal(&held.diagonal().map(|v| 1.0 / v.sqrt()));
+    let factor = (&unit * held * &unit).cholesky()?.l();
+    let inverse = factor.solve_lower_triangular(&DMatrix::identity(r, r))? * &unit;
+    let eigen = eigen::symmetric(symmetric(&inverse * mass * inverse.transpose()))?;
+    let largest = eigen.eigenvalues.amax();
+    let shapes = inverse.transpose() * &eigen.eigenvectors;
+    let mut order: Vec<usize> = (0..r).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let massless = |theta: f64| theta <= MASSLESS * largest;
+    let value = |theta: f64| if massless(theta) { f64::INFINITY } else { 1.0 / theta - shift };
+    let size = |theta: f64| if massless(theta) { 1.0 } else { theta.sqrt() };
+    let values = order.iter().map(|&k| value(eigen.eigenvalues[k])).collect();
+    Some((values, DMatrix::from_fn(r, r, |i, k| shapes[(i, order[k])] / size(eigen.eigenvalues[order[k]]))))
+}

@@ -1,0 +1,91 @@
+//! What modes leave of the answer at the ports: residual vectors of any order.
+//!
+//! The answer of the modes that are not kept is a power series in λ around σ,
+//!
+//! `Σ φ φᵀ F / (λₖ - λ) = Σⱼ (λ - σ)ʲ Xⱼ`, `X₀ = R F`, `Xⱼ₊₁ = R M Xⱼ`, `R = (K - σM)⁻¹` without the modes that are kept.
+//!
+//! `X₀` at σ = 0 is the residual flexibility. A structure that can move freely has no `K⁻¹`: forces are made self-equilibrated by the
+//! inertia of that motion, and as many degrees of freedom are held as it has directions. Holding them takes no force then, so that it may
+//! be done by springs of any stiffness.
+//!
+//! Sources: MacNeal (1971), "A hybrid method of component mode synthesis"; Rubin (1975), "Improved component-mode representation for structural
+//! dynamic analysis"; Hansteen and Bell (1979), "On the accuracy of mode superposition analysis in structural dynamics"; Dickens, Nakagawa and
+//! Wittbrodt (1997), "A critique of mode acceleration and modal truncation augmentation methods for modal response analysis".
+
+use super::{ReductionError, Whole};
+use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes, columns};
+
+/// Attempts to factor beside an eigenvalue, each further by `STEP` of the shift.
+const ATTEMPTS: usize = 8;
+const STEP: f64 = 1e-3;
+
+/// The blocks `X₀, …`, as many as `order`, n × p each, with the modes projected out. Also the shift that was taken, rad²/s².
+pub(super) fn blocks(
+    whole: &Whole,
+    modes: &NaturalModes,
+    shift: f64,
+    order: usize,
+) -> Result<(Vec<Vec<f64>>, f64), ReductionError> {
+    let n = whole.dofs();
+    let (factor, shift) = factor(whole, modes, shift)?;
+    let clear = |block: &mut Vec<f64>| {
+        let along = columns::products(n, &modes.shapes, &whole.mass.times_columns(block));
+        columns::add(n, block, -1.0, &modes.shapes, &along);
+    };
+    let mut blocks: Vec<Vec<f64>> = Vec::with_capacity(order);
+    for _ in 0..order {
+        let mut block = match blocks.last() {
+            Some(last) => whole.mass.times_columns(last),
+            None => whole.forces(),
+        };
+        // forces without the part that the modes answer: A F = (1 - M Φ Φᵀ) F, self-equilibrated with them
+        let along = columns::products(n, &modes.shapes, &block);
+        columns::add(n, &mut block, -1.0, &whole.mass.times_columns(&modes.shapes), &along);
+        factor.solve(&mut block);
+        clear(&mut block);
+        clear(&mut block);
+        blocks.push(block);
+    }
+    Ok((blocks, shift))
+}
+
+/// `K - σM`; at zero with springs where a free motion is largest.
+fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(Factor, f64), ReductionError> {
+    if shift == 0.0 {
+        let supports = supports(whole, modes)?;
+        let sum = [(1.0, &whole.stiffness), (1.0, &supports)];
+        let factor = whole.analysis.factor(&sum);
+        return Ok((factor.map_err(|singular| ReductionError::Singular { omega: 0.0, singular })?, 0.0));
+    }
+    let mut failed = None;
+    for attempt in 0..ATTEMPTS {
+        let shift = shift * (1.0 + STEP * attempt as f64);
+        match whole.analysis.factor(&[(1.0, &whole.stiffness), (-shift, &whole.mass)]) {
+            Ok(factor) => return Ok((factor, shift)),
+            Err(singular) => failed = Some(ReductionError::Singular { omega: shift.max(0.0).sqrt(), singular }),
+        }
+    }
+    Err(failed.unwrap_or(ReductionError::OutOfRange))
+}
+
+/// Springs that hold every free motion once: at the degree of freedom that moves most, then at that which moves most with the first one
+/// held, and so on.
+fn supports(whole: &Whole, modes: &NaturalModes) -> Result<Matrix, ReductionError> {
+    let n = whole.dofs();
+    let (stiffness, mass) = (&whole.stiffness, &whole.mass);
+    let mut motions: Vec<Vec<f64>> = (0..modes.free()).map(|mode| modes.shape(mode).to_vec()).collect();
+    let mut springs = Vec::new();
+    while !motions.is_empty() {
+        let places = (0..motions.len()).flat_map(|k| (0..n).map(move |i| (k, i)));
+        let largest = places.max_by(|&(a, i), &(b, k)| motions[a][i].abs().total_cmp(&motions[b][k].abs()));
+        let Some((k, at)) = largest else { break };
+        let motion = motions.swap_remove(k);
+        for other in &mut motions {
+            let share = other[at] / motion[at];
+            other.iter_mut().zip(&motion).for_each(|(x, y)| *x -= share * y);
+        }
+        // as stiff as its surroundings
+        springs.push((at, at, stiffness.get(at, at).max(modes.scale * mass.get(at, at))));
+    }
+    Matrix::from_triplets(n, springs).map_err(|_| ReductionError::OutOfRange)
+}

@@ -1,0 +1,123 @@
+//! Blocks of steel of 5 mm elements, held at one face or free.
+
+use super::brick::Brick;
+use std::f64::consts::TAU;
+use stickslip::structure::reduction::{Damping, Free, Reduce, Reference, Series, Whole};
+use stickslip_numerics::sparse::{Analysis, NaturalModes, Wanted};
+
+/// Modes are kept up to this multiple of the largest frequency of interest.
+const BEYOND: f64 = 2.0;
+/// The same of modes with the ports held.
+const BEYOND_HELD: f64 = 4.0;
+const EDGE: f64 = 0.005;
+
+fn brick(elements: [usize; 3], held: bool) -> Brick {
+    Brick::new(elements, elements.map(|e| EDGE * e as f64), held)
+}
+
+/// rad²/s², by `benches/peers/scipy_brick.py` of `{"elements": [16, 8, 7], "modes": 20}` (SciPy 1.17.1: eigsh with sigma = 0 and SuperLU),
+/// which assembles the block
+/// in its own way.
+const HELD: [f64; 20] = [
+    6.747094462738e+08,
+    8.216043066283e+08,
+    3.418826299394e+09,
+    1.058807166506e+10,
+    1.103865626639e+10,
+    1.181543752095e+10,
+    3.083625505158e+10,
+    5.006904345575e+10,
+    5.215056383280e+10,
+    8.214040469061e+10,
+    8.516788256294e+10,
+    8.883642423883e+10,
+    9.197949725741e+10,
+    9.524084407521e+10,
+    1.175982181304e+11,
+    1.207111210383e+11,
+    1.217182257451e+11,
+    1.369173223432e+11,
+    1.413310583697e+11,
+    1.445936595748e+11,
+];
+/// The same of `{"elements": [12, 5, 4], "modes": 14, "held": false}`, without the six free motions.
+const FREE: [f64; 8] = [
+    2.126849798549e+10,
+    2.368365769307e+10,
+    2.710344415011e+10,
+    7.224513140387e+10,
+    9.265675431895e+10,
+    9.548392921067e+10,
+    9.749962931658e+10,
+    2.110421741226e+11,
+];
+
+#[test]
+fn modes_are_those_of_scipy() {
+    let (held, free) = (brick([16, 8, 7], true), brick([12, 5, 4], false));
+    for (brick, wanted, expected) in [(held, Wanted::Lowest(20), &HELD[..]), (free, Wanted::Lowest(14), &FREE[..])] {
+        let analysis = Analysis::new(&[&brick.stiffness, &brick.mass]);
+        let modes = NaturalModes::new(&analysis, &brick.stiffness, &brick.mass, wanted).unwrap();
+        let rigid = modes.count() - expected.len();
+        // free motions have the rounding of the largest eigenvalue, 1e13 rad²/s²
+        assert!(modes.values[..rigid].iter().all(|value| value.abs() < 0.1), "{:?}", modes.values);
+        for (value, expected) in modes.values[rigid..].iter().zip(expected) {
+            assert!((value / expected - 1.0).abs() < 1e-10, "{value:.12e} instead of {expected:.12e}");
+        }
+    }
+}
+
+/// 16 nodes of the free face are ports. Frequencies of the reduced block agree with those of the whole far better than 0.1 %, receptances
+/// as the modes that
+/// are left out let expect.
+#[test]
+fn reductions_of_the_block() {
+    let brick = brick([12, 6, 5], true);
+    let up_to = TAU * 40e3;
+    let (mass, stiffness, ports) = (brick.mass.clone(), brick.stiffness.clone(), brick.face(16));
+    assert_eq!((brick.dofs(), ports.len()), (1512, 48));
+    let whole = Whole::new(mass, Damping::Ratio { ratio: 0.005, up_to }, stiffness, ports).unwrap();
+    let modes = whole.modes(BEYOND * up_to).unwrap();
+    let inside = modes.values.partition_point(|value| *value < up_to * up_to);
+    assert!(inside > 5, "{inside}");
+    let reference = Reference::new(&whole, &modes, up_to).unwrap();
+    let free = Free::new(&whole, &modes, 0.0, 2).unwrap();
+    let [one, two] = [1, 2].map(|order| free.reduced(modes.count(), order).unwrap());
+    let held = whole.craig_bampton(BEYOND_HELD * up_to).unwrap();
+    // the share of the first mode left out, `(ω² / λ)²ᴶ`, times its own share of the answer; with the ports held, a frequency that is off
+    // by 3e-4 is a sixteenth of the
+    // distance of a sample from its mode
+    let share: f64 = BEYOND.powi(-4);
+    for (reduced, tolerance) in [(&one, share), (&two, share * share), (&held, 0.1)] {
+        let deviation = reference.deviation(reduced);
+        let frequencies = reduced.frequencies().unwrap();
+        for (omega, value) in frequencies.iter().zip(&modes.values).take(inside) {
+            let off = omega / value.sqrt() - 1.0;
+            assert!(off.abs() < 1e-3, "{}: {} Hz", reduced.kind, omega / TAU);
+        }
+        assert!(deviation.error < tolerance, "{}: {deviation:?}", reduced.kind);
+    }
+    let shift = 0.5 * up_to * up_to;
+    let series = Series::new(&Free::new(&whole, &modes, shift, 4).unwrap(), modes.count()).unwrap();
+    let deviation = reference.deviation_of_series(&series);
+    // around the middle the step is half of it at most
+    let step: f64 = 0.5 / (BEYOND * BEYOND - 0.5);
+    assert!(deviation.error < step.powi(8), "{deviation:?}");
+}
+
+/// As many modes and vectors as the error asks for.
+#[test]
+fn the_error_chooses_the_size() {
+    let brick = brick([10, 4, 4], true);
+    let up_to = TAU * 20e3;
+    let whole =
+        Whole::new(brick.mass.clone(), Damping::Ratio { ratio: 0.005, up_to }, brick.stiffness.clone(), brick.face(4))
+            .unwrap();
+    let mut last = 0;
+    for tolerance in [1e-2, 1e-4, 1e-7] {
+        let chosen = Reduce { up_to, tolerance }.of(&whole).unwrap();
+        assert!(chosen.deviation.error <= tolerance && chosen.reduced.dofs() >= last);
+        last = chosen.reduced.dofs();
+    }
+    assert!(last < whole.dofs() / 4, "{last} of {}", whole.dofs());
+}

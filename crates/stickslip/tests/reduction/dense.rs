@@ -1,0 +1,285 @@
+//! Small structures whose whole receptance is a dense solution.
+
+use nalgebra::{Complex, DMatrix};
+use proptest::prelude::*;
+use stickslip::structure::reduction::{Damping, Free, Reduce, Reduced, ReductionError, Reference, Row, Series, Whole};
+use stickslip_numerics::sparse::Matrix;
+
+fn sparse(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> Matrix {
+    Matrix::from_triplets(n, entries).unwrap()
+}
+
+fn full(matrix: &Matrix) -> DMatrix<f64> {
+    DMatrix::from_fn(matrix.n(), matrix.n(), |i, k| matrix.get(i, k))
+}
+
+/// Springs (i, k, stiffness); to oneself they are springs to the ground.
+fn springs(n: usize, between: &[(usize, usize, f64)]) -> Matrix {
+    let spring = |&(i, k, v): &(usize, usize, f64)| match i == k {
+        true => vec![(i, i, v)],
+        false => vec![(i, i, v), (k, k, v), (i, k, -v), (k, i, -v)],
+    };
+    sparse(n, between.iter().flat_map(spring))
+}
+
+fn chain(n: usize, held: bool) -> Matrix {
+    let mut links: Vec<_> = (1..n).map(|i| (i - 1, i, 1.0 + (i % 3) as f64)).collect();
+    links.extend(held.then_some((0, 0, 2.0)));
+    springs(n, &links)
+}
+
+fn masses(n: usize) -> Matrix {
+    sparse(n, (0..n).map(|i| (i, i, 1.0 + 0.1 * (i % 4) as f64)))
+}
+
+/// `P (K - ω² M + jω C)⁻¹ Pᵀ`.
+fn receptance(m: &Matrix, c: &DMatrix<f64>, k: &Matrix, ports: &[Row], omega: f64) -> DMatrix<Complex<f64>> {
+    let n = m.n();
+    let stiffness =
+        DMatrix::from_fn(n, n, |i, j| Complex::new(k.get(i, j) - omega * omega * m.get(i, j), omega * c[(i, j)]));
+    let mut p = DMatrix::zeros(ports.len(), n);
+    ports.iter().enumerate().for_each(|(i, row)| row.iter().for_each(|(at, v)| p[(i, *at)] += Complex::new(*v, 0.0)));
+    &p * stiffness.lu().solve(&p.transpose()).unwrap()
+}
+
+fn off(a: &DMatrix<Complex<f64>>, b: &DMatrix<Complex<f64>>) -> f64 {
+    (a - b).norm() / b.norm()
+}
+
+/// λ and shapes of unit mass, by Cholesky's factor of M.
+fn modes(m: &Matrix, k: &Matrix) -> (Vec<f64>, DMatrix<f64>) {
+    let n = m.n();
+    let inverse = full(m).cholesky().unwrap().l().solve_lower_triangular(&DMatrix::identity(n, n)).unwrap();
+    let eigen = (&inverse * full(k) * inverse.transpose()).symmetric_eigen();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let shapes = (inverse.transpose() * eigen.eigenvectors).select_columns(&order);
+    (order.iter().map(|&i| eigen.eigenvalues[i]).collect(), shapes)
+}
+
+/// Ports: a place, a difference, a mean; and one that depends on them.
+fn ports(n: usize) -> Vec<Row> {
+    vec![
+        vec![(n - 1, 1.0)],
+        vec![(n / 2, 1.0), (1, -1.0)],
+        vec![(2, 0.5), (n / 3, 0.5)],
+        vec![(n - 1, 2.0), (n / 2, -1.0), (1, 1.0)],
+    ]
+}
+
+/// Above all frequencies of these structures, `√(4 · 3 / 1)`.
+const ABOVE_ALL: f64 = 4.0;
+
+const UNDAMPED: Damping = Damping::Rayleigh { mass: 0.0, stiffness: 0.0 };
+
+/// A reduction errs where its size says so: with residual vectors of J orders like `(ω² / λ)²ᴶ⁺¹` of the first mode left out, of which the
+/// answer at
+/// rest is exact, for held and for free structures.
+#[test]
+fn residual_vectors_make_low_frequencies_exact() {
+    let n = 60;
+    for held in [true, false] {
+        let (m, k) = (masses(n), chain(n, held));
+        let whole = Whole::new(m.clone(), UNDAMPED, k.clone(), ports(n)).unwrap();
+        let (values, _) = modes(&m, &k);
+        let found = whole.modes((values[10] * values[9]).sqrt().sqrt()).unwrap();
+        assert_eq!(found.count(), 10);
+        let free = Free::new(&whole, &found, 0.0, 3).unwrap();
+        let none = DMatrix::zeros(n, n);
+        for order in 1..=3 {
+            let reduced = free.reduced(10, order).unwrap();
+            // one of the four ports depends on the others
+            assert_eq!(reduced.dofs(), 10 + 3 * order, "{}", reduced.kind);
+            for share in [0.05, 0.2, 0.5] {
+                let omega = share * values[10].sqrt() + 1e-3;
+                let error = off(&reduced.receptance(omega).unwrap(), &receptance(&m, &none, &k, &ports(n), omega));
+                let bound = 10.0 * (omega * omega / values[10]).powi(2 * order as i32) + 1e-11;
+                assert!(error < bound, "held {held}, order {order}, share {share}: {error:.1e} beyond {bound:.1e}");
+            }
+        }
+    }
+}
+
+/// The first residual term of a free structure is its residual flexibility, the sum over the modes left out.
+#[test]
+fn residual_flexibility_of_a_free_structure() {
+    let n = 40;
+    let (m, k) = (masses(n), chain(n, false));
+    let whole = Whole::new(m.clone(), UNDAMPED, k.clone(), ports(n)).unwrap();
+    let (values, shapes) = modes(&m, &k);
+    let found = whole.modes((values[5] * values[4]).sqrt().sqrt()).unwrap();
+    for count in [1, 3, 5] {
+        for (shift, order) in [(0.0, 2), (0.5 * values[4] + 0.5 * values[3], 2)] {
+            let series = Series::new(&Free::new(&whole, &found, shift, order).unwrap(), count).unwrap();
+            assert_eq!(series.terms(), 4);
+            let omega: f64 = 0.6 * values[count].sqrt();
+            let row = |row: &Row, mode: usize| row.iter().map(|(at, v)| v * shapes[(*at, mode)]).sum::<f64>();
+            let expected = DMatrix::from_fn(4, 4, |i, j| {
+                let mode = |mode: usize| row(&ports(n)[i], mode) * row(&ports(n)[j], mode);
+                let kept: f64 = (0..count).map(|k| mode(k) / (values[k] - omega * omega)).sum();
+                let step = omega * omega - shift;
+                let left =
+                    |k: usize| (0..4).map(|j| (step / (values[k] - shift)).powi(j)).sum::<f64>() / (values[k] - shift);
+                Complex::new(kept + (count..n).map(|k| mode(k) * left(k)).sum::<f64>(), 0.0)
+            });
+            let error = off(&series.receptance(omega), &expected);
+            assert!(error < 1e-10, "{count} modes, shift {shift}: {error:.1e}");
+        }
+    }
+}
+
+/// Modal damping is the ratio up to the bound and grows with frequency beyond, in the whole structure and in every reduction of it.
+#[test]
+fn damping_by_ratio() {
+    let n = 30;
+    let (m, k) = (masses(n), chain(n, true));
+    let (values, shapes) = modes(&m, &k);
+    let (ratio, up_to) = (0.02, 0.5 * (values[6].sqrt() + values[7].sqrt()));
+    let whole = Whole::new(m.clone(), Damping::Ratio { ratio, up_to }, k.clone(), ports(n)).unwrap();
+    let modal = |value: f64| match value.sqrt() {
+        omega if omega < up_to => 2.0 * ratio * omega,
+        omega => 2.0 * ratio / up_to * omega * omega,
+    };
+    let force = full(&m) * &shapes;
+    let c =
+        &force * DMatrix::from_diagonal(&DMatrix::from_fn(n, 1, |i, _| modal(values[i])).column(0)) * force.transpose();
+    let found = whole.modes(1.5 * up_to).unwrap();
+    let free = Free::new(&whole, &found, 0.0, 3).unwrap();
+    let series = Series::new(&free, found.count()).unwrap();
+    for omega in [0.3 * up_to, values[2].sqrt(), up_to] {
+        let expected = receptance(&m, &c, &k, &ports(n), omega);
+        let error = off(&free.reduced(found.count(), 3).unwrap().receptance(omega).unwrap(), &expected);
+        assert!(error < 1e-6, "free modes at {omega}: {error:.1e}");
+        let error = off(&series.receptance(omega), &expected);
+        assert!(error < 1e-4, "series at {omega}: {error:.1e}");
+        // with all modes it is the whole structure
+        let error = off(&whole.craig_bampton(ABOVE_ALL).unwrap().receptance(omega).unwrap(), &expected);
+        assert!(error < 1e-9, "Craig-Bampton at {omega}: {error:.1e}");
+    }
+}
+
+/// A damping matrix, gyroscopic too, is projected; a series refuses it.
+#[test]
+fn damping_matrix() {
+    let n = 30;
+    let (m, k) = (masses(n), chain(n, true));
+    let c = sparse(n, [(3, 3, 0.2), (4, 9, 0.3), (9, 4, -0.3), (20, 20, 0.1)]);
+    let whole = Whole::new(m.clone(), Damping::Matrix(c.clone()), k.clone(), ports(n)).unwrap();
+    let found = whole.modes(1.3).unwrap();
+    let free = Free::new(&whole, &found, 0.0, 2).unwrap();
+    assert_eq!(Series::new(&free, 2).unwrap_err(), ReductionError::SeriesDamping);
+    let reduced = free.reduced(found.count(), 2).unwrap();
+    let reference = Reference::new(&whole, &found, 0.7).unwrap();
+    let own = reference
+        .frequencies()
+        .map(|omega| off(&reduced.receptance(omega).unwrap(), &receptance(&m, &full(&c), &k, &ports(n), omega)));
+    let own = own.fold(0.0, f64::max);
+    let deviation = reference.deviation(&reduced);
+    // in another norm, with other weights of the ports
+    assert!(deviation.error < 5.0 * own && own < 5.0 * deviation.error, "{own:.1e} {deviation:?}");
+    let all = whole.modes(ABOVE_ALL).unwrap();
+    assert_eq!(all.count(), n);
+    let exact = Free::new(&whole, &all, 0.0, 0).unwrap().reduced(n, 0).unwrap();
+    assert!(reference.deviation(&exact).error < 1e-9, "{:?}", reference.deviation(&exact));
+}
+
+/// Places without mass, seen by a port.
+#[test]
+fn ports_without_mass() {
+    let n = 40;
+    let m = sparse(n, (0..n).filter(|i| i % 2 == 0).map(|i| (i, i, 1.0)));
+    let k = chain(n, true);
+    let ports = vec![vec![(n - 1, 1.0)], vec![(7, 1.0)]];
+    let whole = Whole::new(m.clone(), UNDAMPED, k.clone(), ports.clone()).unwrap();
+    // all twenty modes with a frequency; of the ports, one without mass adds its own spring
+    let free = Free::new(&whole, &whole.modes(ABOVE_ALL).unwrap(), 0.0, 1).unwrap();
+    assert_eq!(free.modes(), 20);
+    for reduced in [free.reduced(20, 1).unwrap(), whole.craig_bampton(ABOVE_ALL).unwrap()] {
+        for omega in [0.01, 0.1, 0.3] {
+            let expected = receptance(&m, &DMatrix::zeros(n, n), &k, &ports, omega);
+            let error = off(&reduced.receptance(omega).unwrap(), &expected);
+            assert!(error < 1e-9, "{} at {omega}: {error:.1e}", reduced.kind);
+        }
+    }
+}
+
+#[test]
+fn what_is_no_reduction_says_why() {
+    let n = 20;
+    let (m, k) = (masses(n), chain(n, false));
+    let make = |m: &Matrix, k: &Matrix, damping, ports| Whole::new(m.clone(), damping, k.clone(), ports).map(|_| ());
+    let one_sided = sparse(n, k.entries().chain([(0, 5, 1.0)]));
+    assert!(matches!(
+        make(&m, &one_sided, UNDAMPED, ports(n)),
+        Err(ReductionError::NotSymmetric { matrix: "stiffness", .. })
+    ));
+    assert!(matches!(make(&masses(3), &k, UNDAMPED, vec![]), Err(ReductionError::Size { rows: 3, .. })));
+    assert_eq!(make(&m, &k, UNDAMPED, vec![]), Err(ReductionError::NoPorts));
+    for row in [vec![], vec![(n, 1.0)], vec![(0, f64::NAN)], vec![(0, 0.0)]] {
+        assert_eq!(make(&m, &k, UNDAMPED, vec![vec![(0, 1.0)], row]), Err(ReductionError::Port { port: 1, n }));
+    }
+    let negative = Damping::Ratio { ratio: -0.1, up_to: 1.0 };
+    assert!(matches!(make(&m, &k, negative, ports(n)), Err(ReductionError::Number { .. })));
+    // a free chain seen as a difference has static answers to it, but held there alone it still moves
+    let two = [springs(n / 2, &(1..n / 2).map(|i| (i - 1, i, 1.0)).collect::<Vec<_>>()); 1];
+    let apart = sparse(n, two[0].entries().flat_map(|(i, k, v)| [(i, k, v), (i + n / 2, k + n / 2, v)]));
+    let whole = Whole::new(m.clone(), UNDAMPED, apart, vec![vec![(0, 1.0)]]).unwrap();
+    assert!(matches!(whole.craig_bampton(1.0), Err(ReductionError::NotHeld { count: 1 })));
+    let whole = Whole::new(m, UNDAMPED, k, ports(n)).unwrap();
+    let reach = Reduce { up_to: 0.9, tolerance: 1e-16 }.of(&whole);
+    assert!(matches!(reach, Err(ReductionError::OutOfReach { .. })), "{reach:?}");
+    assert!(matches!(Reduce { up_to: 0.0, tolerance: 1e-3 }.of(&whole), Err(ReductionError::Number { .. })));
+}
+
+/// Far below the first mode the static answers will do, three of which are independent.
+#[test]
+fn without_modes() {
+    let n = 30;
+    let whole = Whole::new(masses(n), UNDAMPED, chain(n, true), ports(n)).unwrap();
+    let chosen = Reduce { up_to: 1e-3, tolerance: 1e-6 }.of(&whole).unwrap();
+    assert_eq!((chosen.modes.count(), chosen.reduced.dofs()), (0, 3));
+}
+
+/// What is expanded is what is seen.
+#[test]
+fn expansion() {
+    let n = 30;
+    let whole = Whole::new(masses(n), UNDAMPED, chain(n, true), ports(n)).unwrap();
+    let reduced: Reduced = whole.craig_bampton(1.0).unwrap();
+    let q: Vec<f64> = (0..reduced.dofs()).map(|i| (i as f64).sin()).collect();
+    let x = reduced.expand(&q);
+    for (row, weights) in reduced.ports.row_iter().zip(ports(n)) {
+        let (seen, direct): (f64, f64) =
+            (row.iter().zip(&q).map(|(a, b)| a * b).sum(), weights.iter().map(|(at, v)| v * x[*at]).sum());
+        assert!((seen - direct).abs() < 1e-12);
+    }
+}
+
+proptest! {
+    /// Random structures, free or held, with all of their modes or with residual vectors of what is left: the chosen reduction meets its tolerance
+    /// at frequencies that it was not asked about.
+    #[test]
+    fn random_structures(
+        links in proptest::collection::vec((0usize..24, 0usize..24, 0.5f64..2.0), 10..50),
+        weights in proptest::collection::vec(0.5f64..2.0, 24),
+        seen in proptest::collection::vec((0usize..24, 0usize..24), 1..4),
+        at in 0.0f64..1.0,
+    ) {
+        let n = 24;
+        let all: Vec<_> = (1..n).map(|i| (i - 1, i, 1.0)).chain(links).collect();
+        let (m, k) = (sparse(n, (0..n).map(|i| (i, i, weights[i]))), springs(n, &all));
+        let ports: Vec<Row> = seen.iter().map(|&(i, k)| if i == k { vec![(i, 1.0)] } else { vec![(i, 1.0), (k, -1.0)] }).collect();
+        let (values, _) = modes(&m, &k);
+        let up_to = 0.5 * (values[5].sqrt() + values[6].sqrt());
+        let whole = Whole::new(m.clone(), Damping::Ratio { ratio: 0.01, up_to }, k.clone(), ports.clone()).unwrap();
+        let chosen = Reduce { up_to, tolerance: 1e-4 }.of(&whole).unwrap();
+        prop_assert!(chosen.deviation.error <= 1e-4);
+        let (omega, undamped) = (at * up_to, DMatrix::zeros(n, n));
+        prop_assume!(values.iter().all(|v| (v.max(0.0).sqrt() - omega).abs() > 2e-3 * up_to));
+        let mut bare = chosen.reduced.clone();
+        bare.damping *= 0.0;
+        let error = off(&bare.receptance(omega).unwrap(), &receptance(&m, &undamped, &k, &ports, omega));
+        // other frequencies, another norm
+        prop_assert!(error < 3e-3, "{error:.1e} with {}", chosen.reduced.kind);
+    }
+}

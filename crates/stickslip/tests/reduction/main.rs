@@ -1,0 +1,5 @@
+//! Reductions against dense solutions of small structures, and against a block of hexahedra.
+
+mod block;
+mod brick;
+mod dense;
