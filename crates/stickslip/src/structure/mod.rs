@@ -29,6 +29,7 @@ struct Kept {
 }
 
 #[derive(Debug)]
+#[allow(clippy::large_enum_variant)] // one for each structure, behind its reference
 enum Form {
     Full(Arc<Matrices>),
     Sparse {
@@ -550,7 +551,8 @@ mod tests {
     fn wrong_entries_are_refused_as_wrong_matrices_are() {
         let n = 2 * SPARSE;
         let [m, c, k] = chain(n);
-        let error = |change: &dyn Fn(&mut DMatrix<f64>, &mut DMatrix<f64>, &mut DMatrix<f64>)| {
+        type One<'a> = &'a mut DMatrix<f64>;
+        let error = |change: &dyn Fn(One, One, One)| {
             let (mut m, mut c, mut k) = (m.clone(), c.clone(), k.clone());
             change(&mut m, &mut c, &mut k);
             Structure::new(numbered(n), m, c, k).unwrap_err().to_string()

@@ -32,10 +32,18 @@ pub(super) struct Rest {
     n: usize,
     modal: Option<Modal>,
     /// Dynamic stiffnesses of large structures at the last drive frequency, by their rates.
-    factors: RefCell<Vec<(Complex64, f64, Option<Arc<DynamicStiffness>>)>>,
+    factors: RefCell<Vec<Factored>>,
     structure: Structure,
     /// Directions of the axes: rows, rising, with their weights.
     directions: Vec<Vec<(usize, f64)>>,
+}
+
+/// A dynamic stiffness at a rate (1/s), made at a drive frequency (rad/s); none at a resonance without damping.
+#[derive(Debug, Clone)]
+struct Factored {
+    rate: Complex64,
+    omega: f64,
+    factor: Option<Arc<DynamicStiffness>>,
 }
 
 /// Modes, and what they are at the joints.
@@ -202,15 +210,15 @@ impl Rest {
     /// Of a large structure: kept as long as the drive frequency stays. `None` at a resonance without damping.
     fn factor(&self, s: Complex64, omega: f64) -> Option<Arc<DynamicStiffness>> {
         let mut factors = self.factors.borrow_mut();
-        factors.retain(|(_, driven, _)| *driven == omega);
-        if let Some((.., found)) = factors.iter().find(|(rate, ..)| *rate == s) {
-            return found.clone();
+        factors.retain(|kept| kept.omega == omega);
+        if let Some(kept) = factors.iter().find(|kept| kept.rate == s) {
+            return kept.factor.clone();
         }
         // as in the modal form, what nothing holds has a mean position by a soft spring
         let hold = if s == ZERO { (HOLD * omega).powi(2) } else { 0.0 };
-        let found = self.structure.held_stiffness(s, hold).ok().map(Arc::new);
-        factors.push((s, omega, found.clone()));
-        found
+        let factor = self.structure.held_stiffness(s, hold).ok().map(Arc::new);
+        factors.push(Factored { rate: s, omega, factor: factor.clone() });
+        factor
     }
 }
 
