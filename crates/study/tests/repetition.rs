@@ -195,20 +195,20 @@ peaks = false
 kind = "harmonic-balance"
 harmonics = 1
 "#;
-    let study = stickslip_study::read_study("ring.toml", text, &[]).unwrap();
+    let study = read_study("ring.toml", text, &[]).unwrap();
     let checked = stickslip_study::run::check(&study).unwrap();
     let dataset = checked.run(&stickslip_study::run::Context::unwatched(1)).unwrap();
     for name in ["blade1_amplitude_m", "blade3777_amplitude_m"] {
         let amplitudes = dataset.tables[0].numbers(name).unwrap();
         for (hertz, amplitude) in [111.0, 112.0].into_iter().zip(amplitudes) {
-            let omega: f64 = std::f64::consts::TAU * hertz;
+            let omega: f64 = TAU * hertz;
             let expected = 1.0 / (1e5 - 0.2 * omega * omega).hypot(0.4 * omega);
             assert!((amplitude / expected - 1.0).abs() < 1e-9, "{name}: {amplitude} {expected}");
         }
     }
     // methods that carry full matrices say so at once, whatever the memory
     let exact = text.replace("kind = \"harmonic-balance\"\nharmonics = 1", "kind = \"event-driven\"");
-    let study = stickslip_study::read_study("ring.toml", &exact, &[]).unwrap().with_memory_limit(u64::MAX);
+    let study = read_study("ring.toml", &exact, &[]).unwrap().with_memory_limit(u64::MAX);
     let error = stickslip_study::run::check(&study).unwrap_err().to_string();
     assert!(error.contains("full matrices over at most 2000 places"), "{error}");
 }
