@@ -389,14 +389,14 @@ fn large_files_are_read_in_reasonable_time() {
             .replace("[\"2 N\", \"4 N\", \"6 N\", \"8 N\"]", "{ from = \"1 N\", to = \"2 N\", points = 100_000 }"),
     );
     // as many masses as are allowed, and more
-    for masses in [1997, 1998] {
+    for masses in [4997, 4998] {
         let more: String = (0..masses).map(|i| format!("[[mass]]\nname = \"x{i}\"\nmass = 1\n")).collect();
         let result = read_study(
             "a.toml",
             &EXAMPLE.replace("[[spring]]\nbetween = [\"blade1\"", &format!("{more}[[spring]]\nbetween = [\"blade1\"")),
             &[],
         );
-        assert_eq!(result.is_ok(), masses == 1997);
+        assert_eq!(result.is_ok(), masses == 4997);
     }
     survives(&EXAMPLE.replace("10 N", &"(".repeat(1_000_000)));
     survives(&EXAMPLE.replace("10 N", &"1+".repeat(1_000_000)));
