@@ -328,7 +328,7 @@ impl dyn Law + '_ {
         }
     }
 
-    /// The same joint stuck, a linear reference: no force reaches its slip limit, and its faces stay closed. `None` as for [`Self::free`].
+    /// The same joint stuck, a linear reference: no force reaches its slip limit, and its faces stay closed. `None` as for the free reference.
     pub fn stuck(&self) -> Option<SharedLaw> {
         match self.closed() {
             Some(along) => Some(Springs::shared(&along)),

@@ -148,7 +148,7 @@ impl Template {
     /// ```
     ///
     /// # Panics
-    /// If the file is wrong; those of [`TABLE`] are tested.
+    /// If the file is wrong; those of [`TABLE`](crate::templates::TABLE) are tested.
     pub fn parameters(&self) -> Vec<TemplateParameter> {
         let compiled = compile_template(self).and_then(|compiled| Ok((compiled.values(&[])?, compiled)));
         let (values, compiled) = compiled.unwrap_or_else(|error| panic!("template {}: {error}", self.name));
@@ -169,7 +169,7 @@ impl Template {
     /// The model with every parameter at its default.
     ///
     /// # Panics
-    /// If the file is wrong; those of [`TABLE`] are tested.
+    /// If the file is wrong; those of [`TABLE`](crate::templates::TABLE) are tested.
     pub fn model(&self) -> Model {
         self.model_with(&[]).unwrap_or_else(|error| panic!("template {}: {error}", self.name))
     }
