@@ -182,7 +182,7 @@ impl Assembly {
 /// A state counts as rest below this fraction of what the loads could cause.
 pub(crate) const NEAR_REST: f64 = 1e-3;
 
-/// Whether all that a law has are sliders without a limit.
+/// Whether a law carries no force: it says so, or all that it has are sliders without a limit.
 pub(crate) fn carries_nothing(law: &SharedLaw) -> bool {
-    law.sliders().is_some_and(|sliders| sliders.is_empty())
+    law.is_free() || law.sliders().is_some_and(|sliders| sliders.is_empty())
 }
