@@ -63,6 +63,9 @@ fn no_resonance(cases: &[Surveyed]) -> Option<String> {
         if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
             return None; // not known
         }
+        if one.survey.system().joints().iter().any(|joint| joint.law().scale().is_infinite()) {
+            return None; // a force without a bound moves resonances beyond those of small motion
+        }
         // friction puts the resonance between the free frequency of a mode and its stuck one
         let between = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
         let between = between.map(|(a, b)| (a.omega.min(b.omega), a.omega.max(b.omega)));

@@ -143,6 +143,22 @@ fn a_range_without_a_resonance() {
     silent(&template("blade-couple", &[("{ from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }", "\"100 Hz\"")]));
 }
 
+/// On `k + 3/4 k3 a²` a cubic spring has its resonance wherever its amplitude puts it.
+#[test]
+fn a_stiffening_spring_has_its_resonance_at_any_frequency() {
+    let oscillator = |joint: &str| {
+        format!(
+            "schema = 1\n[[mass]]\nname = \"m\"\nmass = \"1 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"10 N/mm\"\n\
+             damping = \"20 N s/m\"\n{joint}[[force]]\non = \"m\"\namplitude = \"20 N\"\n\
+             [study]\nkind = \"response\"\nfrequency = {{ from = \"18 Hz\", to = \"22 Hz\", points = 41 }}\n"
+        )
+    };
+    warns(&oscillator(""), &["the nearest is at 15.9155 Hz"]);
+    silent(&oscillator(
+        "[[joint]]\nname = \"j\"\nbetween = [\"m\", \"ground\"]\nlaw = { kind = \"cubic\", stiffness = \"1e9 N/m^3\" }\n",
+    ));
+}
+
 /// The narrower resonance of the couple is that of a blade with half of the contact's mass, of the width b/(2π (m + m1/2)) = 0.174 Hz: 3 Hz
 /// hold 17.2 of them.
 #[test]

@@ -122,7 +122,7 @@ pub enum OrbitError {
     /// The series that the method may take is too short for the tolerance.
     #[error(
         "{method} reaches an estimated error of {estimate:.1e} at Ω = {omega:.4} rad/s with {harmonics} harmonics, not {tolerance:.1e}; \
-         raise `tolerance`, or use method `event-driven` (exact laws) or `shooting` (smooth ones)"
+         raise `tolerance`, or use method `event-driven` (exact laws) or `shooting` (smooth laws, and others with a `width`)"
     )]
     Truncation {
         /// The method.
