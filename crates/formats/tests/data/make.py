@@ -1,8 +1,8 @@
 """Writes the files of this folder: the same matrices by as many programs as there are, and what must be read from each, bit by bit.
 
-    python3 -m venv /tmp/venv && /tmp/venv/bin/pip install numpy==2.4.6 scipy==1.17.1 h5py==3.16.0 pyyeti==1.4.7
+    python3 -m venv venv && venv/bin/pip install numpy==2.4.6 scipy==1.17.1 h5py==3.16.0 pyyeti==1.4.7
     apt-get install calculix-ccx octave   # 2.20, 7.3.0
-    /tmp/venv/bin/python make.py
+    venv/bin/python make.py
 
 Nothing but these programs writes a file here, except those of Abaqus, ANSYS and Nastran DMIG, which follow their documentation.
 Expected values stand in `NAME.bits`: rows and columns, then `row column bits` of every entry, the bits as 16 hexadecimal digits.

@@ -8,7 +8,7 @@ use super::assembly::NEAR_REST;
 use super::flow::Flow;
 use super::followed::{self, Kind};
 use super::incremental::flow::IncrementalFlow;
-use super::periodic::norm;
+use super::periodic::{APPROACH, norm};
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
@@ -21,8 +21,6 @@ const LARGEST: usize = 24;
 const JOINTS: usize = 12;
 /// Relative error per step of the integration of smooth laws.
 const TOLERANCE: f64 = 1e-8;
-/// Returns after which a motion is near the one that it comes to.
-const APPROACH: usize = 60;
 /// Equal steps per return for laws that know only steps: they follow the motion to about 1e-6.
 const STEPS: usize = 4096;
 

@@ -97,7 +97,7 @@ impl Search {
 
 /// Returns by which a motion comes near an orbit that repeats after several periods, before Newton's method begins: it would find one that
 /// repeats after one period first.
-const APPROACH: usize = 60;
+pub(crate) const APPROACH: usize = 60;
 
 /// The state to which one comes by itself after a while.
 pub(crate) fn approached(map: &mut dyn ReturnMap, mut state: Vec<f64>, sign: f64) -> Vec<f64> {

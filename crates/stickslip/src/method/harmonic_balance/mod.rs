@@ -267,7 +267,7 @@ struct Kept {
 impl Kept {
     /// By the harmonics of the excitation that `counts` accepts, by their amplitudes.
     fn new(system: &System, counts: impl Fn(Complex64) -> bool) -> Self {
-        let present: Vec<usize> = system.harmonics_of_excitation(counts).into_iter().map(|h| h as usize).collect();
+        let present = Kept::present(system, counts);
         let unit = present.iter().fold(0, |a, &b| common_divisor(a, b)).max(1);
         Kept::by(system, &present, (unit, unit))
     }
@@ -275,9 +275,12 @@ impl Kept {
     /// Of a motion that may repeat after `periods` periods of the drive only: all harmonics of its own frequency, but for what the laws' symmetry
     /// leaves out.
     fn slowed(system: &System, periods: usize) -> Self {
-        let present = system.harmonics_of_excitation(|z| z != Complex64::new(0.0, 0.0));
-        let present: Vec<usize> = present.into_iter().map(|h| h as usize).collect();
+        let present = Kept::present(system, |z| z != Complex64::new(0.0, 0.0));
         Kept::by(system, &present, (1, periods))
+    }
+
+    fn present(system: &System, counts: impl Fn(Complex64) -> bool) -> Vec<usize> {
+        system.harmonics_of_excitation(counts).into_iter().map(|h| h as usize).collect()
     }
 
     fn by(system: &System, present: &[usize], (unit, scale): (usize, usize)) -> Self {
