@@ -1,0 +1,147 @@
+//! How a joint holds while its sliders stand.
+
+use super::super::SystemJoint;
+use crate::law::{Law, MOST_DIRECTIONS, RatePoint, Relative, StepPoint};
+
+/// A joint while its sliders stand.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stuck {
+    /// Which joint of the system, and which of its axes.
+    pub(super) joint: usize,
+    pub(super) axis: usize,
+    pub(super) name: String,
+    /// `W`, by its entries.
+    pub(super) at: Vec<(usize, f64)>,
+    pub(super) hold: Hold,
+    /// The force that presses the faces at rest, N, of a normal direction.
+    pub(super) pressed: Option<f64>,
+}
+
+impl Stuck {
+    /// One for each axis of a joint.
+    pub(super) fn of_joint((index, joint): (usize, &SystemJoint)) -> Vec<Self> {
+        let axes = joint.labels().zip(joint.axes()).enumerate();
+        axes.map(|(axis, (name, along))| {
+            let law = &**joint.law();
+            let (hold, pressed) = match law.normal() == Some(axis) {
+                true => (Hold::pressed(law, axis), Some(force_at_rest(law, axis))),
+                false => (Hold::of(law, axis), None),
+            };
+            Stuck { joint: index, axis, name, at: along.rows().to_vec(), hold, pressed }
+        })
+        .collect()
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Hold {
+    /// It carries nothing.
+    Nothing,
+    /// The sum of its springs, N/m; the limit and the displacement of the slider that gives way first.
+    Spring {
+        stiffness: f64,
+        limit: f64,
+        displacement: f64,
+    },
+    Rigid {
+        limit: f64,
+    },
+}
+
+impl Hold {
+    /// Along one of the law's axes.
+    fn of(law: &dyn Law, axis: usize) -> Hold {
+        let Some(branches) = law.sliders() else { return Hold::smooth(law, axis) };
+        let branches = || branches.iter().filter(|branch| branch.limit > 0.0);
+        let rigid = branches().filter(|branch| branch.stiffness.is_none()).map(|branch| branch.limit);
+        if let Some(limit) = rigid.reduce(|a, b| a + b) {
+            return Hold::Rigid { limit };
+        }
+        let springs = || branches().filter_map(|branch| Some((branch.stiffness?, branch.limit)));
+        let first = springs().min_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0)));
+        let stiffness = springs().map(|(stiffness, _)| stiffness).sum();
+        first.map_or(Hold::Nothing, |(k, limit)| Hold::Spring { stiffness, limit, displacement: limit / k })
+    }
+
+    /// Faces pressed on each other: the spring that they are at rest, which no load makes slip.
+    fn pressed(law: &dyn Law, axis: usize) -> Hold {
+        let stiffness = small_stiffness(law, axis);
+        if stiffness > 0.0 {
+            Hold::Spring { stiffness, limit: f64::INFINITY, displacement: f64::INFINITY }
+        } else {
+            Hold::Nothing
+        }
+    }
+
+    /// A smooth law: the spring that it is in small motion, or rigid where its resistance is viscous. The steeper its
+    /// slope, the nearer it is to that.
+    fn smooth(law: &dyn Law, axis: usize) -> Hold {
+        let (limit, stiffness) = (law.scale(), small_stiffness(law, axis));
+        match (limit > 0.0, stiffness > 0.0) {
+            (false, _) => Hold::Nothing,
+            // a law of displacement alone holds as the spring that it is, and never gives way
+            (true, false) if limit.is_infinite() => Hold::Nothing,
+            (true, true) => Hold::Spring { stiffness, limit, displacement: limit / stiffness },
+            (true, false) => Hold::Rigid { limit },
+        }
+    }
+}
+
+/// Stiffness in motion that is small in every direction, N/m.
+fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
+    // what velocity alone decides is as stiff as the spring before it, however it is regularised
+    if let Some(prox) = law.prox() {
+        return if prox.compliance() > 0.0 { prox.compliance().recip() } else { 0.0 };
+    }
+    if law.pieces().is_some() {
+        return law.linearised(SMALL, 1.0).re;
+    }
+    let (count, rest) = (law.directions(), [0.0; MOST_DIRECTIONS]);
+    if let Some(step) = law.step() {
+        let z = vec![0.0; step.states()];
+        let mut point = StepPoint::new(count, z.len());
+        step.linearise(count, &rest, &rest, &z, &mut point);
+        return point.force_slope(axis)[count + axis];
+    }
+    let Some(rate) = law.rate() else { return 0.0 };
+    // with what the states do at once: f_u + f_z z_v
+    let z = vec![0.0; rate.states()];
+    let mut point = RatePoint::new(count, z.len());
+    rate.linearise(count, &Relative { displacement: rest, velocity: rest }, &z, &mut point);
+    let by_states = (0..z.len()).map(|s| point.force_slope(axis)[2 * count + s] * point.rate_slope(s)[count + axis]);
+    point.force_slope(axis)[axis] + by_states.sum::<f64>()
+}
+
+/// The force along an axis of a law that has not moved, N.
+fn force_at_rest(law: &dyn Law, axis: usize) -> f64 {
+    let rest = [0.0; MOST_DIRECTIONS];
+    match (law.step(), law.rate()) {
+        (Some(step), _) => step.value(&rest, &rest, &mut vec![0.0; step.states()])[axis],
+        (None, Some(rate)) => {
+            let mut z = vec![0.0; rate.states()];
+            rate.value(&Relative { displacement: rest, velocity: rest }, &z.clone(), &mut z)[axis]
+        }
+        (None, None) => 0.0,
+    }
+}
+
+/// An amplitude (m) so small that no law slips, whose square is still a normal number.
+const SMALL: f64 = 1e-150;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan};
+
+    #[test]
+    fn laws_hold_as_they_do_in_small_motion() {
+        let spring = Hold::Spring { stiffness: 1e4, limit: 2.0, displacement: 2e-4 };
+        assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 2.0 }, 0), spring);
+        assert_eq!(Hold::of(&JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 }, 0), spring);
+        assert_eq!(Hold::of(&Coulomb { limit: 2.0 }, 0), Hold::Rigid { limit: 2.0 });
+        assert_eq!(Hold::of(&CoulombArctan { limit: 2.0, alpha: 25e3 }, 0), Hold::Rigid { limit: 2.0 });
+        // without a limit a joint is a free reference
+        assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 0.0 }, 0), Hold::Nothing);
+        assert_eq!(Hold::of(&Coulomb { limit: 0.0 }, 0), Hold::Nothing);
+    }
+}

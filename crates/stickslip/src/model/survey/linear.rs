@@ -1,0 +1,318 @@
+//! Modes of masses on springs and rigid constraints. Stiffnesses too far apart for one eigenvalue problem are told
+//! apart by levels: for the modes below, the stiffest springs count as rigid.
+
+use super::loose::Groups;
+use super::{LinearMode, Modes};
+use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+
+/// A spring and damper along a direction of the free places.
+pub(super) struct Link {
+    pub(super) at: Vec<(usize, f64)>,
+    pub(super) stiffness: f64,
+    pub(super) damping: f64,
+}
+
+/// A linear structure in modal coordinates.
+#[derive(Debug, Clone)]
+pub(super) struct Linear {
+    pub(super) modes: Modes,
+    /// Shapes of the elastic modes with `φᵀMφ = 1`, one column each; none if some stiffnesses had to count as rigid.
+    pub(super) shapes: Option<DMatrix<f64>>,
+}
+
+/// An eigenvalue below this share of the largest has fewer than six digits left; then the stiffest springs count as
+/// rigid for the modes below. Symmetric QR errs by some 1e-15 of the largest.
+const FEW_DIGITS: f64 = 1e-9;
+/// An eigenvalue below this share of the largest is rounding.
+const ROUNDING: f64 = 1e-13;
+/// Springs above this share of the stiffest make the modes at the top of the spectrum.
+const STIFFEST: f64 = 1e-4;
+/// Levels of stiffness that are told apart.
+const LEVELS: usize = 4;
+/// A pivot below this share of what it came from is zero.
+const ZERO: f64 = 1e-12;
+/// Degrees of freedom beyond which modes are not computed: they would take longer than a second. Measured: 0.35 s at
+/// 500, with the third power.
+pub(super) const LARGEST: usize = 700;
+/// Iterations of the eigenvalue search per degree of freedom; a few are needed.
+const ITERATIONS: usize = 100;
+
+impl Linear {
+    /// The modes of masses (zero where a place has none) on links, with constraints `Σ w x = 0`.
+    pub(super) fn new(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
+        let total = reduced(mass, links, rigid);
+        let (elastic, rigid_motions) = (total.elastic(), rigid_motions(mass, links, rigid));
+        let dofs = total.frequencies.len();
+        let expected = dofs - rigid_motions.min(dofs);
+        if elastic.len() >= expected {
+            let shapes = total.shapes(expected);
+            let lowest = elastic.len() - expected; // rounding may give a rigid motion a frequency
+            let modes = Modes { elastic: elastic[lowest..].to_vec(), rigid: rigid_motions, lost: 0 };
+            return Linear { modes, shapes: Some(shapes) };
+        }
+        // some modes are too far below the stiffest springs: those springs count as rigid for them
+        let mut high = elastic;
+        let (mut links, mut rigid) = (links.to_vec(), rigid.to_vec());
+        for _ in 0..LEVELS {
+            let stiffest = links.iter().map(|link| link.stiffness).fold(0.0, f64::max);
+            let (above, below): (Vec<&Link>, Vec<&Link>) =
+                links.iter().partition(|link| link.stiffness > STIFFEST * stiffest);
+            if below.is_empty() {
+                break;
+            }
+            rigid.extend(above.iter().map(|link| link.at.as_slice()));
+            links = below;
+            let lower = reduced(mass, &links, &rigid);
+            if lower.frequencies.len() + high.len() != dofs {
+                break; // the gap does not come from these springs
+            }
+            let mut elastic = lower.elastic();
+            elastic.extend(high);
+            high = elastic;
+            if high.len() >= expected {
+                break;
+            }
+        }
+        high.drain(..high.len().saturating_sub(expected));
+        if high.len() < expected {
+            // what is above rounding, with the digits that it has
+            let mut all = total.above(ROUNDING);
+            all.drain(..all.len().saturating_sub(expected));
+            if all.len() > high.len() {
+                high = all;
+            }
+        }
+        let lost = expected - high.len();
+        Linear { modes: Modes { elastic: high, rigid: rigid_motions, lost }, shapes: None }
+    }
+}
+
+/// Modes of the places with mass: squared frequencies, rising, may be rounding around zero.
+struct Reduced {
+    frequencies: Vec<f64>,
+    damping: Vec<f64>,
+    /// `φᵀMφ = 1`, in the places of the model, one column each.
+    vectors: DMatrix<f64>,
+}
+
+impl Reduced {
+    fn above(&self, share: f64) -> Vec<LinearMode> {
+        let floor = share * self.frequencies.last().map_or(0.0, |w| w.abs());
+        let pairs = self.frequencies.iter().zip(&self.damping).filter(|(w, _)| **w > floor);
+        pairs.map(|(w, c)| LinearMode { omega: w.sqrt(), damping: c / (2.0 * w.sqrt()) }).collect()
+    }
+
+    fn elastic(&self) -> Vec<LinearMode> {
+        self.above(FEW_DIGITS)
+    }
+
+    fn shapes(&self, count: usize) -> DMatrix<f64> {
+        self.vectors.columns(self.vectors.ncols() - count, count).into_owned()
+    }
+}
+
+/// Bodies with mass that neither a spring nor a constraint holds to the ground.
+fn rigid_motions(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> usize {
+    let n = mass.len();
+    let mut groups = Groups::new(n + 1); // place n stands for the ground
+    let held = links.iter().filter(|link| link.stiffness > 0.0).map(|link| link.at.as_slice());
+    for at in held.chain(rigid.iter().copied()) {
+        match at {
+            [(a, _)] => groups.join((*a, n)),
+            [(a, _), (b, _)] => groups.join((*a, *b)),
+            _ => {}
+        }
+    }
+    let ground = groups.of(n);
+    let mut bodies: Vec<usize> = (0..n).filter(|i| mass[*i] > 0.0).map(|i| groups.of(i)).collect();
+    bodies.sort_unstable();
+    bodies.dedup();
+    bodies.into_iter().filter(|body| *body != ground).count()
+}
+
+/// Eliminates constraints and places without mass, and solves for the modes of the remaining places.
+fn reduced(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Reduced {
+    let n = mass.len();
+    // places without mass come first: constraints are to remove these, and the masses that remain stay positive
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by_key(|i| mass[*i] > 0.0);
+    let basis = Basis::new(n, &order, rigid);
+    let r = basis.kept.len();
+    let light = basis.kept.iter().take_while(|place| mass[**place] == 0.0).count();
+    let (mut m, mut c, mut k) = (DMatrix::zeros(r, r), DMatrix::zeros(r, r), DMatrix::zeros(r, r));
+    for (place, mass) in mass.iter().enumerate().filter(|(_, mass)| **mass > 0.0) {
+        let row = basis.rows[place].clone();
+        add(&mut m, &row, *mass);
+    }
+    for link in links {
+        let row = basis.along(&link.at);
+        add(&mut k, &row, link.stiffness);
+        add(&mut c, &row, link.damping);
+    }
+    let follow = condense(light, &mut c, &mut k);
+    let heavy = r - light;
+    let part = |matrix: &DMatrix<f64>| matrix.view((light, light), (heavy, heavy)).into_owned();
+    let (m, c, k) = (part(&m), part(&c), part(&k));
+    // without an answer every mode is lost
+    let unknown =
+        || Reduced { frequencies: vec![0.0; heavy], damping: vec![0.0; heavy], vectors: DMatrix::zeros(n, heavy) };
+    if heavy == 0 {
+        return unknown();
+    }
+    // L with M = L Lᵀ; its inverse turns the modes into a standard problem
+    let Some(inverse) = inverse_root(&m) else { return unknown() };
+    let standard = &inverse * k * inverse.transpose();
+    let standard = (&standard + standard.transpose()) * 0.5;
+    let Some(eigen) = SymmetricEigen::try_new(standard, f64::EPSILON, ITERATIONS * heavy) else {
+        return unknown();
+    };
+    let mut rising: Vec<usize> = (0..heavy).collect();
+    rising.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let modal = inverse.transpose() * eigen.eigenvectors;
+    let (mut frequencies, mut damping, mut vectors) = (Vec::new(), Vec::new(), DMatrix::zeros(n, heavy));
+    for (column, &mode) in rising.iter().enumerate() {
+        let shape = modal.column(mode);
+        frequencies.push(eigen.eigenvalues[mode]);
+        damping.push(shape.dot(&(&c * shape)));
+        // places without mass follow from the last to the first
+        let mut y = DVector::zeros(r);
+        y.rows_mut(light, heavy).copy_from(&shape);
+        for p in (0..light).rev() {
+            y[p] = -(p + 1..r).map(|j| follow[(p, j)] * y[j]).sum::<f64>();
+        }
+        for place in 0..n {
+            vectors[(place, column)] = basis.rows[place].iter().map(|(j, t)| t * y[*j]).sum();
+        }
+    }
+    Reduced { frequencies, damping, vectors }
+}
+
+/// `matrix += value · row rowᵀ`
+fn add(matrix: &mut DMatrix<f64>, row: &[(usize, f64)], value: f64) {
+    for (i, a) in row {
+        for (j, b) in row {
+            matrix[(*i, *j)] += value * a * b;
+        }
+    }
+}
+
+/// Removes the first `light` coordinates, which have no mass, from damping and stiffness: they move so that their
+/// springs balance. Returns their rows `x_p = -Σ follow[p, j] x_j`, j > p. A coordinate without a spring follows its
+/// dampers.
+fn condense(light: usize, c: &mut DMatrix<f64>, k: &mut DMatrix<f64>) -> DMatrix<f64> {
+    let r = k.nrows();
+    let mut follow = DMatrix::zeros(light, r);
+    let before: Vec<f64> = (0..light).map(|p| k[(p, p)]).collect();
+    for p in 0..light {
+        let (kpp, cpp) = (k[(p, p)], c[(p, p)]);
+        let springs = kpp > ZERO * before[p] && kpp > 0.0;
+        if !springs && cpp <= 0.0 {
+            continue;
+        }
+        let g: Vec<(usize, f64)> = (p + 1..r)
+            .map(|j| (j, if springs { k[(p, j)] / kpp } else { c[(p, j)] / cpp }))
+            .filter(|(_, g)| *g != 0.0)
+            .collect();
+        for (j, g) in &g {
+            follow[(p, *j)] = *g;
+        }
+        let pivot: Vec<(f64, f64)> = (0..r).map(|j| (k[(p, j)], c[(p, j)])).collect();
+        // congruence with x_p = -Σ g_j x_j: only rows and columns that p is tied to change
+        let tied: Vec<usize> = (p + 1..r).filter(|&j| pivot[j] != (0.0, 0.0)).collect();
+        for &i in &tied {
+            for &j in &tied {
+                let (gi, gj) = (follow[(p, i)], follow[(p, j)]);
+                k[(i, j)] += if springs { -gi * pivot[j].0 } else { 0.0 };
+                c[(i, j)] += gi * gj * cpp - gi * pivot[j].1 - pivot[i].1 * gj;
+            }
+        }
+    }
+    follow
+}
+
+/// `L⁻¹` of `M = L Lᵀ`.
+fn inverse_root(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = m.nrows();
+    let diagonal = (0..n).all(|i| (0..n).all(|j| i == j || m[(i, j)] == 0.0));
+    if diagonal {
+        return Some(DMatrix::from_diagonal(&m.diagonal().map(|m| 1.0 / m.sqrt())));
+    }
+    Cholesky::new(m.clone())?.l().solve_lower_triangular(&DMatrix::identity(n, n))
+}
+
+/// Coordinates that fulfil constraints: every place as a sum of the places that are kept.
+struct Basis {
+    /// The places that are kept, in the order in which they were offered.
+    kept: Vec<usize>,
+    /// For every place its (coordinate, factor).
+    rows: Vec<Vec<(usize, f64)>>,
+}
+
+impl Basis {
+    fn new(n: usize, order: &[usize], rigid: &[&[(usize, f64)]]) -> Basis {
+        let mut a = DMatrix::<f64>::zeros(rigid.len(), n);
+        for (row, at) in rigid.iter().enumerate() {
+            at.iter().for_each(|(place, w)| a[(row, *place)] += w);
+        }
+        // Gauss and Jordan; a constraint that follows from others leaves a row of zeros
+        let mut pivots: Vec<usize> = Vec::new();
+        for &column in order {
+            let next = pivots.len();
+            let best = (next..a.nrows()).max_by(|&p, &q| a[(p, column)].abs().total_cmp(&a[(q, column)].abs()));
+            let Some(best) = best.filter(|p| a[(*p, column)].abs() > ZERO) else { continue };
+            a.swap_rows(next, best);
+            let pivot = a[(next, column)];
+            a.row_mut(next).apply(|v| *v /= pivot);
+            let used: Vec<(usize, f64)> = (0..n).map(|j| (j, a[(next, j)])).filter(|(_, v)| *v != 0.0).collect();
+            for row in (0..a.nrows()).filter(|row| *row != next) {
+                let factor = a[(row, column)];
+                if factor != 0.0 {
+                    used.iter().for_each(|(j, v)| a[(row, *j)] -= factor * v);
+                    a[(row, column)] = 0.0;
+                }
+            }
+            pivots.push(column);
+        }
+        let kept: Vec<usize> = order.iter().copied().filter(|place| !pivots.contains(place)).collect();
+        let mut rows = vec![Vec::new(); n];
+        for (coordinate, &place) in kept.iter().enumerate() {
+            rows[place].push((coordinate, 1.0));
+            for (row, &pivot) in pivots.iter().enumerate() {
+                if a[(row, place)].abs() > ZERO {
+                    rows[pivot].push((coordinate, -a[(row, place)]));
+                }
+            }
+        }
+        Basis { kept, rows }
+    }
+
+    /// A direction of the places in the coordinates.
+    fn along(&self, at: &[(usize, f64)]) -> Vec<(usize, f64)> {
+        let mut sum: Vec<(usize, f64)> = Vec::new();
+        for (place, w) in at {
+            for (j, t) in &self.rows[*place] {
+                match sum.iter_mut().find(|(known, _)| known == j) {
+                    Some((_, value)) => *value += w * t,
+                    None => sum.push((*j, w * t)),
+                }
+            }
+        }
+        sum.retain(|(_, value)| value.abs() > ZERO);
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn constraints_remove_places_without_mass_first() {
+        // place 1 has no mass; 0 = 1, and the same once more
+        let at = [(0, 1.0), (1, -1.0)];
+        let basis = Basis::new(3, &[1, 0, 2], &[&at, &at]);
+        assert_eq!(basis.kept, [0, 2]);
+        assert_eq!(basis.rows, [vec![(0, 1.0)], vec![(0, 1.0)], vec![(1, 1.0)]]);
+        assert!(basis.along(&at).is_empty());
+    }
+}

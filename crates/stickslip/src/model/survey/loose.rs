@@ -1,0 +1,80 @@
+//! Bodies that no spring holds.
+
+use super::super::{GROUND, Joint, Mass, Model};
+use super::Loose;
+use super::hold::{Hold, Stuck};
+use std::collections::HashMap;
+
+impl Model {
+    /// Bodies of masses that no spring holds to the ground or to a moved place.
+    pub(super) fn loose(&self, joints: &[Stuck]) -> Vec<Loose> {
+        let mut index: HashMap<String, usize> = HashMap::from([(GROUND.to_owned(), 0)]);
+        for motion in &self.motions {
+            index.insert(motion.on.clone(), 0); // moved places are held as the ground is
+        }
+        let places: Vec<String> = self.masses.iter().flat_map(Mass::places).collect();
+        for (i, place) in places.iter().enumerate() {
+            index.entry(place.clone()).or_insert(i + 1);
+        }
+        let ends = |between: &[String; 2]| Some((*index.get(&between[0])?, *index.get(&between[1])?));
+        let mut bodies = Groups::new(places.len() + 1);
+        self.springs.iter().filter(|s| s.stiffness > 0.0).filter_map(|s| ends(&s.between)).for_each(|e| bodies.join(e));
+        let mut gripped = bodies.clone();
+        let carries = |(i, _): &(usize, &Joint)| joints.iter().any(|j| j.joint == *i && j.hold != Hold::Nothing);
+        let grips = self.joints.iter().enumerate().filter(carries);
+        for (_, joint) in grips {
+            // of nodes, each direction
+            let along = |name: &String, label: &String| match label.strip_prefix(joint.name.as_str()) {
+                Some(rest) if !rest.is_empty() && name != GROUND => format!("{name}{rest}"),
+                _ => name.clone(),
+            };
+            for label in self.joint_labels(joint) {
+                let between = [along(&joint.between[0], &label), along(&joint.between[1], &label)];
+                if let Some(e) = ends(&between) {
+                    gripped.join(e);
+                }
+            }
+        }
+        let mut loose: Vec<(usize, Loose)> = Vec::new();
+        for place in &places {
+            let at = index[place];
+            let body = bodies.of(at);
+            if body == bodies.of(0) {
+                continue;
+            }
+            match loose.iter_mut().find(|(known, _)| *known == body) {
+                Some((_, one)) => one.masses.push(place.clone()),
+                None => {
+                    let held_by_friction = gripped.of(at) == gripped.of(0);
+                    loose.push((body, Loose { masses: vec![place.clone()], held_by_friction }));
+                }
+            }
+        }
+        loose.into_iter().map(|(_, one)| one).collect()
+    }
+}
+
+/// Which of some things hang together.
+#[derive(Debug, Clone)]
+pub(super) struct Groups {
+    parent: Vec<usize>,
+}
+
+impl Groups {
+    pub(super) fn new(count: usize) -> Self {
+        Groups { parent: (0..count).collect() }
+    }
+
+    /// The lowest member of the group of `i`, or of a group that stands for it.
+    pub(super) fn of(&self, mut i: usize) -> usize {
+        while self.parent[i] != i {
+            i = self.parent[i];
+        }
+        i
+    }
+
+    pub(super) fn join(&mut self, (a, b): (usize, usize)) {
+        let (a, b) = (self.of(a), self.of(b));
+        self.parent[a.max(b)] = a.min(b);
+    }
+}

@@ -1,0 +1,184 @@
+//! What is known of a model before anything is computed: its linear modes with all joints free and with all joints
+//! stuck, the motion at which each joint begins to slip, the masses that nothing holds.
+//!
+//! Free: no joint carries a force. Stuck: every slider stands, so that a joint is its springs, or a constraint if it
+//! is rigid. Between the two lie the resonances of the model with friction: springs and constraints only raise the
+//! frequency of every mode (Courant, Fischer).
+
+mod hold;
+mod linear;
+mod loose;
+mod onset;
+
+use super::{Model, ModelError, System};
+use hold::{Hold, Stuck};
+use linear::{LARGEST, Linear, Link};
+use std::collections::HashMap;
+
+/// A mode of the linear structure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearMode {
+    /// Undamped natural frequency, rad/s.
+    pub omega: f64,
+    /// Damping ratio `φᵀCφ / (2ω φᵀMφ)`: exact where damping does not couple the modes, and to first order where it is
+    /// light.
+    pub damping: f64,
+}
+
+/// The modes of a linear structure.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Modes {
+    /// Those with a frequency, rising.
+    pub elastic: Vec<LinearMode>,
+    /// Motions that no spring resists.
+    pub rigid: usize,
+    /// Modes whose frequency is lost in rounding beside stiffnesses many orders higher.
+    pub lost: usize,
+}
+
+/// How a joint holds while it is stuck, and when it lets go.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FirstSlip {
+    /// Name of the joint.
+    pub joint: String,
+    /// Limit of the slider that gives way first, N; zero if the joint carries nothing.
+    pub limit: f64,
+    /// Relative displacement from the unloaded state at which it gives way, m; `None` if it holds rigidly until the
+    /// limit.
+    pub displacement: Option<f64>,
+    /// Of the direction along which faces press on each other, which opens and closes and never slips: the force with
+    /// which they do at rest, N, zero if they are apart. `None` along the others.
+    pub pressed: Option<f64>,
+}
+
+/// How much of its limit a stuck joint needs under the model's excitation, over a range of drive frequencies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Onset {
+    /// Largest amplitude of the joint's load over its limit. The joint slips where it is above 1; the excitation times
+    /// `1 / largest` is the smallest that makes it slip.
+    pub largest: f64,
+    /// Where that is, rad/s.
+    pub at: f64,
+    /// The stretches of the range in which it is above 1, rad/s. They hold for a joint that slips first: what the
+    /// others do after it has slipped changes the structure.
+    pub slips: Vec<(f64, f64)>,
+}
+
+/// Masses that no spring holds, as one body that can drift.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loose {
+    /// Their names.
+    pub masses: Vec<String>,
+    /// Whether joints that are stuck hold it.
+    pub held_by_friction: bool,
+}
+
+/// What is known of a model before anything is computed.
+#[derive(Debug, Clone)]
+pub struct Survey {
+    system: System,
+    joints: Vec<Stuck>,
+    free: Linear,
+    stuck: Linear,
+    loose: Vec<Loose>,
+}
+
+impl Model {
+    /// Surveys the model; the cost is that of two symmetric eigenvalue problems.
+    ///
+    /// # Errors
+    /// [`ModelError`] as [`Model::assemble`].
+    ///
+    /// # Example
+    /// ```
+    /// use std::f64::consts::TAU;
+    /// let couple = stickslip::model::example::blade_couple();
+    /// let survey = couple.survey().unwrap();
+    /// // both blades on their springs, and the contact mass on the shroud's spring
+    /// assert_eq!(survey.free().elastic.len(), 3);
+    /// assert_eq!(survey.stuck().elastic.len(), 2);   // the contact mass rides on blade 1
+    /// assert!((survey.free().elastic[1].omega / TAU - 121.25).abs() < 0.001);
+    /// ```
+    pub fn survey(&self) -> Result<Survey, ModelError> {
+        let system = self.assemble()?;
+        let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
+        let ends = |between: &[String; 2]| -> Vec<(usize, f64)> {
+            let ends = between.iter().zip([1.0, -1.0]);
+            ends.filter_map(|(name, sign)| Some((*index.get(name.as_str())?, sign))).collect()
+        };
+        let springs: Vec<Link> = self
+            .springs
+            .iter()
+            .map(|s| Link { at: ends(&s.between), stiffness: s.stiffness, damping: s.damping })
+            .filter(|link| !link.at.is_empty())
+            .collect();
+        let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(Stuck::of_joint).collect();
+        let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().own_mass(i)).collect();
+        let loose = self.loose(&joints);
+        if system.dofs() > LARGEST {
+            let unknown = || Linear { modes: Modes { lost: mass.len(), ..Modes::default() }, shapes: None };
+            return Ok(Survey { free: unknown(), stuck: unknown(), system, joints, loose });
+        }
+        let free = Linear::new(&mass, &springs.iter().collect::<Vec<_>>(), &[]);
+        let held: Vec<Link> = joints
+            .iter()
+            .filter_map(|joint| match joint.hold {
+                Hold::Spring { stiffness, .. } => Some(Link { at: joint.at.clone(), stiffness, damping: 0.0 }),
+                _ => None,
+            })
+            .filter(|link| !link.at.is_empty())
+            .collect();
+        let rigid: Vec<&[(usize, f64)]> = joints
+            .iter()
+            .filter(|joint| matches!(joint.hold, Hold::Rigid { .. }) && !joint.at.is_empty())
+            .map(|joint| joint.at.as_slice())
+            .collect();
+        let stuck = Linear::new(&mass, &springs.iter().chain(&held).collect::<Vec<_>>(), &rigid);
+        Ok(Survey { system, joints, free, stuck, loose })
+    }
+}
+
+impl Survey {
+    /// Degrees of freedom.
+    pub fn dofs(&self) -> usize {
+        self.system.dofs()
+    }
+
+    /// The assembled model.
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// Whether the model has too many degrees of freedom for its modes, which then count as lost.
+    pub fn is_too_large(&self) -> bool {
+        self.dofs() > LARGEST
+    }
+
+    /// Modes with all joints free.
+    pub fn free(&self) -> &Modes {
+        &self.free.modes
+    }
+
+    /// Modes with all joints stuck.
+    pub fn stuck(&self) -> &Modes {
+        &self.stuck.modes
+    }
+
+    /// Bodies that no spring holds.
+    pub fn loose(&self) -> &[Loose] {
+        &self.loose
+    }
+
+    /// When each joint begins to slip, in the order of the model.
+    pub fn first_slip(&self) -> Vec<FirstSlip> {
+        let one = |joint: &Stuck| {
+            let (limit, displacement) = match joint.hold {
+                Hold::Nothing => (0.0, None),
+                Hold::Spring { limit, displacement, .. } => (limit, Some(displacement)),
+                Hold::Rigid { limit } => (limit, None),
+            };
+            FirstSlip { joint: joint.name.clone(), limit, displacement, pressed: joint.pressed }
+        };
+        self.joints.iter().map(one).collect()
+    }
+}

@@ -1,0 +1,253 @@
+//! The loads of stuck joints under the excitation, and the motion at which they let go.
+
+use super::hold::{Hold, Stuck};
+use super::{Onset, Survey};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use stickslip_numerics::maximum::maximum;
+
+/// Complex multiplications that an estimate of first slip may take: about 0.1 s.
+const WORK: f64 = 2.5e7;
+/// Frequencies of a range that are looked at, beside those around the modes in it.
+const FREQUENCIES: usize = 200;
+/// Fewer than this many would miss what lies between modes.
+const FEWEST: usize = 24;
+/// Points around a mode, in half its width at half its power.
+const AROUND: [f64; 9] = [0.0, 0.3, 0.6, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+/// Instants per period of the highest harmonic, where there are several: the largest value is met to (π/64)²/2, about
+/// 0.1 %.
+const INSTANTS: usize = 64;
+/// Most instants; harmonics up to 64 have all of theirs.
+const MOST_INSTANTS: usize = 4096;
+/// Halvings with which a border between stick and slip is found: a millionth of a millionth of the step.
+const HALVINGS: usize = 40;
+/// Share of two steps to which the place of the largest load is found: the load is flat there.
+const LOCATED: f64 = 1e-5;
+/// Compliance of a rigid joint, as a share of that of the structure: joints that hold in a ring share the load by it.
+const COMPLIANCE: f64 = 1e-10;
+
+/// Degrees of freedom and joints up to which borders are refined.
+const REFINED: usize = 40;
+
+impl Survey {
+    /// The loads of the stuck joints under the model's excitation, as shares of their limits, over drive frequencies
+    /// from `from` to `to` (rad/s), which may be the same. Constant forces are left out: how joints share these
+    /// depends on what was before.
+    ///
+    /// `None`: the model is so large that this would take long, or it has no linear response there.
+    pub fn onset(&self, from: f64, to: f64) -> Option<Vec<Onset>> {
+        let omegas = self.frequencies(from, to)?;
+        if self.joints.is_empty() {
+            return Some(Vec::new());
+        }
+        let shares: Vec<Vec<f64>> = omegas.iter().map(|omega| self.shares(*omega)).collect::<Option<_>>()?;
+        if shares.iter().flatten().any(|share| share.is_nan()) {
+            return None;
+        }
+        (0..self.joints.len()).map(|joint| self.onset_of(joint, &omegas, &shares)).collect()
+    }
+
+    /// The modal amplitude (m √kg) at which the first joint slips in mode `index` (from 0) of the stuck structure;
+    /// `None` if it has no such mode or no joint is loaded in it.
+    pub fn slip_amplitude(&self, index: usize) -> Option<f64> {
+        let shapes = self.stuck.shapes.as_ref()?;
+        let omega = self.stuck.modes.elastic.get(index)?.omega;
+        let shape = shapes.column(index).into_owned();
+        let motion = |joint: &Stuck| joint.at.iter().map(|(i, w)| w * shape[*i]).sum::<f64>();
+        let (n, rigid) = (self.dofs(), self.rigid());
+        // the constraint forces balance what springs and inertia leave: W f = ω²Mφ - Kφ - W k u
+        let mut rest =
+            self.system.structure().mass() * &shape * (omega * omega) - self.system.structure().stiffness() * &shape;
+        for joint in &self.joints {
+            if let Hold::Spring { stiffness, .. } = joint.hold {
+                let force = stiffness * motion(joint);
+                joint.at.iter().for_each(|(i, w)| rest[*i] -= w * force);
+            }
+        }
+        let mut w = DMatrix::<f64>::zeros(n, rigid.len());
+        for (column, joint) in rigid.iter().enumerate() {
+            self.joints[*joint].at.iter().for_each(|(i, value)| w[(*i, column)] += value);
+        }
+        let normal = w.transpose() * &w + DMatrix::identity(rigid.len(), rigid.len()) * COMPLIANCE;
+        let forces = Cholesky::new(normal)?.solve(&(w.transpose() * rest));
+        let share = |(index, joint): (usize, &Stuck)| match joint.hold {
+            Hold::Nothing => 0.0,
+            Hold::Spring { displacement, .. } => motion(joint).abs() / displacement,
+            Hold::Rigid { limit } => {
+                rigid.iter().position(|r| *r == index).map_or(0.0, |column| forces[column].abs() / limit)
+            }
+        };
+        let largest = self.joints.iter().enumerate().map(share).fold(0.0, f64::max);
+        (largest > 0.0).then(|| 1.0 / largest)
+    }
+
+    fn rigid(&self) -> Vec<usize> {
+        let rigid = |joint: &Stuck| matches!(joint.hold, Hold::Rigid { .. }) && !joint.at.is_empty();
+        (0..self.joints.len()).filter(|j| rigid(&self.joints[*j])).collect()
+    }
+
+    /// Drive frequencies that show the loads of stuck joints: evenly over the range, and around the modes that a
+    /// harmonic of the excitation meets in it.
+    fn frequencies(&self, from: f64, to: f64) -> Option<Vec<f64>> {
+        // stiffnesses that had to count as rigid leave no digits for a response
+        self.stuck.shapes.as_ref()?;
+        if !(from > 0.0 && from <= to && to.is_finite()) {
+            return None;
+        }
+        let unknowns = (self.dofs() + self.rigid().len()) as f64;
+        let harmonics = self.harmonics();
+        let cost = (unknowns.powi(3) / 3.0).max(1.0) * harmonics.len().max(1) as f64;
+        let affordable = (WORK / cost) as usize;
+        if from == to {
+            return (affordable > 0).then(|| vec![from]);
+        }
+        let count = FREQUENCIES.min(affordable / 2);
+        if count < FEWEST {
+            return None;
+        }
+        let mut omegas: Vec<f64> =
+            (0..=count).map(|i| from + (to - from) * i as f64 / count as f64).map(|w| w.min(to)).collect();
+        let mut around = Vec::new();
+        for mode in &self.stuck.modes.elastic {
+            let width = mode.damping.clamp(1e-6, 0.1) * mode.omega;
+            for h in &harmonics {
+                let points = AROUND.iter().flat_map(|a| [mode.omega - a * width, mode.omega + a * width]);
+                around.extend(points.map(|w| w / f64::from(*h)).filter(|w| (from..=to).contains(w)));
+            }
+        }
+        around.truncate(affordable / 2);
+        omegas.extend(around);
+        omegas.sort_by(f64::total_cmp);
+        omegas.dedup();
+        Some(omegas)
+    }
+
+    /// Harmonics of the excitation that are not zero, each once, rising, without the constant part.
+    pub fn harmonics(&self) -> Vec<u32> {
+        let mut harmonics = self.system.harmonics_of_excitation(|z| z != Complex64::ZERO);
+        harmonics.retain(|h| *h > 0);
+        harmonics.sort_unstable();
+        harmonics.dedup();
+        harmonics
+    }
+
+    /// Largest load over limit of every joint in one period at the drive frequency `omega`, all joints stuck.
+    fn shares(&self, omega: f64) -> Option<Vec<f64>> {
+        let harmonics = self.harmonics();
+        let loads = harmonics.iter().map(|h| self.joint_loads(*h, omega)).collect::<Option<Vec<_>>>()?;
+        let largest = |joint: usize| match &loads[..] {
+            [] => 0.0,
+            [one] => one[joint].norm(),
+            several => {
+                let highest = harmonics.last().copied().unwrap_or(1) as usize;
+                let instants = (INSTANTS * highest).min(MOST_INSTANTS);
+                let at = |i: usize| {
+                    let terms = several.iter().zip(&harmonics);
+                    let phase = |h: u32| TAU * ((i * h as usize) % instants) as f64 / instants as f64;
+                    terms.map(|(load, h)| (load[joint] * Complex64::from_polar(1.0, phase(*h))).re).sum::<f64>()
+                };
+                (0..instants).map(|i| at(i).abs()).fold(0.0, f64::max)
+            }
+        };
+        Some((0..self.joints.len()).map(largest).collect())
+    }
+
+    /// Complex load over limit of every stuck joint at harmonic `h`: `Z x + W f = F`, `Wᵀx + g = 0` for rigid joints.
+    fn joint_loads(&self, h: u32, omega: f64) -> Option<Vec<Complex64>> {
+        let (n, rigid, system) = (self.dofs(), self.rigid(), &self.system);
+        let w = f64::from(h) * omega;
+        let mut a = DMatrix::<Complex64>::zeros(n + rigid.len(), n + rigid.len());
+        let mut b = DVector::<Complex64>::zeros(n + rigid.len());
+        for i in 0..n {
+            for j in 0..n {
+                let real = system.structure().stiffness()[(i, j)] - w * w * system.structure().mass()[(i, j)];
+                a[(i, j)] = Complex64::new(real, w * system.structure().damping()[(i, j)]);
+            }
+        }
+        if let Some(load) = system.loads().iter().find(|load| load.harmonic == h) {
+            for i in 0..n {
+                b[i] = load.force[i] + Complex64::new(0.0, w) * load.by_velocity[i];
+            }
+        }
+        let imposed = |index: usize| {
+            let Stuck { joint, axis, .. } = self.joints[index];
+            system.joints()[joint].axes()[axis].imposed_at(h)
+        };
+        for (index, joint) in self.joints.iter().enumerate() {
+            if let Hold::Spring { stiffness, .. } = joint.hold {
+                for (i, wi) in &joint.at {
+                    b[*i] -= imposed(index) * (wi * stiffness);
+                    for (j, wj) in &joint.at {
+                        a[(*i, *j)] += wi * wj * stiffness;
+                    }
+                }
+            }
+        }
+        let scale = (0..n).map(|i| a[(i, i)].norm()).fold(0.0, f64::max);
+        for (row, joint) in rigid.iter().enumerate() {
+            for (i, wi) in &self.joints[*joint].at {
+                a[(*i, n + row)] += wi;
+                a[(n + row, *i)] += wi;
+            }
+            a[(n + row, n + row)] -= COMPLIANCE / scale.max(f64::MIN_POSITIVE);
+            b[n + row] = -imposed(*joint);
+        }
+        let x = if n + rigid.len() == 0 { b } else { a.lu().solve(&b)? };
+        let share = |(index, joint): (usize, &Stuck)| match joint.hold {
+            Hold::Nothing => Some(Complex64::ZERO),
+            Hold::Spring { displacement, .. } => {
+                Some((joint.at.iter().map(|(i, w)| x[*i] * *w).sum::<Complex64>() + imposed(index)) / displacement)
+            }
+            Hold::Rigid { limit } => match rigid.iter().position(|r| *r == index) {
+                Some(row) => Some(x[n + row] / limit),
+                // a moved place against the ground or another moved place cannot stick
+                None if imposed(index) != Complex64::ZERO => Some(Complex64::new(f64::INFINITY, 0.0)),
+                None => Some(Complex64::ZERO),
+            },
+        };
+        self.joints.iter().enumerate().map(share).collect()
+    }
+
+    /// What the samples say of one joint, its largest load and the borders refined.
+    fn onset_of(&self, joint: usize, omegas: &[f64], shares: &[Vec<f64>]) -> Option<Onset> {
+        let at = |omega: f64| Some(self.shares(omega)?[joint]);
+        let value = |i: usize| shares[i][joint];
+        let top = (0..omegas.len()).max_by(|&a, &b| value(a).total_cmp(&value(b)))?;
+        let mut best = (omegas[top], value(top));
+        // a few joints are refined; of hundreds the samples are good enough
+        let refined = (self.dofs() + self.joints.len()) <= REFINED;
+        if refined && omegas.len() > 1 && best.1.is_finite() {
+            let (low, high) = (omegas[top.saturating_sub(1)], omegas[(top + 1).min(omegas.len() - 1)]);
+            let close = |a: f64, b: f64| b - a <= LOCATED * (high - low);
+            let found = maximum((low, high), close, |omega| at(omega).ok_or(())).ok()?;
+            if found.1 > best.1 {
+                best = found;
+            }
+        }
+        let border = |inside: f64, outside: f64| -> Option<f64> {
+            let (mut inside, mut outside) = (inside, outside);
+            for _ in 0..if refined { HALVINGS } else { 0 } {
+                let middle = 0.5 * (inside + outside);
+                if at(middle)? > 1.0 { inside = middle } else { outside = middle }
+            }
+            Some(inside)
+        };
+        // the refined top may be a peak that the samples only see from below
+        let mut points: Vec<(f64, f64)> = omegas.iter().copied().zip((0..omegas.len()).map(value)).collect();
+        points.push(best);
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut slips: Vec<(f64, f64)> = Vec::new();
+        let mut begin = points.first().filter(|p| p.1 > 1.0).map(|p| p.0);
+        for pair in points.windows(2) {
+            let ((w, a), (v, b)) = (pair[0], pair[1]);
+            match (a > 1.0, b > 1.0) {
+                (false, true) => begin = Some(border(v, w)?),
+                (true, false) => slips.extend(begin.take().zip(Some(border(w, v)?))),
+                _ => {}
+            }
+        }
+        slips.extend(begin.zip(points.last().map(|p| p.0)));
+        Some(Onset { largest: best.1, at: best.0, slips })
+    }
+}
