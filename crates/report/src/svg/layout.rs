@@ -1,0 +1,262 @@
+//! Where everything in a figure stands: every text is measured before it is placed.
+
+use super::{BAR, GAP, LABEL, LEADING, MARGIN, PANEL_TITLE, TICK, TICK_LENGTH, TITLE};
+use crate::axis::{self, Range, Ticks};
+use crate::clip::{Point, Window};
+use crate::colour::Colour;
+use crate::font::{self, Weight};
+use crate::frame::{self, Axes, Entry, Shades};
+use stickslip_study::dataset::{Axis, Figure, Panel};
+
+/// Where everything stands.
+pub(super) struct Layout {
+    pub(super) width: f64,
+    pub(super) height: f64,
+    pub(super) title: Vec<String>,
+    pub(super) legend: Vec<Placed>,
+    pub(super) panels: Vec<Place>,
+    pub(super) shades: Shades,
+    pub(super) bar: Option<Bar>,
+}
+
+/// A legend entry and the left end of its first line.
+pub(super) struct Placed {
+    pub(super) entry: Entry,
+    pub(super) lines: Vec<String>,
+    pub(super) x: f64,
+    pub(super) y: f64,
+}
+
+/// The colour bar.
+pub(super) struct Bar {
+    pub(super) left: f64,
+    pub(super) top: f64,
+    pub(super) height: f64,
+    pub(super) range: Range,
+    pub(super) ticks: Ticks,
+    pub(super) title: Vec<String>,
+    /// Distance from the bar to the near edge of its title.
+    pub(super) title_offset: f64,
+}
+
+/// The plot area of a panel with its axes and texts.
+pub(super) struct Place {
+    pub(super) left: f64,
+    pub(super) top: f64,
+    pub(super) width: f64,
+    pub(super) height: f64,
+    pub(super) x: Range,
+    pub(super) y: Range,
+    pub(super) own_x: bool,
+    pub(super) own_y: bool,
+    pub(super) x_ticks: Ticks,
+    pub(super) y_ticks: Ticks,
+    pub(super) title: Vec<String>,
+    pub(super) x_title: Vec<String>,
+    pub(super) y_title: Vec<String>,
+    /// Distance from the axis to the near edge of the y title.
+    pub(super) y_title_offset: f64,
+}
+
+impl Layout {
+    pub(super) fn new(figure: &Figure) -> Layout {
+        let (columns, rows) = frame::grid(figure);
+        let (plot_width, plot_height) = match columns {
+            1 => (620.0, 380.0),
+            2 => (430.0, if rows == 1 { 330.0 } else { 270.0 }),
+            _ => (350.0, 240.0),
+        };
+        let mut panels: Vec<Place> = figure
+            .panels
+            .iter()
+            .zip(frame::axes(figure))
+            .map(|(panel, axes)| Place::new(panel, &axes, plot_width, plot_height))
+            .collect();
+        // where neighbours have the same axis, its title stands once, at the outside
+        for i in 0..panels.len() {
+            if i + columns < panels.len() && !panels[i].own_x && panels[i].x_title == panels[i + columns].x_title {
+                panels[i].x_title.clear();
+            }
+        }
+        for i in (0..panels.len()).rev() {
+            if i % columns > 0 && !panels[i].own_y && panels[i].y_title == panels[i - 1].y_title {
+                panels[i].y_title.clear();
+            }
+        }
+
+        let mut right = MARGIN;
+        for column in 0..columns {
+            let members: Vec<usize> = (column..panels.len()).step_by(columns).collect();
+            let left = members.iter().map(|&i| panels[i].left_side()).fold(0.0, f64::max);
+            for &i in &members {
+                panels[i].left = right + left;
+            }
+            let overhang = members.iter().map(|&i| panels[i].overhang()).fold(0.0, f64::max);
+            right += left + plot_width + if column + 1 < columns { overhang.max(GAP) } else { overhang };
+        }
+        let shades = Shades::of(figure);
+        let full_height = rows as f64 * plot_height;
+        let mut bar = shades.bar.as_ref().map(|(axis, range)| Bar::new(axis, *range, right + GAP, full_height));
+        let width = bar.as_ref().map_or(right, Bar::right) + MARGIN;
+
+        let title = font::wrap(&figure.title, TITLE, Weight::Bold, width - 2.0 * MARGIN);
+        let mut y = MARGIN + TITLE * LEADING * title.len() as f64;
+        let (legend, bottom) = place_legend(frame::legend(figure), width, y);
+        y = bottom + 4.0;
+        for row in 0..rows {
+            let members = (row * columns)..((row + 1) * columns).min(panels.len());
+            let lines = panels[members.clone()].iter().map(|p| p.title.len()).max().unwrap_or(0);
+            let top = y + 8.0 + PANEL_TITLE * LEADING * lines as f64;
+            let below = panels[members.clone()].iter().map(Place::bottom_side).fold(0.0, f64::max);
+            for place in &mut panels[members] {
+                place.top = top;
+            }
+            y = top + plot_height + below + if row + 1 < rows { 10.0 } else { 0.0 };
+        }
+        if let (Some(bar), Some(first), Some(last)) = (&mut bar, panels.first(), panels.last()) {
+            bar.top = first.top;
+            bar.height = last.top + plot_height - first.top;
+        }
+        Layout { width, height: y + MARGIN, title, legend, panels, shades, bar }
+    }
+}
+
+fn widest(ticks: &Ticks) -> f64 {
+    ticks.labels.iter().map(|l| font::width(l, TICK, Weight::Regular)).fold(0.0, f64::max)
+}
+
+/// The title of an axis; a panel that does not share the axis of its like says so.
+fn title(axis: &Axis, ticks: &Ticks, own: bool, limit: f64) -> Vec<String> {
+    let own = if own { ", own range" } else { "" };
+    font::wrap(&format!("{}{own}", axis::axis_title(axis, ticks.power)), LABEL, Weight::Regular, limit)
+}
+
+impl Bar {
+    pub(super) fn new(axis: &Axis, range: Range, left: f64, height: f64) -> Bar {
+        let ticks = axis::ticks(range, height / 46.0);
+        let title_offset = BAR + TICK_LENGTH + 5.0 + widest(&ticks) + 9.0;
+        let title = title(axis, &ticks, false, height);
+        Bar { left, top: 0.0, height, range, ticks, title, title_offset }
+    }
+
+    pub(super) fn right(&self) -> f64 {
+        self.left + self.title_offset + LABEL * LEADING * self.title.len() as f64
+    }
+}
+
+impl Place {
+    pub(super) fn new(panel: &Panel, axes: &Axes, width: f64, height: f64) -> Place {
+        let Axes { x, y, own_x, own_y } = *axes;
+        let y_ticks = axis::ticks(y, height / 46.0);
+        // as many ticks as their labels leave room for
+        let fits =
+            |ticks: &Ticks| (widest(ticks) + 16.0) * ticks.labels.len() as f64 <= width && apart(ticks, x, width);
+        let x_ticks =
+            (3..=8).rev().map(|n| axis::ticks(x, f64::from(n))).find(fits).unwrap_or_else(|| axis::ticks(x, 2.0));
+        let y_title_offset = TICK_LENGTH + 5.0 + widest(&y_ticks) + 9.0;
+        Place {
+            left: 0.0,
+            top: 0.0,
+            width,
+            height,
+            title: font::wrap(&panel.title, PANEL_TITLE, Weight::Bold, width),
+            x_title: title(&panel.x, &x_ticks, own_x, width),
+            y_title: title(&panel.y, &y_ticks, own_y, height),
+            x,
+            y,
+            own_x,
+            own_y,
+            x_ticks,
+            y_ticks,
+            y_title_offset,
+        }
+    }
+
+    /// Space that the y axis needs left of the plot area.
+    pub(super) fn left_side(&self) -> f64 {
+        self.y_title_offset + LABEL * LEADING * self.y_title.len() as f64
+    }
+
+    /// Space that the x axis needs below the plot area.
+    pub(super) fn bottom_side(&self) -> f64 {
+        let title = if self.x_title.is_empty() { 0.0 } else { 5.0 + LABEL * LEADING * self.x_title.len() as f64 };
+        TICK_LENGTH + 3.0 + TICK * LEADING + title
+    }
+
+    /// How far the last x label reaches beyond the plot area.
+    pub(super) fn overhang(&self) -> f64 {
+        let (Some(at), Some(label)) = (self.x_ticks.at.last(), self.x_ticks.labels.last()) else { return 0.0 };
+        (self.map((*at, self.y.from)).0 - self.left + 0.5 * font::width(label, TICK, Weight::Regular) - self.width)
+            .max(0.0)
+    }
+
+    /// The place of a point; far outside it is near enough to infinity for a straight line.
+    pub(super) fn map(&self, (x, y): Point) -> Point {
+        let part = |v: f64, r: Range| r.part(v).clamp(-FAR, FAR);
+        (self.left + self.width * part(x, self.x), self.top + self.height * (1.0 - part(y, self.y)))
+    }
+
+    pub(super) fn window(&self) -> Window {
+        Window { left: self.left, top: self.top, right: self.left + self.width, bottom: self.top + self.height }
+    }
+}
+
+/// Lengths of an axis beyond which all points are equally far.
+const FAR: f64 = 1e6;
+
+/// Whether the labels of an uneven axis stand clear of each other.
+fn apart(ticks: &Ticks, range: Range, width: f64) -> bool {
+    let edges: Vec<(f64, f64)> = (ticks.at.iter().zip(&ticks.labels))
+        .map(|(at, label)| (width * range.part(*at), 0.5 * font::width(label, TICK, Weight::Regular)))
+        .collect();
+    edges.windows(2).all(|w| w[1].0 - w[1].1 - (w[0].0 + w[0].1) >= 8.0)
+}
+
+/// Length of the line before a label, space after it and between entries, px.
+pub(super) const SAMPLE: (f64, f64, f64) = (30.0, 7.0, 24.0);
+
+/// Entries in centred rows below `top`; returns them and the lower edge.
+fn place_legend((entries, more): (Vec<Entry>, usize), width: f64, top: f64) -> (Vec<Placed>, f64) {
+    let limit = width - 2.0 * MARGIN;
+    let before = SAMPLE.0 + SAMPLE.1;
+    struct Item {
+        length: f64,
+        lines: Vec<String>,
+        entry: Entry,
+    }
+    let broken = |entry: Entry| {
+        let lines = font::wrap(&entry.label, LABEL, Weight::Regular, limit - before);
+        let text = lines.iter().map(|l| font::width(l, LABEL, Weight::Regular)).fold(0.0, f64::max);
+        Item { length: before + text, lines, entry }
+    };
+    let rest = (more > 0).then(|| Entry {
+        label: format!("… and {more} more"),
+        colour: Colour::many(),
+        line: None,
+        marks: false,
+        area: None,
+        pale: false,
+    });
+    let mut rows: Vec<(f64, Vec<Item>)> = Vec::new();
+    for item in entries.into_iter().chain(rest).map(broken) {
+        match rows.last_mut() {
+            Some((used, row)) if *used + SAMPLE.2 + item.length <= limit => {
+                *used += SAMPLE.2 + item.length;
+                row.push(item);
+            }
+            _ => rows.push((item.length, vec![item])),
+        }
+    }
+    let mut placed = Vec::new();
+    let mut y = top;
+    for (used, row) in rows {
+        let mut x = ((width - used) / 2.0).max(MARGIN);
+        let lines = row.iter().map(|item| item.lines.len()).max().unwrap_or(1).max(1);
+        for Item { length, lines, entry } in row {
+            placed.push(Placed { entry, lines, x, y: y + LABEL });
+            x += length + SAMPLE.2;
+        }
+        y += LABEL * (1.5 + LEADING * (lines - 1) as f64);
+    }
+    (placed, y)
+}
