@@ -16,23 +16,16 @@
 //! blocks, shifts
 //! and counts.
 
-use super::{Analysis, Factor, Matrix, Singular, columns};
-use crate::eigen;
-use nalgebra::DMatrix;
+mod lanczos;
+
+use super::{Analysis, Factor, Matrix, Singular};
+use lanczos::{Lanczos, Pair};
 
 /// Vectors of a block: eigenvalues of multiplicity up to four are found in one run, and a solution for four right sides takes much less
 /// than four times one.
 const BLOCK: usize = 4;
 /// Residual of a mode in the Lanczos process, relative to θ, at which it counts as found: what follows squares the error of the eigenvalue.
 const CONVERGED: f64 = 1e-10;
-/// Largest relative error bound of `λ - σ` with which a mode is handed out; 1e-11 to 1e-15 is usual. The error itself is about its square.
-const ACCURATE: f64 = 1e-8;
-/// Norm of a new vector, relative to its norm before what is known was projected out, below which it is rounding.
-const DEPENDENT: f64 = 1e-14;
-/// Below this share so many digits have cancelled that it is made orthogonal once more; if half of it goes, it was rounding after all.
-const CANCELLED: f64 = 1e-6;
-/// A negative `vᵀ M v` is rounding up to this share of `|v| |M v|`.
-const MASSLESS: f64 = 1e-10;
 /// An eigenvalue counts as one up to a bound if it is above by less than this share.
 const ROUNDING: f64 = 1e-9;
 /// Vectors of a run at most: memory is n numbers for each.
@@ -418,247 +411,12 @@ impl Search<'_> {
     }
 }
 
-/// An eigenvalue of the projected operator.
-struct Pair {
-    theta: f64,
-    /// Combination of the basis.
-    vector: Vec<f64>,
-    /// `‖(K - σM)⁻¹ M y - θ y‖` in the norm of M.
-    residual: f64,
-}
-
-/// A basis of vectors that M makes orthonormal, orthogonal to the modes already found, and `T = Vᵀ M (K - σM)⁻¹ M V`.
-struct Lanczos<'a> {
-    factor: &'a Factor,
-    mass: &'a Matrix,
-    found: &'a [f64],
-    n: usize,
-    basis: Vec<f64>,
-    /// Columns of T, each as long as the basis was.
-    projected: Vec<Vec<f64>>,
-    /// How many vectors of the basis the operator was applied to.
-    expanded: usize,
-    /// What the last block that the operator was applied to has of the block after it.
-    beyond: DMatrix<f64>,
-    /// State of the start vectors' sequence.
-    seed: u64,
-}
-
-impl<'a> Lanczos<'a> {
-    fn new(factor: &'a Factor, mass: &'a Matrix, found: &'a [f64]) -> Self {
-        let n = mass.n();
-        let beyond = DMatrix::zeros(0, 0);
-        Lanczos { factor, mass, found, n, basis: vec![], projected: vec![], expanded: 0, beyond, seed: 0 }
-    }
-
-    fn size(&self) -> usize {
-        self.basis.len().checked_div(self.n).unwrap_or(0)
-    }
-
-    /// Applies the operator to the last block and adds what is new; false if nothing is.
-    fn expand(&mut self) -> Result<bool, ModesError> {
-        if self.size() == 0 {
-            self.fill(BLOCK)?;
-            if self.size() == 0 {
-                return Ok(false);
-            }
-        }
-        let n = self.n;
-        let mut block = self.operator(&self.basis[self.expanded * n..]);
-        let width = block.len() / n;
-        let sizes = self.norms(&block)?;
-        let coefficients = self.clear(&mut block);
-        for k in 0..width {
-            self.projected.push(coefficients.column(k).iter().copied().collect());
-        }
-        self.expanded += width;
-        self.beyond = self.append(block, &sizes)?;
-        let added = self.size() - self.expanded;
-        if added < BLOCK {
-            self.fill(BLOCK - added)?;
-        }
-        Ok(self.size() > self.expanded)
-    }
-
-    /// `(K - σM)⁻¹ M V`.
-    fn operator(&self, v: &[f64]) -> Vec<f64> {
-        let mut block = self.mass.times_columns(v);
-        self.factor.solve(&mut block);
-        block
-    }
-
-    fn norms(&self, block: &[f64]) -> Result<Vec<f64>, ModesError> {
-        let forces = self.mass.times_columns(block);
-        let squares = block.chunks(self.n).zip(forces.chunks(self.n)).map(|(v, f)| (dot(v, f), length(v) * length(f)));
-        squares
-            .map(|(square, size)| match square {
-                square if !square.is_finite() => Err(ModesError::OutOfRange),
-                square if square >= 0.0 => Ok(square.sqrt()),
-                // of a vector without mass rounding may be negative
-                square if square >= -MASSLESS * size => Ok(0.0),
-                _ => Err(ModesError::NegativeMass),
-            })
-            .collect()
-    }
-
-    /// Projects the modes found and the basis out of a block, and returns its components along the basis. Twice is enough.
-    fn clear(&self, block: &mut [f64]) -> DMatrix<f64> {
-        let n = self.n;
-        let mut coefficients = DMatrix::zeros(self.size(), block.len() / n);
-        for _ in 0..2 {
-            let forces = self.mass.times_columns(block);
-            let known = columns::products(n, self.found, &forces);
-            columns::add(n, block, -1.0, self.found, &known);
-            let along = columns::products(n, &self.basis, &forces);
-            columns::add(n, block, -1.0, &self.basis, &along);
-            coefficients += along;
-        }
-        coefficients
-    }
-
-    /// Makes the columns of a cleared block orthonormal, one after the other, and adds those that are not rounding beside their former
-    /// `sizes`. Returns the
-    /// block's components along the new vectors.
-    fn append(&mut self, block: Vec<f64>, sizes: &[f64]) -> Result<DMatrix<f64>, ModesError> {
-        let n = self.n;
-        let first = self.size();
-        let mut components = DMatrix::zeros(0, sizes.len());
-        for (k, (column, size)) in block.chunks(n).zip(sizes).enumerate() {
-            let mut column = column.to_vec();
-            let mut along = DMatrix::zeros(self.size() - first, 1);
-            for _ in 0..2 {
-                let force = self.mass.times_columns(&column);
-                let part = columns::products(n, &self.basis[first * n..], &force);
-                columns::add(n, &mut column, -1.0, &self.basis[first * n..], &part);
-                along += part;
-            }
-            let norm = self.norms(&column)?[0];
-            (0..along.nrows()).for_each(|i| components[(i, k)] = along[(i, 0)]);
-            if norm <= DEPENDENT * size {
-                continue;
-            }
-            scale(&mut column, 1.0 / norm);
-            if norm < CANCELLED * size {
-                self.clear(&mut column);
-                let left = self.norms(&column)?[0];
-                if left < 0.5 {
-                    continue;
-                }
-                scale(&mut column, 1.0 / left);
-            }
-            self.basis.extend(column);
-            components = components.insert_row(self.size() - first - 1, 0.0);
-            components[(self.size() - first - 1, k)] = norm;
-        }
-        Ok(components)
-    }
-
-    /// Adds up to `count` vectors that have nothing to do with those before; fewer where the space has no more.
-    fn fill(&mut self, count: usize) -> Result<(), ModesError> {
-        let mut start: Vec<f64> = (0..count * self.n).map(|_| self.next()).collect();
-        // without what is known before the operator, which would drown the rest in it
-        self.clear(&mut start);
-        start = self.operator(&start);
-        let sizes = self.norms(&start)?;
-        self.clear(&mut start);
-        self.append(start, &sizes)?;
-        Ok(())
-    }
-
-    /// Numbers between -1 and 1 without a pattern, the same on every machine (Steele, Lea and Flood 2014, splitmix64).
-    fn next(&mut self) -> f64 {
-        self.seed = self.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.seed;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    /// Eigenvalues of the projected operator, the largest |θ| first.
-    fn pairs(&self) -> Result<Vec<Pair>, ModesError> {
-        let m = self.expanded;
-        if m == 0 {
-            return Ok(vec![]);
-        }
-        // of the symmetric matrix the upper triangle was computed
-        let upper = |i: usize, k: usize| self.projected[k].get(i).copied().unwrap_or(0.0);
-        let t = DMatrix::from_fn(m, m, |i, k| upper(i.min(k), i.max(k)));
-        let eigen = eigen::symmetric(t).ok_or(ModesError::OutOfRange)?;
-        let mut order: Vec<usize> = (0..m).collect();
-        order.sort_by(|&a, &b| eigen.eigenvalues[b].abs().total_cmp(&eigen.eigenvalues[a].abs()));
-        let last = self.beyond.ncols();
-        let pair = |k: usize| {
-            let vector: Vec<f64> = eigen.eigenvectors.column(k).iter().copied().collect();
-            let tail = DMatrix::from_column_slice(last, 1, &vector[m - last..]);
-            Pair { theta: eigen.eigenvalues[k], vector, residual: (&self.beyond * tail).norm() }
-        };
-        Ok(order.into_iter().map(pair).filter(|pair| pair.theta != 0.0).collect())
-    }
-
-    /// Modes of eigenvalues of the projected operator: multiplied by the operator once more, and combined so that K and M are diagonal.
-    fn modes(&self, stiffness: &Matrix, shift: f64, pairs: &[Pair]) -> Result<NaturalModes, ModesError> {
-        let (n, count) = (self.n, pairs.len());
-        if count == 0 {
-            return Ok(NaturalModes::none());
-        }
-        let failed = || ModesError::NotConverged { found: 0, counted: count, below: shift };
-        let coefficients = DMatrix::from_fn(self.expanded, count, |i, k| pairs[k].vector[i]);
-        let ritz = columns::combination(n, &self.basis[..self.expanded * n], &coefficients);
-        let mut shapes = self.operator(&ritz);
-        shapes.chunks_mut(n).zip(pairs).for_each(|(shape, pair)| scale(shape, 1.0 / pair.theta));
-        let forces = self.mass.times_columns(&shapes);
-        let known = columns::products(n, self.found, &forces);
-        columns::add(n, &mut shapes, -1.0, self.found, &known);
-        let m = columns::products(n, &shapes, &self.mass.times_columns(&shapes));
-        let k = columns::products(n, &shapes, &stiffness.times_columns(&shapes));
-        let inverse = m
-            .clone()
-            .cholesky()
-            .map(|c| c.l())
-            .and_then(|l| l.solve_lower_triangular(&DMatrix::identity(count, count)));
-        let inverse = inverse.ok_or_else(failed)?;
-        // relative to the shift, so that modes far above do not drown those near it in their rounding
-        let eigen = eigen::symmetric(&inverse * (k - m * shift) * inverse.transpose()).ok_or_else(failed)?;
-        let shapes = columns::combination(n, &shapes, &(inverse.transpose() * &eigen.eigenvectors));
-        let values: Vec<f64> = eigen.eigenvalues.iter().map(|v| v + shift).collect();
-        let mut off = self.operator(&shapes);
-        for ((off, shape), value) in off.chunks_mut(n).zip(shapes.chunks(n)).zip(&values) {
-            off.iter_mut().zip(shape).for_each(|(off, x)| *off = x - (value - shift) * *off);
-        }
-        // inside of the modes' own space K and M are diagonal: what the factor's rounding adds there is no error of theirs
-        for modes in [self.found, &shapes] {
-            let inside = columns::products(n, modes, &self.mass.times_columns(&off));
-            columns::add(n, &mut off, -1.0, modes, &inside);
-        }
-        let residuals = self.norms(&off)?;
-        // a free motion that is not found yet may drown others by the factor's rounding; they are found after it
-        let good: Vec<usize> = (0..count).filter(|&k| residuals[k] <= ACCURATE).collect();
-        if good.is_empty() {
-            return Err(ModesError::Inaccurate { value: values[0], residual: residuals[0] });
-        }
-        let shapes = good.iter().flat_map(|&k| shapes[k * n..(k + 1) * n].iter().copied()).collect();
-        let [values, residuals] = [values, residuals].map(|all| good.iter().map(|&k| all[k]).collect());
-        let mut modes = NaturalModes::none();
-        modes.join(n, NaturalModes { values, shapes, residuals, ..NaturalModes::none() });
-        Ok(modes)
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn length(v: &[f64]) -> f64 {
-    dot(v, v).sqrt()
-}
-
-fn scale(v: &mut [f64], factor: f64) {
-    v.iter_mut().for_each(|x| *x *= factor);
-}
-
 #[cfg(test)]
 mod tests {
+    use super::lanczos::length;
     use super::*;
+    use crate::sparse::columns;
+    use nalgebra::DMatrix;
     use proptest::prelude::*;
     use std::f64::consts::PI;
 
