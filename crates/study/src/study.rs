@@ -624,6 +624,8 @@ impl Study {
             Element::Joint(i) => ("joint", i),
             Element::Force(i) => ("force", i),
             Element::Motion(i) => ("motion", i),
+            Element::Place(i) => ("place", i),
+            Element::Substructure => ("structure", 0),
             Element::Whole => ("", 0),
         };
         let whole = Place::default();

@@ -1,4 +1,4 @@
-//! Picks a method: event-driven for exact laws, shooting for smooth ones, harmonic balance for many joints.
+//! Picks a method: event-driven for exact laws, shooting for smooth ones, harmonic balance for many joints and for waves around a disk.
 
 use super::event_driven::takes;
 use super::harmonic_balance::HarmonicBalance;
@@ -9,7 +9,8 @@ use crate::structure::MOST_IN_FULL;
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: "auto",
-    summary: "event-driven for exact laws, shooting for smooth laws, harmonic balance for more than a dozen joints or a hundred sliders",
+    summary: "event-driven for exact laws, shooting for smooth laws, harmonic balance for more than a dozen joints or a hundred sliders and for \
+              waves around a tuned disk",
     options: &[],
     build: |_| Ok(Box::new(Auto)),
 };
@@ -42,6 +43,8 @@ impl Auto {
         if system.dofs() > MOST_IN_FULL {
             let because = format!("{} places are more than {MOST_IN_FULL}", system.dofs());
             (Box::new(HarmonicBalance::default()), because)
+        } else if joints > 0 && system.cyclic().is_some() {
+            (Box::new(HarmonicBalance::default()), "one of equal sectors is solved".to_owned())
         } else if joints > FOLLOWED {
             let because = format!("{joints} joints are more than {FOLLOWED}");
             (Box::new(HarmonicBalance::default()), because)

@@ -9,7 +9,7 @@
 
 use super::OrbitError;
 use super::periodic::{Aim, Closed, ReturnMap, close};
-use crate::model::System;
+use crate::model::{Axis, System};
 use crate::orbit::{Breakdown, Orbit, Symmetry};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::eigen;
@@ -163,7 +163,7 @@ impl Held {
 
 fn held(system: &System, orbit: &Orbit, springs: &[Spring]) -> Vec<Held> {
     let begin = orbit.sample(0.0);
-    let means: Vec<f64> = orbit.places.iter().map(|place| place.mean).collect();
+    let means = means(system, orbit);
     springs
         .iter()
         .filter_map(|&spring| {
@@ -179,6 +179,23 @@ fn held(system: &System, orbit: &Orbit, springs: &[Spring]) -> Vec<Held> {
             Some(Held { spring, begin, is, ought: mean.max(high - reach).min(low + reach) })
         })
         .collect()
+}
+
+/// Instants of a period for the means of degrees of freedom that are no places: a motion with corners has them to 1e-5.
+const INSTANTS: usize = 256;
+
+/// Mean of every degree of freedom, m.
+fn means(system: &System, orbit: &Orbit) -> Vec<f64> {
+    let is_place = |(row, axis): (usize, &Axis)| axis.rows() == [(row, 1.0)];
+    if system.seen().len() == system.dofs() && system.seen().iter().enumerate().all(is_place) {
+        return orbit.places.iter().map(|place| place.mean).collect();
+    }
+    let mut sum = vec![0.0; system.dofs()];
+    for instant in 0..INSTANTS {
+        let sample = orbit.sample(orbit.period() * instant as f64 / INSTANTS as f64);
+        sum.iter_mut().zip(sample.displacement).for_each(|(sum, x)| *sum += x / INSTANTS as f64);
+    }
+    sum
 }
 
 /// The rounds so far, for as long as the same sliders are held: places and gaps.

@@ -3,7 +3,7 @@
 use super::assembly::Assembly;
 use super::drive::Drive;
 use crate::law::{Contact, Relative};
-use crate::model::System;
+use crate::model::{Axis, System};
 use crate::orbit::measure::{Signals, Slip, extremes};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
 use num_complex::Complex64;
@@ -110,10 +110,12 @@ impl SteppedPath {
         }
     }
 
-    /// Value, slope and curvature of a degree of freedom at both ends of a step.
-    fn ends(&self, step: usize, row: usize) -> [[f64; 3]; 2] {
-        let end =
-            |instant: &Instant| [instant.state[row], instant.state[self.assembly.n + row], instant.acceleration[row]];
+    /// Value, slope and curvature at both ends of a step of what `of` reads off the degrees of freedom.
+    fn ends(&self, step: usize, of: impl Fn(&[f64]) -> f64) -> [[f64; 3]; 2] {
+        let end = |instant: &Instant| {
+            let (x, v) = instant.state.split_at(self.assembly.n);
+            [of(x), of(v), of(&instant.acceleration)]
+        };
         [end(&self.steps.instants[step]), end(&self.steps.instants[step + 1])]
     }
 
@@ -200,7 +202,7 @@ impl Path for SteppedPath {
         let mut state = vec![0.0; 2 * n];
         let mut acceleration = vec![0.0; n];
         for row in 0..n {
-            let [from, to] = self.ends(step, row);
+            let [from, to] = self.ends(step, |values| values[row]);
             (state[row], state[n + row], acceleration[row]) = quintic(s, length, from, to);
         }
         let joints = self.joints((step, s), time, &state, sign);
@@ -210,7 +212,7 @@ impl Path for SteppedPath {
             .flat_map(|(sample, joint)| sample.force[..joint.directions].iter().map(|f| sign * f))
             .collect();
         let (x, v) = state.split_at(n);
-        let moved = reactions(&self.system, self.drive.omega, time, (x, v, &forces));
+        let moved = reactions(&self.system, self.drive.omega, time, [x, v, &acceleration, &forces]);
         let signed = |values: &[f64]| values.iter().map(|value| sign * value).collect();
         Sample {
             displacement: signed(x),
@@ -237,7 +239,7 @@ impl Path for SteppedPath {
 }
 
 /// Displacement of the moved places at one instant, and the forces that move them.
-fn reactions(system: &System, omega: f64, time: f64, (x, v, forces): (&[f64], &[f64], &[f64])) -> Vec<(f64, f64)> {
+fn reactions(system: &System, omega: f64, time: f64, [x, v, a, forces]: [&[f64]; 4]) -> Vec<(f64, f64)> {
     let motion: Vec<[f64; 3]> = system
         .moved()
         .iter()
@@ -250,12 +252,15 @@ fn reactions(system: &System, omega: f64, time: f64, (x, v, forces): (&[f64], &[
         })
         .collect();
     let reaction = |(m, place): (usize, &crate::model::MovedPlace)| {
-        let mut force = place.mass * motion[m][2];
-        for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
-            force += k * motion[other][0] + c * motion[other][1];
+        let mut force = 0.0;
+        for (h, f) in &place.force {
+            force -= (f * Complex64::cis(f64::from(*h) * omega * time)).re;
+        }
+        for (other, [x, v, a]) in motion.iter().enumerate() {
+            force += place.stiffness.1[other] * x + place.damping.1[other] * v + place.mass.1[other] * a;
         }
         for i in 0..x.len() {
-            force += place.stiffness.0[i] * x[i] + place.damping.0[i] * v[i];
+            force += place.stiffness.0[i] * x[i] + place.damping.0[i] * v[i] + place.mass.0[i] * a[i];
         }
         (motion[m][0], force + place.joints.iter().zip(forces).map(|(sign, f)| sign * f).sum::<f64>())
     };
@@ -296,8 +301,8 @@ impl Signals for SteppedPath {
         };
         signal.iter().enumerate().map(term).sum()
     }
-    fn range(&self, row: usize) -> Result<(f64, f64), Infallible> {
-        Ok(self.range_of(|step| self.ends(step, row)))
+    fn range(&self, place: &Axis) -> Result<(f64, f64), Infallible> {
+        Ok(self.range_of(|step| self.ends(step, |values| place.along(values))))
     }
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(|step| self.relative_ends(step, axis)))

@@ -1,19 +1,28 @@
-//! What the user states: masses, springs, joints, forces, imposed motions.
+//! What the user states: a structure by its matrices and its places, masses, springs, joints, forces, imposed motions.
 //!
 //! A [`Model`] is plain data in SI units. [`Model::assemble`] checks it and turns it into a [`System`] of matrices.
 
 mod assemble;
 mod contraction;
+mod coordinates;
+mod disk;
 pub mod example;
+mod place;
+mod places;
 mod survey;
 mod system;
 
-pub use assemble::{Element, ModelError, is_identifier, is_place};
+pub use assemble::{Element, ModelError};
+pub use disk::{Around, Disk, LEAST_SECTORS, NEXT, Ring};
+pub use place::{Frame, FrameError, Place};
+pub use places::{is_identifier, is_place};
 pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey};
-pub use system::{Axis, Load, MovedPlace, System, SystemBuilder, SystemError, SystemJoint};
+pub use system::{Axis, Cyclic, Load, MovedPlace, System, SystemBuilder, SystemError, SystemJoint};
 
 use crate::law::SharedLaw;
-use serde::Serialize;
+use crate::structure::{Component, Reduction};
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 
 /// Name of the fixed frame.
 pub const GROUND: &str = "ground";
@@ -23,6 +32,10 @@ pub const GROUND: &str = "ground";
 /// A place is a mass, a direction of one (`name.direction`), [`GROUND`], or a place that is moved (see [`Motion`]).
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Model {
+    /// A structure by its matrices; all else may be added to it at its places.
+    pub substructure: Option<Substructure>,
+    /// Places of the substructure.
+    pub places: Vec<Place>,
     /// Point masses; each is one degree of freedom.
     pub masses: Vec<Mass>,
     /// Springs and dampers.
@@ -33,6 +46,51 @@ pub struct Model {
     pub forces: Vec<Force>,
     /// Imposed motions, harmonic in time.
     pub motions: Vec<Motion>,
+    /// If it is the ring of a [`Disk`]: how its elements stand.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ring: Option<Ring>,
+}
+
+/// A structure by its matrices, as a part of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Substructure {
+    /// The matrices.
+    pub component: Component,
+    /// Its damping.
+    pub damping: SubstructureDamping,
+    /// How it is brought into few coordinates.
+    pub reduction: Reduction,
+}
+
+/// Damping of a substructure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SubstructureDamping {
+    /// That of the component's own matrix; none if it has none.
+    Own,
+    /// Every mode up to the frequency of interest has this share of critical damping; what lies above is damped in proportion to its
+    /// stiffness.
+    Ratio(f64),
+    /// `C = mass M + stiffness K`, 1/s and s.
+    Rayleigh {
+        /// 1/s.
+        mass: f64,
+        /// s.
+        stiffness: f64,
+    },
+}
+
+impl Serialize for Substructure {
+    /// What it is, without its matrices.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let (mass, _, stiffness) = self.component.matrices();
+        let mut out = serializer.serialize_struct("Substructure", 5)?;
+        out.serialize_field("rows", &self.component.dofs())?;
+        out.serialize_field("entries_of_mass", &mass.len())?;
+        out.serialize_field("entries_of_stiffness", &stiffness.len())?;
+        out.serialize_field("damping", &format!("{:?}", self.damping))?;
+        out.serialize_field("reduction", &format!("{:?}", self.reduction))?;
+        out.end()
+    }
 }
 
 /// A point mass. It has one displacement and is a place, or several, and then is a node with a place `name.direction` for each.

@@ -1,10 +1,11 @@
 //! A model checked and assembled: a structure, its joints, its excitation.
 
 use crate::law::{LawError, SharedLaw};
-use crate::structure::Structure;
+use crate::structure::{ReducedComponent, Sector, Structure, turn};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -31,12 +32,50 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 ///     .unwrap();
 /// assert_eq!((system.dofs(), system.joints().len()), (2, 1));
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct System {
     structure: Structure,
+    places: Vec<String>,
+    seen: Vec<Axis>,
+    reduced: Option<Arc<ReducedComponent>>,
     joints: Vec<SystemJoint>,
     loads: Vec<Load>,
     moved: Vec<MovedPlace>,
+    cyclic: Option<Cyclic>,
+}
+
+/// The symmetry of a ring of equal sectors under an excitation that travels around it: sector n does what the first one does, earlier by
+/// `order n / sectors` of a period of the drive. Degrees of freedom, joints and moved places stand sector by sector.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cyclic {
+    /// Number of sectors.
+    pub sectors: usize,
+    /// Nodal diameters of the first harmonic.
+    pub order: usize,
+}
+
+impl Cyclic {
+    /// The nodal diameter of a harmonic of the drive.
+    pub fn diameter(self, harmonic: usize) -> usize {
+        harmonic % self.sectors * self.order % self.sectors
+    }
+
+    /// By how much a harmonic of sector `sector` leads that of the first, `e^{j 2π h order n / sectors}`.
+    pub fn lead(self, harmonic: usize, sector: usize) -> Complex64 {
+        turn((self.diameter(harmonic) * sector) as i64, self.sectors)
+    }
+}
+
+impl PartialEq for System {
+    fn eq(&self, other: &Self) -> bool {
+        self.structure == other.structure
+            && self.places == other.places
+            && self.seen == other.seen
+            && self.joints == other.joints
+            && self.loads == other.loads
+            && self.moved == other.moved
+            && self.cyclic == other.cyclic
+    }
 }
 
 /// A joint in a system.
@@ -77,7 +116,8 @@ impl SystemJoint {
     }
 }
 
-/// One direction of a joint: `u = Σ w x + g(t)`, and its force acts on the structure as `-w f`.
+/// A weighted sum of degrees of freedom: one direction of a joint, `u = Σ w x + g(t)`, whose force acts on the structure as `-w f`; or a
+/// place, at which results are given.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
     /// The direction's name, if its joint has several.
@@ -140,6 +180,18 @@ impl Axis {
         self.rows.iter().map(|&(i, w)| values[i] * w).sum()
     }
 
+    /// That it names degrees of freedom below `n` and has finite numbers.
+    fn check(&self, n: usize, what: impl Fn() -> String) -> Result<(), SystemError> {
+        if let Some(&(row, _)) = self.rows.iter().find(|(row, _)| *row >= n) {
+            return Err(SystemError::Row { what: what(), row, dofs: n });
+        }
+        let finite = self.rows.iter().all(|(_, w)| w.is_finite());
+        if !(finite && self.imposed.iter().all(|(_, g)| g.is_finite())) {
+            return Err(SystemError::NotFinite { what: what() });
+        }
+        Ok(())
+    }
+
     /// Its weights over all `n` degrees of freedom.
     pub fn dense(&self, n: usize) -> DVector<f64> {
         let mut out = DVector::zeros(n);
@@ -148,7 +200,7 @@ impl Axis {
     }
 }
 
-/// One harmonic of the excitation: `Re((force + jhΩ·by_velocity) e^{j h Ω t})`.
+/// One harmonic of the excitation: `Re((force + s·by_velocity + s²·by_acceleration) e^{st})` at `s = jhΩ`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Load {
     /// Harmonic number h; 0 is constant.
@@ -157,6 +209,25 @@ pub struct Load {
     pub force: DVector<Complex64>,
     /// Amplitudes of imposed motion times the dampers through which it acts, length n, kg m/s.
     pub by_velocity: DVector<Complex64>,
+    /// Amplitudes of imposed motion times the masses that it shares with degrees of freedom, length n, kg m.
+    pub by_acceleration: DVector<Complex64>,
+}
+
+impl Load {
+    fn zero(harmonic: u32, n: usize) -> Self {
+        let zeros = || DVector::from_element(n, ZERO);
+        Load { harmonic, force: zeros(), by_velocity: zeros(), by_acceleration: zeros() }
+    }
+
+    /// Complex force amplitudes at drive frequency `omega` (rad/s), length n, N.
+    pub fn at(&self, omega: f64) -> DVector<Complex64> {
+        let s = Complex64::new(0.0, f64::from(self.harmonic) * omega);
+        &self.force + &self.by_velocity * s + &self.by_acceleration * (s * s)
+    }
+
+    fn amplitudes(&self) -> impl Iterator<Item = &Complex64> {
+        self.force.iter().chain(self.by_velocity.iter()).chain(self.by_acceleration.iter())
+    }
 }
 
 /// A place with imposed motion, and what hangs on it: needed for the force that moves it.
@@ -166,11 +237,13 @@ pub struct MovedPlace {
     pub name: String,
     /// Sorted (harmonic, complex amplitude in m).
     pub motion: Vec<(u32, Complex64)>,
-    /// Mass that moves along, kg.
-    pub mass: f64,
-    /// Row of the stiffness matrix towards the degrees of freedom (length n), and towards the moved places.
+    /// Forces that act on it besides, those of places that move along: sorted (harmonic, complex amplitude in N).
+    pub force: Vec<(u32, Complex64)>,
+    /// Row of the mass matrix towards the degrees of freedom (length n), and towards the moved places, kg.
+    pub mass: (DVector<f64>, Vec<f64>),
+    /// The same of the stiffness matrix, N/m.
     pub stiffness: (DVector<f64>, Vec<f64>),
-    /// The same for damping.
+    /// The same of the damping matrix, kg/s.
     pub damping: (DVector<f64>, Vec<f64>),
     /// For each axis of all joints, in their order, the sign with which its force acts back on this place: the drive must supply `+sign · f`.
     pub joints: Vec<f64>,
@@ -215,19 +288,40 @@ pub enum SystemError {
         /// What is wrong.
         error: LawError,
     },
+    /// It is not as symmetric as it is said to be.
+    #[error("the sectors are not alike: {0} differ from those of the first sector")]
+    NotCyclic(&'static str),
 }
 
 /// Puts a system together; [`SystemBuilder::build`] checks it.
 #[derive(Debug, Clone)]
 pub struct SystemBuilder {
     structure: Structure,
+    places: Option<(Vec<String>, Vec<Axis>)>,
+    reduced: Option<Arc<ReducedComponent>>,
     joints: Vec<SystemJoint>,
-    loads: BTreeMap<u32, (DVector<Complex64>, DVector<Complex64>)>,
+    loads: BTreeMap<u32, Load>,
     moved: Vec<MovedPlace>,
+    cyclic: Option<Cyclic>,
     wrong: Option<SystemError>,
 }
 
 impl SystemBuilder {
+    /// Adds a place at which results are given; without any, each degree of freedom is one.
+    #[must_use]
+    pub fn place(mut self, name: impl Into<String>, along: Axis) -> Self {
+        let (names, seen) = self.places.get_or_insert_default();
+        names.push(name.into());
+        seen.push(along);
+        self
+    }
+
+    /// Says that part of the structure is a component in few coordinates.
+    #[must_use]
+    pub(super) fn reduced(self, reduced: Option<Arc<ReducedComponent>>) -> Self {
+        SystemBuilder { reduced, ..self }
+    }
+
     /// Adds a joint with one axis for each of its law's directions.
     #[must_use]
     pub fn joint(mut self, name: impl Into<String>, law: SharedLaw, axes: Vec<Axis>) -> Self {
@@ -238,23 +332,24 @@ impl SystemBuilder {
     /// Adds a force on a degree of freedom: harmonic and complex amplitude, N.
     #[must_use]
     pub fn force(self, row: usize, harmonic: u32, amplitude: Complex64) -> Self {
-        self.load(row, harmonic, amplitude, ZERO)
+        self.load(row, harmonic, [amplitude, ZERO, ZERO])
     }
 
-    /// Adds a force (N) and one that grows with frequency (kg m/s, times jhΩ) on a degree of freedom.
+    /// Adds a force (N), one that grows with frequency (kg m/s, times s) and one that grows with its square (kg m, times s²) on a degree
+    /// of freedom.
     #[must_use]
-    pub(super) fn load(mut self, row: usize, harmonic: u32, force: Complex64, by_velocity: Complex64) -> Self {
+    pub(super) fn load(mut self, row: usize, harmonic: u32, parts: [Complex64; 3]) -> Self {
         let n = self.structure.dofs();
         let what = || format!("a force of harmonic {harmonic}");
         if row >= n {
             self.wrong.get_or_insert_with(|| SystemError::Row { what: what(), row, dofs: n });
-        } else if !(force.is_finite() && by_velocity.is_finite()) {
+        } else if !parts.iter().all(|part| part.is_finite()) {
             self.wrong.get_or_insert_with(|| SystemError::NotFinite { what: what() });
         } else {
-            let zeros = || (DVector::from_element(n, ZERO), DVector::from_element(n, ZERO));
-            let load = self.loads.entry(harmonic).or_insert_with(zeros);
-            load.0[row] += force;
-            load.1[row] += by_velocity;
+            let load = self.loads.entry(harmonic).or_insert_with(|| Load::zero(harmonic, n));
+            load.force[row] += parts[0];
+            load.by_velocity[row] += parts[1];
+            load.by_acceleration[row] += parts[2];
         }
         self
     }
@@ -266,16 +361,32 @@ impl SystemBuilder {
         self
     }
 
+    /// States that it is a ring of equal sectors in a travelling wave, which [`SystemBuilder::build`] checks: harmonic balance then solves
+    /// one sector.
+    #[must_use]
+    pub fn cyclic(mut self, cyclic: Cyclic) -> Self {
+        self.cyclic = Some(cyclic);
+        self
+    }
+
     /// The system.
     ///
     /// # Errors
     /// [`SystemError`]: axes that do not fit the law, numbers of degrees of freedom that do not exist, numbers that are not finite, a law
-    /// whose parameters are wrong.
+    /// whose parameters are wrong, sectors that are not alike.
     pub fn build(self) -> Result<System, SystemError> {
         if let Some(wrong) = self.wrong {
             return Err(wrong);
         }
         let n = self.structure.dofs();
+        let unit = || {
+            let rows = (0..n).map(|row| Axis::new(vec![(row, 1.0)]));
+            (self.structure.places().to_vec(), rows.collect())
+        };
+        let (places, seen) = self.places.unwrap_or_else(unit);
+        for (name, axis) in places.iter().zip(&seen) {
+            axis.check(n, || format!("place `{name}`"))?;
+        }
         for joint in &self.joints {
             let (axes, directions) = (joint.axes.len(), joint.law.directions());
             if axes != directions {
@@ -283,30 +394,42 @@ impl SystemBuilder {
             }
             joint.law.check().map_err(|error| SystemError::Law { joint: joint.name.clone(), error })?;
             for axis in &joint.axes {
-                let what = || format!("joint `{}`", joint.name);
-                if let Some(&(row, _)) = axis.rows.iter().find(|(row, _)| *row >= n) {
-                    return Err(SystemError::Row { what: what(), row, dofs: n });
-                }
-                let finite = axis.rows.iter().all(|(_, w)| w.is_finite());
-                if !(finite && axis.imposed.iter().all(|(_, g)| g.is_finite())) {
-                    return Err(SystemError::NotFinite { what: what() });
-                }
+                axis.check(n, || format!("joint `{}`", joint.name))?;
             }
         }
-        let load = |(harmonic, (force, by_velocity))| Load { harmonic, force, by_velocity };
-        Ok(System {
+        let system = System {
             structure: self.structure,
+            places,
+            seen,
+            reduced: self.reduced,
             joints: self.joints,
-            loads: self.loads.into_iter().map(load).collect(),
+            loads: self.loads.into_values().collect(),
             moved: self.moved,
-        })
+            cyclic: self.cyclic,
+        };
+        match system.cyclic.and_then(|cyclic| system.off(cyclic)) {
+            Some(what) => Err(SystemError::NotCyclic(what)),
+            None => Ok(system),
+        }
     }
 }
+
+/// Difference between loads of a sector and those of the first, relative to the largest, that counts as rounding of phases.
+const ALIKE: f64 = 1e-12;
 
 impl System {
     /// Begins a system on a structure.
     pub fn builder(structure: Structure) -> SystemBuilder {
-        SystemBuilder { structure, joints: Vec::new(), loads: BTreeMap::new(), moved: Vec::new(), wrong: None }
+        SystemBuilder {
+            structure,
+            places: None,
+            reduced: None,
+            joints: Vec::new(),
+            loads: BTreeMap::new(),
+            moved: Vec::new(),
+            cyclic: None,
+            wrong: None,
+        }
     }
 
     /// Its linear part.
@@ -319,8 +442,10 @@ impl System {
     /// # Errors
     /// As [`SystemBuilder::build`].
     pub fn on(&self, structure: Structure) -> Result<System, SystemError> {
-        let loads = self.loads.iter().map(|load| (load.harmonic, (load.force.clone(), load.by_velocity.clone())));
+        let loads = self.loads.iter().map(|load| (load.harmonic, load.clone()));
         let builder = SystemBuilder {
+            places: Some((self.places.clone(), self.seen.clone())),
+            reduced: self.reduced.clone(),
             joints: self.joints.clone(),
             loads: loads.collect(),
             moved: self.moved.clone(),
@@ -332,7 +457,8 @@ impl System {
     /// The same system, driven by harmonics of a frequency that is so many times lower: harmonic h becomes `h · periods`, and what repeats after
     /// so many periods of the drive repeats after one.
     pub(crate) fn slowed(&self, periods: u32) -> System {
-        let mut system = self.clone();
+        // what repeats after several periods need not travel as the drive does
+        let mut system = System { cyclic: None, ..self.clone() };
         system.loads.iter_mut().for_each(|load| load.harmonic *= periods);
         let axes = system.joints.iter_mut().flat_map(|joint| &mut joint.axes);
         axes.flat_map(|axis| &mut axis.imposed).for_each(|(h, _)| *h *= periods);
@@ -340,14 +466,82 @@ impl System {
         system
     }
 
+    /// The symmetry of a ring in a travelling wave, if it was stated.
+    pub fn cyclic(&self) -> Option<Cyclic> {
+        self.cyclic
+    }
+
+    /// What of the system has not this symmetry.
+    fn off(&self, cyclic: Cyclic) -> Option<&'static str> {
+        let Cyclic { sectors, order } = cyclic;
+        let n = self.dofs();
+        if order >= sectors || Sector::of(&self.structure, sectors).is_none() {
+            return Some("masses, dampers or springs");
+        }
+        let size = n / sectors;
+        let near = |first: Complex64, harmonic: u32, sector: usize, z: Complex64, largest: f64| {
+            (first * cyclic.lead(harmonic as usize, sector) - z).norm() <= ALIKE * largest
+        };
+        for load in &self.loads {
+            for values in [&load.force, &load.by_velocity] {
+                let largest = values.iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+                if !(0..n).all(|i| near(values[i % size], load.harmonic, i / size, values[i], largest)) {
+                    return Some("forces");
+                }
+            }
+        }
+        if !self.joints.len().is_multiple_of(sectors) {
+            return Some("joints");
+        }
+        let each = self.joints.len() / sectors;
+        let mut rows = Vec::new();
+        for (j, joint) in self.joints.iter().enumerate() {
+            let (first, sector) = (&self.joints[j % each], j / each);
+            let same = joint.axes.len() == first.axes.len() && *joint.law == *first.law;
+            let alike = same
+                && joint.axes.iter().zip(&first.axes).all(|(axis, first)| {
+                    rows.clear();
+                    rows.extend(first.rows.iter().map(|(i, w)| ((i + sector * size) % n, *w)));
+                    let largest = first.imposed.iter().fold(0.0, |m: f64, (_, g)| m.max(g.norm()));
+                    axis.rows == rows
+                        && axis.imposed.len() == first.imposed.len()
+                        && axis
+                            .imposed
+                            .iter()
+                            .zip(&first.imposed)
+                            .all(|((h, g), (k, f))| h == k && near(*f, *h, sector, *g, largest))
+                });
+            if !alike {
+                return Some("joints");
+            }
+        }
+        None
+    }
+
     /// Number of degrees of freedom.
     pub fn dofs(&self) -> usize {
         self.structure.dofs()
     }
 
-    /// Names of the degrees of freedom, length n.
+    /// Names of the places, at which results are given. In a model of masses they are the degrees of freedom; of a reduced structure
+    /// they are what is looked at, and fewer or more.
     pub fn places(&self) -> &[String] {
-        self.structure.places()
+        &self.places
+    }
+
+    /// How each place follows from the degrees of freedom.
+    pub fn seen(&self) -> &[Axis] {
+        &self.seen
+    }
+
+    /// The component in few coordinates that part of the structure is, and its error.
+    pub fn reduced(&self) -> Option<&ReducedComponent> {
+        self.reduced.as_deref()
+    }
+
+    /// Displacements, velocities or accelerations of the degrees of freedom (length n), at the places.
+    pub fn at_places(&self, values: &[f64]) -> Vec<f64> {
+        self.seen.iter().map(|axis| axis.along(values)).collect()
     }
 
     /// The joints.
@@ -372,13 +566,7 @@ impl System {
 
     /// Complex force amplitudes at drive frequency `omega` (rad/s): (harmonic, length n).
     pub fn excitation(&self, omega: f64) -> Vec<(u32, DVector<Complex64>)> {
-        self.loads
-            .iter()
-            .map(|load| {
-                let rate = Complex64::new(0.0, f64::from(load.harmonic) * omega);
-                (load.harmonic, &load.force + &load.by_velocity * rate)
-            })
-            .collect()
+        self.loads.iter().map(|load| (load.harmonic, load.at(omega))).collect()
     }
 
     /// Whether the excitation changes its sign after half a period, and all laws with it: then an orbit with `x(t + T/2) = -x(t)` exists.
@@ -389,11 +577,7 @@ impl System {
 
     /// The harmonics of loads and imposed motions whose amplitudes `counts` accepts; some may stand more than once.
     pub(crate) fn harmonics_of_excitation(&self, counts: impl Fn(Complex64) -> bool) -> Vec<u32> {
-        let loads = self
-            .loads
-            .iter()
-            .filter(|load| load.force.iter().chain(load.by_velocity.iter()).any(|z| counts(*z)))
-            .map(|load| load.harmonic);
+        let loads = self.loads.iter().filter(|load| load.amplitudes().any(|z| counts(*z))).map(|load| load.harmonic);
         let imposed = self.axes().flat_map(|(_, axis)| &axis.imposed);
         let moved = self.moved.iter().flat_map(|place| &place.motion);
         loads.chain(imposed.chain(moved).filter(|(_, z)| counts(*z)).map(|(h, _)| *h)).collect()

@@ -4,7 +4,7 @@
 //! written once, here, and is independent of how the motion was found.
 
 use super::{Energy, JointMotion, PlaceMotion, Symmetry};
-use crate::model::System;
+use crate::model::{Axis, System};
 use num_complex::Complex64;
 use stickslip_numerics::radau::quintic;
 
@@ -32,12 +32,23 @@ pub(crate) trait Signals {
     fn product(&self, a: &Self::Signal, b: &Self::Signal) -> f64;
     /// `∫ signal e^{-jωt} dt` over the return.
     fn fourier(&self, signal: &Self::Signal, omega: f64) -> Complex64;
-    /// Least and largest displacement of a degree of freedom, m.
-    fn range(&self, row: usize) -> Result<(f64, f64), Self::Error>;
+    /// Least and largest displacement of a place, m.
+    fn range(&self, place: &Axis) -> Result<(f64, f64), Self::Error>;
     /// Least and largest relative displacement along an axis, m.
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Self::Error>;
     /// When a joint slips.
     fn slip(&self, joint: usize) -> Slip;
+    /// Of signals of the degrees of freedom that of a place.
+    fn along(&self, place: &Axis, of: impl Fn(usize) -> Self::Signal) -> Self::Signal {
+        match *place.rows() {
+            [(row, 1.0)] => of(row),
+            ref rows => {
+                let mut sum = self.harmonics(&[]);
+                rows.iter().for_each(|(row, weight)| self.add(&mut sum, &of(*row), *weight));
+                sum
+            }
+        }
+    }
     /// What the `force` along an axis takes from the motion in the return, J.
     fn dissipation(&self, axis: usize, force: &Self::Signal) -> f64 {
         self.product(force, &self.relative_velocity(axis))
@@ -79,10 +90,10 @@ pub(crate) fn measure<S: Signals>(
         let most = high.max(-low);
         if half { (-most, most) } else { (low, high) }
     };
-    let mut places = Vec::with_capacity(system.dofs());
-    for (row, name) in system.places().iter().enumerate() {
-        let (minimum, maximum) = mirrored(signals.range(row)?);
-        let x = signals.displacement(row);
+    let mut places = Vec::with_capacity(system.places().len());
+    for (name, place) in system.places().iter().zip(system.seen()) {
+        let (minimum, maximum) = mirrored(signals.range(place)?);
+        let x = signals.along(place, |row| signals.displacement(row));
         places.push(PlaceMotion {
             name: name.clone(),
             maximum,
@@ -160,10 +171,11 @@ fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Sig
         })
         .collect();
     for (m, place) in system.moved().iter().enumerate() {
-        let [motion, speed, acceleration] = &moved[m];
+        let [motion, speed, _] = &moved[m];
+        // the inertia that it shares with degrees of freedom is left out: what it takes here, ∫ m a ġ = -∫ m v g̈, it adds to their loads
         let mut reaction = signals.harmonics(&[]);
-        signals.add(&mut reaction, acceleration, place.mass);
         for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
+            signals.add(&mut reaction, &moved[other][2], place.mass.1[other]);
             signals.add(&mut reaction, &moved[other][0], *k);
             signals.add(&mut reaction, &moved[other][1], *c);
             viscous += c * signals.product(speed, &moved[other][1]);

@@ -97,10 +97,10 @@ impl Signals for Sampled<'_> {
         let terms = signal.iter().zip(&self.nodes);
         terms.map(|(value, (time, weight))| Complex64::cis(-omega * time) * (weight * value)).sum()
     }
-    fn range(&self, row: usize) -> Result<(f64, f64), Infallible> {
+    fn range(&self, place: &Axis) -> Result<(f64, f64), Infallible> {
         let at = |i: usize| {
-            let sample = &self.samples[i];
-            [sample.displacement[row], sample.velocity[row], sample.acceleration[row]]
+            let Sample { displacement, velocity, acceleration, .. } = &self.samples[i];
+            [displacement, velocity, acceleration].map(|values| place.along(values))
         };
         Ok(self.range_of(at))
     }

@@ -1,9 +1,14 @@
 //! The linear part of a system: the only owner of mass, damping and stiffness.
 
+mod component;
 mod dynamic;
 pub mod reduction;
+mod sector;
 
+pub use component::{Component, ReducedComponent, Reduction, ReductionKind};
 pub use dynamic::DynamicStiffness;
+pub(crate) use sector::turn;
+pub use sector::{Sector, Wave, WaveStiffness};
 
 use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};
@@ -200,16 +205,8 @@ impl Structure {
         let form = if is_full(n, [&mass, &damping, &stiffness].map(Matrix::len)) {
             Form::Full(Arc::new(written_out(&mass, &damping, &stiffness)))
         } else {
-            let [mass, stiffness] = [("mass", mass), ("stiffness", stiffness)].map(|(name, matrix)| {
-                symmetric(matrix).map_err(|off| StructureError::NotSymmetric {
-                    matrix: name,
-                    row: off.row + 1,
-                    column: off.column + 1,
-                    value: off.value,
-                    mirrored: off.mirrored,
-                })
-            });
-            Form::Sparse { mass: mass?, damping, stiffness: stiffness?, analysis, full }
+            let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
+            Form::Sparse { mass, damping, stiffness, analysis, full }
         };
         Structure::checked(places, form)
     }
@@ -458,12 +455,12 @@ fn written_out(mass: &Matrix, damping: &Matrix, stiffness: &Matrix) -> Matrices 
 }
 
 /// The mean of both triangles, if they differ by rounding only.
-fn symmetric(matrix: Matrix) -> Result<Matrix, Asymmetry> {
+fn symmetric(name: &'static str, matrix: Matrix) -> Result<Matrix, StructureError> {
     if matrix.asymmetry(0.0).is_none() {
         return Ok(matrix);
     }
-    if let Some(off) = matrix.asymmetry(SYMMETRIC * matrix.largest()) {
-        return Err(off);
+    if let Some(Asymmetry { row, column, value, mirrored }) = matrix.asymmetry(SYMMETRIC * matrix.largest()) {
+        return Err(StructureError::NotSymmetric { matrix: name, row: row + 1, column: column + 1, value, mirrored });
     }
     let halves = matrix.entries().flat_map(|(i, k, value)| [(i, k, 0.5 * value), (k, i, 0.5 * value)]);
     // halves of finite numbers that are nearly equal have finite sums, and their places are those of the matrix

@@ -115,7 +115,7 @@ fn the_error_chooses_the_size() {
             .unwrap();
     let mut last = 0;
     for tolerance in [1e-2, 1e-4, 1e-7] {
-        let chosen = Reduce { up_to, tolerance }.of(&whole).unwrap();
+        let chosen = Reduce { up_to, tolerance, kind: None }.of(&whole).unwrap();
         assert!(chosen.deviation.error <= tolerance && chosen.reduced.dofs() >= last);
         last = chosen.reduced.dofs();
     }

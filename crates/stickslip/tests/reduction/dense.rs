@@ -226,9 +226,12 @@ fn what_is_no_reduction_says_why() {
     let whole = Whole::new(m.clone(), UNDAMPED, apart, vec![vec![(0, 1.0)]]).unwrap();
     assert!(matches!(whole.craig_bampton(1.0), Err(ReductionError::NotHeld { count: 1 })));
     let whole = Whole::new(m, UNDAMPED, k, ports(n)).unwrap();
-    let reach = Reduce { up_to: 0.9, tolerance: 1e-16 }.of(&whole);
+    let reach = Reduce { up_to: 0.9, tolerance: 1e-16, kind: None }.of(&whole);
     assert!(matches!(reach, Err(ReductionError::OutOfReach { .. })), "{reach:?}");
-    assert!(matches!(Reduce { up_to: 0.0, tolerance: 1e-3 }.of(&whole), Err(ReductionError::Number { .. })));
+    assert!(matches!(
+        Reduce { up_to: 0.0, tolerance: 1e-3, kind: None }.of(&whole),
+        Err(ReductionError::Number { .. })
+    ));
 }
 
 /// Far below the first mode the static answers will do, three of which are independent.
@@ -236,7 +239,7 @@ fn what_is_no_reduction_says_why() {
 fn without_modes() {
     let n = 30;
     let whole = Whole::new(masses(n), UNDAMPED, chain(n, true), ports(n)).unwrap();
-    let chosen = Reduce { up_to: 1e-3, tolerance: 1e-6 }.of(&whole).unwrap();
+    let chosen = Reduce { up_to: 1e-3, tolerance: 1e-6, kind: None }.of(&whole).unwrap();
     assert_eq!((chosen.modes.count(), chosen.reduced.dofs()), (0, 3));
 }
 
@@ -272,7 +275,7 @@ proptest! {
         let (values, _) = modes(&m, &k);
         let up_to = 0.5 * (values[5].sqrt() + values[6].sqrt());
         let whole = Whole::new(m.clone(), Damping::Ratio { ratio: 0.01, up_to }, k.clone(), ports.clone()).unwrap();
-        let chosen = Reduce { up_to, tolerance: 1e-4 }.of(&whole).unwrap();
+        let chosen = Reduce { up_to, tolerance: 1e-4, kind: None }.of(&whole).unwrap();
         prop_assert!(chosen.deviation.error <= 1e-4);
         let (omega, undamped) = (at * up_to, DMatrix::zeros(n, n));
         prop_assume!(values.iter().all(|v| (v.max(0.0).sqrt() - omega).abs() > 2e-3 * up_to));

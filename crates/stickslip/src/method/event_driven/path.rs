@@ -154,17 +154,27 @@ impl ExactPath {
                 force.iter_mut().zip(signal).for_each(|(f, s)| *f += s * factor);
             }
         };
+        if !place.force.is_empty() {
+            let mut outer = vec![ZERO; nb];
+            self.add_imposed(piece, &place.force, &mut outer);
+            add(&mut force, &outer, -1.0);
+        }
         for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
             let (motion, speed) = self.moved_motion(piece, other);
             add(&mut force, &motion, *k);
             add(&mut force, &speed, *c);
-            if other == m {
+            if place.mass.1[other] != 0.0 {
                 let mut acceleration = vec![ZERO; nb];
                 piece.basis().differentiate(&speed, &mut acceleration);
-                add(&mut force, &acceleration, place.mass);
+                add(&mut force, &acceleration, place.mass.1[other]);
             }
         }
         for i in 0..n {
+            if place.mass.0[i] != 0.0 {
+                let mut acceleration = vec![ZERO; nb];
+                piece.basis().differentiate(&piece.velocity[i * nb..(i + 1) * nb], &mut acceleration);
+                add(&mut force, &acceleration, place.mass.0[i]);
+            }
             add(&mut force, &piece.segment.displacement[i * nb..(i + 1) * nb], place.stiffness.0[i]);
             add(&mut force, &piece.velocity[i * nb..(i + 1) * nb], place.damping.0[i]);
         }
@@ -307,8 +317,9 @@ impl Signals for Measuring<'_> {
         }
         sum
     }
-    fn range(&self, row: usize) -> Result<(f64, f64), Breakdown> {
-        self.range_of(&self.displacement(row), &self.velocity(row))
+    fn range(&self, place: &Axis) -> Result<(f64, f64), Breakdown> {
+        let [x, v] = [self.along(place, |row| self.displacement(row)), self.along(place, |row| self.velocity(row))];
+        self.range_of(&x, &v)
     }
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Breakdown> {
         let signal = self.relative(axis);

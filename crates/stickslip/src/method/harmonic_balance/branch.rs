@@ -32,6 +32,7 @@ pub(crate) struct BranchEquations<'a> {
     value: f64,
     span: f64,
     ports: Ports,
+    around: Option<Ports>,
     rest: Rest,
     rest_of: System,
     level: Level,
@@ -57,7 +58,7 @@ impl<'a> BranchEquations<'a> {
         let kept = Kept::new(&system, |_| true);
         method.check(kept.highest)?;
         let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
-        let ports = Ports::new(&system).map_err(|error| error.with_ways(&system))?;
+        let (ports, around) = Ports::of_sector(&system).map_err(|error| error.with_ways(&system))?;
         let rest = Rest::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
         let level = |top: usize| Level::new(kept.up_to(top), method.samples_at(top, &ports), &ports, None);
@@ -74,6 +75,7 @@ impl<'a> BranchEquations<'a> {
             value: f64::NAN,
             span: (range.1 - range.0).abs(),
             ports,
+            around,
             rest,
             level,
             finer,
@@ -91,13 +93,14 @@ impl<'a> BranchEquations<'a> {
             return true;
         }
         let (system, omega) = (self.at)(value);
-        match Ports::new(&system) {
-            Ok(found)
+        match Ports::of_sector(&system) {
+            Ok((found, around))
                 if omega > 0.0
+                    && found.wave() == self.ports.wave()
                     && found.len() == self.ports.len()
                     && found.iter().zip(self.ports.iter()).all(|(a, b)| a.is_like(b)) =>
             {
-                self.ports = found;
+                (self.ports, self.around) = (found, around);
             }
             _ => return false,
         }
@@ -150,11 +153,12 @@ impl<'a> BranchEquations<'a> {
             let better = path::places(finer, &self.rest, self.omega, &motion);
             let coarse = Compared { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
             let at = (self.kept, self.omega);
-            Some(estimate(&self.ports, &self.rest, at, &coarse, (finer, &motion, &better)))
+            Some(estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &motion, &better)))
         });
         let context = path::Context {
             system: &self.system,
             ports: &self.ports,
+            around: self.around.as_ref(),
             omega: self.omega,
             first: 1,
             odd: self.kept.half_period(),

@@ -20,7 +20,7 @@ use super::ports::{Alternation, Port, Ports, block, blocks};
 use super::rest::Rest;
 use super::sparse::Sparse;
 use crate::method::guess::Guess;
-use crate::model::System;
+use crate::model::{Cyclic, System};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
@@ -115,13 +115,21 @@ pub(super) const GIVEN: Ease = Ease { limits: 1.0, penalty: 1.0 };
 
 impl Level {
     pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, sparse: Option<Sparse>) -> Self {
-        let (nh, axes) = (harmonics.len(), ports.count());
+        let mut level = Level::unassembled(Alternation::new(harmonics, samples), ports, sparse);
+        let size = level.residual.len();
+        level.jacobian = vec![0.0; if level.sparse.is_some() { 0 } else { size * size }];
+        level
+    }
+
+    /// Without memory for a Jacobian.
+    fn unassembled(alternation: Alternation, ports: &Ports, sparse: Option<Sparse>) -> Self {
+        let (nh, axes) = (alternation.harmonics.len(), ports.count());
         let size = 2 * nh * axes;
         let (blocks, tangents) = blocks(ports, nh);
         let widest = ports.iter().map(|port| port.axes).max().unwrap_or(0);
         Level {
             assembled: 0,
-            alternation: Alternation::new(harmonics, samples),
+            alternation,
             receptance: Vec::new(),
             penalty: vec![0.0; ports.len()],
             linear: vec![ZERO; nh * axes],
@@ -131,7 +139,7 @@ impl Level {
             tangents: vec![0.0; tangents],
             blocks,
             forces: ports.iter().flat_map(|port| vec![port.is_force(); port.axes]).collect(),
-            jacobian: vec![0.0; if sparse.is_some() { 0 } else { size * size }],
+            jacobian: Vec::new(),
             sparse,
             residual: vec![0.0; size],
             units: vec![1.0; size],
@@ -146,6 +154,22 @@ impl Level {
 
     pub fn harmonics(&self) -> &[usize] {
         &self.alternation.harmonics
+    }
+
+    /// What is measured of a motion of one sector, over all of them: `ports` are those of the ring, and the motion's are earlier by the lead of
+    /// their sector. Nothing can be solved on it.
+    pub fn around(&self, cyclic: Cyclic, ports: &Ports, motion: &Motion) -> (Level, Motion) {
+        let (nh, own) = (self.harmonics().len(), motion.c.len());
+        let all = |values: &[Complex64]| -> Vec<Complex64> {
+            let lead = |s: usize, i: usize| cyclic.lead(self.harmonics()[i % nh], s);
+            (0..cyclic.sectors).flat_map(|s| (0..own).map(move |i| values[i] * lead(s, i))).collect()
+        };
+        let motion = Motion { c: all(&motion.c), force: all(&motion.force), ..*motion };
+        let level = Level {
+            penalty: (0..ports.len()).map(|p| self.penalty[p % self.penalty.len()]).collect(),
+            ..Level::unassembled(self.alternation.clone(), ports, None)
+        };
+        (level, motion)
     }
 
     /// Prepares for a drive frequency.
@@ -202,10 +226,7 @@ impl Level {
         let rate = top as f64 * omega;
         let smooth = match &mut self.sparse {
             Some(sparse) => sparse.own_at(rate),
-            None => {
-                let receptance = rest.receptance_at(Complex64::new(rate, 0.0), omega);
-                (0..ports.count()).map(|q| receptance[(q, q)].norm()).collect()
-            }
+            None => rest.own_at(rate, omega),
         };
         for (penalty, port) in self.penalty.iter_mut().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
             // one for all axes of a port, so that no direction of its plane is another

@@ -26,7 +26,7 @@ use super::guess::Guess;
 use super::{Method, MethodError, MethodInfo, MethodOption, Options, OrbitError, PERIOD, Solver, periods};
 use crate::dimension::Dimension;
 use crate::method::evidence::Judge;
-use crate::model::System;
+use crate::model::{Axis, System};
 use crate::orbit::Orbit;
 pub(crate) use arc::ModeArc;
 pub(crate) use branch::BranchEquations;
@@ -325,6 +325,7 @@ struct Compared<'a> {
 /// the largest of these motions, without means, times the share that the finer one may be off itself. What the finer one lacks at
 /// resonances above its own harmonics counts too. The finer one is its level, its motion and, per harmonic, the motions of the places.
 fn estimate(
+    seen: &[Axis],
     ports: &Ports,
     rest: &Rest,
     (kept, omega): (Kept, f64),
@@ -343,9 +344,10 @@ fn estimate(
         }
         (distance, size) = (distance.max(d), size.max(s));
     };
-    for i in 0..fine.places.first().map_or(0, |x| x.len()) {
-        let missing = above.iter().map(|x| x[i].norm_sqr()).sum();
-        compare(&|k| coarse.places[k][i], &|k| fine.places[k][i], missing);
+    for place in seen {
+        let missing = above.iter().map(|x| place.along_complex(x).norm_sqr()).sum();
+        let at = |places: &[DVector<Complex64>], k: usize| place.along_complex(&places[k]);
+        compare(&|k| at(coarse.places, k), &|k| at(fine.places, k), missing);
     }
     let (few, many) = (coarse.harmonics.len(), fine.harmonics.len());
     for q in ports.iter().filter(|port| port.series > 0.0).flat_map(|port| port.range()) {
@@ -377,7 +379,7 @@ fn above(
         return Vec::new();
     }
     let forces = level.forces_at(ports, omega, motion, &wanted);
-    wanted.iter().zip(&forces).map(|(h, forces)| rest.respond(*h, omega, &rest.spread(|q| forces[q]))).collect()
+    wanted.iter().zip(&forces).map(|(h, forces)| rest.respond(*h, omega, &rest.spread(*h, |q| forces[q]))).collect()
 }
 
 struct Balance<'a> {
@@ -387,7 +389,10 @@ struct Balance<'a> {
     periods: usize,
     /// The drive's frequency, rad/s; that of the motion is `omega` everywhere here.
     drive: f64,
+    /// Of a ring in a travelling wave those of the first sector.
     ports: Ports,
+    /// And those of the whole ring.
+    around: Option<Ports>,
     rest: Rest,
     kept: Kept,
     first: usize,
@@ -405,7 +410,7 @@ impl<'a> Balance<'a> {
             Kept::new(&system, |z| z != Complex64::new(0.0, 0.0))
         };
         method.check(kept.highest)?;
-        let ports = Ports::new(&system)?;
+        let (ports, around) = Ports::of_sector(&system)?;
         let rest = Rest::new(&system, &ports);
         let first = (FIRST * kept.scale).max(kept.highest);
         let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
@@ -417,6 +422,7 @@ impl<'a> Balance<'a> {
             periods,
             drive: 0.0,
             ports,
+            around,
             rest,
             kept,
             first,
@@ -521,6 +527,7 @@ impl Balance<'_> {
         let context = path::Context {
             system: &self.system,
             ports: &self.ports,
+            around: self.around.as_ref(),
             omega,
             first: self.periods,
             odd: self.kept.half_period(),
@@ -575,7 +582,7 @@ impl Balance<'_> {
         let finer = self.levels.get_mut(&double).expect("solved");
         let coarse = Compared { harmonics: &self.kept.up_to(top), places: x, along: &motion.c };
         let at = (self.kept, omega);
-        Ok((estimate(&self.ports, &self.rest, at, &coarse, (finer, &better, &y)), better, y))
+        Ok((estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &better, &y)), better, y))
     }
 
     /// As many harmonics as the tolerance needs. The solution that is returned is not the finest that was found, but the one whose error

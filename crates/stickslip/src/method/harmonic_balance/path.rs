@@ -22,9 +22,9 @@ pub(super) fn places(level: &mut Level, rest: &Rest, omega: f64, motion: &Motion
     let nh = level.harmonics().len();
     (0..nh)
         .map(|k| {
-            let forces = rest.spread(|q| motion.force[q * nh + k]);
+            let h = level.harmonics()[k];
+            let forces = rest.spread(h, |q| motion.force[q * nh + k]);
             let Some(sparse) = &mut level.sparse else {
-                let h = level.harmonics()[k];
                 let mut x = &level.free[k] - rest.respond(h, omega, &forces);
                 if h == 0 {
                     rest.settle(omega, &mut x, |q| level.mean(q, motion));
@@ -83,6 +83,8 @@ struct Series {
 pub(super) struct Context<'a> {
     pub system: &'a System,
     pub ports: &'a Ports,
+    /// Those of the whole ring, where one sector of it was solved.
+    pub around: Option<&'a Ports>,
     pub omega: f64,
     /// The harmonic that has the drive's frequency.
     pub first: usize,
@@ -96,12 +98,16 @@ pub(super) struct Context<'a> {
 /// Makes the orbit.
 /// `None` if it does not stay where it is.
 pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec<DVector<Complex64>>) -> Option<Orbit> {
+    if let (Some(wave), Some(ports)) = (context.ports.wave(), context.around) {
+        let (mut level, motion) = level.around(wave, ports, motion);
+        return orbit(Context { ports, around: None, ..context }, &mut level, &motion, x);
+    }
     if !stays(&context, level, motion, &x) {
         return None;
     }
     let harmonics = level.harmonics().to_vec();
     let Samples { force, contact, states } = sampled(&context, level, motion, &x);
-    let Context { system, ports, omega, first, odd, truncation, tolerance, judge } = context;
+    let Context { system, ports, omega, first, odd, truncation, tolerance, judge, around: _ } = context;
     let symmetry = if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod };
     let period = TAU / omega;
     let measuring = Measuring {
@@ -116,8 +122,8 @@ pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec
         level: RefCell::new(level),
     };
     let Ok(mut measured) = measure(system, &measuring, omega, (symmetry, period));
-    for (i, place) in measured.places.iter_mut().enumerate() {
-        place.first_harmonic = harmonics.binary_search(&first).map_or(ZERO, |k| x[k][i]);
+    for (place, axis) in measured.places.iter_mut().zip(system.seen()) {
+        place.first_harmonic = harmonics.binary_search(&first).map_or(ZERO, |k| axis.along_complex(&x[k]));
     }
     let n = system.dofs();
     let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
@@ -323,8 +329,8 @@ impl Signals for Measuring<'_> {
         let share = if omega == 0.0 { 1.0 } else { 0.5 };
         self.harmonic(omega).map_or(ZERO, |k| signal[k] * (share * self.length()))
     }
-    fn range(&self, row: usize) -> Result<(f64, f64), Infallible> {
-        Ok(self.range_of(&self.displacement(row)))
+    fn range(&self, place: &Axis) -> Result<(f64, f64), Infallible> {
+        Ok(self.range_of(&self.along(place, |row| self.displacement(row))))
     }
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(&relative(self.axes[axis], self.harmonics, self.x)))
@@ -359,18 +365,22 @@ pub(super) fn balances(system: &System, orbit: &Orbit) -> bool {
 
 /// Loads and imposed motion by harmonic.
 fn moved(place: &MovedPlace, h: usize) -> Complex64 {
-    place.motion.iter().find(|(k, _)| *k as usize == h).map_or(ZERO, |(_, g)| *g)
+    amplitude_at(&place.motion, h)
+}
+
+fn amplitude_at(harmonics: &[(u32, Complex64)], h: usize) -> Complex64 {
+    harmonics.iter().find(|(k, _)| *k as usize == h).map_or(ZERO, |(_, g)| *g)
 }
 
 /// The force that moves a place, without that of the joints.
 fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVector<Complex64>) -> Complex64 {
     let place = &system.moved()[m];
-    let mut force = moved(place, h) * s * s * place.mass;
+    let mut force = -amplitude_at(&place.force, h);
     for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
-        force += moved(&system.moved()[other], h) * (*k + s * *c);
+        force += moved(&system.moved()[other], h) * (*k + s * *c + s * s * place.mass.1[other]);
     }
     for i in 0..x.len() {
-        force += x[i] * (place.stiffness.0[i] + s * place.damping.0[i]);
+        force += x[i] * (place.stiffness.0[i] + s * place.damping.0[i] + s * s * place.mass.0[i]);
     }
     force
 }

@@ -3,11 +3,14 @@
 //! With the modes `(λ, φ)` of `M x'' + C x' + K x`, computed once, the response to `Re(F e^{st})` is a sum of `φ (ψᵀF) / (s - λ)`.
 //! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored. Structures that are sparse, or
 //! so large that their modes would take seconds, are not taken apart into these: their dynamic stiffness is factored at every frequency.
+//!
+//! Of a ring in a travelling wave only the joints of the first sector have ports: harmonic h moves as the wave of its nodal diameter, whose
+//! matrices are those of one sector. Displacements and forces are those of the whole ring all the same.
 
 use super::hold::HOLD;
 use super::ports::Ports;
-use crate::model::System;
-use crate::structure::{DynamicStiffness, Matrices, Structure};
+use crate::model::{Cyclic, System};
+use crate::structure::{DynamicStiffness, Matrices, Sector, Structure, Wave, WaveStiffness, turn};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -36,14 +39,103 @@ pub(super) struct Rest {
     structure: Structure,
     /// Directions of the axes: rows, rising, with their weights.
     directions: Vec<Vec<(usize, f64)>>,
+    /// Of a ring in a travelling wave.
+    waves: Option<Waves>,
 }
 
 /// A dynamic stiffness at a rate (1/s), made at a drive frequency (rad/s); none at a resonance without damping.
 #[derive(Debug, Clone)]
-struct Factored {
+struct Factored<F = DynamicStiffness> {
     rate: Complex64,
     omega: f64,
-    factor: Option<Arc<DynamicStiffness>>,
+    factor: Option<Arc<F>>,
+}
+
+/// The waves on a ring: one per nodal diameter that a harmonic has met.
+#[derive(Debug, Clone)]
+struct Waves {
+    cyclic: Cyclic,
+    sector: Sector,
+    met: RefCell<BTreeMap<usize, Option<Arc<Wave>>>>,
+    factors: RefCell<Vec<(usize, Factored<WaveStiffness>)>>,
+}
+
+impl Waves {
+    fn new(system: &System, cyclic: Cyclic) -> Option<Self> {
+        let sector = Sector::of(system.structure(), cyclic.sectors)?;
+        Some(Waves { cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
+    }
+
+    /// Displacements of the first sector in a wave under complex forces on it, in place, columns one after the other; zeros at a resonance
+    /// without damping.
+    fn solve(&self, diameter: usize, (s, omega): (Complex64, f64), loads: &mut [Complex64]) {
+        match self.factor(diameter, s, omega) {
+            Some(factor) => factor.solve(loads),
+            None => loads.fill(ZERO),
+        }
+    }
+
+    /// Kept as long as the drive frequency stays.
+    fn factor(&self, diameter: usize, s: Complex64, omega: f64) -> Option<Arc<WaveStiffness>> {
+        let mut factors = self.factors.borrow_mut();
+        factors.retain(|(_, kept)| kept.omega == omega);
+        if let Some((_, kept)) = factors.iter().find(|(d, kept)| *d == diameter && kept.rate == s) {
+            return kept.factor.clone();
+        }
+        let mut met = self.met.borrow_mut();
+        let wave = met.entry(diameter).or_insert_with(|| self.sector.wave(diameter).ok().map(Arc::new)).clone()?;
+        let factor = wave.dynamic_stiffness(s, hold(s, omega)).ok().map(Arc::new);
+        factors.push((diameter, Factored { rate: s, omega, factor: factor.clone() }));
+        factor
+    }
+
+    /// `Wᴴ` in a wave: forces on the first sector under unit forces along the axes of its joints and, with their lag, of its neighbours', n × q.
+    fn columns(&self, diameter: usize, directions: &[Vec<(usize, f64)>]) -> DMatrix<Complex64> {
+        let n = self.sector.dofs();
+        let mut columns = DMatrix::from_element(n, directions.len(), ZERO);
+        for (q, rows) in directions.iter().enumerate() {
+            rows.iter().for_each(|&(i, w)| columns[(i % n, q)] += self.phase(diameter, i / n).conj() * w);
+        }
+        columns
+    }
+
+    fn phase(&self, diameter: usize, sector: usize) -> Complex64 {
+        turn((diameter * sector) as i64, self.cyclic.sectors)
+    }
+
+    fn receptance(
+        &self,
+        diameter: usize,
+        at: (Complex64, f64),
+        directions: &[Vec<(usize, f64)>],
+    ) -> DMatrix<Complex64> {
+        let columns = self.columns(diameter, directions);
+        let mut moved = columns.clone();
+        self.solve(diameter, at, moved.as_mut_slice());
+        columns.adjoint() * moved
+    }
+
+    /// Displacements along the axes under unit forces along each alone, without its neighbours': the mean of all waves. At a real rate.
+    fn own(&self, (rate, omega): (f64, f64), directions: &[Vec<(usize, f64)>]) -> Vec<f64> {
+        let sectors = self.cyclic.sectors;
+        let mut own = vec![0.0; directions.len()];
+        for diameter in 0..=sectors / 2 {
+            // a wave the other way around is as stiff
+            let both = if (2 * diameter).is_multiple_of(sectors) { 1.0 } else { 2.0 };
+            let receptance = self.receptance(diameter, (Complex64::new(rate, 0.0), omega), directions);
+            own.iter_mut().enumerate().for_each(|(q, own)| *own += both * receptance[(q, q)].re / sectors as f64);
+        }
+        own
+    }
+
+    /// Displacements of the ring under forces on it that travel.
+    fn respond(&self, diameter: usize, at: (Complex64, f64), force: &DVector<Complex64>) -> DVector<Complex64> {
+        let n = self.sector.dofs();
+        let mut one = force.as_slice()[..n].to_vec();
+        self.solve(diameter, at, &mut one);
+        let phases: Vec<Complex64> = (0..self.cyclic.sectors).map(|k| self.phase(diameter, k)).collect();
+        DVector::from_fn(force.len(), |i, _| one[i % n] * phases[i / n])
+    }
 }
 
 /// Modes, and what they are at the joints.
@@ -71,22 +163,39 @@ impl Rest {
                 rows.into_iter().collect()
             })
             .collect::<Vec<Vec<(usize, f64)>>>();
+        let waves = ports.wave().and_then(|wave| Waves::new(system, wave));
+        let without = waves.is_some() || is_factored(system.structure());
         Rest {
             n,
-            modal: if is_factored(system.structure()) { None } else { modal(system, &columns(n, &directions)) },
+            modal: if without { None } else { modal(system, &columns(n, &directions)) },
             factors: RefCell::default(),
             structure: system.structure().clone(),
             directions,
+            waves,
         }
     }
 
     /// Displacements along the axes under unit forces along them, at `s = jhΩ`, q × q, m/N.
     pub fn receptance(&self, harmonic: usize, omega: f64) -> DMatrix<Complex64> {
-        self.receptance_at(Complex64::new(0.0, harmonic as f64 * omega), omega)
+        let s = Complex64::new(0.0, harmonic as f64 * omega);
+        match &self.waves {
+            Some(waves) => waves.receptance(waves.cyclic.diameter(harmonic), (s, omega), &self.directions),
+            None => self.receptance_at(s, omega),
+        }
     }
 
-    /// The same at any `s`; on the positive real axis it has no resonances.
-    pub fn receptance_at(&self, s: Complex64, omega: f64) -> DMatrix<Complex64> {
+    /// Displacement along each axis under a unit force along it alone at a rate on the positive real axis, where there are no resonances, m/N.
+    pub fn own_at(&self, rate: f64, omega: f64) -> Vec<f64> {
+        match &self.waves {
+            Some(waves) => waves.own((rate, omega), &self.directions),
+            None => {
+                let receptance = self.receptance_at(Complex64::new(rate, 0.0), omega);
+                (0..self.directions.len()).map(|q| receptance[(q, q)].norm()).collect()
+            }
+        }
+    }
+
+    fn receptance_at(&self, s: Complex64, omega: f64) -> DMatrix<Complex64> {
         let q = self.directions.len();
         if self.is_factored() {
             let Some(factor) = self.factor(s, omega) else { return DMatrix::from_element(q, q, ZERO) };
@@ -123,6 +232,9 @@ impl Rest {
     /// Displacements of all places under the complex forces `force` (length n, N), m.
     pub fn respond(&self, harmonic: usize, omega: f64, force: &DVector<Complex64>) -> DVector<Complex64> {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
+        if let Some(waves) = &self.waves {
+            return waves.respond(waves.cyclic.diameter(harmonic), (s, omega), force);
+        }
         if self.is_factored() {
             let Some(factor) = self.factor(s, omega) else { return DVector::from_element(self.n, ZERO) };
             let mut x = force.clone();
@@ -170,7 +282,7 @@ impl Rest {
         // only along what nothing else holds
         let Ok(inverse) = receptance.pseudo_inverse(HELD * largest) else { return };
         let force = (inverse * off).map(|f| Complex64::new(f, 0.0));
-        *x += self.respond(0, omega, &self.spread(|a| force[a]));
+        *x += self.respond(0, omega, &self.spread(0, |a| force[a]));
     }
 
     /// The harmonics next to the resonances above harmonic `top`.
@@ -187,12 +299,16 @@ impl Rest {
         found
     }
 
-    /// `W f`: forces on all places from forces along the axes.
-    pub fn spread(&self, along: impl Fn(usize) -> Complex64) -> DVector<Complex64> {
+    /// `W f`: forces on all places from forces along the axes, those of a harmonic.
+    pub fn spread(&self, harmonic: usize, along: impl Fn(usize) -> Complex64) -> DVector<Complex64> {
         let mut force = DVector::from_element(self.n, ZERO);
-        for (q, rows) in self.directions.iter().enumerate() {
-            let f = along(q);
-            rows.iter().for_each(|&(i, w)| force[i] += f * w);
+        let (sectors, size) = self.waves.as_ref().map_or((1, 0), |waves| (waves.cyclic.sectors, waves.sector.dofs()));
+        for sector in 0..sectors {
+            let lead = self.waves.as_ref().map(|waves| waves.cyclic.lead(harmonic, sector));
+            for (q, rows) in self.directions.iter().enumerate() {
+                let f = lead.map_or_else(|| along(q), |lead| along(q) * lead);
+                rows.iter().for_each(|&(i, w)| force[(i + sector * size) % self.n] += f * w);
+            }
         }
         force
     }
@@ -214,9 +330,7 @@ impl Rest {
         if let Some(kept) = factors.iter().find(|kept| kept.rate == s) {
             return kept.factor.clone();
         }
-        // as in the modal form, what nothing holds has a mean position by a soft spring
-        let hold = if s == ZERO { (HOLD * omega).powi(2) } else { 0.0 };
-        let factor = self.structure.held_stiffness(s, hold).ok().map(Arc::new);
+        let factor = self.structure.held_stiffness(s, hold(s, omega)).ok().map(Arc::new);
         factors.push(Factored { rate: s, omega, factor: factor.clone() });
         factor
     }
@@ -225,6 +339,11 @@ impl Rest {
 /// Whether the dynamic stiffness is factored at every frequency.
 fn is_factored(structure: &Structure) -> bool {
     structure.is_sparse() || structure.dofs() > MODES
+}
+
+/// As in the modal form, what nothing holds has a mean position by a soft spring, 1/s² times its mass.
+fn hold(s: Complex64, omega: f64) -> f64 {
+    if s == ZERO { (HOLD * omega).powi(2) } else { 0.0 }
 }
 
 /// Directions as columns, n × q.

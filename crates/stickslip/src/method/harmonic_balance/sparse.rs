@@ -45,11 +45,11 @@ pub(super) struct Sparse {
 }
 
 impl Sparse {
-    /// `None` if the system is small, has joints with inner motions, or if its joints are so few, or coupled all over, that a full matrix
+    /// `None` if the system is small, has joints with inner motions, is solved on one sector, or if its joints are so few, or coupled all over, that a full matrix
     /// over them is eliminated faster.
     pub fn new(system: &System, ports: &Ports, harmonics: &[usize]) -> Option<Self> {
         let n = system.dofs();
-        if n < LARGE || ports.iter().any(|port| port.series > 0.0) {
+        if n < LARGE || ports.wave().is_some() || ports.iter().any(|port| port.series > 0.0) {
             return None;
         }
         let entries: Vec<(usize, usize, [f64; 3])> = system.structure().entries().collect();

@@ -3,6 +3,8 @@
 
 use super::loose::Groups;
 use super::{LinearMode, Modes};
+use crate::structure::Matrices;
+use crate::structure::reduction::natural;
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 /// A spring and damper along a direction of the free places.
@@ -27,6 +29,8 @@ const FEW_DIGITS: f64 = 1e-9;
 const ROUNDING: f64 = 1e-13;
 /// Springs above this share of the stiffest make the modes at the top of the spectrum.
 const STIFFEST: f64 = 1e-4;
+/// Of a structure by its matrices: eigenvalues below this share of the middle one are free motions, in matrices of ten digits.
+const FREE: f64 = 1e-10;
 /// Levels of stiffness that are told apart.
 const LEVELS: usize = 4;
 /// A pivot below this share of what it came from is zero.
@@ -38,6 +42,35 @@ pub(super) const LARGEST: usize = 700;
 const ITERATIONS: usize = 100;
 
 impl Linear {
+    /// The modes of a structure with springs at joints, and constraints `Σ w x = 0`.
+    pub(super) fn of_matrices(full: &Matrices, links: &[Link], rigid: &[&[(usize, f64)]]) -> Linear {
+        let n = full.mass.nrows();
+        let order: Vec<usize> = (0..n).collect();
+        let basis = Basis::new(n, &order, rigid);
+        let r = basis.kept.len();
+        let mut turn = DMatrix::zeros(n, r);
+        for (row, parts) in basis.rows.iter().enumerate() {
+            parts.iter().for_each(|(column, weight)| turn[(row, *column)] += weight);
+        }
+        let mut stiffness = full.stiffness.clone();
+        links.iter().for_each(|link| add(&mut stiffness, &link.at, link.stiffness));
+        let part = |matrix: &DMatrix<f64>| turn.tr_mul(&(matrix * &turn));
+        let (mass, damping, stiffness) = (part(&full.mass), part(&full.damping), part(&stiffness));
+        let Some((values, shapes)) = natural(&mass, &stiffness) else {
+            return Linear { modes: Modes { lost: r, ..Modes::default() }, shapes: None };
+        };
+        // what has no mass follows the rest, and has no mode
+        let finite = values.partition_point(|value| value.is_finite());
+        let usual = values[finite / 2..finite].first().copied().unwrap_or(0.0);
+        let free = values[..finite].partition_point(|value| *value < FREE * usual);
+        let mode = |k: usize| {
+            let (omega, shape) = (values[k].max(0.0).sqrt(), shapes.column(k));
+            LinearMode { omega, damping: shape.dot(&(&damping * shape)) / (2.0 * omega) }
+        };
+        let modes = Modes { elastic: (free..finite).map(mode).collect(), rigid: free, lost: 0 };
+        Linear { modes, shapes: Some(turn * shapes.columns(free, finite - free)) }
+    }
+
     /// The modes of masses (zero where a place has none) on links, with constraints `Σ w x = 0`.
     pub(super) fn new(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
         let total = reduced(mass, links, rigid);

@@ -1,23 +1,33 @@
 //! Bodies that no spring holds.
 
-use super::super::{GROUND, Joint, Mass, Model};
+use super::super::{GROUND, Joint, Mass, Model, Place, System};
 use super::Loose;
 use super::hold::{Hold, Stuck};
 use std::collections::HashMap;
 
 impl Model {
     /// Bodies of masses that no spring holds to the ground or to a moved place.
-    pub(super) fn loose(&self, joints: &[Stuck]) -> Vec<Loose> {
+    pub(super) fn loose(&self, system: &System, joints: &[Stuck]) -> Vec<Loose> {
         let mut index: HashMap<String, usize> = HashMap::from([(GROUND.to_owned(), 0)]);
         for motion in &self.motions {
             index.insert(motion.on.clone(), 0); // moved places are held as the ground is
         }
-        let places: Vec<String> = self.masses.iter().flat_map(Mass::places).collect();
+        // a component is one body, which is held if it has no free motion of its own
+        let held = system.reduced().is_none_or(|component| component.free() == 0);
+        let of_component: Vec<String> = self.places.iter().flat_map(Place::places).collect();
+        let mut places: Vec<String> = self.masses.iter().flat_map(Mass::places).collect();
         for (i, place) in places.iter().enumerate() {
             index.entry(place.clone()).or_insert(i + 1);
         }
+        let component = places.len() + 1;
+        for place in &of_component {
+            index.entry(place.clone()).or_insert(if held { 0 } else { component });
+        }
+        if !held {
+            places.extend(of_component);
+        }
         let ends = |between: &[String; 2]| Some((*index.get(&between[0])?, *index.get(&between[1])?));
-        let mut bodies = Groups::new(places.len() + 1);
+        let mut bodies = Groups::new(component + 1);
         self.springs.iter().filter(|s| s.stiffness > 0.0).filter_map(|s| ends(&s.between)).for_each(|e| bodies.join(e));
         let mut gripped = bodies.clone();
         let carries = |(i, _): &(usize, &Joint)| joints.iter().any(|j| j.joint == *i && j.hold != Hold::Nothing);

@@ -101,25 +101,13 @@ impl Model {
     /// ```
     pub fn survey(&self) -> Result<Survey, ModelError> {
         let system = self.assemble()?;
-        let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
-        let ends = |between: &[String; 2]| -> Vec<(usize, f64)> {
-            let ends = between.iter().zip([1.0, -1.0]);
-            ends.filter_map(|(name, sign)| Some((*index.get(name.as_str())?, sign))).collect()
-        };
-        let springs: Vec<Link> = self
-            .springs
-            .iter()
-            .map(|s| Link { at: ends(&s.between), stiffness: s.stiffness, damping: s.damping })
-            .filter(|link| !link.at.is_empty())
-            .collect();
         let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(Stuck::of_joint).collect();
-        let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().own_mass(i)).collect();
-        let loose = self.loose(&joints);
+        let loose = self.loose(&system, &joints);
         if system.dofs() > LARGEST {
-            let unknown = || Linear { modes: Modes { lost: mass.len(), ..Modes::default() }, shapes: None };
+            let lost = system.dofs();
+            let unknown = || Linear { modes: Modes { lost, ..Modes::default() }, shapes: None };
             return Ok(Survey { free: unknown(), stuck: unknown(), system, joints, loose });
         }
-        let free = Linear::new(&mass, &springs.iter().collect::<Vec<_>>(), &[]);
         let held: Vec<Link> = joints
             .iter()
             .filter_map(|joint| match joint.hold {
@@ -133,6 +121,24 @@ impl Model {
             .filter(|joint| matches!(joint.hold, Hold::Rigid { .. }) && !joint.at.is_empty())
             .map(|joint| joint.at.as_slice())
             .collect();
+        if self.substructure.is_some() {
+            let free = Linear::of_matrices(system.structure().full(), &[], &[]);
+            let stuck = Linear::of_matrices(system.structure().full(), &held, &rigid);
+            return Ok(Survey { free, stuck, system, joints, loose });
+        }
+        let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
+        let ends = |between: &[String; 2]| -> Vec<(usize, f64)> {
+            let ends = between.iter().zip([1.0, -1.0]);
+            ends.filter_map(|(name, sign)| Some((*index.get(name.as_str())?, sign))).collect()
+        };
+        let springs: Vec<Link> = self
+            .springs
+            .iter()
+            .map(|s| Link { at: ends(&s.between), stiffness: s.stiffness, damping: s.damping })
+            .filter(|link| !link.at.is_empty())
+            .collect();
+        let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().own_mass(i)).collect();
+        let free = Linear::new(&mass, &springs.iter().collect::<Vec<_>>(), &[]);
         let stuck = Linear::new(&mass, &springs.iter().chain(&held).collect::<Vec<_>>(), &rigid);
         Ok(Survey { system, joints, free, stuck, loose })
     }

@@ -165,9 +165,9 @@ impl Survey {
                 a[(i, j)] = Complex64::new(real, w * system.structure().damping()[(i, j)]);
             }
         }
-        if let Some(load) = system.loads().iter().find(|load| load.harmonic == h) {
+        if let Some(excitation) = system.loads().iter().find(|load| load.harmonic == h).map(|load| load.at(omega)) {
             for i in 0..n {
-                b[i] = load.force[i] + Complex64::new(0.0, w) * load.by_velocity[i];
+                b[i] = excitation[i];
             }
         }
         let imposed = |index: usize| {

@@ -1,6 +1,7 @@
 //! The smallest reduction of a given error.
 
 use super::{Deviation, Free, Reduced, ReductionError, Reference, Whole};
+use crate::structure::ReductionKind;
 use stickslip_numerics::sparse::NaturalModes;
 
 /// Modes are computed up to these multiples of the frequency of interest, one after the other until a reduction is close enough.
@@ -9,6 +10,13 @@ const EXTENTS: [f64; 2] = [1.5, 3.0];
 const SHARES: [f64; 4] = [0.67, 0.8, 0.9, 1.0];
 /// Orders of residual vectors that are tried.
 const ORDERS: usize = 3;
+/// Numbers of all residual vectors that are held at once: 1 GB.
+const NUMBERS: usize = 1 << 27;
+
+/// Orders of residual vectors, fewer where many ports of a large structure would fill the memory with them.
+fn orders(whole: &Whole) -> usize {
+    (NUMBERS / (whole.dofs() * whole.ports().len()).max(1)).clamp(1, ORDERS)
+}
 
 /// What is asked of a reduction.
 ///
@@ -27,7 +35,7 @@ const ORDERS: usize = 3;
 /// let mass = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 0.001)))?;
 /// let up_to = TAU * 100.0;
 /// let whole = Whole::new(mass, Damping::Ratio { ratio: 0.005, up_to }, stiffness, vec![vec![(n - 1, 1.0)]])?;
-/// let chosen = Reduce { up_to, tolerance: 1e-4 }.of(&whole)?;
+/// let chosen = Reduce { up_to, tolerance: 1e-4, kind: None }.of(&whole)?;
 /// assert!(chosen.reduced.dofs() < 12 && chosen.deviation.error < 1e-4);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -37,6 +45,8 @@ pub struct Reduce {
     pub up_to: f64,
     /// The largest error of the ports' receptance up to there, relative.
     pub tolerance: f64,
+    /// Of one kind only, if it is named.
+    pub kind: Option<ReductionKind>,
 }
 
 /// A reduction with its error.
@@ -79,12 +89,17 @@ impl Reduce {
                 }
                 (deviation.error <= self.tolerance).then_some(deviation)
             };
-            let free = Free::new(whole, &modes, 0.0, ORDERS)?;
-            for (count, order) in self.sizes(&modes, extent, whole.ports().len()) {
-                let reduced = free.reduced(count, order)?;
-                if let Some(deviation) = good(&reduced) {
-                    return Ok(Chosen { reduced, deviation, modes });
+            if self.kind != Some(ReductionKind::CraigBampton) {
+                let free = Free::new(whole, &modes, 0.0, orders(whole))?;
+                for (count, order) in self.sizes(&modes, extent, whole) {
+                    let reduced = free.reduced(count, order)?;
+                    if let Some(deviation) = good(&reduced) {
+                        return Ok(Chosen { reduced, deviation, modes });
+                    }
                 }
+            }
+            if self.kind == Some(ReductionKind::Rubin) {
+                continue;
             }
             match whole.craig_bampton(extent * self.up_to) {
                 Ok(reduced) => {
@@ -93,7 +108,7 @@ impl Reduce {
                     }
                 }
                 // ports that do not hold the structure leave the free modes
-                Err(ReductionError::NotHeld { .. }) => {}
+                Err(ReductionError::NotHeld { .. }) if self.kind.is_none() => {}
                 Err(other) => return Err(other),
             }
         }
@@ -102,13 +117,14 @@ impl Reduce {
     }
 
     /// Numbers of modes and orders of residual vectors to try, the smallest first.
-    fn sizes(self, modes: &NaturalModes, extent: f64, ports: usize) -> Vec<(usize, usize)> {
+    fn sizes(self, modes: &NaturalModes, extent: f64, whole: &Whole) -> Vec<(usize, usize)> {
+        let ports = whole.ports().len();
         let count = |share: f64| {
             let bound = (share * extent * self.up_to).powi(2);
             if share < 1.0 { modes.values.partition_point(|value| *value <= bound) } else { modes.count() }
         };
         let mut sizes: Vec<(usize, usize)> =
-            (1..=ORDERS).flat_map(|order| SHARES.map(|share| (count(share), order))).collect();
+            (1..=orders(whole)).flat_map(|order| SHARES.map(|share| (count(share), order))).collect();
         sizes.sort_by_key(|&(count, order)| (count + order * ports, order));
         sizes.dedup();
         sizes

@@ -14,6 +14,11 @@ impl Whole {
     /// # Errors
     /// [`ReductionError`]: ports that do not hold the structure, or no modes.
     pub fn craig_bampton(&self, omega: f64) -> Result<Reduced, ReductionError> {
+        self.held(Wanted::UpTo { value: omega * omega, most: MOST_MODES })
+    }
+
+    /// The same with the modes that are wanted.
+    pub(in crate::structure) fn held(&self, wanted: Wanted) -> Result<Reduced, ReductionError> {
         let n = self.dofs();
         let mut boundary: Vec<usize> = self.ports.iter().flatten().map(|(at, _)| *at).collect();
         boundary.sort_unstable();
@@ -30,7 +35,6 @@ impl Whole {
         let stiffness = part(&self.stiffness).map_err(out_of_range)?;
         let mass = part(&self.mass).map_err(out_of_range)?;
         let analysis = Analysis::new(&[&stiffness, &mass]);
-        let wanted = Wanted::UpTo { value: omega * omega, most: MOST_MODES };
         let modes = NaturalModes::new(&analysis, &stiffness, &mass, wanted)?;
         if modes.free() > 0 {
             return Err(ReductionError::NotHeld { count: modes.free() });

@@ -10,7 +10,7 @@
 
 use super::{Damping, Reduced, ReductionError, Series, Whole};
 use nalgebra::{Complex, DMatrix};
-use stickslip_numerics::sparse::NaturalModes;
+use stickslip_numerics::sparse::{Matrix, NaturalModes};
 
 /// Samples at most: each takes a factor of the whole structure.
 const SAMPLES: usize = 9;
@@ -117,7 +117,7 @@ fn sample(whole: &Whole, omega: f64) -> Result<(f64, DMatrix<Complex<f64>>), Red
 
 fn receptance(whole: &Whole, omega: f64) -> Result<DMatrix<Complex<f64>>, ReductionError> {
     let (n, p) = (whole.dofs(), whole.ports.len());
-    let (mass, stiffness) = (&whole.mass, &whole.stiffness);
+    let (mass, stiffness): (&Matrix, &Matrix) = (&whole.mass, &whole.stiffness);
     let singular = |singular| ReductionError::Singular { omega, singular };
     let mut real = whole.forces();
     let see = |value: &dyn Fn(usize) -> Complex<f64>| {

@@ -28,6 +28,7 @@ pub use free::Free;
 pub use series::Series;
 
 use nalgebra::{Complex, DMatrix};
+use std::sync::Arc;
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{Analysis, Matrix, ModesError, NaturalModes, Singular, Wanted, columns};
 
@@ -65,6 +66,26 @@ pub enum Damping {
 }
 
 impl Damping {
+    /// That its numbers are some that damping can have.
+    fn check(&self) -> Result<(), ReductionError> {
+        let number = |what, value: f64, must, holds: bool| match value.is_finite() && holds {
+            true => Ok(()),
+            false => Err(ReductionError::Number { what, value, must }),
+        };
+        match *self {
+            Damping::Ratio { ratio, up_to } => {
+                number("the damping ratio", ratio, "zero or more", ratio >= 0.0)?;
+                number("the upper end of the frequencies (rad/s)", up_to, "positive", up_to > 0.0)?;
+            }
+            Damping::Rayleigh { mass, stiffness } => {
+                number("the damping by mass (1/s)", mass, "zero or more", mass >= 0.0)?;
+                number("the damping by stiffness (s)", stiffness, "zero or more", stiffness >= 0.0)?;
+            }
+            Damping::Matrix(_) => {}
+        }
+        Ok(())
+    }
+
     /// `C = α M + β K` of what is not kept as a mode; none of a matrix.
     fn proportional(&self) -> Option<(f64, f64)> {
         match *self {
@@ -86,11 +107,11 @@ impl Damping {
 /// A structure before its reduction, with its ports.
 #[derive(Debug, Clone)]
 pub struct Whole {
-    mass: Matrix,
-    damping: Damping,
-    stiffness: Matrix,
+    pub(super) mass: Arc<Matrix>,
+    pub(super) damping: Damping,
+    pub(super) stiffness: Arc<Matrix>,
     ports: Vec<Row>,
-    analysis: Analysis,
+    pub(super) analysis: Arc<Analysis>,
 }
 
 /// Why a structure is not reduced.
@@ -183,6 +204,9 @@ pub enum ReductionError {
     OutOfRange,
 }
 
+/// Ports that move by less than this share of the largest displacement of a shape do not see it.
+const UNSEEN: f64 = 1e-9;
+
 /// Difference of an entry and its mirror image, relative to the largest, that counts as rounding of a program that wrote ten digits.
 const SYMMETRIC: f64 = 1e-9;
 
@@ -192,6 +216,11 @@ impl Whole {
     /// # Errors
     /// [`ReductionError`]: sizes that differ, a matrix that is not symmetric, a port that is none, a negative damping ratio.
     pub fn new(mass: Matrix, damping: Damping, stiffness: Matrix, ports: Vec<Row>) -> Result<Self, ReductionError> {
+        Whole::unseen(mass, damping, stiffness)?.seen_at(ports)
+    }
+
+    /// The same before anything is seen of it.
+    pub(super) fn unseen(mass: Matrix, damping: Damping, stiffness: Matrix) -> Result<Self, ReductionError> {
         let n = stiffness.n();
         let own = match &damping {
             Damping::Matrix(c) => Some(c),
@@ -208,9 +237,21 @@ impl Whole {
                 return Err(ReductionError::NotSymmetric { matrix: name, row: pair.row, column: pair.column });
             }
         }
+        damping.check()?;
+        let analysed: Vec<&Matrix> = [Some(&stiffness), Some(&mass), own].into_iter().flatten().collect();
+        let analysis = Arc::new(Analysis::new(&analysed));
+        Ok(Whole { mass: Arc::new(mass), damping, stiffness: Arc::new(stiffness), ports: Vec::new(), analysis })
+    }
+
+    /// The same structure with other ports; the matrices are shared.
+    ///
+    /// # Errors
+    /// [`ReductionError`]: no port, or one that is none.
+    pub fn seen_at(&self, ports: Vec<Row>) -> Result<Self, ReductionError> {
         if ports.is_empty() {
             return Err(ReductionError::NoPorts);
         }
+        let n = self.dofs();
         let wrong = |row: &Row| {
             row.iter().any(|(at, weight)| *at >= n || !weight.is_finite())
                 || row.iter().all(|(_, weight)| *weight == 0.0)
@@ -218,24 +259,7 @@ impl Whole {
         if let Some(port) = ports.iter().position(wrong) {
             return Err(ReductionError::Port { port, n });
         }
-        let number = |what, value: f64, must, holds: bool| match value.is_finite() && holds {
-            true => Ok(()),
-            false => Err(ReductionError::Number { what, value, must }),
-        };
-        match damping {
-            Damping::Ratio { ratio, up_to } => {
-                number("the damping ratio", ratio, "zero or more", ratio >= 0.0)?;
-                number("the upper end of the frequencies (rad/s)", up_to, "positive", up_to > 0.0)?;
-            }
-            Damping::Rayleigh { mass, stiffness } => {
-                number("the damping by mass (1/s)", mass, "zero or more", mass >= 0.0)?;
-                number("the damping by stiffness (s)", stiffness, "zero or more", stiffness >= 0.0)?;
-            }
-            Damping::Matrix(_) => {}
-        }
-        let analysed: Vec<&Matrix> = [Some(&stiffness), Some(&mass), own].into_iter().flatten().collect();
-        let analysis = Analysis::new(&analysed);
-        Ok(Whole { mass, damping, stiffness, ports, analysis })
+        Ok(Whole { ports, ..self.clone() })
     }
 
     /// Degrees of freedom.
@@ -255,6 +279,18 @@ impl Whole {
     pub fn modes(&self, omega: f64) -> Result<NaturalModes, ReductionError> {
         let wanted = Wanted::UpTo { value: omega * omega, most: MOST_MODES };
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, wanted)?)
+    }
+
+    /// The lowest natural modes, or all if there are fewer.
+    ///
+    /// # Errors
+    /// [`ReductionError::Modes`].
+    pub fn lowest_modes(&self, count: usize) -> Result<NaturalModes, ReductionError> {
+        if !(1..=MOST_MODES).contains(&count) {
+            let must = "a whole number from 1 to 600";
+            return Err(ReductionError::Number { what: "the number of modes", value: count as f64, must });
+        }
+        Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, Wanted::Lowest(count))?)
     }
 
     /// Unit forces at the ports, n × p.
@@ -305,6 +341,40 @@ impl Reduced {
     /// Coordinates, r.
     pub fn dofs(&self) -> usize {
         self.mass.nrows()
+    }
+
+    /// The same with another damping, which is none by a matrix.
+    ///
+    /// # Errors
+    /// [`ReductionError`]: numbers that no damping has, or a damping matrix, which is reduced with the others.
+    pub fn damped(&self, by: &Damping) -> Result<Self, ReductionError> {
+        by.check()?;
+        Ok(Reduced { damping: damping(by, &self.mass, &self.stiffness, None)?, ..self.clone() })
+    }
+
+    /// The same in coordinates that are displacements: each is that of the port that moves most with it, in m, or of the degree of freedom if
+    /// no port moves. What compares coordinates with each other then compares metres. The displacements of all other rows are
+    /// forgotten.
+    #[must_use]
+    pub(super) fn in_metres(mut self) -> Self {
+        for k in 0..self.dofs() {
+            let column = &self.basis[k * self.n..(k + 1) * self.n];
+            let largest = column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            let port = if self.ports.nrows() > 0 { self.ports.column(k).amax() } else { 0.0 };
+            let size = if port > UNSEEN * largest { port } else { largest };
+            if size == 0.0 {
+                continue;
+            }
+            let factor = 1.0 / size;
+            self.ports.column_mut(k).scale_mut(factor);
+            for matrix in [&mut self.mass, &mut self.damping, &mut self.stiffness] {
+                matrix.row_mut(k).scale_mut(factor);
+                matrix.column_mut(k).scale_mut(factor);
+            }
+        }
+        // as large as the whole, and whoever asks for metres asks at the ports
+        (self.basis, self.n) = (Vec::new(), 0);
+        self
     }
 
     /// Any weighted sums of the degrees of freedom of the whole structure, as rows over the coordinates.
@@ -376,7 +446,7 @@ fn damping(
 }
 
 /// Eigenvalues λ (rad²/s², rising, infinite without mass) and shapes of unit mass (or unit stiffness without mass) of a small structure.
-fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let r = mass.nrows();
     if r == 0 {
         return Some((vec![], DMatrix::zeros(0, 0)));

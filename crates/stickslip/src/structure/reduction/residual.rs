@@ -53,7 +53,7 @@ pub(super) fn blocks(
 fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(Factor, f64), ReductionError> {
     if shift == 0.0 {
         let supports = supports(whole, modes)?;
-        let sum = [(1.0, &whole.stiffness), (1.0, &supports)];
+        let sum: [(f64, &Matrix); 2] = [(1.0, &whole.stiffness), (1.0, &supports)];
         let factor = whole.analysis.factor(&sum);
         return Ok((factor.map_err(|singular| ReductionError::Singular { omega: 0.0, singular })?, 0.0));
     }

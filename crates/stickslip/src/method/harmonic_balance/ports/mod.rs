@@ -24,7 +24,7 @@ use sliders::Part;
 
 use crate::law::{MOST_DIRECTIONS, Piece, Prox, SharedLaw, Slider};
 use crate::method::MethodError;
-use crate::model::{Axis, System};
+use crate::model::{Axis, Cyclic, System};
 use num_complex::Complex64;
 
 /// What acts at a port.
@@ -148,6 +148,7 @@ pub(super) struct Ports {
     list: Vec<Port>,
     /// Joint and number within it of every axis.
     axes: Vec<(usize, usize)>,
+    wave: Option<Cyclic>,
 }
 
 impl std::ops::Deref for Ports {
@@ -161,7 +162,7 @@ impl Ports {
     /// # Errors
     /// A law whose views harmonic balance cannot take.
     pub fn new(system: &System) -> Result<Self, MethodError> {
-        let mut ports = Ports { list: Vec::new(), axes: Vec::new() };
+        let mut ports = Ports { list: Vec::new(), axes: Vec::new(), wave: None };
         for (j, joint) in system.joints().iter().enumerate() {
             let law = joint.law();
             let unsupported = |misses| MethodError::law(super::NAME, joint, misses);
@@ -230,6 +231,27 @@ impl Ports {
         if rigid > 0.0 {
             self.add(joint, 1, Kernel::Rigid(Rigid { limit: rigid }), (0.0, rigid, 0.0));
         }
+    }
+
+    /// Those of a ring's first sector in a travelling wave, and those of the whole ring; of any other system all of them.
+    ///
+    /// # Errors
+    /// As [`Ports::new`].
+    pub fn of_sector(system: &System) -> Result<(Self, Option<Self>), MethodError> {
+        let all = Ports::new(system)?;
+        let Some(cyclic) = system.cyclic() else { return Ok((all, None)) };
+        let joints = system.joints().len() / cyclic.sectors;
+        let first = Ports {
+            list: all.iter().filter(|port| port.joint < joints).cloned().collect(),
+            axes: all.axes.iter().filter(|(joint, _)| *joint < joints).copied().collect(),
+            wave: Some(cyclic),
+        };
+        Ok((first, Some(all)))
+    }
+
+    /// The wave in which the other sectors follow, if these are the ports of the first one alone.
+    pub fn wave(&self) -> Option<Cyclic> {
+        self.wave
     }
 
     /// Axes of all ports.

@@ -1,0 +1,382 @@
+//! Bladed disks: a model of one sector becomes that of the ring.
+//!
+//! Sectors count from 0; what is called `blade` in a sector is `blade_0`, `blade_1` … in the ring, and `next.blade` the one of the sector after.
+//! The last sector's next is the first.
+
+use super::{Element, GROUND, Model, ModelError};
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+
+/// What stands before a place of the next sector.
+pub const NEXT: &str = "next.";
+/// Sectors of a disk, at least: with one, a sector would be its own neighbour.
+pub const LEAST_SECTORS: usize = 2;
+
+/// How a force, or an imposed motion, is distributed over the sectors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Around {
+    /// Sector n leads by `2π order n / sectors`: a wave that travels, the other way if the order is negative.
+    EngineOrder(i64),
+    /// Sector n has the share `cos(2π diameter n / sectors)`: a wave that stands.
+    NodalDiameter(i64),
+    /// On one sector alone.
+    Sector(usize),
+}
+
+impl Around {
+    /// Share of the amplitude and phase lead (rad) in a sector.
+    fn at(self, sector: usize, sectors: usize) -> (f64, f64) {
+        let phase = |order: i64| crate::structure::turn(turns(order, sector, sectors), sectors);
+        match self {
+            // from whole turns less, so that orders that are the same on this disk have the same bits
+            Around::EngineOrder(order) => (1.0, TAU * turns(order, sector, sectors) as f64 / sectors as f64),
+            Around::NodalDiameter(diameter) => (phase(diameter).re, 0.0),
+            Around::Sector(one) => (if one == sector { 1.0 } else { 0.0 }, 0.0),
+        }
+    }
+
+    /// The wave that it is, if it travels: its order from 0 to the number of sectors.
+    fn order(self, sectors: usize) -> Option<usize> {
+        match self {
+            Around::EngineOrder(order) => Some(turns(order, 1, sectors) as usize),
+            // all sectors alike, or each against its neighbours, is a wave that does both
+            Around::NodalDiameter(diameter) => {
+                let order = turns(diameter, 1, sectors) as usize;
+                (2 * order).is_multiple_of(sectors).then_some(order)
+            }
+            Around::Sector(_) => None,
+        }
+    }
+}
+
+/// `order · sector` without whole turns.
+fn turns(order: i64, sector: usize, sectors: usize) -> i64 {
+    let sectors = sectors as i64;
+    (order.rem_euclid(sectors) * sector as i64).rem_euclid(sectors)
+}
+
+/// The ring that sectors make.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Disk {
+    /// Number of sectors.
+    pub sectors: usize,
+    /// Of every force of the sector; engine order 0 where there is none.
+    pub forces: Vec<Around>,
+    /// Of every imposed motion.
+    pub motions: Vec<Around>,
+}
+
+/// What a model of a ring knows beside its elements: they stand sector by sector, each list as long in every one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Ring {
+    /// Number of sectors.
+    pub sectors: usize,
+    /// Where all sectors are equal and the excitation travels: sector n moves as the first one, earlier by `order n / sectors` of a period.
+    /// Harmonic h of the motion then has the nodal diameter `h order`.
+    pub order: Option<usize>,
+}
+
+impl Disk {
+    /// The ring of sectors that `sector` states, each with the same elements and its own numbers.
+    ///
+    /// # Errors
+    /// [`ModelError`], with the element of the sector: a place that the sector does not have, fewer than two sectors, a force on a sector
+    /// that does not exist.
+    ///
+    /// # Panics
+    /// If the sectors have not the same elements.
+    ///
+    /// # Example
+    /// Blades with springs between them, an engine order of 3 on 24 sectors: one wave with 3 nodal diameters.
+    /// ```
+    /// use stickslip::model::{Around, Disk};
+    /// use stickslip::{Force, GROUND, Mass, Model, Spring};
+    /// let spring = |other: &str, stiffness| Spring { between: ["blade".into(), other.into()], stiffness, damping: 0.1 };
+    /// let sector = Model {
+    ///     masses: vec![Mass::new("blade", 0.2)],
+    ///     springs: vec![spring(GROUND, 1e5), spring("next.blade", 2e4)],
+    ///     forces: vec![Force { on: "blade".into(), amplitude: 1.0, phase: 0.0, harmonic: 1 }],
+    ///     ..Model::default()
+    /// };
+    /// let disk = Disk { sectors: 24, forces: vec![Around::EngineOrder(3)], motions: vec![] };
+    /// let ring = disk.ring(|_| sector.clone()).unwrap();
+    /// assert_eq!((ring.masses.len(), ring.masses[23].name.as_str()), (24, "blade_23"));
+    /// assert_eq!(ring.springs[47].between, ["blade_23", "blade_0"]);
+    /// assert_eq!(ring.ring.unwrap().order, Some(3));
+    /// ```
+    pub fn ring(&self, sector: impl Fn(usize) -> Model) -> Result<Model, ModelError> {
+        let first = sector(0);
+        self.check(&first)?;
+        let count = |model: &Model| {
+            [model.masses.len(), model.springs.len(), model.joints.len(), model.forces.len(), model.motions.len()]
+        };
+        let mut model = Model::default();
+        let mut equal = true;
+        for s in 0..self.sectors {
+            let mut one = if s == 0 { first.clone() } else { sector(s) };
+            assert_eq!(count(&one), count(&first), "sector {s} has other elements than the first");
+            equal &= s == 0 || one == first;
+            let name = |name: &String| self.name(name, s);
+            one.masses.iter_mut().for_each(|mass| mass.name = name(&mass.name));
+            one.springs.iter_mut().for_each(|spring| spring.between = spring.between.each_ref().map(name));
+            for joint in &mut one.joints {
+                joint.name = format!("{}_{s}", joint.name);
+                joint.between = joint.between.each_ref().map(name);
+            }
+            for (force, around) in one.forces.iter_mut().zip(spread(&self.forces)) {
+                let (share, lead) = around.at(s, self.sectors);
+                force.on = name(&force.on);
+                (force.amplitude, force.phase) = (force.amplitude * share, force.phase + lead);
+            }
+            for (motion, around) in one.motions.iter_mut().zip(spread(&self.motions)) {
+                let (share, lead) = around.at(s, self.sectors);
+                motion.on = name(&motion.on);
+                (motion.amplitude, motion.phase) = (motion.amplitude * share, motion.phase + lead);
+            }
+            model.masses.append(&mut one.masses);
+            model.springs.append(&mut one.springs);
+            model.joints.append(&mut one.joints);
+            model.forces.append(&mut one.forces);
+            model.motions.append(&mut one.motions);
+        }
+        let order = if equal { self.order(&first) } else { None };
+        model.ring = Some(Ring { sectors: self.sectors, order });
+        Ok(model)
+    }
+
+    /// The order of the wave that all excitation of equal sectors makes: `harmonic · order` is the engine order of each, up to whole turns.
+    fn order(&self, sector: &Model) -> Option<usize> {
+        let forces =
+            sector.forces.iter().zip(spread(&self.forces)).map(|(f, around)| (f.amplitude, f.harmonic, around));
+        let motions =
+            sector.motions.iter().zip(spread(&self.motions)).map(|(m, around)| (m.amplitude, m.harmonic, around));
+        let excitation: Vec<(u32, Around)> = forces
+            .chain(motions)
+            .filter(|(amplitude, ..)| *amplitude != 0.0)
+            .map(|(_, harmonic, around)| (harmonic, around))
+            .collect();
+        if excitation.is_empty() {
+            return None;
+        }
+        (0..self.sectors).find(|order| {
+            excitation.iter().all(|(harmonic, around)| {
+                let made = (*harmonic as usize % self.sectors * order) % self.sectors;
+                around.order(self.sectors) == Some(made)
+            })
+        })
+    }
+
+    /// What a place of the sector is called in sector number `s`.
+    fn name(&self, name: &String, s: usize) -> String {
+        let (name, s) = match name.strip_prefix(NEXT) {
+            Some(name) => (name, (s + 1) % self.sectors),
+            None => (name.as_str(), s),
+        };
+        match name.split_once('.') {
+            _ if name == GROUND => name.to_owned(),
+            Some((node, along)) => format!("{node}_{s}.{along}"),
+            None => format!("{name}_{s}"),
+        }
+    }
+
+    /// Whether the names of a sector lead somewhere. What else is wrong is found where the ring is assembled.
+    fn check(&self, sector: &Model) -> Result<(), ModelError> {
+        let refuse = |element, key, message: String| Err(ModelError::new(element, key, message));
+        if self.sectors < LEAST_SECTORS {
+            let message = format!("a disk has {LEAST_SECTORS} sectors or more, found {}", self.sectors);
+            return refuse(Element::Whole, "sectors", message);
+        }
+        if sector.substructure.is_some() {
+            let message = "a sector is stated by masses and springs".to_owned();
+            return refuse(Element::Substructure, "stiffness", message);
+        }
+        for (i, mass) in sector.masses.iter().enumerate() {
+            if NEXT.strip_suffix('.') == Some(&mass.name) {
+                let message = "`next` stands for the next sector of a disk and cannot be declared".to_owned();
+                return refuse(Element::Mass(i), "name", message);
+            }
+        }
+        let mut known: BTreeSet<String> = sector.place_names().into_iter().collect();
+        known.extend(sector.masses.iter().map(|mass| mass.name.clone()));
+        let find = |name: &String, element: Element, key: &'static str| {
+            let place = name.strip_prefix(NEXT).unwrap_or(name);
+            if known.contains(place) && (place != GROUND || name == place) {
+                return Ok(());
+            }
+            let message = format!("there is no place `{place}` in a sector");
+            Err(ModelError { wrong_name: Some(place.to_owned()), ..ModelError::new(element, key, message) })
+        };
+        for (i, spring) in sector.springs.iter().enumerate() {
+            spring.between.iter().try_for_each(|name| find(name, Element::Spring(i), "between"))?;
+        }
+        for (i, joint) in sector.joints.iter().enumerate() {
+            joint.between.iter().try_for_each(|name| find(name, Element::Joint(i), "between"))?;
+        }
+        let excited = |on: &String, around: Around, element: Element| {
+            if let Some(place) = on.strip_prefix(NEXT) {
+                let message = format!("name a place of the sector itself, such as `{place}`: every sector has its own");
+                return refuse(element, "on", message);
+            }
+            match around {
+                Around::Sector(sector) if sector >= self.sectors => {
+                    let message = format!("there is no sector {sector}: they count from 0 to {}", self.sectors - 1);
+                    refuse(element, "sector", message)
+                }
+                _ => Ok(()),
+            }
+        };
+        for (i, (force, around)) in sector.forces.iter().zip(spread(&self.forces)).enumerate() {
+            excited(&force.on, around, Element::Force(i))?;
+            find(&force.on, Element::Force(i), "on")?;
+        }
+        for (i, (motion, around)) in sector.motions.iter().zip(spread(&self.motions)).enumerate() {
+            excited(&motion.on, around, Element::Motion(i))?;
+        }
+        Ok(())
+    }
+}
+
+/// Of every element, all alike where nothing is said.
+fn spread(stated: &[Around]) -> impl Iterator<Item = Around> {
+    stated.iter().copied().chain(std::iter::repeat(Around::EngineOrder(0)))
+}
+
+impl Ring {
+    /// The element of the sector that an element of the ring's model `model` comes from.
+    pub fn in_sector(self, element: Element, model: &Model) -> Element {
+        let own = |index: usize, all: usize| index % (all / self.sectors.max(1)).max(1);
+        match element {
+            Element::Mass(i) => Element::Mass(own(i, model.masses.len())),
+            Element::Spring(i) => Element::Spring(own(i, model.springs.len())),
+            Element::Joint(i) => Element::Joint(own(i, model.joints.len())),
+            Element::Force(i) => Element::Force(own(i, model.forces.len())),
+            Element::Motion(i) => Element::Motion(own(i, model.motions.len())),
+            Element::Place(_) | Element::Substructure | Element::Whole => element,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::Jenkins;
+    use crate::model::{Force, Joint, Mass, Motion, Spring};
+    use std::sync::Arc;
+
+    fn sector() -> Model {
+        let between = |a: &str, b: &str| [a.to_owned(), b.to_owned()];
+        Model {
+            masses: vec![Mass::new("disk", 2.0), Mass::new("blade", 0.2).along(&["x", "z"])],
+            springs: vec![
+                Spring { between: between("disk", "next.disk"), stiffness: 1e5, damping: 0.0 },
+                Spring { between: between("disk", "blade.x"), stiffness: 1e5, damping: 0.1 },
+                Spring { between: between("blade.z", "ground"), stiffness: 1e5, damping: 0.1 },
+            ],
+            joints: vec![Joint {
+                name: "shroud".into(),
+                between: between("blade.x", "next.blade.x"),
+                law: Arc::new(Jenkins { stiffness: 1e4, limit: 1.0 }),
+            }],
+            forces: vec![Force { on: "blade.x".into(), amplitude: 2.0, phase: 0.5, harmonic: 1 }],
+            ..Model::default()
+        }
+    }
+
+    fn disk(sectors: usize, forces: &[Around]) -> Disk {
+        Disk { sectors, forces: forces.to_vec(), motions: Vec::new() }
+    }
+
+    #[test]
+    fn names_lead_around_the_ring() {
+        let ring = disk(3, &[Around::EngineOrder(-1)]).ring(|_| sector()).unwrap();
+        let system = ring.assemble().unwrap();
+        assert_eq!(system.places()[6..], ["disk_2", "blade_2.x", "blade_2.z"]);
+        assert_eq!(ring.joints[2].between, ["blade_2.x", "blade_0.x"]);
+        assert_eq!(ring.ring, Some(Ring { sectors: 3, order: Some(2) }));
+        assert!((ring.forces[1].phase - (0.5 + TAU * 2.0 / 3.0)).abs() < 1e-15);
+        let element = Ring { sectors: 3, order: None }.in_sector(Element::Spring(7), &ring);
+        assert_eq!(element, Element::Spring(1));
+    }
+
+    /// Engine orders that differ by whole turns are one excitation, to the last bit.
+    #[test]
+    fn orders_alias() {
+        for (a, b) in [(3, 27), (3, -21), (-3, 21), (0, 24), (12, -12)] {
+            let [a, b] = [a, b].map(|order| disk(24, &[Around::EngineOrder(order)]).ring(|_| sector()).unwrap());
+            assert_eq!(a, b);
+        }
+    }
+
+    /// A wave is solved on one sector only if every excitation travels with it.
+    #[test]
+    fn which_waves_travel() {
+        let order = |forces: &[(u32, Around)], sectors: usize| {
+            let mut sector = sector();
+            sector.forces = forces
+                .iter()
+                .map(|(harmonic, _)| Force { on: "blade.x".into(), amplitude: 1.0, phase: 0.0, harmonic: *harmonic })
+                .collect();
+            let around: Vec<Around> = forces.iter().map(|(_, around)| *around).collect();
+            disk(sectors, &around).ring(|_| sector.clone()).unwrap().ring.unwrap().order
+        };
+        use Around::{EngineOrder, NodalDiameter, Sector};
+        assert_eq!(order(&[(1, EngineOrder(3))], 24), Some(3));
+        assert_eq!(order(&[(1, EngineOrder(3)), (0, EngineOrder(0))], 24), Some(3), "and a constant load");
+        assert_eq!(order(&[(0, EngineOrder(3))], 24), None, "a constant load that differs from blade to blade");
+        assert_eq!(order(&[(2, EngineOrder(3)), (4, EngineOrder(6))], 24), None, "no wave has half a diameter");
+        assert_eq!(order(&[(2, EngineOrder(3))], 7), Some(5), "2 · 5 = 3 + 7");
+        // the drive is the speed of the rotor
+        assert_eq!(order(&[(3, EngineOrder(3)), (5, EngineOrder(5))], 24), Some(1));
+        assert_eq!(order(&[(1, EngineOrder(3)), (1, EngineOrder(4))], 24), None);
+        assert_eq!(order(&[(1, NodalDiameter(3))], 24), None);
+        assert_eq!(order(&[(1, NodalDiameter(12))], 24), Some(12));
+        assert_eq!(order(&[(1, NodalDiameter(24))], 24), Some(0));
+        assert_eq!(order(&[(1, Sector(3))], 24), None);
+        assert_eq!(order(&[], 24), None);
+    }
+
+    #[test]
+    fn sectors_that_differ_are_mistuned() {
+        let one = |s: usize| {
+            let mut sector = sector();
+            sector.springs[1].stiffness *= 1.0 + 0.01 * s as f64;
+            sector
+        };
+        let ring = disk(5, &[Around::EngineOrder(1)]).ring(one).unwrap();
+        assert_eq!(ring.ring.unwrap().order, None);
+        assert_eq!(ring.springs[3 * 4 + 1].stiffness, 1.04e5);
+    }
+
+    #[test]
+    fn waves_that_stand() {
+        let ring = disk(8, &[Around::NodalDiameter(2)]).ring(|_| sector()).unwrap();
+        let amplitudes: Vec<f64> = ring.forces.iter().map(|force| force.amplitude).collect();
+        assert_eq!(amplitudes, [2.0, 0.0, -2.0, 0.0, 2.0, 0.0, -2.0, 0.0]);
+        let one = disk(3, &[Around::Sector(1)]).ring(|_| sector()).unwrap();
+        assert_eq!(one.forces.iter().map(|force| force.amplitude).collect::<Vec<_>>(), [0.0, 2.0, 0.0]);
+    }
+
+    #[test]
+    fn wrong_sectors_are_refused_with_their_element() {
+        let wrong = |change: fn(&mut Model), around: Around, sectors: usize| {
+            let mut sector = sector();
+            change(&mut sector);
+            let error = disk(sectors, &[around]).ring(|_| sector.clone()).unwrap_err();
+            (error.element, error.message)
+        };
+        let wave = Around::EngineOrder(1);
+        let (element, message) = wrong(|m| m.springs[0].between[1] = "next.disc".into(), wave, 3);
+        assert_eq!((element, message.as_str()), (Element::Spring(0), "there is no place `disc` in a sector"));
+        assert!(wrong(|m| m.springs[0].between[1] = "next.ground".into(), wave, 3).1.contains("`ground`"));
+        assert!(wrong(|m| m.joints[0].between[0] = "blade.y".into(), wave, 3).1.contains("`blade.y`"));
+        assert!(wrong(|m| m.masses[0].name = "next".into(), wave, 3).1.contains("cannot be declared"));
+        assert!(wrong(|m| m.forces[0].on = "next.blade.x".into(), wave, 3).1.contains("such as `blade.x`"));
+        assert!(wrong(|_| {}, wave, 1).1.contains("2 sectors or more"));
+        assert!(wrong(|_| {}, Around::Sector(3), 3).1.contains("from 0 to 2"));
+        let mut moved = sector();
+        moved.motions.push(Motion { on: "next.base".into(), amplitude: 1.0, phase: 0.0, harmonic: 1 });
+        assert!(disk(3, &[wave]).ring(|_| moved.clone()).is_err());
+    }
+}

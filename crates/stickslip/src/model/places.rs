@@ -1,0 +1,263 @@
+//! Where the names of a model lead: each a weighted sum of coordinates, the ground, or a place that is moved.
+
+use super::assemble::{Element, ModelError};
+use super::{GROUND, Mass, Model};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What a name stands for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum End {
+    Ground,
+    /// A place by its number in [`Places::stated`].
+    At(usize),
+}
+
+/// What the displacement of a place is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Of {
+    /// Rows of the component: its place by number, and which of its directions.
+    Component(usize, usize),
+    /// A coordinate of its own with this mass, kg.
+    Own(f64),
+}
+
+/// A place as it is stated.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stated {
+    pub name: String,
+    pub of: Of,
+    pub moved: bool,
+}
+
+/// A direction that a joint acts along: its name, if there are several, and where both ends lead.
+pub(super) type Along<'a> = (Option<&'a str>, [End; 2]);
+
+/// Every place of a model, and the directions of every node.
+pub(super) struct Places {
+    /// In their order: those of the component, the masses, those that exist by their motion alone.
+    pub stated: Vec<Stated>,
+    ends: BTreeMap<String, End>,
+    /// Directions in their order, of names that have any.
+    directions: BTreeMap<String, Vec<String>>,
+}
+
+/// Whether `name` is an identifier `[A-Za-z][A-Za-z0-9_]*`.
+pub fn is_identifier(name: &str) -> bool {
+    name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+}
+
+/// Whether `name` is an identifier, or a node and a direction of it, `node.direction`.
+pub fn is_place(name: &str) -> bool {
+    name.split_once('.')
+        .map_or_else(|| is_identifier(name), |(node, along)| is_identifier(node) && is_identifier(along))
+}
+
+/// The places of a name with these directions: itself, or one for each.
+pub(super) fn places_of(name: &str, directions: &[String]) -> Vec<String> {
+    if directions.is_empty() {
+        return vec![name.to_owned()];
+    }
+    directions.iter().map(|along| format!("{name}.{along}")).collect()
+}
+
+impl Mass {
+    /// The places that it makes: itself, or one for each of its directions.
+    pub fn places(&self) -> Vec<String> {
+        places_of(&self.name, &self.directions)
+    }
+}
+
+impl Model {
+    /// The nodes and places that are stated: names with their directions, none of a place with one displacement. Those of the substructure come
+    /// first, then the masses.
+    pub fn nodes(&self) -> impl Iterator<Item = (&str, &[String])> {
+        let places = self.places.iter().map(|place| (place.name.as_str(), place.directions.as_slice()));
+        places.chain(self.masses.iter().map(|mass| (mass.name.as_str(), mass.directions.as_slice())))
+    }
+}
+
+impl Places {
+    /// Every name once, an identifier, and where it leads.
+    pub fn new(model: &Model) -> Result<Self, ModelError> {
+        if model.masses.is_empty() && model.motions.is_empty() && model.places.is_empty() {
+            let message = if model.substructure.is_some() {
+                "a structure needs at least one place: what joints, forces and results speak of"
+            } else {
+                "a model needs at least one mass or one imposed motion"
+            };
+            return Err(ModelError::new(Element::Whole, "mass", message));
+        }
+        let ends = BTreeMap::from([(GROUND.to_owned(), End::Ground)]);
+        let mut collected = Collected {
+            places: Places { stated: Vec::new(), ends, directions: BTreeMap::new() },
+            columns: BTreeSet::new(),
+        };
+        for (i, place) in model.places.iter().enumerate() {
+            let element = Element::Place(i);
+            let expected = place.directions.len().max(1);
+            if place.rows.len() != expected {
+                let message = format!("{} displacements are given for {expected}", place.rows.len());
+                return Err(ModelError::new(element, "dofs", message));
+            }
+            let of = |along: usize| Of::Component(i, along);
+            collected.node(model, element, (&place.name, &place.directions), of)?;
+        }
+        for (i, mass) in model.masses.iter().enumerate() {
+            collected.node(model, Element::Mass(i), (&mass.name, &mass.directions), |_| Of::Own(mass.mass))?;
+        }
+        collected.moved(model)?;
+        let Collected { places, columns } = collected;
+        for (i, joint) in model.joints.iter().enumerate() {
+            let element = Element::Joint(i);
+            identifier(&joint.name, element, "name", is_identifier)?;
+            let taken = columns.contains(&joint.name) || places.directions.contains_key(&joint.name);
+            if taken || model.joints[..i].iter().any(|j| j.name == joint.name) {
+                return twice(&joint.name, element, "name");
+            }
+        }
+        Ok(places)
+    }
+
+    /// Where one place leads.
+    pub fn find(&self, name: &str, element: Element, key: &'static str) -> Result<End, ModelError> {
+        if let Some(end) = self.ends.get(name) {
+            return Ok(*end);
+        }
+        if let Some(directions) = self.directions.get(name) {
+            let places: Vec<String> = directions.iter().map(|along| format!("`{name}.{along}`")).collect();
+            let message = format!("`{name}` moves in several directions; name one of them: {}", places.join(", "));
+            return Err(ModelError::new(element, key, message));
+        }
+        let node = name.split_once('.').filter(|(node, _)| self.directions.contains_key(*node));
+        let message = match node {
+            Some((node, along)) => format!("there is no place `{name}`: `{node}` has no direction {along}"),
+            None => format!("there is no place `{name}`"),
+        };
+        Err(ModelError { wrong_name: Some(name.to_owned()), ..ModelError::new(element, key, message) })
+    }
+
+    /// Where both ends of a joint lead, along each of `count` directions.
+    pub fn axes(&self, between: &[String; 2], count: usize, element: Element) -> Result<Vec<Along<'_>>, ModelError> {
+        let key = "between";
+        let nodes: Vec<&Vec<String>> = between.iter().filter_map(|name| self.directions.get(name)).collect();
+        let Some(directions) = nodes.first().copied() else {
+            let [a, b] = [self.find(&between[0], element, key)?, self.find(&between[1], element, key)?];
+            if count == 1 {
+                return Ok(vec![(None, [a, b])]);
+            }
+            let message = format!(
+                "the law acts along {count} directions, and `{}` and `{}` have one; join nodes with `directions`",
+                between[0], between[1]
+            );
+            return Err(ModelError::new(element, key, message));
+        };
+        if directions.len() != count {
+            let node = if self.directions.contains_key(&between[0]) { &between[0] } else { &between[1] };
+            let message = format!(
+                "the law acts along {count} direction{}, and the node `{node}` has {}: {}",
+                if count == 1 { "" } else { "s" },
+                directions.len(),
+                if count == 1 {
+                    format!("name one, such as `{node}.{}`", directions[0])
+                } else {
+                    directions.join(", ")
+                }
+            );
+            return Err(ModelError::new(element, key, message));
+        }
+        directions
+            .iter()
+            .map(|along| {
+                let end = |name: &String| {
+                    if name == GROUND { Ok(End::Ground) } else { self.find(&format!("{name}.{along}"), element, key) }
+                };
+                Ok((Some(along.as_str()), [end(&between[0])?, end(&between[1])?]))
+            })
+            .collect()
+    }
+}
+
+/// Places while they are collected.
+struct Collected {
+    places: Places,
+    /// Columns of results are named after places, with `_` for the point.
+    columns: BTreeSet<String>,
+}
+
+impl Collected {
+    /// Adds a node, or a place with one displacement.
+    fn node(
+        &mut self,
+        model: &Model,
+        element: Element,
+        (name, directions): (&String, &Vec<String>),
+        of: impl Fn(usize) -> Of,
+    ) -> Result<(), ModelError> {
+        identifier(name, element, "name", is_identifier)?;
+        if directions.len() > crate::law::MOST_DIRECTIONS {
+            let message = format!("a node has up to three directions, found {}", directions.len());
+            return Err(ModelError::new(element, "directions", message));
+        }
+        for (k, along) in directions.iter().enumerate() {
+            identifier(along, element, "directions", is_identifier)?;
+            if directions[..k].contains(along) {
+                return twice(along, element, "directions");
+            }
+        }
+        if self.places.directions.contains_key(name) || self.places.ends.contains_key(name) {
+            return twice(name, element, "name");
+        }
+        for (along, place) in places_of(name, directions).into_iter().enumerate() {
+            let moved = model.motions.iter().any(|motion| motion.on == place);
+            self.place(Stated { name: place, of: of(along), moved }, element, "name")?;
+        }
+        if !directions.is_empty() {
+            self.places.directions.insert(name.clone(), directions.clone());
+        }
+        Ok(())
+    }
+
+    fn place(&mut self, place: Stated, element: Element, key: &'static str) -> Result<(), ModelError> {
+        let column = place.name.replace('.', "_");
+        if !self.columns.insert(column.clone()) {
+            return twice(&column, element, key);
+        }
+        self.places.ends.insert(place.name.clone(), End::At(self.places.stated.len()));
+        self.places.stated.push(place);
+        Ok(())
+    }
+
+    /// Adds places that exist by their motion alone.
+    fn moved(&mut self, model: &Model) -> Result<(), ModelError> {
+        for (i, motion) in model.motions.iter().enumerate() {
+            let element = Element::Motion(i);
+            identifier(&motion.on, element, "on", is_place)?;
+            if self.places.ends.contains_key(&motion.on) {
+                continue;
+            }
+            if self.places.directions.contains_key(&motion.on) {
+                self.places.find(&motion.on, element, "on")?; // says that a direction is missing
+            }
+            self.place(Stated { name: motion.on.clone(), of: Of::Own(0.0), moved: true }, element, "on")?;
+            if let Some((node, along)) = motion.on.split_once('.') {
+                self.places.directions.entry(node.to_owned()).or_default().push(along.to_owned());
+            }
+        }
+        Ok(())
+    }
+}
+
+fn identifier(name: &str, element: Element, key: &'static str, accepts: fn(&str) -> bool) -> Result<(), ModelError> {
+    if name == GROUND {
+        Err(ModelError::new(element, key, "`ground` is the fixed frame and cannot be declared"))
+    } else if accepts(name) {
+        Ok(())
+    } else {
+        let message = format!("`{name}` is no name: a letter first, then letters, digits and `_`");
+        Err(ModelError::new(element, key, message))
+    }
+}
+
+fn twice<T>(name: &str, element: Element, key: &'static str) -> Result<T, ModelError> {
+    Err(ModelError::new(element, key, format!("the name `{name}` stands twice")))
+}

@@ -1,0 +1,276 @@
+//! One sector of a ring of equal sectors, and what it is in a travelling wave.
+//!
+//! Where every sector moves as its neighbour does, `x_s = X e^{j d θ s}` with `θ = 2π/N` and the nodal diameter `d`, the ring's matrices become
+//! those of one sector, `K_d = Σ_s K_{0s} e^{j d θ s}`: Hermitian, as large as a sector. In real numbers that is a sector twice,
+//! `[[Re K_d, -Im K_d], [Im K_d, Re K_d]]` over `(x, -jx)`, symmetric again.
+//!
+//! Source: Thomas (1979), "Dynamics of rotationally periodic structures", Int. J. Numer. Meth. Engng 14, 81-102.
+
+use super::{Structure, StructureError};
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use stickslip_numerics::sparse::{Matrix, Singular};
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// Difference between a sector's matrices and those of the first one, relative to the largest entry, that counts as rounding of sums in another
+/// order.
+const EQUAL: f64 = 1e-12;
+
+/// The rows of the first sector in the matrices of a ring.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sector {
+    sectors: usize,
+    places: Vec<String>,
+    /// Row, column, how many sectors further the column lies, values of mass, damping, stiffness.
+    entries: Vec<(usize, usize, usize, [f64; 3])>,
+}
+
+/// A wave of one nodal diameter on the sectors of a ring: its matrices.
+#[derive(Debug, Clone)]
+pub struct Wave {
+    sectors: usize,
+    diameter: usize,
+    dofs: usize,
+    /// A sector twice, or once where the matrices of the wave are real.
+    structure: Structure,
+}
+
+/// `e^{j 2π k/n}`; equal numbers of turns give equal bits, and quarter turns are exact.
+pub(crate) fn turn(k: i64, n: usize) -> Complex64 {
+    let n = n as i64;
+    let k = k.rem_euclid(n);
+    match 4 * k {
+        0 => Complex64::new(1.0, 0.0),
+        q if q == n => Complex64::new(0.0, 1.0),
+        q if q == 2 * n => Complex64::new(-1.0, 0.0),
+        q if q == 3 * n => Complex64::new(0.0, -1.0),
+        // the second half is the mirror image of the first, so that waves either way are
+        _ if 2 * k > n => Complex64::cis(TAU * (n - k) as f64 / n as f64).conj(),
+        _ => Complex64::cis(TAU * k as f64 / n as f64),
+    }
+}
+
+impl Sector {
+    /// The first of `sectors` equal ones, whose degrees of freedom stand sector by sector in `ring`. `None` if they are not equal.
+    pub fn of(ring: &Structure, sectors: usize) -> Option<Sector> {
+        let all = ring.dofs();
+        if sectors == 0 || !all.is_multiple_of(sectors) {
+            return None;
+        }
+        let n = all / sectors;
+        let key = |row: usize, column: usize| {
+            let [own, other] = [row / n, column / n];
+            (row % n, column % n, (other + sectors - own) % sectors)
+        };
+        let mut entries: Vec<(usize, usize, usize, [f64; 3])> = ring
+            .entries()
+            .filter(|(row, ..)| *row < n)
+            .map(|(row, column, values)| {
+                let (row, column, shift) = key(row, column);
+                (row, column, shift, values)
+            })
+            .collect();
+        entries.sort_unstable_by_key(|entry| (entry.0, entry.1, entry.2));
+        let largest = ring.largest();
+        let mut met = 0;
+        for (row, column, values) in ring.entries() {
+            let key = key(row, column);
+            let near = |first: &[f64; 3]| (0..3).all(|k| (first[k] - values[k]).abs() <= EQUAL * largest[k]);
+            match entries.binary_search_by_key(&key, |entry| (entry.0, entry.1, entry.2)) {
+                Ok(at) if near(&entries[at].3) => met += 1,
+                _ => return None,
+            }
+        }
+        (met == sectors * entries.len()).then(|| Sector { sectors, places: ring.places()[..n].to_vec(), entries })
+    }
+
+    /// Degrees of freedom of a sector.
+    pub fn dofs(&self) -> usize {
+        self.places.len()
+    }
+
+    /// How many sectors there are.
+    pub fn sectors(&self) -> usize {
+        self.sectors
+    }
+
+    /// The matrices of the wave with this nodal diameter; those of `d` and `d + N` are the same.
+    ///
+    /// # Errors
+    /// [`StructureError`]: matrices that are none of a structure.
+    ///
+    /// # Example
+    /// A chain closed to a ring: the wave of nodal diameter d has the stiffness `k + 2 kc (1 - cos 2πd/N)`.
+    /// ```
+    /// use num_complex::Complex64;
+    /// use stickslip::structure::{Sector, Structure};
+    /// use stickslip_numerics::sparse::Matrix;
+    /// let (n, d) = (12, 5);
+    /// let entries = |own: f64, beside: f64| {
+    ///     let all = (0..n).flat_map(|i| [(i, i, own), (i, (i + 1) % n, beside), ((i + 1) % n, i, beside)]);
+    ///     Matrix::from_triplets(n, all).unwrap()
+    /// };
+    /// let places = (0..n).map(|i| format!("m{i}")).collect();
+    /// let ring = Structure::sparse(places, entries(1.0, 0.0), entries(0.1, 0.0), entries(3.0, -0.5)).unwrap();
+    /// let wave = Sector::of(&ring, n).unwrap().wave(d).unwrap();
+    /// let mut x = vec![Complex64::new(1.0, 0.0)];
+    /// wave.dynamic_stiffness(Complex64::ZERO, 0.0).unwrap().solve(&mut x);
+    /// let stiffness = 2.0 + 2.0 * 0.5 * (1.0 - (std::f64::consts::TAU * d as f64 / n as f64).cos());
+    /// assert!((x[0] - 1.0 / stiffness).norm() < 1e-14);
+    /// ```
+    pub fn wave(&self, diameter: usize) -> Result<Wave, StructureError> {
+        let (n, diameter) = (self.dofs(), diameter % self.sectors);
+        // the matrices are real where neighbours move alike, or against each other
+        let real = (2 * diameter).is_multiple_of(self.sectors);
+        let copies = if real { 1 } else { 2 };
+        let mut triplets: [Vec<(usize, usize, f64)>; 3] = Default::default();
+        for &(row, column, shift, values) in &self.entries {
+            let phase = turn((diameter * shift) as i64, self.sectors);
+            for (triplets, value) in triplets.iter_mut().zip(values).filter(|(_, value)| *value != 0.0) {
+                triplets.push((row, column, value * phase.re));
+                if !real {
+                    triplets.push((n + row, n + column, value * phase.re));
+                    triplets.push((row, n + column, -value * phase.im));
+                    triplets.push((n + row, column, value * phase.im));
+                }
+            }
+        }
+        let [mass, damping, stiffness] = triplets.map(|entries| {
+            Matrix::from_triplets(copies * n, entries).map_err(|error| StructureError::of("sector's", &error))
+        });
+        let mut places = self.places.clone();
+        if !real {
+            places.extend(self.places.iter().map(|place| format!("{place}, a quarter later")));
+        }
+        let structure = Structure::sparse(places, mass?, damping?, stiffness?)?;
+        Ok(Wave { sectors: self.sectors, diameter, dofs: n, structure })
+    }
+}
+
+impl Wave {
+    /// Its nodal diameter, below the number of sectors.
+    pub fn diameter(&self) -> usize {
+        self.diameter
+    }
+
+    /// Whether a sector stands in [`Wave::structure`] twice, so that every mode of it does: one wave either way around.
+    pub fn is_double(&self) -> bool {
+        self.structure.dofs() > self.dofs
+    }
+
+    /// A sector twice, its motion and the same a quarter of a period later, or once where the matrices of the wave are real.
+    pub fn structure(&self) -> &Structure {
+        &self.structure
+    }
+
+    /// The phase of a sector against the first one, `e^{j d θ s}`.
+    pub fn phase(&self, sector: i64) -> Complex64 {
+        turn(self.diameter as i64 * sector, self.sectors)
+    }
+
+    /// `s² M_d + s C_d + K_d`, factored, with springs of `hold` (1/s²) times every mass.
+    ///
+    /// # Errors
+    /// [`Singular`]: a resonance without damping.
+    pub fn dynamic_stiffness(&self, s: Complex64, hold: f64) -> Result<WaveStiffness, Singular> {
+        let factor = self.structure.held_stiffness(s, hold)?;
+        Ok(WaveStiffness { dofs: self.dofs, double: self.is_double(), factor })
+    }
+}
+
+/// The dynamic stiffness of a wave at one rate, factored.
+#[derive(Debug, Clone)]
+pub struct WaveStiffness {
+    dofs: usize,
+    double: bool,
+    factor: super::DynamicStiffness,
+}
+
+impl WaveStiffness {
+    /// Complex displacements of the first sector (m) from the forces on it (N), in place: columns, one after the other.
+    pub fn solve(&self, loads: &mut [Complex64]) {
+        if !self.double {
+            return self.factor.solve(loads);
+        }
+        let n = self.dofs;
+        let mut twice = vec![ZERO; 2 * loads.len()];
+        for (load, twice) in loads.chunks_exact(n).zip(twice.chunks_exact_mut(2 * n)) {
+            for i in 0..n {
+                (twice[i], twice[n + i]) = (load[i], load[i] * Complex64::new(0.0, -1.0));
+            }
+        }
+        self.factor.solve(&mut twice);
+        for (load, twice) in loads.chunks_exact_mut(n).zip(twice.chunks_exact(2 * n)) {
+            load.copy_from_slice(&twice[..n]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DMatrix;
+
+    /// Two masses a sector, an asymmetric coupling to the next sector, a gyroscopic pair.
+    fn ring(sectors: usize, spoiled: f64) -> Structure {
+        let n = 2 * sectors;
+        let [mut m, mut c, mut k] = [(); 3].map(|()| DMatrix::<f64>::zeros(n, n));
+        for s in 0..sectors {
+            let (a, b, next) = (2 * s, 2 * s + 1, 2 * ((s + 1) % sectors));
+            (m[(a, a)], m[(b, b)]) = (1.0, 0.7);
+            (c[(a, b)], c[(b, a)]) = (0.05, -0.05);
+            c[(b, b)] += 0.02;
+            for (i, l, value) in [(a, b, 2.0), (b, next, 0.6), (a, next, 0.3)] {
+                for (i, l, value) in [(i, i, value), (l, l, value), (i, l, -value), (l, i, -value)] {
+                    k[(i, l)] += value;
+                }
+            }
+            k[(a, a)] += 0.4;
+        }
+        k[(0, 0)] += spoiled;
+        Structure::new((0..n).map(|i| format!("p{i}")).collect(), m, c, k).unwrap()
+    }
+
+    /// The sector answers a travelling force as the ring does.
+    #[test]
+    fn a_sector_is_its_ring() {
+        for sectors in [2, 3, 7, 24, 30] {
+            let ring = ring(sectors, 0.0);
+            let sector = Sector::of(&ring, sectors).unwrap();
+            for diameter in 0..sectors {
+                let wave = sector.wave(diameter).unwrap();
+                assert_eq!(wave.is_double(), 2 * diameter % sectors != 0);
+                let load = [Complex64::new(1.0, 0.2), Complex64::new(-0.4, 0.3)];
+                for s in [ZERO, Complex64::new(0.0, 0.83), Complex64::new(1.7, 0.0)] {
+                    let mut one = load.to_vec();
+                    wave.dynamic_stiffness(s, 0.0).unwrap().solve(&mut one);
+                    let phase = |s: usize| wave.phase(s as i64);
+                    let mut all: Vec<Complex64> = (0..2 * sectors).map(|i| load[i % 2] * phase(i / 2)).collect();
+                    ring.dynamic_stiffness(s).unwrap().solve(&mut all);
+                    let size = all.iter().fold(0.0f64, |m, x| m.max(x.norm()));
+                    for (i, x) in all.iter().enumerate() {
+                        assert!((x - one[i % 2] * phase(i / 2)).norm() < 1e-12 * size, "{sectors} {diameter}: {i}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn unequal_sectors_are_none() {
+        assert!(Sector::of(&ring(7, 1e-6), 7).is_none());
+        assert!(Sector::of(&ring(7, 0.0), 4).is_none());
+        assert!(Sector::of(&ring(7, 0.0), 0).is_none());
+        // what is said to be fewer sectors than there are: each is then several of them
+        assert_eq!(Sector::of(&ring(6, 0.0), 3).unwrap().dofs(), 4);
+    }
+
+    #[test]
+    fn turns_are_exact_where_they_can_be() {
+        assert_eq!(turn(6, 8), Complex64::new(0.0, -1.0));
+        assert_eq!(turn(-5, 24), turn(19, 24));
+        assert_eq!(turn(5, 24), turn(19, 24).conj());
+        assert!((turn(7, 24) - Complex64::cis(TAU * 7.0 / 24.0)).norm() < 1e-15);
+    }
+}

@@ -1,0 +1,205 @@
+//! Bladed disks: one sector with the phase of each harmonic against the whole ring, against closed forms, and against each other's excitation.
+
+use num_complex::Complex64;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+use stickslip::law::{Coulomb, FrictionContact, Gap, Jenkins, JenkinsArctan, SharedLaw};
+use stickslip::method::event_driven::EventDriven;
+use stickslip::method::harmonic_balance::HarmonicBalance;
+use stickslip::method::shooting::Shooting;
+use stickslip::model::{Around, Disk};
+use stickslip::{Force, GROUND, Joint, Mass, Method, Model, Orbit, Spring};
+
+fn between(a: &str, b: &str) -> [String; 2] {
+    [a.to_owned(), b.to_owned()]
+}
+
+fn spring(a: &str, b: &str, stiffness: f64, damping: f64) -> Spring {
+    Spring { between: between(a, b), stiffness, damping }
+}
+
+fn force(on: &str, amplitude: f64, harmonic: u32) -> Force {
+    Force { on: on.to_owned(), amplitude, phase: 0.3, harmonic }
+}
+
+/// A blade on its part of the disk, which springs join to the next; a joint between neighbouring blades.
+fn sector(law: SharedLaw) -> Model {
+    Model {
+        masses: vec![Mass::new("disk", 2.0), Mass::new("blade", 0.3)],
+        springs: vec![
+            spring("disk", GROUND, 30.0, 0.01),
+            spring("disk", "next.disk", 20.0, 0.02),
+            spring("blade", "disk", 3.0, 0.01),
+        ],
+        joints: vec![Joint { name: "shroud".into(), between: between("blade", "next.blade"), law }],
+        forces: vec![force("blade", 1.0, 1)],
+        ..Model::default()
+    }
+}
+
+fn ring(sector: &Model, sectors: usize, forces: &[Around]) -> Model {
+    let disk = Disk { sectors, forces: forces.to_vec(), motions: Vec::new() };
+    disk.ring(|_| sector.clone()).unwrap()
+}
+
+/// The same ring, whose symmetry nobody knows.
+fn whole(mut model: Model) -> Model {
+    model.ring = None;
+    model
+}
+
+fn orbit(model: &Model, method: &dyn Method, omega: f64) -> Orbit {
+    method.solver(&model.assemble().unwrap()).unwrap().orbit(omega, None).unwrap()
+}
+
+/// Largest difference of numbers of two orbits, relative to the largest amplitude, and to the largest loss or the work of a newton over that
+/// amplitude.
+fn distance(a: &Orbit, b: &Orbit) -> f64 {
+    let size = b.places.iter().fold(0.0f64, |m, place| m.max(place.amplitude()));
+    let loss = b.joints.iter().fold(size * 1.0, |m, joint| m.max(joint.dissipation));
+    let places =
+        a.places.iter().zip(&b.places).map(|(a, b)| {
+            (a.amplitude() - b.amplitude()).abs().max((a.first_harmonic - b.first_harmonic).norm()) / size
+        });
+    let joints = a.joints.iter().zip(&b.joints).map(|(a, b)| (a.dissipation - b.dissipation).abs() / loss);
+    assert_eq!((a.places.len(), a.joints.len()), (b.places.len(), b.joints.len()));
+    places.chain(joints).fold(0.0, f64::max)
+}
+
+/// Theory 12: harmonic balance of one sector with the phase of each harmonic is that of the full ring.
+#[test]
+fn a_tuned_sector_is_the_full_ring() {
+    let laws: [SharedLaw; 4] = [
+        Arc::new(Jenkins { stiffness: 1.0, limit: 0.4 }),
+        Arc::new(Coulomb { limit: 0.2 }),
+        Arc::new(JenkinsArctan { stiffness: 1.0, limit: 0.4, alpha: 0.5 }),
+        Arc::new(Gap { gap: 0.3, stiffness: 0.1 }),
+    ];
+    for (sectors, order, omega) in [(7, 2, 3.05), (8, -3, 3.3), (6, 3, 3.2), (24, 5, 3.1)] {
+        // some laws are sampled: sectors are alike to the last digit only if each lags by whole samples
+        let samples = Some(sectors * 128);
+        let balance = HarmonicBalance { harmonics: Some(9), samples, ..HarmonicBalance::default() };
+        for law in &laws {
+            let model = ring(&sector(law.clone()), sectors, &[Around::EngineOrder(order)]);
+            let one = orbit(&model, &balance, omega);
+            let all = orbit(&whole(model), &balance, omega);
+            let apart = distance(&one, &all);
+            assert!(apart < 1e-10, "{} sectors, order {order}, {}: {apart:.1e}", sectors, law.name());
+            assert!(one.evidence.energy_gap < 1e-8);
+            let slips = one.joints.iter().all(|joint| joint.dissipation > 1e-3);
+            assert!(slips || law.name() == "gap", "{}: a test without slip tests nothing", law.name());
+        }
+    }
+}
+
+/// The same with preload, several harmonics of the excitation, and three directions.
+#[test]
+fn a_sector_with_normal_contact_is_its_ring() {
+    let law = FrictionContact { tangential: 2.0, normal: 3.0, friction: 0.3, preload: 0.6, tangents: 1 };
+    let sector = Model {
+        masses: vec![Mass::new("blade", 0.3).along(&["x", "z"])],
+        springs: vec![
+            spring("blade.x", GROUND, 3.0, 0.02),
+            spring("blade.z", GROUND, 4.0, 0.02),
+            spring("blade.x", "next.blade.z", 0.2, 0.0),
+        ],
+        joints: vec![Joint { name: "shroud".into(), between: between("blade", "next.blade"), law: Arc::new(law) }],
+        forces: vec![force("blade.x", 0.3, 1), force("blade.z", 0.1, 2), force("blade.z", 0.2, 0)],
+        ..Model::default()
+    };
+    let orders = [Around::EngineOrder(2), Around::EngineOrder(4), Around::EngineOrder(0)];
+    let balance = HarmonicBalance { harmonics: Some(7), samples: Some(9 * 64), ..HarmonicBalance::default() };
+    let model = ring(&sector, 9, &orders);
+    assert_eq!(model.ring.unwrap().order, Some(2));
+    for omega in [2.9, 3.6] {
+        let apart = distance(&orbit(&model, &balance, omega), &orbit(&whole(model.clone()), &balance, omega));
+        assert!(apart < 1e-10, "{apart:.1e}");
+    }
+}
+
+/// Methods in time know no waves: they follow the ring, and what they find is the wave.
+#[test]
+fn methods_in_time_find_the_wave() {
+    let balance = HarmonicBalance { harmonics: Some(63), ..HarmonicBalance::default() };
+    let exact = ring(&sector(Arc::new(Jenkins { stiffness: 1.0, limit: 0.4 })), 5, &[Around::EngineOrder(1)]);
+    let apart = distance(&orbit(&exact, &balance, 3.1), &orbit(&exact, &EventDriven, 3.1));
+    assert!(apart < 1e-6, "{apart:.1e}");
+    let law = JenkinsArctan { stiffness: 1.0, limit: 0.4, alpha: 0.5 };
+    let smooth = ring(&sector(Arc::new(law)), 4, &[Around::EngineOrder(1)]);
+    let shooting = Shooting { tolerance: 1e-9, ..Shooting::default() };
+    let apart = distance(&orbit(&smooth, &balance, 3.1), &orbit(&smooth, &shooting, 3.1));
+    assert!(apart < 1e-5, "{apart:.1e}");
+}
+
+/// Engine orders e, e + N and the like are one excitation; -e is its mirror image.
+#[test]
+fn engine_orders_alias() {
+    let balance = HarmonicBalance { harmonics: Some(7), ..HarmonicBalance::default() };
+    let law: SharedLaw = Arc::new(Jenkins { stiffness: 1.0, limit: 0.4 });
+    let find = |order| orbit(&ring(&sector(law.clone()), 24, &[Around::EngineOrder(order)]), &balance, 3.1);
+    let (first, same, back) = (find(5), find(29), find(-19));
+    for other in [&same, &back] {
+        assert!(first.places.iter().zip(&other.places).all(|(a, b)| a == b), "to the last bit");
+    }
+    let mirrored = find(-5);
+    for s in 0..24 {
+        let (a, b) = (&first.places[2 * s + 1], &mirrored.places[2 * ((24 - s) % 24) + 1]);
+        assert!((a.amplitude() - b.amplitude()).abs() < 1e-10 * a.amplitude());
+        assert!((a.first_harmonic - b.first_harmonic).norm() < 1e-10 * a.amplitude());
+    }
+    // linear: order e excites nodal diameter n and no other if and only if e = jN ± n
+    let free = Model { joints: Vec::new(), ..sector(law.clone()) };
+    for (order, diameter) in [(3, 3), (21, 3), (27, 3), (45, 3), (12, 12), (25, 1)] {
+        let orbit = orbit(&ring(&free, 24, &[Around::EngineOrder(order)]), &EventDriven, 3.1);
+        for n in 0..=12 {
+            let share: Complex64 = (0..24)
+                .map(|s| {
+                    let shape = |sign: f64| Complex64::cis(sign * TAU * f64::from(n) * s as f64 / 24.0);
+                    let x = orbit.places[2 * s + 1].first_harmonic;
+                    x * shape(1.0).conj() + Complex64::new(0.0, 1.0) * x * shape(-1.0).conj()
+                })
+                .sum();
+            let size = 24.0 * orbit.places[1].first_harmonic.norm();
+            assert!((share.norm() > 0.5 * size) == (n == diameter), "order {order}, diameter {n}: {}", share.norm());
+            assert!(n == diameter || share.norm() < 1e-10 * size);
+        }
+    }
+}
+
+/// Theory (10.5): dampers between the blades of a tuned disk, one-term harmonic balance, no viscous damping. The optimum of the limit
+/// is `π F0/(4 sin(θ/2))`, the amplitude there `π F0/(4 kd sin²(θ/2))`.
+#[test]
+fn eq10_5_optimum_of_dampers_between_blades() {
+    let (sectors, diameter, stiffness, load) = (24, 3, 0.2, 1.0);
+    let half = PI * diameter as f64 / sectors as f64; // θ/2
+    let best = PI * load / (4.0 * half.sin());
+    let amplitude = PI * load / (4.0 * stiffness * half.sin().powi(2));
+    assert!((best - 2.052_344_3).abs() < 1e-7 && (amplitude - 26.815_170_6).abs() < 1e-7, "{best} {amplitude}");
+    let one_term = HarmonicBalance { harmonics: Some(1), ..HarmonicBalance::default() };
+    // the peak: phase resonance at ω² = k + 4 sin²(θ/2) Re K_J(2 A sin(θ/2)), at a limit beside the optimum, and at it
+    let peak = |limit: f64, from: f64, to: f64| {
+        let law = Arc::new(Jenkins { stiffness, limit });
+        let sector = Model {
+            masses: vec![Mass::new("blade", 1.0)],
+            springs: vec![spring("blade", GROUND, 1.0, 0.0)],
+            joints: vec![Joint { name: "damper".into(), between: between("blade", "next.blade"), law }],
+            forces: vec![force("blade", load, 1)],
+            ..Model::default()
+        };
+        let system = ring(&sector, sectors, &[Around::EngineOrder(diameter)]).assemble().unwrap();
+        let mut solver = one_term.solver(&system).unwrap();
+        let at =
+            |solver: &mut dyn stickslip::Solver, omega: f64| solver.orbit(omega, None).unwrap().places[0].amplitude();
+        let (mut low, mut high) = (from, to);
+        for _ in 0..60 {
+            let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+            if at(&mut *solver, a) < at(&mut *solver, b) { low = a } else { high = b }
+        }
+        at(&mut *solver, 0.5 * (low + high))
+    };
+    let found = peak(best, 1.0, 1.06);
+    assert!((found / amplitude - 1.0).abs() < 1e-7, "{found} {amplitude}");
+    for limit in [0.97 * best, 1.03 * best] {
+        assert!(peak(limit, 1.0, 1.06) > amplitude * (1.0 + 1e-5));
+    }
+}
