@@ -5,8 +5,10 @@ use faer::linalg::lu::partial_pivoting::factor::{PartialPivLuParams, lu_in_place
 use faer::linalg::lu::partial_pivoting::solve::{
     solve_in_place, solve_in_place_scratch, solve_transpose_in_place, solve_transpose_in_place_scratch,
 };
+use faer::linalg::matmul::matmul;
 use faer::perm::PermRef;
-use faer::{MatMut, MatRef, Par, Spec};
+use faer::traits::ComplexField;
+use faer::{Accum, MatMut, MatRef, Par, Spec};
 use num_complex::Complex64;
 
 /// Size from which elimination in blocks is the faster one.
@@ -152,7 +154,54 @@ pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (us
     }
 }
 
-/// `P A = L U` of a complex matrix, in blocks that stay in the cache, for many right sides.
+/// `C = A B`, or `A Bᵀ` if `transposed`, of large column-major matrices in blocks that stay in the cache: A is `rows × inner`, B `inner × columns` or
+/// `columns × inner`. The same bits every time, but maybe others on another processor.
+///
+/// # Example
+/// ```
+/// let (a, b) = ([1.0, 2.0, 3.0, 4.0], [5.0, 6.0]);
+/// let mut c = [0.0; 2];
+/// stickslip_numerics::dense::multiply_in_blocks(&a, &b, &mut c, (2, 2, 1), false);
+/// assert_eq!(c, [23.0, 34.0]);
+/// stickslip_numerics::dense::multiply_in_blocks(&a, &b, &mut c, (2, 2, 1), true);
+/// assert_eq!(c, [23.0, 34.0]);
+/// ```
+pub fn multiply_in_blocks(
+    a: &[f64],
+    b: &[f64],
+    c: &mut [f64],
+    (rows, inner, columns): (usize, usize, usize),
+    transposed: bool,
+) {
+    let a = MatRef::from_column_major_slice(&a[..rows * inner], rows, inner);
+    let b = &b[..inner * columns];
+    let b = match transposed {
+        true => MatRef::from_column_major_slice(b, columns, inner).transpose(),
+        false => MatRef::from_column_major_slice(b, inner, columns),
+    };
+    let c = MatMut::from_column_major_slice_mut(&mut c[..rows * columns], rows, columns);
+    matmul(c, Accum::Replace, a, b, 1.0, Par::Seq);
+}
+
+/// Numbers that [`Lu`] takes: real and complex ones.
+pub trait Number: ComplexField + Copy {
+    /// Whether it is a number at all, and not zero.
+    fn is_pivot(self) -> bool;
+}
+
+impl Number for f64 {
+    fn is_pivot(self) -> bool {
+        self != 0.0 && self.is_finite()
+    }
+}
+
+impl Number for Complex64 {
+    fn is_pivot(self) -> bool {
+        self != Complex64::ZERO && self.is_finite()
+    }
+}
+
+/// `P A = L U` of a real or complex matrix, in blocks that stay in the cache, for many right sides.
 ///
 /// # Example
 /// ```
@@ -166,40 +215,43 @@ pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (us
 /// assert_eq!(x, [-j, 0.5 + 0.0 * j]);
 /// ```
 #[derive(Debug, Clone)]
-pub struct ComplexLu {
+pub struct Lu<T> {
     n: usize,
-    factors: Vec<Complex64>,
+    factors: Vec<T>,
     order: Vec<u32>,
     inverse: Vec<u32>,
 }
 
-impl ComplexLu {
+/// Of a complex matrix.
+pub type ComplexLu = Lu<Complex64>;
+
+impl<T: Number> Lu<T> {
     /// Of a matrix column after column, n × n.
     ///
     /// # Errors
     /// The column in which no pivot is left.
-    pub fn new(mut matrix: Vec<Complex64>, n: usize) -> Result<Self, usize> {
-        let params = Spec::<PartialPivLuParams, Complex64>::default();
-        let mut memory = MemBuffer::new(lu_in_place_scratch::<u32, Complex64>(n, n, Par::Seq, params));
+    pub fn new(mut matrix: Vec<T>, n: usize) -> Result<Self, usize> {
+        let params = Spec::<PartialPivLuParams, T>::default();
+        let mut memory = MemBuffer::new(lu_in_place_scratch::<u32, T>(n, n, Par::Seq, params));
         let (mut order, mut inverse) = (vec![0; n], vec![0; n]);
         let mut factors = MatMut::from_column_major_slice_mut(&mut matrix, n, n);
         lu_in_place(factors.as_mut(), &mut order, &mut inverse, Par::Seq, MemStack::new(&mut memory), params);
-        let weak = (0..n).find(|&k| factors[(k, k)] == Complex64::ZERO || !factors[(k, k)].is_finite());
-        weak.map_or(Ok(ComplexLu { n, factors: matrix, order, inverse }), Err)
+        let weak = (0..n).find(|&k| !factors[(k, k)].is_pivot());
+        weak.map_or(Ok(Lu { n, factors: matrix, order, inverse }), Err)
     }
 
     /// Solves in place for right sides of length n, one after the other.
     ///
     /// # Panics
     /// If the length of `right` is no multiple of n.
-    pub fn solve(&self, right: &mut [Complex64]) {
+    pub fn solve(&self, right: &mut [T]) {
         let n = self.n;
         if n == 0 || right.is_empty() {
             return;
         }
         assert!(right.len().is_multiple_of(n), "{} numbers are no columns of {n}", right.len());
         let columns = right.len() / n;
-        let mut memory = MemBuffer::new(solve_in_place_scratch::<u32, Complex64>(n, columns, Par::Seq));
+        let mut memory = MemBuffer::new(solve_in_place_scratch::<u32, T>(n, columns, Par::Seq));
         let factors = MatRef::from_column_major_slice(&self.factors, n, n);
         let exchanges = PermRef::new_checked(&self.order, &self.inverse, n);
         let right = MatMut::from_column_major_slice_mut(right, n, columns);

@@ -8,6 +8,9 @@
 //!
 //! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 7.4, 7.5 and 10.5; Parlett and Reinsch (1969) for the balance.
 
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::evd::{ComputeEigenvectors, SelfAdjointEvdParams, self_adjoint_evd, self_adjoint_evd_scratch};
+use faer::{ColMut, MatMut, MatRef, Par, Spec};
 use nalgebra::{ComplexField, DMatrix, DVector, Dyn, SVD, SymmetricEigen};
 use num_complex::Complex64;
 
@@ -33,6 +36,31 @@ const RIVAL: f64 = 0.9;
 pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     let steps = STEPS * (matrix.nrows() + 1);
     finite(&matrix).then(|| SymmetricEigen::try_new(matrix, f64::EPSILON, steps))?
+}
+
+/// Eigenvalues, rising, and eigenvectors of a large symmetric matrix, whose lower triangle is read, in blocks that stay in the cache; `None` if an entry is
+/// not finite or the iteration does not end in time.
+///
+/// # Example
+/// ```
+/// use nalgebra::dmatrix;
+/// let (values, vectors) = stickslip_numerics::eigen::symmetric_in_blocks(&dmatrix![2.0, 1.0; 1.0, 2.0]).unwrap();
+/// assert!((values[0] - 1.0).abs() < 1e-14 && (values[1] - 3.0).abs() < 1e-14);
+/// assert!((vectors[(0, 1)] - vectors[(1, 1)]).abs() < 1e-14);
+/// ```
+pub fn symmetric_in_blocks(matrix: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+    let n = matrix.nrows();
+    if !finite(matrix) || matrix.ncols() != n {
+        return None;
+    }
+    let params = Spec::<SelfAdjointEvdParams, f64>::default();
+    let mut memory = MemBuffer::new(self_adjoint_evd_scratch::<f64>(n, ComputeEigenvectors::Yes, Par::Seq, params));
+    let (mut values, mut vectors) = (vec![0.0; n], DMatrix::zeros(n, n));
+    let (kept, stack) = (ColMut::from_slice_mut(&mut values).as_diagonal_mut(), MemStack::new(&mut memory));
+    let wanted = MatMut::from_column_major_slice_mut(vectors.as_mut_slice(), n, n);
+    let read = MatRef::from_column_major_slice(matrix.as_slice(), n, n);
+    self_adjoint_evd(read, kept, Some(wanted), Par::Seq, stack, params).ok()?;
+    Some((values, vectors))
 }
 
 /// Singular values and vectors; `None` if the matrix is empty, an entry is not finite or the iteration does not end in time.

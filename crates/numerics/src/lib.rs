@@ -8,6 +8,7 @@ pub mod dense;
 pub mod dual;
 pub mod eigen;
 pub mod fourier;
+pub mod krylov;
 pub mod lu;
 pub mod maximum;
 pub mod modes;

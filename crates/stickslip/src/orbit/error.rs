@@ -147,6 +147,19 @@ pub enum OrbitError {
         /// Drive frequency, rad/s.
         omega: f64,
     },
+    /// Nothing bounds the motion of the structure without its joints.
+    #[error(
+        "{method} finds the structure without its joints in a resonance without damping at Ω = {omega:.4} rad/s: nothing bounds its motion at \
+         {resonance:.4} rad/s; give it damping, or take a frequency beside it"
+    )]
+    Resonance {
+        /// The method.
+        method: &'static str,
+        /// Drive frequency, rad/s.
+        omega: f64,
+        /// The harmonic of it that is the resonance, rad/s.
+        resonance: f64,
+    },
     /// A path that a method gave is no periodic motion.
     #[error("the motion of {method} at Ω = {omega:.4} rad/s {what}")]
     NotAnOrbit {
@@ -174,6 +187,7 @@ impl OrbitError {
             OrbitError::Evidence { .. } => "evidence-fails",
             OrbitError::Truncation { .. } => "tolerance-not-reached",
             OrbitError::Drift { .. } => "drifts",
+            OrbitError::Resonance { .. } => "resonance",
             OrbitError::NotAnOrbit { .. } => "not-an-orbit",
             OrbitError::Frequency { .. } => "bad-frequency",
         }

@@ -3,7 +3,7 @@
 use super::equations::{Level, Motion, transfer};
 use super::ports::Ports;
 use super::rest::Rest;
-use super::sparse::LARGE;
+use super::sparse::GUESSED;
 use super::{Compared, HarmonicBalance, Kept, LARGEST, TOLERANCE, estimate, path};
 use crate::method::evidence::Judge;
 use crate::method::guess::Guess;
@@ -109,7 +109,9 @@ impl<'a> BranchEquations<'a> {
             self.rest = Rest::new(&system, &self.ports);
             self.rest_of = system.clone();
         }
-        self.level.drive(&system, &self.ports, &self.rest, omega);
+        if self.level.drive(&system, &self.ports, &self.rest, omega).is_err() {
+            return false;
+        }
         if !same || self.system.joints() != system.joints() {
             self.judge = Judge::new(&system);
         }
@@ -127,7 +129,7 @@ impl<'a> BranchEquations<'a> {
             return Err(OrbitError::Frequency { omega: self.omega });
         }
         // as in a point: the guess solves the whole structure, and large ones begin without friction
-        let guess = (self.system.dofs() < LARGE).then(|| Guess::new(&self.system, self.omega));
+        let guess = (self.system.dofs() < GUESSED).then(|| Guess::new(&self.system, self.omega));
         let start = self.level.begin(&self.system, &self.ports, guess.as_ref(), self.omega);
         let solved = self.level.solve(&self.ports, self.omega, start);
         self.motion = solved.map_err(|lost| self.lost(lost.iterations, lost.residual))?;
@@ -144,13 +146,13 @@ impl<'a> BranchEquations<'a> {
         }
         self.level.unpack(&self.ports, (x, self.length), &mut self.motion);
         self.level.polish(&self.ports, self.omega, &mut self.motion, 10).ok()?;
-        let places = path::places(&mut self.level, &self.rest, self.omega, &self.motion);
+        let places = path::places(&mut self.level, &self.rest, self.omega, &self.motion).ok()?;
         let truncation = self.finer.as_mut().and_then(|finer| {
-            finer.drive(&self.system, &self.ports, &self.rest, self.omega);
+            finer.drive(&self.system, &self.ports, &self.rest, self.omega).ok()?;
             let mut motion = transfer(&self.motion, self.level.harmonics(), finer.harmonics());
             // Newton's method alone: a search would find another branch where this one turns
             finer.polish(&self.ports, self.omega, &mut motion, CHECK).ok()?;
-            let better = path::places(finer, &self.rest, self.omega, &motion);
+            let better = path::places(finer, &self.rest, self.omega, &motion).ok()?;
             let coarse = Compared { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
             let at = (self.kept, self.omega);
             Some(estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &motion, &better)))

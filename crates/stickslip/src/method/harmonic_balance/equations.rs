@@ -15,13 +15,15 @@
 //!
 //! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian frequency-time method".
 
+use super::coupled::{Coupled, MANY};
 use super::hold::{CLEAR, stay};
 use super::ports::{Alternation, Port, Ports, block, blocks};
+use super::receptance::{Modal, Receptance};
 use super::rest::Rest;
 use super::sparse::Sparse;
 use crate::method::guess::Guess;
 use crate::model::{Cyclic, System};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use num_complex::Complex64;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -45,8 +47,8 @@ pub(super) struct Level {
     /// How often the derivative was assembled in the present search.
     pub assembled: usize,
     pub alternation: Alternation,
-    /// Receptance per harmonic, axes × axes.
-    receptance: Vec<DMatrix<Complex64>>,
+    /// Of the axes; empty in the banded form.
+    pub(super) receptance: Receptance,
     /// ε per port, N s/m; infinite where the motion is imposed.
     pub(super) penalty: Vec<f64>,
     /// Motion of the axes without friction, [axis][harmonic].
@@ -59,9 +61,13 @@ pub(super) struct Level {
     pub free: Vec<DVector<Complex64>>,
     /// In place of receptance and Jacobian, for large systems.
     pub sparse: Option<Sparse>,
+    /// In place of the Jacobian, for many joints that the structure couples.
+    pub(super) coupled: Option<Coupled>,
+    /// How often the derivative was multiplied with in the present search.
+    pub products: usize,
     /// K or T of every port, one after the other, see [`blocks`].
     pub(super) tangents: Vec<f64>,
-    blocks: Vec<usize>,
+    pub(super) blocks: Vec<usize>,
     /// Per axis: its unknown is a force.
     forces: Vec<bool>,
     pub(super) jacobian: Vec<f64>,
@@ -72,7 +78,7 @@ pub(super) struct Level {
     pub(super) best: Motion,
     pub(super) step: Vec<f64>,
     image: Vec<Complex64>,
-    /// Motions along the axes at one harmonic.
+    /// Motions along the axes under their forces, [axis][harmonic].
     moved: Vec<Complex64>,
     product: Vec<f64>,
 }
@@ -111,6 +117,15 @@ pub(super) struct Ease {
     pub penalty: f64,
 }
 
+/// Which ports' derivatives an evaluation makes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Slopes {
+    None,
+    /// Those that cost little beside the forces: not of laws that are followed through the period.
+    Cheap,
+    All,
+}
+
 pub(super) const GIVEN: Ease = Ease { limits: 1.0, penalty: 1.0 };
 
 impl Level {
@@ -130,7 +145,7 @@ impl Level {
         Level {
             assembled: 0,
             alternation,
-            receptance: Vec::new(),
+            receptance: Receptance::Formed(Vec::new()),
             penalty: vec![0.0; ports.len()],
             linear: vec![ZERO; nh * axes],
             imposed: vec![0.0; axes],
@@ -140,6 +155,8 @@ impl Level {
             blocks,
             forces: ports.iter().flat_map(|port| vec![port.is_force(); port.axes]).collect(),
             jacobian: Vec::new(),
+            coupled: (sparse.is_none() && size >= MANY).then(Coupled::default),
+            products: 0,
             sparse,
             residual: vec![0.0; size],
             units: vec![1.0; size],
@@ -147,7 +164,7 @@ impl Level {
             best: Motion::rest(nh * axes),
             step: vec![0.0; size],
             image: vec![ZERO; nh * widest],
-            moved: vec![ZERO; axes],
+            moved: vec![ZERO; nh * axes],
             product: vec![0.0; (2 * nh * widest).pow(2)],
         }
     }
@@ -173,17 +190,22 @@ impl Level {
     }
 
     /// Prepares for a drive frequency.
-    pub fn drive(&mut self, system: &System, ports: &Ports, rest: &Rest, omega: f64) {
+    ///
+    /// # Errors
+    /// A frequency (rad/s) at which the structure without its joints has a resonance without damping.
+    pub fn drive(&mut self, system: &System, ports: &Ports, rest: &Rest, omega: f64) -> Result<(), f64> {
         let n = system.dofs();
         let excitation = system.excitation(omega);
         let nh = self.harmonics().len();
-        self.receptance.clear();
+        for port in ports.iter() {
+            self.series[port.range()].fill(port.series);
+        }
         self.free.clear();
-        if let Some(sparse) = &mut self.sparse
-            && !sparse.drive(omega)
-        {
-            // a singular frequency: the next number has none of its zeros
-            sparse.drive(omega * (1.0 + f64::EPSILON));
+        if let Some(sparse) = &mut self.sparse {
+            // at a singular frequency: the next number has none of its zeros
+            sparse.drive(omega).or_else(|_| sparse.drive(omega * (1.0 + f64::EPSILON)))?;
+        } else {
+            self.receptance = self.receptance(ports, rest, omega)?;
         }
         for k in 0..nh {
             let h = self.alternation.harmonics[k];
@@ -194,13 +216,8 @@ impl Level {
                     sparse.respond(k, |i| force[i], free.as_mut_slice());
                 }
             } else {
-                let mut receptance = rest.receptance(h, omega);
-                for port in ports.iter() {
-                    port.range().for_each(|q| receptance[(q, q)] += port.series);
-                }
-                self.receptance.push(receptance);
                 if let Some((_, force)) = load {
-                    free = rest.respond(h, omega, force);
+                    free = rest.respond(h, omega, force).map_err(|_| h as f64 * omega)?;
                 }
             }
             for q in 0..ports.count() {
@@ -212,11 +229,8 @@ impl Level {
         for (q, imposed) in self.imposed.iter_mut().enumerate() {
             *imposed = ports.axis(system, q).imposed_at(0).re;
         }
-        for port in ports.iter() {
-            self.series[port.range()].fill(port.series);
-        }
         if !ports.has_forces() {
-            return;
+            return Ok(());
         }
         let top = self.alternation.harmonics[nh - 1].max(1);
         let [mass, _, stiffness] = system.structure().largest();
@@ -226,7 +240,7 @@ impl Level {
         let rate = top as f64 * omega;
         let smooth = match &mut self.sparse {
             Some(sparse) => sparse.own_at(rate),
-            None => rest.own_at(rate, omega),
+            None => rest.own_at(rate, omega).map_err(|_| rate)?,
         };
         for (penalty, port) in self.penalty.iter_mut().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
             // one for all axes of a port, so that no direction of its plane is another
@@ -239,6 +253,22 @@ impl Level {
                 self::penalty(receptance, top, omega).max(CLEAR * port.least_penalty)
             };
         }
+        Ok(())
+    }
+
+    /// Receptances of the axes with the springs in series, as matrices unless these would be many and modes are at hand.
+    fn receptance(&self, ports: &Ports, rest: &Rest, omega: f64) -> Result<Receptance, f64> {
+        let harmonics = self.harmonics();
+        if let Some(structure) = rest.modes_for(ports) {
+            let modal = Modal::new(structure, (harmonics, omega), &self.series);
+            return modal.map(Receptance::Modal).map_err(|_| omega);
+        }
+        let formed = harmonics.iter().map(|&h| {
+            let mut receptance = rest.receptance(h, omega).map_err(|_| h as f64 * omega)?;
+            self.series.iter().enumerate().for_each(|(q, series)| receptance[(q, q)] += series);
+            Ok(receptance)
+        });
+        Ok(Receptance::Formed(formed.collect::<Result<_, f64>>()?))
     }
 
     /// The motion to begin with: that of the describing functions, or without friction.
@@ -268,8 +298,8 @@ impl Level {
         motion
     }
 
-    /// Forces and residual at the unknowns in `motion`; the rest of it follows. The derivative goes into `self.tangents` and, in the dense
-    /// form, `self.jacobian` if `tangent`. Returns the size of the residual, relative.
+    /// Forces and residual at the unknowns in `motion`; the rest of it follows. The derivatives of the ports go into `self.tangents`, see [`Slopes`].
+    /// Returns the size of the residual, relative.
     pub fn evaluate(
         &mut self,
         ports: &Ports,
@@ -277,18 +307,21 @@ impl Level {
         motion: &mut Motion,
         ease: Ease,
         length: f64,
-        tangent: bool,
+        slopes: Slopes,
     ) -> f64 {
-        self.assembled += usize::from(tangent);
+        self.assembled += usize::from(slopes != Slopes::None);
         let nh = self.harmonics().len();
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
             let range = port.first * nh..(port.first + port.axes) * nh;
-            let slot = tangent.then_some(&mut self.tangents[block(&self.blocks, p, port, nh)]);
+            let wanted = slopes == Slopes::All || (slopes == Slopes::Cheap && !port.marches());
+            let slot = wanted.then_some(&mut self.tangents[block(&self.blocks, p, port, nh)]);
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
             self.alternation.respond(port, (omega, ease.limits), c, force, slot);
         }
         // what the structure does: into the residual of motions, and into the motions whose force is unknown
-        let count = ports.count();
+        if self.sparse.is_none() {
+            self.receptance.apply(&motion.force, &mut self.moved);
+        }
         for k in 0..nh {
             let (residual, linear, forces) = (&mut self.residual, &self.linear, &self.forces);
             let (c, force) = (&mut motion.c, &motion.force);
@@ -307,14 +340,7 @@ impl Level {
                     sparse.receive(k, |q| force[q * nh + k], follow);
                 }
                 None => {
-                    // column by column, as the matrix lies in memory
-                    self.moved.fill(ZERO);
-                    for p in 0..count {
-                        let f = force[p * nh + k];
-                        let column = self.receptance[k].column(p);
-                        self.moved.iter_mut().zip(column.iter()).for_each(|(u, r)| *u += r * f);
-                    }
-                    self.moved.iter().enumerate().for_each(|(q, u)| follow(q, *u));
+                    self.moved.chunks_exact(nh).enumerate().for_each(|(q, u)| follow(q, u[k]));
                 }
             }
         }
@@ -325,16 +351,14 @@ impl Level {
             let slot = &mut self.tangents[block(&self.blocks, p, port, nh)];
             slot.fill(0.0);
             let image = &mut self.image[..range.len()];
-            self.alternation.image(port, (omega, penalty, ease.limits), (c, force), image, tangent.then_some(slot));
+            let slot = (slopes != Slopes::None).then_some(slot);
+            self.alternation.image(port, (omega, penalty, ease.limits), (c, force), image, slot);
             for (at, (force, image)) in range.zip(force.iter().zip(&*image)) {
                 let r = force - image;
                 (self.residual[2 * at], self.residual[2 * at + 1]) = (r.re, r.im);
             }
         }
         self.measure(ports, motion, length);
-        if tangent && self.sparse.is_none() {
-            self.assemble(ports, omega, ease, length);
-        }
         // relative to the motion, weighted as velocities are, and to the limits
         let mut sum = 0.0;
         for port in ports.iter() {
@@ -350,6 +374,17 @@ impl Level {
         sum.sqrt()
     }
 
+    /// The derivatives that [`Slopes::Cheap`] left out.
+    pub fn follow_slopes(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, ease: Ease) {
+        let nh = self.harmonics().len();
+        for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.marches()) {
+            let range = port.first * nh..(port.first + port.axes) * nh;
+            let slot = &mut self.tangents[block(&self.blocks, p, port, nh)];
+            let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
+            self.alternation.respond(port, (omega, ease.limits), c, force, Some(slot));
+        }
+    }
+
     /// Units of the residual: the motion's length, or the law's scale. Where only laws hold a direction, the mean of the motion is the small
     /// difference of large ones, and its unit the larger of these.
     fn measure(&mut self, ports: &Ports, motion: &Motion, length: f64) {
@@ -361,7 +396,10 @@ impl Level {
                 continue;
             }
             for q in port.range() {
-                let moved = self.receptance.first().map_or(0.0, |r| r[(q, q)].norm() * motion.force[q * nh].norm());
+                let moved = match self.sparse {
+                    Some(_) => 0.0,
+                    None => self.receptance.mean(q) * motion.force[q * nh].norm(),
+                };
                 let large = unit + self.linear[q * nh].norm().min(moved);
                 (self.units[2 * q * nh], self.units[2 * q * nh + 1]) = (large, large);
             }
@@ -388,12 +426,14 @@ impl Level {
         forces
     }
 
-    /// The Jacobian from the tangents: rows and columns in units.
-    fn assemble(&mut self, ports: &Ports, omega: f64, ease: Ease, length: f64) {
+    /// The Jacobian from the tangents: rows and columns in units. False where receptances are no matrices.
+    pub(super) fn assemble(&mut self, ports: &Ports, omega: f64, ease: Ease, length: f64) -> bool {
+        let Receptance::Formed(receptance) = &self.receptance else { return false };
         let nh = self.harmonics().len();
         let pair = 2 * nh;
         let size = pair * ports.count();
-        self.jacobian.fill(0.0);
+        self.jacobian.clear();
+        self.jacobian.resize(size * size, 0.0);
         for (p, column) in ports.iter().enumerate() {
             let (high, wide) = (pair, pair * column.axes);
             let other = &self.tangents[block(&self.blocks, p, column, nh)];
@@ -409,7 +449,7 @@ impl Level {
                 for a in 0..row.axes {
                     for b in 0..column.axes {
                         for k in 0..nh {
-                            let r = self.receptance[k][(row.first + a, column.first + b)];
+                            let r = receptance[k][(row.first + a, column.first + b)];
                             let at = (a * high + 2 * k) * wide;
                             let (first, second) = product[at..at + 2 * wide].split_at_mut(wide);
                             if column.is_force() {
@@ -487,6 +527,7 @@ impl Level {
                 }
             }
         }
+        true
     }
 
     /// Residual of the equations at `unknowns` (per axis a motion or a force, relative to [`unit`]) into `residual`, in the same
@@ -501,12 +542,17 @@ impl Level {
         jacobian: Option<&mut [f64]>,
     ) {
         self.unpack(ports, (unknowns, length), motion);
-        self.evaluate(ports, omega, motion, GIVEN, length, jacobian.is_some());
+        let slopes = if jacobian.is_some() { Slopes::All } else { Slopes::None };
+        self.evaluate(ports, omega, motion, GIVEN, length, slopes);
         for ((out, r), unit) in residual.iter_mut().zip(&self.residual).zip(&self.units) {
             *out = r / unit;
         }
         if let Some(jacobian) = jacobian {
-            jacobian.copy_from_slice(&self.jacobian);
+            if self.assemble(ports, omega, GIVEN, length) {
+                jacobian.copy_from_slice(&self.jacobian);
+            } else {
+                jacobian.fill(f64::NAN);
+            }
         }
     }
 
@@ -633,7 +679,7 @@ mod tests {
             let sparse = sparse.then(|| Sparse::new(&self.system, &self.ports, &harmonics).unwrap());
             let samples = 256.max(16 * harmonics[harmonics.len() - 1]);
             let mut level = Level::new(harmonics, samples, &self.ports, sparse);
-            level.drive(&self.system, &self.ports, &self.rest, self.omega);
+            level.drive(&self.system, &self.ports, &self.rest, self.omega).unwrap();
             level
         }
     }
@@ -713,7 +759,7 @@ mod tests {
                     level.penalty[0] *= factor;
                     let start = level.begin(&case.system, &case.ports, None, case.omega);
                     let motion = level.solve(&case.ports, case.omega, start).unwrap();
-                    path::places(&mut level, &case.rest, case.omega, &motion)
+                    path::places(&mut level, &case.rest, case.omega, &motion).unwrap()
                 };
                 let distance = |a: &[DVector<Complex64>], b: &[DVector<Complex64>]| {
                     let zero = DVector::from_element(3, ZERO);

@@ -13,14 +13,17 @@
 
 mod arc;
 mod branch;
+mod coupled;
 mod equations;
 mod hold;
 mod mode;
 mod path;
 mod ports;
+mod receptance;
 mod rest;
 mod solve;
 mod sparse;
+mod uncoupled;
 
 use super::guess::Guess;
 use super::{Method, MethodError, MethodInfo, MethodOption, Options, OrbitError, PERIOD, Solver, periods};
@@ -379,7 +382,9 @@ fn above(
         return Vec::new();
     }
     let forces = level.forces_at(ports, omega, motion, &wanted);
-    wanted.iter().zip(&forces).map(|(h, forces)| rest.respond(*h, omega, &rest.spread(*h, |q| forces[q]))).collect()
+    let infinite = || DVector::from_element(level.free[0].len(), Complex64::new(f64::INFINITY, 0.0));
+    let respond = |h: usize, forces: &[Complex64]| rest.respond(h, omega, &rest.spread(h, |q| forces[q]));
+    wanted.iter().zip(&forces).map(|(h, forces)| respond(*h, forces).unwrap_or_else(|_| infinite())).collect()
 }
 
 struct Balance<'a> {
@@ -436,7 +441,10 @@ impl<'a> Balance<'a> {
 
 impl Balance<'_> {
     /// The level of highest harmonic `top`, ready for `omega`.
-    fn level(&mut self, top: usize, omega: f64) -> &mut Level {
+    ///
+    /// # Errors
+    /// A resonance without damping.
+    fn level(&mut self, top: usize, omega: f64) -> Result<&mut Level, Lost> {
         let harmonics = self.kept.up_to(top);
         let samples = self.method.samples_at(top, &self.ports);
         let (system, ports) = (&self.system, &self.ports);
@@ -444,8 +452,8 @@ impl Balance<'_> {
             let sparse = Sparse::new(system, ports, &harmonics);
             Level::new(harmonics, samples, ports, sparse)
         });
-        level.drive(&self.system, &self.ports, &self.rest, omega);
-        level
+        level.drive(&self.system, &self.ports, &self.rest, omega).map_err(Lost::at)?;
+        Ok(level)
     }
 
     fn unknowns(&self, top: usize) -> usize {
@@ -457,7 +465,7 @@ impl Balance<'_> {
         let start = match from {
             Some((other, motion)) => {
                 let harmonics = self.levels[&other].harmonics().to_vec();
-                equations::transfer(motion, &harmonics, self.level(top, omega).harmonics())
+                equations::transfer(motion, &harmonics, self.level(top, omega)?.harmonics())
             }
             None if self.ports.has_forces() && top > COLD * self.kept.scale && top / 2 >= self.first => {
                 let coarse = self.solve(top / 2, omega, None)?;
@@ -465,8 +473,8 @@ impl Balance<'_> {
             }
             None => {
                 // the guess solves the whole structure densely: large systems begin without friction
-                let guess = (self.system.dofs() < sparse::LARGE).then(|| Guess::new(&self.system, omega));
-                self.level(top, omega);
+                let guess = (self.system.dofs() < sparse::GUESSED).then(|| Guess::new(&self.system, omega));
+                self.level(top, omega)?;
                 let begun = self.levels[&top].begin(&self.system, &self.ports, guess.as_ref(), omega);
                 self.approached(top, omega, guess.as_ref()).unwrap_or(begun)
             }
@@ -503,6 +511,9 @@ impl Balance<'_> {
     }
 
     fn lost(&self, lost: Lost) -> OrbitError {
+        if let Some(resonance) = lost.resonance {
+            return OrbitError::Resonance { method: NAME, omega: self.drive, resonance };
+        }
         OrbitError::NotConverged {
             method: NAME,
             omega: self.drive,
@@ -512,8 +523,8 @@ impl Balance<'_> {
     }
 
     /// Harmonics of the places.
-    fn places(&mut self, top: usize, omega: f64, motion: &Motion) -> Vec<DVector<Complex64>> {
-        path::places(self.levels.get_mut(&top).expect("solved"), &self.rest, omega, motion)
+    fn places(&mut self, top: usize, omega: f64, motion: &Motion) -> Result<Vec<DVector<Complex64>>, Lost> {
+        path::places(self.levels.get_mut(&top).expect("solved"), &self.rest, omega, motion).map_err(Lost::at)
     }
 
     fn finish(
@@ -539,7 +550,7 @@ impl Balance<'_> {
         let orbit =
             path::orbit(context, level, &motion, x).ok_or(OrbitError::Drift { method: NAME, omega: self.drive })?;
         if !path::balances(&self.system, &orbit) {
-            let lost = Lost { iterations: motion.iterations, residual: orbit.evidence.energy_gap };
+            let lost = Lost { residual: orbit.evidence.energy_gap, resonance: None, iterations: motion.iterations };
             return Err(self.lost(lost));
         }
         self.recent.truncate(RECENT - 1);
@@ -550,18 +561,18 @@ impl Balance<'_> {
     /// The solution near another one, without an estimate of its error, and without the long ways of [`Level::solve`]: a search that asks
     /// for it can do without.
     fn nearby(&mut self, top: usize, omega: f64, near: &Motion) -> Result<Orbit, OrbitError> {
-        self.level(top, omega);
+        self.level(top, omega).map(|_| ()).map_err(|l| self.lost(l))?;
         let mut motion = Motion { iterations: 0, ..near.clone() };
         let level = self.levels.get_mut(&top).expect("made above");
         level.polish(&self.ports, omega, &mut motion, NEARBY).map_err(|l| self.lost(l))?;
-        let x = self.places(top, omega, &motion);
+        let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         self.finish(top, omega, motion, x, None)
     }
 
     /// The user's number of harmonics, with an estimate of its error.
     fn fixed(&mut self, top: usize, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
         let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
-        let x = self.places(top, omega, &motion);
+        let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         let sparse = self.levels[&top].sparse.is_some();
         let known = sparse || self.unknowns(self.kept.double(top)) <= LARGEST;
         let truncation = if known { self.compare(top, omega, &motion, &x).ok().map(|(error, ..)| error) } else { None };
@@ -578,7 +589,7 @@ impl Balance<'_> {
     ) -> Result<(f64, Motion, Vec<DVector<Complex64>>), Lost> {
         let double = self.kept.double(top);
         let better = self.solve(double, omega, Some((top, motion)))?;
-        let y = self.places(double, omega, &better);
+        let y = self.places(double, omega, &better)?;
         let finer = self.levels.get_mut(&double).expect("solved");
         let coarse = Compared { harmonics: &self.kept.up_to(top), places: x, along: &motion.c };
         let at = (self.kept, omega);
@@ -591,7 +602,7 @@ impl Balance<'_> {
         let tolerance = self.method.tolerance.unwrap_or(TOLERANCE);
         let mut top = self.first;
         let mut motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
-        let mut x = self.places(top, omega, &motion);
+        let mut x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         // nothing is known of the error until two solutions can be compared
         let (mut checked, mut estimate) = (top, 1.0);
         let sparse = self.levels[&top].sparse.is_some();

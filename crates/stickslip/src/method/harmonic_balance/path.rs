@@ -18,24 +18,33 @@ use std::sync::Arc;
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Harmonics of all places under the forces of a motion.
-pub(super) fn places(level: &mut Level, rest: &Rest, omega: f64, motion: &Motion) -> Vec<DVector<Complex64>> {
+///
+/// # Errors
+/// A resonance without damping, rad/s.
+pub(super) fn places(
+    level: &mut Level,
+    rest: &Rest,
+    omega: f64,
+    motion: &Motion,
+) -> Result<Vec<DVector<Complex64>>, f64> {
     let nh = level.harmonics().len();
     (0..nh)
         .map(|k| {
             let h = level.harmonics()[k];
             let forces = rest.spread(h, |q| motion.force[q * nh + k]);
             let Some(sparse) = &mut level.sparse else {
-                let mut x = &level.free[k] - rest.respond(h, omega, &forces);
+                let singular = |_| h as f64 * omega;
+                let mut x = &level.free[k] - rest.respond(h, omega, &forces).map_err(singular)?;
                 if h == 0 {
-                    rest.settle(omega, &mut x, |q| level.mean(q, motion));
+                    rest.settle(omega, &mut x, |q| level.mean(q, motion)).map_err(singular)?;
                 }
-                return x;
+                return Ok(x);
             };
             let mut x = level.free[k].clone();
             let mut moved = x.clone();
             sparse.respond(k, |i| forces[i], moved.as_mut_slice());
             x -= moved;
-            x
+            Ok(x)
         })
         .collect()
 }

@@ -9,6 +9,7 @@
 
 use super::hold::HOLD;
 use super::ports::Ports;
+use super::uncoupled::Uncoupled;
 use crate::model::{Cyclic, System};
 use crate::structure::{DynamicStiffness, Matrices, Sector, Structure, Wave, WaveStiffness, turn};
 use nalgebra::{DMatrix, DVector};
@@ -17,6 +18,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip_numerics::modes::Modes;
+use stickslip_numerics::sparse::Singular;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -26,6 +28,11 @@ const HELD: f64 = 1e-5;
 /// Degrees of freedom beyond which full matrices are not taken apart into modes: at 200 that takes a second, with the third power.
 const MODES: usize = 200;
 
+/// Axes from which receptances of a structure in modes are not formed: the products with both take as long.
+const MANY: usize = 150;
+/// Right sides that a factor solves at once.
+const AT_ONCE: usize = 64;
+
 /// Harmonics that nobody samples.
 const HIGHEST: f64 = 1e6;
 
@@ -34,6 +41,8 @@ const HIGHEST: f64 = 1e6;
 pub(super) struct Rest {
     n: usize,
     modal: Option<Modal>,
+    /// Of large structures whose damping couples no modes.
+    uncoupled: Option<Arc<Uncoupled>>,
     /// Dynamic stiffnesses of large structures at the last drive frequency, by their rates.
     factors: RefCell<Vec<Factored>>,
     structure: Structure,
@@ -43,12 +52,12 @@ pub(super) struct Rest {
     waves: Option<Waves>,
 }
 
-/// A dynamic stiffness at a rate (1/s), made at a drive frequency (rad/s); none at a resonance without damping.
+/// A dynamic stiffness at a rate (1/s), made at a drive frequency (rad/s); singular at a resonance without damping.
 #[derive(Debug, Clone)]
 struct Factored<F = DynamicStiffness> {
     rate: Complex64,
     omega: f64,
-    factor: Option<Arc<F>>,
+    factor: Result<Arc<F>, Singular>,
 }
 
 /// The waves on a ring: one per nodal diameter that a harmonic has met.
@@ -66,25 +75,26 @@ impl Waves {
         Some(Waves { cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
     }
 
-    /// Displacements of the first sector in a wave under complex forces on it, in place, columns one after the other; zeros at a resonance
-    /// without damping.
-    fn solve(&self, diameter: usize, (s, omega): (Complex64, f64), loads: &mut [Complex64]) {
-        match self.factor(diameter, s, omega) {
-            Some(factor) => factor.solve(loads),
-            None => loads.fill(ZERO),
-        }
+    /// Displacements of the first sector in a wave under complex forces on it, in place, columns one after the other.
+    fn solve(&self, diameter: usize, (s, omega): (Complex64, f64), loads: &mut [Complex64]) -> Result<(), Singular> {
+        self.factor(diameter, s, omega)?.solve(loads);
+        Ok(())
     }
 
     /// Kept as long as the drive frequency stays.
-    fn factor(&self, diameter: usize, s: Complex64, omega: f64) -> Option<Arc<WaveStiffness>> {
+    fn factor(&self, diameter: usize, s: Complex64, omega: f64) -> Result<Arc<WaveStiffness>, Singular> {
         let mut factors = self.factors.borrow_mut();
         factors.retain(|(_, kept)| kept.omega == omega);
         if let Some((_, kept)) = factors.iter().find(|(d, kept)| *d == diameter && kept.rate == s) {
             return kept.factor.clone();
         }
         let mut met = self.met.borrow_mut();
-        let wave = met.entry(diameter).or_insert_with(|| self.sector.wave(diameter).ok().map(Arc::new)).clone()?;
-        let factor = wave.dynamic_stiffness(s, hold(s, omega)).ok().map(Arc::new);
+        let wave = met
+            .entry(diameter)
+            .or_insert_with(|| self.sector.wave(diameter).ok().map(Arc::new))
+            .clone()
+            .ok_or(Singular { row: 0 })?;
+        let factor = wave.dynamic_stiffness(s, hold(s, omega)).map(Arc::new);
         factors.push((diameter, Factored { rate: s, omega, factor: factor.clone() }));
         factor
     }
@@ -108,33 +118,38 @@ impl Waves {
         diameter: usize,
         at: (Complex64, f64),
         directions: &[Vec<(usize, f64)>],
-    ) -> DMatrix<Complex64> {
+    ) -> Result<DMatrix<Complex64>, Singular> {
         let columns = self.columns(diameter, directions);
         let mut moved = columns.clone();
-        self.solve(diameter, at, moved.as_mut_slice());
-        columns.adjoint() * moved
+        self.solve(diameter, at, moved.as_mut_slice())?;
+        Ok(columns.adjoint() * moved)
     }
 
     /// Displacements along the axes under unit forces along each alone, without its neighbours': the mean of all waves. At a real rate.
-    fn own(&self, (rate, omega): (f64, f64), directions: &[Vec<(usize, f64)>]) -> Vec<f64> {
+    fn own(&self, (rate, omega): (f64, f64), directions: &[Vec<(usize, f64)>]) -> Result<Vec<f64>, Singular> {
         let sectors = self.cyclic.sectors;
         let mut own = vec![0.0; directions.len()];
         for diameter in 0..=sectors / 2 {
             // a wave the other way around is as stiff
             let both = if (2 * diameter).is_multiple_of(sectors) { 1.0 } else { 2.0 };
-            let receptance = self.receptance(diameter, (Complex64::new(rate, 0.0), omega), directions);
+            let receptance = self.receptance(diameter, (Complex64::new(rate, 0.0), omega), directions)?;
             own.iter_mut().enumerate().for_each(|(q, own)| *own += both * receptance[(q, q)].re / sectors as f64);
         }
-        own
+        Ok(own)
     }
 
     /// Displacements of the ring under forces on it that travel.
-    fn respond(&self, diameter: usize, at: (Complex64, f64), force: &DVector<Complex64>) -> DVector<Complex64> {
+    fn respond(
+        &self,
+        diameter: usize,
+        at: (Complex64, f64),
+        force: &DVector<Complex64>,
+    ) -> Result<DVector<Complex64>, Singular> {
         let n = self.sector.dofs();
         let mut one = force.as_slice()[..n].to_vec();
-        self.solve(diameter, at, &mut one);
+        self.solve(diameter, at, &mut one)?;
         let phases: Vec<Complex64> = (0..self.cyclic.sectors).map(|k| self.phase(diameter, k)).collect();
-        DVector::from_fn(force.len(), |i, _| one[i % n] * phases[i / n])
+        Ok(DVector::from_fn(force.len(), |i, _| one[i % n] * phases[i / n]))
     }
 }
 
@@ -164,10 +179,14 @@ impl Rest {
             })
             .collect::<Vec<Vec<(usize, f64)>>>();
         let waves = ports.wave().and_then(|wave| Waves::new(system, wave));
-        let without = waves.is_some() || is_factored(system.structure());
+        let factored = is_factored(system.structure());
         Rest {
             n,
-            modal: if without { None } else { modal(system, &columns(n, &directions)) },
+            modal: if factored || waves.is_some() { None } else { modal(system, &columns(n, &directions)) },
+            uncoupled: match factored && waves.is_none() {
+                true => Uncoupled::new(system.structure(), &directions).map(Arc::new),
+                false => None,
+            },
             factors: RefCell::default(),
             structure: system.structure().clone(),
             directions,
@@ -175,8 +194,16 @@ impl Rest {
         }
     }
 
+    /// Modes in place of receptances, where these would be large matrices and no port asks for more than their products.
+    pub fn modes_for(&self, ports: &Ports) -> Option<&Arc<Uncoupled>> {
+        self.uncoupled.as_ref().filter(|_| ports.count() >= MANY && !ports.has_forces())
+    }
+
     /// Displacements along the axes under unit forces along them, at `s = jhΩ`, q × q, m/N.
-    pub fn receptance(&self, harmonic: usize, omega: f64) -> DMatrix<Complex64> {
+    ///
+    /// # Errors
+    /// A resonance without damping.
+    pub fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, Singular> {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
         match &self.waves {
             Some(waves) => waves.receptance(waves.cyclic.diameter(harmonic), (s, omega), &self.directions),
@@ -185,28 +212,41 @@ impl Rest {
     }
 
     /// Displacement along each axis under a unit force along it alone at a rate on the positive real axis, where there are no resonances, m/N.
-    pub fn own_at(&self, rate: f64, omega: f64) -> Vec<f64> {
-        match &self.waves {
-            Some(waves) => waves.own((rate, omega), &self.directions),
-            None => {
-                let receptance = self.receptance_at(Complex64::new(rate, 0.0), omega);
-                (0..self.directions.len()).map(|q| receptance[(q, q)].norm()).collect()
-            }
+    ///
+    /// # Errors
+    /// A matrix that is singular there: the structure has neither mass nor spring along a direction.
+    pub fn own_at(&self, rate: f64, omega: f64) -> Result<Vec<f64>, Singular> {
+        if let Some(waves) = &self.waves {
+            return waves.own((rate, omega), &self.directions);
         }
+        let receptance = self.receptance_at(Complex64::new(rate, 0.0), omega)?;
+        Ok((0..self.directions.len()).map(|q| receptance[(q, q)].norm()).collect())
     }
 
-    fn receptance_at(&self, s: Complex64, omega: f64) -> DMatrix<Complex64> {
+    fn receptance_at(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, Singular> {
         let q = self.directions.len();
+        if let Some(uncoupled) = &self.uncoupled {
+            return uncoupled.receptance(s, omega);
+        }
         if self.is_factored() {
-            let Some(factor) = self.factor(s, omega) else { return DMatrix::from_element(q, q, ZERO) };
-            let mut moved = columns(self.n, &self.directions).map(|w| Complex64::new(w, 0.0));
-            factor.solve(moved.as_mut_slice());
-            return DMatrix::from_fn(q, q, |a, b| self.directions[a].iter().map(|&(i, w)| moved[(i, b)] * w).sum());
+            let factor = self.factor(s, omega)?;
+            let mut receptance = DMatrix::from_element(q, q, ZERO);
+            // some at a time: all at once would fill the memory
+            for (number, some) in self.directions.chunks(AT_ONCE).enumerate() {
+                let mut moved = columns(self.n, some).map(|w| Complex64::new(w, 0.0));
+                factor.solve(moved.as_mut_slice());
+                for (b, moved) in moved.column_iter().enumerate() {
+                    for (a, rows) in self.directions.iter().enumerate() {
+                        receptance[(a, number * AT_ONCE + b)] = rows.iter().map(|&(i, w)| moved[i] * w).sum();
+                    }
+                }
+            }
+            return Ok(receptance);
         }
         let Some(modal) = &self.modal else {
-            let Some(inverse) = self.dynamic(s).try_inverse() else { return DMatrix::from_element(q, q, ZERO) };
+            let inverse = self.dynamic(s).try_inverse().ok_or(Singular { row: 0 })?;
             let direction = columns(self.n, &self.directions).map(|w| Complex64::new(w, 0.0));
-            return direction.transpose() * inverse * direction;
+            return Ok(direction.transpose() * inverse * direction);
         };
         let mut sum = DMatrix::from_element(q, q, ZERO);
         for (m, &lambda) in modal.lambda.iter().enumerate() {
@@ -226,23 +266,33 @@ impl Rest {
                 }
             }
         }
-        sum
+        Ok(sum)
     }
 
     /// Displacements of all places under the complex forces `force` (length n, N), m.
-    pub fn respond(&self, harmonic: usize, omega: f64, force: &DVector<Complex64>) -> DVector<Complex64> {
+    ///
+    /// # Errors
+    /// A resonance without damping.
+    pub fn respond(
+        &self,
+        harmonic: usize,
+        omega: f64,
+        force: &DVector<Complex64>,
+    ) -> Result<DVector<Complex64>, Singular> {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
         if let Some(waves) = &self.waves {
             return waves.respond(waves.cyclic.diameter(harmonic), (s, omega), force);
         }
+        if let Some(uncoupled) = &self.uncoupled {
+            return uncoupled.respond(s, omega, force);
+        }
         if self.is_factored() {
-            let Some(factor) = self.factor(s, omega) else { return DVector::from_element(self.n, ZERO) };
             let mut x = force.clone();
-            factor.solve(x.as_mut_slice());
-            return x;
+            self.factor(s, omega)?.solve(x.as_mut_slice());
+            return Ok(x);
         }
         let Some(modal) = &self.modal else {
-            return self.dynamic(s).lu().solve(force).unwrap_or_else(|| DVector::from_element(self.n, ZERO));
+            return self.dynamic(s).lu().solve(force).ok_or(Singular { row: 0 });
         };
         let mut x = DVector::from_element(self.n, ZERO);
         for (m, &lambda) in modal.lambda.iter().enumerate() {
@@ -264,25 +314,36 @@ impl Rest {
                 x[i] += push * modal.free[(i, r)];
             }
         }
-        x
+        Ok(x)
     }
 
     /// Moves the mean positions `x` (length n) so that they are `along` the axes what the ports know. Where only laws hold a direction, positions
     /// are the small difference of large ones, and rounding of the forces would move them.
-    pub fn settle(&self, omega: f64, x: &mut DVector<Complex64>, along: impl Fn(usize) -> f64) {
+    ///
+    /// # Errors
+    /// A structure that is singular at rest.
+    pub fn settle(&self, omega: f64, x: &mut DVector<Complex64>, along: impl Fn(usize) -> f64) -> Result<(), Singular> {
         let q = self.directions.len();
+        let unheld = free_fraction(ZERO, omega).re / self.structure.largest()[0];
+        if let Some(uncoupled) = &self.uncoupled {
+            // nothing at rest moves farther than what is pulled
+            let own = uncoupled.own_receptance(&uncoupled.gains(ZERO, omega)?);
+            if own.iter().all(|r| r.norm() < HELD * unheld) {
+                return Ok(());
+            }
+        }
         let off =
             DVector::from_fn(q, |a, _| along(a) - self.directions[a].iter().map(|&(i, w)| w * x[i].re).sum::<f64>());
-        let receptance = self.receptance(0, omega).map(|r| r.re);
+        let receptance = self.receptance(0, omega)?.map(|r| r.re);
         let largest = receptance.amax();
-        let unheld = free_fraction(ZERO, omega).re / self.structure.largest()[0];
         if largest == 0.0 || largest < HELD * unheld {
-            return; // springs hold all that moves, or nothing does
+            return Ok(()); // springs hold all that moves, or nothing does
         }
         // only along what nothing else holds
-        let Ok(inverse) = receptance.pseudo_inverse(HELD * largest) else { return };
+        let Ok(inverse) = receptance.pseudo_inverse(HELD * largest) else { return Ok(()) };
         let force = (inverse * off).map(|f| Complex64::new(f, 0.0));
-        *x += self.respond(0, omega, &self.spread(0, |a| force[a]));
+        *x += self.respond(0, omega, &self.spread(0, |a| force[a]))?;
+        Ok(())
     }
 
     /// The harmonics next to the resonances above harmonic `top`.
@@ -323,14 +384,14 @@ impl Rest {
         is_factored(&self.structure)
     }
 
-    /// Of a large structure: kept as long as the drive frequency stays. `None` at a resonance without damping.
-    fn factor(&self, s: Complex64, omega: f64) -> Option<Arc<DynamicStiffness>> {
+    /// Of a large structure: kept as long as the drive frequency stays.
+    fn factor(&self, s: Complex64, omega: f64) -> Result<Arc<DynamicStiffness>, Singular> {
         let mut factors = self.factors.borrow_mut();
         factors.retain(|kept| kept.omega == omega);
         if let Some(kept) = factors.iter().find(|kept| kept.rate == s) {
             return kept.factor.clone();
         }
-        let factor = self.structure.held_stiffness(s, hold(s, omega)).ok().map(Arc::new);
+        let factor = self.structure.held_stiffness(s, hold(s, omega)).map(Arc::new);
         factors.push(Factored { rate: s, omega, factor: factor.clone() });
         factor
     }
@@ -440,14 +501,14 @@ mod tests {
                 (1..=n).map(one).sum()
             };
             let at = [3.0, (n - 1) as f64];
-            let receptance = rest.receptance(h, omega);
+            let receptance = rest.receptance(h, omega).unwrap();
             for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
                 let expected = exact(at[a], at[b]);
                 assert!((receptance[(a, b)] - expected).norm() < 1e-9 * exact(at[0], at[0]).norm(), "{a} {b}: {h}");
             }
             let mut force = DVector::from_element(n, ZERO);
             force[9] = Complex64::new(0.0, 2.0);
-            let x = rest.respond(h, omega, &force);
+            let x = rest.respond(h, omega, &force).unwrap();
             for i in [1, 10, n] {
                 let expected = exact(i as f64, 10.0) * Complex64::new(0.0, 2.0);
                 assert!((x[i - 1] - expected).norm() < 1e-9 * exact(10.0, 10.0).norm());

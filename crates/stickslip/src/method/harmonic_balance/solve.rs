@@ -1,7 +1,8 @@
 //! The search for a solution: Newton's method with the exact derivative; where it fails, a smaller penalty, and then slip limits that are
 //! lowered from where everything sticks.
 
-use super::equations::{Ease, GIVEN, Level, Motion, SOLVED, unit};
+use super::coupled::FORMED;
+use super::equations::{Ease, GIVEN, Level, Motion, SOLVED, Slopes, unit};
 use super::ports::Ports;
 use super::sparse::Along;
 use num_complex::Complex64;
@@ -31,14 +32,30 @@ const GENTLE: [f64; 3] = [0.04, 0.2, 1.0];
 /// search that is to end takes a few of them.
 const WORK: f64 = 1e10;
 const FEWEST: f64 = 40.0;
-/// Steps of laws with a memory in one search. A search that is to end takes a few hundred thousand; where a law is stiff these take ten seconds.
+/// Steps of laws with a memory in one search, but for [`EVALUATIONS`] in any case. A search of one joint that is to end takes a few hundred
+/// thousand; where a law is stiff these take ten seconds.
 const MARCHED: usize = 3_000_000;
+/// Evaluations of all laws that a search may take in any case: homotopies take hundreds.
+const EVALUATIONS: usize = 800;
+/// Periods that a law with a memory is followed for one of them, roughly.
+const PERIODS: usize = 4;
+/// Products with the derivative that a step takes, roughly.
+const PRODUCTS: f64 = 30.0;
 
 /// The search did not end.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lost {
     pub iterations: usize,
     pub residual: f64,
+    /// A resonance without damping, rad/s.
+    pub resonance: Option<f64>,
+}
+
+impl Lost {
+    /// By the structure alone.
+    pub fn at(resonance: f64) -> Self {
+        Lost { iterations: 0, residual: f64::INFINITY, resonance: Some(resonance) }
+    }
 }
 
 impl Level {
@@ -46,15 +63,16 @@ impl Level {
     /// set of slipping samples that repeats.
     fn newton(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, ease: Ease, most: usize) -> Result<(), Lost> {
         let mut length = self.length(motion);
-        let mut residual = self.evaluate(ports, omega, motion, ease, length, true);
+        let mut residual = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
         let mut least = f64::INFINITY;
         // the residual that is to be halved, and for how long it was not
         let (mut mark, mut waited) = (residual, 0);
         for _ in 0..most {
-            if self.is_exhausted() || residual <= SOLVED || (waited > PATIENCE && least <= ROUNDED) {
+            if self.is_exhausted(ports) || residual <= SOLVED || (waited > PATIENCE && least <= ROUNDED) {
                 break;
             }
-            if !self.newton_step(ports, ease, length) {
+            self.follow_slopes(ports, omega, motion, ease);
+            if !self.newton_step(ports, omega, ease, (length, residual)) {
                 break;
             }
             motion.iterations += 1;
@@ -66,8 +84,8 @@ impl Level {
                     fraction = 1.0;
                 }
                 self.advance(ports, motion, fraction, length);
-                after = self.evaluate(ports, omega, motion, ease, length, true);
-                if after < (1.0 - SHORTENS * fraction) * residual || self.is_exhausted() {
+                after = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
+                if after < (1.0 - SHORTENS * fraction) * residual || self.is_exhausted(ports) {
                     break;
                 }
                 fraction *= 0.5;
@@ -85,7 +103,7 @@ impl Level {
             if now < 0.5 * length || now > 2.0 * length {
                 // the motion was far from what it began with: its own size counts
                 length = now;
-                residual = self.evaluate(ports, omega, motion, ease, length, true);
+                residual = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
                 least = f64::INFINITY;
             }
         }
@@ -94,29 +112,32 @@ impl Level {
             motion.c.clone_from(&self.best.c);
             motion.force.clone_from(&self.best.force);
             motion.iterations = iterations;
-            residual = self.evaluate(ports, omega, motion, ease, length, false);
+            residual = self.evaluate(ports, omega, motion, ease, length, Slopes::None);
         }
         motion.residual = residual;
         if residual <= SOLVED || (waited > PATIENCE && residual <= ROUNDED) {
             Ok(())
         } else {
-            Err(Lost { iterations: motion.iterations, residual })
+            Err(Lost { iterations: motion.iterations, residual, resonance: None })
         }
     }
 
     /// Whether the search has taken all the work that it may.
-    fn is_exhausted(&self) -> bool {
+    fn is_exhausted(&self, ports: &Ports) -> bool {
         let size = self.residual.len() as f64;
+        let axes = size / (2 * self.harmonics().len()) as f64;
         let one = match self.sparse {
             // blocks of all harmonics of a coordinate and its neighbours
             Some(_) => size * (4 * self.harmonics().len()).pow(2) as f64,
+            None if self.coupled.is_some() => PRODUCTS * 2.0 * size * axes,
             None => size * size * size / 3.0,
         };
-        self.assembled as f64 > (WORK / one).max(FEWEST) || self.alternation.marched > MARCHED
+        let marched = EVALUATIONS * PERIODS * self.alternation.samples() * ports.len();
+        self.assembled as f64 > (WORK / one).max(FEWEST) || self.alternation.marched > MARCHED.max(marched)
     }
 
     /// The Newton step into `self.step`, in the unknowns' units.
-    fn newton_step(&mut self, ports: &Ports, ease: Ease, length: f64) -> bool {
+    fn newton_step(&mut self, ports: &Ports, omega: f64, ease: Ease, (length, residual): (f64, f64)) -> bool {
         let pair = 2 * self.harmonics().len();
         self.step.copy_from_slice(&self.residual);
         match &mut self.sparse {
@@ -135,8 +156,14 @@ impl Level {
                 for (d, unit) in self.step.iter_mut().zip(&self.units) {
                     *d /= unit;
                 }
+                if self.coupled.is_some() && self.coupled_step(ports, omega, ease, (length, residual)) {
+                    return true;
+                }
                 let size = self.step.len();
-                dense::solve(&mut self.jacobian, size, &mut self.step)
+                if self.coupled.is_some() && size > FORMED {
+                    return false;
+                }
+                self.assemble(ports, omega, ease, length) && dense::solve(&mut self.jacobian, size, &mut self.step)
             }
         }
     }
@@ -190,11 +217,11 @@ impl Level {
         good.c.copy_from_slice(&self.linear);
         let mut limits = 1.0;
         // where everything sticks the equations are linear
-        let mut held = Err(Lost { iterations: good.iterations, residual: f64::INFINITY });
+        let mut held = Err(Lost { iterations: good.iterations, residual: f64::INFINITY, resonance: None });
         for _ in 0..60 {
             limits *= 4.0;
             held = self.newton(ports, omega, &mut good, Ease { limits, ..GIVEN }, ITERATIONS);
-            if held.is_ok() || self.is_exhausted() || good.iterations - motion.iterations > MOST_RAISING {
+            if held.is_ok() || self.is_exhausted(ports) || good.iterations - motion.iterations > MOST_RAISING {
                 break;
             }
         }
@@ -212,7 +239,7 @@ impl Level {
                 }
                 Err(lost) => {
                     factor = factor.sqrt();
-                    if factor > 0.995 || self.is_exhausted() || good.iterations > MOST_ITERATIONS {
+                    if factor > 0.995 || self.is_exhausted(ports) || good.iterations > MOST_ITERATIONS {
                         return Err(lost);
                     }
                 }

@@ -11,8 +11,10 @@ use crate::model::System;
 use num_complex::Complex64;
 use stickslip_numerics::banded::{Banded, order};
 
-/// Degrees of freedom from which a system counts as large.
-pub(super) const LARGE: usize = 40;
+/// Degrees of freedom from which the banded form is thought of.
+const LARGE: usize = 16;
+/// Degrees of freedom from which a search begins without friction: the describing functions solve the whole structure, densely.
+pub(super) const GUESSED: usize = 40;
 
 /// What the laws at the ports add to the tangents.
 pub(super) struct Along<'a> {
@@ -54,6 +56,13 @@ impl Sparse {
         }
         let entries: Vec<(usize, usize, [f64; 3])> = system.structure().entries().collect();
         let ends: Vec<Vec<(usize, f64)>> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();
+        // eliminations in the band and along the joints, both without the cube of twice the harmonics
+        let along = (ends.len() as f64).powi(3) / 3.0;
+        let is_dearer = |whole: usize, band: usize| whole as f64 * ((band + 1) as f64).powi(2) > along;
+        let widest = ports.iter().map(|port| port.range().map(|q| ends[q].len()).max().unwrap_or(0)).max();
+        if is_dearer(n, widest.unwrap_or(0).saturating_sub(1)) {
+            return None; // no band is narrower than what one joint couples
+        }
         let mut links: Vec<(usize, usize)> = entries.iter().map(|(i, k, _)| (*i, *k)).collect();
         let mut unknown = 0;
         let mut forces = vec![None; ends.len()];
@@ -72,9 +81,7 @@ impl Sparse {
         let whole = n + unknown;
         let position = order(whole, &links);
         let band = links.iter().map(|&(a, b)| position[a].abs_diff(position[b])).max().unwrap_or(0);
-        // eliminations in the band and along the joints, both without the cube of twice the harmonics
-        let along = (ends.len() as f64).powi(3) / 3.0;
-        if whole as f64 * ((band + 1) as f64).powi(2) > along {
+        if is_dearer(whole, band) {
             return None;
         }
         let nh = harmonics.len();
@@ -94,8 +101,11 @@ impl Sparse {
         })
     }
 
-    /// Factors the dynamic stiffness. False if it is singular at a harmonic.
-    pub fn drive(&mut self, omega: f64) -> bool {
+    /// Factors the dynamic stiffness.
+    ///
+    /// # Errors
+    /// The frequency, rad/s, of a harmonic at which it is singular.
+    pub fn drive(&mut self, omega: f64) -> Result<(), f64> {
         self.omega = omega;
         for (k, factor) in self.factors.iter_mut().enumerate() {
             factor.clear();
@@ -115,10 +125,10 @@ impl Sparse {
                 factor.add(at + 1, at + 1, 1.0);
             }
             if !factor.factor() {
-                return false;
+                return Err(rate);
             }
         }
-        true
+        Ok(())
     }
 
     /// Displacements of all places at harmonic number `k` of the list, from forces on them: `values(place)`, into `out`.

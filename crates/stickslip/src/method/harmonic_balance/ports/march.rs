@@ -6,12 +6,13 @@
 //! sticks all the time, `1 - Π` is singular: there states and derivatives stay what they were when the joint was first moved
 //! from its mean position.
 
-use super::alternation::{Alternation, ZERO, share};
+use super::alternation::{Alternation, share};
 use super::memory::Memory;
 use crate::law::MOST_DIRECTIONS;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
+use stickslip_numerics::dense::multiply_in_blocks;
 
 /// Distance of the states from those a period later, relative to their size, at which they repeat: the rounding of a thousand steps.
 const REPEATS: f64 = 1e-12;
@@ -21,6 +22,8 @@ const ROUNDED: f64 = 1e-9;
 const PERIODS: usize = 60;
 /// Singular values of `1 - Π` below this belong to states that nothing forgets.
 const NEUTRAL: f64 = 1e-9;
+/// Harmonics up to which those of a derivative are made by a matrix, not by transforms.
+const FEW: usize = 16;
 
 /// A law with memory as a chain of steps.
 pub(super) trait March {
@@ -65,7 +68,7 @@ impl Alternation {
     pub(super) fn march(&mut self, march: &mut dyn March, force: &mut [Complex64], tangent: Option<&mut [f64]>) {
         let nh = self.harmonics.len();
         let mut memory = std::mem::take(&mut self.march);
-        if let Some(product) = self.repeat(march, &mut memory) {
+        if let Some(product) = self.repeat(march, &mut memory, tangent.is_some()) {
             for a in 0..march.axes() {
                 self.add_force(a, &mut force[a * nh..(a + 1) * nh]);
             }
@@ -80,8 +83,8 @@ impl Alternation {
         self.march = memory;
     }
 
-    /// States that repeat, into `self.state`, the forces, and the derivatives of all steps. Returns Π.
-    fn repeat(&mut self, march: &mut dyn March, memory: &mut Memory) -> Option<DMatrix<f64>> {
+    /// States that repeat, into `self.state`, the forces, and the derivatives of all steps if `linear`. Returns Π, or any matrix if not.
+    fn repeat(&mut self, march: &mut dyn March, memory: &mut Memory, linear: bool) -> Option<DMatrix<f64>> {
         let m = march.states();
         let mut z = DVector::zeros(m);
         let mut force = [0.0; MOST_DIRECTIONS];
@@ -91,8 +94,14 @@ impl Alternation {
         z = self.period(march, &z, None)?;
         let scale = march.state_scale();
         let mut last = f64::INFINITY;
-        for _ in 0..PERIODS {
-            let (after, product) = self.linear_period(march, &z, memory)?;
+        for round in 0..PERIODS {
+            // what slips has forgotten its beginning after a period: no derivative is needed to see that
+            let first = if round == 0 && !linear { self.period(march, &z, None) } else { None };
+            let done = first.filter(|after| (after - &z).amax() <= REPEATS * scale);
+            let (after, product) = match done {
+                Some(after) => (after, DMatrix::zeros(m, m)),
+                None => self.linear_period(march, &z, memory)?,
+            };
             let gap = (&after - &z).amax() / scale;
             if m == 0 || gap <= REPEATS || (gap <= ROUNDED && gap >= 0.5 * last) {
                 self.state.clear();
@@ -198,92 +207,142 @@ impl Alternation {
         } else {
             None
         };
-        memory.columns.resize(n * d, ZERO);
-        memory.re.resize(n, 0.0);
-        memory.im.resize(n, 0.0);
+        let wide = 2 * nh;
         for b in 0..d {
-            for k in 0..nh {
-                let h = self.harmonics[k];
-                self.follow(march, memory, (beginning.as_deref(), &inverse), Input::Motion { axis: b, harmonic: h });
-                for a in 0..d {
-                    for i in 0..n {
-                        let value = memory.columns[i * d + a];
-                        (memory.re[i], memory.im[i]) = (value.re, -value.im);
+            let input = Input::Motion { axis: b };
+            self.follow(march, memory, (beginning.as_deref(), &inverse), (input, wide));
+            if nh <= FEW {
+                // all at once: [sample][axis][column] times the waves of the harmonics
+                self.fill_projection(&mut memory.projection);
+                memory.spectrum.resize(d * wide * wide, 0.0);
+                let sizes = (d * wide, n, wide);
+                multiply_in_blocks(&memory.columns, &memory.projection, &mut memory.spectrum, sizes, true);
+                for (to, values) in memory.spectrum.chunks_exact(d * wide).enumerate() {
+                    for (a, values) in values.chunks_exact(wide).enumerate() {
+                        let row = &mut tangent[(a * wide + to) * size + b * wide..][..wide];
+                        row.iter_mut().zip(values).for_each(|(t, value)| *t += value);
                     }
-                    for (part, signal) in [&mut memory.re, &mut memory.im].into_iter().enumerate() {
-                        if h == 0 && part == 1 {
-                            continue; // a mean has no imaginary part
-                        }
-                        let sums = self.fourier.sums(signal);
-                        for (l, &to) in self.harmonics.iter().enumerate() {
-                            let value = sums[to] * share(to, n);
-                            let at = 2 * (a * nh + l) * size + 2 * (b * nh + k) + part;
-                            tangent[at] += value.re;
-                            if to > 0 {
-                                tangent[at + size] += value.im;
-                            }
-                        }
+                }
+                continue;
+            }
+            memory.signal.resize(n, 0.0);
+            for (a, column) in (0..d).flat_map(|a| (0..wide).map(move |column| (a, column))) {
+                for i in 0..n {
+                    memory.signal[i] = memory.columns[(i * d + a) * wide + column];
+                }
+                let sums = self.fourier.sums(&mut memory.signal);
+                for (l, &to) in self.harmonics.iter().enumerate() {
+                    let value = sums[to] * share(to, n);
+                    let at = (a * wide + 2 * l) * size + b * wide + column;
+                    tangent[at] += value.re;
+                    if to > 0 {
+                        tangent[at + size] += value.im;
                     }
                 }
             }
         }
         if march.knows_frequency() {
-            self.follow(march, memory, (beginning.as_deref(), &inverse), Input::Frequency);
+            self.follow(march, memory, (beginning.as_deref(), &inverse), (Input::Frequency, 1));
+            memory.signal.resize(n, 0.0);
             for a in 0..d {
                 for i in 0..n {
-                    memory.re[i] = memory.columns[i * d + a].re;
+                    memory.signal[i] = memory.columns[i * d + a];
                 }
-                self.add_by_frequency(a, &mut memory.re);
+                self.add_by_frequency(a, &mut memory.signal);
             }
         }
         true
     }
 
-    /// The derivative of the sampled forces by an input, with states that follow it so that they repeat, into `memory.columns`. `beginning`: the steps
-    /// of the first period, if something is never forgotten.
+    /// What makes the harmonics of a signal, real and imaginary parts, 2 × harmonics for each sample; a mean has no imaginary part.
+    fn fill_projection(&self, projection: &mut Vec<f64>) {
+        let n = self.samples();
+        if projection.len() == 2 * self.harmonics.len() * n {
+            return;
+        }
+        projection.clear();
+        for i in 0..n {
+            for &h in &self.harmonics {
+                let wave = self.turns[h * i % n] * share(h, n);
+                projection.extend([wave.re, if h == 0 { 0.0 } else { -wave.im }]);
+            }
+        }
+    }
+
+    /// The derivative of the sampled forces by inputs, with states that follow them so that they repeat, into `memory.columns`: [sample][axis][column].
+    /// The columns are the parts of the harmonics of a motion along an axis, or the frequency. `beginning`: the steps of the first period, if something
+    /// is never forgotten.
     fn follow(
         &self,
         march: &dyn March,
         memory: &mut Memory,
         (beginning, inverse): (Option<&[f64]>, &DMatrix<f64>),
-        input: Input,
+        (input, wide): (Input, usize),
     ) {
         let n = self.samples();
         let (m, d) = (march.states(), march.axes());
         let (width, angle) = (width(march), TAU / n as f64);
-        let by = |waves: [Complex64; 4]| By { input, waves, width, kinds: march.inputs(), axes: d };
-        let at = |i: usize| match input {
-            Input::Motion { harmonic, .. } => by(march.waves(harmonic, angle, self.turns[i * harmonic % n])),
-            Input::Frequency => by([ZERO; 4]),
+        let size = (m + d) * width;
+        // steps are alike but for where they are on the circle
+        let one = Complex64::new(1.0, 0.0);
+        let fixed: Vec<[Complex64; 4]> = self.harmonics.iter().map(|&h| march.waves(h, angle, one)).collect();
+        let by = By { input, kinds: march.inputs(), axes: d, width, wide };
+        let mut waves = vec![0.0; by.kinds * wide];
+        let turn = |i: usize, waves: &mut [f64]| {
+            if matches!(input, Input::Frequency) {
+                return;
+            }
+            for (k, (&h, fixed)) in self.harmonics.iter().zip(&fixed).enumerate() {
+                let at = self.turns[h * i % n];
+                for kind in 0..by.kinds {
+                    let wave = fixed[kind] * at;
+                    (waves[kind * wide + 2 * k], waves[kind * wide + 2 * k + 1]) = parts(wave, h);
+                }
+            }
         };
-        let (mut start, mut next) = (vec![ZERO; m], vec![ZERO; m]);
+        let (mut start, mut next) = (vec![0.0; m * wide], vec![0.0; m * wide]);
         if let Some(beginning) = beginning {
-            let first = match input {
-                Input::Motion { harmonic, .. } => by(march.first_waves(harmonic)),
-                Input::Frequency => by([ZERO; 4]),
-            };
-            first.advance(&memory.first[..m * width], &next, &mut start);
+            for (k, &h) in self.harmonics.iter().enumerate().filter(|_| !matches!(input, Input::Frequency)) {
+                let first = march.first_waves(h);
+                for kind in 0..by.kinds {
+                    (waves[kind * wide + 2 * k], waves[kind * wide + 2 * k + 1]) = parts(first[kind], h);
+                }
+            }
+            by.advance(&memory.first[..m * width], &waves, &next, &mut start);
             for step in 1..=n {
                 let i = step % n;
-                let rows = &beginning[i * (m + d) * width..(i + 1) * (m + d) * width];
-                at(i).advance(&rows[..m * width], &start, &mut next);
+                turn(i, &mut waves);
+                by.advance(&beginning[i * size..][..m * width], &waves, &start, &mut next);
                 std::mem::swap(&mut start, &mut next);
             }
         }
         // from states that do not change
+        memory.columns.resize(n * d * wide, 0.0);
         let mut s = start.clone();
         for step in 1..=n {
             let i = step % n;
-            let rows = &memory.rows[i * (m + d) * width..(i + 1) * (m + d) * width];
-            let by = at(i);
-            by.advance(&rows[m * width..], &s, &mut memory.columns[i * d..(i + 1) * d]);
-            by.advance(&rows[..m * width], &s, &mut next);
+            turn(i, &mut waves);
+            let rows = &memory.rows[i * size..(i + 1) * size];
+            by.advance(&rows[m * width..], &waves, &s, &mut memory.columns[i * d * wide..][..d * wide]);
+            by.advance(&rows[..m * width], &waves, &s, &mut next);
             std::mem::swap(&mut s, &mut next);
         }
+        if m == 0 {
+            return;
+        }
         // the states at t = 0 follow so that they repeat
-        let shift: Vec<Complex64> = (0..m).map(|r| (0..m).map(|t| (s[t] - start[t]) * inverse[(r, t)]).sum()).collect();
-        for (column, by_state) in memory.columns.iter_mut().zip(memory.by_state.chunks_exact(m.max(1))) {
-            *column += by_state.iter().zip(&shift).map(|(x, z)| z * x).sum::<Complex64>();
+        let mut shift = vec![0.0; m * wide];
+        for (r, shift) in shift.chunks_exact_mut(wide).enumerate() {
+            for t in 0..m {
+                let weight = inverse[(r, t)];
+                let gap = s[t * wide..].iter().zip(&start[t * wide..]);
+                shift.iter_mut().zip(gap).for_each(|(shift, (s, start))| *shift += (s - start) * weight);
+            }
+        }
+        for (column, by_state) in memory.columns.chunks_exact_mut(wide).zip(memory.by_state.chunks_exact(m)) {
+            for (weight, shift) in by_state.iter().zip(shift.chunks_exact(wide)) {
+                add(column, *weight, shift);
+            }
         }
     }
 
@@ -312,35 +371,53 @@ fn width(march: &dyn March) -> usize {
 /// By what a derivative is taken.
 #[derive(Clone, Copy)]
 enum Input {
-    /// A harmonic of the motion along an axis.
-    Motion { axis: usize, harmonic: usize },
+    /// The harmonics of the motion along an axis.
+    Motion { axis: usize },
     /// The frequency ω.
     Frequency,
 }
 
-/// How an input enters one step.
+/// Derivatives of what is `Re(U wave)` by the parts of U, of harmonic `h`.
+fn parts(wave: Complex64, h: usize) -> (f64, f64) {
+    (wave.re, if h == 0 { 0.0 } else { -wave.im })
+}
+
+/// How inputs enter a step.
 struct By {
     input: Input,
-    waves: [Complex64; 4],
-    width: usize,
     kinds: usize,
     axes: usize,
+    width: usize,
+    /// Columns.
+    wide: usize,
 }
 
 impl By {
-    /// `rows` times the input and states, into `out`.
+    /// `rows` times the inputs, [kind][column], and the states, [state][column], into `out`, [row][column].
     #[inline]
-    fn advance(&self, rows: &[f64], states: &[Complex64], out: &mut [Complex64]) {
-        for (row, out) in rows.chunks_exact(self.width).zip(out) {
-            let moved: Complex64 = match self.input {
-                Input::Motion { axis, .. } => {
-                    (0..self.kinds).map(|kind| self.waves[kind] * row[kind * self.axes + axis]).sum()
+    fn advance(&self, rows: &[f64], waves: &[f64], states: &[f64], out: &mut [f64]) {
+        for (row, out) in rows.chunks_exact(self.width).zip(out.chunks_exact_mut(self.wide)) {
+            match self.input {
+                Input::Motion { axis } => {
+                    out.fill(0.0);
+                    for (kind, wave) in waves.chunks_exact(self.wide).enumerate() {
+                        add(out, row[kind * self.axes + axis], wave);
+                    }
                 }
-                Input::Frequency => row[self.width - 1].into(),
-            };
-            let kept: Complex64 = row[self.kinds * self.axes..].iter().zip(states).map(|(x, z)| z * x).sum();
-            *out = moved + kept;
+                Input::Frequency => out.fill(row[self.width - 1]),
+            }
+            for (weight, state) in row[self.kinds * self.axes..].iter().zip(states.chunks_exact(self.wide)) {
+                add(out, *weight, state);
+            }
         }
+    }
+}
+
+/// Adds `weight` times `values`; most weights of a step are zero.
+#[inline]
+fn add(to: &mut [f64], weight: f64, values: &[f64]) {
+    if weight != 0.0 {
+        to.iter_mut().zip(values).for_each(|(to, value)| *to += weight * value);
     }
 }
 

@@ -1,7 +1,5 @@
 //! Memory that a march through the samples needs again and again.
 
-use num_complex::Complex64;
-
 /// Memory of a march.
 #[derive(Debug, Clone, Default)]
 pub(in super::super) struct Memory {
@@ -11,7 +9,11 @@ pub(in super::super) struct Memory {
     pub(super) first: Vec<f64>,
     /// Forces by the states at t = 0, per sample.
     pub(super) by_state: Vec<f64>,
-    pub(super) re: Vec<f64>,
-    pub(super) im: Vec<f64>,
-    pub(super) columns: Vec<Complex64>,
+    /// Forces by inputs: [sample][axis][column].
+    pub(super) columns: Vec<f64>,
+    /// One of them over the samples.
+    pub(super) signal: Vec<f64>,
+    /// From samples to harmonics, and these.
+    pub(super) projection: Vec<f64>,
+    pub(super) spectrum: Vec<f64>,
 }

@@ -66,6 +66,12 @@ impl Port {
         matches!(self.kernel, Kernel::Rigid(_) | Kernel::Prox(_))
     }
 
+    /// Whether its law is followed through the period, step by step, so that derivatives cost many times what forces cost.
+    pub fn marches(&self) -> bool {
+        matches!(self.kernel, Kernel::Step(_))
+            || matches!(&self.kernel, Kernel::Rate(law) if law.rate().is_some_and(|rate| rate.states() > 0))
+    }
+
     /// Whether it holds rigidly, so that accelerations jump.
     pub fn is_rigid(&self) -> bool {
         match &self.kernel {

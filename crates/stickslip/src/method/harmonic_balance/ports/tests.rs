@@ -397,7 +397,7 @@ fn banded_and_dense_agree_in_a_plane() {
     let solve = |banded: bool| {
         let sparse = banded.then(|| Sparse::new(&system, &ports, &harmonics).unwrap());
         let mut level = Level::new(harmonics.clone(), 256, &ports, sparse);
-        level.drive(&system, &ports, &rest, omega);
+        level.drive(&system, &ports, &rest, omega).unwrap();
         let start = level.begin(&system, &ports, None, omega);
         level.solve(&ports, omega, start).unwrap()
     };

@@ -1,0 +1,255 @@
+//! Linear equations of which only products are known: generalised minimal residuals, preconditioned from the right.
+//!
+//! `A P⁻¹ y = b`, `x = P⁻¹ y`: of all x in the space of `P⁻¹ b, P⁻¹ A P⁻¹ b, …` the one with the least residual, which is that of the equations themselves.
+//! Source: Saad and Schultz (1986); Saad, "Iterative Methods for Sparse Linear Systems" (2003), Sec. 6.5 and 9.3.2.
+
+/// What a solution may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Residual relative to the right side at which the equations count as solved.
+    pub tolerance: f64,
+    /// Vectors that are kept; after as many products the search begins anew from what it has.
+    pub vectors: usize,
+    /// Products in all.
+    pub products: usize,
+}
+
+/// How a search ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// Products with the matrix.
+    pub products: usize,
+    /// Residual relative to the right side, of the last solution that was computed from its own product.
+    pub residual: f64,
+    /// Whether it is within the tolerance.
+    pub solved: bool,
+}
+
+/// The memory of searches.
+#[derive(Debug, Clone, Default)]
+pub struct Gmres {
+    basis: Vec<f64>,
+    /// Columns of the triangular factor, one after the other, of `vectors + 1` entries.
+    triangle: Vec<f64>,
+    turns: Vec<(f64, f64)>,
+    rest: Vec<f64>,
+    sum: Vec<f64>,
+    product: Vec<f64>,
+}
+
+/// A new vector shorter than this share of the product that it is left of is rounding: the space is whole.
+const EXHAUSTED: f64 = 1e-14;
+
+impl Gmres {
+    /// Solves `A x = b`: `multiply(v, out)` makes A v, `precondition(v)` replaces v by P⁻¹ v; `x` is b before and the solution after. If it is not
+    /// solved `x` is the nearest that was found.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip_numerics::krylov::{Gmres, Limits};
+    /// let mut x = [3.0, 4.0];
+    /// let multiply = |v: &[f64], out: &mut [f64]| out.copy_from_slice(&[v[0] + v[1], 2.0 * v[1]]);
+    /// let limits = Limits { tolerance: 1e-12, vectors: 5, products: 10 };
+    /// assert!(Gmres::default().solve(&mut x, limits, multiply, |_| ()).solved);
+    /// assert!((x[0] - 1.0).abs() < 1e-12 && (x[1] - 2.0).abs() < 1e-12);
+    /// ```
+    pub fn solve(
+        &mut self,
+        x: &mut [f64],
+        limits: Limits,
+        mut multiply: impl FnMut(&[f64], &mut [f64]),
+        mut precondition: impl FnMut(&mut [f64]),
+    ) -> Outcome {
+        let n = x.len();
+        let most = limits.vectors.clamp(1, n.max(1));
+        let right = x.to_vec();
+        let size = norm(&right);
+        x.fill(0.0);
+        let mut outcome = Outcome { products: 0, residual: 0.0, solved: true };
+        if size == 0.0 {
+            return outcome;
+        }
+        let mut residual = right.clone();
+        let mut left = size;
+        loop {
+            let columns = self.cycle(
+                &residual,
+                left,
+                (most, limits.products - outcome.products),
+                limits.tolerance * size,
+                &mut multiply,
+                &mut precondition,
+            );
+            outcome.products += columns.len();
+            // what the search did not find changes nothing
+            if columns.iter().any(|c| !c.is_finite()) {
+                outcome.solved = false;
+                outcome.residual = left / size;
+                return outcome;
+            }
+            self.sum.clear();
+            self.sum.resize(n, 0.0);
+            for (column, weight) in self.basis.chunks_exact(n).zip(&columns) {
+                self.sum.iter_mut().zip(column).for_each(|(sum, v)| *sum += weight * v);
+            }
+            precondition(&mut self.sum);
+            x.iter_mut().zip(&self.sum).for_each(|(x, sum)| *x += sum);
+            multiply(x, &mut self.product);
+            outcome.products += 1;
+            residual.iter_mut().zip(&right).zip(&self.product).for_each(|((r, b), ax)| *r = b - ax);
+            let before = left;
+            left = norm(&residual);
+            outcome.residual = left / size;
+            // a product that rounds more than the recurrence says is no reason to go on
+            outcome.solved = left <= SLACK * limits.tolerance * size;
+            if outcome.solved || outcome.products >= limits.products || !(left < before) {
+                return outcome;
+            }
+        }
+    }
+
+    /// One search from a residual: the weights of its vectors.
+    fn cycle(
+        &mut self,
+        residual: &[f64],
+        size: f64,
+        (vectors, products): (usize, usize),
+        goal: f64,
+        multiply: &mut impl FnMut(&[f64], &mut [f64]),
+        precondition: &mut impl FnMut(&mut [f64]),
+    ) -> Vec<f64> {
+        let n = residual.len();
+        let tall = vectors + 1;
+        self.basis.clear();
+        self.basis.extend(residual.iter().map(|r| r / size));
+        self.triangle.clear();
+        self.turns.clear();
+        self.rest.clear();
+        self.rest.push(size);
+        self.product.resize(n, 0.0);
+        let mut count = 0;
+        while count < vectors.min(products) {
+            self.sum.clear();
+            self.sum.extend_from_slice(&self.basis[count * n..]);
+            precondition(&mut self.sum);
+            multiply(&self.sum, &mut self.product);
+            let whole = norm(&self.product);
+            let start = count * tall;
+            self.triangle.resize(start + tall, 0.0);
+            // twice: what rounding leaves of the first projection
+            for _ in 0..2 {
+                for (i, v) in self.basis.chunks_exact(n).enumerate() {
+                    let share = dot(v, &self.product);
+                    self.triangle[start + i] += share;
+                    self.product.iter_mut().zip(v).for_each(|(p, v)| *p -= share * v);
+                }
+            }
+            let next = norm(&self.product);
+            let column = &mut self.triangle[start..start + tall];
+            for (i, &(c, s)) in self.turns.iter().enumerate() {
+                (column[i], column[i + 1]) = (c * column[i] + s * column[i + 1], c * column[i + 1] - s * column[i]);
+            }
+            let length = column[count].hypot(next);
+            if !(length > 0.0 && length.is_finite()) {
+                break; // a product without a new direction
+            }
+            let (c, s) = (column[count] / length, next / length);
+            column[count] = length;
+            self.turns.push((c, s));
+            let left = self.rest[count];
+            self.rest[count] = c * left;
+            self.rest.push(-s * left);
+            count += 1;
+            if (s * left).abs() <= goal || next <= EXHAUSTED * whole {
+                break;
+            }
+            self.basis.extend(self.product.iter().map(|p| p / next));
+        }
+        let mut weights = self.rest[..count].to_vec();
+        for i in (0..count).rev() {
+            let sum: f64 = (i + 1..count).map(|j| self.triangle[j * tall + i] * weights[j]).sum();
+            weights[i] = (weights[i] - sum) / self.triangle[i * tall + i];
+        }
+        weights
+    }
+}
+
+/// Share of the tolerance by which the residual of the solution may pass that of the recurrence: rounding of products.
+const SLACK: f64 = 2.0;
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // four sums side by side, always the same four
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a4.zip(b4) {
+        for i in 0..4 {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    sums.iter().sum::<f64>() + tail
+}
+
+fn norm(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Entries without a pattern, with a diagonal that rises.
+    fn entry(i: usize, k: usize, n: usize) -> f64 {
+        let noise = ((i * 7919 + k * 104_729 + 1) as f64).sin() / (n as f64).sqrt();
+        if i == k { 1.0 + i as f64 / n as f64 + noise } else { noise }
+    }
+
+    fn solve(n: usize, limits: Limits, diagonal: bool) -> (Outcome, f64) {
+        let wanted: Vec<f64> = (0..n).map(|i| (i as f64 * 0.7).cos()).collect();
+        let product = |v: &[f64], out: &mut [f64]| {
+            for (i, out) in out.iter_mut().enumerate() {
+                *out = (0..n).map(|k| entry(i, k, n) * v[k]).sum();
+            }
+        };
+        let mut x = vec![0.0; n];
+        product(&wanted, &mut x);
+        let outcome = Gmres::default().solve(&mut x, limits, product, |v| {
+            if diagonal {
+                v.iter_mut().enumerate().for_each(|(i, v)| *v /= 1.0 + i as f64 / n as f64);
+            }
+        });
+        (outcome, x.iter().zip(&wanted).map(|(x, w)| (x - w).abs()).fold(0.0, f64::max))
+    }
+
+    /// The solution is the one that the matrix was multiplied with: in one search, in several, with a preconditioner in fewer products.
+    #[test]
+    fn the_solution_is_found() {
+        for n in [1, 5, 80] {
+            let whole = Limits { tolerance: 1e-12, vectors: n, products: 2 * n + 2 };
+            let (outcome, error) = solve(n, whole, false);
+            assert!(outcome.solved && error < 1e-9, "{n}: {outcome:?} {error:.1e}");
+        }
+        let limits = Limits { tolerance: 1e-10, vectors: 60, products: 400 };
+        let (plain, error) = solve(80, limits, false);
+        assert!(plain.solved && error < 1e-7, "{plain:?} {error:.1e}");
+        let (restarted, error) = solve(80, Limits { vectors: 25, ..limits }, true);
+        assert!(restarted.solved && error < 1e-7, "{restarted:?} {error:.1e}");
+    }
+
+    /// Where there is no solution, or too few products, that is said.
+    #[test]
+    fn what_is_not_solved_is_told() {
+        let limits = Limits { tolerance: 1e-12, vectors: 10, products: 4 };
+        let (outcome, _) = solve(80, limits, false);
+        assert!(!outcome.solved && outcome.products <= 5, "{outcome:?}");
+        assert!(outcome.residual > 1e-12 && outcome.residual < 1.0);
+        let mut x = [1.0, 1.0];
+        let singular = |v: &[f64], out: &mut [f64]| out.copy_from_slice(&[v[0] + v[1], 0.0]);
+        let outcome =
+            Gmres::default().solve(&mut x, Limits { tolerance: 1e-9, vectors: 9, products: 30 }, singular, |_| ());
+        assert!(!outcome.solved && outcome.residual > 0.5, "{outcome:?}");
+        let mut x = [1.0; 3];
+        let none = Gmres::default().solve(&mut x, limits, |_, out| out.fill(f64::NAN), |_| ());
+        assert!(!none.solved, "{none:?}");
+    }
+}

@@ -1,0 +1,433 @@
+//! Newton's step where the structure couples many joints: the derivative `δ r_y - r_u R f_y` is multiplied with, and not formed.
+//!
+//! Laws couple harmonics, the structure joints. Products need both one after the other, and a solution by minimal residuals takes a few tens of them if
+//! one knows roughly what it is. That is the same equations with the mean stiffness of every joint over the period:
+//! - per harmonic, each with the mean stiffness that it sees: a complex matrix over the axes, factored in every step;
+//! - of large structures in their modes, `R = S + Φ diag(g) Φᵀ`: what modes far above the harmonics add, S, is the same for all of these, and so is the
+//!   factor of `1 + S K` with one stiffness for all; the others enter it by as many rows as they are (Woodbury). It is kept from step to step and from
+//!   frequency to frequency for as long as it helps.
+//!
+//! Memory: per harmonic two complex matrices over the axes, or in modes two real ones over the axes and one over axes and modes.
+
+use super::equations::{Ease, Level, SOLVED, unit};
+use super::hold::{CLEAR, stay};
+use super::ports::{Port, Ports, block};
+use super::receptance::{Modal, Receptance};
+use num_complex::Complex64;
+use stickslip_numerics::dense::{ComplexLu, Lu, multiply_in_blocks};
+use stickslip_numerics::krylov::{Gmres, Limits};
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// Unknowns from which products are faster than elimination: 16 nodes of three directions with six harmonics have 576.
+pub(super) const MANY: usize = 400;
+/// Unknowns up to which a matrix is formed all the same where products do not lead to the step: 130 MB, seconds.
+pub(super) const FORMED: usize = 4096;
+/// Share of Newton's residual to which its equations are solved, at most: then the next residual has the size that squaring gives it.
+const SHARE: f64 = 0.1;
+const COARSEST: f64 = 1e-2;
+/// Vectors that are kept, and products in all.
+const VECTORS: usize = 80;
+const PRODUCTS: usize = 320;
+/// Residual of Newton's equations up to which a step is one.
+const USEFUL: f64 = 0.1;
+/// Products beyond which a preconditioner that was kept is made anew.
+const STALE: usize = 25;
+/// Modes with frequencies above this multiple of the highest harmonic answer it nearly as at rest.
+const ABOVE: f64 = 3.0;
+
+/// What Newton's steps by products keep.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Coupled {
+    gmres: Gmres,
+    split: Option<Split>,
+    /// Unknowns as forces, and what they move.
+    force: Vec<Complex64>,
+    moved: Vec<Complex64>,
+}
+
+/// The equations at a motion, as a product needs them.
+struct Linear<'a> {
+    ports: &'a Ports,
+    harmonics: &'a [usize],
+    omega: f64,
+    ease: Ease,
+    length: f64,
+    penalty: &'a [f64],
+    tangents: &'a [f64],
+    blocks: &'a [usize],
+    units: &'a [f64],
+}
+
+impl Level {
+    /// The Newton step from `self.step`, the residual in units, into it; `residual` is the size of that. False if it was not found.
+    pub(super) fn coupled_step(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        ease: Ease,
+        (length, residual): (f64, f64),
+    ) -> bool {
+        let Some(mut coupled) = self.coupled.take() else { return false };
+        let linear = Linear {
+            ports,
+            harmonics: &self.alternation.harmonics,
+            omega,
+            ease,
+            length,
+            penalty: &self.penalty,
+            tangents: &self.tangents,
+            blocks: &self.blocks,
+            units: &self.units,
+        };
+        let wanted = (SHARE * residual).min(COARSEST).max(SHARE * SOLVED / residual.max(SOLVED));
+        let limits = Limits { tolerance: wanted, vectors: VECTORS, products: PRODUCTS };
+        let right = self.step.clone();
+        let mut fresh = false;
+        let Coupled { gmres, split, force, moved } = &mut coupled;
+        let receptance = &mut self.receptance;
+        let found = loop {
+            let Some(preconditioner) = linear.preconditioner(receptance, split, &mut fresh) else {
+                break false;
+            };
+            let most = if fresh { limits } else { Limits { products: STALE, vectors: STALE, ..limits } };
+            let outcome = gmres.solve(
+                &mut self.step,
+                most,
+                |v, out| linear.multiply(receptance, (&mut *force, &mut *moved), v, out),
+                |v| preconditioner.apply(&linear, v),
+            );
+            self.products += outcome.products;
+            if fresh || outcome.solved {
+                break outcome.solved || outcome.residual <= USEFUL;
+            }
+            // a stiffness of another motion
+            *split = None;
+            self.step.copy_from_slice(&right);
+        };
+        self.coupled = Some(coupled);
+        if !found {
+            self.step.copy_from_slice(&right);
+        }
+        found && self.step.iter().all(|d| d.is_finite())
+    }
+}
+
+impl Linear<'_> {
+    fn tangent(&self, p: usize, port: &Port) -> &[f64] {
+        &self.tangents[block(self.blocks, p, port, self.harmonics.len())]
+    }
+
+    fn penalty(&self, p: usize, port: &Port) -> f64 {
+        self.penalty[p] * self.ease.penalty.max(CLEAR * port.least_penalty / self.penalty[p])
+    }
+
+    /// The derivative times a step, both in units.
+    fn multiply(
+        &self,
+        receptance: &mut Receptance,
+        (force, moved): (&mut Vec<Complex64>, &mut Vec<Complex64>),
+        v: &[f64],
+        out: &mut [f64],
+    ) {
+        let nh = self.harmonics.len();
+        let pair = 2 * nh;
+        force.resize(v.len() / 2, ZERO);
+        moved.resize(v.len() / 2, ZERO);
+        // f_y
+        for (p, port) in self.ports.iter().enumerate() {
+            let wide = pair * port.axes;
+            let unit = unit(port, self.length);
+            let v = &v[port.first * pair..][..wide];
+            let force = &mut force[port.first * nh..][..wide / 2];
+            if port.is_force() {
+                force.iter_mut().zip(v.chunks_exact(2)).for_each(|(f, v)| *f = Complex64::new(v[0], v[1]) * unit);
+                continue;
+            }
+            for (f, rows) in force.iter_mut().zip(self.tangent(p, port).chunks_exact(2 * wide)) {
+                let (re, im) = rows.split_at(wide);
+                *f = Complex64::new(dot(re, v), dot(im, v)) * unit;
+            }
+        }
+        receptance.apply(force, moved);
+        for (p, port) in self.ports.iter().enumerate() {
+            let wide = pair * port.axes;
+            let range = port.first * pair..port.first * pair + wide;
+            let unit = unit(port, self.length);
+            let (v, out, units) = (&v[range.clone()], &mut out[range.clone()], &self.units[range]);
+            let moved = &moved[port.first * nh..][..wide / 2];
+            if !port.is_force() {
+                for (i, out) in out.iter_mut().enumerate() {
+                    let u = moved[i / 2];
+                    *out = (unit * v[i] + if i % 2 == 0 { u.re } else { u.im }) / units[i];
+                }
+                continue;
+            }
+            // λ less T of what changes in λ + ε u', u = -R f
+            let penalty = self.penalty(p, port);
+            let changed: Vec<f64> = moved
+                .iter()
+                .enumerate()
+                .flat_map(|(i, u)| {
+                    let rate =
+                        if penalty.is_finite() { penalty * self.harmonics[i % nh] as f64 * self.omega } else { 0.0 };
+                    let z = Complex64::new(v[2 * i], v[2 * i + 1]) * unit - Complex64::new(0.0, rate) * u;
+                    [z.re, z.im]
+                })
+                .collect();
+            for (i, (out, row)) in out.iter_mut().zip(self.tangent(p, port).chunks_exact(wide)).enumerate() {
+                let kept = 1.0 + stay(self.harmonics[i % pair / 2]);
+                *out = (kept * unit * v[i] - dot(row, &changed)) / units[i];
+            }
+        }
+    }
+
+    /// What the tangent of a port does to harmonic number `k` on the whole, between two of its axes.
+    fn mean(&self, tangent: &[f64], axes: usize, (a, b): (usize, usize), k: usize) -> Complex64 {
+        let pair = 2 * self.harmonics.len();
+        let wide = pair * axes;
+        let at = |i: usize, j: usize| tangent[(a * pair + 2 * k + i) * wide + b * pair + 2 * k + j];
+        if self.harmonics[k] == 0 {
+            return Complex64::new(at(0, 0), 0.0);
+        }
+        Complex64::new(at(0, 0) + at(1, 1), at(1, 0) - at(0, 1)) * 0.5
+    }
+
+    /// `None` if it has no factor. `fresh` becomes whether it is of this motion.
+    fn preconditioner<'b>(
+        &self,
+        receptance: &Receptance,
+        kept: &'b mut Option<Split>,
+        fresh: &mut bool,
+    ) -> Option<Preconditioner<'b>> {
+        match receptance {
+            Receptance::Formed(matrices) => {
+                *fresh = true;
+                let factors = matrices.iter().enumerate().map(|(k, matrix)| self.of_harmonic(k, matrix));
+                Some(Preconditioner::Harmonics(factors.collect::<Option<_>>()?))
+            }
+            Receptance::Modal(modal) => {
+                let (bound, usable) = (Split::bound(modal), kept.take());
+                let usable = usable.filter(|split| split.bound == bound);
+                *fresh = usable.is_none();
+                let mut split = match usable {
+                    Some(split) => split,
+                    None => Split::new(
+                        modal,
+                        bound,
+                        |p, port, a, b| {
+                            let tangent = self.tangent(p, port);
+                            let count = self.harmonics.len();
+                            (0..count).map(|k| self.mean(tangent, port.axes, (a, b), k).re).sum::<f64>() / count as f64
+                        },
+                        self.ports,
+                    )?,
+                };
+                split.drive(modal)?;
+                Some(Preconditioner::Split(kept.insert(split)))
+            }
+        }
+    }
+
+    /// The equations of one harmonic with the mean tangents, factored.
+    fn of_harmonic(&self, k: usize, receptance: &nalgebra::DMatrix<Complex64>) -> Option<ComplexLu> {
+        let size = receptance.nrows();
+        let mut matrix = vec![ZERO; size * size];
+        // R f_y
+        for (p, port) in self.ports.iter().enumerate() {
+            for b in 0..port.axes {
+                let column = &mut matrix[(port.first + b) * size..][..size];
+                if port.is_force() {
+                    column.copy_from_slice(receptance.column(port.first + b).as_slice());
+                    continue;
+                }
+                for a in 0..port.axes {
+                    let stiffness = self.mean(self.tangent(p, port), port.axes, (a, b), k);
+                    let moved = receptance.column(port.first + a);
+                    column.iter_mut().zip(moved.iter()).for_each(|(out, r)| *out += r * stiffness);
+                }
+            }
+        }
+        let h = self.harmonics[k];
+        for (p, port) in self.ports.iter().enumerate() {
+            if !port.is_force() {
+                port.range().for_each(|q| matrix[q * size + q] += 1.0);
+                continue;
+            }
+            let penalty = self.penalty(p, port);
+            let rate = if penalty.is_finite() { Complex64::new(0.0, penalty * h as f64 * self.omega) } else { ZERO };
+            let turn: Vec<Complex64> = (0..port.axes * port.axes)
+                .map(|ab| self.mean(self.tangent(p, port), port.axes, (ab / port.axes, ab % port.axes), k))
+                .collect();
+            for column in matrix.chunks_exact_mut(size) {
+                let moved: Vec<Complex64> = port.range().map(|q| column[q] * rate).collect();
+                for (a, q) in port.range().enumerate() {
+                    column[q] = (0..port.axes).map(|b| turn[a * port.axes + b] * moved[b]).sum();
+                }
+            }
+            for (a, q) in port.range().enumerate() {
+                matrix[q * size + q] += 1.0 + stay(h);
+                for (b, column) in port.range().enumerate() {
+                    matrix[column * size + q] -= turn[a * port.axes + b];
+                }
+            }
+        }
+        ComplexLu::new(matrix, size).ok()
+    }
+}
+
+enum Preconditioner<'a> {
+    Harmonics(Vec<ComplexLu>),
+    Split(&'a mut Split),
+}
+
+impl Preconditioner<'_> {
+    /// From a residual in units to a step in units.
+    fn apply(&self, linear: &Linear, v: &mut [f64]) {
+        let nh = linear.harmonics.len();
+        v.iter_mut().zip(linear.units).for_each(|(v, unit)| *v *= unit);
+        match self {
+            Preconditioner::Harmonics(factors) => {
+                let mut column = vec![ZERO; v.len() / (2 * nh)];
+                for (k, factor) in factors.iter().enumerate() {
+                    for (c, v) in column.iter_mut().zip(v.chunks_exact(2 * nh)) {
+                        *c = Complex64::new(v[2 * k], v[2 * k + 1]);
+                    }
+                    factor.solve(&mut column);
+                    for (c, v) in column.iter().zip(v.chunks_exact_mut(2 * nh)) {
+                        (v[2 * k], v[2 * k + 1]) = (c.re, c.im);
+                    }
+                }
+            }
+            Preconditioner::Split(split) => split.apply(v),
+        }
+        for port in linear.ports.iter() {
+            let unit = unit(port, linear.length);
+            v[2 * nh * port.first..2 * nh * (port.first + port.axes)].iter_mut().for_each(|v| *v /= unit);
+        }
+    }
+}
+
+/// `1 + R K` with one real K for all harmonics, of a structure in modes.
+#[derive(Debug, Clone)]
+struct Split {
+    /// Frequency, rad/s, up to which modes are taken as they are.
+    bound: f64,
+    /// Their numbers.
+    low: Vec<usize>,
+    /// `1 + S K`.
+    factor: Lu<f64>,
+    /// `Φᵀ K`, modes × axes, and `(1 + S K)⁻¹ Φ`, axes × modes.
+    pull: Vec<f64>,
+    moved: Vec<f64>,
+    /// `Φᵀ K (1 + S K)⁻¹ Φ`.
+    core: Vec<f64>,
+    /// That with the dynamic stiffness of the modes, per harmonic, at a drive frequency.
+    harmonics: Vec<ComplexLu>,
+    omega: f64,
+}
+
+impl Split {
+    /// The same for frequencies that are near each other.
+    fn bound(modal: &Modal) -> f64 {
+        let top = modal.rates.iter().map(|s| s.im).fold(modal.omega, f64::max);
+        ABOVE * top.log2().ceil().exp2()
+    }
+
+    /// `stiffness(p, port, a, b)` of the joints.
+    fn new(
+        modal: &Modal,
+        bound: f64,
+        stiffness: impl Fn(usize, &Port, usize, usize) -> f64,
+        ports: &Ports,
+    ) -> Option<Self> {
+        let structure = &modal.structure;
+        let (p, n) = (structure.axes, structure.own.len());
+        let is_low = |own: &[f64; 3]| own[2] <= bound * bound * own[0];
+        let (low, high): (Vec<usize>, Vec<usize>) = (0..n).partition(|&m| is_low(&structure.own[m]));
+        let column = |m: usize| &structure.at[m * p..(m + 1) * p];
+        // S, and S K
+        let above: Vec<f64> = high.iter().flat_map(|&m| column(m)).copied().collect();
+        let weighted: Vec<f64> =
+            high.iter().flat_map(|&m| column(m).iter().map(move |a| a / structure.own[m][2])).collect();
+        let mut rest = vec![0.0; p * p];
+        multiply_in_blocks(&weighted, &above, &mut rest, (p, high.len(), p), true);
+        drop((above, weighted));
+        (0..p).for_each(|q| rest[q * p + q] += modal.series[q]);
+        let mut matrix = vec![0.0; p * p];
+        let mut pull = vec![0.0; low.len() * p];
+        for (number, port) in ports.iter().enumerate() {
+            for (a, row) in port.range().enumerate() {
+                for (b, q) in port.range().enumerate() {
+                    let k = stiffness(number, port, a, b);
+                    let moved = &rest[row * p..(row + 1) * p];
+                    matrix[q * p..(q + 1) * p].iter_mut().zip(moved).for_each(|(out, s)| *out += s * k);
+                    for (pull, &m) in pull[q * low.len()..].iter_mut().zip(&low) {
+                        *pull += structure.at[m * p + row] * k;
+                    }
+                }
+            }
+        }
+        drop(rest);
+        (0..p).for_each(|q| matrix[q * p + q] += 1.0);
+        let factor = Lu::new(matrix, p).ok()?;
+        let mut moved: Vec<f64> = low.iter().flat_map(|&m| column(m)).copied().collect();
+        factor.solve(&mut moved);
+        let l = low.len();
+        let mut core = vec![0.0; l * l];
+        multiply_in_blocks(&pull, &moved, &mut core, (l, p, l), false);
+        Some(Split { bound, low, factor, pull, moved, core, harmonics: Vec::new(), omega: f64::NAN })
+    }
+
+    /// Prepares for a drive frequency.
+    fn drive(&mut self, modal: &Modal) -> Option<()> {
+        if self.omega == modal.omega && self.harmonics.len() == modal.rates.len() {
+            return Some(());
+        }
+        let l = self.low.len();
+        self.harmonics.clear();
+        for rate in &modal.rates {
+            let mut matrix: Vec<Complex64> = self.core.iter().map(|x| Complex64::new(*x, 0.0)).collect();
+            for (i, &m) in self.low.iter().enumerate() {
+                matrix[i * l + i] += modal.structure.stiffness(m, *rate, modal.omega).ok()?;
+            }
+            self.harmonics.push(ComplexLu::new(matrix, l).ok()?);
+        }
+        self.omega = modal.omega;
+        Some(())
+    }
+
+    /// `(1 + R K)⁻¹ v = y - (1 + S K)⁻¹ Φ (1/g + core)⁻¹ Φᵀ K y`, `y = (1 + S K)⁻¹ v`, of [axis][harmonic].
+    fn apply(&self, v: &mut [f64]) {
+        let (nh, l) = (self.harmonics.len(), self.low.len());
+        let wide = 2 * nh;
+        let p = v.len() / wide;
+        let mut columns = vec![0.0; v.len()];
+        for (q, v) in v.chunks_exact(wide).enumerate() {
+            v.iter().enumerate().for_each(|(i, v)| columns[i * p + q] = *v);
+        }
+        self.factor.solve(&mut columns);
+        if l > 0 {
+            let mut pulled = vec![0.0; l * wide];
+            multiply_in_blocks(&self.pull, &columns, &mut pulled, (l, p, wide), false);
+            for (k, factor) in self.harmonics.iter().enumerate() {
+                let (re, im) = pulled[2 * k * l..2 * (k + 1) * l].split_at_mut(l);
+                let mut modal: Vec<Complex64> = re.iter().zip(&*im).map(|(re, im)| Complex64::new(*re, *im)).collect();
+                factor.solve(&mut modal);
+                for (i, z) in modal.iter().enumerate() {
+                    (re[i], im[i]) = (z.re, z.im);
+                }
+            }
+            let mut moved = vec![0.0; p * wide];
+            multiply_in_blocks(&self.moved, &pulled, &mut moved, (p, l, wide), false);
+            columns.iter_mut().zip(&moved).for_each(|(c, m)| *c -= m);
+        }
+        for (q, v) in v.chunks_exact_mut(wide).enumerate() {
+            v.iter_mut().enumerate().for_each(|(i, v)| *v = columns[i * p + q]);
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,111 @@
+//! What forces along the axes do to the motions along them: matrices, or where these would be too large their product alone.
+
+use super::uncoupled::Uncoupled;
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use std::sync::Arc;
+use stickslip_numerics::dense::multiply_in_blocks;
+use stickslip_numerics::sparse::Singular;
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// Receptances at the harmonics of a level, m/N.
+#[derive(Debug, Clone)]
+pub(super) enum Receptance {
+    /// Per harmonic, axes × axes.
+    Formed(Vec<DMatrix<Complex64>>),
+    /// By the modes of the structure.
+    Modal(Modal),
+}
+
+/// Modes at the harmonics of a drive frequency.
+#[derive(Debug, Clone)]
+pub(super) struct Modal {
+    pub structure: Arc<Uncoupled>,
+    /// Drive frequency, rad/s, and rates of the harmonics.
+    pub omega: f64,
+    pub rates: Vec<Complex64>,
+    gains: Vec<Vec<Complex64>>,
+    /// Compliances in series with the axes, m/N.
+    pub series: Vec<f64>,
+    /// Of the mean motions along the axes by their own forces.
+    mean: Vec<f64>,
+    forces: Vec<f64>,
+    modal: Vec<f64>,
+    moved: Vec<f64>,
+}
+
+impl Modal {
+    pub fn new(
+        structure: &Arc<Uncoupled>,
+        (harmonics, omega): (&[usize], f64),
+        series: &[f64],
+    ) -> Result<Self, Singular> {
+        let rates: Vec<Complex64> = harmonics.iter().map(|h| Complex64::new(0.0, *h as f64 * omega)).collect();
+        let gains = rates.iter().map(|s| structure.gains(*s, omega)).collect::<Result<Vec<_>, _>>()?;
+        let mean = match harmonics[0] {
+            0 => structure.own_receptance(&gains[0]).iter().zip(series).map(|(r, s)| r.norm() + s).collect(),
+            _ => vec![0.0; structure.axes],
+        };
+        Ok(Modal {
+            structure: structure.clone(),
+            omega,
+            rates,
+            gains,
+            series: series.to_vec(),
+            mean,
+            forces: Vec::new(),
+            modal: Vec::new(),
+            moved: Vec::new(),
+        })
+    }
+
+    /// The forces of all harmonics go through the modes together.
+    fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
+        let (nh, p, n) = (self.rates.len(), self.structure.axes, self.structure.own.len());
+        let tall = 2 * nh;
+        self.forces.clear();
+        self.forces.extend(force.iter().flat_map(|f| [f.re, f.im]));
+        self.modal.resize(tall * n, 0.0);
+        multiply_in_blocks(&self.forces, &self.structure.at, &mut self.modal, (tall, p, n), false);
+        for (m, column) in self.modal.chunks_exact_mut(tall).enumerate() {
+            for (k, pair) in column.chunks_exact_mut(2).enumerate() {
+                let z = Complex64::new(pair[0], pair[1]) * self.gains[k][m];
+                (pair[0], pair[1]) = (z.re, z.im);
+            }
+        }
+        self.moved.resize(tall * p, 0.0);
+        multiply_in_blocks(&self.modal, &self.structure.at, &mut self.moved, (tall, n, p), true);
+        for (at, (u, pair)) in moved.iter_mut().zip(self.moved.chunks_exact(2)).enumerate() {
+            *u = Complex64::new(pair[0], pair[1]) + force[at] * self.series[at / nh];
+        }
+    }
+}
+
+impl Receptance {
+    /// Motions along all axes at all harmonics, [axis][harmonic], under the forces along them.
+    pub fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
+        match self {
+            Receptance::Formed(matrices) => {
+                let nh = matrices.len();
+                moved.fill(ZERO);
+                for (k, matrix) in matrices.iter().enumerate() {
+                    // column by column, as the matrix lies in memory
+                    for (p, column) in matrix.column_iter().enumerate() {
+                        let f = force[p * nh + k];
+                        column.iter().enumerate().for_each(|(q, r)| moved[q * nh + k] += r * f);
+                    }
+                }
+            }
+            Receptance::Modal(modal) => modal.apply(force, moved),
+        }
+    }
+
+    /// Size of the motion of the first harmonic along an axis by a force along it, if that harmonic is the mean.
+    pub fn mean(&self, q: usize) -> f64 {
+        match self {
+            Receptance::Formed(matrices) => matrices.first().map_or(0.0, |r| r[(q, q)].norm()),
+            Receptance::Modal(modal) => modal.mean[q],
+        }
+    }
+}

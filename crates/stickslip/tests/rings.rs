@@ -1,0 +1,94 @@
+//! Rings of many nodes, each in contact with the next along two or three directions.
+
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use stickslip::law::{BoucWen, Dahl, FrictionContact, Jenkins2d, SharedLaw};
+use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
+use stickslip::model::{Axis, System};
+use stickslip::orbit::Orbit;
+use stickslip::structure::Structure;
+use stickslip_numerics::sparse::Matrix;
+
+/// Nodes of `directions` degrees of freedom on springs, each coupled to the next by springs and a contact, in a travelling wave that goes round the
+/// ring once for `nodes / waves` nodes.
+fn ring(nodes: usize, waves: usize, directions: usize, law: SharedLaw) -> System {
+    let (mass, stiffness, coupling, damping) = (0.2, 1e5, 4e3, 1.5);
+    let at = |node: usize, direction: usize| (node % nodes) * directions + direction;
+    let n = nodes * directions;
+    let diagonal = |value: f64| Matrix::from_triplets(n, (0..n).map(|i| (i, i, value))).unwrap();
+    let mut springs = Vec::new();
+    for node in 0..nodes {
+        for d in 0..directions {
+            let (i, k) = (at(node, d), at(node + 1, d));
+            springs.push((i, i, stiffness * (1.0 + 0.1 * d as f64)));
+            springs.extend([(i, i, coupling), (k, k, coupling), (i, k, -coupling), (k, i, -coupling)]);
+        }
+    }
+    let names = (0..n).map(|i| format!("{i}")).collect();
+    let structure =
+        Structure::sparse(names, diagonal(mass), diagonal(damping), Matrix::from_triplets(n, springs).unwrap())
+            .unwrap();
+    let mut builder = System::builder(structure);
+    for node in 0..nodes {
+        let axes = (0..directions).map(|d| Axis::new(vec![(at(node, d), 1.0), (at(node + 1, d), -1.0)]));
+        builder = builder.joint(format!("j{node}"), law.clone(), axes.collect());
+        for d in 0..directions {
+            let phase = TAU * (waves * node) as f64 / nodes as f64 + d as f64;
+            builder = builder.force(at(node, d), 1, Complex64::from_polar(10.0 / (1.0 + d as f64), phase));
+        }
+    }
+    builder.build().unwrap()
+}
+
+/// Orbits over a resonance, each started from the one before, or alone.
+fn sweep(system: &System, omegas: &[f64]) -> Vec<Orbit> {
+    let method = HarmonicBalance { harmonics: Some(3), samples: Some(256), tolerance: None };
+    let mut solver = method.solver(system).unwrap();
+    let mut start: Option<Vec<f64>> = None;
+    let mut orbits = Vec::new();
+    for &omega in omegas {
+        let orbit = solver.orbit(omega, start.as_deref()).unwrap_or_else(|error| panic!("{error}"));
+        start = Some(orbit.start.clone());
+        orbits.push(orbit);
+    }
+    orbits
+}
+
+/// A quarter of the circle between neighbours: four nodes move as any multiple of four do.
+fn check(directions: usize, law: SharedLaw, nodes: usize, omegas: &[f64]) {
+    let small = sweep(&ring(4, 1, directions, law.clone()), omegas);
+    let large = sweep(&ring(nodes, nodes / 4, directions, law), omegas);
+    for (small, large) in small.iter().zip(&large) {
+        for (i, place) in large.places.iter().enumerate() {
+            let expected = small.places[i % (4 * directions)].amplitude();
+            assert!(
+                (place.amplitude() - expected).abs() < 1e-7 * expected,
+                "{} {i}: {} {expected}",
+                small.omega,
+                place.amplitude()
+            );
+        }
+        assert!(large.joints[0].slip_fraction > 0.0 || large.energy.friction > 0.0);
+    }
+}
+
+const OMEGAS: [f64; 4] = [690.0, 720.0, 750.0, 760.0];
+
+#[test]
+fn contacts_in_a_plane() {
+    check(2, Arc::new(Jenkins2d { stiffness: 1e4, limit: 3.0 }), 100, &OMEGAS);
+}
+
+#[test]
+fn contacts_that_separate() {
+    let law = FrictionContact { tangential: 1e4, normal: 1.5e4, friction: 0.3, preload: 12.0, tangents: 2 };
+    check(3, Arc::new(law), 100, &OMEGAS);
+}
+
+#[test]
+fn laws_of_rates() {
+    let bouc_wen = BoucWen { stiffness: 1e4, beta: 2e3, gamma: 1e3, exponent: 1.0 };
+    check(1, Arc::new(bouc_wen), 500, &OMEGAS);
+    check(1, Arc::new(Dahl { stiffness: 1e4, limit: 3.0 }), 500, &OMEGAS);
+}
