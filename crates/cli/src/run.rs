@@ -209,6 +209,8 @@ fn once(
         let (study, summary) = (checked.study(), warned(&checked));
         if std::io::stderr().is_terminal() {
             complain_on!("{}\n{summary}", study.title());
+        } else if let Some(long) = summary.long_run() {
+            complain!("{}: {long}", study.name());
         }
         // of adaptive frequencies nobody knows the number before
         let points = Some(study.points() as u64).filter(|_| !study.is_adaptive());

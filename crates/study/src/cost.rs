@@ -98,6 +98,10 @@ pub struct Costing<'a> {
     has_states: bool,
     /// Whether a law has no rate: integration then goes in equal steps.
     stepped: bool,
+    /// Whether friction falls with velocity somewhere.
+    falls: bool,
+    /// Whether nothing bounds the force of a law.
+    unbounded: bool,
 }
 
 impl<'a> Costing<'a> {
@@ -119,6 +123,8 @@ impl<'a> Costing<'a> {
             surveyed,
             smooth: laws.iter().any(|law| law.pieces().is_none()),
             stepped: laws.iter().any(|law| law.rate().is_none() && !law.is_free()),
+            falls: laws.iter().any(|law| law.prox().is_some() && !law.is_incrementally_passive()),
+            unbounded: laws.iter().any(|law| law.scale().is_infinite()),
             has_states: laws.iter().any(|law| law.rate().is_some_and(|rate| rate.states() > 0)),
         }
     }
@@ -228,7 +234,7 @@ impl Costing<'_> {
         let elements = self.masses + self.joints;
         // the modes of large models are not asked for
         let modes = if self.surveyed.survey.is_too_large() { 0.0 } else { elements.powi(3) / PREPARED };
-        let preparing = self.cases * (PREPARING * (1.0 + modes) + ASSEMBLING * elements * elements);
+        let preparing = self.cases * (PREPARING * (1.0 + modes) + ASSEMBLING * elements);
         let tables = CELL * cost.cells(1.0, 1.0);
         (size, OVERHEAD + GENEROUS * (cost.work + preparing + tables + POINT * cost.drawn))
     }
@@ -287,6 +293,8 @@ const SERIES: f64 = 5e-4;
 const HARD: f64 = 40.0;
 const HARD_RIGID: f64 = 3.0;
 const HARD_SMOOTH: f64 = 10.0;
+/// Friction that falls with velocity needs the most of both. Measured: 0.16 to 0.4 s for two masses and a joint.
+const HARD_FALLING: f64 = 120.0;
 /// Harmonics of [`SERIES`].
 const SERIES_HARMONICS: f64 = 15.0;
 /// Shooting, times the square of masses and joints; more where the sliders have springs. Measured: 25 ms for two
@@ -295,22 +303,26 @@ const SHOOTING: (f64, f64) = (1e-3, 1.5e-2);
 /// Shooting in equal steps, times the square of masses and joints. Measured: 0.8 s for four masses and a joint of 32 sliders at a tolerance
 /// of 1e-9.
 const STEPPED: f64 = 5e-2;
-/// Method `transient`: the periods in which a mode with the least damping loses a digit, times a share of these.
-/// Measured at a damping ratio of 7e-4: exact laws 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses; smooth laws 0.9 s and 8 s
-/// for 2 and 4.
-const SETTLING: (f64, f64) = (0.1, 1.0);
-/// Fewest and most periods of it.
-const SETTLING_PERIODS: (f64, f64) = (20.0, 50_000.0);
-/// A period of a transient: events, per mass and joint; integration, times their square.
-const PERIOD: (f64, f64, f64) = (3e-4, 2.5e-4, 1.3e-3);
+/// Method `transient`: the periods in which a mode with the least damping loses a digit. Measured at a damping ratio of 7e-4: exact laws
+/// 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses; smooth laws 0.9 s and 8 s for 2 and 4. At 1.6 % a ring took 80 periods.
+const SETTLING_PERIODS: (f64, f64) = (80.0, 50_000.0);
+/// Periods after which it ends where nothing settles, which a force without a bound (a gap, a cubic spring) may make of some points; twice, as
+/// a motion that does not settle from its neighbour's is followed from rest again.
+const UNSETTLED_PERIODS: f64 = 2.0 * 4096.0;
+/// Share of the points at which that happens. Measured for two masses and a hard cubic spring with little damping: one in five.
+const UNSETTLED: f64 = 0.2;
+/// A period of a transient: integration, times the square of masses and joints; more with states.
+const PERIOD: (f64, f64) = (2.5e-4, 1.3e-3);
+/// A period from event to event, per mass and joint, and times their cube, for the decomposition of each new pattern. Measured: 0.6, 3.5 and
+/// 21 ms for rings of 12, 24 and 48 masses and joints.
+const PERIOD_EVENTS: (f64, f64) = (2e-5, 2.4e-8);
 /// A period in equal steps, times the square of masses and joints. Measured: 0.2 s for two masses and a joint of 32 sliders.
 const PERIOD_STEPPED: f64 = 3e-2;
 /// Resolving and assembling a case, s, and the number of masses and joints (cubed) that doubles it.
 const PREPARING: f64 = 2e-4;
 const PREPARED: f64 = 1e4;
-/// Reading, checking and assembling, s, times the square of masses and joints: names are looked up one by one. Measured: 25 s of a ring of
-/// 10,000 masses and joints.
-const ASSEMBLING: f64 = 6e-8;
+/// Reading, checking and assembling, s, per mass and joint.
+const ASSEMBLING: f64 = 5e-5;
 /// Reading the motion at one instant, per mass and joint, s.
 const INSTANT: f64 = 5e-7;
 
@@ -328,9 +340,9 @@ impl Costing<'_> {
                 let modes = &self.surveyed.survey.free().elastic;
                 let damping = modes.iter().map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE);
                 let digit = std::f64::consts::LN_10 / (TAU * damping);
-                let share = if self.smooth { SETTLING.1 } else { SETTLING.0 };
                 let most = case.method.options.get("periods").copied().unwrap_or(SETTLING_PERIODS.1);
-                (share * digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1)).min(most) * self.period()
+                let restless = if self.unbounded { UNSETTLED * UNSETTLED_PERIODS } else { 0.0 };
+                (digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1) + restless).min(most) * self.period()
             }
             "shooting" if self.stepped => size * size * STEPPED,
             _ if self.smooth => shooting,
@@ -345,6 +357,7 @@ impl Costing<'_> {
             |law: &SharedLaw| law.sliders().is_some_and(|all| all.iter().any(|branch| branch.stiffness.is_none()));
         let any_rigid = system.joints().iter().any(|joint| rigid(joint.law()));
         let factor = match (self.smooth, any_rigid, harmonics) {
+            (_, _, None) if self.falls => HARD_FALLING,
             (false, false, _) => 1.0,
             (_, _, None) => HARD,
             (true, _, Some(_)) => HARD_SMOOTH,
@@ -362,9 +375,9 @@ impl Costing<'_> {
             return PERIOD_STEPPED * size * size;
         }
         match (self.smooth, self.has_states) {
-            (false, _) => PERIOD.0 * size,
-            (true, false) => PERIOD.1 * size * size,
-            (true, true) => PERIOD.2 * size * size,
+            (false, _) => PERIOD_EVENTS.0 * size + PERIOD_EVENTS.1 * size.powi(3),
+            (true, false) => PERIOD.0 * size * size,
+            (true, true) => PERIOD.1 * size * size,
         }
     }
 

@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 
 /// The result of one study.
@@ -88,6 +88,14 @@ impl Column {
         Column { name: name.to_owned(), values: Values::Number(values) }
     }
 
+    /// Its values, if they are numbers.
+    pub fn as_numbers(&self) -> Option<&[f64]> {
+        match &self.values {
+            Values::Number(values) => Some(values),
+            _ => None,
+        }
+    }
+
     /// Of words.
     pub fn texts(name: &str, values: Vec<String>) -> Column {
         Column { name: name.to_owned(), values: Values::Text(values) }
@@ -97,14 +105,16 @@ impl Column {
 impl Table {
     /// The column of this name.
     pub fn column(&self, name: &str) -> Option<&Column> {
-        self.columns.iter().find(|column| column.name == column_name(name))
+        let name = column_name(name);
+        self.columns.iter().find(|column| column.name == name)
     }
     /// The numbers of a column.
     pub fn numbers(&self, column: &str) -> Option<&[f64]> {
-        self.column(column).and_then(|c| match &c.values {
-            Values::Number(v) => Some(v.as_slice()),
-            _ => None,
-        })
+        self.column(column)?.as_numbers()
+    }
+    /// Its columns by name, for who asks for thousands of them.
+    pub fn index(&self) -> HashMap<&str, &Column> {
+        self.columns.iter().rev().map(|column| (column.name.as_str(), column)).collect()
     }
     /// The words of a column.
     pub fn texts(&self, column: &str) -> Option<&[String]> {

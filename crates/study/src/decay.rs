@@ -1,8 +1,10 @@
 //! Damping read off a free decay, cycle by cycle.
 //!
 //! Three turning points in a row make a cycle of two swings, `s` and `s'` (half of what the motion covers between two turning points, so
-//! that an offset does not matter). Their logarithmic decrement `δ = 2 ln(s/s')` is that of a whole cycle, and
-//! `ζ = δ/√(4π² + δ²)` the damping ratio of the linear oscillator that would lose as much.
+//! that an offset does not matter). A mean that creeps, as that of friction with memory does, makes every other swing longer: it
+//! cancels in the sum of two swings in a row, so that the logarithmic decrement of a whole cycle is that of two such sums, half a
+//! cycle apart: `δ = 2 ln((s + s')/(s' + s''))` with the next swing `s''`. Of a linear oscillator that is exact. The last cycle has no
+//! next swing, and takes the one before it. `ζ = δ/√(4π² + δ²)` is the damping ratio of the linear oscillator that would lose as much.
 
 use std::f64::consts::TAU;
 
@@ -52,18 +54,33 @@ impl Decay {
     /// The cycles one after the other, until the motion rests.
     pub fn cycles(&self) -> Vec<Cycle> {
         let least = REST * self.largest();
-        let cycles = self.turns.windows(3).step_by(2).map_while(|turns| {
-            let (down, up) = (swing(turns[0], turns[1]), swing(turns[1], turns[2]));
-            let duration = turns[2].0 - turns[0].0;
-            let decrement = 2.0 * (down / up).ln();
-            (up > least && duration > 0.0).then(|| Cycle {
-                time: turns[0].0,
-                amplitude: 0.5 * (down + up),
-                frequency: 1.0 / duration,
-                damping_ratio: decrement / TAU.hypot(decrement),
+        let swings: Vec<f64> = self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).collect();
+        let moves = swings.iter().position(|swing| *swing <= least).unwrap_or(swings.len());
+        let (swings, turns) = (&swings[..moves], &self.turns);
+        let cycles = (1..swings.len()).step_by(2).map_while(|second| {
+            let duration = turns[second + 1].0 - turns[second - 1].0;
+            (duration > 0.0).then(|| {
+                let decrement = decrement(swings, second);
+                Cycle {
+                    time: turns[second - 1].0,
+                    amplitude: 0.5 * (swings[second - 1] + swings[second]),
+                    frequency: 1.0 / duration,
+                    damping_ratio: decrement / TAU.hypot(decrement),
+                }
             })
         });
         cycles.collect()
+    }
+}
+
+/// Logarithmic decrement of the cycle whose second swing this is.
+fn decrement(swings: &[f64], second: usize) -> f64 {
+    let cycle = swings[second - 1] + swings[second];
+    match (swings.get(second + 1), second.checked_sub(2)) {
+        (Some(next), _) => 2.0 * (cycle / (swings[second] + next)).ln(),
+        (None, Some(before)) => 2.0 * ((swings[before] + swings[second - 1]) / cycle).ln(),
+        // two swings are all there is
+        (None, None) => 2.0 * (swings[second - 1] / swings[second]).ln(),
     }
 }
 
@@ -120,6 +137,27 @@ mod tests {
             // the cubic between samples 1/100 of a period apart errs by 1e-7
             assert!((cycle.damping_ratio - zeta).abs() < 1e-5, "{cycle:?}");
             assert!((cycle.frequency - damped / TAU).abs() < 1e-4, "{cycle:?}");
+        }
+    }
+
+    /// A mean that creeps by more than the amplitude falls: the same motion beside `c t`, and with a mean that comes to rest.
+    #[test]
+    fn a_mean_that_creeps_is_no_growth() {
+        let (zeta, omega) = (0.002f64, TAU * 10.0);
+        let damped = omega * (1.0 - zeta * zeta).sqrt();
+        for creep in [-0.3, 0.3] {
+            let motion = |t: f64| {
+                let fall = (-zeta * omega * t).exp();
+                let (cos, sin) = ((damped * t).cos(), (damped * t).sin());
+                let (mean, rate) = (-creep * (-t).exp(), creep * (-t).exp());
+                (mean + fall * cos, rate - fall * (zeta * omega * cos + damped * sin))
+            };
+            let cycles = decay(motion, 2.0, 1e-3);
+            assert!(cycles.len() >= 18, "{}", cycles.len());
+            for cycle in &cycles {
+                // what is left of the creep is its second difference over half a cycle, 0.3 (1/20)² of an amplitude of 1, over 2π
+                assert!((cycle.damping_ratio - zeta).abs() < 1.3e-4, "{cycle:?}");
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Figures from finished tables: what the kinds need to draw, whether the tables were computed just now or read from a disk.
 
-use crate::dataset::{Axis, Table, Values as Cells};
+use crate::dataset::{Axis, Table, Values as Cells, column_name};
 use crate::study::{Study, VariedValue};
 use crate::units;
 use crate::values::Values;
@@ -187,7 +187,8 @@ pub(crate) fn words<'t>(table: &'t Table, column: &str) -> &'t [String] {
 
 /// Largest finite size among the columns of these names.
 pub(crate) fn largest(table: &Table, columns: impl IntoIterator<Item = String>) -> f64 {
-    let columns = columns.into_iter().filter_map(|column| table.numbers(&column));
+    let index = table.index();
+    let columns = columns.into_iter().filter_map(|column| index.get(&*column_name(&column))?.as_numbers());
     columns.flatten().map(|value| value.abs()).filter(|value| value.is_finite()).fold(0.0, f64::max)
 }
 

@@ -52,8 +52,8 @@ pub enum Takes {
     Count(i64, i64),
     /// `true` or `false`.
     Flag,
-    /// Frequencies: one, a list, or `{ from, to, points }`.
-    Frequencies,
+    /// Frequencies: one, a list, or a range with these keys.
+    Frequencies(&'static [Key]),
     /// A table from a name to a quantity: `{ blade1 = "1 mm" }`.
     ByName(Dimension),
     /// A table of its own with these keys.

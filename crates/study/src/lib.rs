@@ -19,6 +19,7 @@ mod info;
 mod key;
 mod kind;
 pub mod kinds;
+mod linear;
 pub mod memory;
 mod names;
 mod near;

@@ -3,6 +3,7 @@
 
 use crate::info::Complaint;
 use crate::near::{nearest, one_of, shown};
+use std::collections::BTreeSet;
 use stickslip::model::Model;
 
 /// Names that a message lists.
@@ -32,14 +33,16 @@ impl Names {
     /// Those of masses whose motion is not imposed.
     pub fn of_free_masses(model: &Model) -> Names {
         let mut names = Names::of_masses(model);
-        names.known.retain(|(_, places)| !model.motions.iter().any(|motion| places.contains(&motion.on)));
+        let moved: BTreeSet<&str> = model.motions.iter().map(|motion| motion.on.as_str()).collect();
+        names.known.retain(|(_, places)| !places.iter().any(|place| moved.contains(place.as_str())));
         names
     }
 
     /// The joints too, with their directions.
     #[must_use]
     pub fn and_joints(mut self, model: &Model) -> Names {
-        self.known.extend(model.joints.iter().flat_map(|joint| entries(&joint.name, model.joint_labels(joint))));
+        let labelled = model.joints.iter().zip(model.joint_labels());
+        self.known.extend(labelled.flat_map(|(joint, labels)| entries(&joint.name, labels)));
         self
     }
 

@@ -14,8 +14,8 @@ pub enum Note {
     Truncated(usize, f64),
     /// Points whose series was not compared with a longer one.
     Unchecked(usize),
-    /// Points whose orbit is unstable.
-    Unstable(usize),
+    /// Points whose orbit is unstable, and those of them whose motion repeats after fewer periods than were asked for.
+    Unstable(usize, usize),
     /// Points at which something sticks all the time in a motion that is not its own mirror image.
     History(usize),
     /// Of one case (its varied parameters in words): points at which a joint sticks for the whole period, of so many.
@@ -33,7 +33,8 @@ impl Note {
     /// What an orbit asks for: that it is unstable, if that is known (see [`Orbit::is_stable`]), how accurate its series is, and that it is one of
     /// many.
     pub(crate) fn of_orbit(orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
-        let unstable = (stable == Some(false)).then_some(Note::Unstable(1));
+        let early = || usize::from(orbit.periods > 1 && orbit.repeats() < orbit.periods);
+        let unstable = (stable == Some(false)).then(|| Note::Unstable(1, early()));
         let accuracy = match orbit.evidence.accuracy {
             Accuracy::Truncated => Some(Note::Truncated(1, orbit.evidence.truncation.unwrap_or(0.0))),
             Accuracy::Unchecked => Some(Note::Unchecked(1)),
@@ -52,10 +53,13 @@ impl Note {
                     *largest = largest.max(*other);
                     return;
                 }
-                (Note::Unchecked(points), Note::Unchecked(more))
-                | (Note::Unstable(points), Note::Unstable(more))
-                | (Note::History(points), Note::History(more)) => {
+                (Note::Unchecked(points), Note::Unchecked(more)) | (Note::History(points), Note::History(more)) => {
                     *points += more;
+                    return;
+                }
+                (Note::Unstable(points, early), Note::Unstable(more, other)) => {
+                    *points += more;
+                    *early += other;
                     return;
                 }
                 (Note::Stuck { case, points, of }, Note::Stuck { case: same, points: more_points, of: more })
@@ -87,11 +91,20 @@ impl Note {
                  Try fewer `harmonics`.",
                 points(*count)
             )),
-            Note::Unstable(count) => Some(format!(
-                "warning: at {} the orbit is unstable (`stable` is false): no motion stays on it, and the real one is another; \
-                 look for it with kind = \"transient\"",
-                points(*count)
-            )),
+            Note::Unstable(count, early) => {
+                let early = match early {
+                    0 => String::new(),
+                    early => format!(
+                        "; at {} of them it repeats after fewer periods than `period` says, and none that takes as many was found",
+                        early
+                    ),
+                };
+                Some(format!(
+                    "warning: at {} the orbit is unstable (`stable` is false): no motion stays on it, and the real one is another{early}; \
+                     look for it with another `period` in [method], or with kind = \"transient\"",
+                    points(*count)
+                ))
+            }
             Note::History(count) => Some(format!(
                 "At {} a joint or a part of one sticks for the whole period, in a motion that is not its own mirror image: where it sticks \
                  depends on how the motion began, and with it the means, and the amplitudes too if a gap or another law knows positions. \
@@ -126,6 +139,8 @@ mod tests {
             stuck("Ft = 1 N", 3),
             Note::Truncated(2, 5e-2),
             Note::History(1),
+            Note::Unstable(1, 0),
+            Note::Unstable(1, 1),
             Note::History(1),
             stuck("Ft = 2 N", 0),
             Note::Said("It is so.".to_owned()),
@@ -133,10 +148,15 @@ mod tests {
             note.join(&mut notes);
         }
         let texts: Vec<String> = notes.iter().filter_map(Note::text).collect();
-        assert_eq!(texts.len(), 4, "{texts:?}");
+        assert_eq!(texts.len(), 5, "{texts:?}");
         assert!(texts[0].starts_with("Ft = 1 N: at 3 of 20 points a joint sticks"), "{}", texts[0]);
         assert!(texts[1].starts_with("At 3 points") && texts[1].contains("5.0e-2"), "{}", texts[1]);
         assert!(texts[2].starts_with("At 2 points a joint or a part of one sticks"), "{}", texts[2]);
-        assert_eq!(texts[3], "It is so.");
+        assert!(
+            texts[3].contains("at 2 points the orbit is unstable") && texts[3].contains("at 1 of them it repeats"),
+            "{}",
+            texts[3]
+        );
+        assert_eq!(texts[4], "It is so.");
     }
 }

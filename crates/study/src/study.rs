@@ -747,12 +747,13 @@ pub(crate) fn model_of(structure: &Structure, environment: &Environment<'_>, pro
         let (stiffness, damping) = (number(&values, "stiffness"), number(&values, "damping"));
         model.springs.push(Spring { between: between(&values), stiffness, damping });
     }
+    let nodes: BTreeMap<String, usize> = model.masses.iter().map(|m| (m.name.clone(), m.directions.len())).collect();
     for (i, table) in lists.joint.iter().enumerate() {
         let values = resolve(Element::Joint(i), table);
         // without a law there is a problem, and the model is not used
         if let Some(law) = values.law("law") {
             let between = between(&values);
-            let law = for_nodes(law, table, &between, &model.masses);
+            let law = for_nodes(law, table, &between, &nodes);
             model.joints.push(Joint { name: text(&values, "name"), between, law });
         }
     }
@@ -771,12 +772,17 @@ pub(crate) fn model_of(structure: &Structure, environment: &Environment<'_>, pro
 
 /// A law that leaves its number of tangents open, where the file does too, has those of the nodes that it joins: all their directions but the
 /// normal.
-fn for_nodes(law: &SharedLaw, joint: &StatedTable, between: &[String; 2], masses: &[Mass]) -> SharedLaw {
+fn for_nodes(
+    law: &SharedLaw,
+    joint: &StatedTable,
+    between: &[String; 2],
+    nodes: &BTreeMap<String, usize>,
+) -> SharedLaw {
     let stated = match joint.entry("law").map(|entry| &entry.value) {
         Some(Stated::Law(_, table)) => table.entry(TANGENTS).is_some(),
         _ => true,
     };
-    let directions = masses.iter().filter(|mass| between.contains(&mass.name)).map(|mass| mass.directions.len()).max();
+    let directions = between.iter().filter_map(|name| nodes.get(name)).copied().max();
     match (stated, directions) {
         (false, Some(directions @ 2..)) => law.with(TANGENTS, (directions - 1) as f64).unwrap_or_else(|| law.clone()),
         _ => law.clone(),

@@ -63,6 +63,8 @@ pub struct JointSummary {
 /// Cases that are looked at for warnings, evenly spread over all of them: a warning about the model holds for each of
 /// these.
 const LOOKED_AT: usize = 9;
+/// A run that takes longer says so at its start, s.
+const LONG_RUN: f64 = 3600.0;
 /// Degrees of freedom beyond which only the first case is looked at, so that a summary takes no longer than a second.
 const LARGE: usize = 60;
 
@@ -117,6 +119,14 @@ impl ModelSummary {
             warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
             size,
             seconds,
+        })
+    }
+
+    /// That a run takes so long that it should be known before; `None` of short ones. The estimate is rough, and of one thread.
+    pub fn long_run(&self) -> Option<String> {
+        (self.seconds >= LONG_RUN).then(|| {
+            let time = crate::words::about(self.seconds);
+            format!("this takes {time} on one thread; `check` says it before, and Ctrl-C ends the run and keeps the finished points")
         })
     }
 

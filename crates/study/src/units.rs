@@ -263,7 +263,14 @@ pub(crate) struct Names<'a> {
     pub function: &'a dyn Fn(&str) -> bool,
 }
 
-/// Reads the unit that starts at byte `start` of `text` (a character for which [`starts_unit`] holds).
+/// Whether a text that begins with `/` goes on with a unit and nothing that could be meant instead: `/m`, `/s`.
+pub(crate) fn divides(text: &str, names: &Names<'_>) -> bool {
+    let Some(after) = text.strip_prefix('/') else { return false };
+    let reader = Reader { text: after.trim_start(), at: 0, names, depth: 0 };
+    reader.unit_here() && !(names.parameter)(reader.word())
+}
+
+/// Reads the unit that starts at byte `start` of `text` (a character for which [`starts_unit`] holds, or where it [`divides`]).
 /// Returns it with the byte after it.
 pub(crate) fn read(text: &str, start: usize, names: &Names<'_>) -> Result<(Unit, usize), Fault> {
     let mut reader = Reader { text, at: start, names, depth: 0 };
@@ -312,7 +319,7 @@ impl Reader<'_> {
 
     fn product(&mut self, group: bool) -> Result<Unit, Fault> {
         let start = self.at;
-        let mut unit = self.factor()?;
+        let mut unit = if self.peek() == Some('/') { ONE } else { self.factor()? };
         let mut divided = false;
         loop {
             let before = self.at;

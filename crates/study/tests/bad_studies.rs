@@ -47,6 +47,16 @@ fn keys() {
         "width",
         &["method `event-driven`"],
     );
+    check(
+        "kind = \"event-driven\"",
+        "kind = \"auto\"\nperiod = 2",
+        (51, 1),
+        "period",
+        &[
+            "method `auto` has no key `period`",
+            "a key of `event-driven`, `transient`, `shooting` or `harmonic-balance`",
+        ],
+    );
     check("kind = \"response\"\n", "", (44, 1), "kind", &["`kind` is missing in [study]", "`transient`"]);
     check("[[mass]]", "[mass]", (16, 3), "mass", &["stands twice"]);
     check("points = 241", "points = \"many\"", (46, 60), "points", &["a whole number", "found the text \"many\""]);

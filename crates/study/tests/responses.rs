@@ -317,3 +317,63 @@ samples = 64
         }
     }
 }
+
+/// 1 kg on 1 N/mm and 1 N s/m with a joint, under 2 N where it is driven.
+fn single(law: &str, study: &str) -> Dataset {
+    dataset(&format!(
+        r#"
+schema = 1
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "1 N/mm"
+damping = "1 N s/m"
+[[joint]]
+name = "j"
+between = ["m", "ground"]
+law = {{ {law} }}
+[[force]]
+on = "m"
+amplitude = "2 N"
+[study]
+{study}
+"#
+    ))
+}
+
+/// What faces can stick, slip or part says so; a stop touches or is open, by its force; a spring has no faces. The same in every method.
+#[test]
+fn contact_is_said_of_what_has_faces() {
+    let contacts = |law: &str, method: &str| {
+        let found = single(law, &format!("kind = \"orbit\"\nfrequency = \"4 Hz\"\n[method]\nkind = \"{method}\""));
+        let words = table(&found, "orbit").texts("j_contact").unwrap().to_vec();
+        (words, numbers(&found, "orbit", "j_force_N").to_vec())
+    };
+    for method in ["event-driven", "shooting", "harmonic-balance"] {
+        let (words, force) = contacts("kind = \"gap\", gap = \"1 mm\", stiffness = \"500 N/m\"", method);
+        assert!(words.iter().any(|w| w == "touch") && words.iter().any(|w| w == "open"), "{method}");
+        for (word, force) in words.iter().zip(force).filter(|(_, force)| force.abs() > 1e-3) {
+            assert_eq!(word, if force > 0.0 { "touch" } else { "open" }, "{method}");
+        }
+        if method != "event-driven" {
+            let (words, _) = contacts("kind = \"cubic\", stiffness = \"1e6 N/m^3\"", method);
+            assert!(words.iter().all(String::is_empty), "{method}: {words:?}");
+        }
+    }
+    let (words, _) = contacts("kind = \"jenkins\", stiffness = \"2 N/mm\", limit = \"0.5 N\"", "event-driven");
+    assert!(words.iter().any(|w| w == "stick") && words.iter().any(|w| w == "slip+"));
+}
+
+/// A stiff element of Dahl creeps while it is worked back and forth; the motion loses energy in every cycle all the same.
+#[test]
+fn a_decay_with_creep_has_no_negative_damping() {
+    let release = "kind = \"transient\"\nstart = { m = \"50 mm\" }\nduration = \"4 s\"\ntime_step = \"1 ms\"";
+    let found = single("kind = \"dahl\", stiffness = \"20 N/mm\", limit = \"5 N\"", release);
+    let ratios = numbers(&found, "decay", "damping_ratio");
+    assert!(ratios.len() > 50, "{}", ratios.len());
+    // the damper alone has c/(2 √(k m)) with the stiffness of the stuck element beside the spring, 1 kg: more the element only adds
+    let least = 1.0 / (2.0 * 21_000f64.sqrt());
+    assert!(ratios.iter().all(|ratio| *ratio > 0.9 * least), "{ratios:?}");
+}

@@ -331,3 +331,66 @@ fn the_time_is_estimated_within_bounds() {
     let (few, many) = (points("points = 1000"), points("points = 100000"));
     assert!(many > 50.0 * few && many < 100.0 * few, "{few} {many}");
 }
+
+/// A stop 1 kg may hit, with a bare gap, and a figure with references.
+fn stop(law: &str, figure: &str) -> String {
+    format!(
+        r#"
+schema = 1
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "1 N/mm"
+damping = "5 N s/m"
+[[joint]]
+name = "j"
+between = ["m", "ground"]
+law = {{ {law} }}
+[[force]]
+on = "m"
+amplitude = "2 N"
+[study]
+kind = "response"
+frequency = {{ from = "4 Hz", to = "6 Hz", points = 11 }}
+{figure}
+"#
+    )
+}
+
+#[test]
+fn bare_lengths_that_are_long_are_asked_about() {
+    let gap = |gap: &str| stop(&format!("kind = \"gap\", gap = {gap}, stiffness = \"1 N/mm\""), "");
+    warns(&gap("0.1"), &["`gap` of joint 1", "counts as 0.1 m (100 mm)", "\"0.1 mm\""]);
+    silent(&gap("1e-4"));
+    silent(&gap("\"0.1 m\""));
+}
+
+#[test]
+fn references_that_no_law_has_are_missed_before_the_run() {
+    let references = "[figure]\nreferences = true";
+    let text = stop("kind = \"cubic\", stiffness = \"1e6 N/m^3\"", references);
+    let warnings = summary(&text).warnings;
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    for (warning, what) in warnings.iter().zip(["free", "stuck"]) {
+        let words =
+            format!("no reference curve with all joints {what}: the law `cubic` of joint `j` has no slip limit");
+        assert!(warning.contains(&words), "{warning}");
+    }
+    // a run says it once
+    let notes = run(&study(&text), &Context::unwatched(1)).unwrap().notes;
+    assert_eq!(notes.iter().filter(|note| note.contains("no reference curve")).count(), 2, "{notes:?}");
+    silent(&stop("kind = \"gap\", gap = \"1 mm\", stiffness = \"1 N/mm\"", references));
+}
+
+#[test]
+fn a_long_run_says_so_at_its_start() {
+    let points = |count: &str| {
+        let text = stop("kind = \"stribeck\", limit = \"1 N\", static_limit = \"1.5 N\", velocity = \"10 mm/s\"", "");
+        summary(&text.replace("points = 11", count)).long_run()
+    };
+    assert_eq!(points("points = 11"), None);
+    let said = points("points = 1000000").unwrap();
+    assert!(said.contains("days on one thread") && said.contains("Ctrl-C"), "{said}");
+}

@@ -124,7 +124,7 @@ fn stops_agree_with_integration() {
                 let at = &orbit.sample(orbit.period() * f64::from(i) / 20.0).joints[0];
                 let depth = at.displacement[0] - gap;
                 near("force", at.force[0], stiffness * depth.max(0.0), 1e-12 * stiffness * scale);
-                assert_eq!(at.contact, if depth > 0.0 { Contact::Stick } else { Contact::Open });
+                assert_eq!(at.contact, if depth > 0.0 { Contact::Touch } else { Contact::Open });
             }
         }
     }

@@ -13,6 +13,8 @@ pub enum Contact {
     SlipBackward,
     /// They slide in a plane.
     Slip,
+    /// They touch, and the law does not tell whether they slide: a stop.
+    Touch,
     /// They do not touch.
     Open,
 }
@@ -26,7 +28,7 @@ impl Contact {
         match self {
             Contact::SlipForward => 1.0,
             Contact::SlipBackward => -1.0,
-            Contact::Stick | Contact::Slip | Contact::Open => 0.0,
+            Contact::Stick | Contact::Slip | Contact::Touch | Contact::Open => 0.0,
         }
     }
 

@@ -67,7 +67,7 @@ impl Law for Gap {
         false
     }
     fn contact(&self, _velocity: &[f64], force: &[f64]) -> Contact {
-        if force[0] > 0.0 { Contact::Stick } else { Contact::Open }
+        if force[0] > 0.0 { Contact::Touch } else { Contact::Open }
     }
 }
 
@@ -93,8 +93,8 @@ mod tests {
             (force, law.contact(&[0.0], &[force]))
         };
         assert_eq!(at(0.5, 0.25), (0.0, Contact::Open));
-        assert_eq!(at(0.5, 0.75), (250.0, Contact::Stick));
-        assert_eq!(at(-0.5, 0.0), (500.0, Contact::Stick));
+        assert_eq!(at(0.5, 0.75), (250.0, Contact::Touch));
+        assert_eq!(at(-0.5, 0.0), (500.0, Contact::Touch));
         assert_eq!(at(-0.5, -1.0), (0.0, Contact::Open));
     }
 }

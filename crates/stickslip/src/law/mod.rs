@@ -336,6 +336,18 @@ impl dyn Law + '_ {
         }
     }
 
+    /// Whether its faces can slide or part: a spring has none, and its contact says nothing.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip::law::{Coulomb, Cubic, Gap, Law};
+    /// let laws: [&dyn Law; 3] = [&Coulomb { limit: 2.0 }, &Gap { gap: 1e-3, stiffness: 1e4 }, &Cubic { stiffness: 4e9 }];
+    /// assert_eq!(laws.map(|law| law.has_faces()), [true, true, false]);
+    /// ```
+    pub fn has_faces(&self) -> bool {
+        self.scale().is_finite() || self.closed().is_some()
+    }
+
     /// Whether the law can never carry a force: the size of its forces is zero.
     pub fn is_free(&self) -> bool {
         self.scale() == 0.0

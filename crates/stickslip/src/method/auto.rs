@@ -2,15 +2,19 @@
 
 use super::event_driven::takes;
 use super::harmonic_balance::HarmonicBalance;
-use super::{Choice, Method, MethodError, MethodInfo, Solver, event_driven::EventDriven, shooting::Shooting};
+use super::{
+    Choice, Method, MethodError, MethodInfo, Options, Solver, Ways, event_driven::EventDriven, harmonic_balance,
+    settling, shooting::Shooting,
+};
 use crate::model::System;
 use crate::structure::MOST_IN_FULL;
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: "auto",
-    summary: "event-driven for exact laws, shooting for smooth laws, harmonic balance for more than a dozen joints or a hundred sliders and for \
-              waves around a tuned disk",
+    summary: "event-driven where all laws are exact, shooting where all are smooth; harmonic balance where neither holds (friction in a plane or with \
+              a normal force, mixtures), where a place has no mass, beyond 12 joints, 100 sliders or 2000 places, and for waves around a tuned disk; \
+              what it does not take goes to the method that does",
     options: &[],
     build: |_| Ok(Box::new(Auto)),
 };
@@ -34,28 +38,49 @@ const PIECES: usize = 100;
 pub struct Auto;
 
 impl Auto {
+    /// The method and why. Where the laws' own method refuses the system, the first of the table that takes it.
     fn chosen(system: &System) -> (Box<dyn Method>, String) {
+        let (method, because) = Auto::by_laws(system);
+        let refuses = match method.name() {
+            harmonic_balance::NAME => !HarmonicBalance::takes_laws(system),
+            _ => false,
+        };
+        let methods = if refuses { Ways::of(system).methods } else { Vec::new() };
+        // waiting is the last resort
+        let waits = |name: &&&str| **name == settling::INFO.name;
+        let other = methods.iter().find(|name| !waits(name)).or(methods.first()).copied();
+        match other.and_then(super::find).and_then(|row| (row.build)(&Options::new()).ok()) {
+            Some(other) => (other, format!("{} refuses a law", method.name())),
+            // who refuses says what else there is
+            None => (method, because),
+        }
+    }
+
+    /// The choice by laws and sizes.
+    fn by_laws(system: &System) -> (Box<dyn Method>, String) {
         let joints = system.joints().len();
         let exact = system.joints().iter().all(|joint| takes(joint.law().as_ref()));
         let smooth = system.joints().iter().all(|joint| joint.law().rate().is_some());
         let pieces: usize =
             system.joints().iter().map(|joint| joint.law().pieces().map_or(0, |pieces| pieces.len())).sum();
+        let massless = (0..system.dofs()).find(|place| system.structure().own_mass(*place) <= 0.0);
+        let balance =
+            |because: String| -> (Box<dyn Method>, String) { (Box::new(HarmonicBalance::default()), because) };
         if system.dofs() > MOST_IN_FULL {
-            let because = format!("{} places are more than {MOST_IN_FULL}", system.dofs());
-            (Box::new(HarmonicBalance::default()), because)
+            balance(format!("{} places are more than {MOST_IN_FULL}", system.dofs()))
         } else if joints > 0 && system.cyclic().is_some() {
-            (Box::new(HarmonicBalance::default()), "one of equal sectors is solved".to_owned())
+            balance("one of equal sectors is solved".to_owned())
         } else if joints > FOLLOWED {
-            let because = format!("{joints} joints are more than {FOLLOWED}");
-            (Box::new(HarmonicBalance::default()), because)
+            balance(format!("{joints} joints are more than {FOLLOWED}"))
         } else if exact && pieces > PIECES {
-            let because = format!("{pieces} sliders and stops are more than {PIECES}");
-            (Box::new(HarmonicBalance::default()), because)
+            balance(format!("{pieces} sliders and stops are more than {PIECES}"))
+        } else if let Some(place) = massless {
+            balance(format!("`{}` has no mass", system.places()[place]))
         } else if exact {
             let because = if joints == 0 { "there are no joints" } else { "every law is exact" };
             (Box::new(EventDriven), because.to_owned())
         } else if !smooth {
-            (Box::new(HarmonicBalance::default()), "neither are all laws exact nor all smooth".to_owned())
+            balance("neither are all laws exact nor all smooth".to_owned())
         } else {
             (Box::new(Shooting::default()), "the laws are smooth".to_owned())
         }
@@ -81,8 +106,8 @@ impl Method for Auto {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::Iwan;
-    use crate::model::example;
+    use crate::law::{Iwan, Stribeck};
+    use crate::model::{GROUND, Joint, example};
     use std::sync::Arc;
 
     #[test]
@@ -91,6 +116,24 @@ mod tests {
             let mut model = example::blade_couple();
             model.joints[0].law = Arc::new(Iwan { stiffness: 2e4, limit: 4.0, chi: -0.5, beta: 0.3, elements });
             assert_eq!(Auto.choice(&model.assemble().unwrap()).method, method);
+        }
+    }
+
+    /// Harmonic balance takes places without mass, and event-driven a static limit above the dynamic one at any number of joints.
+    #[test]
+    fn what_the_first_choice_refuses_goes_to_who_takes_it() {
+        let mut massless = example::blade_couple();
+        massless.masses[1].mass = 0.0;
+        let mut many = example::blade_couple();
+        let drops = Arc::new(Stribeck { limit: 2.0, static_limit: 3.0, velocity: 0.0 });
+        for i in 0..=FOLLOWED {
+            let between = ["blade1".into(), GROUND.into()];
+            many.joints.push(Joint { name: format!("j{i}"), between, law: drops.clone() });
+        }
+        for (model, method) in [(massless, "harmonic-balance"), (many, "event-driven")] {
+            let system = model.assemble().unwrap();
+            assert_eq!(Auto.choice(&system).method, method);
+            assert!(Auto.prepare(&system).is_ok(), "{}", Auto.choice(&system));
         }
     }
 }

@@ -71,8 +71,9 @@ mod tests {
     use super::*;
     use crate::dimension::Dimension;
     use crate::law::{Coulomb, Gap, Jenkins, Law, LawInfo, Parameter, Rate, RateLaw, Relative, StepLaw};
+    use crate::method::harmonic_balance::{self, HarmonicBalance};
     use crate::method::shooting::Shooting;
-    use crate::method::{Method, event_driven, settling::Settling};
+    use crate::method::{Method, OrbitError, event_driven, settling::Settling};
     use crate::model::Axis;
     use crate::orbit::{Orbit, Symmetry};
     use crate::structure::Structure;
@@ -397,8 +398,13 @@ mod tests {
 
     /// `x'' + 0.1 x' + x + k max(x, 0) = cos Ωt`, on one place.
     fn stopped(k: f64) -> System {
+        damped(0.1, k)
+    }
+
+    /// The same with another damping.
+    fn damped(c: f64, k: f64) -> System {
         let one = |value: f64| DMatrix::from_element(1, 1, value);
-        let structure = Structure::new(vec!["m".into()], one(1.0), one(0.1), one(1.0)).unwrap();
+        let structure = Structure::new(vec!["m".into()], one(1.0), one(c), one(1.0)).unwrap();
         let stop: SharedLaw = Arc::new(Gap { gap: 0.0, stiffness: k });
         let axes = vec![Axis::new(vec![(0, 1.0)])];
         System::builder(structure).joint("stop", stop, axes).force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap()
@@ -452,6 +458,40 @@ mod tests {
                 assert_eq!((orbit.periods, orbit.is_stable()), (1, Some(false)));
             }
         }
+    }
+
+    /// A sweep comes to the motions of two periods along the orbit that repeats after one, which is unstable there, and leaves it.
+    #[test]
+    fn a_neighbour_does_not_keep_a_search_on_an_unstable_orbit() {
+        let system = stopped(4.0);
+        let shooting = Shooting { period: 2, ..Shooting::default() };
+        let exact = event_driven::Subharmonic { period: 2 };
+        let series = harmonic_balance::Subharmonic { balance: HarmonicBalance::default(), period: 2 };
+        let mut amplitudes = Vec::new();
+        for method in [&shooting as &dyn Method, &exact, &series] {
+            let mut solver = method.solver(&system).unwrap();
+            let first = solver.orbit(3.9, None).unwrap();
+            assert_eq!((first.repeats(), first.is_stable()), (1, Some(true)), "{}", method.name());
+            let orbit = solver.orbit(3.5, Some(&first.start)).unwrap();
+            assert_eq!((orbit.repeats(), orbit.is_stable()), (2, Some(true)), "{}", method.name());
+            amplitudes.push(orbit.places[0].amplitude());
+        }
+        near(amplitudes[1], amplitudes[0], 1e-6);
+        near(amplitudes[2], amplitudes[0], 1e-3);
+    }
+
+    /// Who waits for an orbit that nothing is attracted by ends with the reason: a motion of two periods, or next to no damping.
+    #[test]
+    fn waiting_ends_where_nothing_settles() {
+        let wait = |system: &System, omega: f64| {
+            let error = Settling::default().solver(system).unwrap().orbit(omega, None).unwrap_err();
+            assert_eq!(error.status(), "not-settled", "{error}");
+            let OrbitError::Unsettled { returns, repeats, .. } = error else { panic!("{error}") };
+            (returns, repeats)
+        };
+        assert_eq!(wait(&stopped(4.0), 2.6), (1024, Some(2)));
+        assert_eq!(wait(&stopped(10.0), 2.2), (1024, Some(3)));
+        assert_eq!(wait(&damped(1e-7, 0.5), 1.7), (4096, None));
     }
 
     /// Displacements at the start and one period of the drive later.

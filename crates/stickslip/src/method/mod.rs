@@ -16,6 +16,7 @@ pub mod harmonic_balance;
 mod incremental;
 mod periodic;
 mod relaxed;
+mod repeated;
 pub mod settling;
 pub mod shooting;
 mod smooth;
@@ -235,9 +236,17 @@ const PERIOD: MethodOption = MethodOption {
     doc: "periods of the drive after which the motion repeats; motions that repeat earlier are found too; 1 when absent",
 };
 
-/// The option [`PERIOD`].
-fn periods(options: &Options) -> usize {
-    options.get(PERIOD.key).map_or(1, |periods| *periods as usize)
+/// Most periods of the drive that one of the motion may take: more are another motion than one that repeats.
+const MOST_PERIODS: f64 = 100.0;
+
+/// The option [`PERIOD`] of a method.
+fn periods(method: &'static str, options: &Options) -> Result<usize, MethodError> {
+    let periods = options.get(PERIOD.key).copied().unwrap_or(1.0);
+    if (1.0..=MOST_PERIODS).contains(&periods) {
+        return Ok(periods as usize);
+    }
+    let message = format!("must lie between 1 and {MOST_PERIODS}, found {periods}");
+    Err(MethodError::Option { method, key: PERIOD.key, message })
 }
 
 /// The key of the velocity over which exact laws are smoothed, of the methods that can do so.

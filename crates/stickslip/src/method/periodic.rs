@@ -8,6 +8,7 @@ use super::{Breakdown, OrbitError};
 use crate::model::System;
 use crate::orbit::Symmetry;
 use nalgebra::{DMatrix, DVector};
+use std::collections::VecDeque;
 use stickslip_numerics::eigen;
 
 /// A flow that can be returned.
@@ -131,6 +132,8 @@ fn settle(
     let n = start.len();
     let mut state = start.to_vec();
     let mut changes = Vec::new(); // of every return, relative to the state
+    let mut last_states = VecDeque::with_capacity(MOST_REPEATS + 1);
+    let mut hopeless = 0;
     let mut smallest = f64::INFINITY;
     for count in 1..=returns {
         let before = state.clone();
@@ -144,6 +147,22 @@ fn settle(
         let residual = norm(map.weights(), &change) / size;
         smallest = f64::min(smallest, residual);
         changes.push(residual);
+        last_states.push_front(before);
+        last_states.truncate(MOST_REPEATS);
+        if count >= PATIENCE && count.is_power_of_two() {
+            let distance = |earlier: &Vec<f64>| {
+                let apart: Vec<f64> = state.iter().zip(earlier).map(|(a, b)| a - aim.sign * b).collect();
+                norm(map.weights(), &apart) / size
+            };
+            // the first of them is one return ago
+            let repeats = last_states.iter().position(|earlier| distance(earlier) <= REPEATS * residual);
+            hopeless = if settles(&changes, tolerance, returns - count) { 0 } else { hopeless + 1 };
+            if residual > tolerance && (repeats.is_some() || hopeless == HOPELESS) {
+                let (method, omega) = (aim.method, aim.omega);
+                let repeats = repeats.map(|back| back + 1);
+                return Err(OrbitError::Unsettled { method, omega, returns: count, change: residual, repeats });
+            }
+        }
         let Some(window) = window(count) else { continue };
         let of = |last: usize| changes[count - last - window..count - last].iter().sum::<f64>();
         let (earlier, last) = (of(window), of(0));
@@ -176,6 +195,30 @@ fn window(count: usize) -> Option<usize> {
         return count.is_multiple_of(DECAY_WINDOW).then_some(DECAY_WINDOW);
     }
     count.is_multiple_of(2 * FIRST_WINDOW).then_some(count / 2)
+}
+
+/// Returns after which it is first asked whether the motion settles at all, and then whenever they have doubled. It must look hopeless so many
+/// times in a row: beats of neighbouring modes rise and fall, and do not over windows that grow.
+const PATIENCE: usize = 1024;
+const HOPELESS: usize = 3;
+/// Returns that are looked at for a motion that repeats after several, and share of the change of one return below which it does.
+const MOST_REPEATS: usize = 8;
+const REPEATS: f64 = 1e-3;
+
+/// Whether a motion reaches the tolerance within so many more returns if its changes go on to fall as they fell over the last half of all returns.
+fn settles(changes: &[f64], tolerance: f64, more: usize) -> bool {
+    let window = changes.len() / 4;
+    let of = |last: usize| changes[changes.len() - last - window..changes.len() - last].iter().sum::<f64>();
+    let (earlier, last) = (of(window), of(0));
+    if last == 0.0 {
+        return true;
+    }
+    let decay = last / earlier;
+    if decay.is_nan() || decay >= 1.0 {
+        return false;
+    }
+    let missing = last * decay / (1.0 - decay);
+    missing <= tolerance || window as f64 * (missing / tolerance).ln() <= more as f64 * -decay.ln()
 }
 
 /// A change per return below this is rounding.

@@ -52,7 +52,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             return Err(MethodError::Option { method: NAME, key: "tolerance", message });
         }
         let most = options.get("periods").map_or(PERIODS, |periods| *periods as usize);
-        let (width, period) = (options.get(WIDTH).copied(), periods(options));
+        let (width, period) = (options.get(WIDTH).copied(), periods(NAME, options)?);
         Ok(Box::new(Settling { tolerance, periods: most, width, period }))
     },
 };

@@ -12,6 +12,7 @@ use super::guess::Guess;
 use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
 use super::periodic::{Aim, Closed, ReturnMap, Search, approached, close, newton_step, norm};
 use super::relaxed::{Closing, Spring, relaxed};
+use super::repeated::Afresh;
 use super::smooth::flow::SmoothFlow;
 use super::stepped::SteppedPath;
 use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, WIDTH, periods};
@@ -76,7 +77,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             let message = format!("must lie between 1e-13 and 1e-3, found {tolerance}");
             return Err(MethodError::Option { method: NAME, key: "tolerance", message });
         }
-        Ok(Box::new(Shooting { tolerance, width: options.get(WIDTH).copied(), period: periods(options) }))
+        Ok(Box::new(Shooting { tolerance, width: options.get(WIDTH).copied(), period: periods(NAME, options)? }))
     },
 };
 
@@ -114,7 +115,8 @@ impl Method for Shooting {
         NAME
     }
     fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Ok(Box::new(Shooter::new(system, *self, NAME, Search::Newton)?))
+        let shooter = Shooter::new(system, *self, NAME, Search::Newton)?;
+        Ok(if self.period > 1 { Box::new(Afresh(shooter)) } else { Box::new(shooter) })
     }
 }
 
@@ -241,7 +243,10 @@ impl<'a> Shooter<'a> {
             let coarsely = Search::Settle { tolerance: tolerance.max(COARSE), returns: returns.min(COARSE_RETURNS) };
             let near = coarsely.find(self, start, |shooter| shooter.first_state(aim.omega), aim);
             self.set_tolerance(fine);
-            let near = near.ok().map(|near| near.state);
+            let near = match near {
+                Err(error @ OrbitError::Unsettled { .. }) => return Err(error),
+                near => near.ok().map(|near| near.state),
+            };
             // a settled motion is left as it is: nothing but time has found it
             let closed = search.find(self, near.as_deref().or(start), |shooter| shooter.first_state(aim.omega), aim)?;
             self.record(&closed)?;

@@ -8,7 +8,7 @@ use crate::structure::Structure;
 use crate::structure::reduction::Row;
 use nalgebra::DVector;
 use num_complex::Complex64;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use stickslip_numerics::sparse::Matrix;
 
@@ -67,11 +67,11 @@ impl Model {
     pub fn place_names(&self) -> Vec<String> {
         let mut names = vec![GROUND.to_owned()];
         names.extend(self.nodes().flat_map(|(name, directions)| places_of(name, directions)));
-        for motion in &self.motions {
-            if !names.contains(&motion.on) {
-                names.push(motion.on.clone());
-            }
-        }
+        let mut known: BTreeSet<String> =
+            if self.motions.is_empty() { BTreeSet::new() } else { names.iter().cloned().collect() };
+        names.extend(
+            self.motions.iter().filter(|motion| known.insert(motion.on.clone())).map(|motion| motion.on.clone()),
+        );
         names
     }
 
@@ -80,16 +80,25 @@ impl Model {
         self.place_names().split_off(1)
     }
 
-    /// What results call the axes of a joint: its name, or `joint.direction` where it joins nodes.
-    pub fn joint_labels(&self, joint: &Joint) -> Vec<String> {
-        let of_node = |name: &String| -> Vec<String> {
-            let places = self.place_names();
-            let along = |place: &String| place.strip_prefix(name.as_str())?.strip_prefix('.').map(str::to_owned);
-            places.iter().filter_map(along).collect()
+    /// What results call the axes of every joint: its name, or `joint.direction` where it joins nodes.
+    ///
+    /// # Example
+    /// ```
+    /// let couple = stickslip::model::example::blade_couple();
+    /// assert_eq!(couple.joint_labels(), [["shroud"]]);
+    /// ```
+    pub fn joint_labels(&self) -> Vec<Vec<String>> {
+        let places = self.place_names();
+        let mut nodes: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        for (node, along) in places.iter().filter_map(|place| place.split_once('.')) {
+            nodes.entry(node).or_default().push(along);
+        }
+        let labels = |joint: &Joint| {
+            let directions = joint.between.iter().filter_map(|name| nodes.get(name.as_str())).find(|all| all.len() > 1);
+            let label = |along: &&str| format!("{}.{along}", joint.name);
+            directions.map_or_else(|| vec![joint.name.clone()], |directions| directions.iter().map(label).collect())
         };
-        let directions = joint.between.iter().map(of_node).find(|directions| directions.len() > 1);
-        let label = |along: &String| format!("{}.{along}", joint.name);
-        directions.map_or_else(|| vec![joint.name.clone()], |directions| directions.iter().map(label).collect())
+        self.joints.iter().map(labels).collect()
     }
 
     /// Checks the model and assembles its matrices.

@@ -91,6 +91,7 @@ impl Places {
         let mut collected = Collected {
             places: Places { stated: Vec::new(), ends, directions: BTreeMap::new() },
             columns: BTreeSet::new(),
+            motions: model.motions.iter().map(|motion| motion.on.as_str()).collect(),
         };
         for (i, place) in model.places.iter().enumerate() {
             let element = Element::Place(i);
@@ -100,18 +101,19 @@ impl Places {
                 return Err(ModelError::new(element, "dofs", message));
             }
             let of = |along: usize| Of::Component(i, along);
-            collected.node(model, element, (&place.name, &place.directions), of)?;
+            collected.node(element, (&place.name, &place.directions), of)?;
         }
         for (i, mass) in model.masses.iter().enumerate() {
-            collected.node(model, Element::Mass(i), (&mass.name, &mass.directions), |_| Of::Own(mass.mass))?;
+            collected.node(Element::Mass(i), (&mass.name, &mass.directions), |_| Of::Own(mass.mass))?;
         }
         collected.moved(model)?;
-        let Collected { places, columns } = collected;
+        let Collected { places, columns, .. } = collected;
+        let mut joints = BTreeSet::new();
         for (i, joint) in model.joints.iter().enumerate() {
             let element = Element::Joint(i);
             identifier(&joint.name, element, "name", is_identifier)?;
             let taken = columns.contains(&joint.name) || places.directions.contains_key(&joint.name);
-            if taken || model.joints[..i].iter().any(|j| j.name == joint.name) {
+            if taken || !joints.insert(joint.name.as_str()) {
                 return twice(&joint.name, element, "name");
             }
         }
@@ -178,17 +180,18 @@ impl Places {
 }
 
 /// Places while they are collected.
-struct Collected {
+struct Collected<'a> {
     places: Places,
     /// Columns of results are named after places, with `_` for the point.
     columns: BTreeSet<String>,
+    /// Places with an imposed motion.
+    motions: BTreeSet<&'a str>,
 }
 
-impl Collected {
+impl Collected<'_> {
     /// Adds a node, or a place with one displacement.
     fn node(
         &mut self,
-        model: &Model,
         element: Element,
         (name, directions): (&String, &Vec<String>),
         of: impl Fn(usize) -> Of,
@@ -208,7 +211,7 @@ impl Collected {
             return twice(name, element, "name");
         }
         for (along, place) in places_of(name, directions).into_iter().enumerate() {
-            let moved = model.motions.iter().any(|motion| motion.on == place);
+            let moved = self.motions.contains(place.as_str());
             self.place(Stated { name: place, of: of(along), moved }, element, "name")?;
         }
         if !directions.is_empty() {

@@ -4,25 +4,25 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Breakdown {
     /// Too many switches.
-    #[error("joint {joint} chatters at t = {time:.6e} s after {switches} switches", joint = joint + 1)]
+    #[error("joint `{joint}` chatters at t = {time:.6e} s after {switches} switches")]
     Chatter {
         /// When, s.
         time: f64,
         /// Switches until then.
         switches: usize,
-        /// Index of the joint.
-        joint: usize,
+        /// Name of the joint.
+        joint: String,
     },
     /// Rigid joints that form a loop stick together, and how they share the load is not unique.
     #[error(
-        "joint {joint} and others stick in a loop of rigid contacts whose forces are not unique at t = {time:.6e} s; \
-         give one of them a stiffness (law `jenkins`)", joint = joint + 1
+        "joint `{joint}` and others stick in a loop of rigid contacts whose forces are not unique at t = {time:.6e} s; \
+         give one of them a stiffness (law `jenkins`)"
     )]
     Redundant {
         /// When, s.
         time: f64,
-        /// Index of one of the joints.
-        joint: usize,
+        /// Name of one of the joints.
+        joint: String,
     },
     /// The contact problem has no solution.
     #[error("no stick-slip state is consistent at t = {time:.6e} s")]
@@ -98,6 +98,23 @@ pub enum OrbitError {
         iterations: usize,
         /// Smallest residual reached.
         residual: f64,
+    },
+    /// The motion does not settle.
+    #[error(
+        "{method} at Ω = {omega:.4} rad/s: after {returns} returns the motion still changes by {change:.1e} from one to the next{}",
+        unsettled(*.repeats)
+    )]
+    Unsettled {
+        /// The method.
+        method: &'static str,
+        /// Drive frequency, rad/s.
+        omega: f64,
+        /// Returns made: periods of the drive, or as many of these at a time as were asked for.
+        returns: usize,
+        /// Change over the last return, relative to the state.
+        change: f64,
+        /// Returns after which it repeats, if it does after a few.
+        repeats: Option<usize>,
     },
     /// The motion broke down.
     #[error("{method} broke down at Ω = {omega:.4} rad/s: {cause}")]
@@ -178,11 +195,25 @@ pub enum OrbitError {
     },
 }
 
+/// What a motion that does not settle does instead, and what to do about it.
+fn unsettled(repeats: Option<usize>) -> String {
+    match repeats {
+        // what does not change is settled: the first that can be is the second
+        Some(repeats) => {
+            format!("; it repeats after {repeats} of them: ask for it with {repeats} times the `period` (1 when absent)")
+        }
+        None => "; by its decay it does not settle within `periods`: no orbit attracts it, or next to nothing damps it; `shooting` and \
+                 `event-driven` find orbits without waiting, and kind = \"transient\" shows the motion"
+            .to_owned(),
+    }
+}
+
 impl OrbitError {
     /// One word for tables.
     pub fn status(&self) -> &'static str {
         match self {
             OrbitError::NotConverged { .. } => "not-converged",
+            OrbitError::Unsettled { .. } => "not-settled",
             OrbitError::Breakdown { .. } => "breakdown",
             OrbitError::Evidence { .. } => "evidence-fails",
             OrbitError::Truncation { .. } => "tolerance-not-reached",

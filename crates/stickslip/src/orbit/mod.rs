@@ -272,6 +272,10 @@ pub struct Found {
 /// Difference of displacements, relative to their size, and of velocities, relative to it times Ω, by which the ends of a period, or the start and
 /// the path, may differ: a series of a few harmonics is no more accurate.
 const CLOSES: f64 = 1e-3;
+/// Difference, relative to the largest amplitude (velocities to it times Ω), below which two states of a motion are the same, and instants of the
+/// period at which that is asked: methods in time close orbits to 1e-9, stiff contacts make of that 1e-7.
+const REPEATS: f64 = 1e-6;
+const REPEATED_AT: usize = 8;
 /// How far before the end of the period it is looked at, as a share of it.
 const BEFORE: f64 = 1e-9;
 /// Energy gap above which a motion is no orbit of the system at all.
@@ -390,6 +394,29 @@ impl Orbit {
     /// Period of the motion: as many periods `2π/Ω` of the drive as [`Orbit::periods`] says, s.
     pub fn period(&self) -> f64 {
         self.periods as f64 * std::f64::consts::TAU / self.omega
+    }
+
+    /// Periods of the drive after which the motion really repeats: a search for motions of several periods also finds those of fewer. Of motions
+    /// that differ by less than a millionth, it is one.
+    pub fn repeats(&self) -> usize {
+        let state = |time: f64| {
+            let sample = self.sample(time);
+            let velocities = sample.velocity.into_iter().map(|v| v / self.omega);
+            sample.displacement.into_iter().chain(velocities).collect::<Vec<f64>>()
+        };
+        let size = self.places.iter().map(|place| place.amplitude()).fold(0.0, f64::max);
+        let drive = self.period() / self.periods as f64;
+        let after = |periods: usize| {
+            (0..REPEATED_AT).all(|i| {
+                let time = self.period() * i as f64 / REPEATED_AT as f64;
+                let (now, later) = (state(time), state(time + periods as f64 * drive));
+                now.iter().zip(&later).all(|(now, later)| (now - later).abs() <= REPEATS * size)
+            })
+        };
+        (1..self.periods)
+            .filter(|periods| self.periods.is_multiple_of(*periods))
+            .find(|p| after(*p))
+            .unwrap_or(self.periods)
     }
 
     /// The state at any time (s).

@@ -381,6 +381,11 @@ mod tests {
         check("2^3^2", Dimension::NONE, 512.0);
         check("sqrt(k/m) * 1 rad", Dimension::FREQUENCY, (105_103.0f64 / 0.182).sqrt());
         check("k * 2 mm", Dimension::FORCE, 105_103.0 * 0.002);
+        // the unit of a number may begin with what it divides by, unless that is a parameter
+        for text in ["5 /mm", "5/mm", "5 1/mm", "5 mm^-1"] {
+            check(text, Dimension { m: -1, ..Dimension::NONE }, 5000.0);
+        }
+        check("1/m", Dimension { kg: -1, ..Dimension::NONE }, 1.0 / 0.182);
         check("2 mm + 1e-3", Dimension::LENGTH, 0.003);
         check("min(Ft, 1, 3 N)", Dimension::FORCE, 1.0);
         check("max(1, 2)", Dimension::FORCE, 2.0);

@@ -163,11 +163,15 @@ impl Parser<'_> {
         }
         self.at = end;
         self.space();
+        let parameter = |name: &str| (self.index)(name).is_some() || (self.constant)(name).is_some();
+        let function = |name: &str| FUNCTIONS.contains(&name);
+        let names = Names { parameter: &parameter, function: &function };
+        // `5000 1/m` is `5000 /m`: two numbers in a row mean nothing else
+        if self.rest().strip_prefix('1').is_some_and(|rest| units::divides(rest, &names)) {
+            self.at += 1;
+        }
         let value = match self.peek() {
-            Some(c) if units::starts_unit(c) => {
-                let parameter = |name: &str| (self.index)(name).is_some() || (self.constant)(name).is_some();
-                let function = |name: &str| FUNCTIONS.contains(&name);
-                let names = Names { parameter: &parameter, function: &function };
+            Some(c) if units::starts_unit(c) || units::divides(self.rest(), &names) => {
                 let (unit, end) = units::read(self.text, self.at, &names)?;
                 self.at = end;
                 Value::of(unit.scale(literal), unit.dimension)

@@ -24,7 +24,7 @@ use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
 use stickslip::law::MOST_DIRECTIONS;
-use stickslip::model::{Joint, Model};
+use stickslip::model::Model;
 use stickslip::orbit::{Orbit, Sample};
 
 pub(super) const KIND: Kind = Kind {
@@ -99,8 +99,9 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     }
     if values.flag("sum") == Some(true) && values.text("against").is_none() {
         let wanted = wanted(values, model);
-        let summed = |joint: &&Joint| model.joint_labels(joint).iter().any(|label| wanted.contains(label));
-        let mut ends = model.joints.iter().filter(summed).map(|joint| &joint.between);
+        let labelled = model.joints.iter().zip(model.joint_labels());
+        let summed = labelled.filter(|(_, labels)| labels.iter().any(|label| wanted.contains(label)));
+        let mut ends = summed.map(|(joint, _)| &joint.between);
         let first = ends.next();
         if ends.any(|between| Some(between) != first) {
             let message =
@@ -125,7 +126,7 @@ fn wanted(values: &Values, model: &Model) -> Vec<String> {
     let known = known(model);
     let meant =
         |name: &String| known.all("loop", "joint or moved place", name).map(<[String]>::to_vec).unwrap_or_default();
-    let every = || model.joints.iter().flat_map(|joint| model.joint_labels(joint)).collect();
+    let every = || model.joint_labels().into_iter().flatten().collect();
     let mut wanted: Vec<String> =
         values.names("loop").map_or_else(every, |names| names.iter().flat_map(meant).collect());
     // a joint and one of its directions may both be named

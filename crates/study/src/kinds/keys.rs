@@ -3,6 +3,7 @@
 use crate::extra;
 use crate::info::Complaint;
 use crate::key::{Key, Takes, default, optional, required};
+use crate::schema::RANGE;
 use crate::values::Values;
 use stickslip::method::{MethodError, Options};
 use stickslip::model::{Model, System};
@@ -42,7 +43,7 @@ pub(super) fn check_samples(values: &Values) -> Result<(), Complaint> {
 /// The key `frequency` of the kinds that need a drive.
 pub(super) const FREQUENCY: Key = required(
     "frequency",
-    Takes::Frequencies,
+    Takes::Frequencies(RANGE),
     "drive frequency: one, a list, or a range with both ends",
     "{ from = \"119 Hz\", to = \"123 Hz\", points = 241 }",
 );

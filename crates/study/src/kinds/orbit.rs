@@ -133,7 +133,8 @@ pub(super) fn write_sample(prepared: &Prepared, sample: &Sample, rows: &mut Rows
             rows.number(&format!("{label}_velocity_m_per_s"), state.velocity[a]);
             rows.number(&format!("{label}_force_N"), state.force[a]);
         }
-        rows.text(&format!("{}_contact", joint.name()), word(state.contact));
+        let contact = if joint.law().has_faces() { word(state.contact) } else { "" };
+        rows.text(&format!("{}_contact", joint.name()), contact);
     }
 }
 
@@ -143,6 +144,7 @@ fn word(contact: Contact) -> &'static str {
         Contact::SlipForward => "slip+",
         Contact::SlipBackward => "slip-",
         Contact::Slip => "slip",
+        Contact::Touch => "touch",
         Contact::Open => "open",
     }
 }

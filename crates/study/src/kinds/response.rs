@@ -9,11 +9,12 @@ use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of, named_places, worst};
 use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, amplitude_of};
 use crate::cost::{Cost, Costing, Shape};
-use crate::dataset::{Axis, Figure, Panel, Series, Sharing, Style, Table};
+use crate::dataset::{Axis, Column, Figure, Panel, Series, Sharing, Style, Table, column_name};
 use crate::drawing::{Drawing, Layout, MOST_CURVES, MOST_PANELS, Stretch, largest, numbers, thinned, words};
 use crate::info::KindInfo;
 use crate::key::{Key, Takes, default};
 use crate::kind::Kind;
+use crate::linear::Reference;
 use crate::note::{Note, WARNING};
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
@@ -22,10 +23,11 @@ use crate::values::{Frequencies, hertz};
 use crate::warnings::sampled;
 use crate::words::display_unit;
 use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
+use std::collections::HashMap;
+use std::ops::Range;
 use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::peak::{self, Peak, Point};
 use stickslip::dimension::Dimension;
-use stickslip::law::{Law, SharedLaw};
 use stickslip::method::{self, MethodError, Options, OrbitError, Solver};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
@@ -323,16 +325,6 @@ fn ends_a_level(points: &[Point], quantity: usize, peak: &Peak) -> bool {
     at >= 2 && points[at - 2..at].iter().all(as_high)
 }
 
-/// The same model with every joint as its linear reference, or why there is none.
-fn linear(prepared: &Prepared, change: impl Fn(&dyn Law) -> Option<SharedLaw>) -> Result<System, String> {
-    let mut model = prepared.case.model.clone();
-    for joint in &mut model.joints {
-        let none = || format!("the law `{}` of joint `{}` has no slip limit", joint.law.name(), joint.name);
-        joint.law = change(&*joint.law).ok_or_else(none)?;
-    }
-    model.assemble().map_err(|error| error.to_string())
-}
-
 /// A solver of a linear reference: its joints have other laws than those for which the method was chosen, so that any may do.
 fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     prepared.method.solver(system).or_else(|error| {
@@ -349,24 +341,23 @@ fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>) {
         (0..REFERENCE_POINTS).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / REFERENCE_POINTS as f64)
     });
     let omegas: Vec<f64> = between.chain(omegas.last().copied()).collect();
-    let follow = |system: Result<System, String>| -> Result<Vec<Option<Orbit>>, String> {
-        let system = system?;
-        let mut solver = solver(prepared, &system).map_err(|error| error.to_string())?;
-        Ok(omegas.iter().map(|omega| solver.orbit(*omega, None).ok()).collect())
+    let mut absent = Vec::new();
+    let mut follow = |reference: Reference| -> Option<Vec<Option<Orbit>>> {
+        // what the laws have no reference for was said when the study was checked
+        let model = reference.model(&prepared.case.model).ok()?;
+        let found = model.assemble().map_err(|error| error.to_string()).and_then(|system| {
+            let mut solver = solver(prepared, &system).map_err(|error| error.to_string())?;
+            Ok(omegas.iter().map(|omega| solver.orbit(*omega, None).ok()).collect())
+        });
+        found.map_err(|why| absent.push(format!("{WARNING}{}", reference.missing(&why)))).ok()
     };
-    let free = follow(linear(prepared, |law| law.free()));
-    let stuck = follow(linear(prepared, |law| law.stuck()));
-    let absent = [("free", &free), ("stuck", &stuck)].into_iter().filter_map(|(what, curve)| {
-        let why = curve.as_ref().err()?;
-        Some(format!("{WARNING}there is no reference curve with all joints {what}: {why}"))
-    });
-    let absent = absent.collect();
+    let curves = Reference::ALL.map(|reference| (reference.name(), follow(reference)));
     let mut rows = Rows::default();
     for (i, omega) in omegas.iter().enumerate() {
         rows.number(DRIVE, hertz(*omega));
-        for (what, curve) in [("free", &free), ("stuck", &stuck)] {
+        for (what, curve) in &curves {
             for (place, name) in prepared.system.places().iter().enumerate() {
-                let orbit = curve.as_ref().ok().and_then(|curve| curve[i].as_ref());
+                let orbit = curve.as_ref().and_then(|curve| curve[i].as_ref());
                 let amplitude = orbit.map_or(f64::NAN, |orbit| orbit.places[place].amplitude());
                 rows.number(&amplitude_of(&format!("{name}_{what}")), amplitude);
             }
@@ -380,6 +371,8 @@ fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>) {
 struct Drawn<'a> {
     drawing: &'a Drawing<'a>,
     curve: &'a Table,
+    /// Its columns by name.
+    index: HashMap<&'a str, &'a Column>,
     /// Names of the masses that are shown, and their numbers.
     shown: Vec<(String, usize)>,
     /// Case, and mass, frequency (Hz), amplitude (m) of the peaks inside the range.
@@ -396,14 +389,16 @@ struct Drawn<'a> {
 }
 
 impl Drawn<'_> {
-    fn column(&self, name: &str) -> String {
-        amplitude_of(name)
+    /// Amplitudes of one mass in some rows; NaN where there are none.
+    fn amplitudes(&self, name: &str, rows: Range<usize>) -> Vec<f64> {
+        let column = self.index.get(&*column_name(&amplitude_of(name))).and_then(|column| column.as_numbers());
+        column.map_or_else(|| vec![f64::NAN; rows.len()], |values| values[rows.clone()].to_vec())
     }
 
     /// The curve of one mass in one case, with its peaks among its points.
     fn line(&self, stretch: &Stretch, name: &str) -> (Vec<f64>, Vec<f64>) {
         let x = numbers(self.curve, DRIVE, stretch.rows.clone());
-        let y = numbers(self.curve, &self.column(name), stretch.rows.clone());
+        let y = self.amplitudes(name, stretch.rows.clone());
         self.with_peaks(stretch, x.into_iter().zip(y).collect(), &|mass, _| mass == name)
     }
 
@@ -411,7 +406,7 @@ impl Drawn<'_> {
     fn envelope(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>, String) {
         let x = numbers(self.curve, DRIVE, stretch.rows.clone());
         let all: Vec<Vec<f64>> =
-            self.shown.iter().map(|(name, _)| numbers(self.curve, &self.column(name), stretch.rows.clone())).collect();
+            self.shown.iter().map(|(name, _)| self.amplitudes(name, stretch.rows.clone())).collect();
         let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let most = all.iter().map(|values| highest(values)).fold(f64::NEG_INFINITY, f64::max);
         // which of equal ones is larger by a rounding says nothing
@@ -499,6 +494,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let drawn = Drawn {
         drawing,
         curve,
+        index: curve.index(),
         peaks: peaks_by_case(drawing),
         factor: (x_factor, y_factor),
         force_factor,

@@ -14,6 +14,7 @@ use crate::names::Names;
 use crate::note::Note;
 use crate::point::place_of;
 use crate::rows::Rows;
+use crate::schema::RANGE;
 use crate::values::{Values, hertz};
 use crate::warnings::moved;
 use crate::words::shown_hertz;
@@ -43,7 +44,7 @@ pub(super) const KIND: Kind = Kind {
         keys: &[
             optional(
                 "frequency",
-                Takes::Frequencies,
+                Takes::Frequencies(RANGE),
                 "drive frequency; without it and without `run_up` the motion is a free decay",
                 "\"121 Hz\"",
             ),

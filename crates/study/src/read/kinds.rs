@@ -85,7 +85,17 @@ impl Reader {
             doc: option.doc,
             example: if option.count { "15" } else { example_of(option.dimension) },
         }));
-        Some(self.table(table, &keys, &format!("method `{}`", row.name)))
+        let before = self.problems.len();
+        let stated = self.table(table, &keys, &format!("method `{}`", row.name));
+        // an option of other methods is no misspelling
+        for problem in &mut self.problems[before..] {
+            let others = || method::TABLE.iter().filter(|other| other.options.iter().any(|o| o.key == problem.key));
+            if keys.iter().all(|key| key.name != problem.key) && others().next().is_some() {
+                let names = one_of(others().map(|other| other.name));
+                problem.help = Some(format!("`{}` is a key of {names}: name the method in `kind`", problem.key));
+            }
+        }
+        Some(stated)
     }
 
     pub(super) fn request<'a>(

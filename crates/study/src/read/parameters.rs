@@ -5,7 +5,7 @@ use crate::document::{Content, Entry, Node, Table};
 use crate::error::Problem;
 use crate::expression::is_reserved;
 use crate::near::{nearest, one_of, shown};
-use crate::schema::MOST_POINTS;
+use crate::schema::{self, MOST_POINTS};
 use crate::statement::{Stated, StatedTable};
 use crate::study::{Parameter, Replaced, Varied, VariedPoints, evaluate};
 use std::collections::HashMap;
@@ -123,9 +123,9 @@ impl Reader {
             };
             let points = match &entry.node.value {
                 Content::List(list) => self.quantities(&entry.key, list, &entry.node.place).map(VariedPoints::List),
-                Content::Table(table) => {
-                    self.range(table, &entry.key).map(|(from, to, points)| VariedPoints::Range { from, to, points })
-                }
+                Content::Table(table) => self
+                    .range(table, schema::RANGE, &entry.key)
+                    .map(|(from, to, points)| VariedPoints::Range { from, to, points }),
                 _ => self.quantity(&entry.key, &entry.node).map(|quantity| VariedPoints::List(vec![quantity])),
             };
             varied.extend(points.map(|points| Varied { index, place: entry.node.place.clone(), points }));

@@ -118,13 +118,13 @@ impl Reader {
                 None
             }
             (Takes::Flag, Content::Flag(flag)) => Some(Stated::Fixed(Given::Flag(*flag))),
-            (Takes::Frequencies, Content::Text { .. } | Content::Number { .. }) => {
+            (Takes::Frequencies(_), Content::Text { .. } | Content::Number { .. }) => {
                 Some(Stated::List(vec![self.quantity(key.name, node)?]))
             }
-            (Takes::Frequencies, Content::List(list)) => {
+            (Takes::Frequencies(_), Content::List(list)) => {
                 Some(Stated::List(self.quantities(key.name, list, &node.place)?))
             }
-            (Takes::Frequencies, Content::Table(table)) if table.get("tolerance").is_some() => {
+            (Takes::Frequencies(_), Content::Table(table)) if table.get("tolerance").is_some() => {
                 let before = self.problems.len();
                 let mut stated = self.table(table, schema::ADAPTIVE, &format!("the range of `{}`", shown(key.name)));
                 let mut take = |key: &str| {
@@ -140,8 +140,8 @@ impl Reader {
                 }
                 Some(Stated::Adaptive { from: from?, to: to?, tolerance: tolerance? })
             }
-            (Takes::Frequencies, Content::Table(table)) => {
-                let (from, to, points) = self.range(table, key.name)?;
+            (Takes::Frequencies(keys), Content::Table(table)) => {
+                let (from, to, points) = self.range(table, keys, key.name)?;
                 Some(Stated::Range { from, to, points })
             }
             (Takes::ByName(dimension), Content::Table(table)) => {
@@ -266,9 +266,9 @@ impl Reader {
         list.iter().map(|node| self.quantity(key, node)).collect()
     }
 
-    pub(super) fn range(&mut self, table: &Table, owner: &str) -> Option<(Quantity, Quantity, usize)> {
+    pub(super) fn range(&mut self, table: &Table, keys: &[Key], owner: &str) -> Option<(Quantity, Quantity, usize)> {
         let before = self.problems.len();
-        let mut stated = self.table(table, schema::RANGE, &format!("the range of `{}`", shown(owner)));
+        let mut stated = self.table(table, keys, &format!("the range of `{}`", shown(owner)));
         if self.problems.len() > before {
             return None;
         }

@@ -1,6 +1,7 @@
 //! What looks like a mistake and is none to the reader: sentences that begin with `warning: `.
 
 use crate::expression::displayed;
+use crate::linear::Reference;
 use crate::note::WARNING;
 use crate::statement::{Environment, Quantity, Stated, StatedTable};
 use crate::study::{Study, evaluate};
@@ -18,7 +19,8 @@ pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[Surveyed]) -> Ve
     let mut warnings = of_kind;
     warnings.extend(loose(cases));
     warnings.extend(unused(study));
-    warnings.extend(bare_angles(study));
+    warnings.extend(bare_numbers(study));
+    warnings.extend(no_references(study, cases));
     warnings.into_iter().map(|text| format!("{WARNING}{text}")).collect()
 }
 
@@ -114,34 +116,51 @@ fn each_quantity(table: &StatedTable, each: &mut dyn FnMut(&'static str, &Quanti
     }
 }
 
-/// Bare numbers as angles: they count as radians, as bare frequencies count as Hz.
-fn bare_angles(study: &Study) -> Vec<String> {
+/// That a reference curve which the figure asks for does not exist; the first case stands for all.
+fn no_references(study: &Study, cases: &[Surveyed]) -> Vec<String> {
+    if !study.wants_references() {
+        return Vec::new();
+    }
+    Reference::ALL.into_iter().filter_map(|reference| reference.model(&cases[0].case.model).err()).collect()
+}
+
+/// A bare length from here on, m, was probably meant in millimetres: gaps and imposed motions of machines are tenths of these.
+const LONG: f64 = 0.01;
+
+/// What a bare number of a dimension counts as, where people easily mean another unit: its unit, another one, and the value in that. What was
+/// computed with pi is meant in radians.
+fn easily_meant(dimension: Option<Dimension>, si: f64, with_pi: bool) -> Option<(&'static str, &'static str, f64)> {
+    match dimension? {
+        Dimension::ANGLE if si != 0.0 && !with_pi => Some(("rad", "deg", si * 180.0 / PI)),
+        Dimension::LENGTH if si.abs() >= LONG => Some(("m", "mm", si * 1e3)),
+        _ => None,
+    }
+}
+
+/// Bare numbers whose unit is easily mistaken: angles count as radians, lengths as metres.
+fn bare_numbers(study: &Study) -> Vec<String> {
     let choice: HashMap<_, _> = study.varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
     let Ok(values) = evaluate(&study.names, &study.parameters, &study.order, &choice, &[]) else { return Vec::new() };
     let environment = Environment { names: &study.names, values };
     let mut found: Vec<(String, String, usize)> = Vec::new();
     let lists = &study.structure.lists;
-    for (list, tables) in [("force", &lists.force), ("motion", &lists.motion)] {
+    for (list, tables) in [("joint", &lists.joint), ("force", &lists.force), ("motion", &lists.motion)] {
         for (index, table) in tables.iter().enumerate() {
             each_quantity(table, &mut |key, quantity, dimension| {
                 let Ok(value) = quantity.value(key, &environment) else { return };
-                let bare = dimension == Some(Dimension::ANGLE) && value.dimension.is_none();
-                // what was computed with pi is meant in radians
-                if !bare || value.si == 0.0 || value.with_pi {
-                    return;
-                }
-                let text = quantity.text.trim();
-                match found.iter_mut().find(|(known, _, _)| known == text) {
+                let easily = easily_meant(dimension, value.si, value.with_pi);
+                let Some((unit, other, converted)) = easily.filter(|_| value.dimension.is_none()) else { return };
+                let text = format!("{key} = {}", quantity.text.trim());
+                match found.iter_mut().find(|(known, _, _)| *known == text) {
                     Some((_, _, more)) => *more += 1,
                     None => {
-                        let degrees = significant(value.si * 180.0 / PI, 4);
-                        let number = displayed(value.si, None);
+                        let (number, converted) = (displayed(value.si, None), significant(converted, 4));
                         let sentence = format!(
-                            "`{key}` of {list} {} is the bare number {number}, which counts as radians ({degrees} deg); say the unit: \
-                             \"{number} deg\" or \"{number} rad\"",
+                            "`{key}` of {list} {} is the bare number {number}, which counts as {number} {unit} ({converted} {other}); say the \
+                             unit: \"{number} {other}\" or \"{number} {unit}\"",
                             index + 1
                         );
-                        found.push((text.to_owned(), sentence, 0));
+                        found.push((text, sentence, 0));
                     }
                 }
             });

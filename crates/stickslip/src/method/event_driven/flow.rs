@@ -182,7 +182,7 @@ impl Flow {
             bytes += self.segments[self.used - 1].bytes();
             let many = self.switches > SWITCH_LIMIT || bytes > SEGMENT_LIMIT;
             if many || at_once > AT_ONCE_LIMIT * (1 + self.mechanics.parts.len()) {
-                let joint = self.mechanics.parts[part].joint;
+                let joint = self.mechanics.names[self.mechanics.parts[part].joint].clone();
                 if pattern.redundant {
                     return Err(Breakdown::Redundant { time, joint });
                 }

@@ -119,6 +119,8 @@ pub(crate) struct Mechanics {
     pub inverse_mass: DMatrix<f64>,
     /// Sliders and stops of all joints, those that carry nothing left out.
     pub parts: Arc<[Part]>,
+    /// Names of the joints, for errors.
+    pub names: Arc<[String]>,
     /// Number of sliders behind springs.
     pub elastic: usize,
     /// Estimate of the fastest natural frequency, rad/s.
@@ -185,6 +187,7 @@ impl Mechanics {
             matrices: system.structure().full().clone(),
             inverse_mass,
             parts: parts.into(),
+            names: system.joints().iter().map(|joint| joint.name().to_owned()).collect(),
             elastic,
         })
     }

@@ -26,6 +26,7 @@ use super::drive::Drive;
 use super::guess::Guess;
 use super::periodic::{Aim, Closed, ReturnMap, Search, approached, norm};
 use super::relaxed::{Closing, Spring, relaxed};
+use super::repeated::Afresh;
 use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, PERIOD, Solver, periods};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
@@ -40,7 +41,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
     summary: "exact: closed-form motion between switches, Newton on the period",
     options: &[PERIOD],
-    build: |options| match periods(options) {
+    build: |options| match periods(NAME, options)? {
         1 => Ok(Box::new(EventDriven)),
         period => Ok(Box::new(Subharmonic { period })),
     },
@@ -93,7 +94,7 @@ impl Method for Subharmonic {
         NAME
     }
     fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Ok(Box::new(Exact::new(system, NAME, Search::Newton, self.period)?))
+        Ok(Box::new(Afresh(Exact::new(system, NAME, Search::Newton, self.period)?)))
     }
 }
 
@@ -238,7 +239,9 @@ impl Solver for Exact<'_> {
             known
         };
         let closed = search.find(self, start, |exact| exact.first_state(omega), aim).map_err(|error| match error {
-            OrbitError::NotConverged { .. } if self.drifts() => OrbitError::Drift { method: name, omega },
+            OrbitError::NotConverged { .. } | OrbitError::Unsettled { .. } if self.drifts() => {
+                OrbitError::Drift { method: name, omega }
+            }
             error => error,
         })?;
         let mut orbit = self.finish(closed)?;

@@ -479,8 +479,12 @@ impl Path for ExactPath {
                 let along = |v: &[f64]| joint.axes()[0].along(v);
                 let mine = || self.of_joint(j);
                 let joint_velocity = along(&velocity) + sign * real_dot(&speed, &values);
-                let of_parts = || mine().map(|s| piece.segment.contacts[s]);
-                // a joint slips if a part of it does, rests if one does, and is open if all its stops are
+                let of_part = |s: usize| match piece.segment.contacts[s] {
+                    Contact::Stick if !self.parts[s].is_slider() => Contact::Touch,
+                    contact => contact,
+                };
+                let of_parts = || mine().map(of_part);
+                // a joint slips if a slider of it does, rests if one does, touches if a stop does, and else is open
                 let contact = match of_parts().find(|c| c.slips()).or_else(|| of_parts().min()) {
                     None => Contact::slip(joint_velocity),
                     Some(contact) if sign < 0.0 => contact.mirrored(),

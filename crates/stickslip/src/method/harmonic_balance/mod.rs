@@ -29,6 +29,7 @@ use super::guess::Guess;
 use super::{Method, MethodError, MethodInfo, MethodOption, Options, OrbitError, PERIOD, Solver, periods};
 use crate::dimension::Dimension;
 use crate::method::evidence::Judge;
+use crate::method::repeated::Afresh;
 use crate::model::{Axis, System};
 use crate::orbit::Orbit;
 pub(crate) use arc::ModeArc;
@@ -77,7 +78,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     ],
     build: |options| {
         let balance = HarmonicBalance::from_options(options)?;
-        Ok(match periods(options) {
+        Ok(match periods(NAME, options)? {
             1 => Box::new(balance),
             period => Box::new(Subharmonic { balance, period }),
         })
@@ -152,6 +153,11 @@ impl HarmonicBalance {
         Ok(method)
     }
 
+    /// Whether it has a port for every law of a system.
+    pub(crate) fn takes_laws(system: &System) -> bool {
+        Ports::new(system).is_ok()
+    }
+
     /// Samples at a number of harmonics: what the user gave holds for the user's harmonics; the solution that checks it takes as many as
     /// it needs, so that too few are seen in the estimate.
     fn samples_at(&self, top: usize, ports: &Ports) -> usize {
@@ -190,13 +196,15 @@ impl HarmonicBalance {
 }
 
 /// Whether so many harmonics along so many coordinates can be solved at all.
-fn check_size(unknowns: usize) -> Result<(), MethodError> {
+fn check_size(unknowns: usize, periods: usize) -> Result<(), MethodError> {
     if unknowns <= POSSIBLE {
         return Ok(());
     }
-    let message =
-        format!("there would be {unknowns} unknowns, and {POSSIBLE} are possible: fewer harmonics, or fewer joints");
-    Err(MethodError::Option { method: NAME, key: "harmonics", message })
+    let (key, fewer) = if periods > 1 { (PERIOD.key, "fewer periods, ") } else { ("harmonics", "") };
+    let message = format!(
+        "there would be {unknowns} unknowns, and {POSSIBLE} are possible: {fewer}fewer harmonics, or fewer joints"
+    );
+    Err(MethodError::Option { method: NAME, key, message })
 }
 
 impl Method for HarmonicBalance {
@@ -251,7 +259,7 @@ impl Method for Subharmonic {
         let HarmonicBalance { harmonics, samples, tolerance } = self.balance;
         let balance = HarmonicBalance { harmonics: harmonics.map(times), samples: samples.map(times), tolerance };
         let slowed = system.slowed(u32::try_from(period).map_err(too_high)?);
-        Ok(Box::new(Balance::new(Cow::Owned(slowed), balance, period)?))
+        Ok(Box::new(Afresh(Balance::new(Cow::Owned(slowed), balance, period)?)))
     }
 }
 
@@ -420,7 +428,7 @@ impl<'a> Balance<'a> {
         let first = (FIRST * kept.scale).max(kept.highest);
         let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
         if Sparse::new(&system, &ports, &[1]).is_none() {
-            check_size(2 * ports.count() * harmonics.len())?;
+            check_size(2 * ports.count() * harmonics.len(), periods)?;
         }
         Ok(Balance {
             method,

@@ -1,9 +1,9 @@
 //! Bodies that no spring holds.
 
-use super::super::{GROUND, Joint, Mass, Model, Place, System};
+use super::super::{GROUND, Mass, Model, Place, System};
 use super::Loose;
 use super::hold::{Hold, Stuck};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 impl Model {
     /// Bodies of masses that no spring holds to the ground or to a moved place.
@@ -30,37 +30,39 @@ impl Model {
         let mut bodies = Groups::new(component + 1);
         self.springs.iter().filter(|s| s.stiffness > 0.0).filter_map(|s| ends(&s.between)).for_each(|e| bodies.join(e));
         let mut gripped = bodies.clone();
-        let carries = |(i, _): &(usize, &Joint)| joints.iter().any(|j| j.joint == *i && j.hold != Hold::Nothing);
-        let grips = self.joints.iter().enumerate().filter(carries);
-        for (_, joint) in grips {
+        let carry: BTreeSet<usize> = joints.iter().filter(|j| j.hold != Hold::Nothing).map(|j| j.joint).collect();
+        let grips = self.joints.iter().zip(self.joint_labels()).enumerate().filter(|(i, _)| carry.contains(i));
+        for (_, (joint, labels)) in grips {
             // of nodes, each direction
             let along = |name: &String, label: &String| match label.strip_prefix(joint.name.as_str()) {
                 Some(rest) if !rest.is_empty() && name != GROUND => format!("{name}{rest}"),
                 _ => name.clone(),
             };
-            for label in self.joint_labels(joint) {
+            for label in labels {
                 let between = [along(&joint.between[0], &label), along(&joint.between[1], &label)];
                 if let Some(e) = ends(&between) {
                     gripped.join(e);
                 }
             }
         }
-        let mut loose: Vec<(usize, Loose)> = Vec::new();
+        let mut loose: Vec<Loose> = Vec::new();
+        let mut known: HashMap<usize, usize> = HashMap::new();
         for place in &places {
             let at = index[place];
             let body = bodies.of(at);
             if body == bodies.of(0) {
                 continue;
             }
-            match loose.iter_mut().find(|(known, _)| *known == body) {
-                Some((_, one)) => one.masses.push(place.clone()),
+            match known.get(&body) {
+                Some(one) => loose[*one].masses.push(place.clone()),
                 None => {
                     let held_by_friction = gripped.of(at) == gripped.of(0);
-                    loose.push((body, Loose { masses: vec![place.clone()], held_by_friction }));
+                    known.insert(body, loose.len());
+                    loose.push(Loose { masses: vec![place.clone()], held_by_friction });
                 }
             }
         }
-        loose.into_iter().map(|(_, one)| one).collect()
+        loose
     }
 }
 

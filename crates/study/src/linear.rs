@@ -1,0 +1,47 @@
+//! Linear references of a model: every joint free, or every joint stuck.
+
+use stickslip::law::{Law, SharedLaw};
+use stickslip::model::Model;
+
+/// A linear reference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Reference {
+    /// No joint carries a force.
+    Free,
+    /// No joint slips or opens.
+    Stuck,
+}
+
+impl Reference {
+    /// Both.
+    pub const ALL: [Reference; 2] = [Reference::Free, Reference::Stuck];
+
+    /// What its joints are.
+    pub fn name(self) -> &'static str {
+        match self {
+            Reference::Free => "free",
+            Reference::Stuck => "stuck",
+        }
+    }
+
+    /// The same model with every joint so, or a sentence that says why there is none.
+    pub fn model(self, model: &Model) -> Result<Model, String> {
+        let mut model = model.clone();
+        for joint in &mut model.joints {
+            let law: &dyn Law = &*joint.law;
+            let changed: Option<SharedLaw> = match self {
+                Reference::Free => law.free(),
+                Reference::Stuck => law.stuck(),
+            };
+            let none =
+                || self.missing(&format!("the law `{}` of joint `{}` has no slip limit", law.name(), joint.name));
+            joint.law = changed.ok_or_else(none)?;
+        }
+        Ok(model)
+    }
+
+    /// The sentence that says why there is none.
+    pub fn missing(self, why: &str) -> String {
+        format!("there is no reference curve with all joints {}: {why}", self.name())
+    }
+}
