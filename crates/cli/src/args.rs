@@ -92,6 +92,26 @@ pub enum Command {
         #[arg(long)]
         open: bool,
     },
+    /// Say what is in files of matrices: size, entries, symmetry, definiteness, names; of a pair the lowest frequencies
+    Inspect {
+        /// Files of matrices, and of the names of their rows
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+        /// Their format, if it is not seen from their content
+        #[arg(long)]
+        format: Option<String>,
+    },
+    /// Save the structure of a study in few coordinates, to be read instead of the whole
+    Reduce {
+        /// Study file (TOML) with a [structure]
+        file: PathBuf,
+        /// Folder for the matrices and the tables that name them
+        #[arg(long)]
+        out: PathBuf,
+        /// Change a parameter, for example --set zeta=1% (may be given several times)
+        #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
+        set: Vec<(String, String)>,
+    },
     /// Start a study file from a template
     New {
         /// Template (see `stickslip list templates`)

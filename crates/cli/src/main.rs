@@ -17,10 +17,12 @@ macro_rules! complain_on {
 }
 
 mod args;
+mod inspect;
 mod list;
 mod open;
 mod plot;
 mod progress;
+mod reduce;
 mod run;
 
 use args::{Cli, Command};
@@ -68,6 +70,8 @@ fn main() -> ExitCode {
             let study = study.as_deref();
             plot::plot(&folders, &plot::Wanted { overlay, study, out: out.as_deref(), only: &only, open })
         }
+        Command::Inspect { files, format } => inspect::inspect(&files, format.as_deref()),
+        Command::Reduce { file, out, set } => reduce::reduce(&file, &set, &out),
         Command::New { template, file } => new(&template, file.as_deref()),
         Command::List { what } => print(&list::text(what)),
         Command::Schema => match serde_json::to_string_pretty(&stickslip_study::schema::json_schema()) {

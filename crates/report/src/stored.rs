@@ -9,7 +9,7 @@ use crate::output::Outputs;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Column, Dataset, Record, Table, Values};
-use stickslip_study::{Study, StudyError, read_study, run};
+use stickslip_study::{Study, StudyError, read_stored, run};
 
 /// The kind of a dataset that compares runs; it has no study.
 pub const COMPARISON: &str = "comparison";
@@ -177,7 +177,7 @@ fn study(record: &Value, path: &Path) -> Result<Study, StoredError> {
     };
     let set: Vec<(String, String)> = serde_json::from_value(stored["set"].clone()).unwrap_or_default();
     let failed = |cause| StoredError::Study { path: path.to_owned(), cause: Box::new(cause) };
-    let study = read_study(&format!("{name}.toml"), text, &set).map_err(failed)?;
+    let study = read_stored(&format!("{name}.toml"), text, &set).map_err(failed)?;
     match stored["cases"][0]["method"]["kind"].as_str() {
         Some(method) => study.with_method(method).map_err(failed),
         None => Ok(study),

@@ -10,6 +10,8 @@ pub(crate) const AT_RANGE_END: &str = "at_range_end";
 pub(crate) const RESIDUAL: &str = "residual";
 /// Relative gap between work put in and energy lost.
 pub(crate) const ENERGY_GAP: &str = "energy_gap";
+/// The largest relative error of a structure in few coordinates against the whole, of what its places see.
+pub(crate) const REDUCTION_ERROR: &str = "reduction_error";
 
 /// The amplitude of a place, m.
 pub(crate) fn amplitude_of(place: &str) -> String {

@@ -45,8 +45,8 @@ pub(crate) const TABLE: &[Extra] = &[
         doc: "half of peak to peak of every mass's velocity",
         columns: |system| of_places(system, "velocity_amplitude_m_per_s"),
         values: |prepared, _, samples| {
-            let places = 0..prepared.system.dofs();
-            places.map(|i| half_range(samples.iter().map(|sample| sample.velocity[i]))).collect()
+            let places = prepared.system.seen().iter();
+            places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.velocity)))).collect()
         },
     },
     Extra {
@@ -54,8 +54,8 @@ pub(crate) const TABLE: &[Extra] = &[
         doc: "half of peak to peak of every mass's acceleration",
         columns: |system| of_places(system, "acceleration_amplitude_m_per_s2"),
         values: |prepared, _, samples| {
-            let places = 0..prepared.system.dofs();
-            places.map(|i| half_range(samples.iter().map(|sample| sample.acceleration[i]))).collect()
+            let places = prepared.system.seen().iter();
+            places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.acceleration)))).collect()
         },
     },
     Extra {
@@ -100,11 +100,11 @@ fn half_range(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Amplitudes of the harmonics by the rectangle rule, which for a smooth period errs by the harmonics near [`INSTANTS`] only.
 fn harmonics(prepared: &Prepared, orbit: &Orbit) -> Vec<f64> {
-    let mut sums = vec![Complex64::new(0.0, 0.0); prepared.system.dofs() * HARMONICS];
+    let mut sums = vec![Complex64::new(0.0, 0.0); prepared.system.places().len() * HARMONICS];
     for instant in 0..INSTANTS {
         let turn = TAU * instant as f64 / INSTANTS as f64;
         let sample = orbit.sample(orbit.period() * instant as f64 / INSTANTS as f64);
-        for (place, x) in sample.displacement.iter().enumerate() {
+        for (place, x) in prepared.system.at_places(&sample.displacement).into_iter().enumerate() {
             for h in 1..=HARMONICS {
                 sums[place * HARMONICS + h - 1] += x * Complex64::from_polar(1.0, -(h as f64) * turn);
             }

@@ -9,7 +9,7 @@ use stickslip::model::Model;
 
 /// What is wrong in `[figure]`.
 pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(), Complaint> {
-    let known = Names::of_masses(model).and_joints(model);
+    let known = Names::of_places(model).and_joints(model);
     for name in figure.names("only").unwrap_or_default() {
         known.all("only", "mass or joint", name)?;
     }

@@ -74,6 +74,18 @@ pub enum Takes {
     Repeat,
     /// A list of tables with these keys: `[[mass]]`.
     List(&'static [Key]),
+    /// A file: its path, or `{ file, name, format }`.
+    File,
+    /// A table with these keys, or `false`.
+    TableOrNone(&'static [Key]),
+    /// A row of the matrices: its name, or its number from 1.
+    Row,
+    /// A list of rows, or of nodes.
+    Rows,
+    /// A table from rows to weights, or a list of such.
+    Weights,
+    /// Three numbers.
+    Vector,
     /// Nothing, and why: what is looked for under this name cannot be stated. The key's line says what to do instead.
     Refused(&'static str),
 }

@@ -24,15 +24,20 @@ fn entries(name: &str, labels: Vec<String>) -> Vec<(String, Vec<String>)> {
     entries
 }
 
+fn of_masses(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
+    model.masses.iter().flat_map(|mass| entries(&mass.name, mass.places()))
+}
+
 impl Names {
-    /// The places of all masses, and their nodes.
-    pub fn of_masses(model: &Model) -> Names {
-        Names { known: model.masses.iter().flat_map(|mass| entries(&mass.name, mass.places())).collect() }
+    /// The places of the structure and of all masses, and their nodes.
+    pub fn of_places(model: &Model) -> Names {
+        let places = model.places.iter().flat_map(|place| entries(&place.name, place.places()));
+        Names { known: places.chain(of_masses(model)).collect() }
     }
 
     /// Those of masses whose motion is not imposed.
     pub fn of_free_masses(model: &Model) -> Names {
-        let mut names = Names::of_masses(model);
+        let mut names = Names { known: of_masses(model).collect() };
         let moved: BTreeSet<&str> = model.motions.iter().map(|motion| motion.on.as_str()).collect();
         names.known.retain(|(_, places)| !places.iter().any(|place| moved.contains(place.as_str())));
         names
@@ -125,7 +130,7 @@ mod tests {
 
     #[test]
     fn a_node_stands_for_its_directions_or_names_them() {
-        let names = Names::of_masses(&model()).and_joints(&model());
+        let names = Names::of_places(&model()).and_joints(&model());
         assert_eq!(names.all("only", "mass", "tip").unwrap(), ["tip.x", "tip.z"]);
         assert_eq!(names.all("only", "mass", "rub").unwrap(), ["rub.x", "rub.z"]);
         assert_eq!(

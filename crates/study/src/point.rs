@@ -68,7 +68,7 @@ impl Summary {
     pub fn missing(prepared: &Prepared, status: &str) -> Self {
         let system = &prepared.system;
         Summary {
-            places: vec![[f64::NAN; 3]; system.dofs()],
+            places: vec![[f64::NAN; 3]; system.places().len()],
             joints: vec![[f64::NAN; 2]; system.joints().len()],
             stable: None,
             residual: f64::NAN,
@@ -105,6 +105,9 @@ impl Summary {
         rows.number("truncation", self.truncation);
         if !prepared.method.closes_motions(&prepared.system) {
             rows.number("return_defect", self.return_defect);
+        }
+        if let Some(reduced) = system.reduced() {
+            rows.number(columns::REDUCTION_ERROR, reduced.error());
         }
         rows.integer("iterations", self.iterations);
         rows.text("status", &self.status);

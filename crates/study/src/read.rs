@@ -11,12 +11,13 @@ mod kinds;
 mod lists;
 mod parameters;
 mod reader;
+mod structure;
 mod template;
 mod values;
 
 pub use template::TemplateParameter;
 
-use crate::document;
+use crate::document::{self, Content, Node, Table};
 use crate::error::{Place, Problem, Source, StudyError};
 use crate::near::nearest;
 use crate::schema::{self, FILE, MOST_BYTES};
@@ -111,8 +112,20 @@ fn too_big(name: &str, bytes: usize) -> Result<(), StudyError> {
 /// assert_eq!(error.help_text(), Some("did you mean `stiffness`?"));
 /// ```
 pub fn read_study(name: &str, text: &str, overrides: &[(String, String)]) -> Result<Study, StudyError> {
+    read(name, text, overrides, Reader::default())
+}
+
+/// Reads the study of stored results, for its names alone: the files that its text names need not be there any more, and a structure by its
+/// matrices is none that could be run.
+///
+/// # Errors
+/// As [`read_study`].
+pub fn read_stored(name: &str, text: &str, overrides: &[(String, String)]) -> Result<Study, StudyError> {
+    read(name, text, overrides, Reader { without_files: true, ..Reader::default() })
+}
+
+fn read(name: &str, text: &str, overrides: &[(String, String)], mut reader: Reader) -> Result<Study, StudyError> {
     too_big(name, text.len())?;
-    let mut reader = Reader::default();
     reader.text(name.to_owned(), text.to_owned());
     let study = reader.study(name, text, overrides);
     match study {
@@ -161,7 +174,7 @@ impl Reader {
             }
             None => {
                 let parameters = self.parameters(&root, Vec::new(), overrides);
-                (parameters, self.lists(&root).map(|lists| Structure { lists, template: None }))
+                (parameters, self.own_model(&root, file))
             }
         };
         let (kind, study, vary) = self.request(&root)?;
@@ -195,5 +208,19 @@ impl Reader {
             figure,
             memory: None,
         })
+    }
+
+    /// A model that the file states itself.
+    fn own_model(&mut self, root: &Table, file: &str) -> Option<Structure> {
+        let lists = self.lists(root)?;
+        let matrices = match root.get("structure").map(|entry| &entry.node) {
+            Some(Node { value: Content::Table(table), .. }) => Some(self.matrices(table, file)?),
+            Some(other) => {
+                let key = FILE.iter().find(|key| key.name == "structure")?;
+                return self.wrong_type(key, other).and(None);
+            }
+            None => None,
+        };
+        Some(Structure { lists, template: None, matrices })
     }
 }

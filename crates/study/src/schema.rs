@@ -38,6 +38,13 @@ pub const FILE: &[Key] = &[
         "a ready model instead of the lists below",
         "{ template = \"blade-couple\" }",
     ),
+    optional(
+        "structure",
+        Takes::Table(STRUCTURE),
+        "a structure by its matrices, from a finite-element program; masses, springs and joints may be added to it at places",
+        "{ stiffness = \"blade.sti\", mass = \"blade.mas\", dofs = \"blade.dof\", units = \"mm-t-s\" }",
+    ),
+    optional("place", Takes::List(PLACE), "places of the structure, which joints, forces and results speak of", "[]"),
     optional("mass", Takes::List(MASS), "point masses, each with one displacement", "[]"),
     optional("spring", Takes::List(SPRING), "springs and dampers", "[]"),
     optional("joint", Takes::List(JOINT), "places that rub", "[]"),
@@ -88,6 +95,155 @@ fn scale_names() -> Vec<(&'static str, &'static str)> {
 const MODEL: &[Key] = &[
     required("template", Takes::Choice(template_names), "name of the ready model", "\"blade-couple\""),
     optional("law", Takes::Law, "replaces the law of every joint", "{ kind = \"coulomb\", limit = \"2 N\" }"),
+];
+
+/// The keys of `[structure]`.
+pub const STRUCTURE: &[Key] = &[
+    required(
+        "stiffness",
+        Takes::File,
+        "file of the stiffness matrix, beside the study file; its format is found by its content",
+        "\"blade.sti\"",
+    ),
+    required("mass", Takes::File, "file of the mass matrix", "\"blade.mas\""),
+    optional("damping", Takes::File, "file of a damping matrix", "\"blade.dam\""),
+    optional(
+        "dofs",
+        Takes::Text,
+        "file with the names of the rows: CSV `row,name`, CalculiX .dof, ANSYS .mapping; without it they have those that the matrices \
+         come with, or numbers from 1",
+        "\"blade.dof\"",
+    ),
+    required(
+        "units",
+        Takes::Choice(unit_sets),
+        "units of the numbers in these files; everything else in the study has its own",
+        "\"mm-t-s\"",
+    ),
+    optional(
+        "modal_damping",
+        Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
+        "share of critical damping of every mode",
+        "\"0.5 %\"",
+    ),
+    optional(
+        "rayleigh",
+        Takes::Table(RAYLEIGH),
+        "damping in proportion to mass and stiffness",
+        "{ mass = \"1 /s\", stiffness = \"1e-6 s\" }",
+    ),
+    optional(
+        "reduce",
+        Takes::TableOrNone(REDUCE),
+        "how the structure is brought into few coordinates; absent: as far as its error asks for, up to five times the highest drive \
+         frequency; false: not at all",
+        "{ up_to = \"5 kHz\" }",
+    ),
+];
+
+/// The keys of a file that has several matrices, or none of the formats that are found by content.
+pub(crate) const FILE_KEYS: &[Key] = &[
+    required("file", Takes::Text, "its path", "\"blade.mat\""),
+    optional("name", Takes::Text, "which matrix in it, if it has several", "\"K\""),
+    optional("format", Takes::Choice(format_names), "its format, if that is not seen from its content", "\"mat5\""),
+];
+
+fn format_names() -> Vec<(&'static str, &'static str)> {
+    stickslip_formats::TABLE.iter().map(|format| (format.name, format.summary)).collect()
+}
+
+/// 1/s, which is no frequency: a rate of decay.
+const RATE: Dimension = Dimension { kg: 0, m: 0, s: -1, rad: 0 };
+
+const RAYLEIGH: &[Key] = &[
+    default("mass", Takes::Quantity(RATE, Within::AtLeastZero), "0 /s", "times the mass matrix", "\"1 /s\""),
+    default(
+        "stiffness",
+        Takes::Quantity(Dimension::TIME, Within::AtLeastZero),
+        "0 s",
+        "times the stiffness matrix",
+        "\"1e-6 s\"",
+    ),
+];
+
+const REDUCE: &[Key] = &[
+    optional(
+        "up_to",
+        Takes::Quantity(Dimension::FREQUENCY, Within::Positive),
+        "the largest frequency of interest, of the drive with all harmonics that count: as many modes as the error asks for",
+        "\"5 kHz\"",
+    ),
+    optional("modes", Takes::Count(1, 600), "so many modes instead", "50"),
+    default(
+        "tolerance",
+        Takes::Quantity(Dimension::NONE, Within::Positive),
+        "1e-4",
+        "the largest relative error of what the places see up to there",
+        "1e-6",
+    ),
+    optional(
+        "kind",
+        Takes::Choice(reduction_kinds),
+        "the kind; absent: whichever is small and close enough",
+        "\"rubin\"",
+    ),
+];
+
+fn unit_sets() -> Vec<(&'static str, &'static str)> {
+    crate::unit_sets::TABLE.iter().map(|set| (set.name, set.summary)).collect()
+}
+
+fn reduction_kinds() -> Vec<(&'static str, &'static str)> {
+    vec![
+        (RUBIN, "free modes and residual flexibility"),
+        (CRAIG_BAMPTON, "modes with the places held, and what static forces at them do"),
+    ]
+}
+
+/// Names of the kinds of reduction.
+pub(crate) const RUBIN: &str = "rubin";
+pub(crate) const CRAIG_BAMPTON: &str = "craig-bampton";
+
+const PLACE: &[Key] = &[
+    required("name", Takes::Name, "name, for joints, forces and results", "\"tip\""),
+    optional(
+        "dof",
+        Takes::Row,
+        "the one row that it is, by its name `node.direction`, or its number from 1",
+        "\"1353.y\"",
+    ),
+    optional(
+        "dofs",
+        Takes::Rows,
+        "of a node: a row for each of its directions, a normal last",
+        "[\"188.x\", \"188.y\", \"188.z\"]",
+    ),
+    optional(
+        "nodes",
+        Takes::Rows,
+        "the mean of several nodes, or one node: each direction is the mean of their rows `node.direction`",
+        "[\"188\", \"189\"]",
+    ),
+    optional(
+        "sum",
+        Takes::Weights,
+        "a weighted sum of rows, or a list of one for each direction",
+        "{ \"188.x\" = 0.5, \"189.x\" = 0.5 }",
+    ),
+    optional(
+        "directions",
+        Takes::Names,
+        "names of its directions; absent: as in the names of the rows, with a normal t1, t2, n",
+        "[\"x\", \"y\", \"z\"]",
+    ),
+    optional(
+        "normal",
+        Takes::Vector,
+        "the normal of a local frame: the directions then are two tangents and the normal, made of x, y, z",
+        "[0, \"-sin(a)\", \"cos(a)\"]",
+    ),
+    optional("tangent", Takes::Vector, "a vector whose part across the normal is the first tangent", "[1, 0, 0]"),
+    REPEAT,
 ];
 
 /// The key that every entry of a list has.
@@ -256,6 +412,12 @@ pub fn described(takes: &Takes) -> String {
         Takes::Vary => "a table from parameters to a value, a list of values, or { from, to, points }".to_owned(),
         Takes::Method => "a table with `kind` and the options of that method".to_owned(),
         Takes::Study => "a table with `kind` and the keys of that kind".to_owned(),
+        Takes::File => "the path of a file, or { file = …, name = …, format = … }".to_owned(),
+        Takes::TableOrNone(keys) => format!("{}, or false", described(&Takes::Table(keys))),
+        Takes::Row => "the name of a row, or its number".to_owned(),
+        Takes::Rows => "a list of names or numbers".to_owned(),
+        Takes::Weights => "a table from names of rows to numbers, or a list of such tables".to_owned(),
+        Takes::Vector => "a list of three numbers".to_owned(),
         Takes::Refused(why) => format!("nothing: {why}"),
     }
 }
@@ -323,6 +485,15 @@ fn takes_schema(takes: &Takes) -> Value {
             "type": "object", "additionalProperties": quantity(), "propertyNames": { "pattern": NAME_PATTERN },
         }),
         Takes::Refused(_) => json!({ "not": {} }),
+        Takes::File => json!({ "anyOf": [{ "type": "string" }, object(FILE_KEYS)] }),
+        Takes::TableOrNone(keys) => json!({ "anyOf": [object(keys), { "const": false }] }),
+        Takes::Row => json!({ "type": ["string", "integer"] }),
+        Takes::Rows => json!({ "type": "array", "items": { "type": ["string", "integer"] }, "minItems": 1 }),
+        Takes::Weights => {
+            let one = json!({ "type": "object", "additionalProperties": quantity(), "minProperties": 1 });
+            json!({ "anyOf": [one, { "type": "array", "items": one, "minItems": 1 }] })
+        }
+        Takes::Vector => json!({ "type": "array", "items": quantity(), "minItems": 3, "maxItems": 3 }),
         Takes::Table(keys) => object(keys),
         Takes::List(keys) => json!({ "type": "array", "items": object(keys), "maxItems": MOST_ELEMENTS }),
         Takes::Repeat => json!({

@@ -34,6 +34,9 @@ pub(crate) struct StatedEntry {
     pub value: Stated,
 }
 
+/// Rows with their weights.
+pub(crate) type Weights = Vec<(String, Place, Quantity)>;
+
 #[derive(Debug, Clone)]
 pub(crate) enum Stated {
     Fixed(Given),
@@ -43,6 +46,8 @@ pub(crate) enum Stated {
     Range { from: Quantity, to: Quantity, points: usize },
     Adaptive { from: Quantity, to: Quantity, tolerance: Quantity },
     ByName(Vec<(String, Place, Quantity)>, Dimension),
+    Vector(Vec<Quantity>),
+    Sums(Vec<Weights>),
     Law(&'static LawInfo, StatedTable),
     Table(StatedTable),
 }
@@ -63,6 +68,7 @@ impl StatedTable {
         let inside = name.and_then(|name| match &entry.value {
             Stated::Names(names) => names.iter().find(|(n, _)| n == name).map(|(_, place)| place),
             Stated::ByName(names, _) => names.iter().find(|(n, _, _)| n == name).map(|(_, place, _)| place),
+            Stated::Sums(sums) => sums.iter().flatten().find(|(n, _, _)| n == name).map(|(_, place, _)| place),
             _ => None,
         });
         inside.unwrap_or(&entry.place)
@@ -226,6 +232,23 @@ impl Stated {
                     table.insert(name.clone(), number);
                 }
                 Given::ByName(table, *dimension)
+            }
+            Stated::Vector(parts) => {
+                let mut vector = [0.0; 3];
+                for (value, part) in vector.iter_mut().zip(parts) {
+                    *value = part.number(key, (Dimension::NONE, Within::Finite), "[0, 0, 1]", environment)?;
+                }
+                Given::Vector(vector)
+            }
+            Stated::Sums(sums) => {
+                let one = |sum: &Weights| {
+                    let weight = |(name, _, quantity): &(String, Place, Quantity)| {
+                        let weight = quantity.number(name, (Dimension::NONE, Within::Finite), "", environment)?;
+                        Ok((name.clone(), weight))
+                    };
+                    sum.iter().map(weight).collect::<Result<Vec<_>, Problem>>()
+                };
+                Given::Sums(sums.iter().map(one).collect::<Result<_, Problem>>()?)
             }
             Stated::Law(row, table) => Given::Law(law(row, table, key, environment, problems)?),
             Stated::Table(table) => Given::Table(table.values(environment, problems)),

@@ -10,6 +10,7 @@ use crate::memory;
 use crate::names::Names;
 use crate::near::{nearest, one_of, shown};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
+use crate::substructure;
 use crate::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
 use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, HashMap};
@@ -18,6 +19,7 @@ use stickslip::dimension::Dimension;
 use stickslip::law::{SharedLaw, TANGENTS};
 use stickslip::method::{self, Options};
 use stickslip::model::{Element, Force, Joint, Mass, Model, ModelError, Motion, Spring};
+use stickslip::structure::{Component, Reduction};
 
 /// A study file, read and checked.
 #[derive(Debug, Clone)]
@@ -95,6 +97,17 @@ impl VariedPoints {
 pub(crate) struct Structure {
     pub lists: Lists,
     pub template: Option<NamedTemplate>,
+    pub matrices: Option<Matrices>,
+}
+
+/// `[structure]`: what was read of its files.
+#[derive(Debug, Clone)]
+pub(crate) struct Matrices {
+    pub table: StatedTable,
+    /// None of a study whose files were not read.
+    pub component: Option<Component>,
+    /// Rows of the files that are constrained, and not in it.
+    pub left_out: usize,
 }
 
 /// The template that a study names.
@@ -123,6 +136,7 @@ impl NamedTemplate {
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Lists {
+    pub place: Vec<StatedTable>,
     pub mass: Vec<StatedTable>,
     pub spring: Vec<StatedTable>,
     pub joint: Vec<StatedTable>,
@@ -133,6 +147,7 @@ pub(crate) struct Lists {
 impl Lists {
     pub fn get_mut(&mut self, name: &str) -> Option<&mut Vec<StatedTable>> {
         match name {
+            "place" => Some(&mut self.place),
             "mass" => Some(&mut self.mass),
             "spring" => Some(&mut self.spring),
             "joint" => Some(&mut self.joint),
@@ -144,6 +159,7 @@ impl Lists {
 
     fn get(&self, name: &str) -> &[StatedTable] {
         match name {
+            "place" => &self.place,
             "mass" => &self.mass,
             "spring" => &self.spring,
             "joint" => &self.joint,
@@ -243,6 +259,9 @@ impl Case {
 pub(crate) fn varied_text(varied: &[VariedValue]) -> String {
     varied.iter().map(|varied| varied.text.as_str()).collect::<Vec<_>>().join(", ")
 }
+
+/// Lowest frequencies that are shown where a structure cannot be reduced.
+const LOWEST: usize = 3;
 
 /// Most cases that [`Study::resolved`] writes out; a run can be repeated from the text in any case.
 const MOST_RESOLVED: usize = 1_000;
@@ -426,6 +445,7 @@ impl Study {
             ("method", _) => Some(&self.method),
             ("figure", _) => Some(&self.figure),
             (_, Some(template)) => Some(&template.table),
+            ("structure", None) => self.structure.matrices.as_ref().map(|matrices| &matrices.table),
             (_, None) => self.structure.lists.get(table).get(index),
         };
         let whole = Place::default();
@@ -568,8 +588,9 @@ impl Study {
             }
         };
         let environment = Environment { names: &self.names, values };
-        let model = model_of(&self.structure, &environment, problems);
+        let mut model = model_of(&self.structure, &environment, problems);
         let values = self.study.values(&environment, problems);
+        substructure::settle(&mut model, &values);
         let method = self.method.values(&environment, problems);
         if !problems.is_empty() {
             return None;
@@ -631,7 +652,9 @@ impl Study {
         let whole = Place::default();
         let (place, message) = match &self.structure.template {
             None => {
-                let table = self.structure.lists.get(list).get(index);
+                let matrices = self.structure.matrices.as_ref().filter(|_| list == "structure");
+                let table =
+                    matrices.map(|matrices| &matrices.table).or_else(|| self.structure.lists.get(list).get(index));
                 let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
                 (place, table.map_or_else(|| error.message.clone(), |table| table.with_turn(&error.message)))
             }
@@ -641,7 +664,7 @@ impl Study {
             }
         };
         let places = model.place_names();
-        let nodes = Names::of_masses(model);
+        let nodes = Names::of_places(model);
         let help = match &error.wrong_name {
             Some(wrong) => {
                 Some(match (nodes.directions_of(wrong), nearest(wrong, places.iter().map(String::as_str))) {
@@ -653,11 +676,29 @@ impl Study {
                     ),
                 })
             }
+            None if error.element == Element::Whole && model.substructure.is_some() => {
+                Some("add a [[place]] with a name and a dof".to_owned())
+            }
             None if error.element == Element::Whole => Some("add a [[mass]] or a [[motion]]".to_owned()),
+            None if error.key == "reduce" => self.advice_on_reduction(model),
             None if error.key == "name" => Some("choose another name".to_owned()),
             None => None,
         };
         Problem::new(place, error.key, message).maybe_help(help)
+    }
+
+    /// What to do where a structure cannot be reduced: units that were mistaken move its frequencies by powers of ten.
+    fn advice_on_reduction(&self, model: &Model) -> Option<String> {
+        let substructure = model.substructure.as_ref()?;
+        if matches!(substructure.reduction, Reduction::UpTo { up_to, .. } if up_to <= 0.0) {
+            return Some(
+                "this study has no drive frequency that would tell: add reduce = { up_to = \"5 kHz\" }".to_owned(),
+            );
+        }
+        let component = &substructure.component;
+        let lowest = component.frequencies(LOWEST).ok()?;
+        let listed: Vec<String> = lowest.iter().map(|omega| displayed(*omega, Some(Dimension::FREQUENCY))).collect();
+        Some(format!("its lowest frequencies are {}: are the units right, and `up_to`?", listed.join(", ")))
     }
 
     fn complaint(&self, complaint: Complaint) -> Problem {
@@ -717,8 +758,29 @@ pub(crate) fn evaluate(
 }
 
 pub(crate) fn model_of(structure: &Structure, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Model {
-    let Structure { lists, template } = structure;
+    let Structure { lists, template, matrices } = structure;
     let mut model = Model::default();
+    let component = matrices.as_ref().and_then(|matrices| matrices.component.as_ref());
+    match (matrices, component) {
+        (Some(matrices), Some(component)) => {
+            model.substructure = Some(substructure::of(&matrices.table, component, environment, problems));
+            for table in &lists.place {
+                model.places.extend(substructure::place(table, component, environment, problems));
+            }
+        }
+        // names alone: masses stand for the places
+        (Some(_), None) => {
+            let values = lists.place.iter().map(|table| (table, table.values(environment, problems)));
+            model.masses.extend(values.map(|(table, values)| substructure::stand_in(table, &values)));
+        }
+        (None, _) => {
+            if let Some(place) = lists.place.first() {
+                let message = "a place is one of a structure, and there is none";
+                let help = "add [structure] with `stiffness` and `mass`; a point mass is a [[mass]]";
+                problems.push(Problem::new(&place.place, "place", message).help(help));
+            }
+        }
+    }
     let mut resolve = |element: Element, table: &StatedTable| {
         let before = problems.len();
         let values = table.values(environment, problems);
@@ -747,7 +809,8 @@ pub(crate) fn model_of(structure: &Structure, environment: &Environment<'_>, pro
         let (stiffness, damping) = (number(&values, "stiffness"), number(&values, "damping"));
         model.springs.push(Spring { between: between(&values), stiffness, damping });
     }
-    let nodes: BTreeMap<String, usize> = model.masses.iter().map(|m| (m.name.clone(), m.directions.len())).collect();
+    let nodes: BTreeMap<String, usize> =
+        model.nodes().map(|(name, directions)| (name.to_owned(), directions.len())).collect();
     for (i, table) in lists.joint.iter().enumerate() {
         let values = resolve(Element::Joint(i), table);
         // without a law there is a problem, and the model is not used

@@ -3,8 +3,11 @@
 //!
 //! Everything here comes from the linear structure and from counting; no orbit is computed.
 
+mod structure;
 mod text;
 mod warnings;
+
+pub use structure::StructureSummary;
 
 use crate::cost::{Costing, Size};
 use crate::error::StudyError;
@@ -25,6 +28,8 @@ pub struct ModelSummary {
     pub cases: usize,
     /// Degrees of freedom.
     pub dofs: usize,
+    /// The structure by its matrices, if there is one.
+    pub structure: Option<StructureSummary>,
     /// Whether these are too many for the modes, which are then absent.
     pub too_large: bool,
     /// Modes with all joints free.
@@ -111,6 +116,7 @@ impl ModelSummary {
             case: shown.case.label(),
             cases: study.cases(),
             dofs: first.dofs(),
+            structure: StructureSummary::new(study, &cases[0]),
             too_large: first.is_too_large(),
             free: first.free().clone(),
             stuck: first.stuck().clone(),
@@ -155,6 +161,7 @@ impl ModelSummary {
         json!({
             "case": self.case,
             "degrees_of_freedom": self.dofs,
+            "structure": self.structure.as_ref().map(StructureSummary::to_json),
             "joints_free": modes(&self.free),
             "joints_stuck": modes(&self.stuck),
             "joints": self.joints.iter().map(joint).collect::<Vec<_>>(),

@@ -148,6 +148,14 @@ impl Frequencies {
         }
     }
 
+    /// The highest, rad/s.
+    pub fn highest(&self) -> Option<f64> {
+        match self {
+            Frequencies::List(list) => list.iter().copied().reduce(f64::max),
+            Frequencies::Range { from, to, .. } | Frequencies::Adaptive { from, to, .. } => Some(from.max(*to)),
+        }
+    }
+
     /// All of them, rad/s.
     pub fn iter(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.len()).filter_map(|index| self.get(index))
@@ -193,6 +201,8 @@ pub(crate) enum Given {
     Flag(bool),
     Frequencies(Frequencies),
     ByName(BTreeMap<String, f64>, Dimension),
+    Vector([f64; 3]),
+    Sums(Vec<Vec<(String, f64)>>),
     Law(SharedLaw),
     Table(Values),
 }
@@ -231,6 +241,10 @@ accessors! {
     frequencies -> &Frequencies { Given::Frequencies(frequencies) => frequencies }
     /// Quantities in SI by name.
     by_name -> &BTreeMap<String, f64> { Given::ByName(table, _) => table }
+    /// Three numbers.
+    vector -> [f64; 3] { Given::Vector(vector) => *vector }
+    /// Weighted sums of rows.
+    sums -> &[Vec<(String, f64)>] { Given::Sums(sums) => sums }
     /// A friction law.
     law -> &SharedLaw { Given::Law(law) => law }
     /// A table inside the table.
@@ -267,6 +281,8 @@ impl Given {
                 let entry = |(name, value): (&String, &f64)| (name.clone(), quantity_json(*value, Some(*dimension)));
                 Json::Object(table.iter().map(entry).collect())
             }
+            Given::Vector(vector) => json!(vector),
+            Given::Sums(sums) => json!(sums),
             Given::Law(law) => json!(law),
             Given::Table(table) => table.to_json(),
         }

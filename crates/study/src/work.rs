@@ -97,8 +97,10 @@ pub(crate) fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyE
             study.error_at("joint", index, "law", message, help)
         }
         MethodError::NeedsMass { place, .. } => {
-            let index = model.masses.iter().position(|mass| mass.places().contains(place)).unwrap_or(0);
-            study.error_at("mass", index, "mass", message, help)
+            match model.masses.iter().position(|mass| mass.places().contains(place)) {
+                Some(index) => study.error_at("mass", index, "mass", message, help),
+                None => study.error_at("structure", 0, "mass", message, help),
+            }
         }
         // a kind that needs no method has the method's options among its own keys
         MethodError::Option { key, .. } => {

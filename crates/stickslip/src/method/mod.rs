@@ -164,7 +164,7 @@ impl MethodError {
 
     /// `method` needs a mass where a system has none.
     pub(crate) fn needs_mass(method: &'static str, system: &System, place: usize) -> Self {
-        MethodError::NeedsMass { method, place: system.places()[place].clone(), ways: Box::default() }
+        MethodError::NeedsMass { method, place: system.structure().places()[place].clone(), ways: Box::default() }
     }
 
     /// `method` carries full matrices: whether those of a system are too large for it.

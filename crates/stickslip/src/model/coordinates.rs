@@ -134,7 +134,7 @@ impl Part {
         };
         Ok(Part {
             names: substructure.component.rows().iter().enumerate().map(named).collect(),
-            places: model.places.iter().map(|place| place.rows.iter().cloned().map(combined).collect()).collect(),
+            places: model.places.iter().map(|place| place.displacements(&place.rows)).collect(),
             entries: [entries, damping, springs],
             reduced: None,
         })
@@ -161,7 +161,7 @@ impl Part {
         let mut next = 0;
         let of_place = |place: &super::Place| -> Vec<Row> {
             next += place.rows.len();
-            (next - place.rows.len()..next).map(row).collect()
+            place.displacements(&(next - place.rows.len()..next).map(row).collect::<Vec<_>>())
         };
         Ok(Part {
             names: (1..=reduced.dofs()).map(|number| format!("coordinate {number}")).collect(),

@@ -11,8 +11,9 @@ use serde::Serialize;
 /// // rows 6, 7, 8 of the matrices are x, y, z of a node; the contact plane is inclined by 30 degrees about x
 /// let (sin, cos) = (0.5, 0.75f64.sqrt());
 /// let frame = Frame::new([0.0, -sin, cos], Some([1.0, 0.0, 0.0])).unwrap();
-/// let node = Place::node("n188", &["t1", "t2", "n"], [6, 7, 8].map(|row| vec![(row, 1.0)]).to_vec()).turned(&frame);
-/// let normal = &node.rows[2];
+/// let node = Place::node("n188", &["t1", "t2", "n"], [6, 7, 8].map(|row| vec![(row, 1.0)]).to_vec()).turned(frame);
+/// let normal = &node.displacements(&node.rows)[2];
+/// assert_eq!(normal.len(), 2);
 /// assert!((normal[0].1 + sin).abs() < 1e-15 && (normal[1].1 - cos).abs() < 1e-15);
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -21,31 +22,38 @@ pub struct Place {
     pub name: String,
     /// Its directions if it is a node, at most three, in the order in which laws take them; a normal is the last.
     pub directions: Vec<String>,
-    /// The displacement along each direction, or the one that it has: (row from 0, weight).
+    /// The displacement along each direction, or the one that it has: (row from 0, weight). With a frame those along x, y, z of the structure.
     pub rows: Vec<Row>,
+    /// The axes that its directions have; those of the structure without it.
+    pub frame: Option<Frame>,
 }
 
 impl Place {
     /// With one displacement.
     pub fn new(name: impl Into<String>, row: Row) -> Self {
-        Place { name: name.into(), directions: Vec::new(), rows: vec![row] }
+        Place { name: name.into(), directions: Vec::new(), rows: vec![row], frame: None }
     }
 
     /// A node with a displacement along each direction.
     pub fn node(name: impl Into<String>, directions: &[&str], rows: Vec<Row>) -> Self {
         let directions = directions.iter().map(|&along| along.to_owned()).collect();
-        Place { name: name.into(), directions, rows }
+        Place { name: name.into(), directions, rows, frame: None }
     }
 
-    /// The same along the axes of a local frame, whose components the rows have been so far.
+    /// The same along the axes of a local frame; its rows are those of x, y, z.
     #[must_use]
-    pub fn turned(mut self, frame: &Frame) -> Self {
-        let turned = frame.axes.iter().map(|axis| {
-            let parts = self.rows.iter().zip(axis).filter(|(_, share)| **share != 0.0);
+    pub fn turned(self, frame: Frame) -> Self {
+        Place { frame: Some(frame), ..self }
+    }
+
+    /// The displacement along each direction, of `rows` that are its own, whatever they count.
+    pub fn displacements(&self, rows: &[Row]) -> Vec<Row> {
+        let Some(frame) = &self.frame else { return rows.to_vec() };
+        let along = |axis: &[f64; 3]| {
+            let parts = rows.iter().zip(axis).filter(|(_, share)| **share != 0.0);
             parts.flat_map(|(row, share)| row.iter().map(move |(at, weight)| (*at, weight * share))).collect()
-        });
-        self.rows = turned.collect();
-        self
+        };
+        frame.axes.iter().map(along).collect()
     }
 
     /// The places that it makes: itself, or one for each of its directions.
@@ -55,7 +63,7 @@ impl Place {
 }
 
 /// Two tangents and a normal, orthogonal and of unit length, right-handed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Frame {
     axes: [[f64; 3]; 3],
 }

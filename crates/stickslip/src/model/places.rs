@@ -100,6 +100,10 @@ impl Places {
                 let message = format!("{} displacements are given for {expected}", place.rows.len());
                 return Err(ModelError::new(element, "dofs", message));
             }
+            if place.frame.is_some() && expected != 3 {
+                let message = "a local frame turns three displacements, those along x, y and z";
+                return Err(ModelError::new(element, "normal", message));
+            }
             let of = |along: usize| Of::Component(i, along);
             collected.node(element, (&place.name, &place.directions), of)?;
         }

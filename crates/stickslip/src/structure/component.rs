@@ -147,16 +147,13 @@ impl Component {
         &self.0.rows
     }
 
-    /// The row of that name, or of that number from 1.
+    /// The row of that name.
     pub fn row(&self, name: &str) -> Option<usize> {
         let index = self.0.index.get_or_init(|| {
             let named = self.0.rows.iter().enumerate().filter(|(_, name)| !name.is_empty());
             named.map(|(row, name)| (name.clone(), row)).collect()
         });
-        index.get(name).copied().or_else(|| {
-            let number = name.parse::<usize>().ok().filter(|number| (1..=self.dofs()).contains(number))?;
-            Some(number - 1)
-        })
+        index.get(name).copied()
     }
 
     /// Mass (kg), damping (kg/s) if it has one, and stiffness (N/m).

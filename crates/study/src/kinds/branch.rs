@@ -248,7 +248,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let (system, places) = (&prepared.system, peak_places(&prepared));
     let (outer, along) = split(drawing.study, &prepared.case.varied);
     let column = |place: usize| format!("{}_amplitude_m", system.places()[place]);
-    let (y, factor) = drawing.axis(1, "amplitude", largest(table, (0..system.dofs()).map(column)), "m");
+    let (y, factor) = drawing.axis(1, "amplitude", largest(table, (0..system.places().len()).map(column)), "m");
     let (name, _) = axis(along);
     let along_unit = along.map_or("Hz".to_owned(), |parameter| parameter.on_axis().1);
     let stretches = drawing.stretches_of(table, outer.len());
@@ -257,7 +257,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let y = if one { y } else { Axis { quantity: format!("amplitude of {}", names.join(", ")), ..y } };
     // of several branches the masses whose peaks count are shown, the largest amplitude of them
     let shown: Vec<Vec<usize>> = match one {
-        true => (0..system.dofs())
+        true => (0..system.places().len())
             .filter(|place| drawing.shows(&system.places()[*place]))
             .map(|place| vec![place])
             .collect(),

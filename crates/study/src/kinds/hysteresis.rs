@@ -24,7 +24,7 @@ use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
 use stickslip::law::MOST_DIRECTIONS;
-use stickslip::model::Model;
+use stickslip::model::{Axis as Along, Model};
 use stickslip::orbit::{Orbit, Sample};
 
 pub(super) const KIND: Kind = Kind {
@@ -95,7 +95,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
         known.all("loop", "joint or moved place", name)?;
     }
     if let Some(name) = values.text("against") {
-        Names::of_masses(model).one("against", "mass", name)?;
+        Names::of_places(model).one("against", "mass", name)?;
     }
     if values.flag("sum") == Some(true) && values.text("against").is_none() {
         let wanted = wanted(values, model);
@@ -140,7 +140,7 @@ fn wanted(values: &Values, model: &Model) -> Vec<String> {
 struct Source {
     force: Of,
     /// The mass whose displacement counts, instead of that of the joint or moved place.
-    against: Option<usize>,
+    against: Option<Along>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -161,7 +161,7 @@ impl Source {
             }
             Of::Moved(m) => sample.moved[*m],
         };
-        (self.against.map_or(displacement, |place| sample.displacement[place]), force)
+        (self.against.as_ref().map_or(displacement, |place| place.along(&sample.displacement)), force)
     }
 }
 
@@ -211,6 +211,7 @@ fn compute(work: &Work<'_>) -> Computed {
 fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
     let (system, values) = (&prepared.system, &prepared.case.values);
     let against = values.text("against").and_then(|name| system.places().iter().position(|place| place == name));
+    let against = against.map(|place| system.seen()[place].clone());
     let axes: Vec<(String, (usize, usize))> = system
         .joints()
         .iter()
@@ -234,14 +235,18 @@ fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
             sums[at].names.push(name);
             sums[at].joints.push((j, axis));
         }
-        let one = |sum: Sum| (sum.names.join(" + "), Source { force: Of::Joints(sum.joints), against });
+        let one =
+            |sum: Sum| (sum.names.join(" + "), Source { force: Of::Joints(sum.joints), against: against.clone() });
         return sums.into_iter().map(one).collect();
     }
     let find = |name: &String| {
         let joint = joint(name).map(|joint| Of::Joints(vec![joint]));
         joint.or_else(|| system.moved().iter().position(|place| place.name == *name).map(Of::Moved))
     };
-    names.iter().filter_map(|name| Some((name.clone(), Source { force: find(name)?, against }))).collect()
+    names
+        .iter()
+        .filter_map(|name| Some((name.clone(), Source { force: find(name)?, against: against.clone() })))
+        .collect()
 }
 
 /// The joints whose forces along one direction are added up.

@@ -10,7 +10,7 @@ use stickslip::model::{Model, System};
 
 /// Whether there is a mass whose peak could count.
 pub(super) fn check_masses(model: &Model) -> Result<(), Complaint> {
-    if model.masses.is_empty() {
+    if model.masses.is_empty() && model.places.is_empty() {
         let help = "add a [[mass]], or ask for kind = \"hysteresis\"";
         return Err(Complaint::new("kind", "the model has no mass, so no amplitude has a peak", help));
     }

@@ -89,7 +89,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     check_samples(values)?;
     let (number, masses): (u64, u64) =
         (values.count("mode").unwrap_or(1), model.masses.iter().map(|mass| mass.places().len() as u64).sum());
-    if number > masses {
+    if number > masses && model.substructure.is_none() {
         let message = format!("there is no mode {number}: the structure has {masses}");
         return Err(Complaint::new("mode", message, "count modes from 1, by rising frequency"));
     }

@@ -123,9 +123,10 @@ fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
 
 /// The cells of one instant.
 pub(super) fn write_sample(prepared: &Prepared, sample: &Sample, rows: &mut Rows) {
-    for (i, place) in prepared.system.places().iter().enumerate() {
-        rows.number(&format!("{place}_displacement_m"), sample.displacement[i]);
-        rows.number(&format!("{place}_velocity_m_per_s"), sample.velocity[i]);
+    let system = &prepared.system;
+    for (place, along) in system.places().iter().zip(system.seen()) {
+        rows.number(&format!("{place}_displacement_m"), along.along(&sample.displacement));
+        rows.number(&format!("{place}_velocity_m_per_s"), along.along(&sample.velocity));
     }
     for (joint, state) in prepared.system.joints().iter().zip(&sample.joints) {
         for (a, label) in joint.labels().enumerate() {
@@ -179,14 +180,14 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                     series: columns.iter().enumerate().map(line).collect(),
                 }
             };
-            if system.dofs() > 0 {
+            if !system.places().is_empty() {
                 let names = system.places().iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
                 panels.push(panel("displacement", "m", names, "displacement_m", 0));
             }
             if !system.joints().is_empty() {
                 let labels: Vec<String> = system.joints().iter().flat_map(|joint| joint.labels()).collect();
                 let names = labels.iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
-                panels.push(panel("joint force", "N", names, "force_N", system.dofs()));
+                panels.push(panel("joint force", "N", names, "force_N", system.places().len()));
             }
         }
     }

@@ -21,7 +21,7 @@ pub(super) const PEAK_OF: Key = optional(
 
 /// Whether it names masses of the model.
 pub(super) fn check_peak_of(values: &Values, model: &Model) -> Result<(), Complaint> {
-    let masses = Names::of_masses(model);
+    let masses = Names::of_places(model);
     let mut named = values.names("peak_of").unwrap_or_default().iter().filter(|name| *name != ALL);
     named.try_for_each(|name| masses.all(PEAK_OF.name, "mass", name).map(drop))
 }
@@ -33,7 +33,7 @@ pub(super) fn named_places(prepared: &Prepared) -> Vec<usize> {
     if names.iter().any(|name| name == ALL) && !places.iter().any(|place| place == ALL) {
         return (0..places.len()).collect();
     }
-    let masses = Names::of_masses(&prepared.case.model);
+    let masses = Names::of_places(&prepared.case.model);
     let meant = names.iter().filter_map(|name| masses.all(PEAK_OF.name, "mass", name).ok()).flatten();
     let mut found: Vec<usize> = Vec::new();
     for place in meant.filter_map(|name| places.iter().position(|place| place == name)) {

@@ -282,7 +282,7 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
         .frequencies
         .as_ref()
         .map_or((0.0, 0.0), |f| (f.get(0).unwrap_or(0.0), f.get(f.len() - 1).unwrap_or(0.0)));
-    let wanted = if named.is_empty() { prepared.system.dofs() } else { 1 };
+    let wanted = if named.is_empty() { prepared.system.places().len() } else { 1 };
     let found = |quantity: usize, peak: Peak, values: &[f64]| {
         let worst = (1..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(1);
         Found { mass: if named.is_empty() { quantity } else { named[worst - 1] }, peak }
@@ -571,8 +571,13 @@ impl Drawn<'_> {
         let (mut panel, names) = (self.panel(stretch.label()), self.names());
         panel.series.extend(self.references(&names));
         if self.single() {
-            let mass = |place: usize| self.system.structure().own_mass(place);
-            let heaviest = (0..self.system.dofs()).map(mass).fold(0.0, f64::max);
+            // of a place that is no mass nobody knows how heavy it is
+            let mass = |place: usize| match self.system.seen()[place].rows() {
+                [(row, _)] => self.system.structure().own_mass(*row),
+                _ => f64::INFINITY,
+            };
+            let places = 0..self.system.places().len();
+            let heaviest = places.map(mass).filter(|mass| mass.is_finite()).fold(0.0, f64::max);
             for (name, place) in &self.shown {
                 let (x, y) = self.line(stretch, name);
                 let light = mass(*place) < LIGHT * heaviest;
@@ -618,7 +623,7 @@ impl Drawn<'_> {
         let mut panel = self.panel(join(named.into_iter().chain([outer.to_owned()]).chain(thinned_out)));
         if mass.is_none() {
             panel.y.quantity = format!("largest amplitude of {} masses", self.shown.len());
-        } else if panels == 1 && self.system.dofs() > 1 {
+        } else if panels == 1 && self.system.places().len() > 1 {
             panel.y.quantity = format!("amplitude of {}", self.shown[0].0);
         }
         panel.series.extend(self.references(&mass.map_or_else(|| self.names(), |mass| vec![mass])));
@@ -647,7 +652,7 @@ impl Drawn<'_> {
         for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
             let (x, y) = self.force_line(stretch, joint);
             // one curve has a colour of its own, beside those of the masses
-            let colour = if stretch.varied.is_empty() { self.system.dofs() } else { colour };
+            let colour = if stretch.varied.is_empty() { self.system.places().len() } else { colour };
             panel.series.push(of_case(stretch, joint, x, y, colour));
         }
         panel

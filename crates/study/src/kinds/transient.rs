@@ -204,7 +204,14 @@ fn compute(work: &Work<'_>) -> Computed {
     };
     let initial = |key: &str| -> Vec<f64> {
         let given = values.by_name(key);
-        prepared.system.places().iter().map(|p| given.and_then(|g| g.get(p)).copied().unwrap_or(0.0)).collect()
+        // only masses are started, which are degrees of freedom of their own
+        let mut state = vec![0.0; prepared.system.dofs()];
+        for (place, along) in prepared.system.places().iter().zip(prepared.system.seen()) {
+            if let (Some(value), [(row, _)]) = (given.and_then(|given| given.get(place)), along.rows()) {
+                state[*row] = *value;
+            }
+        }
+        state
     };
     let mut part = Part::default();
     let (mut rows, mut extremes) = (Rows::default(), Rows::default());
@@ -232,8 +239,8 @@ fn compute(work: &Work<'_>) -> Computed {
         };
         let mut stopped = false;
         // of every mass the largest displacement, and when
-        let mut largest = vec![(0.0f64, 0.0); prepared.system.dofs()];
-        let mut decays = vec![Decay::default(); prepared.system.dofs()];
+        let mut largest = vec![(0.0f64, 0.0); prepared.system.places().len()];
+        let mut decays = vec![Decay::default(); prepared.system.places().len()];
         let end = transient.run(&prepared.system, &mut |time, omega, sample| {
             rows.varied(case);
             if work.several_frequencies() {
@@ -243,9 +250,9 @@ fn compute(work: &Work<'_>) -> Computed {
             rows.number("frequency_Hz", hertz(omega));
             write_sample(prepared, sample, &mut rows);
             rows.end();
-            for (i, decay) in decays.iter_mut().enumerate() {
-                let x = sample.displacement[i];
-                decay.add(time, x, sample.velocity[i]);
+            for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.seen()).enumerate() {
+                let x = along.along(&sample.displacement);
+                decay.add(time, x, along.along(&sample.velocity));
                 if x.abs() > largest[i].0 {
                     largest[i] = (x.abs(), time);
                 }

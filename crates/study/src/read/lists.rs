@@ -24,6 +24,8 @@ impl Reader {
             };
             match (key.takes, &node.value) {
                 // a template that is unknown, or no table at all
+                // its files are read with it
+                (Takes::Table(_), _) if name == "structure" => {}
                 (Takes::Table(keys), Content::Table(table)) => {
                     self.table(table, keys, &format!("[{name}]"));
                 }

@@ -20,6 +20,8 @@ pub(super) struct Reader {
     /// The repetition of the entry that is being read, and which of its turns.
     pub(super) repetition: Repetition,
     pub(super) number: usize,
+    /// Whether no files beside the study's own are read, so that only names are known of a structure by its matrices.
+    pub(super) without_files: bool,
 }
 
 impl Reader {

@@ -55,7 +55,7 @@ impl Reader {
         table: &Table,
         source: usize,
     ) -> Option<Structure> {
-        for key in FILE.iter().filter(|key| matches!(key.takes, Takes::List(_))) {
+        for key in FILE.iter().filter(|key| matches!(key.takes, Takes::List(_)) || key.name == "structure") {
             if let Some(entry) = root.get(key.name) {
                 let message =
                     format!("the template `{}` brings its own model, `{}` cannot be added to it", row.name, key.name);
@@ -75,7 +75,7 @@ impl Reader {
                 entry.clone_from(law);
             }
         }
-        Some(Structure { lists, template: Some(NamedTemplate { table, source }) })
+        Some(Structure { lists, template: Some(NamedTemplate { table, source }), matrices: None })
     }
 }
 
@@ -115,7 +115,7 @@ fn compile_template(row: &Template) -> Result<CompiledTemplate, StudyError> {
     let order = stated.as_ref().and_then(|stated| reader.order(&stated.parameters, &[]));
     match (stated, order) {
         (Some(TemplateFile { parameters, lists, .. }), Some(order)) if reader.problems.is_empty() => {
-            let structure = Structure { lists, template: None };
+            let structure = Structure { lists, template: None, matrices: None };
             Ok(CompiledTemplate { names: reader.names, parameters, order, structure, sources: reader.sources })
         }
         _ => Err(reader.error(row.name)),

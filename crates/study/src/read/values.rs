@@ -1,12 +1,12 @@
 //! From a node of the document to a stated value: keys that are unknown or missing, types, names, quantities, ranges.
 
 use super::reader::Reader;
-use crate::document::{Content, Node, Table};
+use crate::document::{Content, Entry, Node, Table};
 use crate::error::{Place, Problem};
 use crate::expression::Expression;
 use crate::near::{nearest, one_of, shown};
 use crate::schema::{self, Key, MOST_POINTS, Presence, Takes};
-use crate::statement::{Quantity, Stated, StatedEntry, StatedTable};
+use crate::statement::{Quantity, Stated, StatedEntry, StatedTable, Weights};
 use crate::values::Given;
 use stickslip::model::{is_identifier, is_place};
 
@@ -152,6 +152,37 @@ impl Reader {
                 }
                 Some(Stated::ByName(names, *dimension))
             }
+            (Takes::File, Content::Text { text, .. }) => Some(Stated::Fixed(Given::Text(text.clone()))),
+            (Takes::File, Content::Table(table)) => {
+                Some(Stated::Table(self.table(table, schema::FILE_KEYS, &format!("`{}`", key.name))))
+            }
+            (Takes::TableOrNone(_), Content::Flag(false)) => Some(Stated::Fixed(Given::Flag(false))),
+            (Takes::TableOrNone(keys), Content::Table(table)) => {
+                Some(Stated::Table(self.table(table, keys, &format!("`{}`", key.name))))
+            }
+            (Takes::Row, Content::Text { .. } | Content::Number { whole: Some(_), .. }) => {
+                Some(Stated::Names(vec![(self.row(key, node)?, node.place.clone())]))
+            }
+            (Takes::Rows, Content::List(list)) if !list.is_empty() => {
+                let rows = list.iter().map(|node| Some((self.row(key, node)?, node.place.clone())));
+                Some(Stated::Names(rows.collect::<Option<_>>()?))
+            }
+            (Takes::Weights, Content::Table(table)) if !table.entries.is_empty() => {
+                Some(Stated::Sums(vec![self.weights(key, table)?]))
+            }
+            (Takes::Weights, Content::List(list)) if !list.is_empty() => {
+                let mut sums = Vec::with_capacity(list.len());
+                for node in list {
+                    match &node.value {
+                        Content::Table(table) if !table.entries.is_empty() => sums.push(self.weights(key, table)?),
+                        _ => return self.wrong_type(key, node),
+                    }
+                }
+                Some(Stated::Sums(sums))
+            }
+            (Takes::Vector, Content::List(list)) if list.len() == 3 => {
+                Some(Stated::Vector(self.quantities(key.name, list, &node.place)?))
+            }
             (Takes::Table(keys), Content::Table(table)) => {
                 Some(Stated::Table(self.table(table, keys, &format!("`{}`", key.name))))
             }
@@ -191,6 +222,34 @@ impl Reader {
         };
         self.problems.push(problem);
         None
+    }
+
+    /// The name of a row, or its number, with the indices of a repetition filled in.
+    fn row(&mut self, key: &Key, node: &Node) -> Option<String> {
+        match &node.value {
+            Content::Text { text, inner } => self.filled(key, text, *inner, &node.place),
+            Content::Number { whole: Some(number), .. } => Some(number.to_string()),
+            _ => self.wrong_type(key, node).and(None),
+        }
+    }
+
+    /// Rows with their weights.
+    fn weights(&mut self, key: &Key, table: &Table) -> Option<Weights> {
+        let one = |entry: &Entry| {
+            let name = self.filled(key, &entry.key, None, &entry.key_place)?;
+            Some((name, entry.key_place.clone(), self.quantity(&entry.key, &entry.node)?))
+        };
+        table.entries.iter().map(one).collect()
+    }
+
+    fn filled(&mut self, key: &Key, text: &str, inner: Option<usize>, place: &Place) -> Option<String> {
+        match self.turn().name(text) {
+            Ok(name) => Some(name),
+            Err(fault) => {
+                self.problems.push(Problem::fault(place, inner, key.name, fault));
+                None
+            }
+        }
     }
 
     fn names(&mut self, key: &Key, list: &[Node]) -> Option<Stated> {

@@ -112,6 +112,9 @@ impl fmt::Display for ModelSummary {
         let shown = if self.case.is_empty() { String::new() } else { format!(", shown for {}", self.case) };
         let mut line = |name: &str, text: &str| writeln!(f, "  {name:<WIDTH$} {text}");
         line("model", &format!("{dofs}, {joints} joint{}{shown}", plural(joints)))?;
+        for (name, text) in self.structure.iter().flat_map(|structure| structure.lines()) {
+            line(name, &text)?;
+        }
         if self.dofs > 0 {
             line(if joints > 0 { "joints free" } else { "modes" }, &self.modes(&self.free))?;
             if joints > 0 {

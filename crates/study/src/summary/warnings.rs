@@ -8,7 +8,7 @@ use crate::study::{Study, evaluate};
 use crate::survey::Surveyed;
 use crate::words::significant;
 use std::collections::{BTreeSet, HashMap};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use stickslip::dimension::Dimension;
 
 /// Names that a warning lists; of more it gives the number.
@@ -18,6 +18,7 @@ const NAMED: usize = 6;
 pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[Surveyed]) -> Vec<String> {
     let mut warnings = of_kind;
     warnings.extend(loose(cases));
+    warnings.extend(structure(&cases[0]));
     warnings.extend(unused(study));
     warnings.extend(bare_numbers(study));
     warnings.extend(no_references(study, cases));
@@ -45,6 +46,48 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
         }
     };
     cases[0].survey.loose().iter().take(NAMED).map(one).collect()
+}
+
+/// Frequencies that a structure of the size of a machine has, Hz: outside of these the units are mistaken, which moves them by powers of ten.
+const USUAL: (f64, f64) = (0.1, 2e5);
+/// Error of a reduction above which it shows in a response.
+const REDUCTION_ERROR: f64 = 1e-3;
+
+/// What looks like a mistake in a structure by its matrices.
+fn structure(case: &Surveyed) -> Vec<String> {
+    let Some(reduced) = case.survey.system().reduced() else { return Vec::new() };
+    let mut found = Vec::new();
+    let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
+    let lowest = reduced.frequencies().get(reduced.free()).copied();
+    match lowest {
+        Some(lowest) if lowest / TAU < USUAL.0 || lowest / TAU > USUAL.1 => {
+            found.push(format!(
+                "the lowest natural frequency of the structure is {}: are its `units` right?",
+                hertz(lowest)
+            ));
+        }
+        None => found.push(format!(
+            "the structure has no natural frequency up to {}: are its `units` right, and `reduce`?",
+            hertz(reduced.up_to())
+        )),
+        Some(_) => {}
+    }
+    if reduced.error() > REDUCTION_ERROR {
+        found.push(format!(
+            "the reduced structure errs by {} at {}; take more modes, or `reduce = {{ up_to = … }}`, which takes as many as are needed",
+            displayed(reduced.error(), None),
+            hertz(reduced.worst_at())
+        ));
+    }
+    let beyond = crate::survey::range(&case.case).filter(|(_, high)| *high > reduced.up_to());
+    if let Some((_, high)) = beyond {
+        found.push(format!(
+            "the drive reaches {}, and the error of the reduced structure is known up to {} only",
+            hertz(high),
+            hertz(reduced.up_to())
+        ));
+    }
+    found
 }
 
 fn unused(study: &Study) -> Option<String> {
@@ -80,7 +123,8 @@ fn used_parameters(study: &Study) -> BTreeSet<usize> {
     from(&study.study);
     from(&study.method);
     let lists = &study.structure.lists;
-    for list in [&lists.mass, &lists.spring, &lists.joint, &lists.force, &lists.motion] {
+    study.structure.matrices.iter().for_each(|matrices| from(&matrices.table));
+    for list in [&lists.place, &lists.mass, &lists.spring, &lists.joint, &lists.force, &lists.motion] {
         list.iter().for_each(&mut from);
     }
     let mut used = BTreeSet::new();
@@ -100,6 +144,8 @@ fn each_quantity(table: &StatedTable, each: &mut dyn FnMut(&'static str, &Quanti
         match &entry.value {
             Stated::Fixed(_) | Stated::Names(_) => {}
             Stated::Quantity { quantity, dimension, .. } => each(entry.key, quantity, Some(*dimension)),
+            Stated::Vector(parts) => parts.iter().for_each(|q| each(entry.key, q, Some(Dimension::NONE))),
+            Stated::Sums(sums) => sums.iter().flatten().for_each(|(_, _, q)| each(entry.key, q, Some(Dimension::NONE))),
             Stated::List(list) => list.iter().for_each(|q| each(entry.key, q, Some(Dimension::FREQUENCY))),
             Stated::Range { from, to, .. } => {
                 each(entry.key, from, None);

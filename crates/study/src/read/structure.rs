@@ -1,0 +1,190 @@
+//! `[structure]`: the matrices of a structure, read from their files once for all cases, with the names of their rows.
+//!
+//! Rows that a program keeps of what it has constrained, with 1e36 on the diagonal or without any entry, are left out.
+
+use super::reader::Reader;
+use crate::document::Table;
+use crate::error::Problem;
+use crate::schema::STRUCTURE;
+use crate::statement::{Stated, StatedTable};
+use crate::study::Matrices;
+use crate::unit_sets;
+use crate::values::Given;
+use std::path::{Path, PathBuf};
+use stickslip::structure::{Component, StructureError};
+use stickslip_formats::{self as formats, names};
+use stickslip_numerics::sparse::Matrix;
+
+/// A diagonal from which on a row is one that the program has constrained by a penalty.
+const CLAMPED: f64 = 1e36;
+
+impl Reader {
+    /// The table and its matrices; none if a problem was found.
+    pub(super) fn matrices(&mut self, table: &Table, study_file: &str) -> Option<Matrices> {
+        let before = self.problems.len();
+        let stated = self.table(table, STRUCTURE, "[structure]");
+        let several = ["damping", "modal_damping", "rayleigh"].into_iter().filter(|key| stated.entry(key).is_some());
+        let several: Vec<&str> = several.collect();
+        if let [first, second, ..] = several[..] {
+            let message = format!("a structure has one damping, and both `{first}` and `{second}` are stated");
+            self.problems
+                .push(Problem::new(stated.place_of(second, None), second, message).help("leave out one of them"));
+        }
+        if self.problems.len() > before {
+            return None;
+        }
+        if self.without_files {
+            return Some(Matrices { table: stated, component: None, left_out: 0 });
+        }
+        let folder = Path::new(study_file).parent().unwrap_or(Path::new(""));
+        match read(&stated, folder) {
+            Ok((component, left_out)) => Some(Matrices { table: stated, component: Some(component), left_out }),
+            Err(problem) => {
+                self.problems.push(problem);
+                None
+            }
+        }
+    }
+}
+
+/// A matrix of the table with the key that it stands under.
+type Read = (&'static str, formats::Matrix);
+
+fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, usize), Problem> {
+    let problem = |key: &str, message: String| Problem::new(stated.place_of(key, None), key, message);
+    let one = |key: &'static str| -> Result<Option<Read>, Problem> {
+        let Some(file) = file(stated, key) else { return Ok(None) };
+        let path = folder.join(&file.path);
+        let matrix = formats::read(&path, file.format.as_deref(), file.name.as_deref());
+        let matrix =
+            matrix.and_then(|matrix| matrix.must_be_square().map(|()| matrix)).map_err(|error| said(error, &path));
+        matrix.map(|matrix| Some((key, matrix))).map_err(|(message, help)| problem(key, message).help(help))
+    };
+    let missing = |key| problem(key, "the file is missing".to_owned());
+    let stiffness = one("stiffness")?.ok_or_else(|| missing("stiffness"))?;
+    // rows without an entry are not written by some programs: those of the stiffness count
+    let ordered = |(key, matrix): Read| match (stiffness.1.names(), matrix.names()) {
+        (Some(names), Some(own)) if names != own => {
+            let ordered = matrix.in_order_of(names).map_err(|error| said(error, Path::new("")));
+            ordered.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
+        }
+        _ => Ok((key, matrix)),
+    };
+    let mass = ordered(one("mass")?.ok_or_else(|| missing("mass"))?)?;
+    let damping = one("damping")?.map(ordered).transpose()?;
+    let rows = stiffness.1.rows();
+    for (key, matrix) in [Some(&mass), damping.as_ref()].into_iter().flatten() {
+        if matrix.rows() != rows {
+            let message = format!("the {key} matrix has {} rows, and the stiffness matrix {rows}", matrix.rows());
+            return Err(problem(key, message).help("export both from the same model, with the same constraints"));
+        }
+    }
+    let names = row_names(stated, folder, [&stiffness.1, &mass.1])?;
+    let all: Vec<Read> = [Some(stiffness), Some(mass), damping].into_iter().flatten().collect();
+    let kept = kept(&all, rows);
+    let units = match stated.entry("units").map(|entry| &entry.value) {
+        Some(Stated::Fixed(Given::Text(text))) => unit_sets::find(text),
+        _ => None,
+    };
+    let units = units.ok_or_else(|| problem("units", "the units are missing".to_owned()))?;
+    let mut new = vec![usize::MAX; rows];
+    kept.iter().enumerate().for_each(|(at, row)| new[*row] = at);
+    let matrix = |(key, matrix): &Read| {
+        let unit = match *key {
+            "stiffness" => units.stiffness(),
+            "mass" => units.mass,
+            _ => units.damping(),
+        };
+        let entries =
+            matrix.both_triangles().map(|entry| (new[entry.row as usize], new[entry.column as usize], entry.value));
+        let inside = entries.filter(|(row, column, _)| *row != usize::MAX && *column != usize::MAX);
+        let made = Matrix::from_triplets(kept.len(), inside.map(|(row, column, value)| (row, column, value * unit)));
+        made.map_err(|error| problem(key, error.to_string()))
+    };
+    let mut made = all.iter().map(matrix);
+    let mut next = || made.next().transpose();
+    let (stiffness, mass, damping) = (next()?, next()?, next()?);
+    let (Some(stiffness), Some(mass)) = (stiffness, mass) else { return Err(missing("mass")) };
+    let names = kept.iter().map(|row| names[*row].clone()).collect();
+    let component = Component::new(names, mass, damping, stiffness).map_err(|error| match &error {
+        StructureError::NegativeMass => problem("mass", error.to_string())
+            .help("a mass matrix has no negative eigenvalue: is it the stiffness that is named here, or a matrix cut short?"),
+        StructureError::NotSymmetric { matrix, row, column, value, mirrored } => {
+            let name = |at: usize| kept.get(at - 1).map_or(at, |row| row + 1);
+            let (row, column) = (name(*row), name(*column));
+            let message = format!(
+                "the {matrix} matrix is not symmetric: {value:e} in row {row}, column {column} and {mirrored:e} across the diagonal"
+            );
+            problem(matrix, message).help("export both triangles, without rotation, follower loads or friction; name one triangle as such")
+        }
+        _ => problem("stiffness", error.to_string()),
+    })?;
+    Ok((component, rows - kept.len()))
+}
+
+/// What is wrong with a file, in the words of the formats, and what to do.
+fn said(error: formats::Error, path: &Path) -> (String, String) {
+    let mut error = error;
+    if !path.as_os_str().is_empty() {
+        error.path.get_or_insert_with(|| path.to_owned());
+    }
+    let remedy = std::mem::take(&mut error.remedy);
+    let message = error.to_string();
+    (message.trim_end_matches("; ").to_owned(), remedy)
+}
+
+/// A file as it is stated.
+struct File {
+    path: PathBuf,
+    name: Option<String>,
+    format: Option<String>,
+}
+
+fn file(stated: &StatedTable, key: &str) -> Option<File> {
+    let text = |stated: &Stated| match stated {
+        Stated::Fixed(Given::Text(text)) => Some(text.clone()),
+        _ => None,
+    };
+    match &stated.entry(key)?.value {
+        Stated::Table(table) => {
+            let of = |key: &str| text(&table.entry(key)?.value);
+            Some(File { path: of("file")?.into(), name: of("name"), format: of("format") })
+        }
+        other => Some(File { path: text(other)?.into(), name: None, format: None }),
+    }
+}
+
+/// The names of all rows: from a file of their own, or those that a matrix came with; numbers from 1 where there are none.
+fn row_names(stated: &StatedTable, folder: &Path, matrices: [&formats::Matrix; 2]) -> Result<Vec<String>, Problem> {
+    let rows = matrices[0].rows();
+    let mut all = match file(stated, "dofs") {
+        Some(file) => {
+            let path = folder.join(&file.path);
+            names::read(&path, rows).map_err(|error| {
+                let (message, help) = said(error, &path);
+                Problem::new(stated.place_of("dofs", None), "dofs", message).help(help)
+            })?
+        }
+        None => {
+            let named = matrices.iter().find_map(|matrix| matrix.names());
+            named.map_or_else(|| vec![String::new(); rows], <[String]>::to_vec)
+        }
+    };
+    for (row, name) in all.iter_mut().enumerate().filter(|(_, name)| name.is_empty()) {
+        *name = (row + 1).to_string();
+    }
+    Ok(all)
+}
+
+/// Rows that are not constrained.
+fn kept(matrices: &[Read], rows: usize) -> Vec<usize> {
+    let (mut filled, mut clamped) = (vec![false; rows], vec![false; rows]);
+    for (_, matrix) in matrices {
+        for entry in matrix.entries() {
+            let (row, column) = (entry.row as usize, entry.column as usize);
+            (filled[row], filled[column]) = (true, true);
+            clamped[row] |= row == column && entry.value >= CLAMPED;
+        }
+    }
+    (0..rows).filter(|&row| filled[row] && !clamped[row]).collect()
+}

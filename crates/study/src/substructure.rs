@@ -1,0 +1,264 @@
+//! What `[structure]` and `[[place]]` state, as parts of a model.
+
+use crate::error::Problem;
+use crate::near::{nearest, one_of, shown};
+use crate::schema::{CRAIG_BAMPTON, RUBIN};
+use crate::statement::{Environment, StatedTable};
+use crate::values::Values;
+use stickslip::model::{Frame, Mass, Model, Place, Substructure, SubstructureDamping};
+use stickslip::structure::reduction::Row;
+use stickslip::structure::{Component, Reduction, ReductionKind};
+
+/// So many harmonics of the highest drive frequency count where the file does not say how far a reduction must reach.
+const HARMONICS: f64 = 5.0;
+/// Names of the directions of a node with a normal.
+const IN_FRAME: [&str; 3] = ["t1", "t2", "n"];
+/// What the rows of a node with a normal are called.
+const CARTESIAN: [&str; 3] = ["x", "y", "z"];
+
+/// The structure of `[structure]`. Where nothing is said of its reduction, [`settle`] decides.
+pub(crate) fn of(
+    table: &StatedTable,
+    component: &Component,
+    environment: &Environment<'_>,
+    problems: &mut Vec<Problem>,
+) -> Substructure {
+    let values = table.values(environment, problems);
+    let damping = match (values.quantity("modal_damping"), values.table("rayleigh")) {
+        (Some(ratio), _) => SubstructureDamping::Ratio(ratio),
+        (None, Some(rayleigh)) => SubstructureDamping::Rayleigh {
+            mass: rayleigh.quantity("mass").unwrap_or(0.0),
+            stiffness: rayleigh.quantity("stiffness").unwrap_or(0.0),
+        },
+        (None, None) => SubstructureDamping::Own,
+    };
+    let reduction = match (values.table("reduce"), values.flag("reduce")) {
+        (Some(reduce), _) => stated_reduction(reduce).unwrap_or_else(|(key, message, help)| {
+            problems.push(Problem::new(table.place_of("reduce", None), key, message).help(help));
+            Reduction::None
+        }),
+        (None, Some(false)) => Reduction::None,
+        _ => Reduction::up_to(0.0),
+    };
+    Substructure { component: component.clone(), damping, reduction }
+}
+
+fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'static str, &'static str)> {
+    let kind = reduce.text("kind").and_then(|kind| match kind {
+        RUBIN => Some(ReductionKind::Rubin),
+        CRAIG_BAMPTON => Some(ReductionKind::CraigBampton),
+        _ => None,
+    });
+    let tolerance = reduce.quantity("tolerance").unwrap_or(Reduction::TOLERANCE);
+    match (reduce.quantity("up_to"), reduce.count("modes")) {
+        (Some(_), Some(_)) => Err((
+            "modes",
+            "both `up_to` and `modes` are stated",
+            "leave out one: `up_to` takes as many modes as the error asks for",
+        )),
+        (None, Some(modes)) => {
+            Ok(Reduction::Modes { modes: modes as usize, kind: kind.unwrap_or(ReductionKind::Rubin) })
+        }
+        (up_to, None) => Ok(Reduction::UpTo { up_to: up_to.unwrap_or(0.0), tolerance, kind }),
+    }
+}
+
+/// Decides how far the reduction reaches, where the file does not: from the frequencies of the study.
+pub(crate) fn settle(model: &mut Model, values: &Values) {
+    let Some(Substructure { reduction: Reduction::UpTo { up_to, .. }, .. }) = &mut model.substructure else { return };
+    if *up_to > 0.0 {
+        return;
+    }
+    let run_up = values.table("run_up");
+    let ends = run_up.into_iter().flat_map(|table| ["from", "to"].map(|key| table.quantity(key).unwrap_or(0.0)));
+    let drive = values.frequencies("frequency").into_iter().filter_map(|frequencies| frequencies.highest());
+    let harmonic =
+        model.forces.iter().map(|force| force.harmonic).chain(model.motions.iter().map(|motion| motion.harmonic));
+    let most = f64::from(harmonic.max().unwrap_or(1).max(1));
+    *up_to = HARMONICS * most * ends.chain(drive).fold(0.0, f64::max);
+}
+
+/// A `[[place]]`.
+pub(crate) fn place(
+    table: &StatedTable,
+    component: &Component,
+    environment: &Environment<'_>,
+    problems: &mut Vec<Problem>,
+) -> Option<Place> {
+    let before = problems.len();
+    let values = table.values(environment, problems);
+    if problems.len() > before {
+        return None;
+    }
+    match made(table, &values, component) {
+        Ok(place) => Some(place),
+        Err(mut problem) => {
+            problem.message = table.with_turn(&problem.message);
+            problems.push(*problem);
+            None
+        }
+    }
+}
+
+/// A mass in the stead of a place, where only names are known.
+pub(crate) fn stand_in(table: &StatedTable, values: &Values) -> Mass {
+    let (directions, _) = directions(table, values).unwrap_or_default();
+    Mass { name: values.text("name").unwrap_or_default().to_owned(), mass: 1.0, directions }
+}
+
+/// Names of the directions of a place, none if it has one displacement; and what the rows of nodes are called.
+fn directions(table: &StatedTable, values: &Values) -> Result<(Vec<String>, Vec<String>), Box<Problem>> {
+    let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+    let problem = |key: &str, message: String| Box::new(Problem::new(table.place_of(key, None), key, message));
+    let stated = values.names("directions").map(<[String]>::to_vec);
+    let framed = values.vector("normal").is_some();
+    let sums = values.sums("sum").map(<[_]>::len);
+    if sums == Some(1) && stated.is_none() && !framed {
+        return Ok(Default::default());
+    }
+    let count = values.names("dofs").map(<[String]>::len).or(sums);
+    if let Some(count) = count.filter(|count| *count > CARTESIAN.len()) {
+        let key = if sums.is_some() { "sum" } else { "dofs" };
+        return Err(problem(key, format!("a node has up to three directions, and {count} rows are named"))
+            .map_help("a mean of several rows is nodes = [\"188\", \"189\"], a sum of them sum = { … }"));
+    }
+    let names = match (framed, &stated, values.names("dofs")) {
+        (false, _, _) if values.names("dof").is_some() => stated.unwrap_or_default(),
+        (true, None, _) => owned(&IN_FRAME),
+        (_, Some(names), _) => names.clone(),
+        // the ends of the names of rows, if they tell the directions apart
+        (false, None, Some(rows)) => {
+            let ends: Vec<&str> = rows.iter().map(|row| row.rsplit_once('.').map_or("", |(_, along)| along)).collect();
+            let apart = ends.iter().enumerate().all(|(i, end)| !end.is_empty() && !ends[..i].contains(end));
+            let usable = apart && ends.iter().all(|end| stickslip::model::is_identifier(end));
+            if usable { owned(&ends) } else { owned(&CARTESIAN[..rows.len()]) }
+        }
+        (false, None, None) => owned(&CARTESIAN[..sums.unwrap_or(CARTESIAN.len())]),
+    };
+    let rows = if framed { owned(&CARTESIAN) } else { names.clone() };
+    if let Some(count) = count.filter(|count| *count != names.len()) {
+        let message = format!("{} directions for {count} rows", names.len());
+        return Err(problem("directions", message).map_help("give each row the name of its direction"));
+    }
+    Ok((names, rows))
+}
+
+trait Helped {
+    fn map_help(self, help: &str) -> Self;
+}
+
+impl Helped for Box<Problem> {
+    fn map_help(mut self, help: &str) -> Self {
+        self.help = Some(help.to_owned());
+        self
+    }
+}
+
+fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<Place, Box<Problem>> {
+    let problem = |key: &str, message: String| Box::new(Problem::new(table.place_of(key, None), key, message));
+    let stated: Vec<&str> =
+        ["dof", "dofs", "nodes", "sum"].into_iter().filter(|key| table.entry(key).is_some()).collect();
+    let [key] = stated[..] else {
+        let message = match stated[..] {
+            [] => "the place has no row: one of `dof`, `dofs`, `nodes`, `sum` is needed".to_owned(),
+            _ => format!("a place is one of `{}`", stated.join("`, `")),
+        };
+        return Err(problem(stated.last().copied().unwrap_or("name"), message).map_help(
+            "write dof = \"1353.y\", dofs = [\"188.x\", \"188.y\", \"188.z\"], or nodes = [\"188\", \"189\"]",
+        ));
+    };
+    let find = |name: &str| {
+        component.row(name).ok_or_else(|| {
+            let place = table.place_of(key, Some(name));
+            Box::new(
+                Problem::new(place, key, format!("the structure has no row `{}`", shown(name)))
+                    .help(near(component, name)),
+            )
+        })
+    };
+    let (directions, along) = directions(table, values)?;
+    let mut rows: Vec<Row> = Vec::new();
+    match key {
+        "sum" => {
+            for sum in values.sums("sum").unwrap_or_default() {
+                let row: Result<Row, Box<Problem>> =
+                    sum.iter().map(|(name, weight)| Ok((find(name)?, *weight))).collect();
+                rows.push(row?);
+            }
+        }
+        "nodes" => {
+            let nodes = values.names("nodes").unwrap_or_default();
+            let weight = 1.0 / nodes.len() as f64;
+            for along in &along {
+                let row: Result<Row, Box<Problem>> =
+                    nodes.iter().map(|node| Ok((find_of(component, table, node, along)?, weight))).collect();
+                rows.push(row?);
+            }
+        }
+        _ => {
+            for name in values.names(key).unwrap_or_default() {
+                rows.push(vec![(find(name)?, 1.0)]);
+            }
+        }
+    }
+    let frame = match values.vector("normal") {
+        Some(normal) => {
+            if rows.len() != CARTESIAN.len() {
+                return Err(problem("normal", "a local frame needs three rows: those of x, y and z".to_owned())
+                    .map_help(
+                        "name them in dofs = [\"188.x\", \"188.y\", \"188.z\"], or the node in nodes = [\"188\"]",
+                    ));
+            }
+            let frame = Frame::new(normal, values.vector("tangent"));
+            Some(frame.map_err(|error| problem("normal", error.to_string()))?)
+        }
+        None if values.vector("tangent").is_some() => {
+            return Err(problem("tangent", "a tangent without a normal is no frame".to_owned())
+                .map_help("add normal = [0, 0, 1]"));
+        }
+        None => None,
+    };
+    Ok(Place { name: values.text("name").unwrap_or_default().to_owned(), directions, rows, frame })
+}
+
+/// A row of a node.
+fn find_of(component: &Component, table: &StatedTable, node: &str, along: &str) -> Result<usize, Box<Problem>> {
+    let name = format!("{node}.{along}");
+    component.row(&name).ok_or_else(|| {
+        let place = table.place_of("nodes", Some(node));
+        Box::new(
+            Problem::new(place, "nodes", format!("the structure has no row `{}`", shown(&name)))
+                .help(near(component, &name)),
+        )
+    })
+}
+
+/// Rows that a message lists.
+const LISTED: usize = 4;
+/// Rows among which a similar name is looked for: each takes a microsecond.
+const LOOKED_AT: usize = 200_000;
+
+/// What to do about a row that is not there: the rows of the same node, one with a similar name, or the first.
+fn near(component: &Component, name: &str) -> String {
+    let rows = component.rows();
+    let node = name.rsplit_once('.').map_or(name, |(node, _)| node);
+    let same: Vec<&str> = rows
+        .iter()
+        .map(String::as_str)
+        .filter(|row| row.rsplit_once('.').is_some_and(|(of, _)| of == node))
+        .take(2 * LISTED)
+        .collect();
+    if !same.is_empty() {
+        return format!(
+            "its rows of this node are {}; what is missing there is constrained",
+            one_of(same).replace(" or ", ", ")
+        );
+    }
+    match nearest(name, rows.iter().take(LOOKED_AT).map(String::as_str)) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => {
+            let first = rows.iter().take(LISTED).map(|row| format!("`{row}`")).collect::<Vec<_>>().join(", ");
+            format!("its {} rows are {first}, …", rows.len())
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! What is known of a structure by its matrices: its size, what was made of it, its lowest frequencies.
+
+use crate::study::Study;
+use crate::survey::Surveyed;
+use crate::words::{plural, significant};
+use serde_json::{Value as Json, json};
+use std::f64::consts::TAU;
+
+/// Frequencies that are listed.
+const LISTED: usize = 6;
+
+/// A structure by its matrices.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StructureSummary {
+    /// Rows.
+    pub rows: usize,
+    /// Rows of the files that are constrained, and left out.
+    pub left_out: usize,
+    /// Entries of stiffness and mass that are not zero.
+    pub entries: [usize; 2],
+    /// What it was reduced to; none where all its rows are degrees of freedom.
+    pub reduced: Option<ReducedSummary>,
+}
+
+/// A structure in few coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReducedSummary {
+    /// Coordinates.
+    pub coordinates: usize,
+    /// What they are.
+    pub kind: String,
+    /// The largest relative error of what the places see.
+    pub error: f64,
+    /// Up to there, rad/s.
+    pub up_to: f64,
+    /// Free motions of the whole.
+    pub free: usize,
+    /// Its lowest elastic frequencies, rad/s.
+    pub frequencies: Vec<f64>,
+}
+
+impl StructureSummary {
+    pub(super) fn new(study: &Study, one: &Surveyed) -> Option<Self> {
+        let component = &one.case.model.substructure.as_ref()?.component;
+        let (mass, _, stiffness) = component.matrices();
+        let reduced = one.survey.system().reduced().map(|reduced| ReducedSummary {
+            coordinates: reduced.dofs(),
+            kind: reduced.kind().to_owned(),
+            error: reduced.error(),
+            up_to: reduced.up_to(),
+            free: reduced.free(),
+            frequencies: reduced.frequencies().iter().skip(reduced.free()).take(LISTED).copied().collect(),
+        });
+        Some(StructureSummary {
+            rows: component.dofs(),
+            left_out: study.structure.matrices.as_ref().map_or(0, |matrices| matrices.left_out),
+            entries: [stiffness.len(), mass.len()],
+            reduced,
+        })
+    }
+
+    /// For a terminal: a name and a text for each line.
+    pub(super) fn lines(&self) -> Vec<(&'static str, String)> {
+        let Self { rows, left_out, entries: [stiffness, mass], .. } = self;
+        let mut text = format!(
+            "{rows} rows, {stiffness} entries of stiffness, {mass} of mass, symmetric, mass definite or semidefinite"
+        );
+        if *left_out > 0 {
+            text += &format!("; {left_out} constrained row{} left out", plural(*left_out));
+        }
+        let mut lines = vec![("structure", text)];
+        let Some(reduced) = &self.reduced else {
+            lines.push(("reduced", "not at all".to_owned()));
+            return lines;
+        };
+        let hertz = |omega: f64| significant(omega / TAU, 6);
+        let mut own: Vec<String> = reduced.frequencies.iter().map(|omega| hertz(*omega)).collect();
+        if own.is_empty() {
+            own.push("none".to_owned());
+        }
+        let free = match reduced.free {
+            0 => String::new(),
+            free => format!(", {free} free motion{}", plural(free)),
+        };
+        lines.push(("frequencies", format!("{} Hz{free}", own.join(", "))));
+        let error = significant(100.0 * reduced.error, 2);
+        let ReducedSummary { coordinates, kind, up_to, .. } = reduced;
+        lines.push((
+            "reduced",
+            format!("{coordinates} coordinates ({kind}), error {error} % up to {} Hz", hertz(*up_to)),
+        ));
+        lines
+    }
+
+    /// For the record of a run, SI but for the frequencies in Hz.
+    pub(super) fn to_json(&self) -> Json {
+        let reduced = self.reduced.as_ref().map(|reduced| {
+            json!({
+                "coordinates": reduced.coordinates,
+                "kind": reduced.kind,
+                "reduction_error": reduced.error,
+                "up_to_Hz": reduced.up_to / TAU,
+                "free_motions": reduced.free,
+                "frequencies_Hz": reduced.frequencies.iter().map(|omega| omega / TAU).collect::<Vec<_>>(),
+            })
+        });
+        json!({
+            "rows": self.rows,
+            "constrained_rows": self.left_out,
+            "entries_of_stiffness": self.entries[0],
+            "entries_of_mass": self.entries[1],
+            "reduced": reduced,
+        })
+    }
+}

@@ -1,0 +1,327 @@
+//! Studies of structures by their matrices: files in several formats and units, against a dense solution that knows nothing of places,
+//! reductions or studies; with masses and joints added; and each file that is wrong.
+
+#[path = "../../stickslip/tests/reduction/brick.rs"]
+mod brick;
+
+use brick::Brick;
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use std::fmt::Write;
+use std::path::Path;
+use stickslip_formats::{Matrix, Symmetry, names, write};
+use stickslip_study::dataset::Dataset;
+use stickslip_study::read_file;
+use stickslip_study::run::{Context, run};
+
+/// Damping in proportion to mass (1/s) and stiffness (s).
+const RAYLEIGH: (f64, f64) = (20.0, 2e-6);
+const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
+
+/// A steel blade 80 mm long, held at x = 0, with 8 x 2 x 1 elements: 144 rows.
+fn blade() -> Brick {
+    Brick::new([8, 2, 1], [0.08, 0.02, 0.004], true)
+}
+
+/// `node.direction` of every row; nodes count from 101.
+fn named(brick: &Brick) -> Vec<String> {
+    (0..brick.dofs()).map(|row| format!("{}.{}", 101 + row / 3, DIRECTIONS[row % 3])).collect()
+}
+
+/// The name of a node at the far end.
+fn tip(brick: &Brick, y: usize, z: usize) -> String {
+    (101 + brick.row([8, y, z], 0).unwrap() / 3).to_string()
+}
+
+fn full(matrix: &stickslip_numerics::sparse::Matrix) -> DMatrix<f64> {
+    let mut full = DMatrix::zeros(matrix.n(), matrix.n());
+    matrix.entries().for_each(|(row, column, value)| full[(row, column)] = value);
+    full
+}
+
+/// Writes both matrices in units of which one of stiffness is `units.0` N/m and one of mass `units.1` kg.
+fn write_pair(folder: &Path, brick: &Brick, ending: &str, units: (f64, f64)) {
+    for (name, matrix, unit) in [("k", &brick.stiffness, units.0), ("m", &brick.mass, units.1)] {
+        let entries = matrix.entries().map(|(row, column, value)| (row, column, value / unit));
+        let made = Matrix::new(matrix.n(), matrix.n(), Symmetry::General, entries).unwrap();
+        match ending {
+            // CalculiX: upper triangle, from 1
+            "sti" => {
+                let mut text = String::new();
+                for entry in made.both_triangles().filter(|entry| entry.column >= entry.row) {
+                    let _ = writeln!(text, "{} {} {:e}", entry.row + 1, entry.column + 1, entry.value);
+                }
+                std::fs::write(folder.join(format!("{name}.{ending}")), text).unwrap();
+            }
+            _ => write(folder.join(format!("{name}.{ending}")), &made).unwrap(),
+        }
+        let made = made.with_names(named(brick)).unwrap();
+        names::write(folder.join("rows.csv"), &made).unwrap();
+    }
+    let numbers = |row: usize| format!("{}.{}\n", 101 + row / 3, row % 3 + 1);
+    std::fs::write(folder.join("rows.dof"), (0..brick.dofs()).map(numbers).collect::<String>()).unwrap();
+}
+
+fn structure(ending: &str, dofs: &str, units: &str, more: &str) -> String {
+    format!(
+        "schema = 1\n[structure]\nstiffness = \"k.{ending}\"\nmass = \"m.{ending}\"\ndofs = \"{dofs}\"\nunits = \"{units}\"\n\
+         {more}\n"
+    )
+}
+
+const DAMPED: &str = "rayleigh = { mass = \"20 /s\", stiffness = \"2e-6 s\" }";
+
+/// Runs a study whose files stand in `folder`.
+fn results(folder: &Path, text: &str) -> Dataset {
+    let path = folder.join("study.toml");
+    std::fs::write(&path, text).unwrap();
+    let study = read_file(&path, &[]).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
+    let data = run(&study, &Context::unwatched(1)).unwrap();
+    assert!(data.failures.is_empty(), "{:?}", data.failures);
+    data
+}
+
+fn numbers<'a>(data: &'a Dataset, column: &str) -> &'a [f64] {
+    data.tables[0].numbers(column).unwrap_or_else(|| panic!("no {column}: {:?}", data.tables[0].columns))
+}
+
+/// Amplitudes of all rows under a force along `load`, with what is added to mass and stiffness.
+fn dense(brick: &Brick, hertz: f64, load: &DVector<f64>, added: &[(usize, f64, f64)]) -> DVector<Complex64> {
+    let omega = hertz * TAU;
+    let (mut mass, mut stiffness) = (full(&brick.mass), full(&brick.stiffness));
+    let damping = &mass * RAYLEIGH.0 + &stiffness * RAYLEIGH.1;
+    for (row, m, k) in added {
+        mass[(*row, *row)] += m;
+        stiffness[(*row, *row)] += k;
+    }
+    let z = (stiffness - mass * (omega * omega)).map(|v| Complex64::new(v, 0.0))
+        + damping.map(|v| Complex64::new(0.0, omega * v));
+    z.lu().solve(&load.map(|v| Complex64::new(v, 0.0))).unwrap()
+}
+
+/// The force of 1 N along z on a node at the tip, and the frequencies of the test, Hz; the first bending mode is near 520 Hz.
+const FORCED: &str = "[[force]]\non = \"tip.z\"\namplitude = \"1 N\"\n\
+    [study]\nkind = \"response\"\nfrequency = [\"300 Hz\", \"515 Hz\", \"900 Hz\"]\n";
+const HERTZ: [f64; 3] = [300.0, 515.0, 900.0];
+
+fn place(name: &str, node: &str) -> String {
+    format!("[[place]]\nname = \"{name}\"\ndofs = [\"{node}.x\", \"{node}.y\", \"{node}.z\"]\n")
+}
+
+/// Whatever the format and the units, the response is that of a dense solution.
+#[test]
+fn files_of_several_formats_and_units_have_one_response() {
+    let brick = blade();
+    let node = tip(&brick, 0, 1);
+    let z = brick.row([8, 0, 1], 2).unwrap();
+    let mut load = DVector::zeros(brick.dofs());
+    load[z] = 1.0;
+    let pound = 4.4482216152605;
+    for (ending, dofs, units, (k, m)) in [
+        ("mtx", "rows.csv", "m-kg-s", (1.0, 1.0)),
+        ("npz", "rows.csv", "mm-t-s", (1e3, 1e3)),
+        ("sti", "rows.dof", "in-lbf-s", (pound / 0.0254, pound / 0.0254)),
+        ("mtx", "rows.dof", "mm-kg-ms", (1e6, 1.0)),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        write_pair(folder.path(), &brick, ending, (k, m));
+        let more = format!("{DAMPED}\nreduce = false");
+        let text = structure(ending, dofs, units, &more) + &place("tip", &node) + FORCED;
+        let text = text + "[method]\nkind = \"harmonic-balance\"\n";
+        let data = results(folder.path(), &text);
+        for (i, hertz) in HERTZ.iter().enumerate() {
+            let x = dense(&brick, *hertz, &load, &[]);
+            for (k, along) in DIRECTIONS.iter().enumerate() {
+                let (found, expected) = (numbers(&data, &format!("tip_{along}_amplitude_m"))[i], x[z - 2 + k].norm());
+                assert!((found - expected).abs() < 1e-8 * x[z].norm(), "{ending} {hertz} {along}: {found} {expected}");
+            }
+        }
+    }
+}
+
+/// In few coordinates the response is as far from the whole as the record says, for each kind and by every method.
+#[test]
+fn reductions_are_as_good_as_they_say() {
+    let brick = blade();
+    let (node, z) = (tip(&brick, 0, 1), brick.row([8, 0, 1], 2).unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "npz", (1.0, 1.0));
+    let mut load = DVector::zeros(brick.dofs());
+    load[z] = 1.0;
+    for (reduce, method) in [
+        ("", "harmonic-balance"),
+        ("reduce = { up_to = \"5 kHz\", tolerance = 1e-6 }", "event-driven"),
+        ("reduce = { modes = 12, kind = \"craig-bampton\" }", "harmonic-balance"),
+        ("reduce = { modes = 12 }", "shooting"),
+    ] {
+        let text =
+            structure("npz", "rows.csv", "m-kg-s", &format!("{DAMPED}\n{reduce}")) + &place("tip", &node) + FORCED;
+        let data = results(folder.path(), &format!("{text}[method]\nkind = \"{method}\"\n"));
+        let error = numbers(&data, "reduction_error")[0];
+        assert!(error > 0.0 && error < 2e-3, "{reduce}: {error:e}");
+        for (i, hertz) in HERTZ.iter().enumerate() {
+            let expected = dense(&brick, *hertz, &load, &[])[z].norm();
+            let off = numbers(&data, "tip_z_amplitude_m")[i] / expected - 1.0;
+            // near the resonance, 515 Hz, an error of its frequency counts by 1 / (2 zeta) = 60
+            assert!(off.abs() < 60.0 * error.max(1e-6), "{reduce} {method} {hertz}: {off:e}, {error:e}");
+        }
+    }
+}
+
+/// A lumped mass on a spring to the ground, tied to the blade, and a mass that has no other place than a row of it.
+#[test]
+fn masses_and_springs_are_added_at_places() {
+    let brick = blade();
+    let (node, z) = (tip(&brick, 2, 0), brick.row([8, 2, 0], 2).unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "mtx", (1.0, 1.0));
+    let (spring, mass, hold) = (4e5, 0.02, 1e5);
+    let more = format!("{DAMPED}\nreduce = {{ up_to = \"20 kHz\", tolerance = 1e-7 }}");
+    let text = structure("mtx", "rows.csv", "m-kg-s", &more)
+        + &format!("[[place]]\nname = \"tip\"\ndof = \"{node}.z\"\n")
+        + "[[mass]]\nname = \"damper\"\nmass = \"20 g\"\n\
+           [[spring]]\nbetween = [\"tip\", \"damper\"]\nstiffness = \"4e5 N/m\"\n\
+           [[spring]]\nbetween = [\"damper\", \"ground\"]\nstiffness = \"1e5 N/m\"\n\
+           [[force]]\non = \"damper\"\namplitude = \"1 N\"\n\
+           [study]\nkind = \"response\"\nfrequency = [\"300 Hz\", \"515 Hz\", \"900 Hz\"]\n";
+    let data = results(folder.path(), &text);
+    for (i, hertz) in HERTZ.iter().enumerate() {
+        // the damper is eliminated: it pulls the tip by its dynamic stiffness
+        let own = spring + hold - mass * (hertz * TAU).powi(2);
+        let mut load = DVector::zeros(brick.dofs());
+        load[z] = spring / own;
+        let tip = dense(&brick, *hertz, &load, &[(z, 0.0, spring - spring * spring / own)])[z];
+        let damper = (tip * spring + 1.0) / own;
+        for (column, expected) in [("tip_amplitude_m", tip.norm()), ("damper_amplitude_m", damper.norm())] {
+            let off = numbers(&data, column)[i] / expected - 1.0;
+            assert!(off.abs() < 1e-5, "{column} {hertz}: {off:e}");
+        }
+    }
+}
+
+/// A row of the structure that is moved: of the others, a dense solution with its column on the other side.
+#[test]
+fn rows_can_be_moved() {
+    let brick = blade();
+    let (node, z) = (tip(&brick, 0, 0), brick.row([8, 0, 0], 2).unwrap());
+    let other = brick.row([4, 1, 1], 2).unwrap();
+    let name = named(&brick)[other].clone();
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "mtx", (1.0, 1.0));
+    for (reduce, tolerance) in [("false", 1e-8), ("{ up_to = \"20 kHz\", tolerance = 1e-7 }", 1e-5)] {
+        let text = structure("mtx", "rows.csv", "m-kg-s", &format!("{DAMPED}\nreduce = {reduce}"))
+            + &format!(
+                "[[place]]\nname = \"tip\"\ndof = \"{node}.z\"\n[[place]]\nname = \"middle\"\ndof = \"{name}\"\n"
+            )
+            + "[[motion]]\non = \"tip\"\namplitude = \"0.1 mm\"\n\
+               [study]\nkind = \"response\"\nfrequency = [\"300 Hz\", \"515 Hz\", \"900 Hz\"]\n\
+               [method]\nkind = \"harmonic-balance\"\n";
+        let data = results(folder.path(), &text);
+        for (i, hertz) in HERTZ.iter().enumerate() {
+            // the receptance of the force that moves it
+            let mut load = DVector::zeros(brick.dofs());
+            load[z] = 1.0;
+            let x = dense(&brick, *hertz, &load, &[]);
+            let expected = (x[other] / x[z]).norm() * 1e-4;
+            let off = numbers(&data, "middle_amplitude_m")[i] / expected - 1.0;
+            assert!(off.abs() < tolerance, "{reduce} {hertz}: {off:e}");
+        }
+    }
+}
+
+/// Friction in the plane is the same in every direction: tangents turned by 30 degrees about the normal give the same orbit.
+#[test]
+fn a_turned_frame_has_the_same_orbit() {
+    let brick = blade();
+    let (node, far) = (tip(&brick, 0, 0), tip(&brick, 2, 1));
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "mtx", (1.0, 1.0));
+    let of = |tangent: &str| {
+        let text = structure("mtx", "rows.csv", "m-kg-s", &format!("{DAMPED}\nreduce = {{ up_to = \"5 kHz\" }}"))
+            + &format!("[[place]]\nname = \"pad\"\nnodes = [\"{node}\"]\nnormal = [0, 0, 1]\ntangent = {tangent}\n")
+            + &place("tip", &far)
+            + "[[joint]]\nname = \"rub\"\nbetween = [\"pad\", \"ground\"]\n\
+               law = { kind = \"friction-contact\", tangential = \"2e5 N/m\", normal = \"3e5 N/m\", friction = 0.3, preload = \"20 N\" }\n\
+               [[force]]\non = \"tip.y\"\namplitude = \"60 N\"\n[[force]]\non = \"tip.z\"\namplitude = \"2 N\"\nphase = \"50 deg\"\n\
+               [study]\nkind = \"response\"\nfrequency = [\"600 Hz\", \"700 Hz\"]\n\
+               [method]\nkind = \"harmonic-balance\"\nharmonics = 7\n";
+        results(folder.path(), &text)
+    };
+    let straight = of("[1, 0, 0]");
+    let turned = of("[\"cos(30 deg)\", \"sin(30 deg)\", 0]");
+    let slip = numbers(&straight, "rub_slip_fraction");
+    assert!(slip.iter().all(|share| *share > 0.05), "{slip:?}");
+    let largest = numbers(&straight, "tip_y_amplitude_m").iter().fold(0.0f64, |most, x| most.max(*x));
+    for column in ["tip_x_amplitude_m", "tip_y_amplitude_m", "tip_z_amplitude_m", "pad_n_amplitude_m"] {
+        for (a, b) in numbers(&straight, column).iter().zip(numbers(&turned, column)) {
+            assert!((a - b).abs() < 1e-6 * largest, "{column}: {a} {b}");
+        }
+    }
+    // and a frame is needed to see them: the tangents themselves differ
+    let first = numbers(&straight, "pad_t1_amplitude_m")[0];
+    assert!((first - numbers(&turned, "pad_t1_amplitude_m")[0]).abs() > 1e-2 * first);
+}
+
+/// Each mistake says which file or key, and what to do.
+#[test]
+fn what_is_wrong_is_said() {
+    let brick = blade();
+    let node = tip(&brick, 0, 1);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_pair(path, &brick, "mtx", (1.0, 1.0));
+    let rows = brick.dofs();
+    std::fs::write(path.join("wide.mtx"), "%%MatrixMarket matrix coordinate real general\n2 3 1\n1 1 1.0\n").unwrap();
+    std::fs::write(path.join("complex.mtx"), "%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1.0 2.0\n")
+        .unwrap();
+    std::fs::write(path.join("cut.mtx"), "%%MatrixMarket matrix coordinate real general\n2 2 3\n1 1 1.0\n").unwrap();
+    std::fs::write(path.join("few.dof"), "101.1\n101.2\n").unwrap();
+    let negative = brick
+        .mass
+        .entries()
+        .map(|(row, column, value)| (row, column, if row == 5 && column == 5 { -value } else { value }));
+    write(path.join("negative.mtx"), &Matrix::new(rows, rows, Symmetry::General, negative).unwrap()).unwrap();
+    let slanted = brick
+        .stiffness
+        .entries()
+        .map(|(row, column, value)| (row, column, if row == 3 && column == 0 { 2.0 * value } else { value }));
+    write(path.join("slanted.mtx"), &Matrix::new(rows, rows, Symmetry::General, slanted).unwrap()).unwrap();
+    let good = structure("mtx", "rows.csv", "m-kg-s", DAMPED) + &place("tip", &node) + FORCED;
+    let wrong = |from: &str, to: &str| {
+        assert!(good.contains(from), "{from}");
+        std::fs::write(path.join("study.toml"), good.replacen(from, to, 1)).unwrap();
+        let error = read_file(&path.join("study.toml"), &[]).expect_err(to);
+        format!("{} | {}", error, error.help_text().unwrap_or_default())
+    };
+    let told = |from: &str, to: &str, words: &[&str]| {
+        let text = wrong(from, to);
+        assert!(words.iter().all(|word| text.contains(word)), "{to}: {text}");
+    };
+    told("\"k.mtx\"", "\"gone.mtx\"", &["study.toml:3", "gone.mtx"]);
+    told("\"k.mtx\"", "\"wide.mtx\"", &["wide.mtx", "2 rows and 3 columns"]);
+    told("\"k.mtx\"", "\"complex.mtx\"", &["complex.mtx", "complex"]);
+    told("\"k.mtx\"", "\"cut.mtx\"", &["cut.mtx"]);
+    told("\"k.mtx\"", "\"slanted.mtx\"", &["not symmetric", "row 4, column 1"]);
+    told("\"m.mtx\"", "\"negative.mtx\"", &["study.toml:4", "negative"]);
+    told("\"rows.csv\"", "\"few.dof\"", &["study.toml:5", "few.dof", "2 names for 144 rows"]);
+    told("units = \"m-kg-s\"\n", "", &["`units` is missing", "mm-t-s"]);
+    told("\"m-kg-s\"", "\"mm-t\"", &["mm-t-s"]);
+    told(&format!("\"{node}.z\""), "\"7.z\"", &["no row `7.z`"]);
+    told(&format!("\"{node}.z\"]"), &format!("\"{node}.w\"]"), &["no row", "its rows of this node are"]);
+    told(DAMPED, "modal_damping = 0.01\nreduce = false", &["modes", "rayleigh"]);
+    told(DAMPED, &format!("{DAMPED}\nmodal_damping = 0.01"), &["one damping"]);
+    told(DAMPED, "reduce = { modes = 3, up_to = \"1 kHz\" }", &["leave out one"]);
+    told("dofs = [", "normal = [0, 0, 0]\ndofs = [", &["normal"]);
+    told("tip.z", "tip", &["several directions"]);
+    told("tip.z", "top.z", &["no place `top.z`"]);
+    // times in milliseconds taken for seconds: the frequencies are a thousand times too low for any reduction
+    write_pair(path, &brick, "npz", (1e6, 1.0));
+    let text = wrong("k.mtx\"\nmass = \"m.mtx", "k.npz\"\nmass = \"m.npz");
+    assert!(text.contains("units"), "{text}");
+    // and the other way round they are so high that nothing is left of them
+    write_pair(path, &brick, "npz", (1e-6, 1.0));
+    let high = good.replacen("k.mtx\"\nmass = \"m.mtx", "k.npz\"\nmass = \"m.npz", 1);
+    let warned = results(path, &high);
+    assert!(warned.notes.iter().any(|note| note.contains("units")), "{:?}", warned.notes);
+}

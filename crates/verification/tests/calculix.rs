@@ -1,0 +1,92 @@
+//! A blade by CalculiX, through a study file: its frequencies to six digits, and its response without joints to 1e-5, whole and in few
+//! coordinates. The data is made by `data/calculix/make.py`.
+
+use flate2::read::GzDecoder;
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use stickslip_study::read_file;
+use stickslip_study::run::{Context, run};
+
+fn data(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/calculix").join(name)
+}
+
+fn text(name: &str) -> String {
+    std::fs::read_to_string(data(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// The matrices as CalculiX wrote them, and a study beside them.
+fn folder(more: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["blade.sti", "blade.mas"] {
+        let mut bytes = Vec::new();
+        GzDecoder::new(File::open(data(&format!("{name}.gz"))).unwrap()).read_to_end(&mut bytes).unwrap();
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    std::fs::copy(data("blade.dof"), folder.path().join("blade.dof")).unwrap();
+    let study = format!(
+        "schema = 1\n[structure]\nstiffness = \"blade.sti\"\nmass = \"blade.mas\"\ndofs = \"blade.dof\"\nunits = \"mm-t-s\"\n\
+         rayleigh = {{ mass = \"5 /s\", stiffness = \"1e-7 s\" }}\n{more}\n\
+         [[place]]\nname = \"tip\"\nnodes = [\"588\"]\n[[place]]\nname = \"middle\"\nnodes = [\"293\"]\n\
+         [[force]]\non = \"tip.z\"\namplitude = \"1 N\"\n\
+         [study]\nkind = \"response\"\nfrequency = [\"480.03 Hz\", \"492.28 Hz\", \"2128 Hz\", \"2171 Hz\"]\n\
+         [method]\nkind = \"harmonic-balance\"\n"
+    );
+    std::fs::write(folder.path().join("blade.toml"), study).unwrap();
+    folder
+}
+
+/// Both print seven digits; ours are right to more.
+const SIX_DIGITS: f64 = 1e-6;
+
+#[test]
+fn frequencies_to_six_digits() {
+    let folder = folder("reduce = { up_to = \"5 kHz\" }");
+    let study = read_file(&folder.path().join("blade.toml"), &[]).unwrap();
+    let model = study.case(0).unwrap().model;
+    let component = &model.substructure.as_ref().unwrap().component;
+    assert_eq!(component.dofs(), 1680);
+    let expected: Vec<f64> = text("blade_frequencies_Hz.txt").lines().map(|line| line.parse().unwrap()).collect();
+    assert_eq!(expected.len(), 20);
+    for (own, expected) in component.frequencies(expected.len()).unwrap().iter().zip(expected) {
+        assert!((own / TAU / expected - 1.0).abs() < SIX_DIGITS, "{} {expected}", own / TAU);
+    }
+}
+
+#[test]
+fn response_to_five_digits() {
+    let rows: Vec<Vec<f64>> = text("blade_response.csv")
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|value| value.parse().unwrap()).collect())
+        .collect();
+    for reduce in ["false", "{ up_to = \"5 kHz\", tolerance = 1e-8 }"] {
+        let folder = folder(&format!("reduce = {reduce}"));
+        let study = read_file(&folder.path().join("blade.toml"), &[]).unwrap();
+        let found = run(&study, &Context::unwatched(1)).unwrap();
+        assert!(found.failures.is_empty(), "{:?}", found.failures);
+        let table = &found.tables[0];
+        let hertz = table.numbers("frequency_Hz").unwrap();
+        for row in &rows {
+            // where it is driven the modes that CalculiX leaves out count beside all resonances but the first
+            let (place, bound) = match (row[1] as u32, row[0] < 500.0) {
+                (293, _) => ("middle", 1e-5),
+                (_, true) => ("tip", 5e-5),
+                _ => continue,
+            };
+            let point = hertz.iter().position(|f| (f - row[0]).abs() < 1e-9).unwrap();
+            let (mut apart, mut size) = (0.0f64, 0.0f64);
+            for (k, along) in ["x", "y", "z"].iter().enumerate() {
+                let column = |what: &str| table.numbers(&format!("{place}_{along}_{what}")).unwrap()[point];
+                let own = Complex64::from_polar(1e3 * column("amplitude_m"), column("phase_deg").to_radians());
+                let expected = Complex64::new(row[2 + k], row[5 + k]);
+                apart = apart.max((own - expected).norm());
+                size = size.max(expected.norm());
+            }
+            assert!(apart < bound * size, "{reduce}, {place} at {} Hz: {:e}", row[0], apart / size);
+        }
+    }
+}
