@@ -1,12 +1,13 @@
 //! What a reader of the results must know, in sentences. Notes of one sort from several units become one sentence.
 
+use serde::{Deserialize, Serialize};
 use stickslip::orbit::{Accuracy, Orbit};
 
 /// How a note begins that is a warning.
 pub(crate) const WARNING: &str = "warning: ";
 
 /// A note.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Note {
     /// A sentence.
     Said(String),

@@ -107,44 +107,54 @@ impl Checked {
     /// are in the dataset, as failures.
     pub fn run(&self, context: &Context) -> Result<Dataset, StudyError> {
         let start = Instant::now();
-        let Checked { study, summary, methods, .. } = self;
+        let study = &self.study;
         let first = match &self.first {
             Some(first) => first.clone(),
             None => Arc::new(Prepared::new(study, 0)?),
         };
         let part = parts(study, &first, context)?;
-        let kind = study.kind();
         let interrupted = part.points.contains_key(NOT_REACHED);
+        let mut dataset = self.outline(context.threads);
+        dataset.notes.extend(part.notes.iter().filter_map(Note::text));
+        if interrupted {
+            dataset.notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
+        }
+        let tables = study.kind().tables.iter().zip(part.tables).map(|(name, rows)| rows.table(name));
+        // a table that nothing was ever written to has no columns either
+        dataset.tables = tables.filter(|table| !table.columns.is_empty()).collect();
+        dataset.figure = redrawn(study, &dataset.tables);
+        dataset.failures = part.failures;
+        dataset.record.wall_time_s += start.elapsed().as_secs_f64();
+        dataset.record.points = part.points;
+        dataset.record.interrupted = interrupted;
+        Ok(dataset)
+    }
+
+    /// What is known of the results before anything is computed.
+    pub fn outline(&self, threads: usize) -> Dataset {
+        let Checked { study, summary, methods, .. } = self;
         let mut notes = summary.warnings.clone();
         notes.extend(study.notes());
-        notes.extend(part.notes.iter().filter_map(Note::text));
-        if interrupted {
-            notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
-        }
-        let tables = kind.tables.iter().zip(part.tables).map(|(name, rows)| rows.table(name));
-        // a table that nothing was ever written to has no columns either
-        let tables: Vec<_> = tables.filter(|table| !table.columns.is_empty()).collect();
-        let figure = redrawn(study, &tables);
-        Ok(Dataset {
+        Dataset {
             name: study.name().to_owned(),
             title: study.title().to_owned(),
             source: study.source().map(str::to_owned),
-            kind: kind.name.to_owned(),
-            tables,
-            figure,
+            kind: study.kind().name.to_owned(),
+            tables: Vec::new(),
+            figure: Figure::default(),
             notes,
-            failures: part.failures,
+            failures: Vec::new(),
             record: Record {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 study: recorded(study, summary),
                 methods: methods.clone(),
                 seed: None,
-                threads: context.threads,
-                wall_time_s: (self.time + start.elapsed()).as_secs_f64(),
-                points: part.points,
-                interrupted,
+                threads,
+                wall_time_s: self.time.as_secs_f64(),
+                points: BTreeMap::new(),
+                interrupted: false,
             },
-        })
+        }
     }
 }
 
@@ -237,7 +247,12 @@ fn next(receive: &mpsc::Receiver<Finished>) -> Option<Finished> {
     None
 }
 
-fn compute(study: &Study, first: &Arc<Prepared>, index: usize, context: &Context) -> Result<Part, StudyError> {
+pub(crate) fn compute(
+    study: &Study,
+    first: &Arc<Prepared>,
+    index: usize,
+    context: &Context,
+) -> Result<Part, StudyError> {
     let unit = units(study).get(index);
     if context.stopped() {
         return Ok(Part::not_reached(unit.len()));

@@ -81,6 +81,11 @@ impl RatePoint {
     pub fn rate_slope(&self, s: usize) -> &[f64] {
         self.slopes.state(s)
     }
+
+    /// All derivatives, for a law that computes them by itself: one row of arguments for each force, then for each rate.
+    pub fn slopes_mut(&mut self) -> &mut [f64] {
+        self.slopes.all_mut()
+    }
 }
 
 impl<L: RateLaw + Debug + Send + Sync> Rate for L {

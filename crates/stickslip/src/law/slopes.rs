@@ -33,6 +33,11 @@ impl Slopes {
         self.force(self.directions + s)
     }
 
+    /// All of them, row by row.
+    pub fn all_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
     /// Keeps what a pass found by the arguments from `first` on, for a force or, behind the forces, a state.
     #[inline]
     pub fn keep<const N: usize>(&mut self, row: usize, first: usize, value: &Dual<N>) {

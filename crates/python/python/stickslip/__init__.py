@@ -1,0 +1,40 @@
+"""How structures with dry-friction joints vibrate: exact, fast, with evidence on every number.
+
+A :class:`Study` is what a study file asks for; a :class:`Model` is stated by calls. Both give a :class:`Result`: tables that pandas, polars and NumPy
+read without a copy, a figure, and the record of the run.
+
+>>> import stickslip
+>>> result = stickslip.Study.from_template("blade-couple-massless", Ft="2 N").run()
+>>> result["peaks"].columns[:3]
+['Ft_N', 'mass', 'frequency_Hz']
+"""
+
+from . import statistics
+from ._campaign import Campaign, CampaignError, campaign
+from ._core import Law, Model, Orbit, Result, Study, Table, __version__, law, laws, templates
+from ._errors import MethodError, ModelError, OrbitError, ReportError, StickslipError, StudyError
+from ._rate import rate_law
+
+__all__ = [
+    "Campaign",
+    "CampaignError",
+    "Law",
+    "MethodError",
+    "Model",
+    "ModelError",
+    "Orbit",
+    "OrbitError",
+    "ReportError",
+    "Result",
+    "StickslipError",
+    "Study",
+    "StudyError",
+    "Table",
+    "__version__",
+    "campaign",
+    "law",
+    "laws",
+    "rate_law",
+    "statistics",
+    "templates",
+]

@@ -1,0 +1,24 @@
+"""A bar by tqdm, if it is installed."""
+
+from __future__ import annotations
+
+
+def bar(name: str):
+    """A function of the points done and of all that draws a bar; ``None`` without tqdm."""
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        return None
+    return _Bar(tqdm(desc=name, unit="point", leave=False))
+
+
+class _Bar:
+    def __init__(self, line) -> None:
+        self._line = line
+
+    def __call__(self, done: int, total: int | None) -> None:
+        self._line.total = total
+        self._line.update(done - self._line.n)
+
+    def _stickslip_close(self) -> None:
+        self._line.close()

@@ -1,0 +1,62 @@
+//! Errors as Python's exceptions, with the text that the command prints.
+//!
+//! The classes stand in `stickslip/_errors.py`: they have bases and attributes that Python states more simply.
+
+use miette::{GraphicalReportHandler, GraphicalTheme};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use stickslip_study::StudyError;
+
+/// An exception of this class of `stickslip._errors`.
+pub fn exception(py: Python<'_>, class: &str, message: String) -> PyErr {
+    with(py, class, message, |_| Ok(()))
+}
+
+fn with(py: Python<'_>, class: &str, message: String, fill: impl FnOnce(&Bound<'_, PyDict>) -> PyResult<()>) -> PyErr {
+    let build = || {
+        let attributes = PyDict::new(py);
+        fill(&attributes)?;
+        py.import("stickslip._errors")?.getattr(class)?.call((message,), Some(&attributes))
+    };
+    match build() {
+        Ok(value) => PyErr::from_value(value),
+        Err(error) => error,
+    }
+}
+
+/// A study that is refused: the picture of the command, with file, line, column, key and help as attributes.
+pub fn study(py: Python<'_>, error: &StudyError) -> PyErr {
+    let mut text = String::new();
+    let handler = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor());
+    if handler.render_report(&mut text, error).is_err() {
+        text = error.to_string();
+    }
+    with(py, "StudyError", text, |attributes| {
+        attributes.set_item("file", error.file_name())?;
+        attributes.set_item("line", error.line())?;
+        attributes.set_item("column", error.column())?;
+        attributes.set_item("key", error.key())?;
+        attributes.set_item("reason", error.message())?;
+        attributes.set_item("help", error.help_text())
+    })
+}
+
+/// A model, a law or a quantity that is refused.
+pub fn model(py: Python<'_>, error: impl ToString) -> PyErr {
+    exception(py, "ModelError", error.to_string())
+}
+
+/// A system that a method cannot take.
+pub fn method(py: Python<'_>, error: impl ToString) -> PyErr {
+    exception(py, "MethodError", error.to_string())
+}
+
+/// An orbit that was not found.
+pub fn orbit(py: Python<'_>, error: impl ToString) -> PyErr {
+    exception(py, "OrbitError", error.to_string())
+}
+
+/// Results that could not be made or written.
+pub fn report(py: Python<'_>, error: impl ToString) -> PyErr {
+    exception(py, "ReportError", error.to_string())
+}

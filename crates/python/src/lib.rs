@@ -1,0 +1,54 @@
+//! The Python package of Stickslip: the part in Rust, `stickslip._core`. The package around it stands in `python/stickslip`.
+
+mod arrow;
+mod error;
+mod law;
+mod lend;
+mod matrices;
+mod model;
+mod orbit;
+mod python_law;
+mod quantity;
+mod result;
+mod rows;
+mod study;
+mod watch;
+
+use pyo3::prelude::*;
+
+/// The part of `stickslip` in Rust.
+#[pymodule]
+mod _core {
+    use pyo3::prelude::*;
+    use pyo3::types::PyDict;
+
+    #[pymodule_export]
+    use crate::law::{PyLaw, laws, named};
+    #[pymodule_export]
+    use crate::model::PyModel;
+    #[pymodule_export]
+    use crate::orbit::PyOrbit;
+    #[pymodule_export]
+    use crate::python_law::_rate_law;
+    #[pymodule_export]
+    use crate::result::{_result, PyResultSet, Table};
+    #[pymodule_export]
+    use crate::study::{_joined, _study, PyStudy};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+
+    /// All templates: a dictionary from their names to their summaries.
+    ///
+    /// >>> import stickslip
+    /// >>> "blade-couple" in stickslip.templates()
+    /// True
+    #[pyfunction]
+    fn templates(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+        let all = PyDict::new(py);
+        stickslip_study::templates::TABLE.iter().try_for_each(|one| all.set_item(one.name, one.summary()))?;
+        Ok(all)
+    }
+}

@@ -1,0 +1,788 @@
+//! Models by calls, and what is computed of them: orbits, responses, loops, modes.
+
+use crate::law::PyLaw;
+use crate::matrices::{Matrices, entries};
+use crate::orbit::PyOrbit;
+use crate::python_law::Written;
+use crate::result::PyResultSet;
+use crate::rows::{self, Row};
+use crate::study::{bar, close};
+use crate::watch::{Watch, watched};
+use crate::{error, quantity};
+use numpy::{PyArray1, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+use serde_json::json;
+use std::collections::{BTreeMap, HashMap};
+use std::f64::consts::TAU;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+use stickslip::curve::modes::{ModeRequest, mode};
+use stickslip::curve::sweep::{BLOCK, Watch as Sweep, sweep};
+use stickslip::dimension::Dimension;
+use stickslip::method::{self, Method, Options, OrbitError, Solver};
+use stickslip::model::{Force, Joint, Mass, Model, ModelError, Motion, Spring, System};
+use stickslip::orbit::Orbit;
+use stickslip_study::dataset::{Axis, Column, Dataset, Failure, Figure, Panel, Record, Series, Table};
+use stickslip_study::hertz;
+use stickslip_study::run::{CONVERGED, Context, NOT_REACHED};
+
+/// A structure with joints and its excitation, stated by calls.
+///
+/// Quantities are numbers in SI or strings with units; frequencies are numbers in Hz. A place is a mass, a direction of one (``"name.x"``),
+/// ``"ground"``, or a place that is moved.
+///
+/// >>> import stickslip
+/// >>> model = stickslip.Model()
+/// >>> for blade in ("a", "b"):
+/// ...     model.mass(blade, "0.182 kg")
+/// ...     model.spring(blade, "ground", stiffness=105103, damping="0.2 kg/s")
+/// >>> model.joint("shroud", "a", "b", stickslip.law("coulomb", limit="2 N"))
+/// >>> model.force("a", "10 N")
+/// >>> orbit = model.orbit(121)
+/// >>> orbit.evidence["energy_gap"] < 1e-9
+/// True
+#[pyclass(module = "stickslip", name = "Model")]
+#[derive(Default)]
+pub struct PyModel {
+    model: Model,
+    matrices: Option<Matrices>,
+    /// Laws that Python wrote, to ask them what they raised.
+    written: Vec<Arc<Written>>,
+    /// The system and what finds its orbits, as asked for last.
+    ready: Mutex<Option<Ready>>,
+}
+
+/// A system with a solver of it.
+struct Ready {
+    key: (String, Options),
+    /// Borrows from `system`, and is dropped before it.
+    solver: Box<dyn Solver + Send>,
+    system: Arc<System>,
+}
+
+/// The solver of a system that is kept beside it.
+fn kept_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solver + Send>, method::MethodError> {
+    let solver = method.solver(system)?;
+    // SAFETY: the system stands on the heap and does not move; `Ready` drops the solver before its own reference to the system, and gives
+    // the solver to nobody
+    #[allow(unsafe_code)]
+    Ok(unsafe { std::mem::transmute::<Box<dyn Solver + Send + '_>, Box<dyn Solver + Send + 'static>>(solver) })
+}
+
+/// What orbits of a model are sought with.
+struct Asked {
+    system: Arc<System>,
+    method: Box<dyn Method>,
+}
+
+/// How the points of a response are told apart: values of parameters, one for each point.
+type Along = Vec<(String, Vec<f64>)>;
+
+impl PyModel {
+    /// The model of a study.
+    pub fn from_model(model: Model) -> Self {
+        PyModel { model, ..PyModel::default() }
+    }
+
+    /// The model is another one from now on.
+    fn changed(&mut self) {
+        *self.ready.get_mut().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    fn system(&self, py: Python<'_>) -> PyResult<System> {
+        self.system_of(py, &self.model)
+    }
+
+    fn system_of(&self, py: Python<'_>, model: &Model) -> PyResult<System> {
+        let system = model.assemble().map_err(|cause| refused(py, &cause))?;
+        match &self.matrices {
+            None => Ok(system),
+            Some(matrices) => {
+                let rows: HashMap<&str, usize> =
+                    system.places().iter().enumerate().map(|(row, place)| (place.as_str(), row)).collect();
+                let structure = matrices.structure(py, system.structure(), &|place| rows.get(place).copied())?;
+                system.on(structure).map_err(|cause| error::model(py, cause))
+            }
+        }
+    }
+
+    fn asked(&self, py: Python<'_>, name: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Asked> {
+        let (method, _) = built(py, name, options)?;
+        Ok(Asked { system: Arc::new(self.system(py)?), method })
+    }
+
+    /// What a law in Python raised stands above what a method made of it.
+    fn raised(&self) -> PyResult<()> {
+        self.written.iter().try_for_each(|law| law.raised().map_or(Ok(()), Err))
+    }
+
+    fn result(&self, name: &str, title: &str, tables: Vec<Table>, figure: Figure, told: Told) -> PyResultSet {
+        PyResultSet::new(Dataset {
+            name: name.to_owned(),
+            title: title.to_owned(),
+            source: None,
+            kind: name.to_owned(),
+            tables,
+            figure: Figure { title: title.to_owned(), ..figure },
+            notes: told.notes,
+            failures: told.failures,
+            record: Record {
+                version: env!("CARGO_PKG_VERSION").to_owned(),
+                study: json!({ "kind": name, "model": self.model, "matrices": self.matrices.is_some() }),
+                methods: told.methods,
+                seed: None,
+                threads: told.threads,
+                wall_time_s: told.seconds,
+                interrupted: told.points.contains_key(NOT_REACHED),
+                points: told.points,
+            },
+        })
+    }
+
+    /// Gives a parameter of the model another value, SI.
+    fn put(model: &mut Model, name: &str, value: f64) -> bool {
+        let Some((of, key)) = name.rsplit_once('.') else { return false };
+        match key {
+            "mass" => each(model.masses.iter_mut().filter(|mass| mass.name == of), |mass| mass.mass = value),
+            "force" => each(model.forces.iter_mut().filter(|force| force.on == of), |force| force.amplitude = value),
+            "motion" => {
+                each(model.motions.iter_mut().filter(|motion| motion.on == of), |motion| motion.amplitude = value)
+            }
+            "stiffness" | "damping" if of.contains('-') => {
+                let springs = model.springs.iter_mut().filter(|spring| spring.between.join("-") == of);
+                each(springs, |spring| {
+                    *(if key == "stiffness" { &mut spring.stiffness } else { &mut spring.damping }) = value
+                })
+            }
+            _ => {
+                let mut joints = model.joints.iter_mut().filter(|joint| joint.name == of);
+                let Some(joint) = joints.next() else { return false };
+                match joint.law.with(key, value) {
+                    Some(law) => joint.law = law,
+                    None => return false,
+                }
+                true
+            }
+        }
+    }
+
+    /// The dimension of a parameter that `put` takes.
+    fn dimension(&self, name: &str) -> Option<Dimension> {
+        let (of, key) = name.rsplit_once('.')?;
+        match key {
+            "mass" => Some(Dimension::MASS),
+            "force" => Some(Dimension::FORCE),
+            "motion" => Some(Dimension::LENGTH),
+            "stiffness" if of.contains('-') => Some(Dimension::STIFFNESS),
+            "damping" if of.contains('-') => Some(Dimension::DAMPING),
+            _ => {
+                let law = &self.model.joints.iter().find(|joint| joint.name == of)?.law;
+                let parameter = law.info().parameters.iter().find(|parameter| parameter.key == key)?;
+                parameter.dimension_under(|key| law.value(key))
+            }
+        }
+    }
+
+    /// The parameters of `vary`, as long as each other and as the frequencies.
+    fn along(&self, py: Python<'_>, vary: Option<&Bound<'_, PyDict>>, omegas: &mut Vec<f64>) -> PyResult<Along> {
+        let mut along = Along::new();
+        for (name, values) in vary.into_iter().flatten() {
+            let name: String = name.extract()?;
+            let known = self.dimension(&name).filter(|_| PyModel::put(&mut self.model.clone(), &name, 0.0));
+            let Some(dimension) = known else {
+                let message = format!(
+                    "`{name}` is no parameter of the model: say JOINT.KEY for a parameter of its law, PLACE.mass, PLACE.force, PLACE.motion, \
+                     A-B.stiffness or A-B.damping"
+                );
+                return Err(error::model(py, message));
+            };
+            let values = quantity::many(&values, dimension, &format!("`{name}`"))?;
+            along.push((name, values));
+        }
+        let count = along.iter().map(|(_, values)| values.len()).chain([omegas.len()]).max().unwrap_or(0);
+        let lists = along.iter_mut().map(|(name, values)| (name.as_str(), values));
+        for (name, list) in lists.chain([("frequency", omegas)]) {
+            match list.len() {
+                len if len == count => {}
+                1 => list.resize(count, list[0]),
+                len => {
+                    let message =
+                        format!("`{name}` has {len} values where {count} are asked for: give as many, or one");
+                    return Err(error::model(py, message));
+                }
+            }
+        }
+        Ok(along)
+    }
+}
+
+fn each<'a, T: 'a>(all: impl Iterator<Item = &'a mut T>, mut change: impl FnMut(&mut T)) -> bool {
+    all.fold(false, |_, one| {
+        change(one);
+        true
+    })
+}
+
+fn refused(py: Python<'_>, cause: &ModelError) -> PyErr {
+    error::model(py, cause)
+}
+
+/// What is said of a computation in its record.
+struct Told {
+    methods: Vec<String>,
+    notes: Vec<String>,
+    failures: Vec<Failure>,
+    points: BTreeMap<String, u64>,
+    threads: usize,
+    seconds: f64,
+}
+
+impl Told {
+    fn of(rows: &[Row], at: &dyn Fn(usize) -> String, methods: Vec<String>, threads: usize, start: Instant) -> Told {
+        let mut points = BTreeMap::new();
+        let mut failures = Vec::new();
+        for (index, row) in rows.iter().enumerate() {
+            *points.entry(row.status.to_owned()).or_default() += 1;
+            failures.extend(row.failure.iter().map(|reason| Failure { at: at(index), reason: reason.clone() }));
+        }
+        Told { methods, notes: Vec::new(), failures, points, threads, seconds: start.elapsed().as_secs_f64() }
+    }
+}
+
+/// The method of this name with its options.
+fn built(py: Python<'_>, name: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<(Box<dyn Method>, Options)> {
+    let Some(row) = method::find(name) else {
+        let names: Vec<&str> = method::TABLE.iter().map(|row| row.name).collect();
+        return Err(error::method(py, format!("there is no method `{name}`; there are {}", names.join(", "))));
+    };
+    let mut options = Options::new();
+    for (key, value) in given.into_iter().flatten() {
+        let key: String = key.extract()?;
+        let Some(option) = row.options.iter().find(|option| option.key == key) else {
+            let keys: Vec<&str> = row.options.iter().map(|option| option.key).collect();
+            let message = match keys.len() {
+                0 => format!("method `{name}` has no options, found `{key}`"),
+                _ => format!("method `{name}` has no option `{key}`; it has {}", keys.join(", ")),
+            };
+            return Err(error::method(py, message));
+        };
+        let value = quantity::si(&value, option.dimension, &format!("option `{key}`"))?;
+        if option.count && (value < 1.0 || value.fract() != 0.0 || value > f64::from(u32::MAX)) {
+            return Err(error::method(py, format!("option `{key}` must be a whole number from 1, found {value}")));
+        }
+        options.insert(key, value);
+    }
+    let method = (row.build)(&options).map_err(|cause| error::method(py, cause))?;
+    Ok((method, options))
+}
+
+/// The frequency of one orbit, rad/s.
+fn one_frequency(value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    quantity::si(value, Dimension::FREQUENCY, "frequency")
+}
+
+#[pymethods]
+impl PyModel {
+    #[new]
+    fn new() -> Self {
+        PyModel::default()
+    }
+
+    /// A model whose structure is given by matrices: arrays, or sparse matrices of SciPy, n × n, in kg, N/m and kg/s.
+    ///
+    /// ``places`` names the rows; ``"tip.x"`` and ``"tip.y"`` make a node ``"tip"`` for joints of several directions. Masses, springs, joints and
+    /// forces may be added.
+    ///
+    /// >>> import numpy as np, stickslip
+    /// >>> model = stickslip.Model.from_matrices(np.eye(2), [[2, -1], [-1, 2]], places=["a", "b"])
+    /// >>> model.places
+    /// ['a', 'b']
+    #[staticmethod]
+    #[pyo3(signature = (mass, stiffness, damping=None, *, places))]
+    fn from_matrices(
+        py: Python<'_>,
+        mass: Bound<'_, PyAny>,
+        stiffness: Bound<'_, PyAny>,
+        damping: Option<Bound<'_, PyAny>>,
+        places: Vec<String>,
+    ) -> PyResult<PyModel> {
+        let n = places.len();
+        let damping = match damping {
+            Some(damping) => entries(&damping, n, "damping")?,
+            None => Vec::new(),
+        };
+        let all = [entries(&mass, n, "mass")?, damping, entries(&stiffness, n, "stiffness")?];
+        let mut masses: Vec<Mass> = Vec::new();
+        let mut nodes: HashMap<&str, usize> = HashMap::new();
+        for place in &places {
+            match place.split_once('.') {
+                None => masses.push(Mass::new(place.as_str(), 0.0)),
+                Some((node, along)) => {
+                    let at = *nodes.entry(node).or_insert_with(|| {
+                        masses.push(Mass::new(node, 0.0));
+                        masses.len() - 1
+                    });
+                    masses[at].directions.push(along.to_owned());
+                }
+            }
+        }
+        let model = Model { masses, ..Model::default() };
+        let made = PyModel { model, matrices: Some(Matrices { places, entries: all }), ..PyModel::default() };
+        made.system(py)?;
+        Ok(made)
+    }
+
+    /// Adds a point mass (kg); with ``directions``, up to three names, it is a node with a place for each.
+    #[pyo3(signature = (name, mass, *, directions=None))]
+    fn mass(&mut self, name: String, mass: &Bound<'_, PyAny>, directions: Option<Vec<String>>) -> PyResult<()> {
+        let mass = quantity::si(mass, Dimension::MASS, &format!("mass of `{name}`"))?;
+        self.model.masses.push(Mass { name, mass, directions: directions.unwrap_or_default() });
+        self.changed();
+        Ok(())
+    }
+
+    /// Adds a spring (N/m) with a viscous damper (kg/s) in parallel between two places.
+    #[pyo3(signature = (a, b, *, stiffness=None, damping=None))]
+    fn spring(
+        &mut self,
+        a: String,
+        b: String,
+        stiffness: Option<&Bound<'_, PyAny>>,
+        damping: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let value = |given: Option<&Bound<'_, PyAny>>, dimension, what: &str| {
+            given.map_or(Ok(0.0), |given| quantity::si(given, dimension, &format!("{what} between `{a}` and `{b}`")))
+        };
+        let stiffness = value(stiffness, Dimension::STIFFNESS, "stiffness")?;
+        let damping = value(damping, Dimension::DAMPING, "damping")?;
+        self.model.springs.push(Spring { between: [a, b], stiffness, damping });
+        self.changed();
+        Ok(())
+    }
+
+    /// Adds a joint: two places or nodes that rub or touch by this law. ``u`` is the motion of ``a`` relative to ``b``.
+    fn joint(&mut self, name: String, a: String, b: String, law: &PyLaw) {
+        self.written.extend(law.written.clone());
+        self.model.joints.push(Joint { name, between: [a, b], law: law.law.clone() });
+        self.changed();
+    }
+
+    /// Adds a force ``amplitude cos(harmonic Ω t + phase)``: N, rad; ``harmonic=0`` makes it constant.
+    #[pyo3(signature = (on, amplitude, *, phase=None, harmonic=1))]
+    fn force(
+        &mut self,
+        on: String,
+        amplitude: &Bound<'_, PyAny>,
+        phase: Option<&Bound<'_, PyAny>>,
+        harmonic: u32,
+    ) -> PyResult<()> {
+        let amplitude = quantity::si(amplitude, Dimension::FORCE, &format!("force on `{on}`"))?;
+        let phase = phase.map_or(Ok(0.0), |phase| quantity::si(phase, Dimension::ANGLE, "phase"))?;
+        self.model.forces.push(Force { on, amplitude, phase, harmonic });
+        self.changed();
+        Ok(())
+    }
+
+    /// Adds an imposed motion ``amplitude cos(harmonic Ω t + phase)`` of a place: m, rad.
+    #[pyo3(signature = (on, amplitude, *, phase=None, harmonic=1))]
+    fn motion(
+        &mut self,
+        on: String,
+        amplitude: &Bound<'_, PyAny>,
+        phase: Option<&Bound<'_, PyAny>>,
+        harmonic: u32,
+    ) -> PyResult<()> {
+        let amplitude = quantity::si(amplitude, Dimension::LENGTH, &format!("motion of `{on}`"))?;
+        let phase = phase.map_or(Ok(0.0), |phase| quantity::si(phase, Dimension::ANGLE, "phase"))?;
+        self.model.motions.push(Motion { on, amplitude, phase, harmonic });
+        self.changed();
+        Ok(())
+    }
+
+    /// Gives parameters other values: ``model.set({"shroud.limit": "3 N", "a.mass": 0.2, "a-ground.stiffness": 1e5, "a.force": 5})``.
+    fn set(&mut self, py: Python<'_>, values: &Bound<'_, PyDict>) -> PyResult<()> {
+        let along = self.along(py, Some(values), &mut vec![1.0])?;
+        along.iter().for_each(|(name, values)| {
+            PyModel::put(&mut self.model, name, values[0]);
+        });
+        self.changed();
+        Ok(())
+    }
+
+    /// Names of the degrees of freedom.
+    #[getter]
+    fn places(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        Ok(self.system(py)?.places().to_vec())
+    }
+
+    /// Names of the joints.
+    #[getter]
+    fn joints(&self) -> Vec<&str> {
+        self.model.joints.iter().map(|joint| joint.name.as_str()).collect()
+    }
+
+    /// The matrices of mass (kg), damping (kg/s) and stiffness (N/m) without joints, in full.
+    #[getter]
+    fn matrices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let system = self.system(py)?;
+        let structure = system.structure();
+        if structure.dofs() > stickslip::structure::MOST_IN_FULL {
+            return Err(error::model(py, format!("matrices of {} places are too large in full", structure.dofs())));
+        }
+        let out = PyDict::new(py);
+        for (name, matrix) in
+            [("mass", structure.mass()), ("damping", structure.damping()), ("stiffness", structure.stiffness())]
+        {
+            // columns follow each other, those of the transpose are rows
+            let (rows, values) = (matrix.nrows(), matrix.transpose());
+            let array = PyArray1::from_slice(py, values.as_slice()).reshape([rows, rows])?;
+            out.set_item(name, array)?;
+        }
+        Ok(out)
+    }
+
+    /// Checks the model and says what is known of it before anything is computed: natural frequencies with joints free and stuck (Hz), and the
+    /// method that would find its orbits.
+    #[pyo3(signature = (method="auto", **options))]
+    fn check<'py>(
+        &self,
+        py: Python<'py>,
+        method: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let asked = self.asked(py, method, options)?;
+        let prepared = py.detach(|| asked.method.solver(&asked.system).map(|_| asked.method.choice(&asked.system)));
+        self.raised()?;
+        let choice = prepared.map_err(|cause| error::method(py, cause))?;
+        let out = PyDict::new(py);
+        out.set_item("places", asked.system.places())?;
+        out.set_item("joints", self.joints())?;
+        out.set_item("method", choice.to_string())?;
+        if self.matrices.is_none() {
+            let survey = py.detach(|| self.model.survey()).map_err(|cause| refused(py, &cause))?;
+            let hertz =
+                |modes: &stickslip::model::Modes| modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>();
+            out.set_item("free_Hz", hertz(survey.free()))?;
+            out.set_item("stuck_Hz", hertz(survey.stuck()))?;
+        }
+        Ok(out)
+    }
+
+    /// The periodic motion at a drive frequency, as an :class:`Orbit`.
+    ///
+    /// ``method`` and its options as in a study's ``[method]``; ``start`` is the ``start`` of a neighbouring orbit.
+    /// Raises :class:`OrbitError` where none is found, :class:`MethodError` where the method cannot take the model.
+    #[pyo3(signature = (frequency, *, method="auto", start=None, **options))]
+    fn orbit(
+        &self,
+        py: Python<'_>,
+        frequency: &Bound<'_, PyAny>,
+        method: &str,
+        start: Option<numpy::PyReadonlyArray1<'_, f64>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyOrbit> {
+        let omega = one_frequency(frequency)?;
+        let start: Option<Vec<f64>> = start.map(|start| start.as_array().to_vec());
+        // without options a solver that is kept is known by its name alone
+        // who waits for it does not keep Python waiting
+        let mut ready = self.ready.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
+        let plain = options.is_none_or(|options| options.is_empty());
+        let same = |ready: &Ready| plain && ready.key.0 == method && ready.key.1.is_empty();
+        if !ready.as_ref().is_some_and(same) {
+            let (made, options) = built(py, method, options)?;
+            let key = (method.to_owned(), options);
+            if ready.as_ref().is_none_or(|ready| ready.key != key) {
+                let system = Arc::new(self.system(py)?);
+                let solver = py.detach(|| kept_solver(&*made, &system));
+                self.raised()?;
+                *ready = Some(Ready { key, solver: solver.map_err(|cause| error::method(py, cause))?, system });
+            }
+        }
+        let Some(found) = ready.as_mut() else { unreachable!("a solver was made above") };
+        let n = 2 * found.system.dofs();
+        if let Some(start) = start.as_ref().filter(|start| start.len() < n) {
+            return Err(error::model(
+                py,
+                format!("`start` must hold displacements and velocities, {n} numbers, found {}", start.len()),
+            ));
+        }
+        let outcome = py.detach(|| found.solver.orbit(omega, start.as_deref()));
+        self.raised()?;
+        let orbit = outcome.map_err(|cause| error::orbit(py, cause))?;
+        Ok(PyOrbit { orbit, system: found.system.clone() })
+    }
+
+    /// Orbits at many frequencies, or with many values of parameters, by one call: a :class:`Result` with the table ``curve`` and a figure.
+    ///
+    /// ``frequency``: numbers in Hz or strings. ``vary``: values of parameters, as many as there are frequencies (or one frequency for all), named
+    /// as in :meth:`set`; point ``i`` has the ``i``-th value of each. Without ``vary`` each orbit starts from its neighbour, else from nothing.
+    /// A point without an orbit has empty cells and stands among the ``failures``. ``threads`` and ``progress`` as in :meth:`Study.run`.
+    #[pyo3(signature = (frequency, *, vary=None, method="auto", threads=None, progress=None, **options))]
+    #[allow(clippy::too_many_arguments)] // they are keywords in Python
+    fn response(
+        &self,
+        py: Python<'_>,
+        frequency: &Bound<'_, PyAny>,
+        vary: Option<&Bound<'_, PyDict>>,
+        method: &str,
+        threads: Option<usize>,
+        progress: Option<Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyResultSet> {
+        let start = Instant::now();
+        let mut omegas = quantity::many(frequency, Dimension::FREQUENCY, "frequency")?;
+        let along = self.along(py, vary, &mut omegas)?;
+        let asked = self.asked(py, method, options)?;
+        let bar = bar(py, progress, "response")?;
+        let watch =
+            Watch { threads, progress: bar.as_ref().map(|bar| bar.clone().unbind()), total: Some(omegas.len() as u64) };
+        let outcome = watched(py, &watch, |context| {
+            let rows = if along.is_empty() {
+                along_frequencies(&asked, &omegas, context)
+            } else {
+                self.along_parameters(&asked, &omegas, &along, context)
+            };
+            (rows, context.threads)
+        });
+        close(bar)?;
+        self.raised()?;
+        let (rows, threads) = outcome?;
+        let rows = rows.map_err(|refusal| refusal.raised(py))?;
+        let at = |index: usize| {
+            let values = along.iter().map(|(name, values)| format!("{name} = {}", values[index]));
+            values.chain([format!("frequency = {:.6} Hz", hertz(omegas[index]))]).collect::<Vec<_>>().join(", ")
+        };
+        let told = Told::of(&rows, &at, vec![asked.method.choice(&asked.system).to_string()], threads, start);
+        let first = along
+            .iter()
+            .map(|(name, values)| Column::numbers(&name.replace(['.', '-'], "_"), values.clone()))
+            .collect();
+        let table = rows::table("curve", first, &asked.system, &*asked.method, &rows);
+        let figure = curves(&table, &asked.system, along.first().map(|(name, _)| name.as_str()));
+        Ok(self.result("response", "Response", vec![table], figure, told))
+    }
+
+    /// The loops of all joints at a drive frequency: a :class:`Result` with the tables ``loops`` (force over displacement, ``points`` instants
+    /// of a period and the switches) and ``loops_summary`` (energy lost per period, J), and a figure.
+    #[pyo3(signature = (frequency, *, points=256, method="auto", **options))]
+    fn hysteresis(
+        &self,
+        py: Python<'_>,
+        frequency: &Bound<'_, PyAny>,
+        points: usize,
+        method: &str,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyResultSet> {
+        let start = Instant::now();
+        let found = self.orbit(py, frequency, method, None, options)?;
+        let (mut labels, mut times, mut signals) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new(), Vec::new()]);
+        let mut figure = Figure::default();
+        for (j, joint) in found.system.joints().iter().enumerate() {
+            let (instants, values) = found.loop_of(j, points);
+            for (a, label) in joint.labels().enumerate() {
+                let pick =
+                    |signal: &[f64]| signal.iter().skip(a).step_by(joint.axes().len()).copied().collect::<Vec<_>>();
+                let picked: Vec<Vec<f64>> = values.iter().map(|signal| pick(signal)).collect();
+                labels.extend(std::iter::repeat_n(label.clone(), instants.len()));
+                times.extend(&instants);
+                signals.iter_mut().zip(&picked).for_each(|(all, one)| all.extend(one));
+                figure.panels.push(loop_panel(label, &picked[0], &picked[2]));
+            }
+        }
+        let [displacement, velocity, force] = signals;
+        let loops = Table {
+            name: "loops".to_owned(),
+            columns: vec![
+                Column::texts("joint", labels),
+                Column::numbers("time_s", times),
+                Column::numbers("displacement_m", displacement),
+                Column::numbers("velocity_m_per_s", velocity),
+                Column::numbers("force_N", force),
+            ],
+        };
+        let joints = &found.orbit.joints;
+        let summary = Table {
+            name: "loops_summary".to_owned(),
+            columns: vec![
+                Column::texts("joint", joints.iter().map(|joint| joint.name.clone()).collect()),
+                Column::numbers("dissipation_J", joints.iter().map(|joint| joint.dissipation).collect()),
+                Column::numbers("slip_fraction", joints.iter().map(|joint| joint.slip_fraction).collect()),
+            ],
+        };
+        let row = Row::new(&found.system, found.orbit.omega, Ok(&found.orbit));
+        let told = Told::of(&[row], &|_| String::new(), vec![found.orbit.method.to_owned()], 1, start);
+        Ok(self.result("hysteresis", "Hysteresis", vec![loops, summary], figure, told))
+    }
+
+    /// A nonlinear mode: frequency and damping ratio over the amplitude (m √kg, modal), as a :class:`Result` with the table ``modes``.
+    ///
+    /// ``amplitude``: the smallest and the largest. ``mode``: its number by rising frequency, from 1.
+    #[pyo3(signature = (amplitude, *, mode=1, points=61, harmonics=15, samples=1024))]
+    fn modes(
+        &self,
+        py: Python<'_>,
+        amplitude: (f64, f64),
+        mode: usize,
+        points: usize,
+        harmonics: usize,
+        samples: usize,
+    ) -> PyResult<PyResultSet> {
+        let start = Instant::now();
+        let (low, high) = amplitude;
+        if !(low.is_finite() && high.is_finite() && 0.0 < low && low < high)
+            || mode == 0
+            || points < 2
+            || harmonics == 0
+        {
+            let message = "modes need amplitudes 0 < from < to, mode and harmonics from 1, and at least two points";
+            return Err(error::model(py, message));
+        }
+        // enough that no harmonic is taken for another
+        if samples < 4 * harmonics + 4 {
+            return Err(error::model(
+                py,
+                format!("{harmonics} harmonics need at least {} samples, found {samples}", 4 * harmonics + 4),
+            ));
+        }
+        let system = self.system(py)?;
+        let request = ModeRequest { mode: mode - 1, range: amplitude, points, harmonics, samples };
+        let outcome = py.detach(|| self::mode(&system, request));
+        self.raised()?;
+        let found = outcome.map_err(|cause| error::method(py, cause))?;
+        let numbers = |name: &str, value: &dyn Fn(&stickslip::curve::modes::ModePoint) -> f64| {
+            Column::numbers(name, found.points.iter().map(value).collect())
+        };
+        let mut columns = vec![
+            numbers("modal_amplitude_m_sqrt_kg", &|point| point.amplitude),
+            numbers("frequency_Hz", &|point| point.omega / TAU),
+            numbers("damping_ratio", &|point| point.damping),
+            numbers("viscous_damping_ratio", &|point| point.viscous),
+        ];
+        for (i, place) in system.places().iter().enumerate() {
+            columns.push(numbers(&format!("{}_amplitude_m", place.replace('.', "_")), &|point| point.places[i]));
+        }
+        let table = Table { name: "modes".to_owned(), columns };
+        let x = Axis::new("modal amplitude", "m √kg").log();
+        let line = |quantity: &str, unit: &str, column: &str| Panel {
+            title: String::new(),
+            x: x.clone(),
+            y: Axis::new(quantity, unit),
+            series: vec![Series::line(
+                "",
+                table.numbers("modal_amplitude_m_sqrt_kg").unwrap_or_default().to_vec(),
+                table.numbers(column).unwrap_or_default().to_vec(),
+                0,
+            )],
+        };
+        let panels = vec![line("frequency", "Hz", "frequency_Hz"), line("damping ratio", "", "damping_ratio")];
+        let mut told = Told::of(&[], &|_| String::new(), Vec::new(), 1, start);
+        told.points.insert(CONVERGED.to_owned(), found.points.len() as u64);
+        told.notes.extend(found.lost.map(|lost| format!("The mode ends at {:.3e} m √kg: {}.", lost.at, lost.reason)));
+        Ok(self.result("modes", "Nonlinear mode", vec![table], Figure { panels, ..Figure::default() }, told))
+    }
+
+    fn __repr__(&self) -> String {
+        let model = &self.model;
+        let matrices = self.matrices.as_ref().map(|matrices| format!(", matrices of {} places", matrices.places.len()));
+        format!(
+            "<stickslip.Model: {} masses, {} springs, {} joints, {} forces, {} motions{}>",
+            model.masses.len(),
+            model.springs.len(),
+            model.joints.len(),
+            model.forces.len(),
+            model.motions.len(),
+            matrices.unwrap_or_default()
+        )
+    }
+}
+
+/// Why a point cannot even be tried.
+enum Refusal {
+    Model(String),
+    Method(String),
+}
+
+impl Refusal {
+    fn raised(self, py: Python<'_>) -> PyErr {
+        match self {
+            Refusal::Model(message) => error::model(py, message),
+            Refusal::Method(message) => error::method(py, message),
+        }
+    }
+}
+
+fn along_frequencies(asked: &Asked, omegas: &[f64], context: &Context) -> Result<Vec<Row>, Refusal> {
+    let watch = Sweep { finished: &*context.finished, stop: &context.stop };
+    let row = |index: usize, outcome: Result<&Orbit, &OrbitError>| Row::new(&asked.system, omegas[index], outcome);
+    let rows = sweep(&*asked.method, &asked.system, omegas.len(), &|index| omegas[index], watch, &row);
+    // a run that was stopped ends with the exception that stopped it
+    Ok(rows.map_err(|cause| Refusal::Method(cause.to_string()))?.into_iter().flatten().collect())
+}
+
+impl PyModel {
+    /// One model for each point: in blocks, so that threads take whole stretches.
+    fn along_parameters(
+        &self,
+        asked: &Asked,
+        omegas: &[f64],
+        along: &Along,
+        context: &Context,
+    ) -> Result<Vec<Row>, Refusal> {
+        let point = |index: usize| -> Result<Option<Row>, Refusal> {
+            if context.stopped() {
+                return Ok(None);
+            }
+            let mut model = self.model.clone();
+            along.iter().for_each(|(name, values)| {
+                PyModel::put(&mut model, name, values[index]);
+            });
+            let at = |message: String| format!("point {index}: {message}");
+            let system = model.assemble().map_err(|cause| Refusal::Model(at(cause.to_string())))?;
+            let system = match &self.matrices {
+                // forces and joints may differ, and the structure by its springs
+                Some(_) => Python::attach(|py| self.system_of(py, &model))
+                    .map_err(|cause| Refusal::Model(at(cause.to_string())))?,
+                None => system,
+            };
+            let solver = asked.method.solver(&system);
+            let mut solver = solver.map_err(|cause| Refusal::Method(at(cause.to_string())))?;
+            let outcome = solver.orbit(omegas[index], None);
+            (context.finished)();
+            Ok(Some(Row::new(&system, omegas[index], outcome.as_ref())))
+        };
+        let blocks: Result<Vec<Vec<Row>>, Refusal> = (0..omegas.len().div_ceil(BLOCK))
+            .into_par_iter()
+            .map(|block| {
+                let points = block * BLOCK..((block + 1) * BLOCK).min(omegas.len());
+                points.filter_map(|index| point(index).transpose()).collect()
+            })
+            .collect();
+        Ok(blocks?.into_iter().flatten().collect())
+    }
+}
+
+/// Amplitudes over the frequency, or over the first parameter where the frequency is one.
+fn curves(table: &Table, system: &System, along: Option<&str>) -> Figure {
+    let numbers = |name: &str| table.numbers(name).unwrap_or_default().to_vec();
+    let frequencies = numbers("frequency_Hz");
+    let fixed = frequencies.windows(2).all(|pair| pair[0] == pair[1]);
+    let (x, values) = match along.filter(|_| fixed) {
+        Some(name) => (Axis::new(name, "SI"), numbers(&name.replace(['.', '-'], "_"))),
+        None => (Axis::new("frequency", "Hz"), frequencies),
+    };
+    let series = system.places().iter().enumerate();
+    let series =
+        series.map(|(i, place)| Series::line(place, values.clone(), numbers(&format!("{place}_amplitude_m")), i));
+    let y = Axis::new("amplitude", "m").log();
+    Figure { panels: vec![Panel { title: String::new(), x, y, series: series.collect() }], ..Figure::default() }
+}
+
+fn loop_panel(joint: String, displacement: &[f64], force: &[f64]) -> Panel {
+    // closed by its first point
+    let closed = |values: &[f64]| values.iter().chain(values.first()).copied().collect();
+    let series = vec![Series::line("", closed(displacement), closed(force), 0)];
+    Panel { title: joint, x: Axis::new("displacement", "m"), y: Axis::new("force", "N"), series }
+}

@@ -1,0 +1,243 @@
+//! An orbit as Python sees it: numbers on demand.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::Arc;
+use stickslip::model::System;
+use stickslip::orbit::Orbit;
+use stickslip_study::hertz;
+
+/// A periodic motion, with the evidence for it.
+///
+/// >>> import stickslip
+/// >>> couple = stickslip.Study.from_template("blade-couple").model()
+/// >>> orbit = couple.orbit("121 Hz")
+/// >>> energy = orbit.energy                         # J a period
+/// >>> abs(energy["work_in"] - energy["viscous"] - energy["friction"]) < 1e-9 * energy["work_in"]
+/// True
+/// >>> orbit.evidence["energy_gap"] < 1e-9, orbit.stable
+/// (True, True)
+#[pyclass(frozen, module = "stickslip", name = "Orbit")]
+pub struct PyOrbit {
+    pub orbit: Orbit,
+    pub system: Arc<System>,
+}
+
+fn dict<'py, V: IntoPyObject<'py>>(
+    py: Python<'py>,
+    pairs: impl IntoIterator<Item = (impl AsRef<str>, V)>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    pairs.into_iter().try_for_each(|(key, value)| all.set_item(key.as_ref(), value))?;
+    Ok(all)
+}
+
+#[pymethods]
+impl PyOrbit {
+    /// Name of the method that found it.
+    #[getter]
+    fn method(&self) -> &str {
+        self.orbit.method
+    }
+
+    /// Drive frequency, Hz.
+    #[getter]
+    #[pyo3(name = "frequency_Hz")]
+    fn frequency(&self) -> f64 {
+        hertz(self.orbit.omega)
+    }
+
+    /// Period of the motion, s.
+    #[getter]
+    fn period(&self) -> f64 {
+        self.orbit.period()
+    }
+
+    /// Half of peak to peak of every place, m.
+    #[getter]
+    fn amplitude<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        dict(py, self.orbit.places.iter().map(|place| (&place.name, place.amplitude())))
+    }
+
+    /// Mean displacement of every place, m.
+    #[getter]
+    fn mean<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        dict(py, self.orbit.places.iter().map(|place| (&place.name, place.mean)))
+    }
+
+    /// First harmonic ``X`` of every place, complex, m: ``x = Re(X exp(jΩt)) + …``.
+    #[getter]
+    fn first_harmonic<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let complex = |place: &stickslip::orbit::PlaceMotion| {
+            pyo3::types::PyComplex::from_doubles(py, place.first_harmonic.re, place.first_harmonic.im)
+        };
+        dict(py, self.orbit.places.iter().map(|place| (&place.name, complex(place))))
+    }
+
+    /// Energy lost in every joint per period, J.
+    #[getter]
+    fn dissipation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        dict(py, self.orbit.joints.iter().map(|joint| (&joint.name, joint.dissipation)))
+    }
+
+    /// Fraction of the period in which every joint slips.
+    #[getter]
+    fn slip_fraction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        dict(py, self.orbit.joints.iter().map(|joint| (&joint.name, joint.slip_fraction)))
+    }
+
+    /// Energies per period, J: ``work_in``, ``viscous``, ``friction``.
+    #[getter]
+    fn energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let energy = &self.orbit.energy;
+        dict(py, [("work_in", energy.work_in), ("viscous", energy.viscous), ("friction", energy.friction)])
+    }
+
+    /// Why the orbit may be trusted: ``residual``, ``energy_gap``, ``truncation``, ``return_defect`` (pure numbers, ``None`` where the method has
+    /// none), ``status``, ``iterations``, ``switches``, and the joints that are ``stuck`` or keep their ``history``.
+    #[getter]
+    fn evidence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let found = &self.orbit.evidence;
+        let evidence = PyDict::new(py);
+        evidence.set_item("residual", found.residual)?;
+        evidence.set_item("energy_gap", found.energy_gap)?;
+        evidence.set_item("truncation", found.truncation)?;
+        evidence.set_item("return_defect", found.return_defect)?;
+        evidence.set_item("status", found.accuracy.status())?;
+        evidence.set_item("iterations", found.iterations)?;
+        evidence.set_item("switches", found.switches)?;
+        evidence.set_item("stuck", &found.stuck)?;
+        evidence.set_item("history", &found.history)?;
+        Ok(evidence)
+    }
+
+    /// Whether no small disturbance grows; ``None`` if that is not known.
+    #[getter]
+    fn stable(&self) -> Option<bool> {
+        self.orbit.is_stable()
+    }
+
+    /// Floquet multipliers of a period, by falling modulus; ``None`` if there is no return map.
+    #[getter]
+    fn multipliers<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<numpy::Complex64>>> {
+        let multipliers = py.detach(|| self.orbit.multipliers())?;
+        let multipliers: Vec<numpy::Complex64> =
+            multipliers.into_iter().map(|value| numpy::Complex64::new(value.re, value.im)).collect();
+        Some(multipliers.to_pyarray(py))
+    }
+
+    /// State at t = 0: displacements (m), velocities (m/s), then the states of joints. A start for neighbouring orbits.
+    #[getter]
+    fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.orbit.start.to_pyarray(py)
+    }
+
+    /// Instants at which a joint switches, s, rising.
+    #[getter]
+    fn switch_times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.orbit.switch_times().to_pyarray(py)
+    }
+
+    /// Names of the places, in the order of `sample`.
+    #[getter]
+    fn places(&self) -> Vec<&str> {
+        self.orbit.places.iter().map(|place| place.name.as_str()).collect()
+    }
+
+    /// The motion at times (s): a dictionary of arrays ``time_s`` (n), ``displacement_m``, ``velocity_m_per_s`` and
+    /// ``acceleration_m_per_s2`` (n × places).
+    ///
+    /// Without ``times`` at ``points`` equal steps over a period, the first at zero.
+    #[pyo3(signature = (times=None, *, points=256))]
+    fn sample<'py>(
+        &self,
+        py: Python<'py>,
+        times: Option<numpy::PyReadonlyArray1<'py, f64>>,
+        points: usize,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let times: Vec<f64> = match times {
+            Some(times) => times.as_array().iter().copied().collect(),
+            None => self.times(points),
+        };
+        let n = self.orbit.places.len();
+        let mut signals: [Vec<f64>; 3] = Default::default();
+        py.detach(|| {
+            for &time in &times {
+                let sample = self.orbit.sample(time);
+                signals[0].extend(sample.displacement);
+                signals[1].extend(sample.velocity);
+                signals[2].extend(sample.acceleration);
+            }
+        });
+        let out = PyDict::new(py);
+        out.set_item("time_s", times.to_pyarray(py))?;
+        let names = ["displacement_m", "velocity_m_per_s", "acceleration_m_per_s2"];
+        for (name, signal) in names.into_iter().zip(signals) {
+            out.set_item(name, rows(py, signal, times.len(), n)?)?;
+        }
+        Ok(out)
+    }
+
+    /// The loop of a joint: arrays ``time_s``, ``displacement_m``, ``velocity_m_per_s`` and ``force_N`` (n, or n × directions), at ``points``
+    /// equal steps over a period and at its switches.
+    #[pyo3(signature = (joint=None, *, points=256))]
+    fn hysteresis<'py>(&self, py: Python<'py>, joint: Option<&str>, points: usize) -> PyResult<Bound<'py, PyDict>> {
+        let index = match joint {
+            None if self.orbit.joints.is_empty() => return Err(PyKeyError::new_err("the model has no joint")),
+            None => 0,
+            Some(name) => self.orbit.joints.iter().position(|one| one.name == name).ok_or_else(|| {
+                let names: Vec<&str> = self.orbit.joints.iter().map(|one| one.name.as_str()).collect();
+                PyKeyError::new_err(format!("there is no joint `{name}`, there are {}", names.join(", ")))
+            })?,
+        };
+        let d = self.system.joints()[index].axes().len();
+        let (times, signals) = py.detach(|| self.loop_of(index, points));
+        let out = PyDict::new(py);
+        out.set_item("time_s", times.to_pyarray(py))?;
+        for (name, signal) in ["displacement_m", "velocity_m_per_s", "force_N"].into_iter().zip(signals) {
+            let array = rows(py, signal, times.len(), d)?;
+            let array = if d == 1 { array.call_method1("reshape", (times.len(),))? } else { array.into_any() };
+            out.set_item(name, array)?;
+        }
+        Ok(out)
+    }
+
+    fn __repr__(&self) -> String {
+        let evidence = &self.orbit.evidence;
+        let (method, hertz) = (self.orbit.method, hertz(self.orbit.omega));
+        format!(
+            "<stickslip.Orbit at {hertz} Hz by {method}: {}, residual {:.1e}>",
+            evidence.accuracy.status(),
+            evidence.residual
+        )
+    }
+}
+
+fn rows<'py>(py: Python<'py>, values: Vec<f64>, rows: usize, columns: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    PyArray1::from_vec(py, values).reshape([rows, columns])
+}
+
+impl PyOrbit {
+    fn times(&self, points: usize) -> Vec<f64> {
+        (0..points).map(|i| self.orbit.period() * i as f64 / points as f64).collect()
+    }
+
+    /// Times, and displacements, velocities and forces of a joint, instant by instant.
+    pub fn loop_of(&self, joint: usize, points: usize) -> (Vec<f64>, [Vec<f64>; 3]) {
+        let d = self.system.joints()[joint].axes().len();
+        let mut times = self.times(points);
+        times.extend(self.orbit.switch_times());
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let mut signals: [Vec<f64>; 3] = Default::default();
+        for &time in &times {
+            let sample = self.orbit.sample(time).joints[joint];
+            signals[0].extend(&sample.displacement[..d]);
+            signals[1].extend(&sample.velocity[..d]);
+            signals[2].extend(&sample.force[..d]);
+        }
+        (times, signals)
+    }
+}

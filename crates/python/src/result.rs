@@ -1,0 +1,361 @@
+//! What a study yields: tables, a figure, the record of the run.
+
+use crate::{arrow, error, lend};
+use pyo3::exceptions::{PyIndexError, PyKeyError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList, PyTuple};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use stickslip_report::{Outputs, html, png, svg, terminal::Terminal, write_dataset};
+use stickslip_study::dataset::{self, Dataset, Figure, Record, Values};
+use stickslip_study::results::worst_evidence;
+
+/// What a run yields: tables, a figure, notes, and the record of how it was made.
+///
+/// `result["curve"]` is a :class:`Table`; `result.save("out")` writes the files that the command writes; in a notebook it shows its figure.
+///
+/// >>> import stickslip
+/// >>> result = stickslip.Study.from_template("element").run()
+/// >>> result.tables
+/// ['loops', 'loops_summary']
+/// >>> float(result["loops_summary"]["dissipation_J"][1])     # 4 Ft (a - Ft/kt), J
+/// 4e-06
+#[pyclass(frozen, module = "stickslip", name = "Result")]
+pub struct PyResultSet {
+    dataset: Arc<Dataset>,
+}
+
+impl PyResultSet {
+    pub fn new(dataset: Dataset) -> Self {
+        PyResultSet { dataset: Arc::new(dataset) }
+    }
+
+    fn table(&self, index: usize) -> Table {
+        Table { dataset: self.dataset.clone(), index }
+    }
+}
+
+#[pymethods]
+impl PyResultSet {
+    /// Name of the study, and of the folder that `save` writes.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.dataset.name
+    }
+
+    /// Title of the study.
+    #[getter]
+    fn title(&self) -> &str {
+        &self.dataset.title
+    }
+
+    /// Kind of the study, for example ``"response"``.
+    #[getter]
+    fn kind(&self) -> &str {
+        &self.dataset.kind
+    }
+
+    /// Names of the tables, the most important first.
+    #[getter]
+    fn tables(&self) -> Vec<&str> {
+        self.dataset.tables.iter().map(|table| table.name.as_str()).collect()
+    }
+
+    /// Sentences that a reader of the results must know.
+    #[getter]
+    fn notes(&self) -> Vec<&str> {
+        self.dataset.notes.iter().map(String::as_str).collect()
+    }
+
+    /// Points without a result: pairs of where and why.
+    #[getter]
+    fn failures(&self) -> Vec<(&str, &str)> {
+        self.dataset.failures.iter().map(|failure| (failure.at.as_str(), failure.reason.as_str())).collect()
+    }
+
+    /// Number of points by status, for example ``{"converged": 244}``.
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let points = PyDict::new(py);
+        self.dataset.record.points.iter().try_for_each(|(status, count)| points.set_item(status, count))?;
+        Ok(points)
+    }
+
+    /// The worst evidence over all orbits: ``residual`` (defect of the return map) and ``energy_gap`` (relative gap between work put in and
+    /// energy lost), both pure numbers; ``None`` where the kind keeps none.
+    #[getter]
+    fn evidence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let worst = worst_evidence(&self.dataset);
+        let evidence = PyDict::new(py);
+        evidence.set_item("residual", worst.residual)?;
+        evidence.set_item("energy_gap", worst.energy_gap)?;
+        Ok(evidence)
+    }
+
+    /// How the run was made, as a dictionary: version, the study with all values in SI, methods, threads, wall time in s.
+    #[getter]
+    fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        json(py, &self.dataset.record)
+    }
+
+    /// The figure as plain data: panels with axes and series, as the figure files show them.
+    #[getter]
+    fn figure<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        json(py, &self.dataset.figure)
+    }
+
+    fn __getitem__(&self, table: &str) -> PyResult<Table> {
+        match self.dataset.tables.iter().position(|one| one.name == table) {
+            Some(index) => Ok(self.table(index)),
+            None => {
+                Err(PyKeyError::new_err(format!("there is no table `{table}`, there are {}", self.tables().join(", "))))
+            }
+        }
+    }
+
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        PyList::new(py, self.tables())?.call_method0("__iter__")
+    }
+
+    fn __len__(&self) -> usize {
+        self.dataset.tables.len()
+    }
+
+    /// Writes the files of the command into ``folder/NAME/`` and returns their paths. ``only`` names outputs: csv, json, svg, png, html.
+    #[pyo3(signature = (folder, only=None))]
+    fn save<'py>(&self, py: Python<'py>, folder: PathBuf, only: Option<Vec<String>>) -> PyResult<Bound<'py, PyList>> {
+        let outputs = match only {
+            Some(only) => Outputs::only(&only).map_err(|cause| error::report(py, cause))?,
+            None => Outputs::all(),
+        };
+        let files = py.detach(|| write_dataset(&self.dataset, &folder, &outputs));
+        PyList::new(py, files.map_err(|cause| error::report(py, cause))?)
+    }
+
+    /// The figure as SVG.
+    fn svg(&self, py: Python<'_>) -> String {
+        py.detach(|| svg::to_svg(&self.dataset.figure))
+    }
+
+    /// The figure as PNG.
+    fn png<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let png = py.detach(|| png::to_png(&self.dataset.figure)).map_err(|cause| error::report(py, cause))?;
+        Ok(PyBytes::new(py, &png))
+    }
+
+    /// The interactive figure as a page of its own; ``script`` is the address of plotly.js, which `save` writes beside the folder.
+    #[pyo3(signature = (script=None))]
+    fn html(&self, py: Python<'_>, script: Option<&str>) -> String {
+        py.detach(|| html::to_html(&self.dataset.figure, script.unwrap_or(&html::script_name())))
+    }
+
+    /// Draws the figure with matplotlib and returns its ``Figure``; ``axes`` takes axes of your own, one for each panel.
+    #[pyo3(signature = (axes=None))]
+    fn plot<'py>(slf: Bound<'py, Self>, axes: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("stickslip._plot")?.getattr("plot")?.call1((slf.getattr("figure")?, axes))
+    }
+
+    fn _repr_svg_(&self, py: Python<'_>) -> Option<String> {
+        (!self.dataset.figure.panels.is_empty()).then(|| self.svg(py))
+    }
+
+    fn _repr_html_(&self, py: Python<'_>) -> String {
+        let tables = self.dataset.tables.iter();
+        let tables = tables.map(|table| format!("<code>{}</code> ({} rows)", escaped(&table.name), table.rows()));
+        let mut page =
+            format!("<div><p><b>{}</b>: {}</p>", escaped(&self.dataset.title), tables.collect::<Vec<_>>().join(", "));
+        page += &self._repr_svg_(py).unwrap_or_default();
+        let remarks =
+            self.dataset.notes.iter().cloned().chain(self.dataset.failures.iter().take(10).map(ToString::to_string));
+        remarks.for_each(|remark| page += &format!("<p>{}</p>", escaped(&remark)));
+        page + "</div>"
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<stickslip.Result {} ({}): {}>", self.dataset.name, self.dataset.kind, self.tables().join(", "))
+    }
+
+    /// What the command prints on a terminal.
+    fn __str__(&self, py: Python<'_>) -> String {
+        py.detach(|| Terminal { colour: false, width: None }.text(&self.dataset, &[]))
+    }
+
+    fn __eq__(&self, other: &PyResultSet) -> bool {
+        *self.dataset == *other.dataset
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let bytes = py.detach(|| rmp_serde::to_vec_named(&*self.dataset)).map_err(|cause| error::report(py, cause))?;
+        Ok((py.import("stickslip._core")?.getattr("_result")?, (PyBytes::new(py, &bytes),)))
+    }
+}
+
+/// A result from its pickle.
+#[pyfunction]
+pub fn _result(py: Python<'_>, bytes: &[u8]) -> PyResult<PyResultSet> {
+    let dataset = py.detach(|| rmp_serde::from_slice(bytes));
+    dataset.map(PyResultSet::new).map_err(|cause| error::report(py, format!("this is no pickled result: {cause}")))
+}
+
+/// A value as Python's plain data.
+fn json<'py>(py: Python<'py>, value: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(value).map_err(|cause| error::report(py, cause))?;
+    py.import("json")?.call_method1("loads", (text,))
+}
+
+/// Text for a page.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// A table: named columns of equal length; units stand at the end of their names.
+///
+/// ``table["blade1_amplitude_m"]`` is a NumPy array over the memory of the result, without a copy and read-only. pandas, polars and pyarrow read
+/// the whole table by Arrow's PyCapsule interface.
+///
+/// >>> import stickslip
+/// >>> table = stickslip.Study.from_template("element").run()["loops"]
+/// >>> table["displacement_m"].flags.owndata
+/// False
+#[pyclass(frozen, module = "stickslip")]
+pub struct Table {
+    dataset: Arc<Dataset>,
+    index: usize,
+}
+
+impl Table {
+    /// A table that belongs to no result.
+    pub fn alone(table: dataset::Table) -> Table {
+        let record = Record {
+            version: String::new(),
+            study: serde_json::Value::Null,
+            methods: Vec::new(),
+            seed: None,
+            threads: 1,
+            wall_time_s: 0.0,
+            points: BTreeMap::new(),
+            interrupted: false,
+        };
+        let dataset = Dataset {
+            name: String::new(),
+            title: String::new(),
+            source: None,
+            kind: String::new(),
+            tables: vec![table],
+            figure: Figure::default(),
+            notes: Vec::new(),
+            failures: Vec::new(),
+            record,
+        };
+        Table { dataset: Arc::new(dataset), index: 0 }
+    }
+
+    fn table(&self) -> &dataset::Table {
+        &self.dataset.tables[self.index]
+    }
+}
+
+#[pymethods]
+impl Table {
+    /// Name of the table.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.table().name
+    }
+
+    /// Names of the columns.
+    #[getter]
+    fn columns(&self) -> Vec<&str> {
+        self.table().columns.iter().map(|column| column.name.as_str()).collect()
+    }
+
+    /// Rows and columns.
+    #[getter]
+    fn shape(&self) -> (usize, usize) {
+        (self.table().rows(), self.table().columns.len())
+    }
+
+    fn __len__(&self) -> usize {
+        self.table().rows()
+    }
+
+    fn __getitem__<'py>(slf: Bound<'py, Self>, column: &str) -> PyResult<Bound<'py, PyAny>> {
+        let (py, this) = (slf.py(), slf.get());
+        let Some(found) = this.table().column(column) else {
+            let message = format!("there is no column `{column}`, there are {}", this.columns().join(", "));
+            return Err(PyKeyError::new_err(message));
+        };
+        let owner = slf.clone().into_any();
+        let numpy = || py.import("numpy");
+        match &found.values {
+            // SAFETY: the table, which the array refers to, keeps the dataset, which nobody can change
+            #[allow(unsafe_code)]
+            Values::Number(values) => Ok(unsafe { lend::array(values, owner) }.into_any()),
+            // SAFETY: the same
+            #[allow(unsafe_code)]
+            Values::Integer(values) => Ok(unsafe { lend::array(values, owner) }.into_any()),
+            Values::Text(values) => numpy()?.call_method1("array", (PyList::new(py, values)?, "str")),
+            Values::Flag(values) => numpy()?.call_method1("array", (PyList::new(py, values)?, "object")),
+        }
+    }
+
+    fn __contains__(&self, column: &str) -> bool {
+        self.table().column(column).is_some()
+    }
+
+    /// Row ``index`` as a dictionary.
+    fn row<'py>(slf: Bound<'py, Self>, index: usize) -> PyResult<Bound<'py, PyDict>> {
+        let (py, table) = (slf.py(), slf.get().table());
+        if index >= table.rows() {
+            return Err(PyIndexError::new_err(format!("there is no row {index}, there are {}", table.rows())));
+        }
+        let row = PyDict::new(py);
+        for column in &table.columns {
+            match &column.values {
+                Values::Number(values) => row.set_item(&column.name, values[index])?,
+                Values::Integer(values) => row.set_item(&column.name, values[index])?,
+                Values::Text(values) => row.set_item(&column.name, &values[index])?,
+                Values::Flag(values) => row.set_item(&column.name, values[index])?,
+            }
+        }
+        Ok(row)
+    }
+
+    /// The table by Arrow's PyCapsule interface: what pandas, polars, pyarrow, DuckDB and others ask for.
+    #[pyo3(signature = (requested_schema=None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        // a producer that has one schema may give it whatever is requested
+        let _ = requested_schema;
+        arrow::stream(py, self.dataset.clone(), self.index)
+    }
+
+    /// As a ``pyarrow.Table``; numbers stay where they are.
+    fn to_arrow<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        tables(&slf, "to_arrow")
+    }
+
+    /// As a ``pandas.DataFrame``.
+    fn to_pandas<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        tables(&slf, "to_pandas")
+    }
+
+    /// As a ``polars.DataFrame``; numbers stay where they are.
+    fn to_polars<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        tables(&slf, "to_polars")
+    }
+
+    fn __repr__(&self) -> String {
+        let (rows, columns) = self.shape();
+        format!("<stickslip.Table {}: {rows} rows, {columns} columns: {}>", self.name(), self.columns().join(", "))
+    }
+}
+
+fn tables<'py>(table: &Bound<'py, Table>, function: &str) -> PyResult<Bound<'py, PyAny>> {
+    let function = table.py().import("stickslip._tables")?.getattr(function)?;
+    function.call1(PyTuple::new(table.py(), [table])?)
+}

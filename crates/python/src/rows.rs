@@ -1,0 +1,92 @@
+//! Tables of orbits with the columns that studies have.
+
+use stickslip::method::{Method, OrbitError};
+use stickslip::model::System;
+use stickslip::orbit::Orbit;
+use stickslip_study::dataset::{Column, Table, Values, column_name};
+use stickslip_study::hertz;
+
+/// What a table keeps of one orbit, or of its absence.
+pub struct Row {
+    omega: f64,
+    places: Vec<[f64; 3]>,
+    joints: Vec<[f64; 2]>,
+    stable: Option<bool>,
+    /// Residual, energy gap, truncation, return defect.
+    evidence: [f64; 4],
+    iterations: u64,
+    pub status: &'static str,
+    pub failure: Option<String>,
+}
+
+impl Row {
+    /// Of what was found at a frequency, rad/s.
+    pub fn new(system: &System, omega: f64, outcome: Result<&Orbit, &OrbitError>) -> Row {
+        match outcome {
+            Ok(orbit) => {
+                let found = &orbit.evidence;
+                let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
+                Row {
+                    omega,
+                    places: orbit
+                        .places
+                        .iter()
+                        .map(|place| [place.amplitude(), place.mean, place.phase_deg()])
+                        .collect(),
+                    joints: orbit.joints.iter().map(|joint| [joint.dissipation, joint.slip_fraction]).collect(),
+                    stable: orbit.is_stable(),
+                    evidence: [found.residual, found.energy_gap, number(found.truncation), number(found.return_defect)],
+                    iterations: found.iterations as u64,
+                    status: found.accuracy.status(),
+                    failure: None,
+                }
+            }
+            Err(error) => {
+                Row { failure: Some(error.to_string()), status: error.status(), ..Row::missing(system, omega) }
+            }
+        }
+    }
+
+    fn missing(system: &System, omega: f64) -> Row {
+        Row {
+            omega,
+            places: vec![[f64::NAN; 3]; system.dofs()],
+            joints: vec![[f64::NAN; 2]; system.joints().len()],
+            stable: None,
+            evidence: [f64::NAN; 4],
+            iterations: 0,
+            status: "failed",
+            failure: None,
+        }
+    }
+}
+
+/// The columns of these rows, behind `first`.
+pub fn table(name: &str, first: Vec<Column>, system: &System, method: &dyn Method, rows: &[Row]) -> Table {
+    let numbers =
+        |name: &str, value: &dyn Fn(&Row) -> f64| Column::numbers(&column_name(name), rows.iter().map(value).collect());
+    let mut columns = first;
+    columns.push(numbers("frequency_Hz", &|row| hertz(row.omega)));
+    for (i, place) in system.places().iter().enumerate() {
+        for (k, what) in ["amplitude_m", "mean_m", "phase_deg"].into_iter().enumerate() {
+            columns.push(numbers(&format!("{place}_{what}"), &|row| row.places[i][k]));
+        }
+    }
+    for (j, joint) in system.joints().iter().enumerate() {
+        for (k, what) in ["dissipation_J", "slip_fraction"].into_iter().enumerate() {
+            columns.push(numbers(&format!("{}_{what}", joint.name()), &|row| row.joints[j][k]));
+        }
+    }
+    let stable = Values::Flag(rows.iter().map(|row| row.stable).collect());
+    columns.push(Column { name: "stable".to_owned(), values: stable });
+    for (k, what) in ["residual", "energy_gap", "truncation", "return_defect"].into_iter().enumerate() {
+        // where motions are closed the residual is the return defect
+        if k < 3 || !method.closes_motions(system) {
+            columns.push(numbers(what, &|row| row.evidence[k]));
+        }
+    }
+    let iterations = Values::Integer(rows.iter().map(|row| row.iterations).collect());
+    columns.push(Column { name: "iterations".to_owned(), values: iterations });
+    columns.push(Column::texts("status", rows.iter().map(|row| row.status.to_owned()).collect()));
+    Table { name: name.to_owned(), columns }
+}

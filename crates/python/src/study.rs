@@ -1,0 +1,399 @@
+//! Studies: files, texts and dictionaries, read, checked and run.
+
+use crate::error;
+use crate::model::PyModel;
+use crate::result::{PyResultSet, Table};
+use crate::watch::{Watch, watched};
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyList, PyString};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use stickslip::dimension::Dimension;
+use stickslip_study::batch::{self, Batch};
+use stickslip_study::dataset::{self, Column, Values};
+use stickslip_study::run::{Checked, check};
+use stickslip_study::{StudyError, read_bytes, read_file, templates};
+
+/// What a study file asks for, read and checked.
+///
+/// Made by `from_file`, `from_text`, `from_dict` or `from_template`. A study does not change: `set` and `method` return another one.
+///
+/// >>> import stickslip
+/// >>> study = stickslip.Study.from_template("blade-couple")
+/// >>> study.kind, study.cases, study.varied
+/// ('response', 4, ['Ft'])
+/// >>> study.set(Ft="3 N").cases
+/// 1
+#[pyclass(frozen, module = "stickslip", name = "Study", from_py_object)]
+#[derive(Clone)]
+pub struct PyStudy {
+    pub study: Arc<stickslip_study::Study>,
+    /// The file's name as given.
+    file: String,
+    overrides: Vec<(String, String)>,
+    method: Option<String>,
+    /// The study after its check, once it was asked for: that prepares every case.
+    checked: Arc<Mutex<Option<Arc<Checked>>>>,
+}
+
+impl PyStudy {
+    fn checked(&self, py: Python<'_>) -> PyResult<Arc<Checked>> {
+        let kept = || self.checked.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(checked) = kept().as_ref() {
+            return Ok(checked.clone());
+        }
+        // the lock is not held meanwhile: another call may check too, and what it finds is the same
+        let checked = py.detach(|| check(&self.study)).map_err(|cause| error::study(py, &cause))?;
+        Ok(kept().insert(Arc::new(checked)).clone())
+    }
+
+    fn finished(
+        py: Python<'_>,
+        file: String,
+        overrides: Vec<(String, String)>,
+        method: Option<String>,
+        read: impl FnOnce(&[(String, String)]) -> Result<stickslip_study::Study, StudyError> + Send,
+    ) -> PyResult<PyStudy> {
+        let name = method.clone();
+        let study = py.detach(|| {
+            let study = read(&overrides)?;
+            match name {
+                Some(name) => study.with_method(&name),
+                None => Ok(study),
+            }
+        });
+        let study = Arc::new(study.map_err(|cause| error::study(py, &cause))?);
+        Ok(PyStudy { study, file, overrides, method, checked: Arc::default() })
+    }
+
+    fn again(&self, py: Python<'_>, overrides: Vec<(String, String)>, method: Option<String>) -> PyResult<PyStudy> {
+        let (file, text) = (self.file.clone(), self.study.text().to_owned());
+        PyStudy::finished(py, self.file.clone(), overrides, method, move |set| read_bytes(&file, text.as_bytes(), set))
+    }
+
+    /// Values of parameters as they would be typed.
+    fn typed(&self, py: Python<'_>, values: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(String, String)>> {
+        typed(values, &|name| {
+            let case = self.study.case(0).map_err(|cause| error::study(py, &cause))?;
+            Ok(case.parameters.get(name).and_then(|(_, dimension)| *dimension))
+        })
+    }
+}
+
+/// Values of parameters as they would be typed: numbers in the SI unit of the parameter's dimension, frequencies in Hz.
+fn typed(
+    values: Option<&Bound<'_, PyDict>>,
+    dimension: &dyn Fn(&str) -> PyResult<Option<Dimension>>,
+) -> PyResult<Vec<(String, String)>> {
+    let mut set = Vec::new();
+    for (name, value) in values.into_iter().flatten() {
+        let name: String = name.extract()?;
+        let text = if let Ok(text) = value.cast::<PyString>() {
+            text.to_str()?.to_owned()
+        } else {
+            let number: f64 = value.extract()?;
+            let unit = match dimension(&name)? {
+                None | Some(Dimension::NONE) => String::new(),
+                Some(Dimension::FREQUENCY) => " Hz".to_owned(),
+                Some(Dimension::SWEEP_RATE) => " Hz/s".to_owned(),
+                Some(other) => {
+                    format!(" {}", other.name_and_unit().map_or_else(|| other.to_string(), |(_, unit)| unit.to_owned()))
+                }
+            };
+            format!("{number:?}{unit}")
+        };
+        set.push((name, text));
+    }
+    Ok(set)
+}
+
+#[pymethods]
+impl PyStudy {
+    /// Reads the study file (TOML) at ``path``; keyword arguments give parameters other values, as ``--set`` does.
+    #[staticmethod]
+    #[pyo3(signature = (path, **set))]
+    fn from_file(py: Python<'_>, path: PathBuf, set: Option<&Bound<'_, PyDict>>) -> PyResult<PyStudy> {
+        let file = path.display().to_string();
+        let study = PyStudy::finished(py, file, Vec::new(), None, move |set| read_file(&path, set))?;
+        study.set(py, set)
+    }
+
+    /// Reads the text of a study file; ``name`` stands for the file's name.
+    #[staticmethod]
+    #[pyo3(signature = (text, name="study", **set))]
+    fn from_text(py: Python<'_>, text: &str, name: &str, set: Option<&Bound<'_, PyDict>>) -> PyResult<PyStudy> {
+        let (file, bytes) = (name.to_owned(), text.as_bytes());
+        let study = PyStudy::finished(py, name.to_owned(), Vec::new(), None, move |set| read_bytes(&file, bytes, set))?;
+        study.set(py, set)
+    }
+
+    /// A study from a dictionary with the tables and keys of a study file.
+    #[staticmethod]
+    #[pyo3(signature = (tables, name="study", **set))]
+    fn from_dict(
+        py: Python<'_>,
+        tables: Bound<'_, PyDict>,
+        name: &str,
+        set: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyStudy> {
+        let text: String = py.import("stickslip._toml")?.call_method1("text", (tables,))?.extract()?;
+        PyStudy::from_text(py, &text, name, set)
+    }
+
+    /// The study of a template; ``stickslip.templates()`` lists them.
+    #[staticmethod]
+    #[pyo3(signature = (template, **set))]
+    fn from_template(py: Python<'_>, template: &str, set: Option<&Bound<'_, PyDict>>) -> PyResult<PyStudy> {
+        match templates::find(template) {
+            Some(found) => PyStudy::from_text(py, found.study, found.name, set),
+            None => {
+                let names: Vec<&str> = templates::TABLE.iter().map(|one| one.name).collect();
+                let message = format!("there is no template `{template}`; there are {}", names.join(", "));
+                Err(error::model(py, message))
+            }
+        }
+    }
+
+    /// The same study with other values of its parameters: strings with units, or numbers in SI (frequencies in Hz).
+    #[pyo3(signature = (**values))]
+    fn set(&self, py: Python<'_>, values: Option<&Bound<'_, PyDict>>) -> PyResult<PyStudy> {
+        if values.is_none_or(|values| values.is_empty()) {
+            return Ok(self.clone());
+        }
+        let new = self.typed(py, values)?;
+        let kept = self.overrides.iter().filter(|(name, _)| new.iter().all(|(other, _)| other != name)).cloned();
+        let overrides = kept.chain(new.iter().cloned()).collect();
+        self.again(py, overrides, self.method.clone())
+    }
+
+    /// The same study with another method.
+    fn method(&self, py: Python<'_>, name: &str) -> PyResult<PyStudy> {
+        self.again(py, self.overrides.clone(), Some(name.to_owned()))
+    }
+
+    /// Name: the stem of the file.
+    #[getter]
+    fn name(&self) -> &str {
+        self.study.name()
+    }
+
+    /// Title.
+    #[getter]
+    fn title(&self) -> &str {
+        self.study.title()
+    }
+
+    /// Kind, for example ``"response"``.
+    #[getter]
+    fn kind(&self) -> &str {
+        self.study.kind().name
+    }
+
+    /// Text of the file.
+    #[getter]
+    fn text(&self) -> &str {
+        self.study.text()
+    }
+
+    /// Version of Stickslip that computes it.
+    #[getter]
+    fn version(&self) -> &str {
+        env!("CARGO_PKG_VERSION")
+    }
+
+    /// Names of the tables that it yields, the most important first.
+    #[getter]
+    fn tables(&self) -> Vec<&str> {
+        self.study.kind().tables.to_vec()
+    }
+
+    /// Number of cases.
+    #[getter]
+    fn cases(&self) -> usize {
+        self.study.cases()
+    }
+
+    /// Number of units of work, which know nothing of each other.
+    #[getter]
+    fn units(&self) -> usize {
+        batch::units(&self.study)
+    }
+
+    /// Number of points: cases times frequencies.
+    #[getter]
+    fn points(&self) -> usize {
+        self.study.points()
+    }
+
+    /// Names of the varied parameters; the first changes slowest.
+    #[getter]
+    fn varied(&self) -> Vec<&str> {
+        self.study.varied()
+    }
+
+    /// The parameters of case ``index``: values in SI, frequencies in rad/s.
+    #[pyo3(signature = (index=0))]
+    fn parameters<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyDict>> {
+        let case = self.study.case(index).map_err(|cause| error::study(py, &cause))?;
+        let parameters = PyDict::new(py);
+        case.parameters.iter().try_for_each(|(name, (si, _))| parameters.set_item(name, si))?;
+        Ok(parameters)
+    }
+
+    /// The model of case ``index``, to compute with by calls.
+    #[pyo3(signature = (index=0))]
+    fn model(&self, py: Python<'_>, index: usize) -> PyResult<PyModel> {
+        let case = self.study.case(index).map_err(|cause| error::study(py, &cause))?;
+        Ok(PyModel::from_model(case.model))
+    }
+
+    /// What is known before anything is computed, as text: modes with joints free and stuck, when joints slip, warnings, size and time.
+    ///
+    /// Raises :class:`StudyError` where the study cannot be run.
+    fn check(&self, py: Python<'_>) -> PyResult<String> {
+        let checked = self.checked(py)?;
+        let summary = checked.summary();
+        let lines =
+            summary.warnings.iter().cloned().chain(self.study.notes().into_iter().map(|note| format!("note: {note}")));
+        let mut text: String = lines.map(|line| line + "\n").collect();
+        text += &summary.to_string();
+        Ok(text)
+    }
+
+    /// Runs the study and returns its :class:`Result`.
+    ///
+    /// ``threads``: how many; all without it. ``progress``: ``True`` for a bar by tqdm (none if it is not installed), or a function of the points
+    /// done and of all (``None`` where adaptive). Ctrl-C ends the run. ``memory``: bytes that the run may take.
+    /// The results are the same bits on any number of threads.
+    #[pyo3(signature = (*, threads=None, progress=None, memory=None))]
+    fn run(
+        &self,
+        py: Python<'_>,
+        threads: Option<usize>,
+        progress: Option<Bound<'_, PyAny>>,
+        memory: Option<u64>,
+    ) -> PyResult<PyResultSet> {
+        let study = match memory {
+            Some(bytes) => Arc::new((*self.study).clone().with_memory_limit(bytes)),
+            None => self.study.clone(),
+        };
+        let total = (!study.is_adaptive()).then_some(study.points() as u64);
+        let bar = bar(py, progress, study.name())?;
+        let watch = Watch { threads, progress: bar.as_ref().map(|bar| bar.clone().unbind()), total };
+        let outcome = watched(py, &watch, |context| check(&study)?.run(context));
+        close(bar)?;
+        outcome?.map(PyResultSet::new).map_err(|cause| error::study(py, &cause))
+    }
+
+    /// Computes units `start` to `stop` (excluded), on one thread: their tables, and what is to be said of them, for `_joined`.
+    fn _batch<'py>(&self, py: Python<'py>, start: usize, stop: usize) -> PyResult<Bound<'py, PyDict>> {
+        let checked = self.checked(py)?;
+        let watch = Watch { threads: Some(1), progress: None, total: None };
+        let batch = watched(py, &watch, |context| batch::batch(&checked, start..stop, context))?;
+        let Batch { tables, told } = batch.map_err(|cause| error::study(py, &cause))?;
+        let out = PyDict::new(py);
+        out.set_item("told", serde_json::to_string(&told).map_err(|cause| error::report(py, cause))?)?;
+        out.set_item("points", PyDict::from_sequence(PyList::new(py, told.points)?.as_any())?)?;
+        let tables = tables.into_iter().filter(|table| !table.columns.is_empty());
+        out.set_item(
+            "tables",
+            PyList::new(py, tables.map(Table::alone).map(|table| Py::new(py, table)).collect::<PyResult<Vec<_>>>()?)?,
+        )?;
+        Ok(out)
+    }
+
+    fn __repr__(&self) -> String {
+        let plural = |count: usize| if count == 1 { "" } else { "s" };
+        let (cases, points) = (self.study.cases(), self.study.points());
+        let method = self.method.as_ref().map(|method| format!(", by {method}")).unwrap_or_default();
+        let set: String = self.overrides.iter().map(|(name, value)| format!(", {name} = {value}")).collect();
+        let (name, kind) = (self.study.name(), self.study.kind().name);
+        format!(
+            "<stickslip.Study {name}: {kind}, {cases} case{}, {points} point{}{method}{set}>",
+            plural(cases),
+            plural(points)
+        )
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled<'_>)> {
+        let build = py.import("stickslip._core")?.getattr("_study")?;
+        Ok((build, (&self.file, self.study.text(), self.overrides.clone(), self.method.clone())))
+    }
+}
+
+/// A pickled study: name of the file, text, values of parameters, method.
+type Pickled<'a> = (&'a str, &'a str, Vec<(String, String)>, Option<String>);
+
+/// A study from its pickle.
+#[pyfunction]
+pub fn _study(
+    py: Python<'_>,
+    file: String,
+    text: String,
+    overrides: Vec<(String, String)>,
+    method: Option<String>,
+) -> PyResult<PyStudy> {
+    let name = file.clone();
+    PyStudy::finished(py, file, overrides, method, move |set| read_bytes(&name, text.as_bytes(), set))
+}
+
+/// A table as Python hands it over: its name, and of each column the name, the type that Arrow calls it, and the values.
+type Columns<'py> = Vec<(String, String, Bound<'py, PyAny>)>;
+
+/// The result of a study from the tables of all its units and what is to be said of them, batch by batch.
+#[pyfunction]
+pub fn _joined<'py>(
+    py: Python<'py>,
+    study: &PyStudy,
+    tables: Vec<(String, Columns<'py>)>,
+    told: Vec<String>,
+    seconds: f64,
+) -> PyResult<PyResultSet> {
+    let checked = study.checked(py)?;
+    let mut whole = Batch::default();
+    for (name, columns) in tables {
+        let column = |(name, kind, values): (String, String, Bound<'py, PyAny>)| {
+            let values = match kind.as_str() {
+                "double" => Values::Number(values.extract::<numpy::PyReadonlyArray1<'_, f64>>()?.as_array().to_vec()),
+                "uint64" => Values::Integer(values.extract()?),
+                "bool" => Values::Flag(values.extract()?),
+                _ => Values::Text(values.extract()?),
+            };
+            Ok(Column { name, values })
+        };
+        whole.tables.push(dataset::Table { name, columns: columns.into_iter().map(column).collect::<PyResult<_>>()? });
+    }
+    for text in &told {
+        whole.told.append(serde_json::from_str(text).map_err(|cause| error::report(py, cause))?);
+    }
+    Ok(PyResultSet::new(py.detach(|| batch::joined(&checked, vec![whole], 1, seconds))))
+}
+
+/// What `progress` asks for: `None`, a bar, or the function that was given.
+pub fn bar<'py>(
+    py: Python<'py>,
+    progress: Option<Bound<'py, PyAny>>,
+    name: &str,
+) -> PyResult<Option<Bound<'py, PyAny>>> {
+    match progress {
+        None => Ok(None),
+        Some(progress) if progress.is_none() => Ok(None),
+        Some(progress) => match progress.cast::<PyBool>() {
+            Ok(flag) if !flag.is_true() => Ok(None),
+            // without tqdm there is none
+            Ok(_) => {
+                let bar = py.import("stickslip._progress")?.call_method1("bar", (name,))?;
+                Ok((!bar.is_none()).then_some(bar))
+            }
+            Err(_) => Ok(Some(progress)),
+        },
+    }
+}
+
+/// Closes a bar that was made here; a function from elsewhere has nothing to close.
+pub fn close(bar: Option<Bound<'_, PyAny>>) -> PyResult<()> {
+    match bar {
+        Some(bar) if bar.hasattr("_stickslip_close")? => bar.call_method0("_stickslip_close").map(|_| ()),
+        _ => Ok(()),
+    }
+}

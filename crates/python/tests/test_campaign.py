@@ -1,0 +1,216 @@
+"""Campaigns: on processes and on a Dask cluster, killed and resumed, with units that fail."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+
+import numpy as np
+import pytest
+
+import stickslip
+from stickslip import _campaign
+
+pytest.importorskip("pyarrow")
+
+CASES = """
+schema = 1
+model = { template = "blade-couple-massless" }
+[study]
+kind = "response"
+frequency = { from = "118 Hz", to = "124 Hz", points = 13 }
+vary = { Ft = { from = "1 N", to = "4 N", points = 40 } }
+"""
+
+
+@pytest.fixture(scope="module")
+def study():
+    return stickslip.Study.from_text(CASES, name="many")
+
+
+@pytest.fixture(scope="module")
+def whole(study):
+    return study.run()
+
+
+def same_bits(one, other):
+    for table in one:
+        for column in one[table].columns:
+            a, b = one[table][column], other[table][column]
+            assert a.tobytes() == b.tobytes() if a.dtype != object else a.tolist() == b.tolist(), (table, column)
+
+
+def test_processes_give_the_files_of_a_run(study, whole, tmp_path):
+    seen = []
+    done = stickslip.campaign(study, out=tmp_path / "c", processes=2, seconds=0.05, progress=lambda *pair: seen.append(pair))
+    assert done.is_complete and not done.failed and seen[-1] == (study.units, study.units)
+    assert len(done.files("curve")) > 2  # more than one batch
+    result = done.result()
+    same_bits(result, whole)
+    assert result.figure == whole.figure and result.notes == whole.notes and result.points == whole.points
+    written = result.save(tmp_path / "a", only=["csv", "svg"])
+    whole.save(tmp_path / "b", only=["csv", "svg"])
+    for path in written:
+        if path.name != "record.json":
+            assert path.read_bytes() == (tmp_path / "b" / "many" / path.name).read_bytes()
+    # nothing is computed again
+    stamps = {file: file.stat().st_mtime_ns for file in done.files("curve")}
+    again = stickslip.campaign(study, out=tmp_path / "c")
+    assert {file: file.stat().st_mtime_ns for file in again.files("curve")} == stamps
+
+
+def test_parts_are_read_lazily_and_summed_up(study, whole, tmp_path):
+    done = stickslip.campaign(study, out=tmp_path, processes=1, seconds=0.05)
+    curve = whole["curve"]
+    frame = pytest.importorskip("polars") and done.table("curve").collect()
+    assert frame["blade1_amplitude_m"].to_numpy().tobytes() == curve["blade1_amplitude_m"].tobytes()
+    assert done.table(library="pyarrow").count_rows() == len(curve)
+    amplitude, frequency = curve["blade1_amplitude_m"], curve["frequency_Hz"]
+    x, bands = done.percentiles("blade1_amplitude_m", (5, 50, 95), by="frequency_Hz")
+    np.testing.assert_array_equal(x, np.unique(frequency))
+    np.testing.assert_allclose(bands[3], np.percentile(amplitude[frequency == x[3]], [5, 50, 95]))
+    np.testing.assert_allclose(done.percentiles("blade1_amplitude_m", 50), np.median(amplitude))
+    level = float(np.median(amplitude))
+    assert done.exceedance("blade1_amplitude_m", [0.0, level, 1.0]).tolist() == [1.0, np.mean(amplitude > level), 0.0]
+    by = done.sensitivity("blade1_amplitude_m", ["Ft_N", "frequency_Hz"])
+    assert 0 <= by["Ft_N"] < by["frequency_Hz"] <= 1
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    assert done.plot("blade1_amplitude_m", by="frequency_Hz").axes[0].get_xlabel() == "frequency_Hz"
+
+
+def test_a_campaign_that_is_killed_goes_on(study, whole, tmp_path):
+    (tmp_path / "study.toml").write_text(CASES)
+    script = tmp_path / "run.py"
+    script.write_text(
+        textwrap.dedent(
+            """
+            import stickslip
+            if __name__ == "__main__":
+                study = stickslip.Study.from_text(open("study.toml").read(), name="many")
+                stickslip.campaign(study, out="c", processes=2, seconds=0.01)
+            """
+        )
+    )
+    kept = []
+    for wait in (1, 2, 4):  # parts that are there when it is killed
+        process = subprocess.Popen([sys.executable, script], cwd=tmp_path, start_new_session=True)
+        done = tmp_path / "c" / "done"
+        deadline = time.monotonic() + 60
+        while process.poll() is None and time.monotonic() < deadline:
+            if done.exists() and len(list(done.glob("*.json"))) >= len(kept) + wait:
+                os.killpg(process.pid, signal.SIGKILL)
+                break
+            time.sleep(0.001)
+        process.wait()
+        kept = list(done.glob("*.json"))
+        assert process.returncode == -signal.SIGKILL or len(kept) > 2
+    # a part without what is said of it was never computed
+    orphan = tmp_path / "c" / "parts" / "curve" / f"{0:012}-{study.units:012}.parquet"
+    orphan.write_bytes(b"half a file")
+    finished = stickslip.campaign(study, out=tmp_path / "c", processes=2)
+    same_bits(finished.result(), whole)
+
+
+def test_a_folder_of_another_study_is_refused(study, tmp_path):
+    stickslip.campaign(study.set(Ft="1 N"), out=tmp_path, processes=1)
+    with pytest.raises(stickslip.CampaignError, match="another study"):
+        stickslip.campaign(study, out=tmp_path)
+    with pytest.raises(stickslip.CampaignError, match="no campaign"):
+        stickslip.Campaign(tmp_path / "nothing")
+    with pytest.raises(stickslip.CampaignError, match="no table `curves`"):
+        stickslip.Campaign(tmp_path).table("curves")
+    (tmp_path / "campaign.json").write_text("{")
+    with pytest.raises(stickslip.CampaignError, match="cannot be read"):
+        stickslip.Campaign(tmp_path)
+
+
+class Scripted:
+    """Workers that fail as they are told, in this process."""
+
+    threads = 2
+
+    def __init__(self, study, fails):
+        self.study, self.fails, self.tried, self.running = study, fails, [], {}
+
+    def submit(self, start, stop, tries, avoid):
+        key = object()
+        self.running[key] = (start, stop)
+        self.tried.append((start, stop, avoid))
+        return key
+
+    def wait(self, running):
+        return running[:1]
+
+    def answer(self, future):
+        start, stop = self.running[future]
+        for unit in range(start, stop):
+            if self.fails(unit, sum(first <= unit < last for first, last, _ in self.tried)):
+                raise RuntimeError(f"unit {unit} broke down")
+        return _campaign._work(_campaign.pickle.dumps(self.study), start, stop)
+
+    def where(self, future):
+        return "tcp://first"
+
+    def close(self):
+        pass
+
+
+@pytest.mark.parametrize(
+    "fails, lost", [(lambda unit, times: unit == 7, [7]), (lambda unit, times: unit % 9 == 4 and times < 2, [])], ids=["always", "once"]
+)
+def test_a_unit_that_fails_is_tried_elsewhere_and_kept_with_its_reason(study, whole, tmp_path, fails, lost):
+    campaign = stickslip.Campaign._begin(study, tmp_path)
+    workers = Scripted(study, fails)
+    _campaign._compute(campaign, workers, campaign._missing(), 0.5, lambda units: None)
+    finished = stickslip.Campaign(tmp_path)
+    assert finished.is_complete and list(finished.failed) == lost
+    assert any(avoid == "tcp://first" for _, _, avoid in workers.tried)
+    if lost:
+        assert finished.failed[7] == "RuntimeError: unit 7 broke down"
+        assert finished.table(library="pyarrow").count_rows() == len(whole["curve"]) * (study.units - 1) // study.units
+        with pytest.raises(stickslip.CampaignError, match="units that failed"):
+            finished.result()
+    else:
+        same_bits(finished.result(), whole)
+
+
+def test_a_dask_cluster_gives_the_same_bits_though_a_worker_is_killed(study, whole, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=3, threads_per_worker=1, dashboard_address=None) as cluster:
+        with distributed.Client(cluster) as client:
+            killed = []
+
+            def kill(done, total):
+                if not killed:
+                    killed.append(client.run(os.getpid))
+                    os.kill(next(iter(killed[0].values())), signal.SIGKILL)
+
+            done = stickslip.campaign(study, client=client, out=tmp_path, seconds=0.05, progress=kill)
+            assert killed and done.is_complete and not done.failed
+    same_bits(done.result(), whole)
+    told = [json.loads(file.read_text()) for file in (tmp_path / "done").iterdir()]
+    assert sum(sum(one["points"].values()) for one in told) == study.points
+
+
+def test_sobol_indices_are_those_of_ishigami():
+    pytest.importorskip("scipy")
+    # Ishigami and Homma (1990), a = 7, b = 0.1: closed forms
+    a, b = 7.0, 0.1
+    first = np.array([0.5 * (1 + b * np.pi**4 / 5) ** 2, a**2 / 8, 0.0])
+    both = b**2 * np.pi**8 * (1 / 18 - 1 / 50)
+    total = first + np.array([both, 0.0, both])
+    variance = first.sum() + both
+
+    def ishigami(x):
+        return np.sin(x[:, 0]) + a * np.sin(x[:, 1]) ** 2 + b * x[:, 2] ** 4 * np.sin(x[:, 0])
+
+    found = stickslip.statistics.sobol(ishigami, [(-np.pi, np.pi)] * 3, count=8192, seed=3)
+    np.testing.assert_allclose(found["first"], first / variance, atol=0.02)
+    np.testing.assert_allclose(found["total"], total / variance, atol=0.02)
+    x = np.random.default_rng(2).uniform(-np.pi, np.pi, (20_000, 3))
+    given = [stickslip.statistics.first_order(x[:, i], ishigami(x)) for i in range(3)]
+    np.testing.assert_allclose(given, first / variance, atol=0.03)

@@ -1,0 +1,223 @@
+"""Models by calls: against closed forms, SciPy, and the methods against each other."""
+
+import numpy as np
+import pytest
+from conftest import CONTACT, DAMPING, FORCE, LIMIT, MASS, STIFFNESS, couple
+
+import stickslip
+
+
+def test_a_linear_oscillator_has_its_receptance():
+    model = stickslip.Model()
+    model.mass("m", "200 g")
+    model.spring("m", "ground", stiffness="50 N/mm", damping="2 kg/s")
+    model.force("m", "3 N", phase="30 deg")
+    frequency = np.linspace(20, 120, 41)
+    omega = 2 * np.pi * frequency
+    expected = 3 * np.exp(1j * np.pi / 6) / (50e3 - 0.2 * omega**2 + 2j * omega)
+    table = model.response(frequency)["curve"]
+    np.testing.assert_allclose(table["m_amplitude_m"], abs(expected), rtol=1e-9)
+    np.testing.assert_allclose(table["m_phase_deg"], np.degrees(np.angle(expected)), atol=1e-6)
+    np.testing.assert_array_equal(table["frequency_Hz"], frequency)
+    orbit = model.orbit("60 Hz")
+    expected = 3 * np.exp(1j * np.pi / 6) / (50e3 - 0.2 * (120 * np.pi) ** 2 + 240j * np.pi)
+    assert orbit.first_harmonic["m"] == pytest.approx(expected, rel=1e-9)
+    assert orbit.energy["viscous"] == pytest.approx(np.pi * 2 * 120 * np.pi * abs(expected) ** 2, rel=1e-9)
+    motion = orbit.sample(points=64)
+    assert motion["displacement_m"].shape == (64, 1)
+    np.testing.assert_allclose(
+        motion["displacement_m"][:, 0], (expected * np.exp(2j * np.pi * 60 * motion["time_s"])).real, atol=1e-12
+    )
+
+
+def test_an_orbit_of_the_couple_is_what_scipy_integrates():
+    integrate = pytest.importorskip("scipy.integrate")
+    frequency, period = 121.0, 1 / 121.0
+    orbit = couple().orbit(frequency)
+    joint = orbit.hysteresis("shroud")
+    assert abs(joint["force_N"]).max() == pytest.approx(LIMIT, rel=1e-12)
+    # over a period from the orbit's own start, with the slider's force smoothed by nothing but the clamp
+    start = orbit.start
+    offset = start[0] - start[1] - joint["force_N"][0] / CONTACT
+
+    def steps(count):
+        t = np.linspace(0, period, count + 1)
+        dt, s = t[1], offset
+        x, v = start[:2].copy(), start[2:4].copy()
+
+        def acceleration(time, x, v, s):
+            f = np.clip(CONTACT * (x[0] - x[1] - s), -LIMIT, LIMIT)
+            drive = FORCE * np.cos(2 * np.pi * frequency * time)
+            return (np.array([drive - f, f]) - STIFFNESS * x - DAMPING * v) / MASS
+
+        for time in t[:-1]:
+            a = acceleration(time, x, v, s)
+            half = v + 0.5 * dt * a
+            x = x + dt * half
+            u = x[0] - x[1]
+            s = np.clip(s, u - LIMIT / CONTACT, u + LIMIT / CONTACT)
+            v = half + 0.5 * dt * acceleration(time + dt, x, half + 0.5 * dt * a, s)
+        return np.concatenate([x, v])
+
+    del integrate
+    errors = [np.linalg.norm(steps(n)[:2] - start[:2]) / np.linalg.norm(start[:2]) for n in (2000, 4000)]
+    assert errors[1] < 1e-4 and errors[1] < 0.6 * errors[0]
+
+
+def test_methods_agree_and_give_their_evidence():
+    model = couple()
+    exact = model.orbit("121 Hz", method="event-driven")
+    series = model.orbit("121 Hz", method="harmonic-balance", harmonics=31)
+    assert series.amplitude["blade1"] == pytest.approx(exact.amplitude["blade1"], rel=1e-4)
+    assert exact.evidence["residual"] < 1e-10 and exact.evidence["energy_gap"] < 1e-9
+    assert series.evidence["truncation"] < 1e-3 and series.method == "harmonic-balance"
+    assert exact.stable and abs(exact.multipliers).max() <= 1 + 1e-6
+    # the loss is the area of the loop
+    loop = exact.hysteresis(points=20_000)
+    u, f = (np.append(loop[key], loop[key][0]) for key in ("displacement_m", "force_N"))
+    assert 0.5 * np.sum((f[1:] + f[:-1]) * np.diff(u)) == pytest.approx(exact.dissipation["shroud"], rel=1e-6)
+    again = model.hysteresis("121 Hz", method="event-driven")
+    assert again["loops_summary"]["dissipation_J"][0] == exact.dissipation["shroud"]
+
+
+def test_an_orbit_has_the_same_bits_whatever_was_computed_before():
+    fresh, used = couple(), couple()
+    for frequency in (118.0, 121.0, 124.0, 121.5):
+        used.orbit(frequency)
+    assert (used.orbit(120.0).start == fresh.orbit(120.0).start).all()
+
+
+def test_one_call_for_many_parameters_is_many_calls():
+    limits = np.linspace(0.5, 4.0, 130)
+    together = couple().response("121 Hz", vary={"shroud.limit": limits})["curve"]
+    np.testing.assert_array_equal(together["shroud_limit"], limits)
+    for index in (0, 61, 129):
+        alone = couple(stickslip.law("jenkins", stiffness=CONTACT, limit=limits[index])).orbit("121 Hz")
+        assert together["blade1_amplitude_m"][index] == alone.amplitude["blade1"]
+        assert together["shroud_dissipation_J"][index] == alone.dissipation["shroud"]
+    # every kind of parameter, and a frequency for each point
+    mixed = couple().response(
+        [120.0, 121.0],
+        vary={"blade1.mass": ["181 g", 0.182], "blade3-ground.stiffness": 1e5, "blade1.force": [9.0, 10.0], "blade1-ground.damping": 0.3},
+        threads=1,
+    )["curve"]
+    model = couple()
+    model.set({"blade1.mass": 0.182, "blade3-ground.stiffness": "100 N/mm", "blade1.force": 10, "blade1-ground.damping": 0.3})
+    assert mixed["blade1_amplitude_m"][1] == model.orbit(121).amplitude["blade1"]
+    threads = [couple().response("121 Hz", vary={"shroud.limit": limits}, threads=n)["curve"] for n in (1, 3)]
+    np.testing.assert_array_equal(threads[0]["blade1_amplitude_m"], threads[1]["blade1_amplitude_m"])
+
+
+def test_matrices_are_the_model_that_was_stated_by_masses():
+    sparse = pytest.importorskip("scipy.sparse")
+    linalg = pytest.importorskip("scipy.linalg")
+    n = 60
+    rng = np.random.default_rng(5)
+    stiffness = sparse.diags([2.1 + rng.random(n), -np.ones(n - 1), -np.ones(n - 1)], [0, 1, -1], format="csr") * 1e4
+    mass = np.diag(0.1 + rng.random(n))
+    mass[3, 4] = mass[4, 3] = 0.02  # which no list of masses could say
+    damping = 1e-5 * stiffness
+    places = [f"p{i}" for i in range(n)]
+    model = stickslip.Model.from_matrices(sparse.coo_matrix(mass), stiffness, damping.toarray(), places=places)
+    np.testing.assert_allclose(model.matrices["stiffness"], stiffness.toarray())
+    np.testing.assert_allclose(model.matrices["mass"], mass)
+    model.force("p7", 2.0)
+    omega = 2 * np.pi * 15.0
+    force = np.zeros(n)
+    force[7] = 2.0
+    expected = abs(linalg.solve(stiffness.toarray() - omega**2 * mass + 1j * omega * damping.toarray(), force))
+    found = model.response(15.0)["curve"]
+    np.testing.assert_allclose([found[f"{place}_amplitude_m"][0] for place in places], expected, rtol=1e-7)
+    # a joint and a lumped damper beside them
+    model.mass("damper", 0.05)
+    model.spring("damper", "p3", stiffness=1e4)
+    model.joint("rub", "damper", "p9", stickslip.law("jenkins", stiffness=5e3, limit=0.1))
+    orbit = model.orbit(15.0, method="harmonic-balance", harmonics=9)
+    assert orbit.evidence["energy_gap"] < 1e-6 and orbit.dissipation["rub"] > 0
+
+
+def test_nodes_of_matrices_take_laws_of_several_directions():
+    places = ["tip.x", "tip.y", "root"]
+    stiffness = np.array([[3e4, 0, -1e4], [0, 2e4, 0], [-1e4, 0, 5e4]])
+    model = stickslip.Model.from_matrices(np.eye(3), stiffness, 1e-4 * stiffness, places=places)
+    model.joint("rub", "tip", "ground", stickslip.law("jenkins-2d", stiffness="1e4 N/m", limit=1.0))
+    model.force("tip.x", 5.0)
+    model.force("tip.y", 5.0, phase="90 deg")
+    lumped = stickslip.Model()
+    lumped.mass("tip", 1.0, directions=["x", "y"])
+    lumped.mass("root", 1.0)
+    lumped.spring("tip.x", "root", stiffness=1e4, damping=1.0)
+    for place, value in (("tip.x", 2e4), ("tip.y", 2e4), ("root", 4e4)):
+        lumped.spring(place, "ground", stiffness=value, damping=1e-4 * value)
+    lumped.joint("rub", "tip", "ground", stickslip.law("jenkins-2d", stiffness="1e4 N/m", limit=1.0))
+    lumped.force("tip.x", 5.0)
+    lumped.force("tip.y", 5.0, phase=np.pi / 2)
+    one, other = (each.response([20.0, 22.0], method="harmonic-balance", harmonics=7)["curve"] for each in (model, lumped))
+    for place in ("tip_x", "tip_y", "root"):
+        np.testing.assert_allclose(one[f"{place}_amplitude_m"], other[f"{place}_amplitude_m"], rtol=1e-9)
+
+
+def test_modes_begin_stuck_and_end_free():
+    result = couple().modes((1e-6, 1.0), points=21)
+    table = result["modes"]
+    # in phase the joint does not move: its frequency is the blade's at any amplitude
+    alone = np.sqrt(STIFFNESS / MASS) / (2 * np.pi)
+    second = couple().modes((1e-6, 1.0), mode=2, points=21)["modes"]["frequency_Hz"]
+    stuck = np.sqrt((STIFFNESS + 2 * CONTACT) / MASS) / (2 * np.pi)
+    both = np.sort([table["frequency_Hz"][0], second[0]])
+    np.testing.assert_allclose(both, [alone, stuck], rtol=1e-3)
+    assert second[-1] == pytest.approx(alone, rel=1e-3)
+    known = couple().check()
+    np.testing.assert_allclose(known["free_Hz"], [alone, alone], rtol=1e-12)
+    np.testing.assert_allclose(known["stuck_Hz"], [alone, stuck], rtol=1e-12)
+
+
+def test_laws_take_quantities_and_say_what_they_miss():
+    law = stickslip.law("jenkins", stiffness="10 N/mm", limit=2)
+    assert law.parameters == {"stiffness": 1e4, "limit": 2.0} and law.directions == 1
+    assert set(stickslip.laws()) >= {"coulomb", "jenkins", "iwan", "friction-contact"}
+    bouc = stickslip.law("bouc-wen", stiffness=1e4, beta="1e6 m^-2", gamma=0.0, exponent=2)
+    assert bouc.parameters["beta"] == 1e6
+    for name, parameters, match in [
+        ("jenkin", {}, "there are coulomb"),
+        ("jenkins", {"limit": 2}, "stiffness"),
+        ("jenkins", {"limit": 2, "stiffness": "3 N"}, "stiffness.*force"),
+        ("jenkins", {"limit": -2, "stiffness": 3}, "zero or more"),
+        ("jenkins", {"limit": 2, "stiffness": 3, "mu": 0.1}, "no parameter `mu`"),
+        ("jenkins", {"limit": float("nan"), "stiffness": 3}, "finite"),
+        ("jenkins", {"limit": None, "stiffness": 3}, "a number in SI or a string"),
+        ("coulomb", {"limit": "2 Newton"}, "limit"),
+    ]:
+        with pytest.raises(stickslip.ModelError, match=match):
+            stickslip.law(name, **parameters)
+
+
+def test_wrong_models_are_refused_with_words():
+    model = couple()
+    for match, call in [
+        ("`nobody`", lambda: couple_with(lambda m: m.force("nobody", 1.0))),
+        ("no method `newmark`", lambda: model.orbit(121, method="newmark")),
+        ("no option `harmonic`", lambda: model.orbit(121, method="harmonic-balance", harmonic=3)),
+        ("whole number", lambda: model.orbit(121, method="harmonic-balance", harmonics=2.5)),
+        ("frequency", lambda: model.orbit("121 N")),
+        ("4 numbers", lambda: model.orbit(121, start=np.zeros(2))),
+        ("no parameter", lambda: model.response(121, vary={"shroud.mu": [1, 2]})),
+        ("2 values where 3", lambda: model.response([121, 122, 123], vary={"shroud.limit": [1, 2]}) and None),
+        ("2 x 3", lambda: stickslip.Model.from_matrices(np.eye(2), np.ones((2, 3)), places=["a", "b"])),
+        ("not symmetric", lambda: stickslip.Model.from_matrices(np.eye(2), [[1, 2], [0, 1]], places=["a", "b"])),
+        ("finite", lambda: stickslip.Model.from_matrices(np.eye(2), [[1, np.nan], [0, 1]], places=["a", "b"])),
+        ("1x", lambda: stickslip.Model.from_matrices(np.eye(1), np.eye(1), places=["1x"])),
+    ]:
+        with pytest.raises((stickslip.ModelError, stickslip.MethodError), match=match):
+            call()
+    with pytest.raises(stickslip.OrbitError):
+        model.orbit(0.0)
+    with pytest.raises(stickslip.MethodError, match="event-driven cannot take"):
+        law = stickslip.law("dahl", stiffness=1e4, limit=2)
+        couple(law).orbit(121, method="event-driven")
+
+
+def couple_with(change):
+    model = couple()
+    change(model)
+    return model.orbit(121)

@@ -1,0 +1,126 @@
+"""Laws written in Python: the built-in ones again, with derivatives that differences have."""
+
+import numpy as np
+import pytest
+from conftest import couple
+
+import stickslip
+from stickslip._rate import Dual
+
+K, LIMIT = 1e4, 2.0
+
+
+@stickslip.rate_law(states=1, scale=LIMIT, odd=True)
+def dahl(u, v, z):
+    """f' = K v (1 - f / LIMIT sgn v), the state is f / LIMIT."""
+    return LIMIT * z[0], (K / LIMIT * (v - abs(v) * z[0]))[None]
+
+
+@stickslip.rate_law(odd=True)
+def cubic(u, v, z):
+    return 1e9 * u**3
+
+
+@pytest.mark.parametrize("method", [{"method": "harmonic-balance", "harmonics": 9}, {"method": "shooting"}])
+@pytest.mark.parametrize(
+    "mine, builtin",
+    [(dahl, ("dahl", {"stiffness": K, "limit": LIMIT})), (cubic, ("cubic", {"stiffness": 1e9}))],
+    ids=["dahl", "cubic"],
+)
+def test_a_law_in_python_gives_the_orbit_of_the_builtin_law(method, mine, builtin):
+    name, parameters = builtin
+    own = couple(mine).orbit(118.0, **method)
+    rust = couple(stickslip.law(name, **parameters)).orbit(118.0, **method)
+    for place in ("blade1", "blade3"):
+        assert own.first_harmonic[place] == pytest.approx(rust.first_harmonic[place], rel=1e-10)
+        assert own.amplitude[place] == pytest.approx(rust.amplitude[place], rel=1e-10)
+    assert own.dissipation["shroud"] == pytest.approx(rust.dissipation["shroud"], rel=1e-9, abs=1e-12)
+    assert own.stable == rust.stable
+
+
+def test_many_orbits_of_a_law_in_python_run_on_all_threads():
+    own = couple(dahl).response([117.0, 118.0, 119.0], method="harmonic-balance", harmonics=5, threads=2)
+    rust = couple(stickslip.law("dahl", stiffness=K, limit=LIMIT))
+    rust = rust.response([117.0, 118.0, 119.0], method="harmonic-balance", harmonics=5)
+    np.testing.assert_allclose(own["curve"]["blade1_amplitude_m"], rust["curve"]["blade1_amplitude_m"], rtol=1e-9)
+
+
+def test_own_derivatives_do_as_well():
+    def slopes(u, v, z):
+        by = np.zeros((2, 3, u.size))
+        by[0, 2] = LIMIT
+        by[1, 1] = K / LIMIT * (1 - np.sign(v) * z[0])
+        by[1, 2] = -K / LIMIT * abs(v)
+        return by
+
+    def law(u, v, z):
+        return LIMIT * z[0], (K / LIMIT * (v - abs(v) * z[0]))[None]
+
+    mine = stickslip.rate_law(law, states=1, scale=LIMIT, odd=True, derivatives=slopes)
+    one, other = (couple(each).orbit(118.0, method="harmonic-balance", harmonics=5) for each in (mine, dahl))
+    assert one.amplitude["blade1"] == pytest.approx(other.amplitude["blade1"], rel=1e-12)
+
+
+def test_a_law_may_act_along_two_directions():
+    @stickslip.rate_law(directions=2)
+    def dampers(u, v, z):
+        return np.stack([3.0 * v[0], 3.0 * v[1]])
+
+    model = stickslip.Model()
+    model.mass("m", 1.0, directions=["x", "y"])
+    for place in ("m.x", "m.y"):
+        model.spring(place, "ground", stiffness=1e4)
+        model.force(place, 1.0)
+    model.joint("d", "m", "ground", dampers)
+    orbit = model.orbit(10.0, method="harmonic-balance")
+    omega = 20 * np.pi
+    assert abs(orbit.first_harmonic["m.y"]) == pytest.approx(1 / abs(1e4 - omega**2 + 3j * omega), rel=1e-9)
+
+
+def test_what_a_law_raises_is_raised():
+    @stickslip.rate_law(states=1)
+    def wrong(u, v, z):
+        raise ZeroDivisionError("in the law")
+
+    for method in ("harmonic-balance", "shooting"):
+        with pytest.raises(ZeroDivisionError, match="in the law"):
+            couple(wrong).orbit(118.0, method=method)
+
+    @stickslip.rate_law(states=1)
+    def unknown(u, v, z):
+        return np.sinc(z[0]), v[None]
+
+    with pytest.raises(TypeError, match="derivatives"):
+        couple(unknown).orbit(118.0, method="harmonic-balance")
+
+    @stickslip.rate_law
+    def infinite(u, v, z):
+        return u / 0.0 * 0.0
+
+    with np.errstate(all="ignore"), pytest.raises(stickslip.OrbitError):
+        couple(infinite).orbit(118.0, method="harmonic-balance")
+    with pytest.raises(stickslip.ModelError, match="1 to 3"):
+        stickslip.rate_law(lambda u, v, z: u, directions=4)
+
+
+FUNCTIONS = [
+    lambda a, b: a * b + a / b - 3 / a,
+    lambda a, b: np.exp(a) * np.tanh(b) - np.log(b) + 2.0**a,
+    lambda a, b: np.sqrt(b) + np.arctan(a) * np.sign(a) * abs(a) ** 1.7,
+    lambda a, b: np.where(a > 0.2, a * a, b) + np.maximum(a, b) + np.clip(a, -0.1, 0.1),
+    lambda a, b: np.hypot(a, b) + np.arctan2(a, b) + np.cbrt(b) + np.square(a) + np.log1p(b),
+    lambda a, b: np.sin(a) * np.cos(b) + np.tan(a) + np.sinh(a) * np.cosh(b) + np.expm1(b) + a**3 + b ** (-1),
+    lambda a, b: np.copysign(a, b) + np.arcsinh(b) + np.arcsin(0.5 * a) + np.arccos(0.5 * a) + np.minimum(a, 0.3),
+]
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
+def test_dual_arrays_have_the_derivatives_that_differences_have(function):
+    a, b = np.array([-0.7, 0.05, 0.4, 0.9]), np.array([0.3, 0.8, 1.1, 0.6])
+    ones, zeros = np.ones_like(a), np.zeros_like(a)
+    dual = function(Dual(a, np.stack([ones, zeros])), Dual(b, np.stack([zeros, ones])))
+    step = 1e-6
+    by_a = (function(a + step, b) - function(a - step, b)) / (2 * step)
+    by_b = (function(a, b + step) - function(a, b - step)) / (2 * step)
+    np.testing.assert_allclose(dual.value, function(a, b), rtol=1e-14)
+    np.testing.assert_allclose(dual.slope, [by_a, by_b], rtol=1e-7, atol=1e-7)
