@@ -13,5 +13,6 @@ pub mod lu;
 pub mod maximum;
 pub mod modes;
 pub mod radau;
+pub mod random;
 pub mod signal;
 pub mod sparse;

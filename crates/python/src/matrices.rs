@@ -3,27 +3,20 @@
 use crate::error;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use stickslip::structure::{Structure, StructureError};
-use stickslip_numerics::sparse::{Matrix, MatrixError};
+use pyo3::types::PyDict;
+use std::collections::HashMap;
+use stickslip::model::Place;
+use stickslip::structure::Component;
+use stickslip_numerics::sparse::Matrix;
 
 /// The entries of a matrix: row, column, value.
-pub type Entries = Vec<(usize, usize, f64)>;
-
-/// Matrices over named places.
-#[derive(Clone)]
-pub struct Matrices {
-    /// Names of the rows.
-    pub places: Vec<String>,
-    /// Mass (kg), damping (kg/s), stiffness (N/m).
-    pub entries: [Entries; 3],
-}
+type Entries = Vec<(usize, usize, f64)>;
 
 /// The entries of a square matrix of n rows: an array, or any sparse matrix of SciPy.
-pub fn entries(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Entries> {
+fn entries(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Entries> {
     let py = value.py();
     let size = |rows: usize, columns: usize| {
-        let message =
-            format!("the {what} matrix is {rows} x {columns}, and there are {n} names of places: it must be {n} x {n}");
+        let message = format!("the {what} matrix is {rows} x {columns}, and there are {n} rows: it must be {n} x {n}");
         Err(error::model(py, message))
     };
     if value.hasattr("tocoo")? {
@@ -59,40 +52,75 @@ pub fn entries(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Entri
     Ok(all.map(|((i, k), value)| (i, k, *value)).collect())
 }
 
-impl Matrices {
-    /// The structure of these matrices and of `lumped` springs and masses, over the places of `lumped`; `row` says where a place stands there.
-    pub fn structure(
-        &self,
-        py: Python<'_>,
-        lumped: &Structure,
-        row: &dyn Fn(&str) -> Option<usize>,
-    ) -> PyResult<Structure> {
-        let n = lumped.dofs();
-        let mut rows = Vec::with_capacity(self.places.len());
-        for place in &self.places {
-            rows.push(row(place).ok_or_else(|| {
-                let message = format!("`{place}` is a place of the matrices and cannot be moved: move a place of its own and tie it by a spring");
-                error::model(py, message)
-            })?);
-        }
-        let mut all = self.entries.clone();
-        all.iter_mut().flatten().for_each(|(i, k, _)| (*i, *k) = (rows[*i], rows[*k]));
-        for (i, k, values) in lumped.entries() {
-            all.iter_mut().zip(values).for_each(|(entries, value)| entries.push((i, k, value)));
-        }
-        let refused = |what: &str, cause: &MatrixError| error::model(py, format!("the {what} matrix: {cause}"));
-        let names = ["mass", "damping", "stiffness"];
-        let mut made = Vec::new();
-        for (what, entries) in names.into_iter().zip(all) {
-            let entries = entries.into_iter().filter(|entry| entry.2 != 0.0);
-            made.push(Matrix::from_triplets(n, entries).map_err(|cause| refused(what, &cause))?);
-        }
-        let wrong = |cause: StructureError| error::model(py, cause);
-        match <[Matrix; 3]>::try_from(made) {
-            Ok([mass, damping, stiffness]) => {
-                Structure::sparse(lumped.places().to_vec(), mass, damping, stiffness).map_err(wrong)
+/// A structure of n rows by its matrices of mass (kg), damping (kg/s), if there is one, and stiffness (N/m).
+pub fn component(
+    py: Python<'_>,
+    names: Vec<String>,
+    mass: &Bound<'_, PyAny>,
+    damping: Option<&Bound<'_, PyAny>>,
+    stiffness: &Bound<'_, PyAny>,
+) -> PyResult<Component> {
+    let n = names.len();
+    let matrix = |value: &Bound<'_, PyAny>, what: &str| {
+        let made = Matrix::from_triplets(n, entries(value, n, what)?.into_iter().filter(|entry| entry.2 != 0.0));
+        made.map_err(|cause| error::model(py, format!("the {what} matrix: {cause}")))
+    };
+    let (mass, stiffness) = (matrix(mass, "mass")?, matrix(stiffness, "stiffness")?);
+    let damping = damping.map(|damping| matrix(damping, "damping")).transpose()?;
+    py.detach(|| Component::new(names, mass, damping, stiffness)).map_err(|cause| error::model(py, cause))
+}
+
+/// The places of a model on a structure of n rows, and what the rows are called.
+///
+/// A list names every row; `name.direction` makes nodes. A dictionary names those that are looked at: to the number of their row, or for a node
+/// to a dictionary from its directions to their rows.
+pub fn places(py: Python<'_>, given: &Bound<'_, PyAny>, n: usize) -> PyResult<(Vec<String>, Vec<Place>)> {
+    if let Ok(given) = given.cast::<PyDict>() {
+        let mut places = Vec::new();
+        let row = |row: &Bound<'_, PyAny>, name: &str| {
+            let number: usize = row
+                .extract()
+                .map_err(|_| error::model(py, format!("the row of `{name}` must be a whole number from 0")))?;
+            match number < n {
+                true => Ok(vec![(number, 1.0)]),
+                false => Err(error::model(
+                    py,
+                    format!("`{name}` names row {number}, and the last of the matrices is {}", n.saturating_sub(1)),
+                )),
             }
-            Err(_) => unreachable!("three names make three matrices"),
+        };
+        for (name, at) in given {
+            let name: String = name.extract()?;
+            places.push(match at.cast::<PyDict>() {
+                Err(_) => Place::new(name.as_str(), row(&at, &name)?),
+                Ok(along) => {
+                    let mut node = Place::node(name.as_str(), &[], Vec::new());
+                    for (direction, at) in along {
+                        node.directions.push(direction.extract()?);
+                        node.rows.push(row(&at, &name)?);
+                    }
+                    node
+                }
+            });
+        }
+        return Ok((vec![String::new(); n], places));
+    }
+    let names: Vec<String> = given.extract()?;
+    let mut places: Vec<Place> = Vec::new();
+    let mut nodes: HashMap<&str, usize> = HashMap::new();
+    for (row, name) in names.iter().enumerate() {
+        let rows = vec![(row, 1.0)];
+        match name.split_once('.') {
+            None => places.push(Place::new(name.as_str(), rows)),
+            Some((node, along)) => {
+                let at = *nodes.entry(node).or_insert_with(|| {
+                    places.push(Place::node(node, &[], Vec::new()));
+                    places.len() - 1
+                });
+                places[at].directions.push(along.to_owned());
+                places[at].rows.push(rows);
+            }
         }
     }
+    Ok((names, places))
 }

@@ -1,30 +1,33 @@
 //! Models by calls, and what is computed of them: orbits, responses, loops, modes.
 
 use crate::law::PyLaw;
-use crate::matrices::{Matrices, entries};
 use crate::orbit::PyOrbit;
 use crate::python_law::Written;
 use crate::result::PyResultSet;
 use crate::rows::{self, Row};
 use crate::study::{bar, close};
 use crate::watch::{Watch, watched};
-use crate::{error, quantity};
+use crate::{error, matrices, quantity};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 use serde_json::json;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 use stickslip::curve::modes::{ModeRequest, mode};
 use stickslip::curve::sweep::{BLOCK, Watch as Sweep, sweep};
 use stickslip::dimension::Dimension;
+use stickslip::law::BuildError;
 use stickslip::method::{self, Method, Options, OrbitError, Solver};
-use stickslip::model::{Force, Joint, Mass, Model, ModelError, Motion, Spring, System};
+use stickslip::model::{
+    Force, Joint, Mass, Model, ModelError, Motion, Spring, Substructure, SubstructureDamping, System,
+};
 use stickslip::orbit::Orbit;
+use stickslip::structure::Reduction;
 use stickslip_study::dataset::{Axis, Column, Dataset, Failure, Figure, Panel, Record, Series, Table};
 use stickslip_study::hertz;
 use stickslip_study::run::{CONVERGED, Context, NOT_REACHED};
@@ -48,7 +51,6 @@ use stickslip_study::run::{CONVERGED, Context, NOT_REACHED};
 #[derive(Default)]
 pub struct PyModel {
     model: Model,
-    matrices: Option<Matrices>,
     /// Laws that Python wrote, to ask them what they raised.
     written: Vec<Arc<Written>>,
     /// The system and what finds its orbits, as asked for last.
@@ -72,6 +74,9 @@ fn kept_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solv
     Ok(unsafe { std::mem::transmute::<Box<dyn Solver + Send + '_>, Box<dyn Solver + Send + 'static>>(solver) })
 }
 
+/// Degrees of freedom up to which the natural frequencies of a model are computed in full, in a second.
+const MOST_SURVEYED: usize = 600;
+
 /// What orbits of a model are sought with.
 struct Asked {
     system: Arc<System>,
@@ -93,20 +98,7 @@ impl PyModel {
     }
 
     fn system(&self, py: Python<'_>) -> PyResult<System> {
-        self.system_of(py, &self.model)
-    }
-
-    fn system_of(&self, py: Python<'_>, model: &Model) -> PyResult<System> {
-        let system = model.assemble().map_err(|cause| refused(py, &cause))?;
-        match &self.matrices {
-            None => Ok(system),
-            Some(matrices) => {
-                let rows: HashMap<&str, usize> =
-                    system.places().iter().enumerate().map(|(row, place)| (place.as_str(), row)).collect();
-                let structure = matrices.structure(py, system.structure(), &|place| rows.get(place).copied())?;
-                system.on(structure).map_err(|cause| error::model(py, cause))
-            }
-        }
+        self.model.assemble().map_err(|cause| refused(py, &cause))
     }
 
     fn asked(&self, py: Python<'_>, name: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Asked> {
@@ -131,7 +123,7 @@ impl PyModel {
             failures: told.failures,
             record: Record {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
-                study: json!({ "kind": name, "model": self.model, "matrices": self.matrices.is_some() }),
+                study: json!({ "kind": name, "model": self.model }),
                 methods: told.methods,
                 seed: None,
                 threads: told.threads,
@@ -142,46 +134,52 @@ impl PyModel {
         })
     }
 
-    /// Gives a parameter of the model another value, SI.
-    fn put(model: &mut Model, name: &str, value: f64) -> bool {
-        let Some((of, key)) = name.rsplit_once('.') else { return false };
+    /// Gives a parameter of the model, one that `dimension` knows, another value, SI.
+    ///
+    /// # Errors
+    /// The value is none that the law can have. Those of masses, springs, forces and motions are checked when the model is assembled.
+    fn put(model: &mut Model, name: &str, value: f64) -> Result<(), BuildError> {
+        let Some((of, key)) = name.rsplit_once('.') else { return Ok(()) };
         match key {
-            "mass" => each(model.masses.iter_mut().filter(|mass| mass.name == of), |mass| mass.mass = value),
-            "force" => each(model.forces.iter_mut().filter(|force| force.on == of), |force| force.amplitude = value),
+            "mass" => model.masses.iter_mut().filter(|mass| mass.name == of).for_each(|mass| mass.mass = value),
+            "force" => model.forces.iter_mut().filter(|force| force.on == of).for_each(|force| force.amplitude = value),
             "motion" => {
-                each(model.motions.iter_mut().filter(|motion| motion.on == of), |motion| motion.amplitude = value)
+                model.motions.iter_mut().filter(|motion| motion.on == of).for_each(|motion| motion.amplitude = value);
             }
             "stiffness" | "damping" if of.contains('-') => {
-                let springs = model.springs.iter_mut().filter(|spring| spring.between.join("-") == of);
-                each(springs, |spring| {
-                    *(if key == "stiffness" { &mut spring.stiffness } else { &mut spring.damping }) = value
-                })
+                for spring in model.springs.iter_mut().filter(|spring| spring.between.join("-") == of) {
+                    *(if key == "stiffness" { &mut spring.stiffness } else { &mut spring.damping }) = value;
+                }
             }
             _ => {
-                let mut joints = model.joints.iter_mut().filter(|joint| joint.name == of);
-                let Some(joint) = joints.next() else { return false };
-                match joint.law.with(key, value) {
-                    Some(law) => joint.law = law,
-                    None => return false,
+                for joint in model.joints.iter_mut().filter(|joint| joint.name == of) {
+                    let info = joint.law.info();
+                    let keys = info.parameters.iter().map(|parameter| parameter.key);
+                    let mut values: BTreeMap<&str, f64> = keys.zip(joint.law.values()).collect();
+                    values.insert(key, value);
+                    joint.law = info.build(&values)?;
                 }
-                true
             }
         }
+        Ok(())
     }
 
-    /// The dimension of a parameter that `put` takes.
+    /// The dimension of a parameter of the model; `None` if it has none of this name.
     fn dimension(&self, name: &str) -> Option<Dimension> {
         let (of, key) = name.rsplit_once('.')?;
+        let model = &self.model;
+        let springs = || model.springs.iter().any(|spring| spring.between.join("-") == of);
         match key {
-            "mass" => Some(Dimension::MASS),
-            "force" => Some(Dimension::FORCE),
-            "motion" => Some(Dimension::LENGTH),
-            "stiffness" if of.contains('-') => Some(Dimension::STIFFNESS),
-            "damping" if of.contains('-') => Some(Dimension::DAMPING),
+            "mass" => model.masses.iter().any(|mass| mass.name == of).then_some(Dimension::MASS),
+            "force" => model.forces.iter().any(|force| force.on == of).then_some(Dimension::FORCE),
+            "motion" => model.motions.iter().any(|motion| motion.on == of).then_some(Dimension::LENGTH),
+            "stiffness" if of.contains('-') => springs().then_some(Dimension::STIFFNESS),
+            "damping" if of.contains('-') => springs().then_some(Dimension::DAMPING),
             _ => {
-                let law = &self.model.joints.iter().find(|joint| joint.name == of)?.law;
+                let law = &model.joints.iter().find(|joint| joint.name == of)?.law;
                 let parameter = law.info().parameters.iter().find(|parameter| parameter.key == key)?;
-                parameter.dimension_under(|key| law.value(key))
+                // what is raised to a power that is no whole number is a plain number
+                Some(parameter.dimension_under(|key| law.value(key)).unwrap_or(Dimension::NONE))
             }
         }
     }
@@ -191,8 +189,7 @@ impl PyModel {
         let mut along = Along::new();
         for (name, values) in vary.into_iter().flatten() {
             let name: String = name.extract()?;
-            let known = self.dimension(&name).filter(|_| PyModel::put(&mut self.model.clone(), &name, 0.0));
-            let Some(dimension) = known else {
+            let Some(dimension) = self.dimension(&name) else {
                 let message = format!(
                     "`{name}` is no parameter of the model: say JOINT.KEY for a parameter of its law, PLACE.mass, PLACE.force, PLACE.motion, \
                      A-B.stiffness or A-B.damping"
@@ -201,6 +198,9 @@ impl PyModel {
             };
             let values = quantity::many(&values, dimension, &format!("`{name}`"))?;
             along.push((name, values));
+        }
+        if omegas.is_empty() {
+            return Err(error::model(py, "`frequency` has no values"));
         }
         let count = along.iter().map(|(_, values)| values.len()).chain([omegas.len()]).max().unwrap_or(0);
         let lists = along.iter_mut().map(|(name, values)| (name.as_str(), values));
@@ -217,13 +217,6 @@ impl PyModel {
         }
         Ok(along)
     }
-}
-
-fn each<'a, T: 'a>(all: impl Iterator<Item = &'a mut T>, mut change: impl FnMut(&mut T)) -> bool {
-    all.fold(false, |_, one| {
-        change(one);
-        true
-    })
 }
 
 fn refused(py: Python<'_>, cause: &ModelError) -> PyErr {
@@ -293,45 +286,47 @@ impl PyModel {
 
     /// A model whose structure is given by matrices: arrays, or sparse matrices of SciPy, n × n, in kg, N/m and kg/s.
     ///
-    /// ``places`` names the rows; ``"tip.x"`` and ``"tip.y"`` make a node ``"tip"`` for joints of several directions. Masses, springs, joints and
-    /// forces may be added.
+    /// ``places``: a list that names all rows, where ``"tip.x"`` and ``"tip.y"`` make a node ``"tip"`` for joints of several directions; or a
+    /// dictionary of those that are looked at: ``{"tip": 12, "foot": {"x": 3, "y": 4}}`` (rows from 0).
+    /// ``reduce``: the highest frequency of interest, of the drive with all harmonics that count; the structure is then brought into as few
+    /// coordinates as leave an error of 1e-4 up to there. ``damping_ratio``: that of every mode, instead of ``damping``.
+    /// Masses, springs, joints, forces and motions may be added.
     ///
     /// >>> import numpy as np, stickslip
     /// >>> model = stickslip.Model.from_matrices(np.eye(2), [[2, -1], [-1, 2]], places=["a", "b"])
     /// >>> model.places
     /// ['a', 'b']
     #[staticmethod]
-    #[pyo3(signature = (mass, stiffness, damping=None, *, places))]
+    #[pyo3(signature = (mass, stiffness, damping=None, *, places, damping_ratio=None, reduce=None))]
     fn from_matrices(
         py: Python<'_>,
         mass: Bound<'_, PyAny>,
         stiffness: Bound<'_, PyAny>,
         damping: Option<Bound<'_, PyAny>>,
-        places: Vec<String>,
+        places: Bound<'_, PyAny>,
+        damping_ratio: Option<Bound<'_, PyAny>>,
+        reduce: Option<Bound<'_, PyAny>>,
     ) -> PyResult<PyModel> {
-        let n = places.len();
-        let damping = match damping {
-            Some(damping) => entries(&damping, n, "damping")?,
-            None => Vec::new(),
+        // of a list its length is that of the matrices, or they are refused
+        let n = match places.cast::<PyDict>() {
+            Ok(_) if stiffness.hasattr("shape")? => stiffness.getattr("shape")?.get_item(0)?.extract()?,
+            Ok(_) => stiffness.len()?,
+            Err(_) => places.len()?,
         };
-        let all = [entries(&mass, n, "mass")?, damping, entries(&stiffness, n, "stiffness")?];
-        let mut masses: Vec<Mass> = Vec::new();
-        let mut nodes: HashMap<&str, usize> = HashMap::new();
-        for place in &places {
-            match place.split_once('.') {
-                None => masses.push(Mass::new(place.as_str(), 0.0)),
-                Some((node, along)) => {
-                    let at = *nodes.entry(node).or_insert_with(|| {
-                        masses.push(Mass::new(node, 0.0));
-                        masses.len() - 1
-                    });
-                    masses[at].directions.push(along.to_owned());
-                }
-            }
-        }
-        let model = Model { masses, ..Model::default() };
-        let made = PyModel { model, matrices: Some(Matrices { places, entries: all }), ..PyModel::default() };
-        made.system(py)?;
+        let (names, places) = matrices::places(py, &places, n)?;
+        let component = matrices::component(py, names, &mass, damping.as_ref(), &stiffness)?;
+        let damping = match (damping_ratio, damping) {
+            (None, _) => SubstructureDamping::Own,
+            (Some(ratio), None) => SubstructureDamping::Ratio(quantity::si(&ratio, Dimension::NONE, "damping_ratio")?),
+            (Some(_), Some(_)) => return Err(error::model(py, "give `damping` or `damping_ratio`, not both")),
+        };
+        let reduction = match reduce {
+            None => Reduction::None,
+            Some(reduce) => Reduction::up_to(quantity::si(&reduce, Dimension::FREQUENCY, "reduce")?),
+        };
+        let substructure = Some(Substructure { component, damping, reduction });
+        let made = PyModel::from_model(Model { substructure, places, ..Model::default() });
+        py.detach(|| made.model.assemble()).map_err(|cause| refused(py, &cause))?;
         Ok(made)
     }
 
@@ -405,14 +400,22 @@ impl PyModel {
     /// Gives parameters other values: ``model.set({"shroud.limit": "3 N", "a.mass": 0.2, "a-ground.stiffness": 1e5, "a.force": 5})``.
     fn set(&mut self, py: Python<'_>, values: &Bound<'_, PyDict>) -> PyResult<()> {
         let along = self.along(py, Some(values), &mut vec![1.0])?;
-        along.iter().for_each(|(name, values)| {
-            PyModel::put(&mut self.model, name, values[0]);
-        });
+        if let Some((name, values)) = along.iter().find(|(_, values)| values.len() > 1) {
+            return Err(error::model(
+                py,
+                format!("`{name}` takes one value here, found {}; `response` varies it", values.len()),
+            ));
+        }
+        let mut model = self.model.clone();
+        for (name, values) in &along {
+            PyModel::put(&mut model, name, values[0]).map_err(|cause| error::model(py, cause))?;
+        }
+        self.model = model;
         self.changed();
         Ok(())
     }
 
-    /// Names of the degrees of freedom.
+    /// Names of the places at which results are given.
     #[getter]
     fn places(&self, py: Python<'_>) -> PyResult<Vec<String>> {
         Ok(self.system(py)?.places().to_vec())
@@ -461,7 +464,7 @@ impl PyModel {
         out.set_item("places", asked.system.places())?;
         out.set_item("joints", self.joints())?;
         out.set_item("method", choice.to_string())?;
-        if self.matrices.is_none() {
+        if asked.system.dofs() <= MOST_SURVEYED {
             let survey = py.detach(|| self.model.survey()).map_err(|cause| refused(py, &cause))?;
             let hertz =
                 |modes: &stickslip::model::Modes| modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>();
@@ -686,7 +689,7 @@ impl PyModel {
 
     fn __repr__(&self) -> String {
         let model = &self.model;
-        let matrices = self.matrices.as_ref().map(|matrices| format!(", matrices of {} places", matrices.places.len()));
+        let own = model.substructure.as_ref().map(|own| format!(", matrices of {} rows", own.component.dofs()));
         format!(
             "<stickslip.Model: {} masses, {} springs, {} joints, {} forces, {} motions{}>",
             model.masses.len(),
@@ -694,7 +697,7 @@ impl PyModel {
             model.joints.len(),
             model.forces.len(),
             model.motions.len(),
-            matrices.unwrap_or_default()
+            own.unwrap_or_default()
         )
     }
 }
@@ -736,17 +739,11 @@ impl PyModel {
                 return Ok(None);
             }
             let mut model = self.model.clone();
-            along.iter().for_each(|(name, values)| {
-                PyModel::put(&mut model, name, values[index]);
-            });
             let at = |message: String| format!("point {index}: {message}");
+            for (name, values) in along {
+                PyModel::put(&mut model, name, values[index]).map_err(|cause| Refusal::Model(at(cause.to_string())))?;
+            }
             let system = model.assemble().map_err(|cause| Refusal::Model(at(cause.to_string())))?;
-            let system = match &self.matrices {
-                // forces and joints may differ, and the structure by its springs
-                Some(_) => Python::attach(|py| self.system_of(py, &model))
-                    .map_err(|cause| Refusal::Model(at(cause.to_string())))?,
-                None => system,
-            };
             let solver = asked.method.solver(&system);
             let mut solver = solver.map_err(|cause| Refusal::Method(at(cause.to_string())))?;
             let outcome = solver.orbit(omegas[index], None);

@@ -166,9 +166,11 @@ impl PyOrbit {
         py.detach(|| {
             for &time in &times {
                 let sample = self.orbit.sample(time);
-                signals[0].extend(sample.displacement);
-                signals[1].extend(sample.velocity);
-                signals[2].extend(sample.acceleration);
+                for (signal, values) in
+                    signals.iter_mut().zip([&sample.displacement, &sample.velocity, &sample.acceleration])
+                {
+                    signal.extend(self.system.seen().iter().map(|place| place.along(values)));
+                }
             }
         });
         let out = PyDict::new(py);

@@ -50,7 +50,7 @@ impl Row {
     fn missing(system: &System, omega: f64) -> Row {
         Row {
             omega,
-            places: vec![[f64::NAN; 3]; system.dofs()],
+            places: vec![[f64::NAN; 3]; system.places().len()],
             joints: vec![[f64::NAN; 2]; system.joints().len()],
             stable: None,
             evidence: [f64::NAN; 4],

@@ -157,6 +157,27 @@ def test_nodes_of_matrices_take_laws_of_several_directions():
         np.testing.assert_allclose(one[f"{place}_amplitude_m"], other[f"{place}_amplitude_m"], rtol=1e-9)
 
 
+def test_a_large_structure_is_reduced_to_what_is_looked_at():
+    sparse = pytest.importorskip("scipy.sparse")
+    linalg = pytest.importorskip("scipy.sparse.linalg")
+    n = 3000  # a rod of masses on springs, held at its beginning
+    stiffness = 1e7 * sparse.diags([np.append(2 * np.ones(n - 1), 1.0), -np.ones(n - 1), -np.ones(n - 1)], [0, 1, -1], format="csc")
+    mass = 1e-3 * sparse.identity(n, format="csc")
+    damping = 1e-5 * stiffness
+    places = {"tip": n - 1, "middle": {"x": n // 2}}
+    model = stickslip.Model.from_matrices(mass, stiffness, damping, places=places, reduce="200 Hz")
+    model.force("tip", 3.0)
+    omega = 2 * np.pi * 60.0
+    force = np.zeros(n)
+    force[-1] = 3.0
+    expected = abs(linalg.spsolve((stiffness - omega**2 * mass + 1j * omega * damping).tocsc(), force))
+    orbit = model.orbit("60 Hz")
+    assert list(orbit.amplitude) == model.places == ["tip", "middle.x"] and orbit.start.size < 100
+    np.testing.assert_allclose(list(orbit.amplitude.values()), expected[[n - 1, n // 2]], rtol=2e-4)
+    sampled = orbit.sample(points=4096)["displacement_m"]
+    np.testing.assert_allclose(abs(sampled).max(axis=0), expected[[n - 1, n // 2]], rtol=2e-4)
+
+
 def test_modes_begin_stuck_and_end_free():
     result = couple().modes((1e-6, 1.0), points=21)
     table = result["modes"]
@@ -203,6 +224,9 @@ def test_wrong_models_are_refused_with_words():
         ("4 numbers", lambda: model.orbit(121, start=np.zeros(2))),
         ("no parameter", lambda: model.response(121, vary={"shroud.mu": [1, 2]})),
         ("2 values where 3", lambda: model.response([121, 122, 123], vary={"shroud.limit": [1, 2]}) and None),
+        ("more than zero", lambda: model.response(121, vary={"shroud.stiffness": [1e4, 0]})),
+        ("takes one value", lambda: model.set({"shroud.limit": [1, 2]})),
+        ("no values", lambda: model.response([])),
         ("2 x 3", lambda: stickslip.Model.from_matrices(np.eye(2), np.ones((2, 3)), places=["a", "b"])),
         ("not symmetric", lambda: stickslip.Model.from_matrices(np.eye(2), [[1, 2], [0, 1]], places=["a", "b"])),
         ("finite", lambda: stickslip.Model.from_matrices(np.eye(2), [[1, np.nan], [0, 1]], places=["a", "b"])),

@@ -343,6 +343,7 @@ mod tests {
     use super::*;
     use crate::output::write_dataset;
     use std::fs;
+    use stickslip_study::read_study;
     use stickslip_study::run::Context;
     use tempfile::TempDir;
 

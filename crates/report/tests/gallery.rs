@@ -15,7 +15,7 @@ const UPDATE: &str = "STICKSLIP_UPDATE_BOOK";
 const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-report --test gallery";
 
 /// The studies, in the order of the page.
-const STUDIES: [&str; 23] = [
+const STUDIES: [&str; 26] = [
     "underplatform_damper",
     "best_slip_force",
     "slip_limit_map",
@@ -24,6 +24,9 @@ const STUDIES: [&str; 23] = [
     "ring_of_blades",
     "mistuned_ring",
     "friction_ring",
+    "disk_diameters",
+    "campbell",
+    "mistuned_disk",
     "bolted_joint",
     "ring_down",
     "nonlinear_modes",

@@ -116,6 +116,13 @@ impl Table {
     pub fn index(&self) -> HashMap<&str, &Column> {
         self.columns.iter().rev().map(|column| (column.name.as_str(), column)).collect()
     }
+    /// The counts of a column.
+    pub fn integers(&self, column: &str) -> Option<&[u64]> {
+        match &self.column(column)?.values {
+            Values::Integer(values) => Some(values),
+            _ => None,
+        }
+    }
     /// The words of a column.
     pub fn texts(&self, column: &str) -> Option<&[String]> {
         self.column(column).and_then(|c| match &c.values {

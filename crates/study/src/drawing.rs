@@ -55,7 +55,9 @@ impl<'a> Drawing<'a> {
 
     /// Whether the figure shows a mass or joint of this name.
     pub(crate) fn shows(&self, name: &str) -> bool {
-        self.options().names("only").is_none_or(|names| names.iter().any(|shown| shown == name || is_of(shown, name)))
+        let sectors = self.study.structure.lists.disk.is_some();
+        let is = |shown: &String| shown == name || is_of(shown, name) || (sectors && is_of_sector(shown, name));
+        self.options().names("only").is_none_or(|names| names.iter().any(is))
     }
 
     /// How curves of so many masses and cases are laid out.
@@ -195,4 +197,12 @@ pub(crate) fn largest(table: &Table, columns: impl IntoIterator<Item = String>) 
 /// Whether `name` is an axis or a direction of what `whole` names: `root.x` of `root`.
 fn is_of(whole: &str, name: &str) -> bool {
     name.strip_prefix(whole).is_some_and(|rest| rest.starts_with('.'))
+}
+
+/// Whether `name` is what a disk's sector calls `whole`: `blade_3`, or `blade_3.x`, of `blade`; `blade_3.x` of `blade.x`.
+fn is_of_sector(whole: &str, name: &str) -> bool {
+    let (node, along) = whole.split_once('.').map_or((whole, None), |(node, along)| (node, Some(along)));
+    let (in_ring, direction) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));
+    let number = in_ring.strip_prefix(node).and_then(|rest| rest.strip_prefix('_'));
+    number.is_some_and(|number| number.parse::<usize>().is_ok()) && (along.is_none() || along == direction)
 }

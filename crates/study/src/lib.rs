@@ -9,6 +9,7 @@ mod columns;
 pub mod cost;
 pub mod dataset;
 mod decay;
+mod disk;
 mod document;
 mod drawing;
 mod error;

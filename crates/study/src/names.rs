@@ -1,5 +1,5 @@
 //! The names of a model in the values of a key: of places, of joints, of moved places. A node stands for all its directions, a joint of nodes
-//! likewise; where a key takes one place, it is refused with its directions named.
+//! likewise, and on a disk what a sector calls it for all sectors; where a key takes one place, it is refused with its directions named.
 
 use crate::info::Complaint;
 use crate::near::{nearest, one_of, shown};
@@ -32,7 +32,27 @@ impl Names {
     /// The places of the structure and of all masses, and their nodes.
     pub fn of_places(model: &Model) -> Names {
         let places = model.places.iter().flat_map(|place| entries(&place.name, place.places()));
-        Names { known: places.chain(of_masses(model)).collect() }
+        let mut names = Names { known: places.chain(of_masses(model)).collect() };
+        names.around(model, model.masses.iter().map(|mass| (mass.name.as_str(), mass.places())).collect());
+        names
+    }
+
+    /// What is called `blade` in a sector stands for those of all sectors. `all` are the elements of the ring in their order.
+    fn around(&mut self, model: &Model, all: Vec<(&str, Vec<String>)>) {
+        let Some(ring) = model.ring else { return };
+        let each = all.len() / ring.sectors.max(1);
+        for (i, (name, _)) in all.iter().enumerate().take(each) {
+            let Some(name) = name.strip_suffix("_0") else { continue };
+            let labels: Vec<Vec<String>> = all.iter().skip(i).step_by(each).map(|(_, labels)| labels.clone()).collect();
+            if labels.first().is_some_and(|labels| labels.len() > 1) {
+                for along in 0..labels[0].len() {
+                    let Some((_, direction)) = labels[0][along].split_once('.') else { continue };
+                    let these = labels.iter().map(|labels| labels[along].clone()).collect();
+                    self.known.push((format!("{name}.{direction}"), these));
+                }
+            }
+            self.known.push((name.to_owned(), labels.into_iter().flatten().collect()));
+        }
     }
 
     /// Those of masses whose motion is not imposed.
@@ -46,8 +66,10 @@ impl Names {
     /// The joints too, with their directions.
     #[must_use]
     pub fn and_joints(mut self, model: &Model) -> Names {
-        let labelled = model.joints.iter().zip(model.joint_labels());
-        self.known.extend(labelled.flat_map(|(joint, labels)| entries(&joint.name, labels)));
+        let labels = model.joint_labels();
+        let all: Vec<(&str, Vec<String>)> = model.joints.iter().map(|joint| joint.name.as_str()).zip(labels).collect();
+        self.known.extend(all.iter().flat_map(|(name, labels)| entries(name, labels.clone())));
+        self.around(model, all);
         self
     }
 
@@ -85,8 +107,8 @@ impl Names {
         match self.all(key, what, name)? {
             [one] => Ok(one),
             several => {
-                let message = format!("`{name}` has several directions, and one is needed");
-                let help = format!("say {}", one_of(several.iter().map(String::as_str)));
+                let message = format!("`{name}` stands for {} places, and one is needed", several.len());
+                let help = format!("say {}", one_of(several.iter().take(LISTED).map(String::as_str)));
                 Err(Complaint { name: Some(name.to_owned()), ..Complaint::new(key, message, help) })
             }
         }

@@ -3,10 +3,12 @@
 //! - `reader`: what is known while a file is read;
 //! - `values`: from a node of the tree to a stated value;
 //! - `kinds`: tables whose `kind` says which keys they have;
+//! - `disk`: `[disk]`, and the pattern that it names;
 //! - `lists`: the lists of a model, and entries that are repeated;
 //! - `parameters`: `[parameters]`, `vary`, and values from outside;
 //! - `template`: the model of a template.
 
+mod disk;
 mod kinds;
 mod lists;
 mod parameters;
@@ -126,6 +128,7 @@ pub fn read_stored(name: &str, text: &str, overrides: &[(String, String)]) -> Re
 
 fn read(name: &str, text: &str, overrides: &[(String, String)], mut reader: Reader) -> Result<Study, StudyError> {
     too_big(name, text.len())?;
+    reader.folder = Path::new(name).parent().map(Path::to_owned);
     reader.text(name.to_owned(), text.to_owned());
     let study = reader.study(name, text, overrides);
     match study {

@@ -48,6 +48,12 @@ pub const FILE: &[Key] = &[
     optional("mass", Takes::List(MASS), "point masses, each with one displacement", "[]"),
     optional("spring", Takes::List(SPRING), "springs and dampers", "[]"),
     optional("joint", Takes::List(JOINT), "places that rub", "[]"),
+    optional(
+        "disk",
+        Takes::Table(DISK),
+        "the model is one sector of a bladed disk, with `next.NAME` for the place of that name in the next sector",
+        "{ sectors = 24 }",
+    ),
     optional("force", Takes::List(FORCE), "forces amplitude * cos(harmonic * Omega * t + phase); they add up", "[]"),
     optional("motion", Takes::List(MOTION), "imposed motions of a place; they add up", "[]"),
     required("study", Takes::Study, "what is asked for", "{ kind = \"response\" }"),
@@ -300,6 +306,70 @@ const JOINT: &[Key] = &[
     REPEAT,
 ];
 
+/// The keys of `[disk]`.
+const DISK: &[Key] = &[
+    required(
+        "sectors",
+        Takes::Quantity(Dimension::NONE, Within::Positive),
+        "number of sectors, 2 or more; places of sector n are called `NAME_n`, from 0",
+        "24",
+    ),
+    optional(
+        "mistuning",
+        Takes::Table(MISTUNING),
+        "how sectors differ; absent: all alike, and a travelling wave is solved on one",
+        "{ of = \"k\", deviation = \"2 %\", seed = 7 }",
+    ),
+];
+
+const MISTUNING: &[Key] = &[
+    required(
+        "of",
+        Takes::Names,
+        "what differs: a parameter, a mass, or the two ends of a spring; it is multiplied by 1 + deviation",
+        "\"k\"",
+    ),
+    optional(
+        "deviation",
+        Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
+        "standard deviation of normal deviations",
+        "\"2 %\"",
+    ),
+    optional(
+        "seed",
+        Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
+        "whole number that decides them: the same ones on every machine; 0 when absent",
+        "7",
+    ),
+    optional(
+        "file",
+        Takes::Text,
+        "instead of both: a CSV file with the columns sector, deviation, beside the study file",
+        "\"pattern.csv\"",
+    ),
+];
+
+const ENGINE_ORDER: Key = optional(
+    "engine_order",
+    Takes::Quantity(Dimension::NONE, Within::Finite),
+    "on a disk: sector n leads by 2 pi engine_order n / sectors, a travelling wave; all sectors alike when absent",
+    "3",
+);
+
+const NODAL_DIAMETER: Key = optional(
+    "nodal_diameter",
+    Takes::Quantity(Dimension::NONE, Within::Finite),
+    "on a disk: sector n has the share cos(2 pi nodal_diameter n / sectors), a standing wave",
+    "3",
+);
+
+const ONE_SECTOR: Key = optional(
+    "sector",
+    Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
+    "on a disk: it acts on this sector alone, from 0",
+    "0",
+);
+
 const MOST_HARMONIC: i64 = 1_000;
 
 const FORCE: &[Key] = &[
@@ -307,6 +377,9 @@ const FORCE: &[Key] = &[
     required("amplitude", Takes::Quantity(Dimension::FORCE, Within::Finite), "amplitude", "\"10 N\""),
     default("phase", Takes::Quantity(Dimension::ANGLE, Within::Finite), "0 deg", "phase lead", "\"90 deg\""),
     default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
+    ENGINE_ORDER,
+    NODAL_DIAMETER,
+    ONE_SECTOR,
     REPEAT,
 ];
 
@@ -315,6 +388,9 @@ const MOTION: &[Key] = &[
     required("amplitude", Takes::Quantity(Dimension::LENGTH, Within::Finite), "amplitude", "\"2 mm\""),
     default("phase", Takes::Quantity(Dimension::ANGLE, Within::Finite), "0 deg", "phase lead", "\"90 deg\""),
     default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
+    ENGINE_ORDER,
+    NODAL_DIAMETER,
+    ONE_SECTOR,
     refused(
         "velocity",
         "a place that moves on at a constant velocity, such as a belt, cannot be stated: every motion repeats with the drive",
@@ -394,9 +470,8 @@ pub fn described(takes: &Takes) -> String {
         Takes::Frequencies(keys) => {
             let needed = keys.iter().filter(|key| key.presence == Presence::Required);
             let needed = needed.map(|key| key.name).collect::<Vec<_>>().join(", ");
-            format!(
-                "a frequency (Hz or rad/s), a list of them, or {{ {needed} }}; in a response also {{ from, to, tolerance }}"
-            )
+            let adaptive = if needed.ends_with("points") { "; in a response also { from, to, tolerance }" } else { "" };
+            format!("a frequency (Hz or rad/s), a list of them, or {{ {needed} }}{adaptive}")
         }
         Takes::ByName(dimension) => format!("a table from names to {}", crate::expression::described(*dimension)),
         Takes::Table(keys) | Takes::List(keys) => {

@@ -1,5 +1,6 @@
 //! A study that has been read: its cases, each with its model and the values of its kind.
 
+use crate::disk::{self, Again, StatedDisk};
 use crate::error::{Place, Problem, Source, StudyError};
 use crate::expression::{Value, displayed};
 use crate::figure;
@@ -18,7 +19,7 @@ use std::sync::Arc;
 use stickslip::dimension::Dimension;
 use stickslip::law::{SharedLaw, TANGENTS};
 use stickslip::method::{self, Options};
-use stickslip::model::{Element, Force, Joint, Mass, Model, ModelError, Motion, Spring};
+use stickslip::model::{Around, Element, Force, Joint, Mass, Model, ModelError, Motion, Spring};
 use stickslip::structure::{Component, Reduction};
 
 /// A study file, read and checked.
@@ -142,6 +143,8 @@ pub(crate) struct Lists {
     pub joint: Vec<StatedTable>,
     pub force: Vec<StatedTable>,
     pub motion: Vec<StatedTable>,
+    /// The lists state one sector of it.
+    pub disk: Option<StatedDisk>,
 }
 
 impl Lists {
@@ -446,7 +449,11 @@ impl Study {
             ("figure", _) => Some(&self.figure),
             (_, Some(template)) => Some(&template.table),
             ("structure", None) => self.structure.matrices.as_ref().map(|matrices| &matrices.table),
-            (_, None) => self.structure.lists.get(table).get(index),
+            (_, None) => {
+                // of a ring: that of its sector
+                let list = self.structure.lists.get(table);
+                list.get(if self.structure.lists.disk.is_some() { index % list.len().max(1) } else { index })
+            }
         };
         let whole = Place::default();
         let place = stated.map_or(&whole, |table| match (table.entry(key), &self.structure.template) {
@@ -496,9 +503,18 @@ impl Study {
             let help = "write { from = …, to = …, points = … }; only a response takes a tolerance".to_owned();
             return Err(self.error_at("study", 0, "frequency", message, Some(help)));
         }
+        let mut sectors = None;
         for index in 0..self.cases() {
             let mut problems = Vec::new();
-            self.parts(index, Look::First, &mut problems);
+            let parts = self.parts(index, Look::First, &mut problems);
+            if let Some(found) = parts.and_then(|parts| parts.model.ring).map(|ring| ring.sectors)
+                && *sectors.get_or_insert(found) != found
+            {
+                let message = "the number of sectors is another in another case, and results are named after them";
+                let place = self.structure.lists.disk.as_ref().map(|disk| disk.table.place_of("sectors", None).clone());
+                let problem = Problem::new(&place.unwrap_or_default(), "sectors", message);
+                return Err(StudyError::at(&self.sources, problem.help("make a study for every number of sectors")));
+            }
             if let Some(error) = StudyError::all(&self.sources, problems) {
                 return Err(error);
             }
@@ -588,7 +604,11 @@ impl Study {
             }
         };
         let environment = Environment { names: &self.names, values };
-        let mut model = model_of(&self.structure, &environment, problems);
+        let again = |changed: &[(usize, f64)]| {
+            let fixed: Vec<_> = fixed.iter().chain(changed).copied().collect();
+            evaluate(&self.names, &self.parameters, &self.order, &choice, &fixed)
+        };
+        let mut model = model_of(&self.structure, &environment, &again, problems);
         let values = self.study.values(&environment, problems);
         substructure::settle(&mut model, &values);
         let method = self.method.values(&environment, problems);
@@ -639,72 +659,80 @@ impl Study {
     }
 
     fn model_problem(&self, error: &ModelError, model: &Model) -> Problem {
-        let (list, index) = match error.element {
-            Element::Mass(i) => ("mass", i),
-            Element::Spring(i) => ("spring", i),
-            Element::Joint(i) => ("joint", i),
-            Element::Force(i) => ("force", i),
-            Element::Motion(i) => ("motion", i),
-            Element::Place(i) => ("place", i),
-            Element::Substructure => ("structure", 0),
-            Element::Whole => ("", 0),
-        };
-        let whole = Place::default();
-        let (place, message) = match &self.structure.template {
-            None => {
-                let matrices = self.structure.matrices.as_ref().filter(|_| list == "structure");
-                let table =
-                    matrices.map(|matrices| &matrices.table).or_else(|| self.structure.lists.get(list).get(index));
-                let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
-                (place, table.map_or_else(|| error.message.clone(), |table| table.with_turn(&error.message)))
+        match model.ring {
+            // as they stand in the file: those of a sector
+            Some(ring) => {
+                let element = ring.in_sector(error.element, model);
+                problem_of(&self.structure, &ModelError { element, ..error.clone() }, model)
             }
-            Some(template) => {
-                let place = template.table.place_of(if error.key == "law" { "law" } else { "template" }, None);
-                (place, template.blame(error.element, error.key, &error.message))
-            }
-        };
-        let places = model.place_names();
-        let nodes = Names::of_places(model);
-        let help = match &error.wrong_name {
-            Some(wrong) => {
-                Some(match (nodes.directions_of(wrong), nearest(wrong, places.iter().map(String::as_str))) {
-                    (Some(directions), _) => format!("say {}", one_of(directions.iter().map(String::as_str))),
-                    (None, Some(near)) => format!("did you mean `{near}`?"),
-                    (None, None) => format!(
-                        "the places are {}",
-                        one_of(places.iter().take(20).map(String::as_str)).replace(" or ", ", ")
-                    ),
-                })
-            }
-            None if error.element == Element::Whole && model.substructure.is_some() => {
-                Some("add a [[place]] with a name and a dof".to_owned())
-            }
-            None if error.element == Element::Whole => Some("add a [[mass]] or a [[motion]]".to_owned()),
-            None if error.key == "reduce" => self.advice_on_reduction(model),
-            None if error.key == "name" => Some("choose another name".to_owned()),
-            None => None,
-        };
-        Problem::new(place, error.key, message).maybe_help(help)
-    }
-
-    /// What to do where a structure cannot be reduced: units that were mistaken move its frequencies by powers of ten.
-    fn advice_on_reduction(&self, model: &Model) -> Option<String> {
-        let substructure = model.substructure.as_ref()?;
-        if matches!(substructure.reduction, Reduction::UpTo { up_to, .. } if up_to <= 0.0) {
-            return Some(
-                "this study has no drive frequency that would tell: add reduce = { up_to = \"5 kHz\" }".to_owned(),
-            );
+            None => problem_of(&self.structure, error, model),
         }
-        let component = &substructure.component;
-        let lowest = component.frequencies(LOWEST).ok()?;
-        let listed: Vec<String> = lowest.iter().map(|omega| displayed(*omega, Some(Dimension::FREQUENCY))).collect();
-        Some(format!("its lowest frequencies are {}: are the units right, and `up_to`?", listed.join(", ")))
     }
 
     fn complaint(&self, complaint: Complaint) -> Problem {
         let place = self.study.place_of(complaint.key, complaint.name.as_deref());
         Problem::new(place, complaint.key, complaint.message).maybe_help(complaint.help)
     }
+}
+
+/// What is wrong with a model, at the place in the file that states it; `model` has the names that there are.
+pub(crate) fn problem_of(structure: &Structure, error: &ModelError, model: &Model) -> Problem {
+    let (list, index) = match error.element {
+        Element::Mass(i) => ("mass", i),
+        Element::Spring(i) => ("spring", i),
+        Element::Joint(i) => ("joint", i),
+        Element::Force(i) => ("force", i),
+        Element::Motion(i) => ("motion", i),
+        Element::Place(i) => ("place", i),
+        Element::Substructure => ("structure", 0),
+        Element::Whole => ("", 0),
+    };
+    let whole = Place::default();
+    let (place, message) = match &structure.template {
+        None => {
+            let matrices = structure.matrices.as_ref().filter(|_| list == "structure");
+            let table = matrices.map(|matrices| &matrices.table).or_else(|| structure.lists.get(list).get(index));
+            let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
+            (place, table.map_or_else(|| error.message.clone(), |table| table.with_turn(&error.message)))
+        }
+        Some(template) => {
+            let place = template.table.place_of(if error.key == "law" { "law" } else { "template" }, None);
+            (place, template.blame(error.element, error.key, &error.message))
+        }
+    };
+    let places = model.place_names();
+    let nodes = Names::of_places(model);
+    let help = match &error.wrong_name {
+        Some(wrong) => Some(match (nodes.directions_of(wrong), nearest(wrong, places.iter().map(String::as_str))) {
+            (Some(directions), _) => format!("say {}", one_of(directions.iter().map(String::as_str))),
+            (None, Some(near)) => format!("did you mean `{near}`?"),
+            (None, None) => {
+                format!("the places are {}", one_of(places.iter().take(20).map(String::as_str)).replace(" or ", ", "))
+            }
+        }),
+        None if error.element == Element::Whole && model.substructure.is_some() => {
+            Some("add a [[place]] with a name and a dof".to_owned())
+        }
+        None if error.element == Element::Whole => Some("add a [[mass]] or a [[motion]]".to_owned()),
+        None if error.key == "reduce" => advice_on_reduction(model),
+        None if error.key == "name" => Some("choose another name".to_owned()),
+        None => None,
+    };
+    Problem::new(place, error.key, message).maybe_help(help)
+}
+
+/// What to do where a structure cannot be reduced: units that were mistaken move its frequencies by powers of ten.
+fn advice_on_reduction(model: &Model) -> Option<String> {
+    let substructure = model.substructure.as_ref()?;
+    if matches!(substructure.reduction, Reduction::UpTo { up_to, .. } if up_to <= 0.0) {
+        return Some(
+            "this study has no drive frequency that would tell: add reduce = { up_to = \"5 kHz\" }".to_owned(),
+        );
+    }
+    let component = &substructure.component;
+    let lowest = component.frequencies(LOWEST).ok()?;
+    let listed: Vec<String> = lowest.iter().map(|omega| displayed(*omega, Some(Dimension::FREQUENCY))).collect();
+    Some(format!("its lowest frequencies are {}: are the units right, and `up_to`?", listed.join(", ")))
 }
 
 /// How a case is looked at.
@@ -757,8 +785,31 @@ pub(crate) fn evaluate(
     Ok(environment.values)
 }
 
-pub(crate) fn model_of(structure: &Structure, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Model {
+/// The model: what the lists state, or the ring of which they state a sector. `again` tells the parameters with some of them changed.
+pub(crate) fn model_of(
+    structure: &Structure,
+    environment: &Environment<'_>,
+    again: Again<'_>,
+    problems: &mut Vec<Problem>,
+) -> Model {
+    match &structure.lists.disk {
+        Some(disk) => disk::ring_of(structure, disk, environment, again, problems),
+        None => {
+            let tables = structure.lists.force.iter().chain(&structure.lists.motion);
+            tables.for_each(|table| disk::none_around(table, problems));
+            sector_of(structure, environment, problems).0
+        }
+    }
+}
+
+/// What the lists state, and how its forces and imposed motions go around a disk.
+pub(crate) fn sector_of(
+    structure: &Structure,
+    environment: &Environment<'_>,
+    problems: &mut Vec<Problem>,
+) -> (Model, Vec<Around>, Vec<Around>) {
     let Structure { lists, template, matrices } = structure;
+    let (mut forces, mut motions, mut wrong) = (Vec::new(), Vec::new(), Vec::new());
     let mut model = Model::default();
     let component = matrices.as_ref().and_then(|matrices| matrices.component.as_ref());
     match (matrices, component) {
@@ -823,14 +874,17 @@ pub(crate) fn model_of(structure: &Structure, environment: &Environment<'_>, pro
     for (i, table) in lists.force.iter().enumerate() {
         let values = resolve(Element::Force(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
+        forces.push(disk::around(table, &values, &mut wrong));
         model.forces.push(Force { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }
     for (i, table) in lists.motion.iter().enumerate() {
         let values = resolve(Element::Motion(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
+        motions.push(disk::around(table, &values, &mut wrong));
         model.motions.push(Motion { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }
-    model
+    problems.append(&mut wrong);
+    (model, forces, motions)
 }
 
 /// A law that leaves its number of tangents open, where the file does too, has those of the nodes that it joins: all their directions but the

@@ -1,4 +1,4 @@
-//! Models that come ready: the paper's. Each is one file, `templates/NAME.toml`, a whole study to start from; another
+//! Models that come ready: the paper's, and bladed disks. Each is one file, `templates/NAME.toml`, a whole study to start from; another
 //! study takes its model with `model = { template = "NAME" }` and gives those parameters that it wants otherwise.
 //!
 //! What is known of a template stands in its file: its first line, a comment, is the summary, `[parameters]` are its
@@ -22,8 +22,17 @@ macro_rules! templates {
 }
 
 /// Every template there is.
-pub const TABLE: &[Template] =
-    templates!["element", "element-with-mass", "blade-couple", "blade-couple-massless", "symmetric-couple"];
+pub const TABLE: &[Template] = templates![
+    "element",
+    "element-with-mass",
+    "blade-couple",
+    "blade-couple-massless",
+    "symmetric-couple",
+    "bladed-ring",
+    "bladed-disk",
+    "shroud",
+    "rim-ring",
+];
 
 /// The template with this name.
 pub fn find(name: &str) -> Option<&'static Template> {

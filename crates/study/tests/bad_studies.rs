@@ -159,7 +159,7 @@ fn frequencies() {
     check(range, "\"-1 Hz\"", (46, 14), "frequency", &["more than zero, found -1 Hz"]);
     check(range, "0", (46, 13), "frequency", &["more than zero"]);
     check(range, "[]", (46, 13), "frequency", &["empty"]);
-    check(range, "\"121 1/s\"", (46, 18), "frequency", &["operator"]);
+    check(range, "\"121 1/s\"", (46, 14), "frequency", &["1/s does not say whether it counts radians or cycles"]);
     check(range, "\"121 s^-1\"", (46, 14), "frequency", &["radians or cycles"]);
     check(range, "\"121 N\"", (46, 14), "frequency", &["expected frequency (Hz or rad/s), found force (N)"]);
     check(&format!("frequency = {range}\n"), "", (44, 1), "frequency", &["`frequency` is missing"]);
@@ -399,14 +399,14 @@ fn large_files_are_read_in_reasonable_time() {
             .replace("[\"2 N\", \"4 N\", \"6 N\", \"8 N\"]", "{ from = \"1 N\", to = \"2 N\", points = 100_000 }"),
     );
     // as many masses as are allowed, and more
-    for masses in [4997, 4998] {
+    for masses in [19_997, 19_998] {
         let more: String = (0..masses).map(|i| format!("[[mass]]\nname = \"x{i}\"\nmass = 1\n")).collect();
         let result = read_study(
             "a.toml",
             &EXAMPLE.replace("[[spring]]\nbetween = [\"blade1\"", &format!("{more}[[spring]]\nbetween = [\"blade1\"")),
             &[],
         );
-        assert_eq!(result.is_ok(), masses == 4997);
+        assert_eq!(result.is_ok(), masses == 19_997);
     }
     survives(&EXAMPLE.replace("10 N", &"(".repeat(1_000_000)));
     survives(&EXAMPLE.replace("10 N", &"1+".repeat(1_000_000)));

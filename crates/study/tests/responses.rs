@@ -354,7 +354,9 @@ fn contact_is_said_of_what_has_faces() {
     for method in ["event-driven", "shooting", "harmonic-balance"] {
         let (words, force) = contacts("kind = \"gap\", gap = \"1 mm\", stiffness = \"500 N/m\"", method);
         assert!(words.iter().any(|w| w == "touch") && words.iter().any(|w| w == "open"), "{method}");
-        for (word, force) in words.iter().zip(force).filter(|(_, force)| force.abs() > 1e-3) {
+        // a series of the force passes zero beside the samples that tell the contact
+        let clear = 0.1 * force.iter().copied().fold(0.0, f64::max);
+        for (word, force) in words.iter().zip(force).filter(|(_, force)| force.abs() > clear) {
             assert_eq!(word, if force > 0.0 { "touch" } else { "open" }, "{method}");
         }
         if method != "event-driven" {

@@ -186,7 +186,7 @@ fn bare_numbers_as_angles() {
         template("blade-couple", &[("amplitude = \"F0\"", &format!("amplitude = \"F0\"\nphase = {value}"))])
     };
     // 90 rad are 5156.62 deg
-    warns(&phase("90"), &["`phase` of force 1", "radians", "(5157 deg)", "\"90 deg\""]);
+    warns(&phase("90"), &["`phase` of force 1", "counts as 90 rad", "(5157 deg)", "\"90 deg\""]);
     warns(&phase("\"2 * 45\""), &["90"]);
     for value in ["\"90 deg\"", "\"1.5 rad\"", "\"pi/2\"", "0", "\"pi/2 * 1 rad\""] {
         silent(&phase(value));

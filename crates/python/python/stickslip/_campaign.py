@@ -37,7 +37,7 @@ class CampaignError(StickslipError):
     """A campaign that cannot begin or go on."""
 
 
-def campaign(study, *, out, client=None, processes=None, seconds=BATCH_SECONDS, progress=None):
+def campaign(study, *, out, client=None, processes=None, seconds=BATCH_SECONDS, progress=None, retry=False):
     """Computes all units of ``study`` that ``out`` does not hold yet, and returns the :class:`Campaign`.
 
     ``client``: a Dask client (``distributed.Client``); workers need this package, not this folder. Without one ``processes`` processes of this
@@ -45,10 +45,13 @@ def campaign(study, *, out, client=None, processes=None, seconds=BATCH_SECONDS, 
     ``seconds``: how long a batch should take; its size follows the measured cost. ``progress``: ``True`` for a bar by tqdm, or a function of the
     units done and of all.
 
-    A unit that fails is tried once more, elsewhere, and is then kept with its reason: :attr:`Campaign.failed`. A campaign that was interrupted,
+    A unit that fails is tried once more, elsewhere, and is then kept with its reason: :attr:`Campaign.failed`; ``retry=True`` tries those again. A campaign that was interrupted,
     killed or short of workers goes on when it is called again, and ends with the same numbers, which are those of the command bit for bit.
     """
     begun = Campaign._begin(study, Path(out))
+    if retry and begun.failed:
+        begun._forget_failed()
+        begun = Campaign(out)
     todo = begun._missing()
     if not todo:
         return begun
@@ -75,8 +78,8 @@ def _progress(progress, name: str):
 class _Batches:
     """The ranges to compute, in batches of a size that follows what units cost."""
 
-    def __init__(self, todo, seconds: float, threads: int) -> None:
-        self._todo, self._seconds, self._threads = deque(todo), seconds, threads
+    def __init__(self, todo, seconds: float) -> None:
+        self._todo, self._seconds = deque(todo), seconds
         self._size = 1
         self._cost: float | None = None
 
@@ -88,13 +91,13 @@ class _Batches:
         wanted = int(self._seconds / max(self._cost, 1e-9))
         self._size = max(1, min(wanted, GROWTH * self._size))
 
-    def next(self):
-        """The next range; ``None`` if there is no more."""
+    def next(self, threads: int):
+        """The next range for one of so many threads; ``None`` if there is no more."""
         if not self._todo:
             return None
         left = sum(stop - start for start, stop in self._todo)
         # towards the end smaller, so that all threads end together
-        size = max(1, min(self._size, -(-left // (2 * self._threads))))
+        size = max(1, min(self._size, -(-left // (2 * threads))))
         start, stop = self._todo.popleft()
         if stop - start > size:
             self._todo.appendleft((start + size, stop))
@@ -103,7 +106,7 @@ class _Batches:
 
 
 def _compute(campaign: Campaign, workers, todo, seconds: float, tell) -> None:
-    batches, units = _Batches(todo, seconds, workers.threads), 0
+    batches, units = _Batches(todo, seconds), 0
     running: dict = {}
 
     def begin(start, stop, tries=0, avoid=None):
@@ -111,7 +114,7 @@ def _compute(campaign: Campaign, workers, todo, seconds: float, tell) -> None:
 
     while True:
         while len(running) < AHEAD * workers.threads:
-            batch = batches.next()
+            batch = batches.next(workers.threads)
             if batch is None:
                 break
             begin(*batch)
@@ -124,14 +127,14 @@ def _compute(campaign: Campaign, workers, todo, seconds: float, tell) -> None:
             try:
                 answer = workers.answer(future)
             except Exception as error:  # whatever a worker or its death makes of it
-                tries += 1
+                tries, where = tries + 1, getattr(error, "where", None)
                 if tries < TRIES:
-                    begin(start, stop, tries, workers.where(future))
+                    begin(start, stop, tries, where)
                 elif stop - start > 1:
                     # one of them is to blame: halves find it, each with the last try
                     middle = (start + stop) // 2
-                    begin(start, middle, tries - 1, workers.where(future))
-                    begin(middle, stop, tries - 1, workers.where(future))
+                    begin(start, middle, tries - 1, where)
+                    begin(middle, stop, tries - 1, where)
                 else:
                     campaign._keep(start, stop, {"tables": {}, "failed": _reason(error), "tries": tries})
                     units += 1
@@ -145,6 +148,8 @@ def _compute(campaign: Campaign, workers, todo, seconds: float, tell) -> None:
 
 
 def _reason(error: BaseException) -> str:
+    if isinstance(error, _Failed):
+        return str(error)
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
 
 
@@ -163,6 +168,7 @@ def _work(pickled: bytes, start: int, stop: int) -> dict:
         while len(_STUDIES) >= _MOST_STUDIES:
             _STUDIES.pop(next(iter(_STUDIES)))
         study = _STUDIES[pickled] = pickle.loads(pickled)
+        study._batch(0, 0)  # checks it: no cost of a batch
     begin = time.perf_counter()
     batch = study._batch(start, stop)
     tables = {}
@@ -173,6 +179,28 @@ def _work(pickled: bytes, start: int, stop: int) -> dict:
     return {"told": batch["told"], "points": batch["points"], "tables": tables, "seconds": time.perf_counter() - begin}
 
 
+class _Failed(Exception):
+    """What went wrong on a worker, and on which."""
+
+    def __init__(self, reason: str, where: str | None) -> None:
+        super().__init__(reason)
+        self.where = where
+
+
+def _work_on_dask(pickled: bytes, start: int, stop: int) -> dict:
+    """The same, but an error comes back with the worker's address."""
+    from distributed import get_worker
+
+    try:
+        return _work(pickled, start, stop)
+    except Exception as error:
+        return {"error": _reason(error), "where": get_worker().address}
+
+
+#: How long the number of a cluster's threads is taken as known, s; clusters grow and shrink.
+KNOWN_SECONDS = 2.0
+
+
 class _Dask:
     """Workers of a Dask cluster."""
 
@@ -181,36 +209,43 @@ class _Dask:
 
         self._client, self._name, self._study = client, study.name, pickle.dumps(study)
         self._finished = as_completed([], with_results=False)
-        self.threads = max(1, sum(client.nthreads().values()))
-        self._where: dict = {}
+        self._running: set = set()
+        self._known, self._threads = float("-inf"), 1
+
+    @property
+    def threads(self) -> int:
+        """Threads of all workers; one while there is none yet."""
+        if time.monotonic() > self._known + KNOWN_SECONDS:
+            self._known, self._threads = time.monotonic(), max(1, sum(self._client.nthreads().values()))
+        return self._threads
 
     def submit(self, start: int, stop: int, tries: int, avoid):
         others = [worker for worker in self._client.nthreads() if worker != avoid]
         elsewhere = {"workers": others, "allow_other_workers": True} if avoid and others else {}
         # the name is what the dashboard shows
         key = f"stickslip-{self._name}-{start}-{stop}-{tries}-{time.monotonic_ns()}"
-        future = self._client.submit(_work, self._study, start, stop, key=key, pure=False, retries=0, **elsewhere)
+        future = self._client.submit(_work_on_dask, self._study, start, stop, key=key, pure=False, retries=0, **elsewhere)
         self._finished.add(future)
+        self._running.add(future)
         return future
 
     def wait(self, _running):
         return [next(self._finished)]
 
     def answer(self, future):
-        answer = future.result()
-        future.release()
-        return answer
-
-    def where(self, future):
-        """The worker on which it failed, as far as that is known."""
+        self._running.discard(future)
         try:
-            error = future.exception(timeout=5)
-        except Exception:
-            return None
-        return getattr(getattr(error, "last_worker", None), "address", None)
+            answer = future.result()
+        except Exception as error:  # the worker itself is gone
+            raise _Failed(_reason(error), getattr(getattr(error, "last_worker", None), "address", None)) from error
+        future.release()
+        if "error" in answer:
+            raise _Failed(answer["error"], answer["where"])
+        return answer
 
     def close(self) -> None:
         self._finished.clear()
+        self._client.cancel(list(self._running))
 
 
 class _Local:
@@ -244,9 +279,6 @@ class _Local:
 
     def answer(self, future):
         return future.result()
-
-    def where(self, _future):
-        return None
 
     def close(self) -> None:
         if self._pool is not None:
@@ -295,8 +327,9 @@ class Campaign:
         head = json.loads(json.dumps(head))
         if (out / "campaign.json").exists():
             there = cls(out)
-            for key in ("version", "study"):
-                if there._head[key] != head[key]:
+            # the file may have moved
+            for key, what in (("version", lambda head: head["version"]), ("study", lambda head: head["study"][1:])):
+                if what(there._head) != what(head):
                     found = f": version {there._head['version']}, and this is {head['version']}" if key == "version" else ""
                     raise CampaignError(f"{out} holds the campaign of another {key}{found}; choose another folder, or remove that one")
             return there
@@ -360,6 +393,10 @@ class Campaign:
     def failed(self) -> dict[int, str]:
         """Units that were given up, with the reason."""
         return {start: told["failed"] for start, _, told in self._told() if told.get("failed")}
+
+    def _forget_failed(self) -> None:
+        for unit in self.failed:
+            (self.folder / "done" / f"{unit:012}-{unit + 1:012}.json").unlink()
 
     @property
     def points(self) -> dict[str, int]:

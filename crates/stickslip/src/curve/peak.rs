@@ -72,8 +72,9 @@ const LEVEL: f64 = 1e-10;
 const CLOSEST: f64 = 1e-7;
 /// Share of the rise that a parabola predicts which must come true for the next trial to be a parabola again.
 const KEPT: f64 = 0.5;
-/// Neighbouring points that share a solver with its memory; chunks are the same on any number of threads.
-const CHUNK: usize = 6;
+/// Peaks about one point that share a solver with its memory: few enough for two hundred peaks about a handful of points to keep all threads at work,
+/// and the same on any number of these.
+const TOGETHER: usize = 12;
 /// Broken promises after which only halving is left.
 const JUMP: usize = 15;
 /// Orbits that the peak of one quantity may take beside those that others have asked for; smooth peaks take 3 to 6, kinks up to 15.
@@ -163,33 +164,22 @@ pub fn all(
     wanted: usize,
     quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
 ) -> Result<Vec<PeakOf>, MethodError> {
-    let inner: Vec<usize> = (1..points.len().saturating_sub(1)).collect();
-    let found: Vec<Result<Vec<PeakOf>, MethodError>> = inner
-        .par_chunks(CHUNK)
-        .map(|chunk| {
-            let mut solver: Option<Box<dyn Solver + Send + '_>> = None;
-            let mut peaks = Vec::new();
-            for &i in chunk {
-                let near = &points[i - 1..=i + 1];
-                let wanted: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
-                if wanted.is_empty() {
-                    continue;
-                }
-                let solver = match &mut solver {
-                    Some(solver) => solver,
-                    none => none.insert(method.solver(system)?),
-                };
-                let mut found = refine(&mut **solver, near, &wanted, quantities);
-                found.sort_by(|a, b| a.peak.omega.total_cmp(&b.peak.omega));
-                peaks.extend(found);
-            }
-            Ok(peaks)
-        })
+    let tops = (1..points.len().saturating_sub(1)).flat_map(|i| {
+        let near = &points[i - 1..=i + 1];
+        let here: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
+        here.chunks(TOGETHER).map(|some| (near, some.to_vec())).collect::<Vec<_>>()
+    });
+    let tops: Vec<(&[Point], Vec<usize>)> = tops.collect();
+    let found: Vec<Result<Vec<PeakOf>, MethodError>> = tops
+        .par_iter()
+        .map(|(near, wanted)| Ok(refine(&mut *method.solver(system)?, near, wanted, quantities)))
         .collect();
     let mut peaks = Vec::new();
     for some in found {
         peaks.extend(some?);
     }
+    // peaks about one point are in the order of their quantities
+    peaks.sort_by(|a, b| a.peak.omega.total_cmp(&b.peak.omega));
     Ok(peaks)
 }
 

@@ -3,7 +3,7 @@
 //! The frequencies are cut into blocks of fixed length; a block starts cold and runs in order, and blocks run in parallel. The
 //! start of every point is thus the same on any number of threads, and so are its bits.
 //!
-//! Where a curve has a fold, the points beyond it have no orbit near the last one: they are sought again from behind, from the first orbit
+//! A point that its neighbour does not lead to, on either side, is sought alone. Where a curve has a fold, the points beyond it have no orbit near the last one: they are sought again from behind, from the first orbit
 //! that is found after them.
 
 use crate::method::{Method, MethodError, OrbitError, Solver};
@@ -86,40 +86,57 @@ pub fn stretch(
     let mut solver = method.solver(system)?;
     let mut start: Option<Vec<f64>> = None;
     // points that were not found, until an orbit is found behind them
-    let mut missing: Vec<(f64, Result<Orbit, OrbitError>)> = Vec::new();
+    let mut missing: Vec<Missing> = Vec::new();
     let mut omegas = omegas.peekable();
     while let Some(omega) = omegas.next() {
         if watch.stop.load(Ordering::Relaxed) {
-            missing.drain(..).for_each(|(omega, outcome)| see(omega, Some(outcome.as_ref())));
+            missing.drain(..).for_each(|point| see(point.omega, Some(point.outcome.as_ref())));
             see(omega, None);
             continue;
         }
-        let outcome = solver.orbit(omega, start.as_deref());
+        let (outcome, led) = (solver.orbit(omega, start.as_deref()), start.is_some());
         (watch.finished)();
         // after a failure the next point starts cold: the last good orbit may be far away
         start = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
-        if outcome.is_err() && omegas.peek().is_some() {
-            missing.push((omega, outcome));
+        let found = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
+        missing.push(Missing { omega, outcome, led });
+        if found.is_none() && omegas.peek().is_some() {
             continue;
         }
-        if let Ok(orbit) = &outcome {
-            from_behind(&mut *solver, &orbit.start, &mut missing, watch);
+        if let Some(behind) = found {
+            let before = missing.len() - 1;
+            from_behind(&mut *solver, &behind, &mut missing[..before], watch);
         }
-        missing.drain(..).for_each(|(omega, outcome)| see(omega, Some(outcome.as_ref())));
-        see(omega, Some(outcome.as_ref()));
+        for point in &mut missing {
+            point.seek_alone(&mut *solver, watch);
+            see(point.omega, Some(point.outcome.as_ref()));
+        }
+        missing.clear();
     }
     Ok(())
 }
 
+/// A point that is not seen yet.
+struct Missing {
+    omega: f64,
+    outcome: Result<Orbit, OrbitError>,
+    /// It was sought from the orbit before it.
+    led: bool,
+}
+
+impl Missing {
+    /// What its neighbours lead away from may be found without them.
+    fn seek_alone(&mut self, solver: &mut dyn Solver, watch: Watch<'_>) {
+        if self.led && self.outcome.is_err() && !watch.stop.load(Ordering::Relaxed) {
+            self.outcome = solver.orbit(self.omega, None).or(self.outcome.clone());
+        }
+    }
+}
+
 /// Seeks the missing points from the orbit behind them, the last one first, until one is not found from there either.
-fn from_behind(
-    solver: &mut dyn Solver,
-    behind: &[f64],
-    missing: &mut [(f64, Result<Orbit, OrbitError>)],
-    watch: Watch<'_>,
-) {
+fn from_behind(solver: &mut dyn Solver, behind: &[f64], missing: &mut [Missing], watch: Watch<'_>) {
     let mut start = behind.to_vec();
-    for (omega, outcome) in missing.iter_mut().rev() {
+    for Missing { omega, outcome, .. } in missing.iter_mut().rev() {
         if watch.stop.load(Ordering::Relaxed) {
             return;
         }

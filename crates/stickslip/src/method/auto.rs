@@ -38,19 +38,17 @@ const PIECES: usize = 100;
 pub struct Auto;
 
 impl Auto {
-    /// The method and why. Where the laws' own method refuses the system, the first of the table that takes it.
+    /// The method and why; where harmonic balance refuses a law, one that takes the system.
     fn chosen(system: &System) -> (Box<dyn Method>, String) {
         let (method, because) = Auto::by_laws(system);
-        let refuses = match method.name() {
-            harmonic_balance::NAME => !HarmonicBalance::takes_laws(system),
-            _ => false,
-        };
-        let methods = if refuses { Ways::of(system).methods } else { Vec::new() };
+        if method.name() != harmonic_balance::NAME || HarmonicBalance::takes_laws(system) {
+            return (method, because);
+        }
+        let methods = Ways::of(system).methods;
         // waiting is the last resort
-        let waits = |name: &&&str| **name == settling::INFO.name;
-        let other = methods.iter().find(|name| !waits(name)).or(methods.first()).copied();
-        match other.and_then(super::find).and_then(|row| (row.build)(&Options::new()).ok()) {
-            Some(other) => (other, format!("{} refuses a law", method.name())),
+        let other = methods.iter().find(|name| **name != settling::INFO.name).or(methods.first());
+        match other.and_then(|name| super::find(name)).and_then(|row| (row.build)(&Options::new()).ok()) {
+            Some(other) => (other, format!("{} refuses a law", harmonic_balance::NAME)),
             // who refuses says what else there is
             None => (method, because),
         }
@@ -63,7 +61,7 @@ impl Auto {
         let smooth = system.joints().iter().all(|joint| joint.law().rate().is_some());
         let pieces: usize =
             system.joints().iter().map(|joint| joint.law().pieces().map_or(0, |pieces| pieces.len())).sum();
-        let massless = (0..system.dofs()).find(|place| system.structure().own_mass(*place) <= 0.0);
+        let massless = (0..system.dofs()).any(|dof| system.structure().own_mass(dof) <= 0.0);
         let balance =
             |because: String| -> (Box<dyn Method>, String) { (Box::new(HarmonicBalance::default()), because) };
         if system.dofs() > MOST_IN_FULL {
@@ -74,8 +72,8 @@ impl Auto {
             balance(format!("{joints} joints are more than {FOLLOWED}"))
         } else if exact && pieces > PIECES {
             balance(format!("{pieces} sliders and stops are more than {PIECES}"))
-        } else if let Some(place) = massless {
-            balance(format!("`{}` has no mass", system.places()[place]))
+        } else if massless {
+            balance("a place has no mass".to_owned())
         } else if exact {
             let because = if joints == 0 { "there are no joints" } else { "every law is exact" };
             (Box::new(EventDriven), because.to_owned())

@@ -2,7 +2,7 @@
 
 use super::coordinates::{Coordinates, combined};
 use super::places::{End, Of, Places, places_of};
-use super::system::{Axis, Cyclic, MovedPlace, System, SystemBuilder};
+use super::system::{Axis, MovedPlace, System, SystemBuilder};
 use super::{GROUND, Joint, Model, Ring};
 use crate::structure::Structure;
 use crate::structure::reduction::Row;
@@ -119,15 +119,17 @@ impl Model {
         let assembler = Assembler { model: self, places, coordinates };
         let matrices = assembler.matrices()?;
         let motions = assembler.motions()?;
-        let mut builder =
-            System::builder(assembler.structure(&matrices)?).reduced(assembler.coordinates.reduced.clone());
-        if let Some(Ring { sectors, order: Some(order) }) = self.ring {
-            builder = builder.cyclic(Cyclic { sectors, order });
-        }
+        let builder = System::builder(assembler.structure(&matrices)?).reduced(assembler.coordinates.reduced.clone());
         let (builder, forces) = assembler.forces(assembler.seen(builder))?;
         let builder = assembler.loads_of_motions(builder, &matrices, &motions);
         let (builder, signs) = assembler.joints(builder, &motions)?;
-        assembler.moved(builder, &matrices, (&motions, &forces), &signs).build().map_err(|error| whole(&error))
+        let builder = assembler.moved(builder, &matrices, (&motions, &forces), &signs);
+        let system = builder.build().map_err(|error| whole(&error))?;
+        // what has been changed since it was made a ring may be none any more, and is solved whole
+        Ok(match self.ring.and_then(Ring::wave) {
+            Some(wave) => system.clone().travelling(wave).unwrap_or(system),
+            None => system,
+        })
     }
 }
 

@@ -3,10 +3,11 @@
 //! Sectors count from 0; what is called `blade` in a sector is `blade_0`, `blade_1` … in the ring, and `next.blade` the one of the sector after.
 //! The last sector's next is the first.
 
-use super::{Element, GROUND, Model, ModelError};
+use super::{Cyclic, Element, GROUND, Model, ModelError};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
+use stickslip_numerics::random::Stream;
 
 /// What stands before a place of the next sector.
 pub const NEXT: &str = "next.";
@@ -73,7 +74,9 @@ pub struct Disk {
 pub struct Ring {
     /// Number of sectors.
     pub sectors: usize,
-    /// Where all sectors are equal and the excitation travels: sector n moves as the first one, earlier by `order n / sectors` of a period.
+    /// Whether all sectors are equal.
+    pub equal: bool,
+    /// Where they are and the excitation travels: sector n moves as the first one, earlier by `order n / sectors` of a period.
     /// Harmonic h of the motion then has the nodal diameter `h order`.
     pub order: Option<usize>,
 }
@@ -142,7 +145,7 @@ impl Disk {
             model.motions.append(&mut one.motions);
         }
         let order = if equal { self.order(&first) } else { None };
-        model.ring = Some(Ring { sectors: self.sectors, order });
+        model.ring = Some(Ring { sectors: self.sectors, equal, order });
         Ok(model)
     }
 
@@ -192,6 +195,10 @@ impl Disk {
             let message = "a sector is stated by masses and springs".to_owned();
             return refuse(Element::Substructure, "stiffness", message);
         }
+        if sector.substructure.is_some() {
+            let message = "a structure by its matrices cannot be a sector yet; masses and springs can";
+            return refuse(Element::Substructure, "stiffness", message.to_owned());
+        }
         for (i, mass) in sector.masses.iter().enumerate() {
             if NEXT.strip_suffix('.') == Some(&mass.name) {
                 let message = "`next` stands for the next sector of a disk and cannot be declared".to_owned();
@@ -238,12 +245,30 @@ impl Disk {
     }
 }
 
+/// Deviations of sectors: normal with mean 0 and this standard deviation, decided by the seed, the same bits on every machine. Seeds are samples of
+/// the same distribution, and a longer pattern begins with the shorter one.
+///
+/// # Example
+/// ```
+/// let pattern = stickslip::model::normal_pattern(24, 0.02, 7);
+/// assert_eq!(pattern[..12], stickslip::model::normal_pattern(12, 0.02, 7));
+/// ```
+pub fn normal_pattern(sectors: usize, deviation: f64, seed: u64) -> Vec<f64> {
+    let stream = Stream::new(seed);
+    (0..sectors as u64).map(|sector| deviation * stream.normal(sector)).collect()
+}
+
 /// Of every element, all alike where nothing is said.
 fn spread(stated: &[Around]) -> impl Iterator<Item = Around> {
     stated.iter().copied().chain(std::iter::repeat(Around::EngineOrder(0)))
 }
 
 impl Ring {
+    /// The wave that travels around it.
+    pub(super) fn wave(self) -> Option<Cyclic> {
+        self.order.map(|order| Cyclic { sectors: self.sectors, order })
+    }
+
     /// The element of the sector that an element of the ring's model `model` comes from.
     pub fn in_sector(self, element: Element, model: &Model) -> Element {
         let own = |index: usize, all: usize| index % (all / self.sectors.max(1)).max(1);
@@ -294,9 +319,9 @@ mod tests {
         let system = ring.assemble().unwrap();
         assert_eq!(system.places()[6..], ["disk_2", "blade_2.x", "blade_2.z"]);
         assert_eq!(ring.joints[2].between, ["blade_2.x", "blade_0.x"]);
-        assert_eq!(ring.ring, Some(Ring { sectors: 3, order: Some(2) }));
+        assert_eq!(ring.ring, Some(Ring { sectors: 3, equal: true, order: Some(2) }));
         assert!((ring.forces[1].phase - (0.5 + TAU * 2.0 / 3.0)).abs() < 1e-15);
-        let element = Ring { sectors: 3, order: None }.in_sector(Element::Spring(7), &ring);
+        let element = Ring { sectors: 3, equal: true, order: None }.in_sector(Element::Spring(7), &ring);
         assert_eq!(element, Element::Spring(1));
     }
 

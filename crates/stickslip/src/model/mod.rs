@@ -13,10 +13,10 @@ mod survey;
 mod system;
 
 pub use assemble::{Element, ModelError};
-pub use disk::{Around, Disk, LEAST_SECTORS, NEXT, Ring};
+pub use disk::{Around, Disk, LEAST_SECTORS, NEXT, Ring, normal_pattern};
 pub use place::{Frame, FrameError, Place};
 pub use places::{is_identifier, is_place};
-pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey};
+pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey, WaveModes};
 pub use system::{Axis, Cyclic, Load, MovedPlace, System, SystemBuilder, SystemError, SystemJoint};
 
 use crate::law::SharedLaw;

@@ -302,7 +302,6 @@ pub struct SystemBuilder {
     joints: Vec<SystemJoint>,
     loads: BTreeMap<u32, Load>,
     moved: Vec<MovedPlace>,
-    cyclic: Option<Cyclic>,
     wrong: Option<SystemError>,
 }
 
@@ -361,19 +360,11 @@ impl SystemBuilder {
         self
     }
 
-    /// States that it is a ring of equal sectors in a travelling wave, which [`SystemBuilder::build`] checks: harmonic balance then solves
-    /// one sector.
-    #[must_use]
-    pub fn cyclic(mut self, cyclic: Cyclic) -> Self {
-        self.cyclic = Some(cyclic);
-        self
-    }
-
     /// The system.
     ///
     /// # Errors
     /// [`SystemError`]: axes that do not fit the law, numbers of degrees of freedom that do not exist, numbers that are not finite, a law
-    /// whose parameters are wrong, sectors that are not alike.
+    /// whose parameters are wrong.
     pub fn build(self) -> Result<System, SystemError> {
         if let Some(wrong) = self.wrong {
             return Err(wrong);
@@ -397,7 +388,7 @@ impl SystemBuilder {
                 axis.check(n, || format!("joint `{}`", joint.name))?;
             }
         }
-        let system = System {
+        Ok(System {
             structure: self.structure,
             places,
             seen,
@@ -405,12 +396,8 @@ impl SystemBuilder {
             joints: self.joints,
             loads: self.loads.into_values().collect(),
             moved: self.moved,
-            cyclic: self.cyclic,
-        };
-        match system.cyclic.and_then(|cyclic| system.off(cyclic)) {
-            Some(what) => Err(SystemError::NotCyclic(what)),
-            None => Ok(system),
-        }
+            cyclic: None,
+        })
     }
 }
 
@@ -427,7 +414,6 @@ impl System {
             joints: Vec::new(),
             loads: BTreeMap::new(),
             moved: Vec::new(),
-            cyclic: None,
             wrong: None,
         }
     }
@@ -466,7 +452,18 @@ impl System {
         system
     }
 
-    /// The symmetry of a ring in a travelling wave, if it was stated.
+    /// The same system, known to be a ring of equal sectors in a travelling wave: harmonic balance then solves one sector.
+    ///
+    /// # Errors
+    /// [`SystemError::NotCyclic`]: its sectors differ, or its loads do not travel so.
+    pub fn travelling(self, cyclic: Cyclic) -> Result<System, SystemError> {
+        match self.off(cyclic) {
+            Some(what) => Err(SystemError::NotCyclic(what)),
+            None => Ok(System { cyclic: Some(cyclic), ..self }),
+        }
+    }
+
+    /// The symmetry of a ring in a travelling wave, if it is known, see [`System::travelling`].
     pub fn cyclic(&self) -> Option<Cyclic> {
         self.cyclic
     }
@@ -483,7 +480,7 @@ impl System {
             (first * cyclic.lead(harmonic as usize, sector) - z).norm() <= ALIKE * largest
         };
         for load in &self.loads {
-            for values in [&load.force, &load.by_velocity] {
+            for values in [&load.force, &load.by_velocity, &load.by_acceleration] {
                 let largest = values.iter().fold(0.0, |m: f64, z| m.max(z.norm()));
                 if !(0..n).all(|i| near(values[i % size], load.harmonic, i / size, values[i], largest)) {
                     return Some("forces");
@@ -494,16 +491,18 @@ impl System {
             return Some("joints");
         }
         let each = self.joints.len() / sectors;
-        let mut rows = Vec::new();
+        let sorted = |mut rows: Vec<(usize, f64)>| {
+            rows.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+            rows
+        };
         for (j, joint) in self.joints.iter().enumerate() {
             let (first, sector) = (&self.joints[j % each], j / each);
             let same = joint.axes.len() == first.axes.len() && *joint.law == *first.law;
             let alike = same
                 && joint.axes.iter().zip(&first.axes).all(|(axis, first)| {
-                    rows.clear();
-                    rows.extend(first.rows.iter().map(|(i, w)| ((i + sector * size) % n, *w)));
+                    let shifted = first.rows.iter().map(|(i, w)| ((i + sector * size) % n, *w)).collect();
                     let largest = first.imposed.iter().fold(0.0, |m: f64, (_, g)| m.max(g.norm()));
-                    axis.rows == rows
+                    sorted(axis.rows.clone()) == sorted(shifted)
                         && axis.imposed.len() == first.imposed.len()
                         && axis
                             .imposed

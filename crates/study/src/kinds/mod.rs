@@ -3,9 +3,11 @@
 //! A kind states its keys of `[study]`; the reader checks them and hands over their [`Values`](crate::Values) for every case.
 
 mod branch;
+mod campbell;
 pub mod hysteresis;
 mod keys;
 mod modes;
+mod nodal_diameter;
 mod orbit;
 mod orbits;
 mod peak_of;
@@ -20,8 +22,17 @@ pub use crate::info::{Complaint, KindInfo};
 pub use crate::kind::Kind;
 
 /// Every study kind there is, in the order in which lists show them.
-pub const TABLE: &[Kind] =
-    &[hysteresis::KIND, orbit::KIND, response::KIND, transient::KIND, performance::KIND, modes::KIND, branch::KIND];
+pub const TABLE: &[Kind] = &[
+    hysteresis::KIND,
+    orbit::KIND,
+    response::KIND,
+    transient::KIND,
+    performance::KIND,
+    modes::KIND,
+    branch::KIND,
+    nodal_diameter::KIND,
+    campbell::KIND,
+];
 
 /// The kind with this name.
 pub fn find(name: &str) -> Option<&'static Kind> {

@@ -21,7 +21,7 @@ use crate::rows::Rows;
 use crate::study::varied_text;
 use crate::values::{Frequencies, hertz};
 use crate::warnings::sampled;
-use crate::words::display_unit;
+use crate::words::{display_unit, shown_hertz};
 use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -516,6 +516,14 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     }
 }
 
+/// What a place of a ring is called in its sector, and the number of that: `blade` and 3 for `blade_3`, `blade.x` and 3 for `blade_3.x`.
+fn of_sector(name: &str) -> Option<(String, usize)> {
+    let (node, along) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));
+    let (place, sector) = node.rsplit_once('_')?;
+    let place = along.map_or_else(|| place.to_owned(), |along| format!("{place}.{along}"));
+    Some((place, sector.parse().ok()?))
+}
+
 /// The column of a joint's force.
 fn force(joint: &str) -> String {
     format!("{joint}_force_amplitude_N")
@@ -553,6 +561,7 @@ impl Drawn<'_> {
             if !self.shown.is_empty() {
                 panels.push(self.masses_of(stretch));
             }
+            panels.extend(self.sectors_of(stretch));
             if !self.joints.is_empty() {
                 let mut panel = self.force_panel(stretch.label());
                 for (i, joint) in self.joints.iter().enumerate() {
@@ -597,6 +606,33 @@ impl Drawn<'_> {
         panel.title = join([panel.title, worst]);
         panel.series.push(Series::line(format!("largest of {} masses", names.len()), x, y, 0));
         panel
+    }
+
+    /// Of a disk a bar for every sector, at the frequency where the largest amplitude is.
+    fn sectors_of(&self, stretch: &Stretch) -> Option<Panel> {
+        self.drawing.study.structure.lists.disk.as_ref()?;
+        let columns: Vec<(&str, Vec<f64>)> =
+            self.shown.iter().map(|(name, _)| (name.as_str(), self.amplitudes(name, stretch.rows.clone()))).collect();
+        let highest = |row: usize| columns.iter().map(|(_, values)| values[row]).fold(f64::NEG_INFINITY, f64::max);
+        let row = (0..stretch.rows.len()).max_by(|a, b| highest(*a).total_cmp(&highest(*b)))?;
+        // what is one place in a sector has one colour
+        let mut series: Vec<Series> = Vec::new();
+        for (name, values) in &columns {
+            let (place, sector) = of_sector(name)?;
+            let at = series.iter().position(|bars| bars.label == place).unwrap_or_else(|| {
+                series.push(Series::bars(place, Vec::new(), Vec::new(), series.len()));
+                series.len() - 1
+            });
+            series[at].x.push(sector as f64);
+            series[at].y.push(values[row] * self.factor.1);
+        }
+        if series.iter().all(|bars| bars.x.len() < 2) {
+            return None;
+        }
+        let frequency = shown_hertz(numbers(self.curve, DRIVE, stretch.rows.clone())[row]);
+        let title = join([stretch.label(), format!("at {frequency}")]);
+        let (x, y) = (Axis::new("sector", ""), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
+        Some(Panel { title, x, y, series })
     }
 
     /// A panel for every mass (or for the largest of them), with a curve for every case, and then for every joint the same. The last varied

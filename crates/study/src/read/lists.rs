@@ -23,6 +23,9 @@ impl Reader {
                 None => continue,
             };
             match (key.takes, &node.value) {
+                (Takes::Table(keys), Content::Table(table)) if name == "disk" => {
+                    lists.disk = self.disk(table, keys);
+                }
                 // a template that is unknown, or no table at all
                 // its files are read with it
                 (Takes::Table(_), _) if name == "structure" => {}

@@ -4,6 +4,7 @@ use crate::error::{Place, Problem, Source, StudyError};
 use crate::expression::Expression;
 use crate::repeat::{Repetition, Turn};
 use std::collections::HashMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Most errors that are reported at once.
@@ -13,6 +14,8 @@ const MOST_ERRORS: usize = 20;
 #[derive(Default)]
 pub(super) struct Reader {
     pub(super) sources: Vec<Arc<Source>>,
+    /// Where files are that a study names.
+    pub(super) folder: Option<PathBuf>,
     pub(super) problems: Vec<Problem>,
     /// Parameters, in order, and their index by name.
     pub(super) names: Vec<String>,

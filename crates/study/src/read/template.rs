@@ -66,6 +66,22 @@ impl Reader {
                 self.problems.push(Problem::new(&entry.node.place, key.name, message).help(help));
             }
         }
+        if let Some(entry) = root.get("disk") {
+            match (&mut lists.disk, FILE.iter().find(|key| key.name == "disk").map(|key| key.takes), &entry.node.value)
+            {
+                (None, ..) => {
+                    let message = format!("the template `{}` is no sector of a disk", row.name);
+                    self.problems.push(Problem::new(&entry.node.place, "disk", message));
+                }
+                (Some(own), Some(Takes::Table(keys)), Content::Table(table)) => {
+                    *own = self.disk(table, keys)?;
+                }
+                _ => {
+                    let message = format!("expected a table, found {}", entry.node.value.described());
+                    self.problems.push(Problem::new(&entry.node.place, "disk", message));
+                }
+            }
+        }
         let Some(Takes::Table(keys)) = FILE.iter().find(|key| key.name == "model").map(|key| key.takes) else {
             return None;
         };
@@ -100,7 +116,11 @@ impl CompiledTemplate {
     fn model(&self, fixed: &[(usize, f64)]) -> Result<Model, StudyError> {
         let environment = Environment { names: &self.names, values: self.values(fixed)? };
         let mut problems = Vec::new();
-        let model = model_of(&self.structure, &environment, &mut problems);
+        let again = |changed: &[(usize, f64)]| {
+            let fixed: Vec<_> = fixed.iter().chain(changed).copied().collect();
+            evaluate(&self.names, &self.parameters, &self.order, &HashMap::new(), &fixed)
+        };
+        let model = model_of(&self.structure, &environment, &again, &mut problems);
         StudyError::all(&self.sources, problems).map_or(Ok(model), Err)
     }
 }
@@ -217,7 +237,8 @@ mod tests {
             for parameter in template.parameters() {
                 let place = format!("{}, {}", template.name, parameter.key);
                 assert!(!parameter.doc.is_empty(), "{place}: no comment stands behind it");
-                assert!(parameter.value.is_finite() && parameter.dimension != Dimension::NONE, "{place}");
+                let counted = ["N", "EO", "mu"].contains(&parameter.key.as_str());
+                assert!(parameter.value.is_finite() && (counted || parameter.dimension != Dimension::NONE), "{place}");
             }
         }
     }

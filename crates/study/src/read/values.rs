@@ -8,7 +8,7 @@ use crate::near::{nearest, one_of, shown};
 use crate::schema::{self, Key, MOST_POINTS, Presence, Takes};
 use crate::statement::{Quantity, Stated, StatedEntry, StatedTable, Weights};
 use crate::values::Given;
-use stickslip::model::{is_identifier, is_place};
+use stickslip::model::{NEXT, is_identifier, is_place};
 
 impl Reader {
     /// Unknown and missing keys.
@@ -209,7 +209,10 @@ impl Reader {
     fn name(&mut self, key: &str, text: &str, inner: Option<usize>, place: &Place) -> Option<String> {
         let problem = match self.turn().name(text) {
             Ok(name) if is_identifier(&name) => return Some(name),
-            Ok(name) if !matches!(key, "name" | "directions") && is_place(&name) => return Some(name),
+            // of a disk's next sector likewise
+            Ok(name) if !matches!(key, "name" | "directions") && is_place(name.strip_prefix(NEXT).unwrap_or(&name)) => {
+                return Some(name);
+            }
             Ok(name) => {
                 let message = format!("`{}` is no name: a letter first, then letters, digits and `_`", shown(&name));
                 Problem::new(place, key, message)

@@ -127,6 +127,10 @@ fn used_parameters(study: &Study) -> BTreeSet<usize> {
     for list in [&lists.place, &lists.mass, &lists.spring, &lists.joint, &lists.force, &lists.motion] {
         list.iter().for_each(&mut from);
     }
+    if let Some(disk) = &lists.disk {
+        from(&disk.table);
+    }
+    open.extend(lists.disk.iter().flat_map(|disk| disk.mistuned(&study.names)));
     let mut used = BTreeSet::new();
     while let Some(index) = open.pop() {
         if used.insert(index) {

@@ -431,3 +431,104 @@ impl Split {
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::equations::Motion;
+    use super::super::rest::Rest;
+    use super::super::uncoupled::Uncoupled;
+    use super::*;
+    use crate::law::{Coulomb, Dahl, FrictionContact, Jenkins, SharedLaw};
+    use crate::model::{Axis, System};
+    use crate::structure::Structure;
+    use nalgebra::DMatrix;
+    use std::sync::Arc;
+
+    /// Values without a pattern between -1 and 1.
+    fn noise(i: usize) -> f64 {
+        ((i * 7919 + 13) as f64).sin()
+    }
+
+    /// A structure that couples all with all, with damping in proportion to its stiffness, on contacts with the ground.
+    fn system(joints: &[(SharedLaw, usize)]) -> System {
+        let n = joints.iter().map(|joint| joint.1).sum();
+        let spread = DMatrix::from_fn(n, n, |i, k| noise(i * n + k) / (n as f64).sqrt());
+        let stiffness = &spread * spread.transpose() * 2.0 + DMatrix::identity(n, n);
+        let mass = DMatrix::from_fn(n, n, |i, k| if i == k { 1.0 + 0.2 * noise(i) } else { 0.0 });
+        let names = (0..n).map(|i| format!("{i}")).collect();
+        let structure = Structure::new(names, mass, &stiffness * 0.04, stiffness).unwrap();
+        let mut builder = System::builder(structure);
+        let mut first = 0;
+        for (number, (law, directions)) in joints.iter().enumerate() {
+            let axes = (first..first + directions).map(|i| Axis::new(vec![(i, 1.0)])).collect();
+            builder = builder.joint(format!("{number}"), law.clone(), axes);
+            first += directions;
+        }
+        for i in 0..n {
+            builder = builder.force(i, 1, Complex64::new(noise(3 * i + 1), noise(3 * i + 2)));
+        }
+        builder.build().unwrap()
+    }
+
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    enum Form {
+        Eliminated,
+        Formed,
+        Modal,
+    }
+
+    /// The motion, and how many products it took.
+    fn solve(system: &System, omega: f64, harmonics: &[usize], form: Form) -> (Motion, usize) {
+        let ports = Ports::new(system).unwrap();
+        let rest = Rest::new(system, &ports);
+        let mut level = Level::new(harmonics.to_vec(), 1024, &ports, None);
+        level.coupled = (form != Form::Eliminated).then(Coupled::default);
+        level.drive(system, &ports, &rest, omega).unwrap();
+        if form == Form::Modal {
+            let directions: Vec<_> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();
+            let structure = Arc::new(Uncoupled::new(system.structure(), &directions).unwrap());
+            let series = vec![0.0; ports.count()];
+            level.receptance = Receptance::Modal(Modal::new(&structure, (harmonics, omega), &series).unwrap());
+        }
+        let start = level.begin(system, &ports, None, omega);
+        let found = level.solve(&ports, omega, start);
+        (found.unwrap_or_else(|lost| panic!("{form:?} at {omega}: {lost:?}")), level.products)
+    }
+
+    fn agree(system: &System, harmonics: &[usize], forms: &[Form]) {
+        for omega in [0.6, 1.7] {
+            let (expected, _) = solve(system, omega, harmonics, Form::Eliminated);
+            let size = expected.c.iter().map(|c| c.norm()).fold(0.0, f64::max);
+            for form in forms {
+                let (found, products) = solve(system, omega, harmonics, *form);
+                assert!(products > 0 && products < 60 * found.iterations, "{products} in {}", found.iterations);
+                for (a, b) in found.c.iter().zip(&expected.c) {
+                    assert!((a - b).norm() < 1e-8 * size, "{omega}: {a} {b}");
+                }
+            }
+        }
+    }
+
+    /// The same motion by elimination, by products with receptances, and by products with modes.
+    #[test]
+    fn products_lead_where_elimination_does() {
+        let contact = |i: usize| -> (SharedLaw, usize) {
+            let (tangential, preload) = (1.5 + 0.5 * noise(i), 2.5 + 0.5 * noise(i + 40));
+            (Arc::new(FrictionContact { tangential, normal: 2.0, friction: 0.3, preload, tangents: 2 }), 3)
+        };
+        let contacts: Vec<_> = (0..9).map(contact).collect();
+        agree(&system(&contacts), &[0, 1, 2, 3], &[Form::Formed, Form::Modal]);
+    }
+
+    /// Unknown forces too, of rigid friction beside elastic.
+    #[test]
+    fn forces_are_unknowns_of_products_too() {
+        let laws: [SharedLaw; 3] = [
+            Arc::new(Coulomb { limit: 0.3 }),
+            Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 }),
+            Arc::new(Dahl { stiffness: 1.5, limit: 0.3 }),
+        ];
+        let joints: Vec<_> = (0..18).map(|i| (laws[i % 3].clone(), 1)).collect();
+        agree(&system(&joints), &[1, 3, 5], &[Form::Formed]);
+    }
+}

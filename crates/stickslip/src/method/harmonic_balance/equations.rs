@@ -132,11 +132,11 @@ impl Level {
     pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, sparse: Option<Sparse>) -> Self {
         let mut level = Level::unassembled(Alternation::new(harmonics, samples), ports, sparse);
         let size = level.residual.len();
-        level.jacobian = vec![0.0; if level.sparse.is_some() { 0 } else { size * size }];
+        level.coupled = (level.sparse.is_none() && size >= MANY).then(Coupled::default);
         level
     }
 
-    /// Without memory for a Jacobian.
+    /// Without what Newton's steps need.
     fn unassembled(alternation: Alternation, ports: &Ports, sparse: Option<Sparse>) -> Self {
         let (nh, axes) = (alternation.harmonics.len(), ports.count());
         let size = 2 * nh * axes;
@@ -155,7 +155,7 @@ impl Level {
             blocks,
             forces: ports.iter().flat_map(|port| vec![port.is_force(); port.axes]).collect(),
             jacobian: Vec::new(),
-            coupled: (sparse.is_none() && size >= MANY).then(Coupled::default),
+            coupled: None,
             products: 0,
             sparse,
             residual: vec![0.0; size],

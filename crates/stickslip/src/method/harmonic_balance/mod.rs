@@ -97,8 +97,12 @@ const NEARBY: usize = 20;
 const RECENT: usize = 8;
 /// Unknowns beyond which no error is estimated: the elimination would take seconds.
 const LARGEST: usize = 2100;
-/// Unknowns beyond which nothing is begun: the matrices would fill gigabytes.
+/// Unknowns beyond which no branch is begun: its matrices are formed, and would fill gigabytes.
 const POSSIBLE: usize = 8192;
+/// Memory of the equations, bytes, beyond which nothing is begun: 1000 nodes of three directions with five harmonics need half of it without modes.
+const MEMORY: f64 = 4e9;
+/// Harmonics times axes squared up to which products with all of them take a tenth of a second, so that an error is estimated.
+const ESTIMATED: f64 = 1e7;
 /// Laws of velocity begin with this many harmonics at most, and double them from there: the sets of slipping samples are then nearly
 /// known.
 const COLD: usize = 15;
@@ -196,15 +200,48 @@ impl HarmonicBalance {
 }
 
 /// Whether so many harmonics along so many coordinates can be solved at all.
-fn check_size(unknowns: usize, periods: usize) -> Result<(), MethodError> {
+fn check_size(unknowns: usize) -> Result<(), MethodError> {
     if unknowns <= POSSIBLE {
         return Ok(());
     }
-    let (key, fewer) = if periods > 1 { (PERIOD.key, "fewer periods, ") } else { ("harmonics", "") };
+    let message =
+        format!("there would be {unknowns} unknowns, and {POSSIBLE} are possible: fewer harmonics, or fewer joints");
+    Err(MethodError::Option { method: NAME, key: "harmonics", message })
+}
+
+/// What there may be less of: a motion of several periods of the drive has as many times the harmonics.
+fn fewer(periods: usize) -> (&'static str, &'static str) {
+    if periods > 1 { (PERIOD.key, "fewer periods, ") } else { ("harmonics", "") }
+}
+
+/// Whether what equations with so many harmonics need fits into memory.
+fn check_memory(ports: &Ports, rest: &Rest, (harmonics, periods): (usize, usize)) -> Result<(), MethodError> {
+    let bytes = memory(ports, rest, harmonics);
+    if bytes <= MEMORY {
+        return Ok(());
+    }
+    let (key, fewer) = fewer(periods);
     let message = format!(
-        "there would be {unknowns} unknowns, and {POSSIBLE} are possible: {fewer}fewer harmonics, or fewer joints"
+        "the equations of {} directions of joints and {harmonics} harmonics would fill {:.0} GB, and {:.0} are allowed: {fewer}fewer harmonics, or fewer joints",
+        ports.count(),
+        1e-9 * bytes,
+        1e-9 * MEMORY
     );
     Err(MethodError::Option { method: NAME, key, message })
+}
+
+/// Memory of a level that is not banded, bytes: derivatives of the ports; receptances and their factors, or modes along the axes with the factor of
+/// what most of them add; and where a matrix may be formed, that.
+fn memory(ports: &Ports, rest: &Rest, harmonics: usize) -> f64 {
+    let (axes, pair) = (ports.count() as f64, 2.0 * harmonics as f64);
+    let size = pair * axes;
+    let tangents: f64 = ports.iter().map(|port| (pair * port.axes as f64).powi(2)).sum();
+    let structure = match rest.modes_for(ports) {
+        Some(structure) => structure.at.len() as f64 + 3.0 * axes * axes,
+        None => 4.0 * harmonics as f64 * axes * axes,
+    };
+    let formed = if size <= coupled::FORMED as f64 { size * size } else { 0.0 };
+    8.0 * (tangents + structure + formed)
 }
 
 impl Method for HarmonicBalance {
@@ -428,7 +465,7 @@ impl<'a> Balance<'a> {
         let first = (FIRST * kept.scale).max(kept.highest);
         let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
         if Sparse::new(&system, &ports, &[1]).is_none() {
-            check_size(2 * ports.count() * harmonics.len(), periods)?;
+            check_memory(&ports, &rest, (harmonics.len(), periods))?;
         }
         Ok(Balance {
             method,
@@ -464,8 +501,13 @@ impl Balance<'_> {
         Ok(level)
     }
 
-    fn unknowns(&self, top: usize) -> usize {
-        2 * self.ports.count() * self.kept.up_to(top).len()
+    /// Whether a solution with twice the harmonics takes no more than seconds.
+    fn can_compare(&self, top: usize) -> bool {
+        let harmonics = self.kept.up_to(self.kept.double(top)).len();
+        let axes = self.ports.count();
+        let products = (harmonics * axes * axes) as f64;
+        2 * axes * harmonics <= LARGEST
+            || (products <= ESTIMATED && memory(&self.ports, &self.rest, harmonics) <= MEMORY)
     }
 
     /// Solves at `top`, from a motion at another number of harmonics or from the first guess.
@@ -497,22 +539,18 @@ impl Balance<'_> {
     fn approached(&mut self, top: usize, omega: f64, guess: Option<&Guess>) -> Option<Motion> {
         let start = guess.filter(|_| self.periods > 1)?.state(self.system.dofs());
         let path = self.judge.approach(&self.system, omega, start)?;
-        let level = &self.levels[&top];
-        let (harmonics, n) = (level.harmonics(), level.alternation.samples());
+        let level = self.levels.get_mut(&top)?;
+        let (nh, n) = (level.harmonics().len(), level.alternation.samples());
         let mut motion = Motion::rest(level.linear.len());
-        for i in 0..n {
-            let sample = path.sample(TAU / omega * i as f64 / n as f64);
-            for (k, &h) in harmonics.iter().enumerate() {
-                let turn = Complex64::cis(-TAU * (h * i % n) as f64 / n as f64);
-                let share = turn * if h == 0 { 1.0 } else { 2.0 } / n as f64;
-                for port in self.ports.iter() {
-                    for q in port.range() {
-                        let (joint, axis) = self.ports.place(q);
-                        let (u, force) = (sample.joints[joint].displacement[axis], sample.joints[joint].force[axis]);
-                        motion.c[q * harmonics.len() + k] += share * (u - force * port.series);
-                        motion.force[q * harmonics.len() + k] += share * force;
-                    }
-                }
+        let samples: Vec<_> = (0..n).map(|i| path.sample(TAU / omega * i as f64 / n as f64).joints).collect();
+        for port in self.ports.iter() {
+            for q in port.range() {
+                let (joint, axis) = self.ports.place(q);
+                let force: Vec<f64> = samples.iter().map(|now| now[joint].force[axis]).collect();
+                let moved = samples.iter().zip(&force).map(|(now, f)| now[joint].displacement[axis] - f * port.series);
+                let range = q * nh..(q + 1) * nh;
+                level.alternation.add_signal(&mut moved.collect::<Vec<f64>>(), &mut motion.c[range.clone()]);
+                level.alternation.add_signal(&mut force.clone(), &mut motion.force[range]);
             }
         }
         Some(motion)
@@ -582,7 +620,7 @@ impl Balance<'_> {
         let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
         let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         let sparse = self.levels[&top].sparse.is_some();
-        let known = sparse || self.unknowns(self.kept.double(top)) <= LARGEST;
+        let known = sparse || self.can_compare(top);
         let truncation = if known { self.compare(top, omega, &motion, &x).ok().map(|(error, ..)| error) } else { None };
         self.finish(top, omega, motion, x, truncation)
     }
@@ -614,7 +652,7 @@ impl Balance<'_> {
         // nothing is known of the error until two solutions can be compared
         let (mut checked, mut estimate) = (top, 1.0);
         let sparse = self.levels[&top].sparse.is_some();
-        while top <= MOST * self.kept.scale && (sparse || self.unknowns(self.kept.double(top)) <= LARGEST) {
+        while top <= MOST * self.kept.scale && (sparse || self.can_compare(top)) {
             let (mut error, finer, y) = self.compare(top, omega, &motion, &x).map_err(|l| self.lost(l))?;
             if (self.ports.has_forces() || self.ports.has_steep()) && top > self.first {
                 error = error.max(CHANCE * estimate);

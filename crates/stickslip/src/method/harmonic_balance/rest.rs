@@ -65,7 +65,7 @@ struct Factored<F = DynamicStiffness> {
 struct Waves {
     cyclic: Cyclic,
     sector: Sector,
-    met: RefCell<BTreeMap<usize, Option<Arc<Wave>>>>,
+    met: RefCell<BTreeMap<usize, Result<Arc<Wave>, Singular>>>,
     factors: RefCell<Vec<(usize, Factored<WaveStiffness>)>>,
 }
 
@@ -91,9 +91,8 @@ impl Waves {
         let mut met = self.met.borrow_mut();
         let wave = met
             .entry(diameter)
-            .or_insert_with(|| self.sector.wave(diameter).ok().map(Arc::new))
-            .clone()
-            .ok_or(Singular { row: 0 })?;
+            .or_insert_with(|| self.sector.wave(diameter).map(Arc::new).map_err(|_| Singular { row: 0 }))
+            .clone()?;
         let factor = wave.dynamic_stiffness(s, hold(s, omega)).map(Arc::new);
         factors.push((diameter, Factored { rate: s, omega, factor: factor.clone() }));
         factor
@@ -179,14 +178,11 @@ impl Rest {
             })
             .collect::<Vec<Vec<(usize, f64)>>>();
         let waves = ports.wave().and_then(|wave| Waves::new(system, wave));
-        let factored = is_factored(system.structure());
+        let factored = waves.is_none() && is_factored(system.structure());
         Rest {
             n,
             modal: if factored || waves.is_some() { None } else { modal(system, &columns(n, &directions)) },
-            uncoupled: match factored && waves.is_none() {
-                true => Uncoupled::new(system.structure(), &directions).map(Arc::new),
-                false => None,
-            },
+            uncoupled: if factored { Uncoupled::new(system.structure(), &directions).map(Arc::new) } else { None },
             factors: RefCell::default(),
             structure: system.structure().clone(),
             directions,
@@ -214,13 +210,15 @@ impl Rest {
     /// Displacement along each axis under a unit force along it alone at a rate on the positive real axis, where there are no resonances, m/N.
     ///
     /// # Errors
-    /// A matrix that is singular there: the structure has neither mass nor spring along a direction.
+    /// A structure that is singular there all the same.
     pub fn own_at(&self, rate: f64, omega: f64) -> Result<Vec<f64>, Singular> {
-        if let Some(waves) = &self.waves {
-            return waves.own((rate, omega), &self.directions);
+        match &self.waves {
+            Some(waves) => waves.own((rate, omega), &self.directions),
+            None => {
+                let receptance = self.receptance_at(Complex64::new(rate, 0.0), omega)?;
+                Ok((0..self.directions.len()).map(|q| receptance[(q, q)].norm()).collect())
+            }
         }
-        let receptance = self.receptance_at(Complex64::new(rate, 0.0), omega)?;
-        Ok((0..self.directions.len()).map(|q| receptance[(q, q)].norm()).collect())
     }
 
     fn receptance_at(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, Singular> {
@@ -280,11 +278,11 @@ impl Rest {
         force: &DVector<Complex64>,
     ) -> Result<DVector<Complex64>, Singular> {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
-        if let Some(waves) = &self.waves {
-            return waves.respond(waves.cyclic.diameter(harmonic), (s, omega), force);
-        }
         if let Some(uncoupled) = &self.uncoupled {
             return uncoupled.respond(s, omega, force);
+        }
+        if let Some(waves) = &self.waves {
+            return waves.respond(waves.cyclic.diameter(harmonic), (s, omega), force);
         }
         if self.is_factored() {
             let mut x = force.clone();
@@ -513,6 +511,32 @@ mod tests {
                 let expected = exact(i as f64, 10.0) * Complex64::new(0.0, 2.0);
                 assert!((x[i - 1] - expected).norm() < 1e-9 * exact(10.0, 10.0).norm());
             }
+        }
+    }
+
+    /// A resonance without damping is said by its name, whatever its form: equal oscillators driven at their frequency, by themselves and coupled, where
+    /// the frequency is that of a rigid motion on springs.
+    #[test]
+    fn a_resonance_without_damping_is_no_answer() {
+        for (n, coupling) in [(60, 0.0), (60, 3.0), (230, 0.0)] {
+            let name = |i: usize| format!("m{i}");
+            let mut model = Model::default();
+            for i in 0..n {
+                model.masses.push(Mass::new(name(i), 1.0));
+                model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness: 4.0, damping: 0.0 });
+                if i > 0 && coupling > 0.0 {
+                    model.springs.push(Spring { between: [name(i - 1), name(i)], stiffness: coupling, damping: 0.0 });
+                }
+            }
+            model.forces.push(Force { on: name(0), amplitude: 1.0, phase: 0.3, harmonic: 1 });
+            let law = Arc::new(Jenkins { stiffness: 0.5, limit: 0.05 });
+            model.joints.push(Joint { name: "j".into(), between: [name(3), GROUND.into()], law });
+            let system = model.assemble().unwrap();
+            let mut solver = HarmonicBalance::default().solver(&system).unwrap();
+            let error = solver.orbit(2.0, None).unwrap_err();
+            assert_eq!(error.status(), "resonance", "{n} {coupling}: {error}");
+            assert!(error.to_string().contains("2.0000 rad/s"), "{error}");
+            assert!(solver.orbit(2.1, None).is_ok());
         }
     }
 

@@ -14,8 +14,8 @@ use stickslip_numerics::sparse::Singular;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Damping between modes, relative to that of the two, that counts as the rounding of matrices.
-const UNCOUPLED: f64 = 1e-9;
+/// Damping between modes that counts as the rounding of matrices: relative to that of the two, and to the largest of all.
+const UNCOUPLED: [f64; 2] = [1e-9, 1e-13];
 /// Degrees of freedom up to which modes are sought: the decomposition of so many takes a minute.
 const MOST: usize = 4000;
 /// A dynamic stiffness below this share of its parts is their rounding: a resonance without damping.
@@ -151,7 +151,7 @@ fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
     let apart = (0..n).flat_map(|k| (0..n).map(move |i| (i, k))).filter(|(i, k)| i != k);
     if apart.into_iter().any(|(i, k)| {
         let both = (modal[(i, i)] * modal[(k, k)]).abs().sqrt();
-        modal[(i, k)].abs() > UNCOUPLED * (both + UNCOUPLED * size)
+        modal[(i, k)].abs() > UNCOUPLED[0] * both + UNCOUPLED[1] * size
     }) {
         return None;
     }

@@ -152,8 +152,9 @@ fn rigid_motions(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> us
     for at in held.chain(rigid.iter().copied()) {
         match at {
             [(a, _)] => groups.join((*a, n)),
-            [(a, _), (b, _)] => groups.join((*a, *b)),
-            _ => {}
+            [(a, _), (b, _)] if a != b => groups.join((*a, *b)),
+            // of a wave: neighbours that move alike stretch it
+            _ => at.iter().for_each(|(a, _)| groups.join((*a, n))),
         }
     }
     let ground = groups.of(n);

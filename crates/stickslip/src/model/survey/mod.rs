@@ -9,6 +9,9 @@ mod hold;
 mod linear;
 mod loose;
 mod onset;
+mod waves;
+
+pub use waves::WaveModes;
 
 use super::{Model, ModelError, System};
 use hold::{Hold, Stuck};

@@ -100,22 +100,27 @@ impl Alternation {
 
     /// Adds the harmonics of the sampled force along an axis.
     pub(super) fn add_force(&mut self, axis: usize, force: &mut [Complex64]) {
+        let mut work = std::mem::take(&mut self.work);
+        work.copy_from_slice(&self.force[axis]);
+        self.add_signal(&mut work, force);
+        self.work = work;
+    }
+
+    /// Adds the harmonics of a signal, which is used up.
+    pub fn add_signal(&mut self, signal: &mut [f64], to: &mut [Complex64]) {
         let n = self.samples();
-        self.work.copy_from_slice(&self.force[axis]);
-        let sums = self.fourier.sums(&mut self.work);
-        for (f, &h) in force.iter_mut().zip(&self.harmonics) {
-            *f += sums[h] * share(h, n);
+        let sums = self.fourier.sums(signal);
+        for (to, &h) in to.iter_mut().zip(&self.harmonics) {
+            *to += sums[h] * share(h, n);
         }
     }
 
     /// Adds the harmonics of a signal along an axis to the derivative by ω, if that is kept. The signal is used up.
     pub(super) fn add_by_frequency(&mut self, axis: usize, signal: &mut [f64]) {
-        let (n, nh) = (self.samples(), self.harmonics.len());
-        let Some(by_frequency) = &mut self.by_frequency else { return };
-        let sums = self.fourier.sums(signal);
-        for (by, &h) in by_frequency[axis * nh..(axis + 1) * nh].iter_mut().zip(&self.harmonics) {
-            *by += sums[h] * share(h, n);
-        }
+        let nh = self.harmonics.len();
+        let Some(mut by_frequency) = self.by_frequency.take() else { return };
+        self.add_signal(signal, &mut by_frequency[axis * nh..(axis + 1) * nh]);
+        self.by_frequency = Some(by_frequency);
     }
 
     /// The spectrum of the slope of number `slope`, into the spectrum of number `to`. False if the slope is zero all the time.

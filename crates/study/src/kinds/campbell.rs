@@ -1,0 +1,359 @@
+//! Campbell diagrams: natural frequencies over the speed of a rotor, with the lines of the engine orders and where they cross.
+//!
+//! What a rotor's stiffness gains from the speed is stated in the model: the speed is a parameter, and a spring `k0 + k1*speed^2` stiffens.
+//! On a tuned disk an engine order e meets the modes of one nodal diameter, `e` less whole turns.
+
+use super::keys::anything;
+use super::nodal_diameter::{STATES, waves};
+use crate::columns::FREQUENCY;
+use crate::cost::{Cost, Costing, Shape};
+use crate::dataset::{Figure, Panel, Series, Style, Table};
+use crate::drawing::{Drawing, MOST_PANELS, Stretch, largest, numbers, words};
+use crate::info::{Complaint, KindInfo};
+use crate::key::{Takes, default, required};
+use crate::kind::Kind;
+use crate::note::Note;
+use crate::rows::Rows;
+use crate::schema::RANGE;
+use crate::values::{Values, hertz};
+use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
+use std::f64::consts::TAU;
+use stickslip::dimension::Dimension;
+use stickslip::model::Model;
+
+const TABLE: &str = "campbell";
+const CROSSINGS: &str = "crossings";
+const SPEED: &str = "speed_Hz";
+const JOINTS: &str = "joints";
+const DIAMETER: &str = "nodal_diameter";
+const MODE: &str = "mode";
+const ORDER: &str = "engine_order";
+
+/// The name of the parameter when none is given.
+const PARAMETER: &str = "speed";
+
+pub(super) const KIND: Kind = Kind {
+    info: KindInfo {
+        name: "campbell",
+        summary: "natural frequencies over the speed of a rotor, with engine orders and where they cross",
+        keys: &[
+            required(
+                "speed",
+                Takes::Frequencies(RANGE),
+                "speeds of rotation, as frequencies",
+                "{ from = \"10 Hz\", to = \"120 Hz\", points = 56 }",
+            ),
+            default(
+                "parameter",
+                Takes::Name,
+                PARAMETER,
+                "the parameter that is the speed, if stiffnesses depend on it; its own value then does not count",
+                "\"speed\"",
+            ),
+            default("engine_orders", Takes::Count(1, 200), "6", "highest engine order", "6"),
+            default("modes", Takes::Count(1, 100), "3", "lowest modes, of a tuned disk of every nodal diameter", "3"),
+        ],
+        check,
+        axes: [Some(Dimension::FREQUENCY), Some(Dimension::FREQUENCY)],
+        uses_method: false,
+        needs: anything,
+        adapts: false,
+        tables: &[TABLE, CROSSINGS],
+    },
+    grain: |_| Grain::Case,
+    cost,
+    warnings: |_| Vec::new(),
+    compute,
+    draw,
+};
+
+fn check(values: &Values, _: &Model, _: usize) -> Result<(), Complaint> {
+    let speeds = values.frequencies("speed").map_or(0, crate::values::Frequencies::len);
+    if speeds >= 2 {
+        return Ok(());
+    }
+    let message = "a Campbell diagram needs two speeds or more";
+    Err(Complaint::new("speed", message, "write { from = \"10 Hz\", to = \"120 Hz\", points = 56 }"))
+}
+
+/// Time of an eigenvalue problem over the cube of its size, s.
+const EIGEN: f64 = 1e-8;
+
+fn cost(costing: &Costing<'_>) -> Cost {
+    let values = &costing.case.values;
+    let speeds = values.frequencies("speed").map_or(2, crate::values::Frequencies::len) as f64;
+    let count = |key: &str, or: u64| values.count(key).unwrap_or(or) as f64;
+    let waves = costing.case.model.ring.map_or(1.0, |ring| ring.sectors as f64 / 2.0 + 1.0);
+    let lines = 2.0 * waves * count("modes", 3);
+    let crossings = lines * count("engine_orders", 6);
+    Cost {
+        tables: vec![
+            Shape { rows: costing.cases * speeds * lines, numbers: costing.varied + 4.0, words: 1.0 },
+            Shape { rows: costing.cases * crossings, numbers: costing.varied + 5.0, words: 1.0 },
+        ],
+        drawn: costing.cases * (speeds * lines + crossings),
+        unit: speeds * lines * 8.0,
+        work: costing.cases * (speeds + REFINED * crossings) * costing.masses.powi(3) * EIGEN,
+    }
+}
+
+/// A natural frequency: state of the joints (see [`STATES`]), nodal diameter if the disk is tuned, number from 0, rad/s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Natural {
+    state: usize,
+    diameter: Option<usize>,
+    mode: usize,
+    omega: f64,
+}
+
+impl Natural {
+    fn is_like(&self, other: &Natural) -> bool {
+        (self.state, self.diameter, self.mode) == (other.state, other.diameter, other.mode)
+    }
+}
+
+/// The natural frequencies of a model.
+fn naturals(model: &Model, most: usize) -> Result<Vec<Natural>, String> {
+    let mut found = Vec::new();
+    let mut add = |state: usize, diameter: Option<usize>, modes: &stickslip::model::Modes| {
+        let all = modes.elastic.iter().take(most).enumerate();
+        found.extend(all.map(|(mode, one)| Natural { state, diameter, mode, omega: one.omega }));
+    };
+    if model.ring.is_some_and(|ring| ring.equal) {
+        for wave in waves(model)? {
+            add(0, Some(wave.diameter), &wave.free);
+            add(1, Some(wave.diameter), &wave.stuck);
+        }
+    } else {
+        let survey = model.survey().map_err(|error| error.to_string())?;
+        if survey.is_too_large() {
+            return Err("the model is too large for all of its modes".to_owned());
+        }
+        add(0, None, survey.free());
+        add(1, None, survey.stuck());
+    }
+    Ok(found)
+}
+
+/// The nodal diameter that an engine order excites on so many sectors.
+fn excited(order: usize, sectors: usize) -> usize {
+    let turns = order % sectors;
+    turns.min(sectors - turns)
+}
+
+/// Every engine order with the modes that it can excite: of a tuned disk those of its nodal diameter.
+fn met(found: &[Natural], orders: usize, sectors: Option<usize>) -> impl Iterator<Item = (f64, &Natural)> {
+    let meets = move |natural: &Natural, order: usize| match (natural.diameter, sectors) {
+        (Some(diameter), Some(sectors)) => diameter == excited(order, sectors),
+        _ => true,
+    };
+    (1..=orders).flat_map(move |order| {
+        found.iter().filter(move |natural| meets(natural, order)).map(move |natural| (order as f64, natural))
+    })
+}
+
+/// Evaluations that find a crossing between two speeds.
+const REFINED: f64 = 8.0;
+/// Most of them.
+const MOST_REFINED: usize = 60;
+/// A crossing is found when it moves by no more than this share of its speed.
+const FOUND: f64 = 1e-12;
+
+/// One case while its speeds are gone through.
+struct Diagram<'a> {
+    work: &'a Work<'a>,
+    prepared: &'a Prepared,
+    most: usize,
+    depends: bool,
+}
+
+impl Diagram<'_> {
+    /// The natural frequencies at a speed, rad/s.
+    fn at(&self, speed: f64) -> Result<Vec<Natural>, String> {
+        if !self.depends {
+            return naturals(&self.prepared.case.model, self.most);
+        }
+        let name = self.prepared.case.values.text("parameter").unwrap_or(PARAMETER);
+        let case =
+            self.work.study.case_with(self.prepared.case.index, name, speed).map_err(|error| error.to_string())?;
+        naturals(&case.model, self.most)
+    }
+
+    /// Where `order` times the speed is the frequency of `mode`, between two speeds that lie on either side; false position with bisection.
+    fn crossing(&self, order: f64, mode: &Natural, (mut a, mut b): (f64, f64)) -> Result<f64, String> {
+        let gap = |speed: f64| -> Result<f64, String> {
+            let all = self.at(speed)?;
+            let found = all.iter().find(|other| other.is_like(mode));
+            found.map(|found| found.omega - order * speed).ok_or_else(|| "a mode is lost between two speeds".to_owned())
+        };
+        let (mut at_a, mut at_b) = (gap(a)?, gap(b)?);
+        for step in 0..MOST_REFINED {
+            if (b - a).abs() <= FOUND * b.abs() || at_a == 0.0 {
+                return Ok(a);
+            }
+            let middle = 0.5 * (a + b);
+            let secant = a - at_a * (b - a) / (at_b - at_a);
+            // every third step halves, so that a bent curve ends too
+            let next = if step % 3 == 2 || !(secant > a.min(b) && secant < a.max(b)) { middle } else { secant };
+            let there = gap(next)?;
+            if there == 0.0 {
+                return Ok(next);
+            }
+            if (next - a).abs().min((next - b).abs()) <= FOUND * next.abs() {
+                return Ok(next);
+            }
+            if (there > 0.0) == (at_a > 0.0) { (a, at_a) = (next, there) } else { (b, at_b) = (next, there) }
+        }
+        Ok(0.5 * (a + b))
+    }
+}
+
+fn compute(work: &Work<'_>) -> Computed {
+    let prepared = work.case();
+    let values = &prepared.case.values;
+    let name = values.text("parameter").unwrap_or(PARAMETER);
+    let depends = prepared.case.parameters.contains_key(name);
+    let diagram = Diagram { work, prepared, most: values.count("modes").unwrap_or(3) as usize, depends };
+    let mut part = Part::default();
+    if !depends {
+        let message = format!("There is no parameter `{name}`: the frequencies do not depend on the speed.");
+        part.notes.push(Note::Said(message));
+    }
+    let (mut rows, mut crossings) = (Rows::default(), Rows::default());
+    let orders = values.count("engine_orders").unwrap_or(6) as usize;
+    let sectors = prepared.case.model.ring.filter(|ring| ring.equal).map(|ring| ring.sectors);
+    let mut before: Option<(f64, Vec<Natural>)> = None;
+    for speed in values.frequencies("speed").into_iter().flat_map(|speeds| speeds.iter()) {
+        let place = || format!("{}speed = {} Hz", label(prepared), hertz(speed));
+        if work.context.stopped() {
+            part.count(place, NOT_REACHED, None);
+            continue;
+        }
+        let found = match diagram.at(speed) {
+            Ok(found) => found,
+            Err(reason) => {
+                part.count(place, "failed", Some(reason));
+                before = None;
+                continue;
+            }
+        };
+        part.count(place, CONVERGED, None);
+        for natural in &found {
+            write(prepared, speed, natural, &mut rows);
+            rows.end();
+        }
+        if let Some((last, all)) = &before {
+            let between = (*last, speed);
+            for (order, natural) in met(&found, orders, sectors) {
+                let Some(was) = all.iter().find(|was| was.is_like(natural)) else { continue };
+                if (was.omega - order * last > 0.0) == (natural.omega - order * speed > 0.0) {
+                    continue;
+                }
+                match diagram.crossing(order, natural, between) {
+                    Ok(at) => {
+                        write(prepared, at, &Natural { omega: order * at, ..*natural }, &mut crossings);
+                        crossings.integer(ORDER, order as u64);
+                        crossings.end();
+                    }
+                    Err(reason) => part.count(place, "failed", Some(reason)),
+                }
+            }
+        }
+        before = Some((speed, found));
+        (work.context.finished)();
+    }
+    part.tables = vec![rows, crossings];
+    Ok(part)
+}
+
+fn label(prepared: &Prepared) -> String {
+    let label = prepared.case.label();
+    if label.is_empty() { label } else { format!("{label}, ") }
+}
+
+fn write(prepared: &Prepared, speed: f64, natural: &Natural, rows: &mut Rows) {
+    rows.varied(&prepared.case);
+    rows.text(JOINTS, STATES[natural.state]);
+    if let Some(diameter) = natural.diameter {
+        rows.integer(DIAMETER, diameter as u64);
+    }
+    rows.integer(MODE, natural.mode as u64 + 1);
+    rows.number(SPEED, speed / TAU);
+    rows.number(FREQUENCY, hertz(natural.omega));
+}
+
+/// A panel for every case: the frequencies, of a tuned disk those that an engine order meets, the lines of the engine orders, the crossings.
+fn draw(drawing: &Drawing<'_>) -> Figure {
+    let Some(table) = drawing.table(TABLE) else { return Figure::default() };
+    let (x, x_factor) = drawing.axis(0, "speed of rotation", largest(table, [SPEED.to_owned()]), "Hz");
+    let (y, y_factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
+    let crossings = drawing.table(CROSSINGS);
+    let marks = crossings.map(|table| drawing.stretches(table)).unwrap_or_default();
+    let panel = |stretch: &Stretch| {
+        let case = drawing.study.case(stretch.case).ok();
+        let orders = case.as_ref().and_then(|case| case.values.count("engine_orders")).unwrap_or(6) as usize;
+        let ring = case.and_then(|case| case.model.ring).filter(|ring| ring.equal);
+        let shown = |diameter: Option<u64>| match (diameter, ring) {
+            (Some(diameter), Some(ring)) => (1..=orders).any(|o| excited(o, ring.sectors) as u64 == diameter),
+            _ => true,
+        };
+        let mut series = frequencies(table, stretch, (x_factor, y_factor), &shown);
+        let speeds = numbers(table, SPEED, stretch.rows.clone());
+        let (low, high) = speeds.iter().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(*v), high.max(*v)));
+        let highest = series.iter().flat_map(|line| &line.y).copied().fold(0.0, f64::max);
+        let top = ROOM * highest;
+        for order in 1..=orders {
+            // to the end of the speeds, or out of the frequencies that there are
+            let end = (high * x_factor).min(top * x_factor / (order as f64 * y_factor));
+            let line = |speed: f64| order as f64 * speed / x_factor * y_factor;
+            let ends = vec![low * x_factor, end.max(low * x_factor)];
+            let y = ends.iter().map(|x| line(*x)).collect();
+            series.push(Series::line(format!("engine orders 1 to {orders}"), ends, y, 0).reference());
+        }
+        if let Some((table, stretch)) = crossings.zip(marks.iter().find(|marks| marks.case == stretch.case)) {
+            for (colour, state) in STATES.into_iter().enumerate() {
+                let states = words(table, JOINTS);
+                let rows: Vec<usize> = stretch.rows.clone().filter(|row| states[*row] == state).collect();
+                let column = |name: &str, factor: f64| -> Vec<f64> {
+                    let all = numbers(table, name, 0..table.rows());
+                    rows.iter().map(|row| all[*row] * factor).collect()
+                };
+                series.push(Series::marks("crossings", column(SPEED, x_factor), column(FREQUENCY, y_factor), colour));
+            }
+        }
+        Panel { title: stretch.label(), x: x.clone(), y: y.clone().between(0.0, top), series }
+    };
+    Figure { panels: drawing.stretches(table).iter().take(MOST_PANELS).map(panel).collect(), ..Figure::default() }
+}
+
+/// Room above the highest frequency, as a share of it.
+const ROOM: f64 = 1.1;
+
+fn frequencies(
+    table: &Table,
+    stretch: &Stretch,
+    (x_factor, y_factor): (f64, f64),
+    shown: &dyn Fn(Option<u64>) -> bool,
+) -> Vec<Series> {
+    let Some(modes) = table.integers(MODE) else { return Vec::new() };
+    let (states, diameters) = (words(table, JOINTS), table.integers(DIAMETER));
+    let of = |row: usize| (diameters.map(|all| all[row]), modes[row]);
+    let mut kinds: Vec<(Option<u64>, u64)> = stretch.rows.clone().map(of).filter(|(d, _)| shown(*d)).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    let (x, y) = (numbers(table, SPEED, 0..table.rows()), numbers(table, FREQUENCY, 0..table.rows()));
+    let mut series = Vec::new();
+    for (colour, state) in STATES.into_iter().enumerate() {
+        for kind in &kinds {
+            let rows = || stretch.rows.clone().filter(|row| of(*row) == *kind && states[*row] == state);
+            let line = Series::line(
+                format!("joints {state}"),
+                rows().map(|row| x[row] * x_factor).collect(),
+                rows().map(|row| y[row] * y_factor).collect(),
+                colour,
+            );
+            series.push(Series { style: if colour == 0 { Style::Solid } else { Style::Dashed }, ..line });
+        }
+    }
+    series
+}

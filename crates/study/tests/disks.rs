@@ -1,0 +1,223 @@
+//! Bladed disks in study files.
+
+use stickslip_study::run::{Context, run};
+use stickslip_study::{Case, Study, StudyError, read_study};
+
+const SECTOR: &str = r#"
+schema = 1
+[parameters]
+k = "1e5 N/m"
+c = "k*1e-6 s"
+s = 7
+[[mass]]
+name = "blade"
+mass = "200 g"
+[[spring]]
+between = ["blade", "ground"]
+stiffness = "k"
+damping = "c"
+[[spring]]
+between = ["blade", "next.blade"]
+stiffness = "1e4 N/m"
+[[joint]]
+name = "shroud"
+between = ["blade", "next.blade"]
+law = { kind = "jenkins", stiffness = "2e4 N/m", limit = "1 N" }
+[[force]]
+on = "blade"
+amplitude = "1 N"
+"#;
+
+const STUDY: &str = "
+[study]
+kind = \"response\"
+frequency = { from = \"110 Hz\", to = \"130 Hz\", points = 5 }
+";
+
+fn read(force: &str, disk: &str, study: &str) -> Result<Study, StudyError> {
+    read_study("disk.toml", &format!("{SECTOR}{force}\n[disk]\nsectors = 6\n{disk}\n{study}"), &[])
+}
+
+fn case(force: &str, disk: &str) -> Case {
+    read(force, disk, STUDY).unwrap_or_else(|error| panic!("{error:?}")).case(0).unwrap()
+}
+
+/// Stiffness of each blade relative to the tuned one.
+fn blades(case: &Case) -> Vec<f64> {
+    (0..6).map(|s| case.model.springs[2 * s].stiffness / 1e5).collect()
+}
+
+#[test]
+fn a_sector_becomes_a_ring() {
+    let case = case("engine_order = -1", "");
+    let model = &case.model;
+    assert_eq!(model.place_names()[1..], ["blade_0", "blade_1", "blade_2", "blade_3", "blade_4", "blade_5"]);
+    assert_eq!(model.joints[5].between, ["blade_5", "blade_0"]);
+    assert_eq!(model.ring.unwrap().order, Some(5));
+    let study = read("engine_order = -1", "", STUDY).unwrap();
+    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let names: Vec<&str> = data.tables[0].columns.iter().map(|column| column.name.as_str()).collect();
+    let bars = &data.figure.panels[1].series[0];
+    assert_eq!((bars.label.as_str(), bars.x.as_slice()), ("blade", &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0][..]));
+    assert!(bars.y.iter().all(|y| (y / bars.y[0] - 1.0).abs() < 1e-6), "tuned: all alike");
+    for column in ["blade_0_amplitude_m", "blade_5_amplitude_m", "shroud_3_dissipation_J"] {
+        assert!(names.contains(&column), "{column} in {names:?}");
+    }
+}
+
+/// k (1 + deviation), whatever the name; what follows from a parameter follows.
+#[test]
+fn mistuning_by_parameter_mass_and_spring() {
+    let pattern = stickslip::model::normal_pattern(6, 0.02, 7);
+    let by_parameter = case("", "mistuning = { of = \"k\", deviation = \"2 %\", seed = 7 }");
+    for (s, deviation) in pattern.iter().enumerate() {
+        let spring = &by_parameter.model.springs[2 * s];
+        assert!((spring.stiffness / (1e5 * (1.0 + deviation)) - 1.0).abs() < 1e-15);
+        assert!((spring.damping / (0.1 * (1.0 + deviation)) - 1.0).abs() < 1e-15, "the damping is an expression of k");
+    }
+    let by_spring = case("", "mistuning = { of = [\"ground\", \"blade\"], deviation = 0.02, seed = \"s\" }");
+    assert_eq!(blades(&by_spring), blades(&by_parameter));
+    assert_eq!(by_spring.model.springs[0].damping, by_spring.model.springs[2].damping);
+    let by_mass = case("", "mistuning = { of = \"blade\", deviation = 0.02, seed = 7 }");
+    assert!((by_mass.model.masses[3].mass / (0.2 * (1.0 + pattern[3])) - 1.0).abs() < 1e-15);
+    assert!(by_mass.model.ring.unwrap().order.is_none());
+    // no deviation, no mistuning
+    assert!(case("", "mistuning = { of = \"k\", deviation = 0 }").model.ring.unwrap().order.is_some());
+}
+
+#[test]
+fn seeds_are_cases() {
+    let study = read(
+        "engine_order = 2",
+        "mistuning = { of = \"k\", deviation = 0.02, seed = \"s\" }",
+        "[study]\nkind = \"response\"\nfrequency = \"115 Hz\"\nvary = { s = { from = 1, to = 4, points = 4 } }",
+    )
+    .unwrap();
+    assert_eq!(study.cases(), 4);
+    let all: Vec<Vec<f64>> = (0..4).map(|i| blades(&study.case(i).unwrap())).collect();
+    assert!((0..3).all(|i| all[i] != all[i + 1]));
+}
+
+#[test]
+fn a_pattern_from_a_file() {
+    let folder = std::env::temp_dir().join(format!("stickslip-pattern-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    write("pattern.csv", "sector,deviation\n0,1 %\n1,0\n2,-0.02\n3,0\n4,0\n5,0.5 %\n");
+    write("short.csv", "sector,deviation\n0,1 %\n");
+    write("wrong.csv", "sector,deviation\n0,stiff\n");
+    let read = |file: &str| {
+        let text = format!("{SECTOR}\n[disk]\nsectors = 6\nmistuning = {{ of = \"k\", file = \"{file}\" }}\n{STUDY}");
+        std::fs::write(folder.join("disk.toml"), text).unwrap();
+        stickslip_study::read_file(&folder.join("disk.toml"), &[])
+    };
+    let found = blades(&read("pattern.csv").unwrap().case(0).unwrap());
+    assert!(found.iter().zip([1.01, 1.0, 0.98, 1.0, 1.0, 1.005]).all(|(a, b)| (a - b).abs() < 1e-15), "{found:?}");
+    for (file, words) in
+        [("short.csv", "has 1 sectors, and the disk has 6"), ("wrong.csv", "line 2"), ("none.csv", "cannot be read")]
+    {
+        assert!(read(file).unwrap_err().message().contains(words), "{file}");
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn wrong_disks_are_refused_at_their_place() {
+    let message = |force: &str, disk: &str| {
+        let error = read(force, disk, STUDY).unwrap_err();
+        format!("{} | {}", error.message(), error.help_text().unwrap_or_default())
+    };
+    for (force, disk, words) in [
+        ("engine_order = 1.5", "", "whole number"),
+        ("engine_order = 1\nnodal_diameter = 2", "", "different things"),
+        ("sector = 6", "", "from 0 to 5"),
+        ("", "mistuning = { of = \"q\", deviation = 0.02 }", "no parameter or mass `q`"),
+        ("", "mistuning = { of = [\"blade\", \"disk\"], deviation = 0.02 }", "no spring between"),
+        ("", "mistuning = { of = \"k\" }", "`deviation` or `file` is missing"),
+        ("", "mistuning = { of = \"k\", deviation = 0.02, seed = 0.5 }", "whole number"),
+        ("", "mistuning = { of = \"k\", deviation = 0.02, file = \"p.csv\" }", "says nothing beside it"),
+        ("", "mistuning = { of = \"k\", deviation = 100, seed = 1 }", "nothing is left"),
+        ("", "sectors_ = 3", "no key `sectors_`"),
+    ] {
+        assert!(message(force, disk).contains(words), "{force} {disk}: {}", message(force, disk));
+    }
+    let text = format!("{SECTOR}engine_order = 3\n{STUDY}");
+    assert!(
+        read_study("d.toml", &text.replace("next.blade", "ground"), &[]).unwrap_err().message().contains("no [disk]")
+    );
+    let one = format!("{SECTOR}\n[disk]\nsectors = 1\n{STUDY}");
+    assert!(read_study("d.toml", &one, &[]).unwrap_err().message().contains("2 sectors or more"));
+    let many = format!("{SECTOR}\n[disk]\nsectors = 1e8\n{STUDY}");
+    assert!(read_study("d.toml", &many, &[]).unwrap_err().message().contains("the limit is"));
+    let misspelt = format!("{SECTOR}\n[disk]\nsectors = 6\n{STUDY}").replacen("\"next.blade\"", "\"next.blad\"", 1);
+    let error = read_study("d.toml", &misspelt, &[]).unwrap_err();
+    assert!(error.message().contains("no place `blad`") && error.help_text() == Some("did you mean `blade`?"));
+    let varied = format!(
+        "{SECTOR}\n[disk]\nsectors = \"s\"\n[study]\nkind = \"response\"\nfrequency = \"1 Hz\"\nvary = {{ s = [4, 5] }}"
+    );
+    assert!(read_study("d.toml", &varied, &[]).unwrap_err().message().contains("in another case"));
+}
+
+/// `only = \"blade\"` are the blades of all sectors, and one of them has its number.
+#[test]
+fn names_of_a_sector_stand_for_all() {
+    let figure = |only: &str| read("", "", &format!("{STUDY}[figure]\nonly = {only}\n")).map(|_| ());
+    for good in ["\"blade\"", "[\"blade_3\", \"shroud_0\"]", "\"shroud\""] {
+        figure(good).unwrap();
+    }
+    assert!(figure("\"blade_6\"").is_err());
+}
+
+/// `ω² = (k + 2 kc (1 - cos 2πd/N)) / m` with the joints' springs in kc where they stick.
+#[test]
+fn frequencies_by_nodal_diameter() {
+    let study = read("", "", "[study]\nkind = \"nodal-diameter\"\nmodes = 2\n").unwrap();
+    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let table = &data.tables[0];
+    let (d, f) = (table.integers("nodal_diameter").unwrap(), table.numbers("frequency_Hz").unwrap());
+    let joints = table.texts("joints").unwrap();
+    assert_eq!(table.rows(), 8, "one mode of each of 4 diameters, free and stuck");
+    for row in 0..8 {
+        let kc = if joints[row] == "free" { 1e4 } else { 3e4 };
+        let square = (1e5 + 2.0 * kc * (1.0 - (std::f64::consts::TAU * d[row] as f64 / 6.0).cos())) / 0.2;
+        assert!((f[row] * std::f64::consts::TAU / square.sqrt() - 1.0).abs() < 1e-12);
+    }
+    assert!(!data.figure.panels[0].series.is_empty());
+    let mistuned = read("", "mistuning = { of = \"k\", deviation = 0.01 }", "[study]\nkind = \"nodal-diameter\"\n");
+    assert!(mistuned.unwrap_err().message().contains("no nodal diameters"));
+}
+
+/// A blade that the speed stiffens, `k0 + k1 Ω²`: engine order e crosses at `Ω² = k0/(e² m - k1)`, and on a disk only the modes of its own
+/// nodal diameter.
+#[test]
+fn campbell_crossings() {
+    let sector = SECTOR
+        .replace("k = \"1e5 N/m\"", "speed = \"0 Hz\"\nk0 = \"1e5 N/m\"\nk = \"k0 + 0.1 kg*(speed/(1 rad))^2\"")
+        .replace("stiffness = \"1e4 N/m\"", "stiffness = \"0 N/m\"");
+    let kind =
+        "[study]\nkind = \"campbell\"\nspeed = { from = \"20 Hz\", to = \"200 Hz\", points = 7 }\nengine_orders = 8\n";
+    let crossings = |text: &str| {
+        let data = run(&read_study("c.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap();
+        data.tables.into_iter().find(|table| table.name == "crossings").unwrap()
+    };
+    let plain = sector
+        .replace("next.blade", "ground")
+        .replace("kind = \"jenkins\", stiffness = \"2e4", "kind = \"jenkins\", stiffness = \"0");
+    let plain = plain.replace("\"0 N/m\", limit", "\"1e-9 N/m\", limit");
+    let found = crossings(&format!("{plain}{kind}"));
+    let (orders, speeds) = (found.integers("engine_order").unwrap(), found.numbers("speed_Hz").unwrap());
+    let joints = found.texts("joints").unwrap();
+    for order in 1..=5u64 {
+        let speed = (1e5 / ((order * order) as f64 * 0.2 - 0.1)).sqrt() / std::f64::consts::TAU;
+        let rows: Vec<usize> = (0..found.rows()).filter(|r| orders[*r] == order && joints[*r] == "free").collect();
+        assert_eq!(rows.len(), usize::from((20.0..200.0).contains(&speed)), "{order} {speed}");
+        assert!(rows.iter().all(|row| (speeds[*row] / speed - 1.0).abs() < 1e-9), "{order}");
+    }
+    let ring = crossings(&format!("{sector}[disk]\nsectors = 6\n{kind}"));
+    let (orders, diameters) = (ring.integers("engine_order").unwrap(), ring.integers("nodal_diameter").unwrap());
+    assert!(ring.rows() > 8);
+    for (order, diameter) in orders.iter().zip(diameters) {
+        let turns = order % 6;
+        assert_eq!(*diameter, turns.min(6 - turns));
+    }
+}
