@@ -63,7 +63,7 @@ fn response_to_five_digits() {
         .skip(1)
         .map(|line| line.split(',').map(|value| value.parse().unwrap()).collect())
         .collect();
-    for reduce in ["false", "{ up_to = \"5 kHz\", tolerance = 1e-8 }"] {
+    for reduce in ["false", "{ up_to = \"5 kHz\", tolerance = 1e-6 }"] {
         let folder = folder(&format!("reduce = {reduce}"));
         let study = read_file(&folder.path().join("blade.toml"), &[]).unwrap();
         let found = run(&study, &Context::unwatched(1)).unwrap();

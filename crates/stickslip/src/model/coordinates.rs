@@ -64,11 +64,13 @@ impl Coordinates {
             .map(|(place, row)| (place.name.as_str(), row))
             .collect();
         let turned = Turned::new(names.len(), &moved)?;
+        let placed: Vec<Row> = rows.iter().map(|row| turned.row(row)).collect();
+        follows(model, places, &placed, turned.free)?;
         Ok(Coordinates {
             free: turned.free,
             moved: moved.len(),
             names: names.into_iter().zip(&turned.pivot).filter(|(_, pivot)| !**pivot).map(|(name, _)| name).collect(),
-            places: rows.iter().map(|row| turned.row(row)).collect(),
+            places: placed,
             entries: part.entries.map(|entries| turned.entries(entries)),
             reduced: part.reduced,
         })
@@ -78,6 +80,25 @@ impl Coordinates {
     pub fn moved_number(&self, places: &Places, place: usize) -> Option<usize> {
         places.stated[place].moved.then(|| places.stated[..place].iter().filter(|place| place.moved).count())
     }
+}
+
+/// Refuses places that follow a moved one directly, as all do in few coordinates: results are read off the free coordinates alone.
+fn follows(model: &Model, places: &Places, rows: &[Row], free: usize) -> Result<(), ModelError> {
+    for (place, row) in places.stated.iter().zip(rows).filter(|(place, _)| !place.moved) {
+        let size = row.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
+        let on = row.iter().find(|(at, weight)| *at >= free && weight.abs() > DEPENDENT * size);
+        let Some((at, _)) = on else { continue };
+        let name =
+            places.stated.iter().filter(|place| place.moved).nth(at - free).map_or("", |place| place.name.as_str());
+        let motion = model.motions.iter().position(|motion| motion.on == name).unwrap_or(0);
+        let message = format!(
+            "`{}` follows `{name}`, whose motion is imposed, as places of a structure in few coordinates do; say reduce = false in \
+             [structure], or move another place that a stiff spring ties to it",
+            place.name
+        );
+        return Err(ModelError::new(Element::Motion(motion), "on", message));
+    }
+    Ok(())
 }
 
 /// The substructure in coordinates of its own.

@@ -30,10 +30,9 @@ use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted};
 /// assert!(seen.dofs() < 12 && seen.error() < 1e-4);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Component(Arc<Kept>);
 
-#[derive(Debug)]
 struct Kept {
     rows: Vec<String>,
     index: OnceLock<HashMap<String, usize>>,
@@ -189,6 +188,14 @@ impl Component {
         let answer = self.0.whole.seen_at(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new);
         known.push(((seen.to_vec(), *how), answer.clone()));
         answer
+    }
+}
+
+impl std::fmt::Debug for Component {
+    /// Its size, not its matrices.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (mass, _, stiffness) = self.matrices();
+        write!(f, "Component of {} rows, {} and {} entries", self.dofs(), stiffness.len(), mass.len())
     }
 }
 

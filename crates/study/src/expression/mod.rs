@@ -376,6 +376,9 @@ mod tests {
     fn dimensions_follow_the_algebra() {
         check("m - m1/2", Dimension::MASS, 0.182 - 0.002 / 2.0);
         check("m1 - m1/2", Dimension::MASS, 0.001);
+        check("20 /s", Dimension { kg: 0, m: 0, s: -1, rad: 0 }, 20.0);
+        check("20/ms * 1 mm", Dimension::VELOCITY, 20.0 / 1e-3 * 1e-3);
+        check("0.182 kg * 8/m", Dimension::NONE, 0.182 * 8.0 / 0.182); // a parameter is no unit
         check("-2^2", Dimension::NONE, -4.0);
         check("2^-1", Dimension::NONE, 0.5);
         check("2^3^2", Dimension::NONE, 512.0);

@@ -4,6 +4,7 @@ use super::{FUNCTIONS, Operation, Value, is_not_finite};
 use crate::near::{nearest, shown};
 use crate::units::{self, Fault, Names};
 use std::ops::Range;
+use stickslip::dimension::Dimension;
 
 /// Parentheses and powers inside each other.
 const DEEPEST: usize = 64;
@@ -176,6 +177,13 @@ impl Parser<'_> {
                 self.at = end;
                 Value::of(unit.scale(literal), unit.dimension)
             }
+            Some('/') => match self.inverse_unit() {
+                Some((unit, inverse, end)) => {
+                    self.at = end;
+                    Value::of(literal.parse().unwrap_or(f64::NAN) / unit.scale("1"), inverse)
+                }
+                None => Value::bare(literal.parse().unwrap_or(f64::NAN)),
+            },
             _ => Value::bare(literal.parse().unwrap_or(f64::NAN)),
         };
         if !value.si.is_finite() {
@@ -188,6 +196,19 @@ impl Parser<'_> {
         self.push(Operation::Push(value), start);
         self.space();
         Ok(())
+    }
+
+    /// The unit behind `/` in `20 /s`, the dimension of one by it, and where it ends; none where a parameter has its name.
+    fn inverse_unit(&self) -> Option<(units::Unit, Dimension, usize)> {
+        let start = self.at + 1;
+        let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        let name = self.text[start..].split(|c| !word(c)).next().filter(|name| !name.is_empty())?;
+        let end = start + name.len();
+        let taken = (self.index)(name).is_some()
+            || (self.constant)(name).is_some()
+            || self.text[end..].trim_start().starts_with('^');
+        let unit = units::find(name).filter(|_| !taken)?;
+        Some((unit, unit.dimension.to_the(-1.0)?, end))
     }
 
     fn name(&mut self) -> Result<(), Fault> {

@@ -92,6 +92,8 @@ impl<'a> Free<'a> {
     /// If there are fewer modes or orders.
     pub fn reduced(&self, modes: usize, order: usize) -> Result<Reduced, ReductionError> {
         assert!(modes <= self.modes() && order <= self.counts.1, "of {} modes, {} orders", self.modes(), self.counts.1);
+        // all modes leave nothing to the residual vectors but rounding
+        let order = if modes < self.whole.dofs() { order } else { 0 };
         let small = self.combination(modes, order).ok_or(ReductionError::OutOfRange)?;
         let project = |matrix: &DMatrix<f64>| symmetric(small.transpose() * matrix * &small);
         let (mass, stiffness) = (project(&self.mass), project(&self.stiffness));
