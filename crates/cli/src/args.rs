@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use stickslip_report::stream::Shard;
 
 /// How structures with dry-friction joints vibrate.
 #[derive(Debug, Parser)]
@@ -43,9 +44,12 @@ pub enum Command {
         /// Memory that a run may take, for example 4GB; a study that needs more is refused [default: 2GB, or what is free]
         #[arg(long, value_name = "SIZE", value_parser = bytes)]
         memory: Option<u64>,
-        /// Write only these outputs: csv, json, svg, png, html (comma between them)
+        /// Write only these outputs: csv, parquet, json, svg, png, html (comma between them)
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
+        /// Write these outputs too: parquet
+        #[arg(long, value_delimiter = ',')]
+        also: Vec<String>,
         /// Print the results as JSON on standard output, one line per study
         #[arg(long)]
         json: bool,
@@ -55,6 +59,36 @@ pub enum Command {
         /// Run again whenever a file changes, until Ctrl-C
         #[arg(long)]
         watch: bool,
+        /// Go on where a run that did not end has stopped; begin anew if there is none
+        #[arg(long, conflicts_with_all = ["restart", "watch"])]
+        resume: bool,
+        /// Throw away what a long run that did not end has kept
+        #[arg(long)]
+        restart: bool,
+        /// Compute one part of so many, for `stickslip merge`; on as many machines as you like
+        #[arg(long, value_name = "N/OF", conflicts_with_all = ["only", "also", "json", "open", "watch"])]
+        shard: Option<Shard>,
+        /// How progress is shown: a bar on a terminal, or for programs one JSON object a line on standard error
+        #[arg(long, value_name = "HOW", default_value = "bar")]
+        progress: Progress,
+    },
+    /// Join the parts of a study that `run --shard` has computed, and draw its figure
+    Merge {
+        /// Folders of the parts, or the folder in which they are
+        #[arg(required = true, value_name = "DIR")]
+        folders: Vec<PathBuf>,
+        /// Folder of the results; the study gets a folder of its name in it
+        #[arg(long, default_value = "stickslip-out")]
+        out: PathBuf,
+        /// Write only these outputs: csv, parquet, json, svg, png, html (comma between them)
+        #[arg(long, value_delimiter = ',')]
+        only: Vec<String>,
+        /// Write these outputs too: parquet
+        #[arg(long, value_delimiter = ',')]
+        also: Vec<String>,
+        /// Show the figure in the browser
+        #[arg(long)]
+        open: bool,
     },
     /// Check study files without running them
     Check {
@@ -145,6 +179,17 @@ pub struct Place {
     /// Threads; all cores when absent. Results do not depend on it
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+}
+
+/// How progress is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Progress {
+    /// A bar, if standard error is a terminal
+    Bar,
+    /// One JSON object a line
+    Json,
+    /// Nothing
+    None,
 }
 
 /// What `list` lists.

@@ -1,35 +1,29 @@
 //! The `stickslip` command.
 
-/// Says something on standard error; a reader that has gone away is no reason to end.
+/// Says something on standard error, see [`speak`].
 macro_rules! complain {
-    ($($text:tt)*) => {{
-        use std::io::Write;
-        let _ = writeln!(std::io::stderr(), $($text)*);
-    }};
-}
-
-/// The same without a line feed.
-macro_rules! complain_on {
-    ($($text:tt)*) => {{
-        use std::io::Write;
-        let _ = write!(std::io::stderr(), $($text)*);
-    }};
+    ($($text:tt)*) => {
+        $crate::speak::line(&format!($($text)*))
+    };
 }
 
 mod args;
 mod inspect;
 mod list;
+mod merge;
 mod open;
 mod plot;
 mod progress;
 mod reduce;
 mod run;
+mod speak;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
+use stickslip_report::stream::Start;
 
 /// How a command ends; the numbers are those of the exit status.
 #[derive(Debug)]
@@ -59,10 +53,35 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let ending = match cli.command {
         Command::Paper { place, open } => run::paper(&place, open),
-        Command::Run { files, place, set, method, memory, only, json, open, watch } => {
+        Command::Run {
+            files,
+            place,
+            set,
+            method,
+            memory,
+            only,
+            also,
+            json,
+            open,
+            watch,
+            resume,
+            restart,
+            shard,
+            progress,
+        } => {
             let request = run::Request { files: &files, set: &set, method: method.as_deref(), memory };
-            run::run(&request, &place, &run::Wanted { only: &only, json, open, watch })
+            let start = match (resume, restart || watch) {
+                (true, _) => Start::Resume,
+                (false, true) => Start::Anew,
+                (false, false) => Start::First,
+            };
+            run::run(
+                &request,
+                &place,
+                &run::Wanted { only: &only, also: &also, json, open, watch, start, shard, progress },
+            )
         }
+        Command::Merge { folders, out, only, also, open } => merge::merge(&folders, &out, (&only, &also), open),
         Command::Check { files, set, method, memory } => {
             run::check(&run::Request { files: &files, set: &set, method: method.as_deref(), memory })
         }
@@ -92,7 +111,7 @@ fn main() -> ExitCode {
         }
     };
     if let Ending::Failed(message) = &ending {
-        complain!("error: {message}");
+        speak::error(message);
     }
     ending.code()
 }

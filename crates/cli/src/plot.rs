@@ -25,7 +25,7 @@ pub struct Wanted<'a> {
 
 /// `stickslip plot`.
 pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
-    let outputs = match outputs(wanted.only) {
+    let outputs = match outputs(wanted.only, &[]) {
         Ok(outputs) => outputs,
         Err(ending) => return ending,
     };

@@ -1,8 +1,11 @@
 //! A progress bar on a terminal, silence in a pipe, and Ctrl-C that keeps what is finished; SIGTERM and SIGHUP are like Ctrl-C.
 
+use crate::args::Progress as Shown;
+use crate::speak;
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
+use serde_json::json;
 use std::fmt::Write;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -32,8 +35,101 @@ pub fn stop_flag() -> Arc<AtomicBool> {
 /// Signals closer than this to the first are the same request.
 const REPEATED: Duration = Duration::from_millis(400);
 
+/// Shows how a run goes on.
+#[derive(Clone)]
+pub enum Progress {
+    /// On a terminal.
+    Bar(ProgressBar),
+    /// For programs: the study, its points so far, units that are kept, when it began, and when it was said last.
+    Lines(Arc<Lines>),
+    /// Not at all.
+    Silent,
+}
+
+/// What programs are told.
+pub struct Lines {
+    study: String,
+    points: AtomicU64,
+    kept: AtomicU64,
+    begun: Instant,
+    said: Mutex<Instant>,
+}
+
+/// Programs are told no more often than this.
+const SAID: Duration = Duration::from_millis(500);
+
+impl Progress {
+    /// Of a study with so many points, of which the first `done` are there.
+    pub fn new(how: Shown, points: Option<u64>, done: u64, study: &str) -> Progress {
+        match how {
+            Shown::None => Progress::Silent,
+            Shown::Bar => {
+                let bar = bar(points, study);
+                bar.inc(done);
+                bar.reset_eta();
+                Progress::Bar(bar)
+            }
+            Shown::Json => Progress::Lines(Arc::new(Lines {
+                study: study.to_owned(),
+                points: AtomicU64::new(done),
+                kept: AtomicU64::new(0),
+                begun: Instant::now(),
+                said: Mutex::new(Instant::now()),
+            })),
+        }
+    }
+
+    /// A point is finished.
+    pub fn point(&self) {
+        match self {
+            Progress::Bar(bar) => bar.inc(1),
+            Progress::Lines(lines) => {
+                lines.points.fetch_add(1, Ordering::Relaxed);
+                // who finds it taken leaves the saying to the other
+                if let Ok(mut said) = lines.said.try_lock()
+                    && said.elapsed() >= SAID
+                {
+                    *said = Instant::now();
+                    lines.say();
+                }
+            }
+            Progress::Silent => {}
+        }
+    }
+
+    /// So many units are on the disk.
+    pub fn kept(&self, units: usize) {
+        if let Progress::Lines(lines) = self {
+            lines.kept.store(units as u64, Ordering::Relaxed);
+        }
+    }
+
+    /// The end.
+    pub fn end(&self) {
+        match self {
+            Progress::Bar(bar) => bar.finish_and_clear(),
+            Progress::Lines(lines) => lines.say(),
+            Progress::Silent => {}
+        }
+    }
+}
+
+impl Lines {
+    fn say(&self) {
+        speak::event(
+            "progress",
+            json!({
+                "study": self.study,
+                "points": self.points.load(Ordering::Relaxed),
+                "kept": self.kept.load(Ordering::Relaxed),
+                "elapsed_s": self.begun.elapsed().as_secs_f64(),
+            }),
+        );
+    }
+}
+
 /// A bar over `points`, or a count where their number is not known before; it draws nothing unless standard error is a terminal.
-pub fn bar(points: Option<u64>, what: &str) -> ProgressBar {
+fn bar(points: Option<u64>, what: &str) -> ProgressBar {
     let bar = points.map_or_else(ProgressBar::no_length, ProgressBar::new);
     let template = match points {
         Some(_) => "{msg} {bar:24} {pos}/{len} points, {left}",

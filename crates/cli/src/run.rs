@@ -1,7 +1,9 @@
 //! `stickslip run`, `check` and `paper`.
 
 use crate::args::Place;
-use crate::{Ending, open, print, progress};
+use crate::progress::{self, Progress};
+use crate::{Ending, open, print, speak};
+use serde_json::json;
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
@@ -9,11 +11,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use stickslip::orbit::Accuracy;
-use stickslip_report::{Outputs, check_writable, json::write_dataset_json, terminal::Terminal, write_dataset};
+use stickslip_report::assemble::{Assembled, Parts, assemble};
+use stickslip_report::journal::{Journal, JournalError};
+use stickslip_report::stream::{self, Shard, Start, StreamError};
+use stickslip_report::{Outputs, check_writable, json::write_dataset_json, terminal::Terminal};
 use stickslip_study::dataset::Dataset;
 use stickslip_study::run::{CONVERGED, Checked, Context, check as check_study};
 use stickslip_study::schema::MOST_BYTES;
 use stickslip_study::summary::ModelSummary;
+use stickslip_study::thinning::MOST_ROWS;
 use stickslip_study::{Study, StudyError, read_bytes, read_file};
 
 /// The studies that a command line names.
@@ -76,6 +82,9 @@ fn read(file: &Path, set: &[(String, String)]) -> Result<Study, StudyError> {
 
 /// Prints an error of a study file with its place underlined.
 pub(crate) fn show(error: &StudyError) {
+    if speak::is_for_programs() {
+        return speak::error(&error.to_string());
+    }
     let report = miette::Report::new(error.clone());
     complain!("{report:?}");
 }
@@ -113,12 +122,20 @@ pub fn check(request: &Request<'_>) -> Ending {
 pub struct Wanted<'a> {
     /// `--only`.
     pub only: &'a [String],
+    /// `--also`.
+    pub also: &'a [String],
     /// `--json`.
     pub json: bool,
     /// `--open`.
     pub open: bool,
     /// `--watch`.
     pub watch: bool,
+    /// `--resume`, `--restart`.
+    pub start: Start,
+    /// `--shard`.
+    pub shard: Option<Shard>,
+    /// `--progress`.
+    pub progress: crate::args::Progress,
 }
 
 /// What is known of a study before it is run, with its warnings on standard error.
@@ -127,10 +144,10 @@ fn warned(checked: &Checked) -> &ModelSummary {
     checked.summary()
 }
 
-/// The outputs that `--only` names; all without it.
-pub(crate) fn outputs(only: &[String]) -> Result<Outputs, Ending> {
-    let outputs = if only.is_empty() { Ok(Outputs::all()) } else { Outputs::only(only) };
-    outputs.map_err(|error| {
+/// The outputs that `--only` names, the usual ones without it; and those of `--also`.
+pub(crate) fn outputs(only: &[String], also: &[String]) -> Result<Outputs, Ending> {
+    let outputs = if only.is_empty() { Ok(Outputs::usual()) } else { Outputs::only(only) };
+    outputs.and_then(|outputs| Ok(outputs.and(&Outputs::only(also)?))).map_err(|error| {
         complain!("error: {error}");
         Ending::WrongInput
     })
@@ -138,7 +155,10 @@ pub(crate) fn outputs(only: &[String]) -> Result<Outputs, Ending> {
 
 /// `stickslip run`.
 pub fn run(request: &Request<'_>, place: &Place, wanted: &Wanted<'_>) -> Ending {
-    let outputs = match outputs(wanted.only) {
+    if wanted.progress == crate::args::Progress::Json {
+        speak::for_programs();
+    }
+    let outputs = match outputs(wanted.only, wanted.also) {
         Ok(outputs) => outputs,
         Err(ending) => return ending,
     };
@@ -154,14 +174,14 @@ pub fn run(request: &Request<'_>, place: &Place, wanted: &Wanted<'_>) -> Ending 
     let mut open = wanted.open;
     loop {
         let before = contents(request.files);
-        let ending = once(request, place, (&outputs, wanted.json, open), threads, &stop);
+        let ending = once(request, place, (&outputs, &Wanted { open, ..*wanted }), threads, &stop);
         if !wanted.watch || stop.load(Ordering::Relaxed) {
             return ending;
         }
         // the browser shows it; a reload shows what follows
         open &= matches!(ending, Ending::WrongInput);
         if let Ending::Failed(message) = &ending {
-            complain!("error: {message}");
+            speak::error(message);
         }
         complain!("waiting for a change; Ctrl-C ends");
         while contents(request.files) == before {
@@ -185,7 +205,7 @@ fn contents(files: &[PathBuf]) -> Vec<Option<Vec<u8>>> {
 fn once(
     request: &Request<'_>,
     place: &Place,
-    (outputs, json, open): (&Outputs, bool, bool),
+    (outputs, wanted): (&Outputs, &Wanted<'_>),
     threads: usize,
     stop: &Arc<AtomicBool>,
 ) -> Ending {
@@ -207,52 +227,166 @@ fn once(
     // each is let go once it was run, with the case that it keeps
     for checked in studies {
         let (study, summary) = (checked.study(), warned(&checked));
-        if std::io::stderr().is_terminal() {
-            complain_on!("{}\n{summary}", study.title());
+        if std::io::stderr().is_terminal() && wanted.progress == crate::args::Progress::Bar {
+            complain!("{}\n{}", study.title(), summary.to_string().trim_end());
         } else if let Some(long) = summary.long_run() {
             complain!("{}: {long}", study.name());
         }
-        // of adaptive frequencies nobody knows the number before
-        let points = Some(study.points() as u64).filter(|_| !study.is_adaptive());
-        let bar = progress::bar(points, study.name());
-        let counter = bar.clone();
-        let context = Context { threads, stop: stop.clone(), finished: Arc::new(move || counter.inc(1)) };
-        let result = checked.run(&context);
-        bar.finish_and_clear();
-        let dataset = match result {
-            Ok(dataset) => dataset,
-            Err(error) => {
-                show(&error);
-                return Ending::WrongInput;
-            }
-        };
-        // those of the summary stand there already
-        let known = |note: &&String| summary.warnings.contains(note);
-        let late = dataset.notes.iter().filter(|note| note.starts_with("warning") && !known(note));
-        late.for_each(|warning| complain!("{warning}"));
-        failed |= dataset.record.points.keys().any(|status| status != CONVERGED);
-        let files = match write(&dataset, &place.out, outputs, json) {
-            Ok(files) => files,
-            Err(ending) => return ending,
-        };
-        if open {
-            show_figure(&files);
+        match one(&checked, place, outputs, wanted, (threads, stop)) {
+            Ending::Done => {}
+            Ending::SomeFailed => failed = true,
+            other => return other,
         }
-        let folder = files.first().and_then(|file| file.parent()).unwrap_or(&place.out);
-        if stop.load(Ordering::Relaxed) {
+    }
+    if failed { Ending::SomeFailed } else { Ending::Done }
+}
+
+/// One run of one study.
+fn one(
+    checked: &Checked,
+    place: &Place,
+    outputs: &Outputs,
+    wanted: &Wanted<'_>,
+    (threads, stop): (usize, &Arc<AtomicBool>),
+) -> Ending {
+    let study = checked.study();
+    let mut journal = match stream::begin(checked, &place.out, wanted.shard, wanted.start, threads) {
+        Ok(journal) => journal,
+        Err(error @ (StreamError::Other { .. } | StreamError::Unfinished { .. } | StreamError::Name(_))) => {
+            speak::error(&error.to_string());
+            return Ending::WrongInput;
+        }
+        Err(error) => return Ending::Failed(error.to_string()),
+    };
+    let done: u64 = journal.tally().points().values().sum();
+    let range = journal.head().range.clone();
+    // of adaptive frequencies, and of a part, nobody knows the number before
+    let points = Some(study.points() as u64).filter(|_| !study.is_adaptive() && wanted.shard.is_none());
+    speak::event(
+        "begin",
+        json!({ "study": study.name(), "kind": study.kind().name, "points": points, "units": journal.head().units,
+                "from": range.start, "to": range.end, "kept": journal.units().len() }),
+    );
+    if !journal.units().is_empty() {
+        complain!("{}: {} of {} units are kept from before", study.name(), journal.units().len(), range.len());
+    }
+    let progress = Progress::new(wanted.progress, points, done, study.name());
+    let counter = progress.clone();
+    let context = Context { threads, stop: stop.clone(), finished: Arc::new(move || counter.point()) };
+    let computed =
+        stream::compute(checked, &mut journal, &context, &|journal| progress.kept(journal.kept() - range.start));
+    progress.end();
+    let rest = match computed {
+        Ok(rest) => rest,
+        Err(StreamError::Journal(JournalError::Study(error))) => {
+            show(&error);
+            return Ending::WrongInput;
+        }
+        Err(error) => return Ending::Failed(error.to_string()),
+    };
+    if let Some(shard) = wanted.shard {
+        return part(study, shard, &mut journal, rest.is_empty());
+    }
+    let folder = journal.folder().to_owned();
+    let mut outline = journal.head().outline.clone();
+    outline.record.threads = threads;
+    let parts = Parts { outline: &outline, journals: std::slice::from_ref(&journal), rest: &rest };
+    let assembled = match assemble(&parts, study, outputs, &place.out, &folder) {
+        Ok(assembled) => assembled,
+        Err(error) => {
+            return Ending::Failed(format!(
+                "{error}; what was computed stays in {}: --resume makes the results of it",
+                folder.join("").display()
+            ));
+        }
+    };
+    let interrupted = assembled.dataset.record.interrupted;
+    if !interrupted {
+        drop(journal);
+        // the results are there; what cannot be removed is no reason to fail
+        let _ = std::fs::remove_dir_all(&folder);
+    }
+    let ending = told(&assembled, &outline.notes, (wanted.json, wanted.open));
+    match ending {
+        Ending::Done | Ending::SomeFailed if stop.load(Ordering::Relaxed) => {
+            let results = assembled.files.first().and_then(|file| file.parent()).unwrap_or(&place.out);
             let whole = place.out.join(study.name());
-            let beside = if folder == whole || !dataset.record.interrupted {
+            let beside = if results == whole || !interrupted {
                 String::new()
             } else {
                 format!("; the whole run in {} stays", whole.join("").display())
             };
-            return Ending::Failed(format!(
-                "interrupted; the finished points are in {}{beside}",
-                folder.join("").display()
-            ));
+            let on = if interrupted { "; --resume goes on from there" } else { "" };
+            Ending::Failed(format!(
+                "interrupted; the finished points are in {}{beside}{on}",
+                results.join("").display()
+            ))
         }
+        ending => ending,
+    }
+}
+
+/// The end of a part of a study, whose journal stays.
+fn part(study: &Study, shard: Shard, journal: &mut Journal, whole: bool) -> Ending {
+    let folder = journal.folder().join("").display().to_string();
+    if !whole {
+        return Ending::Failed(format!("interrupted; the finished units are in {folder}; --resume goes on from there"));
+    }
+    if let Err(error) = journal.seal() {
+        return Ending::Failed(error.to_string());
+    }
+    let failed = journal.tally().points().keys().any(|status| status != CONVERGED);
+    speak::event(
+        "end",
+        json!({ "study": study.name(), "status": if failed { "some-failed" } else { "done" }, "points": journal.tally().points() }),
+    );
+    if !speak::is_for_programs() {
+        complain!(
+            "{}: part {shard} is in {folder}; `stickslip merge` joins the parts when all are there",
+            study.name()
+        );
     }
     if failed { Ending::SomeFailed } else { Ending::Done }
+}
+
+/// Says what there is to say of results that are written, but the notes that are `known`.
+pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool, bool)) -> Ending {
+    let Assembled { dataset, is_whole, files } = assembled;
+    let late = dataset.notes.iter().filter(|note| note.starts_with("warning") && !known.contains(note));
+    late.for_each(|warning| complain!("{warning}"));
+    let failed = dataset.record.points.keys().any(|status| status != CONVERGED);
+    let status = match (dataset.record.interrupted, failed) {
+        (true, _) => "interrupted",
+        (false, true) => "some-failed",
+        (false, false) => "done",
+    };
+    speak::event("written", json!({ "study": dataset.name, "files": files }));
+    // the summary on a terminal says it too
+    let summary = !json && std::io::stdout().is_terminal();
+    if !(summary && std::io::stderr().is_terminal()) {
+        complain(dataset);
+    }
+    let ending = if json && !is_whole {
+        Ending::Failed(format!(
+            "--json prints tables of up to {MOST_ROWS} rows; the results are in {}",
+            files.first().map_or(String::new(), |file| file.with_file_name("").display().to_string())
+        ))
+    } else if json {
+        print_json(dataset)
+    } else if summary {
+        let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
+        print(&Terminal { colour: true, width }.text(dataset, files))
+    } else {
+        Ending::Done
+    };
+    speak::event("end", json!({ "study": dataset.name, "status": status, "points": dataset.record.points }));
+    if open {
+        show_figure(files);
+    }
+    match ending {
+        Ending::Done if failed => Ending::SomeFailed,
+        ending => ending,
+    }
 }
 
 /// Failed points that are named on standard error; the record has all.
@@ -297,25 +431,6 @@ pub(crate) fn show_figure(files: &[PathBuf]) {
         Some(Err(message)) => complain!("{message}"),
         None => complain!("there is no figure to show: it is not among the outputs of --only"),
     }
-}
-
-/// Writes the results and says what there is to say; returns the files.
-fn write(dataset: &Dataset, out: &Path, outputs: &Outputs, json: bool) -> Result<Vec<PathBuf>, Ending> {
-    let files = write_dataset(dataset, out, outputs).map_err(|error| Ending::Failed(error.to_string()))?;
-    // the summary on a terminal says it too
-    let summary = !json && std::io::stdout().is_terminal();
-    if !(summary && std::io::stderr().is_terminal()) {
-        complain(dataset);
-    }
-    let ending = if json {
-        print_json(dataset)
-    } else if summary {
-        let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
-        print(&Terminal { colour: true, width }.text(dataset, &files))
-    } else {
-        Ending::Done
-    };
-    if let Ending::Failed(_) = ending { Err(ending) } else { Ok(files) }
 }
 
 /// `stickslip paper`.

@@ -102,7 +102,7 @@ impl Gmres {
             outcome.residual = left / size;
             // a product that rounds more than the recurrence says is no reason to go on
             outcome.solved = left <= SLACK * limits.tolerance * size;
-            if outcome.solved || outcome.products >= limits.products || !(left < before) {
+            if outcome.solved || outcome.products >= limits.products || left.is_nan() || left >= before {
                 return outcome;
             }
         }

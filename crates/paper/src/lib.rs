@@ -69,7 +69,7 @@ struct Extent {
 /// # Ok::<(), stickslip_paper::PaperError>(())
 /// ```
 pub fn paper(out: &Path, context: &Context, say: &dyn Fn(&str)) -> Result<Outcome, PaperError> {
-    produce(out, context, say, &Extent { points: None, outputs: Outputs::all() })
+    produce(out, context, say, &Extent { points: None, outputs: Outputs::usual() })
 }
 
 fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -> Result<Outcome, PaperError> {

@@ -9,7 +9,8 @@ use pyo3::types::{PyBool, PyDict, PyList, PyString};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use stickslip::dimension::Dimension;
-use stickslip_study::batch::{self, Batch};
+use stickslip_study::batch;
+use stickslip_study::block::{Block, Tally};
 use stickslip_study::dataset::{self, Column, Values};
 use stickslip_study::run::{Checked, check};
 use stickslip_study::{StudyError, read_bytes, read_file, templates};
@@ -290,10 +291,10 @@ impl PyStudy {
         let checked = self.checked(py)?;
         let watch = Watch { threads: Some(1), progress: None, total: None };
         let batch = watched(py, &watch, |context| batch::batch(&checked, start..stop, context))?;
-        let Batch { tables, told } = batch.map_err(|cause| error::study(py, &cause))?;
+        let Block { tables, tally, .. } = batch.map_err(|cause| error::study(py, &cause))?;
         let out = PyDict::new(py);
-        out.set_item("told", serde_json::to_string(&told).map_err(|cause| error::report(py, cause))?)?;
-        out.set_item("points", PyDict::from_sequence(PyList::new(py, told.points)?.as_any())?)?;
+        out.set_item("told", serde_json::to_string(&tally).map_err(|cause| error::report(py, cause))?)?;
+        out.set_item("points", PyDict::from_sequence(PyList::new(py, tally.points().clone())?.as_any())?)?;
         let tables = tables.into_iter().filter(|table| !table.columns.is_empty());
         out.set_item(
             "tables",
@@ -350,7 +351,7 @@ pub fn _joined<'py>(
     seconds: f64,
 ) -> PyResult<PyResultSet> {
     let checked = study.checked(py)?;
-    let mut whole = Batch::default();
+    let (mut all, mut tally) = (Vec::new(), Tally::default());
     for (name, columns) in tables {
         let column = |(name, kind, values): (String, String, Bound<'py, PyAny>)| {
             let values = match kind.as_str() {
@@ -361,12 +362,12 @@ pub fn _joined<'py>(
             };
             Ok(Column { name, values })
         };
-        whole.tables.push(dataset::Table { name, columns: columns.into_iter().map(column).collect::<PyResult<_>>()? });
+        all.push(dataset::Table { name, columns: columns.into_iter().map(column).collect::<PyResult<_>>()? });
     }
     for text in &told {
-        whole.told.append(serde_json::from_str(text).map_err(|cause| error::report(py, cause))?);
+        tally.append(serde_json::from_str(text).map_err(|cause| error::report(py, cause))?);
     }
-    Ok(PyResultSet::new(py.detach(|| batch::joined(&checked, vec![whole], 1, seconds))))
+    Ok(PyResultSet::new(py.detach(|| batch::joined(&checked, all, tally, 1, seconds))))
 }
 
 /// What `progress` asks for: `None`, a bar, or the function that was given.

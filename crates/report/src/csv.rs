@@ -3,60 +3,104 @@
 //! A number is written with the fewest digits that read back as the same 64-bit value; a number that does not exist
 //! (NaN) and an unknown flag are empty cells. Same dataset, same bytes.
 
-use crate::file::{File, Output, ReportError, file_name};
-use stickslip_study::dataset::{Dataset, Table, Values};
+use crate::file::{Output, ReportError, Rows, Sink, even};
+use rayon::prelude::*;
+use std::fmt::Write as _;
+use std::io::Write;
+use std::ops::Range;
+use stickslip_study::dataset::{Table, Values};
 
 /// The output `csv`.
-pub const OUTPUT: Output =
-    Output { name: "csv", summary: "every table as NAME.csv, numbers with all their digits", make: files };
+pub const OUTPUT: Output = Output {
+    name: "csv",
+    summary: "every table as NAME.csv, numbers with all their digits",
+    make: |dataset| SINK.files(dataset),
+    sink: Some(SINK),
+    usual: true,
+};
 
-fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
-    for (i, table) in dataset.tables.iter().enumerate() {
-        if dataset.tables[..i].iter().any(|other| other.name.eq_ignore_ascii_case(&table.name)) {
-            return Err(ReportError::SameName(table.name.clone()));
-        }
-    }
-    dataset
-        .tables
-        .iter()
-        .map(|table| Ok(File::new(format!("{}.csv", file_name(&table.name, "table")?), to_csv(table)?)))
-        .collect()
-}
+const SINK: Sink = Sink { extension: "csv", begin };
+
+/// Rows that one thread makes text of at a time.
+const ROWS: usize = 1024;
 
 /// A table as CSV (RFC 4180, line feed, header first).
 /// # Errors
 /// [`ReportError::Uneven`] if the columns differ in length.
 pub fn to_csv(table: &Table) -> Result<Vec<u8>, ReportError> {
-    let rows = table.rows();
-    if let Some(column) = table.columns.iter().find(|column| column.values.len() != rows) {
-        return Err(ReportError::Uneven {
-            table: table.name.clone(),
-            column: column.name.clone(),
-            rows: column.values.len(),
-            expected: rows,
-        });
+    SINK.file(table)
+}
+
+struct Lines<'a>(Box<dyn Write + 'a>);
+
+fn begin<'a>(table: &Table, mut writer: Box<dyn Write + 'a>) -> Result<Box<dyn Rows + 'a>, ReportError> {
+    if !table.columns.is_empty() {
+        let header = lines(table, |text| text.write_record(table.columns.iter().map(|column| &column.name)))?;
+        writer.write_all(&header).map_err(|cause| failed(table, &cause))?;
     }
-    if table.columns.is_empty() {
-        return Ok(Vec::new());
+    Ok(Box::new(Lines(writer)))
+}
+
+impl Rows for Lines<'_> {
+    fn rows(&mut self, table: &Table) -> Result<(), ReportError> {
+        even(table)?;
+        let stretches: Vec<Range<usize>> =
+            (0..table.rows()).step_by(ROWS).map(|from| from..(from + ROWS).min(table.rows())).collect();
+        let texts: Vec<Result<Vec<u8>, ReportError>> =
+            stretches.into_par_iter().map(|rows| lines(table, |text| cells(table, rows, text))).collect();
+        for text in texts {
+            self.0.write_all(&text?).map_err(|cause| failed(table, &cause))?;
+        }
+        Ok(())
     }
-    let fail = |reason: &dyn std::fmt::Display| ReportError::encode(format!("{}.csv", table.name), reason);
+
+    fn end(mut self: Box<Self>) -> Result<(), ReportError> {
+        self.0.flush().map_err(|cause| ReportError::encode("a table", cause))
+    }
+}
+
+fn failed(table: &Table, reason: &dyn std::fmt::Display) -> ReportError {
+    ReportError::encode(format!("{}.csv", table.name), reason)
+}
+
+type Text = ::csv::Writer<Vec<u8>>;
+
+/// What `write` writes, as bytes.
+fn lines(table: &Table, write: impl FnOnce(&mut Text) -> ::csv::Result<()>) -> Result<Vec<u8>, ReportError> {
     let mut writer = ::csv::Writer::from_writer(Vec::new());
-    writer.write_record(table.columns.iter().map(|column| &column.name)).map_err(|e| fail(&e))?;
-    for row in 0..rows {
-        writer.write_record(table.columns.iter().map(|column| cell(&column.values, row))).map_err(|e| fail(&e))?;
+    write(&mut writer).map_err(|cause| failed(table, &cause))?;
+    writer.into_inner().map_err(|cause| failed(table, &cause))
+}
+
+fn cells(table: &Table, rows: Range<usize>, writer: &mut Text) -> ::csv::Result<()> {
+    let mut text = String::new();
+    for row in rows {
+        for column in &table.columns {
+            text.clear();
+            write_cell(&column.values, row, &mut text);
+            writer.write_field(&text)?;
+        }
+        writer.write_record(None::<&[u8]>)?;
     }
-    writer.into_inner().map_err(|e| fail(&e))
+    Ok(())
 }
 
 /// The text of one cell.
 pub(crate) fn cell(values: &Values, row: usize) -> String {
-    match values {
-        Values::Number(v) if v[row].is_nan() => String::new(),
-        Values::Number(v) => format!("{:?}", v[row]),
-        Values::Integer(v) => v[row].to_string(),
-        Values::Text(v) => v[row].clone(),
-        Values::Flag(v) => v[row].map_or(String::new(), |flag| flag.to_string()),
-    }
+    let mut text = String::new();
+    write_cell(values, row, &mut text);
+    text
+}
+
+fn write_cell(values: &Values, row: usize, text: &mut String) {
+    // writing into a string cannot fail
+    let _ = match values {
+        Values::Number(v) if v[row].is_nan() => Ok(()),
+        Values::Number(v) => write!(text, "{:?}", v[row]),
+        Values::Integer(v) => write!(text, "{}", v[row]),
+        Values::Text(v) => text.write_str(&v[row]),
+        Values::Flag(v) => v[row].map_or(Ok(()), |flag| write!(text, "{flag}")),
+    };
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use stickslip_study::dataset::Dataset;
+use stickslip_study::dataset::{Dataset, Table};
 
 /// One kind of output: what it is called and how its files are made.
 #[derive(Debug)]
@@ -13,6 +13,84 @@ pub struct Output {
     pub summary: &'static str,
     /// Makes the files: name inside the study's folder, and content.
     pub make: fn(&Dataset) -> Result<Vec<File>, ReportError>,
+    /// Writes a table row by row, for results that need not be in memory as a whole; `None` if it is no output of tables.
+    pub sink: Option<Sink>,
+    /// Whether it is written when nobody says what.
+    pub usual: bool,
+}
+
+/// A file per table, to which rows are written as they come.
+#[derive(Debug, Clone, Copy)]
+pub struct Sink {
+    /// What the name of the file ends in, after the name of the table and a dot.
+    pub extension: &'static str,
+    /// Begins the file of a table with these columns, whose rows do not count, in a writer.
+    pub begin: for<'a> fn(&Table, Box<dyn Write + 'a>) -> Result<Box<dyn Rows + 'a>, ReportError>,
+}
+
+/// The file of a table that is being written.
+pub trait Rows {
+    /// Writes these rows after those before; the columns are those that it was begun with.
+    ///
+    /// # Errors
+    /// [`ReportError`]: the columns are uneven, or the writer refuses.
+    fn rows(&mut self, table: &Table) -> Result<(), ReportError>;
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// [`ReportError`]: the writer refuses.
+    fn end(self: Box<Self>) -> Result<(), ReportError>;
+}
+
+impl Sink {
+    /// The files of all tables of a dataset.
+    ///
+    /// # Errors
+    /// [`ReportError`]: the columns of a table differ in length, or two tables have one name.
+    pub fn files(&self, dataset: &Dataset) -> Result<Vec<File>, ReportError> {
+        for (i, table) in dataset.tables.iter().enumerate() {
+            if dataset.tables[..i].iter().any(|other| other.name.eq_ignore_ascii_case(&table.name)) {
+                return Err(ReportError::SameName(table.name.clone()));
+            }
+        }
+        let file = |table: &Table| Ok(File::new(self.file_name(&table.name)?, self.file(table)?));
+        dataset.tables.iter().map(file).collect()
+    }
+
+    /// The file of a table.
+    ///
+    /// # Errors
+    /// [`ReportError`]: its columns differ in length.
+    pub fn file(&self, table: &Table) -> Result<Vec<u8>, ReportError> {
+        let mut bytes = Vec::new();
+        let mut rows = (self.begin)(table, Box::new(&mut bytes))?;
+        rows.rows(table)?;
+        rows.end()?;
+        Ok(bytes)
+    }
+
+    /// The name of the file of a table.
+    ///
+    /// # Errors
+    /// [`ReportError::Name`]: the table has no name for a file.
+    pub fn file_name(&self, table: &str) -> Result<String, ReportError> {
+        Ok(format!("{}.{}", file_name(table, "table")?, self.extension))
+    }
+}
+
+/// Refuses columns of different length.
+pub(crate) fn even(table: &Table) -> Result<(), ReportError> {
+    let rows = table.rows();
+    match table.columns.iter().find(|column| column.values.len() != rows) {
+        None => Ok(()),
+        Some(column) => Err(ReportError::Uneven {
+            table: table.name.clone(),
+            column: column.name.clone(),
+            rows: column.values.len(),
+            expected: rows,
+        }),
+    }
 }
 
 /// A file before it is written.

@@ -53,7 +53,7 @@ fn written_before(folder: &Path) -> BTreeSet<String> {
 /// # Errors
 /// [`ReportError`] says which file and why; what was in the folder is there as before.
 pub(crate) fn replace(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
-    put(folder, files, &|| written_before(folder))
+    Aside::new(aside(folder)).replace(folder, files)
 }
 
 /// The same, but what else the run wrote stays: these files belong to it.
@@ -61,36 +61,104 @@ pub(crate) fn replace(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, Rep
 /// # Errors
 /// As [`replace`].
 pub(crate) fn exchange(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
-    put(folder, files, &BTreeSet::new)
+    put(folder, files, Aside::new(aside(folder)), &BTreeSet::new)
 }
 
-fn put(folder: &Path, files: &[File], before: &dyn Fn() -> BTreeSet<String>) -> Result<Vec<PathBuf>, ReportError> {
+/// Where files are written before they are moved in; the process id keeps two runs into the same folder apart.
+fn aside(folder: &Path) -> PathBuf {
+    folder.join(format!(".{}.part", std::process::id()))
+}
+
+/// Files that are written aside, bit by bit, on the file system of the folder that they will be moved into.
+#[derive(Debug)]
+pub(crate) struct Aside {
+    folder: PathBuf,
+    written: Vec<(String, fs::File)>,
+}
+
+impl Aside {
+    /// In a folder that is made when the first file is.
+    pub fn new(folder: PathBuf) -> Aside {
+        Aside { folder, written: Vec::new() }
+    }
+
+    fn new_files(&self) -> PathBuf {
+        self.folder.join("new")
+    }
+
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// [`ReportError`] says why it cannot be made.
+    pub fn file(&mut self, name: &str) -> Result<fs::File, ReportError> {
+        let path = self.new_files().join(file_name(name, "result")?);
+        let failed = |cause| ReportError::Write { path: path.clone(), cause };
+        fs::create_dir_all(self.new_files()).map_err(failed)?;
+        let file = fs::File::create(&path).map_err(failed)?;
+        self.written.push((name.to_owned(), file.try_clone().map_err(failed)?));
+        Ok(file)
+    }
+
+    /// These files, and those that were begun here and are complete now, replace those of an earlier run in `folder`, all or none. Returns the
+    /// paths, of those that were begun here first.
+    ///
+    /// # Errors
+    /// [`ReportError`] says which file and why; what was in the folder is there as before.
+    pub fn replace(self, folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
+        put(folder, files, self, &|| written_before(folder))
+    }
+
+    /// Removes what was begun and is not wanted any more.
+    pub fn remove(self) {
+        // what cannot be removed is no reason to fail
+        let _ = fs::remove_dir_all(self.new_files());
+        let _ = fs::remove_dir(&self.folder);
+    }
+}
+
+fn put(
+    folder: &Path,
+    files: &[File],
+    aside: Aside,
+    before: &dyn Fn() -> BTreeSet<String>,
+) -> Result<Vec<PathBuf>, ReportError> {
     let mut names = BTreeSet::new();
-    for file in files {
-        if !names.insert(file_name(&file.name, "result")?) {
-            return Err(ReportError::SameName(file.name.clone()));
+    let begun = aside.written.iter().map(|(name, _)| name.as_str());
+    for name in begun.chain(files.iter().map(|file| file.name.as_str())) {
+        if !names.insert(file_name(name, "result")?) {
+            return Err(ReportError::SameName(name.to_owned()));
         }
-        let path = folder.join(&file.name);
+        let path = folder.join(name);
         if path.is_dir() {
             return Err(ReportError::Write { path, cause: std::io::ErrorKind::IsADirectory.into() });
         }
     }
+    let names: Vec<&str> = aside
+        .written
+        .iter()
+        .map(|(name, _)| name.as_str())
+        .chain(files.iter().map(|file| file.name.as_str()))
+        .collect();
     let fresh = !folder.exists();
     let failed = |path: &Path| {
         let path = path.to_owned();
         move |cause| ReportError::Write { path, cause }
     };
     fs::create_dir_all(folder).map_err(failed(folder))?;
-    // the process id keeps two runs into the same folder apart
-    let aside = folder.join(format!(".{}.part", std::process::id()));
-    let (new, old) = (aside.join("new"), aside.join("old"));
+    let (new, old) = (aside.new_files(), aside.folder.join("old"));
     let done = [&new, &old]
         .into_iter()
         .try_for_each(|part| fs::create_dir_all(part).map_err(failed(folder)))
         .and_then(|()| files.iter().try_for_each(|file| write(&new.join(&file.name), file).map_err(failed(folder))))
-        .and_then(|()| swap(folder, &new, &old, files, before()));
+        .and_then(|()| {
+            let mut begun = aside.written.iter();
+            begun.try_for_each(|(name, file)| file.sync_all().map_err(failed(&folder.join(name))))
+        })
+        .and_then(|()| swap(folder, &new, &old, &names, before()));
     // only what this run has put there; what cannot be removed is no reason to fail
-    let _ = fs::remove_dir_all(&aside);
+    let _ = fs::remove_dir_all(&old);
+    drop(names);
+    aside.remove();
     if done.is_err() && fresh {
         let _ = fs::remove_dir(folder);
     }
@@ -108,14 +176,14 @@ fn swap(
     folder: &Path,
     new: &Path,
     old: &Path,
-    files: &[File],
+    files: &[&str],
     mut out: BTreeSet<String>,
 ) -> Result<Vec<PathBuf>, ReportError> {
     let record_last = |name: &&str| *name == RECORD;
-    out.extend(files.iter().map(|file| file.name.clone()).filter(|name| folder.join(name).is_file()));
+    out.extend(files.iter().filter(|name| folder.join(name).is_file()).map(|name| (*name).to_owned()));
     let mut out: Vec<String> = out.into_iter().collect();
     out.sort_by_key(|name| !record_last(&name.as_str()));
-    let mut names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+    let mut names: Vec<&str> = files.to_vec();
     names.sort_by_key(record_last);
 
     let mut moves: Vec<(PathBuf, PathBuf)> = Vec::new();
@@ -131,7 +199,7 @@ fn swap(
         }
         moves.push((from, to));
     }
-    Ok(files.iter().map(|file| folder.join(&file.name)).collect())
+    Ok(files.iter().map(|name| folder.join(name)).collect())
 }
 
 /// Whether results could be written into `folder` (which need not exist yet); leaves nothing behind.
@@ -228,8 +296,8 @@ mod tests {
         fs::create_dir_all(&new).unwrap();
         fs::create_dir_all(&old).unwrap();
         fs::write(new.join("a.csv"), "new").unwrap();
-        let files = [file("a.csv", "new"), file("c.csv", "not written")];
-        assert!(swap(&folder, &new, &old, &files, written_before(&folder)).is_err());
+        // the second was not written
+        assert!(swap(&folder, &new, &old, &["a.csv", "c.csv"], written_before(&folder)).is_err());
         assert_eq!(names(&folder), ["a.csv", "b.csv", RECORD]);
         assert_eq!(fs::read_to_string(folder.join("a.csv")).unwrap(), "old");
         assert!(replace(&folder, &[file("x.csv", ""), file("x.csv", "")]).is_err());

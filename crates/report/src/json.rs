@@ -7,11 +7,41 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use stickslip_study::dataset::{Dataset, Table, Values};
 
 /// The output `json`.
-pub const OUTPUT: Output =
-    Output { name: "json", summary: "record.json: versions, resolved study, seed, points by status", make: files };
+pub const OUTPUT: Output = Output {
+    name: "json",
+    summary: "record.json: versions, resolved study, seed, points by status",
+    make: files,
+    sink: None,
+    usual: true,
+};
 
 fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
     Ok(vec![File::new("record.json", to_json(dataset, &[])?)])
+}
+
+/// What a table holds, for the record.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Shape {
+    pub name: String,
+    pub rows: usize,
+    /// Names of its columns, and what their cells hold.
+    pub columns: Vec<(String, &'static str)>,
+}
+
+impl Shape {
+    pub fn of(table: &Table) -> Shape {
+        let columns = table.columns.iter().map(|column| (column.name.clone(), sort(&column.values)));
+        Shape { name: table.name.clone(), rows: table.rows(), columns: columns.collect() }
+    }
+
+    /// More rows of the same table.
+    pub fn add(&mut self, more: Shape) {
+        if self.columns.is_empty() {
+            *self = more;
+        } else {
+            self.rows += more.rows;
+        }
+    }
 }
 
 /// The record of a run and what a reader of the results must know, as indented JSON with a final line feed; `files` are the names of the
@@ -19,6 +49,12 @@ fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
 /// # Errors
 /// [`ReportError::Encode`] if a value cannot be written as JSON.
 pub fn to_json(dataset: &Dataset, files: &[String]) -> Result<String, ReportError> {
+    let shapes: Vec<Shape> = dataset.tables.iter().map(Shape::of).collect();
+    with_shapes(dataset, &shapes, files)
+}
+
+/// The same, where the dataset has not all rows of its tables in memory.
+pub(crate) fn with_shapes(dataset: &Dataset, shapes: &[Shape], files: &[String]) -> Result<String, ReportError> {
     let record = &dataset.record;
     let value = serde_json::json!({
         "name": dataset.name,
@@ -35,11 +71,11 @@ pub fn to_json(dataset: &Dataset, files: &[String]) -> Result<String, ReportErro
         "notes": dataset.notes,
         "failures": dataset.failures,
         "files": files,
-        "tables": dataset.tables.iter().map(|t| serde_json::json!({
+        "tables": shapes.iter().map(|t| serde_json::json!({
             "file": format!("{}.csv", t.name),
-            "rows": t.rows(),
-            "columns": t.columns.iter().map(|c| &c.name).collect::<Vec<_>>(),
-            "values": t.columns.iter().map(|c| sort(&c.values)).collect::<Vec<_>>(),
+            "rows": t.rows,
+            "columns": t.columns.iter().map(|c| &c.0).collect::<Vec<_>>(),
+            "values": t.columns.iter().map(|c| c.1).collect::<Vec<_>>(),
         })).collect::<Vec<_>>(),
         "study": record.study,
     });

@@ -15,7 +15,32 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! # From another program
+//! Units are computed one by one or in ranges, with tables in memory; whoever drives them is told of every point, and may end the run at any.
+//! ```
+//! use std::sync::Arc;
+//! use std::sync::atomic::{AtomicUsize, Ordering};
+//! use stickslip_study::{read_study, run::{Context, check, redrawn}};
+//!
+//! let text = stickslip_study::templates::find("blade-couple").unwrap().study;
+//! let checked = check(&read_study("couple.toml", text, &[("kt".into(), "12 N/mm".into())]).unwrap()).unwrap();
+//! let points = Arc::new(AtomicUsize::new(0));
+//! let counter = points.clone();
+//! let context = Context { finished: Arc::new(move || _ = counter.fetch_add(1, Ordering::Relaxed)), ..Context::unwatched(1) };
+//! // `context.stop.store(true, …)` ends it early
+//! let mut block = checked.block(0..2, &context).unwrap();
+//! block.append(checked.block(2..checked.units(), &context).unwrap());
+//! assert_eq!(points.load(Ordering::Relaxed), 964);
+//! let curve = &block.tables[0];
+//! let units: Vec<_> = curve.columns.iter().take(3).map(|column| (column.name.as_str(), column.unit())).collect();
+//! assert_eq!(units[2], ("blade1_amplitude_m", Some("m".to_owned())));
+//! let figure = redrawn(checked.study(), &block.tables);
+//! assert!(stickslip_report::svg::to_svg(&figure).starts_with("<svg"));
+//! assert!(stickslip_report::html::to_html(&figure, "plotly.js").contains("plotly.js"));
+//! ```
 
+pub mod assemble;
 mod axis;
 mod clip;
 mod colour;
@@ -26,11 +51,14 @@ pub mod folder;
 mod font;
 mod frame;
 pub mod html;
+pub mod journal;
 pub mod json;
 pub mod output;
 pub mod page;
+pub mod parquet;
 pub mod png;
 pub mod stored;
+pub mod stream;
 pub mod svg;
 pub mod terminal;
 

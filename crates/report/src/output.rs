@@ -2,12 +2,19 @@
 
 use crate::file::{File, Output, ReportError, file_name, write_once};
 use crate::folder;
+use crate::json::{Shape, with_shapes};
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::Dataset;
 
 /// All outputs, in the order in which they are written.
-pub static TABLE: &[Output] =
-    &[crate::csv::OUTPUT, crate::json::OUTPUT, crate::svg::OUTPUT, crate::png::OUTPUT, crate::html::OUTPUT];
+pub static TABLE: &[Output] = &[
+    crate::csv::OUTPUT,
+    crate::parquet::OUTPUT,
+    crate::json::OUTPUT,
+    crate::svg::OUTPUT,
+    crate::png::OUTPUT,
+    crate::html::OUTPUT,
+];
 
 /// Which outputs to write.
 #[derive(Debug, Clone)]
@@ -15,7 +22,7 @@ pub struct Outputs(Vec<&'static Output>);
 
 impl Default for Outputs {
     fn default() -> Outputs {
-        Outputs::all()
+        Outputs::usual()
     }
 }
 
@@ -23,6 +30,18 @@ impl Outputs {
     /// Every output of [`TABLE`].
     pub fn all() -> Outputs {
         Outputs(TABLE.iter().collect())
+    }
+
+    /// Those that are written when nobody says which.
+    pub fn usual() -> Outputs {
+        Outputs(TABLE.iter().filter(|output| output.usual).collect())
+    }
+
+    /// The same, and those of `others`.
+    #[must_use]
+    pub fn and(&self, others: &Outputs) -> Outputs {
+        let is_in = |outputs: &Outputs, output: &Output| outputs.iter().any(|known| known.name == output.name);
+        Outputs(TABLE.iter().filter(|output| is_in(self, output) || is_in(others, output)).collect())
     }
 
     /// The outputs of these names, in the order of [`TABLE`].
@@ -59,19 +78,32 @@ pub fn write_dataset(dataset: &Dataset, out: &Path, outputs: &Outputs) -> Result
     for output in outputs.iter() {
         files.extend((output.make)(dataset)?);
     }
+    let shapes: Vec<Shape> = dataset.tables.iter().map(Shape::of).collect();
+    let files = with_record(dataset, &shapes, out, &[], files)?;
+    folder::replace(&folder::of_run(out, name, dataset.record.interrupted), &files)
+}
+
+/// The files of a run without those that studies share, which are written, and with the record, which lists them and those that are `begun`.
+pub(crate) fn with_record(
+    dataset: &Dataset,
+    shapes: &[Shape],
+    out: &Path,
+    begun: &[String],
+    files: Vec<File>,
+) -> Result<Vec<File>, ReportError> {
     let (shared, mut files): (Vec<File>, Vec<File>) = files.into_iter().partition(|file| file.shared);
     if files.iter().all(|file| file.name != folder::RECORD) {
         files.push(File::new(folder::RECORD, Vec::new()));
     }
-    let names: Vec<String> = files.iter().map(|file| file.name.clone()).collect();
+    let names: Vec<String> = begun.iter().cloned().chain(files.iter().map(|file| file.name.clone())).collect();
     for file in files.iter_mut().filter(|file| file.name == folder::RECORD) {
-        file.content = crate::json::to_json(dataset, &names)?.into_bytes();
+        file.content = with_shapes(dataset, shapes, &names)?.into_bytes();
     }
     // shared files first: a page must not appear before what it needs
     for file in &shared {
         write_once(&out.join(file_name(&file.name, "result")?), &file.content)?;
     }
-    folder::replace(&folder::of_run(out, name, dataset.record.interrupted), &files)
+    Ok(files)
 }
 
 #[cfg(test)]
@@ -85,7 +117,20 @@ mod tests {
         let out = tempfile::tempdir().unwrap();
         let files = write_dataset(&samples::response(), out.path(), &Outputs::all()).unwrap();
         let mut names: Vec<_> = files.iter().map(|f| f.file_name().unwrap().to_str().unwrap().to_owned()).collect();
-        assert_eq!(names, ["curve.csv", "peaks.csv", "record.json", "figure.svg", "figure.png", "figure.html"]);
+        let expected = [
+            "curve.csv",
+            "peaks.csv",
+            "curve.parquet",
+            "peaks.parquet",
+            "record.json",
+            "figure.svg",
+            "figure.png",
+            "figure.html",
+        ];
+        assert_eq!(names, expected);
+        let usual = Outputs::usual();
+        assert!(usual.iter().all(|output| output.name != "parquet") && usual.iter().count() == TABLE.len() - 1);
+        assert_eq!(usual.and(&Outputs::only(&["parquet"]).unwrap()).iter().count(), TABLE.len());
         let folder = out.path().join("fig06");
         let mut found: Vec<_> =
             std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();

@@ -6,8 +6,13 @@ use resvg::{tiny_skia, usvg};
 use stickslip_study::dataset::{Dataset, Figure};
 
 /// The output `png`.
-pub const OUTPUT: Output =
-    Output { name: "png", summary: "figure.png, for documents that cannot take SVG", make: files };
+pub const OUTPUT: Output = Output {
+    name: "png",
+    summary: "figure.png, for documents that cannot take SVG",
+    make: files,
+    sink: None,
+    usual: true,
+};
 
 /// Pixels per unit of the SVG: a figure of 1000 units prints at 300 dpi on 170 mm.
 const SCALE: f32 = 2.0;

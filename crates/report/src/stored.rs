@@ -132,7 +132,7 @@ pub fn read(folder: &Path) -> Result<Stored, StoredError> {
     if kind == COMPARISON {
         return Err(StoredError::Comparison { folder: folder.to_owned() });
     }
-    let study = study(&record, &path)?;
+    let study = study_of(&record["study"], &path)?;
     if study.kind().name != kind {
         return Err(wrong(format!("the record says `{kind}`, its study is a `{}`", study.kind().name)));
     }
@@ -168,10 +168,12 @@ fn numbers(version: &str) -> Vec<u64> {
     release.split('.').map(|part| part.parse().unwrap_or(0)).collect()
 }
 
-/// The study of a record: its text, the values from outside the file, the method from outside the file.
-fn study(record: &Value, path: &Path) -> Result<Study, StoredError> {
+/// The study of a record, which was found at `path`: its text, the values from outside the file, the method from outside the file.
+///
+/// # Errors
+/// [`StoredError`]: there is none, or it cannot be read.
+pub fn study_of(stored: &Value, path: &Path) -> Result<Study, StoredError> {
     let wrong = |reason: &str| StoredError::Record { path: path.to_owned(), reason: reason.to_owned() };
-    let stored = &record["study"];
     let (Some(name), Some(text)) = (stored["name"].as_str(), stored["file"].as_str()) else {
         return Err(wrong("there is no study in the record"));
     };

@@ -83,12 +83,12 @@ fn contacts_in_a_plane() {
 #[test]
 fn contacts_that_separate() {
     let law = FrictionContact { tangential: 1e4, normal: 1.5e4, friction: 0.3, preload: 12.0, tangents: 2 };
-    check(3, Arc::new(law), 100, &OMEGAS);
+    check(3, Arc::new(law), 100, &OMEGAS[1..3]);
 }
 
 #[test]
 fn laws_of_rates() {
     let bouc_wen = BoucWen { stiffness: 1e4, beta: 2e3, gamma: 1e3, exponent: 1.0 };
-    check(1, Arc::new(bouc_wen), 500, &OMEGAS);
-    check(1, Arc::new(Dahl { stiffness: 1e4, limit: 3.0 }), 500, &OMEGAS);
+    check(1, Arc::new(bouc_wen), 200, &OMEGAS[1..3]);
+    check(1, Arc::new(Dahl { stiffness: 1e4, limit: 3.0 }), 200, &OMEGAS[1..3]);
 }

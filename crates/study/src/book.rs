@@ -1,7 +1,7 @@
 //! The reference of study files for the book, made of what the schema, the lists of laws and methods, and the templates say of themselves.
 
 use crate::kind::Kind;
-use crate::schema::{FILE, Key, Presence, STUDY, Takes, described};
+use crate::schema::{FILE, Key, Presence, SAMPLE, STUDY, Takes, described};
 use crate::{kinds, templates};
 use stickslip::{law, method};
 
@@ -31,6 +31,7 @@ pub fn markdown() -> String {
         match key.takes {
             Takes::List(keys) => rows(&mut book, &format!("`[[{}]]`", key.name), key.doc, keys),
             Takes::Table(keys) => rows(&mut book, &format!("`[{}]`", key.name), key.doc, keys),
+            Takes::Sample => rows(&mut book, &format!("`[{}]`", key.name), key.doc, SAMPLE),
             _ => {}
         }
     }

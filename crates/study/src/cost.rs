@@ -3,8 +3,10 @@
 
 use crate::error::{Problem, StudyError};
 use crate::extra;
+use crate::run::AHEAD;
 use crate::study::{Case, Study};
 use crate::survey::{Surveyed, range};
+use crate::thinning::MOST_ROWS;
 use crate::words::bytes_text;
 use std::f64::consts::TAU;
 use stickslip::curve::sweep::BLOCK;
@@ -18,8 +20,10 @@ pub struct Size {
     pub rows: u64,
     /// Its tables as numbers of eight bytes.
     pub results: u64,
-    /// Most memory at one time, bytes: rough.
+    /// Most memory at one time, bytes, of a run that writes its tables while it goes on: rough.
     pub memory: u64,
+    /// The same of a run that keeps them all.
+    pub whole: u64,
 }
 
 /// Bytes of a number in a table.
@@ -217,41 +221,53 @@ impl Cost {
     fn cells(&self, number: f64, word: f64) -> f64 {
         self.tables.iter().map(|table| table.rows * (number * table.numbers + word * table.words)).sum()
     }
+
+    /// The same, of no more rows than a figure shows.
+    fn shown(&self, number: f64, word: f64) -> f64 {
+        let rows = |table: &Shape| table.rows.min(MOST_ROWS as f64);
+        self.tables.iter().map(|table| rows(table) * (number * table.numbers + word * table.words)).sum()
+    }
 }
 
 impl Costing<'_> {
     /// Size, and rough time on one thread (s), of a study of this cost whose work is cut into so many units.
     pub(crate) fn total(&self, cost: &Cost, units: usize) -> (Size, f64) {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let units = units.min(threads) as f64;
+        let tables = cost.cells(NUMBER + WRITTEN, WORD + WRITTEN);
+        // units wait for their turn; of the tables as many rows are read back as a figure shows
+        let waiting = tables * ((AHEAD * threads) as f64 / units.max(1) as f64).min(1.0);
+        let shown = cost.shown(NUMBER + WRITTEN, WORD + WRITTEN);
+        let drawn = DRAWN * cost.drawn.min(MOST_ROWS as f64 * (self.masses + self.joints));
+        let working = units.min(threads) as f64 * cost.unit;
         // a float that is too large for the type becomes its largest value
         let whole = |value: f64| value as u64;
         let size = Size {
             rows: whole(cost.rows()),
             results: whole(cost.cells(NUMBER, NUMBER)),
-            memory: whole(cost.cells(NUMBER + WRITTEN, WORD + WRITTEN) + DRAWN * cost.drawn + units * cost.unit),
+            memory: whole(tables.min(waiting + shown) + drawn + working),
+            whole: whole(tables + drawn + working),
         };
         let elements = self.masses + self.joints;
         // the modes of large models are not asked for
         let modes = if self.surveyed.survey.is_too_large() { 0.0 } else { elements.powi(3) / PREPARED };
         let preparing = self.cases * (PREPARING * (1.0 + modes) + ASSEMBLING * elements);
-        let tables = CELL * cost.cells(1.0, 1.0);
-        (size, OVERHEAD + GENEROUS * (cost.work + preparing + tables + POINT * cost.drawn))
+        let writing = CELL * cost.cells(1.0, 1.0);
+        (size, OVERHEAD + GENEROUS * (cost.work + preparing + writing + POINT * cost.drawn))
     }
 }
 
 // ------------------------------------------------------------------------------------------ the limit
 
 impl Size {
-    /// Why a study is not run, if it would take more memory than it may.
-    pub(crate) fn refusal(&self, study: &Study) -> Option<StudyError> {
+    /// Why a study is not run that needs so much memory, if that is more than it may take.
+    pub(crate) fn refusal(&self, study: &Study, memory: u64) -> Option<StudyError> {
         let limit = study.memory_limit();
-        if self.memory <= limit {
+        if memory <= limit {
             return None;
         }
         let message = format!(
             "this would need about {} of memory for {} rows of results; the limit is {}",
-            bytes_text(self.memory),
+            bytes_text(memory),
             self.rows,
             bytes_text(limit)
         );

@@ -83,6 +83,25 @@ pub fn column_name(name: &str) -> Cow<'_, str> {
 }
 
 impl Column {
+    /// The unit of its numbers as it is written in study files, which the end of its name says: `N/m` of `kt_N_per_m`. `None` for pure
+    /// numbers, and for what is no number.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip_study::dataset::Column;
+    /// let unit = |name: &str| Column::numbers(name, Vec::new()).unit();
+    /// assert_eq!(unit("blade1_amplitude_m").as_deref(), Some("m"));
+    /// assert_eq!(unit("tip_velocity_m_per_s").as_deref(), Some("m/s"));
+    /// assert_eq!((unit("slip_fraction"), unit("residual")), (None, None));
+    /// ```
+    pub fn unit(&self) -> Option<String> {
+        if !matches!(self.values, Values::Number(_)) {
+            return None;
+        }
+        let ends = self.name.match_indices('_').map(|(at, _)| &self.name[at + 1..]);
+        ends.filter(|end| !end.starts_with("per_")).find_map(written_unit)
+    }
+
     /// Of numbers.
     pub fn numbers(name: &str, values: Vec<f64>) -> Column {
         Column { name: name.to_owned(), values: Values::Number(values) }
@@ -100,6 +119,21 @@ impl Column {
     pub fn texts(name: &str, values: Vec<String>) -> Column {
         Column { name: name.to_owned(), values: Values::Text(values) }
     }
+}
+
+/// The unit that the end of a column's name says, see [`table_unit`](crate::values::table_unit).
+fn written_unit(end: &str) -> Option<String> {
+    let mut unit = String::new();
+    for (i, part) in end.replace("_to_minus_", "^-").split("_per_").enumerate() {
+        unit += if i > 0 { "/" } else { "" };
+        for (j, factor) in part.split('_').enumerate() {
+            let letters = factor.trim_end_matches(|c: char| c.is_ascii_digit());
+            let power = &factor[letters.len()..];
+            let raised = if power.is_empty() || letters.ends_with('-') { "" } else { "^" };
+            unit += &format!("{}{letters}{raised}{power}", if j > 0 { " " } else { "" });
+        }
+    }
+    crate::units::parse(&unit).map(|_| unit)
 }
 
 impl Table {
@@ -140,6 +174,27 @@ impl Table {
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, |c| c.values.len())
+    }
+
+    /// The rows of `more` after these; a table without columns takes them over.
+    ///
+    /// # Panics
+    /// If the columns differ.
+    pub fn append(&mut self, more: Table) {
+        if self.columns.is_empty() {
+            self.columns = more.columns;
+            return;
+        }
+        for (column, other) in self.columns.iter_mut().zip(more.columns) {
+            assert_eq!(column.name, other.name, "rows of one table have the same columns");
+            match (&mut column.values, other.values) {
+                (Values::Number(a), Values::Number(b)) => a.extend(b),
+                (Values::Integer(a), Values::Integer(b)) => a.extend(b),
+                (Values::Text(a), Values::Text(b)) => a.extend(b),
+                (Values::Flag(a), Values::Flag(b)) => a.extend(b),
+                (a, b) => panic!("column {} has two sorts of values: {a:?}, {b:?}", column.name),
+            }
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use crate::study::{Study, VariedValue};
 use crate::units;
 use crate::values::Values;
 use crate::words::display_unit;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use stickslip::model::System;
 
@@ -60,8 +61,11 @@ impl<'a> Drawing<'a> {
         self.options().names("only").is_none_or(|names| names.iter().any(is))
     }
 
-    /// How curves of so many masses and cases are laid out.
+    /// How curves of so many masses and cases are laid out; draws are shown by their percentiles, for every mass.
     pub(crate) fn layout(&self, masses: usize, cases: usize) -> Layout {
+        if self.study.draws().is_some() {
+            return Layout::Masses;
+        }
         match self.options().text("panels") {
             Some("cases") => return Layout::Cases,
             Some("masses") => return Layout::Masses,
@@ -102,6 +106,29 @@ impl<'a> Drawing<'a> {
         let middle = values.get(values.len() / 2).copied().unwrap_or(0.0);
         let by_ratio = positive && high > DECADES * low && (middle / (low * high).sqrt()).ln().abs() < 0.7;
         Some(if by_ratio { axis.log() } else { axis })
+    }
+
+    /// The stretches of the same parameters of `vary`, whatever is drawn: these in words, and the stretches.
+    pub(crate) fn by_listed<'s>(&self, stretches: &'s [Stretch]) -> Vec<(String, Vec<&'s Stretch>)> {
+        let (drawn, combinations) = (self.study.drawn(), self.study.cases_of_a_draw());
+        let mut groups: BTreeMap<usize, Vec<&Stretch>> = BTreeMap::new();
+        stretches.iter().for_each(|stretch| groups.entry(stretch.case % combinations).or_default().push(stretch));
+        let words = |stretch: &Stretch| crate::study::varied_text(stretch.varied.get(drawn..).unwrap_or_default());
+        groups.into_values().map(|group| (group.first().map_or_else(String::new, |s| words(s)), group)).collect()
+    }
+
+    /// How many of the draws curves of so many show, in words.
+    pub(crate) fn draws(&self, shown: usize) -> String {
+        match self.study.draws() {
+            Some(all) if all > shown => format!("the first {shown} of {all} draws"),
+            _ => format!("{shown} draws"),
+        }
+    }
+
+    /// How many of the cases figures show, if not all.
+    pub(crate) fn left_out(&self, shown: usize) -> Option<String> {
+        let all = self.study.cases();
+        (shown < all && self.study.draws().is_none()).then(|| format!("{shown} of {all} cases"))
     }
 
     /// A table by name; one that nothing was written to is absent.

@@ -7,7 +7,10 @@ use stickslip::law;
 pub const VERSION: i64 = 1;
 
 /// Most points of a study: cases times frequencies.
-pub const MOST_POINTS: usize = 1_000_000;
+pub const MOST_POINTS: usize = 100_000_000;
+
+/// Most cases of a study: each is resolved and assembled once before anything is computed.
+pub const MOST_CASES: usize = 1_000_000;
 
 /// One key of a table.
 #[derive(Debug, Clone, Copy)]
@@ -66,6 +69,10 @@ pub enum Takes {
     Parameters,
     /// `vary`: lists of quantities, or ranges, by parameter.
     Vary,
+    /// `[sample]`: how many draws, and of what.
+    Sample,
+    /// `of` in `[sample]`: distributions by parameter.
+    Distributions,
     /// `[method]`: `kind` and the options of that method.
     Method,
     /// `[study]`: `kind`, `vary` and the keys of that kind.

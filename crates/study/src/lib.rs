@@ -4,6 +4,7 @@
 //! case once, so that whatever is wrong is found before anything is written. [`schema`] describes all tables and keys as data.
 
 pub mod batch;
+pub mod block;
 pub mod book;
 mod columns;
 pub mod cost;
@@ -26,12 +27,14 @@ pub mod memory;
 mod names;
 mod near;
 mod note;
+mod percentiles;
 mod point;
 mod read;
 mod repeat;
 pub mod results;
 mod rows;
 pub mod run;
+mod sample;
 pub mod schema;
 mod statement;
 mod study;
@@ -39,6 +42,7 @@ mod substructure;
 pub mod summary;
 mod survey;
 pub mod templates;
+pub mod thinning;
 pub mod unit_sets;
 pub mod units;
 mod values;
@@ -47,6 +51,6 @@ mod words;
 pub mod work;
 
 pub use error::StudyError;
-pub use read::{TemplateParameter, read_bytes, read_file, read_stored, read_study};
+pub use read::{TemplateParameter, read_bytes, read_document, read_file, read_stored, read_study};
 pub use study::{Case, MethodChoice, Study, VariedValue};
 pub use values::{Frequencies, Values, hertz};

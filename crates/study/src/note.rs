@@ -6,6 +6,9 @@ use stickslip::orbit::{Accuracy, Orbit};
 /// How a note begins that is a warning.
 pub(crate) const WARNING: &str = "warning: ";
 
+/// Cases that are named one by one because a joint sticks in them; of the others the points are counted together.
+const MOST_STUCK: usize = 100;
+
 /// A note.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Note {
@@ -28,6 +31,8 @@ pub enum Note {
         /// All points.
         of: usize,
     },
+    /// Points that stick in further cases, beyond [`MOST_STUCK`].
+    StuckElsewhere(usize),
 }
 
 impl Note {
@@ -45,8 +50,37 @@ impl Note {
         unstable.into_iter().chain(accuracy).chain(history).collect()
     }
 
-    /// Adds it to `notes`, to one of its sort if there is one.
+    /// Adds it to `notes`, to one of its sort if there is one. However notes are joined first with their neighbours, the whole is the same.
     pub(crate) fn join(self, notes: &mut Vec<Note>) {
+        let Some(note) = self.stuck_joined(notes) else { return };
+        note.joined(notes);
+    }
+
+    /// The cases follow each other, so that only the last one of the list can go on. One at which nothing sticks is let go then, but not the
+    /// first of the list: it may go on with the last one of another.
+    fn stuck_joined(self, notes: &mut Vec<Note>) -> Option<Note> {
+        let Note::Stuck { case, points, of } = self else { return Some(self) };
+        let is_stuck = |note: &Note| matches!(note, Note::Stuck { .. });
+        let (first, last) = (notes.iter().position(is_stuck), notes.iter().rposition(is_stuck));
+        if let Some(Note::Stuck { case: known, points: before, of: all }) = last.and_then(|at| notes.get_mut(at)) {
+            if *known == case {
+                *before += points;
+                *all += of;
+                return None;
+            }
+            if let (0, Some(at)) = (*before, last.filter(|_| last != first)) {
+                notes.remove(at);
+            }
+        }
+        let named = notes.iter().filter(|note| matches!(note, Note::Stuck { points: 1.., .. })).count();
+        match (named < MOST_STUCK, points) {
+            (true, _) => Some(Note::Stuck { case, points, of }),
+            (false, 0) => None,
+            (false, _) => Some(Note::StuckElsewhere(points)),
+        }
+    }
+
+    fn joined(self, notes: &mut Vec<Note>) {
         for known in notes.iter_mut() {
             match (known, &self) {
                 (Note::Truncated(points, largest), Note::Truncated(more, other)) => {
@@ -54,20 +88,15 @@ impl Note {
                     *largest = largest.max(*other);
                     return;
                 }
-                (Note::Unchecked(points), Note::Unchecked(more)) | (Note::History(points), Note::History(more)) => {
+                (Note::Unchecked(points), Note::Unchecked(more))
+                | (Note::History(points), Note::History(more))
+                | (Note::StuckElsewhere(points), Note::StuckElsewhere(more)) => {
                     *points += more;
                     return;
                 }
                 (Note::Unstable(points, early), Note::Unstable(more, other)) => {
                     *points += more;
                     *early += other;
-                    return;
-                }
-                (Note::Stuck { case, points, of }, Note::Stuck { case: same, points: more_points, of: more })
-                    if case == same =>
-                {
-                    *points += more_points;
-                    *of += more;
                     return;
                 }
                 _ => {}
@@ -102,7 +131,7 @@ impl Note {
                 };
                 Some(format!(
                     "warning: at {} the orbit is unstable (`stable` is false): no motion stays on it, and the real one is another{early}; \
-                     look for it with another `period` in [method], or with kind = \"transient\"",
+                     look for it with kind = \"transient\", or with the option `period` of a method if it may take several",
                     points(*count)
                 ))
             }
@@ -111,6 +140,10 @@ impl Note {
                  depends on how the motion began, and with it the means, and the amplitudes too if a gap or another law knows positions. \
                  Shown is the motion in which a spring that never slips carries no mean force, as in joints that creep, and with method \
                  `transient` the one that its run led to.",
+                points(*count)
+            )),
+            Note::StuckElsewhere(count) => Some(format!(
+                "In further cases a joint sticks for the whole period at {}; the same holds there.",
                 points(*count)
             )),
             Note::Stuck { points: 0, .. } => None,
@@ -159,5 +192,32 @@ mod tests {
             texts[3]
         );
         assert_eq!(texts[4], "It is so.");
+    }
+
+    #[test]
+    fn however_notes_are_joined_first_the_whole_is_the_same() {
+        // stretches of three units a case; a joint sticks in most cases, and in some not at first
+        let all: Vec<Note> = (0..3 * MOST_STUCK)
+            .flat_map(|unit| {
+                let (case, points) = (format!("case {}", unit / 3), if unit % 7 < 2 { 0 } else { unit % 5 });
+                [Note::Stuck { case, points, of: 10 }, Note::Truncated(unit % 2, unit as f64), Note::History(1)]
+            })
+            .chain((0..700).map(|unit| Note::Stuck { case: format!("late {}", unit / 3), points: unit % 4, of: 10 }))
+            .collect();
+        let joined = |stretch: usize| {
+            let mut whole = Vec::new();
+            for notes in all.chunks(stretch) {
+                let mut part = Vec::new();
+                notes.iter().for_each(|note| note.clone().join(&mut part));
+                part.into_iter().for_each(|note| note.join(&mut whole));
+            }
+            whole.iter().filter_map(Note::text).collect::<Vec<_>>()
+        };
+        let one_by_one = joined(1);
+        assert!(one_by_one.len() <= MOST_STUCK + 4, "{}", one_by_one.len());
+        assert!(one_by_one.iter().any(|text| text.starts_with("In further cases")), "{one_by_one:?}");
+        for stretch in [2, 3, 7, 50, 1000, all.len()] {
+            assert_eq!(joined(stretch), one_by_one, "{stretch}");
+        }
     }
 }

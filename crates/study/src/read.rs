@@ -140,6 +140,38 @@ fn read(name: &str, text: &str, overrides: &[(String, String)], mut reader: Read
     }
 }
 
+/// Reads a study from a document that another program holds: a table of tables, lists, texts, numbers and truth values, keyed as a study file is.
+/// Errors are placed in the TOML text that it makes.
+///
+/// # Errors
+/// [`StudyError`]: what [`read_study`] refuses, or a value that TOML has not, such as null.
+///
+/// # Example
+/// ```
+/// use stickslip_study::{read_document, run::{Context, run}};
+/// let document = serde_json::json!({
+///     "schema": 1,
+///     "parameters": { "a": "2 mm" },
+///     "motion": [{ "on": "mover", "amplitude": "a" }],
+///     "joint": [{ "name": "pad", "between": ["mover", "ground"], "law": { "kind": "jenkins", "stiffness": 1e3, "limit": "1 N" } }],
+///     "study": { "kind": "hysteresis", "frequency": "1 Hz" },
+/// });
+/// let study = read_document("pad", &document, &[("a".into(), "3 mm".into())]).unwrap();
+/// let dataset = run(&study, &Context::unwatched(1)).unwrap();
+/// let loss = dataset.tables[1].numbers("dissipation_J").unwrap()[0];
+/// assert!((loss - 4.0 * 1.0 * (3e-3 - 1e-3)).abs() < 1e-12);   // 4 limit (a - limit/stiffness)
+/// ```
+pub fn read_document(
+    name: &str,
+    document: &impl serde::Serialize,
+    overrides: &[(String, String)],
+) -> Result<Study, StudyError> {
+    match toml::to_string(document) {
+        Ok(text) => read_study(name, &text, overrides),
+        Err(error) => Err(StudyError::file(name, format!("the document is none of a study: {error}"), None)),
+    }
+}
+
 impl Reader {
     fn study(&mut self, file: &str, text: &str, overrides: &[(String, String)]) -> Option<Study> {
         let root = match document::parse(text, 0) {
@@ -184,13 +216,15 @@ impl Reader {
         let method = self.method(&root);
         let figure = self.figure(&root);
         let mut parameters = parameters?;
-        let mut varied = vary.and_then(|entry| self.vary(entry, &mut parameters)).unwrap_or_default();
+        let listed = vary.and_then(|entry| self.vary(entry, &mut parameters)).unwrap_or_default();
+        let (sample, mut varied) = self.sample(&root, &mut parameters, &listed).unwrap_or_default();
+        varied.extend(listed);
         if !self.problems.is_empty() {
             return None;
         }
         let replaced = self.replace(&mut varied, &parameters, overrides);
         let order = self.order(&parameters, &varied)?;
-        self.limit_points(&study, &varied)?;
+        self.limit_points(&study, &varied, sample)?;
         let stem = Path::new(file).file_stem().and_then(|stem| stem.to_str()).unwrap_or("study").to_owned();
         Some(Study {
             title: title.unwrap_or_else(|| stem.clone()),
@@ -204,6 +238,7 @@ impl Reader {
             parameters,
             order,
             varied,
+            sample,
             replaced,
             structure: structure?,
             study,

@@ -63,27 +63,6 @@ impl Rows {
         self.next = 0;
     }
 
-    /// The rows of `more`, which has the same columns, after these.
-    ///
-    /// # Panics
-    /// If the columns differ.
-    pub fn append(&mut self, more: Rows) {
-        if self.columns.is_empty() {
-            self.columns = more.columns;
-            return;
-        }
-        for (column, other) in self.columns.iter_mut().zip(more.columns) {
-            assert_eq!(column.name, other.name, "rows of one table have the same columns");
-            match (&mut column.values, other.values) {
-                (Cells::Number(a), Cells::Number(b)) => a.extend(b),
-                (Cells::Integer(a), Cells::Integer(b)) => a.extend(b),
-                (Cells::Text(a), Cells::Text(b)) => a.extend(b),
-                (Cells::Flag(a), Cells::Flag(b)) => a.extend(b),
-                (a, b) => panic!("column {} has two sorts of values: {a:?}, {b:?}", column.name),
-            }
-        }
-    }
-
     /// The table.
     pub fn table(self, name: &str) -> Table {
         Table { name: name.to_owned(), columns: self.columns }

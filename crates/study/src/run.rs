@@ -1,15 +1,17 @@
 //! Runs a study: checks every case (so that what a method cannot take is found before anything is computed), computes its units on all
 //! threads, joins their parts in order, lets the kind draw its figure, and adds the record.
 
+use crate::block::{Block, Tally};
 use crate::dataset::{Dataset, Figure, Record, Table};
 use crate::drawing::Drawing;
 use crate::error::StudyError;
 use crate::kinds;
-use crate::note::Note;
 use crate::study::Study;
 use crate::summary::ModelSummary;
+use crate::thinning::Thinning;
 use crate::work::{Part, Units, Work, refused};
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
@@ -65,7 +67,7 @@ pub struct Checked {
 pub fn check(study: &Study) -> Result<Checked, StudyError> {
     let start = Instant::now();
     let summary = ModelSummary::new(study)?;
-    if let Some(error) = summary.size.refusal(study) {
+    if let Some(error) = summary.size.refusal(study, summary.size.memory) {
         return Err(error);
     }
     let mut choices = BTreeSet::new();
@@ -100,37 +102,78 @@ impl Checked {
         Checked { first: None, ..self }
     }
 
-    /// Computes it.
-    ///
-    /// # Errors
-    /// [`StudyError`]: a search between the cases met a model that the method cannot take. Points that do not converge are no error: they
-    /// are in the dataset, as failures.
-    pub fn run(&self, context: &Context) -> Result<Dataset, StudyError> {
-        let start = Instant::now();
-        let study = &self.study;
-        let first = match &self.first {
-            Some(first) => first.clone(),
-            None => Arc::new(Prepared::new(study, 0)?),
-        };
-        let part = parts(study, &first, context)?;
-        let interrupted = part.points.contains_key(NOT_REACHED);
-        let mut dataset = self.outline(context.threads);
-        dataset.notes.extend(part.notes.iter().filter_map(Note::text));
-        if interrupted {
-            dataset.notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
-        }
-        let tables = study.kind().tables.iter().zip(part.tables).map(|(name, rows)| rows.table(name));
-        // a table that nothing was ever written to has no columns either
-        dataset.tables = tables.filter(|table| !table.columns.is_empty()).collect();
-        dataset.figure = redrawn(study, &dataset.tables);
-        dataset.failures = part.failures;
-        dataset.record.wall_time_s += start.elapsed().as_secs_f64();
-        dataset.record.points = part.points;
-        dataset.record.interrupted = interrupted;
-        Ok(dataset)
+    /// Number of its units of work, which know nothing of each other.
+    pub fn units(&self) -> usize {
+        units(&self.study).len()
     }
 
-    /// What is known of the results before anything is computed.
+    /// Computes it, with all of its tables in memory.
+    ///
+    /// # Errors
+    /// [`StudyError`]: the tables need more memory than a run may take, or a search between the cases met a model that the method cannot
+    /// take. Points that do not converge are no error: they are in the dataset, as failures.
+    pub fn run(&self, context: &Context) -> Result<Dataset, StudyError> {
+        let start = Instant::now();
+        if let Some(error) = self.summary.size.refusal(&self.study, self.summary.size.whole) {
+            return Err(error);
+        }
+        let Block { tables, tally, .. } = self.block(0..self.units(), context)?;
+        let figure = redrawn(&self.study, &tables);
+        Ok(self.outline(context.threads).completed(tables, figure, tally, start.elapsed()))
+    }
+
+    /// Computes the units of a range, with what they yield in memory.
+    ///
+    /// # Errors
+    /// [`StudyError`]: a search between the cases met a model that the method cannot take.
+    ///
+    /// # Panics
+    /// If there are no such units.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip_study::{read_study, run::{Context, check}};
+    /// let text = stickslip_study::templates::find("blade-couple").unwrap().study;
+    /// let checked = check(&read_study("couple.toml", text, &[]).unwrap()).unwrap();
+    /// let context = Context::unwatched(1);
+    /// let mut block = checked.block(0..3, &context).unwrap();
+    /// block.append(checked.block(3..checked.units(), &context).unwrap());
+    /// assert_eq!(block.tables, checked.block(0..checked.units(), &context).unwrap().tables);
+    /// ```
+    pub fn block(&self, range: Range<usize>, context: &Context) -> Result<Block, StudyError> {
+        let mut whole = Block::empty(self.study.kind(), range.start);
+        self.each(range, context, &mut |block| {
+            whole.append(block);
+            Ok::<(), StudyError>(())
+        })?;
+        Ok(whole)
+    }
+
+    /// Computes the units of a range on all threads, and hands what each yields to `take`, one after the other in their order. Of a run
+    /// that is stopped the units that were not finished come too, with their points as [`NOT_REACHED`].
+    ///
+    /// # Errors
+    /// A [`StudyError`]: a search between the cases met a model that the method cannot take; or what `take` returns, after which nothing more
+    /// is computed.
+    ///
+    /// # Panics
+    /// If there are no such units.
+    pub fn each<E: From<StudyError>>(
+        &self,
+        range: Range<usize>,
+        context: &Context,
+        take: &mut dyn FnMut(Block) -> Result<(), E>,
+    ) -> Result<(), E> {
+        assert!(range.end <= self.units(), "units {range:?} of {}", self.units());
+        let first = match &self.first {
+            Some(first) => first.clone(),
+            None => Arc::new(Prepared::new(&self.study, 0)?),
+        };
+        let kind = self.study.kind();
+        parts(&self.study, &first, range, context, &mut |unit, part| take(Block::of(kind, unit, part)))
+    }
+
+    /// What is known of the results before anything is computed; see [`Dataset::completed`].
     pub fn outline(&self, threads: usize) -> Dataset {
         let Checked { study, summary, methods, .. } = self;
         let mut notes = summary.warnings.clone();
@@ -148,7 +191,7 @@ impl Checked {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 study: recorded(study, summary),
                 methods: methods.clone(),
-                seed: None,
+                seed: study.seed(),
                 threads,
                 wall_time_s: self.time.as_secs_f64(),
                 points: BTreeMap::new(),
@@ -158,8 +201,35 @@ impl Checked {
     }
 }
 
+impl Dataset {
+    /// An outline with its results: the tables, their figure, and what is to be said.
+    #[must_use]
+    pub fn completed(mut self, tables: Vec<Table>, figure: Figure, tally: Tally, time: Duration) -> Dataset {
+        // a table that nothing was ever written to has no columns either
+        self.tables = tables.into_iter().filter(|table| !table.columns.is_empty()).collect();
+        self.figure = figure;
+        self.notes.extend(tally.notes());
+        self.failures = tally.failures().to_vec();
+        self.record.interrupted = !tally.is_whole();
+        self.record.points = tally.points().clone();
+        self.record.wall_time_s += time.as_secs_f64();
+        self
+    }
+}
+
 /// The figure of finished tables, computed just now or read from a disk. Tables that are none of this study have an empty figure.
 pub fn redrawn(study: &Study, tables: &[Table]) -> Figure {
+    let rows: Vec<(&str, usize)> = tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
+    let mut thinning = Thinning::new(study, &rows);
+    if thinning.keeps_all() {
+        return drawn(study, tables);
+    }
+    tables.iter().for_each(|table| thinning.add(table.clone()));
+    drawn(study, &thinning.tables())
+}
+
+/// The figure of the rows that a [`Thinning`] has kept.
+pub fn drawn(study: &Study, tables: &[Table]) -> Figure {
     Figure { title: study.title().to_owned(), ..(kinds::of(study).draw)(&Drawing { study, tables }) }
 }
 
@@ -176,29 +246,34 @@ fn units(study: &Study) -> Units {
 }
 
 /// Units that may be under way or waiting for their turn, per thread: enough that none waits for a long one, few enough to keep little.
-const AHEAD: usize = 8;
+pub(crate) const AHEAD: usize = 8;
 /// How often a run looks whether it is to stop.
 const LOOK: Duration = Duration::from_millis(20);
 /// How long an interrupted run waits for what is under way, which ends with the orbit that it is at: less than the second that a user
 /// waits gladly.
 const GRACE: Duration = Duration::from_millis(500);
 
-/// Computes all units and joins their parts in order.
+/// Computes the units of a range and hands on their parts in order.
 ///
 /// Units run as tasks of the pool that own what they need, so that an interrupted run can leave behind one that does not end.
-fn parts(study: &Study, first: &Arc<Prepared>, context: &Context) -> Result<Part, StudyError> {
+fn parts<E: From<StudyError>>(
+    study: &Study,
+    first: &Arc<Prepared>,
+    range: Range<usize>,
+    context: &Context,
+    take: &mut dyn FnMut(usize, Part) -> Result<(), E>,
+) -> Result<(), E> {
     let units = units(study);
     let shared = Arc::new(study.clone());
     let (send, receive) = mpsc::channel();
-    let mut whole = Part::default();
     let mut waiting: BTreeMap<usize, Part> = BTreeMap::new();
-    let (mut begun, mut joined) = (0, 0);
+    let (mut begun, mut joined) = (range.start, range.start);
     let mut deadline: Option<Instant> = None;
-    while joined < units.len() {
+    while joined < range.end {
         if deadline.is_none() && context.stopped() {
             deadline = Some(Instant::now() + GRACE);
         }
-        while begun < units.len() && begun < joined + AHEAD * context.threads.max(1) && deadline.is_none() {
+        while begun < range.end && begun < joined + AHEAD * context.threads.max(1) && deadline.is_none() {
             let (study, first, context) = (shared.clone(), first.clone(), context.clone());
             let (send, index) = (send.clone(), begun);
             rayon::spawn_fifo(move || {
@@ -217,7 +292,7 @@ fn parts(study: &Study, first: &Arc<Prepared>, context: &Context) -> Result<Part
             None => {}
         }
         while let Some(part) = waiting.remove(&joined) {
-            whole.append(part);
+            take(joined, part)?;
             joined += 1;
         }
         // what has not begun does not begin any more
@@ -225,10 +300,10 @@ fn parts(study: &Study, first: &Arc<Prepared>, context: &Context) -> Result<Part
             break;
         }
     }
-    for index in joined..units.len() {
-        whole.append(waiting.remove(&index).unwrap_or_else(|| Part::not_reached(units.get(index).len())));
+    for index in joined..range.end {
+        take(index, waiting.remove(&index).unwrap_or_else(|| Part::not_reached(units.get(index).len())))?;
     }
-    Ok(whole)
+    Ok(())
 }
 
 type Finished = (usize, std::thread::Result<Result<Part, StudyError>>);

@@ -4,12 +4,15 @@
 //! methods come from [`stickslip::law::TABLE`] and [`stickslip::method::TABLE`], study kinds from [`crate::kinds::TABLE`].
 
 use crate::kind::Kind;
+use crate::sample::{DESIGNS, DISTRIBUTIONS, WITHIN};
 use crate::{kinds, templates};
 use serde_json::{Map, Value, json};
 use stickslip::dimension::Dimension;
 use stickslip::{law, method};
 
-pub use crate::key::{Key, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, refused, required};
+pub use crate::key::{
+    Key, MOST_CASES, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, refused, required,
+};
 
 /// Most elements in one list (`[[spring]]`, …), repetitions counted.
 pub const MOST_ELEMENTS: usize = 40_000;
@@ -57,6 +60,12 @@ pub const FILE: &[Key] = &[
     optional("force", Takes::List(FORCE), "forces amplitude * cos(harmonic * Omega * t + phase); they add up", "[]"),
     optional("motion", Takes::List(MOTION), "imposed motions of a place; they add up", "[]"),
     required("study", Takes::Study, "what is asked for", "{ kind = \"response\" }"),
+    optional(
+        "sample",
+        Takes::Sample,
+        "uncertain parameters: runs the study for values that are drawn from distributions",
+        "{ count = 1000, of = { Ft = { normal = [\"2 N\", \"0.2 N\"] } } }",
+    ),
     optional("method", Takes::Method, "how the orbits are found", "{ kind = \"event-driven\" }"),
     optional("figure", Takes::Table(FIGURE), "how the figure is drawn", "{ overlay = true }"),
 ];
@@ -411,6 +420,35 @@ pub const STUDY: &[Key] = &[
     ),
 ];
 
+/// The keys of `[sample]`.
+pub const SAMPLE: &[Key] = &[
+    required("count", Takes::Count(1, MOST_CASES as i64), "how many values are drawn", "1000"),
+    default(
+        "seed",
+        Takes::Count(0, i64::MAX),
+        "1",
+        "what the draws depend on; the same seed gives the same values on every machine",
+        "7",
+    ),
+    required(
+        "of",
+        Takes::Distributions,
+        "the uncertain parameters and their distributions",
+        "{ Ft = { normal = [\"2 N\", \"0.2 N\"] }, k = { uniform = [\"1e5 N/m\", \"1.1e5 N/m\"] } }",
+    ),
+    default(
+        "design",
+        Takes::Choice(design_names),
+        "random",
+        "how the draws are spread over the parameters",
+        "\"sobol\"",
+    ),
+];
+
+fn design_names() -> Vec<(&'static str, &'static str)> {
+    DESIGNS.iter().map(|(name, summary, _)| (*name, *summary)).collect()
+}
+
 const FROM: Key =
     required("from", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "first value", "\"119 Hz\"");
 const TO: Key = required("to", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "last value", "\"123 Hz\"");
@@ -485,6 +523,12 @@ pub fn described(takes: &Takes) -> String {
         Takes::Choice(words) => format!("one of {}", crate::near::one_of(words().iter().map(|word| word.0))),
         Takes::Parameters => "a table of quantities by name".to_owned(),
         Takes::Vary => "a table from parameters to a value, a list of values, or { from, to, points }".to_owned(),
+        Takes::Sample => "a table with `count`, `of`, `seed` and `design`".to_owned(),
+        Takes::Distributions => {
+            let all = DISTRIBUTIONS.map(|(name, numbers, _)| format!("{{ {name} = [{numbers}] }}"));
+            let all = crate::near::one_of(all.iter().map(String::as_str));
+            format!("a table from parameters to {all}, the first two also with {WITHIN} = [least, most]")
+        }
         Takes::Method => "a table with `kind` and the options of that method".to_owned(),
         Takes::Study => "a table with `kind` and the keys of that kind".to_owned(),
         Takes::File => "the path of a file, or { file = …, name = …, format = … }".to_owned(),
@@ -599,6 +643,23 @@ fn takes_schema(takes: &Takes) -> Value {
                 "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(RANGE)],
             },
         }),
+        Takes::Sample => object(SAMPLE),
+        Takes::Distributions => {
+            let numbers = json!({ "type": "array", "items": quantity(), "minItems": 1 });
+            let one = |(name, takes, summary): &(&str, &str, &str)| {
+                let bounds = json!({ "type": "array", "items": quantity(), "minItems": 2, "maxItems": 2 });
+                let mut numbers = numbers.clone();
+                numbers["description"] = json!(format!("{summary}: {takes}"));
+                json!({
+                    "type": "object", "properties": { *name: numbers, WITHIN: bounds }, "required": [name],
+                    "additionalProperties": false,
+                })
+            };
+            json!({
+                "type": "object", "propertyNames": { "pattern": NAME_PATTERN },
+                "additionalProperties": { "oneOf": DISTRIBUTIONS.iter().map(one).collect::<Vec<_>>() },
+            })
+        }
         Takes::Method => {
             let one = |row: &method::MethodInfo| {
                 let takes = crate::expression::described;

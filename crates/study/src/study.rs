@@ -10,6 +10,7 @@ use crate::key::VERSION;
 use crate::memory;
 use crate::names::Names;
 use crate::near::{nearest, one_of, shown};
+use crate::sample::{Drawn, Sample};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
 use crate::substructure;
 use crate::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
@@ -35,7 +36,9 @@ pub struct Study {
     pub(crate) names: Vec<String>,
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) order: Vec<usize>,
+    /// Drawn parameters first, which all change together and slowest.
     pub(crate) varied: Vec<Varied>,
+    pub(crate) sample: Option<Sample>,
     pub(crate) replaced: Vec<Replaced>,
     pub(crate) structure: Structure,
     pub(crate) study: StatedTable,
@@ -74,22 +77,29 @@ pub(crate) struct Replaced {
 pub(crate) enum VariedPoints {
     List(Vec<Quantity>),
     Range { from: Quantity, to: Quantity, points: usize },
+    Drawn(Drawn),
 }
 
 impl VariedPoints {
     pub fn len(&self) -> usize {
         match self {
+            VariedPoints::Drawn(drawn) => drawn.sample.count,
             VariedPoints::List(list) => list.len(),
             VariedPoints::Range { points, .. } => *points,
         }
     }
 
     pub fn quantities(&self) -> impl Iterator<Item = &Quantity> {
-        let (list, ends): (&[Quantity], [Option<&Quantity>; 2]) = match self {
-            VariedPoints::List(list) => (list, [None, None]),
-            VariedPoints::Range { from, to, .. } => (&[], [Some(from), Some(to)]),
+        let (list, ends, drawn): (&[Quantity], [Option<&Quantity>; 2], Option<&Drawn>) = match self {
+            VariedPoints::List(list) => (list, [None, None], None),
+            VariedPoints::Range { from, to, .. } => (&[], [Some(from), Some(to)], None),
+            VariedPoints::Drawn(drawn) => (&[], [None, None], Some(drawn)),
         };
-        list.iter().chain(ends.into_iter().flatten())
+        list.iter().chain(ends.into_iter().flatten()).chain(drawn.into_iter().flat_map(Drawn::quantities))
+    }
+
+    fn is_drawn(&self) -> bool {
+        matches!(self, VariedPoints::Drawn(_))
     }
 }
 
@@ -269,6 +279,10 @@ const LOWEST: usize = 3;
 /// Most cases that [`Study::resolved`] writes out; a run can be repeated from the text in any case.
 const MOST_RESOLVED: usize = 1_000;
 
+/// What to do about a draw that no model can have.
+const IMPOSSIBLE: &str = "of the values that [sample] draws this one cannot be: bound the distribution with `within = [least, most]`, or take one \
+                          without such values, such as `lognormal`";
+
 impl Study {
     /// The stem of the file's name.
     pub fn name(&self) -> &str {
@@ -309,9 +323,34 @@ impl Study {
         self.replaced.iter().map(note).collect()
     }
 
-    /// Number of cases: the product of the numbers of values in `vary`; 1 if nothing is varied.
+    /// Number of cases: the product of the number of draws and the numbers of values in `vary`; 1 if nothing is drawn or varied.
     pub fn cases(&self) -> usize {
-        self.varied.iter().map(|varied| varied.points.len()).product()
+        self.draws().unwrap_or(1) * self.cases_of_a_draw()
+    }
+
+    /// How often uncertain parameters are drawn, if any are.
+    pub fn draws(&self) -> Option<usize> {
+        self.sample.map(|sample| sample.count)
+    }
+
+    /// Cases that have the same draw: the combinations of `vary`.
+    pub(crate) fn cases_of_a_draw(&self) -> usize {
+        self.listed().map(|varied| varied.points.len()).product()
+    }
+
+    /// The parameters of `vary`.
+    fn listed(&self) -> impl DoubleEndedIterator<Item = &Varied> {
+        self.varied.iter().filter(|varied| !varied.points.is_drawn())
+    }
+
+    /// Number of parameters that are drawn, the first of [`Study::varied`].
+    pub(crate) fn drawn(&self) -> usize {
+        self.varied.len() - self.listed().count()
+    }
+
+    /// The seed of the draws, if any are made.
+    pub fn seed(&self) -> Option<u64> {
+        self.sample.map(|sample| sample.seed)
     }
 
     /// The same study, which may take so many bytes of memory.
@@ -339,7 +378,7 @@ impl Study {
 
     /// Number of values of the last varied parameter, the one that changes fastest; 1 if nothing is varied.
     pub(crate) fn last_varied(&self) -> usize {
-        self.varied.last().map_or(1, |varied| varied.points.len())
+        self.listed().next_back().map_or(1, |varied| varied.points.len())
     }
 
     /// The varied parameters of the case with this number, without its model; `None` if there is no such case.
@@ -490,6 +529,7 @@ impl Study {
             "replaced": self.replaced.iter().map(|r| json!({ "parameter": r.name, "value": r.text, "values_in_file": r.values }))
                 .collect::<Vec<_>>(),
             "number_of_cases": self.cases(),
+            "seed": self.seed(),
             "cases": cases,
         })
     }
@@ -532,6 +572,9 @@ impl Study {
             }
             for problem in problems.iter_mut().filter(|problem| !others.contains(problem)) {
                 problem.message = format!("{} ({})", problem.message, self.case_words(index));
+                if problem.help.is_none() && self.sample.is_some() {
+                    problem.help = Some(IMPOSSIBLE.to_owned());
+                }
             }
         }
         parts
@@ -561,10 +604,13 @@ impl Study {
     fn choice(&self, index: usize) -> HashMap<usize, (&Varied, usize)> {
         let mut remainder = index;
         let mut choice = HashMap::new();
-        for varied in self.varied.iter().rev() {
+        for varied in self.listed().rev() {
             choice.insert(varied.index, (varied, remainder % varied.points.len()));
             remainder /= varied.points.len();
         }
+        // all drawn ones are of one draw
+        let drawn = self.varied.iter().filter(|varied| varied.points.is_drawn());
+        choice.extend(drawn.map(|varied| (varied.index, (varied, remainder))));
         choice
     }
 
@@ -574,7 +620,7 @@ impl Study {
             let value = environment[varied.index];
             let literal = match &varied.points {
                 VariedPoints::List(list) => choice.get(&varied.index).and_then(|(_, point)| list.get(*point)),
-                VariedPoints::Range { .. } => None,
+                VariedPoints::Range { .. } | VariedPoints::Drawn(_) => None,
             };
             // as the user wrote it, if that is a number with its unit
             let text = match literal.filter(|q| q.inner.is_some() && q.expression.is_literal()) {
@@ -767,6 +813,7 @@ pub(crate) fn evaluate(
         let value = match choice.get(&index).map(|(varied, point)| (&varied.points, *point)) {
             None => parameter.quantity.settled(name, dimension, &environment)?,
             Some((VariedPoints::List(list), point)) => list[point].settled(name, dimension, &environment)?,
+            Some((VariedPoints::Drawn(drawn), point)) => drawn.value(name, dimension, point, &environment)?,
             Some((VariedPoints::Range { from, to, points }, point)) => {
                 let start = from.value("from", &environment)?;
                 let end = to.value("to", &environment)?;

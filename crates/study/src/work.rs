@@ -282,21 +282,6 @@ impl Part {
     pub(crate) fn not_reached(points: usize) -> Self {
         Part { points: BTreeMap::from([(NOT_REACHED.to_owned(), points as u64)]), ..Part::default() }
     }
-
-    /// Takes in the part of the next unit.
-    pub(crate) fn append(&mut self, next: Part) {
-        if self.tables.is_empty() {
-            self.tables = next.tables;
-        } else {
-            // a unit that was not reached has no tables
-            self.tables.iter_mut().zip(next.tables).for_each(|(rows, more)| rows.append(more));
-        }
-        next.notes.into_iter().for_each(|note| note.join(&mut self.notes));
-        self.failures.extend(next.failures);
-        for (status, count) in next.points {
-            *self.points.entry(status).or_default() += count;
-        }
-    }
 }
 
 #[cfg(test)]

@@ -25,6 +25,8 @@ pub const OUTPUT: Output = Output {
     name: "html",
     summary: "figure.html, interactive, with one script for all figures beside their folders",
     make: files,
+    sink: None,
+    usual: true,
 };
 
 fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {

@@ -19,7 +19,8 @@ use layout::{Bar, Layout, Place, Placed, SAMPLE};
 use stickslip_study::dataset::{Dataset, Emphasis, Figure, Panel, Series, Style};
 
 /// The output `svg`.
-pub const OUTPUT: Output = Output { name: "svg", summary: "figure.svg, for papers and slides", make: files };
+pub const OUTPUT: Output =
+    Output { name: "svg", summary: "figure.svg, for papers and slides", make: files, sink: None, usual: true };
 
 /// Sizes of text, px. A figure of two columns printed 170 mm wide shows the ticks at 6 to 7 pt.
 const TITLE: f64 = 18.0;

@@ -121,7 +121,7 @@ impl Disk {
             let mut one = if s == 0 { first.clone() } else { sector(s) };
             assert_eq!(count(&one), count(&first), "sector {s} has other elements than the first");
             equal &= s == 0 || one == first;
-            let name = |name: &String| self.name(name, s);
+            let name = |name: &String| self.name(name.as_str(), s);
             one.masses.iter_mut().for_each(|mass| mass.name = name(&mass.name));
             one.springs.iter_mut().for_each(|spring| spring.between = spring.between.each_ref().map(name));
             for joint in &mut one.joints {
@@ -172,10 +172,10 @@ impl Disk {
     }
 
     /// What a place of the sector is called in sector number `s`.
-    fn name(&self, name: &String, s: usize) -> String {
+    fn name(&self, name: &str, s: usize) -> String {
         let (name, s) = match name.strip_prefix(NEXT) {
             Some(name) => (name, (s + 1) % self.sectors),
-            None => (name.as_str(), s),
+            None => (name, s),
         };
         match name.split_once('.') {
             _ if name == GROUND => name.to_owned(),

@@ -9,12 +9,13 @@ use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
 use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, largest, numbers};
+use crate::drawing::{Drawing, Stretch, largest, numbers};
 use crate::info::Complaint;
 use crate::info::KindInfo;
 use crate::kind::Kind;
 use crate::note::Note;
 use crate::note::WARNING;
+use crate::percentiles::percentiles;
 use crate::rows::Rows;
 use crate::study::{VariedValue, varied_text};
 use crate::values::{Values, hertz};
@@ -204,6 +205,9 @@ fn curve(work: &Work<'_>) -> Result<PerformanceCurve, MethodError> {
     }
 }
 
+/// Bands of more combinations of `vary` than this hide each other.
+const MOST_BANDS: usize = 7;
+
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(table), outer) = (drawing.table(tables::PERFORMANCE), drawing.study.varied().len().saturating_sub(1))
     else {
@@ -221,6 +225,25 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         let parameter = varied.as_ref().and(stretches.get(curve))?.varied.first();
         parameter.map(|parameter| parameter.on_axis().0)
     };
+    let panel = |title: String, series| Panel {
+        title,
+        x: Axis::new(&inner.name, inner.on_axis().1),
+        y: y_axis.clone(),
+        series,
+    };
+    if drawing.study.draws().is_some() {
+        // the stretches are of all parameters but the last: their first case stands for them
+        let groups = drawing.by_listed(&stretches);
+        let draws = drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
+        let bands = groups.iter().take(MOST_BANDS).enumerate().flat_map(|(colour, (_, group))| {
+            let curve =
+                |stretch: &&Stretch| (parameter(table, stretch.rows.clone()), height(table, stretch.rows.clone()));
+            let outer =
+                group.first().map_or(&[][..], |stretch| &stretch.varied[drawing.study.drawn().min(outer)..outer]);
+            percentiles(&group.iter().map(curve).collect::<Vec<_>>(), &varied_text(outer), colour)
+        });
+        return Figure { panels: vec![panel(draws, bands.collect())], ..Figure::default() };
+    }
     let mut series = Vec::new();
     for (colour, stretch) in stretches.iter().enumerate() {
         let label = varied_text(&stretch.varied[..outer]);
@@ -248,6 +271,5 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             }
         }
     }
-    let panel = Panel { title: String::new(), x: Axis::new(&inner.name, inner.on_axis().1), y: y_axis, series };
-    Figure { panels: vec![panel], varied, ..Figure::default() }
+    Figure { panels: vec![panel(String::new(), series)], varied, ..Figure::default() }
 }

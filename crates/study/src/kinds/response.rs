@@ -16,6 +16,7 @@ use crate::key::{Key, Takes, default};
 use crate::kind::Kind;
 use crate::linear::Reference;
 use crate::note::{Note, WARNING};
+use crate::percentiles::percentiles;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
 use crate::study::varied_text;
@@ -386,6 +387,8 @@ struct Drawn<'a> {
     /// From the values of tables to those on the axes.
     factor: (f64, f64),
     force_factor: f64,
+    /// How many of the cases are shown, if not all.
+    left_out: Option<String>,
 }
 
 impl Drawn<'_> {
@@ -504,6 +507,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         system: &system,
         shown,
         joints,
+        left_out: drawing.left_out(stretches.len()),
     };
     match layout {
         Layout::Cases => Figure { panels: drawn.by_case(&stretches), ..Figure::default() },
@@ -638,6 +642,9 @@ impl Drawn<'_> {
     /// A panel for every mass (or for the largest of them), with a curve for every case, and then for every joint the same. The last varied
     /// parameter tells the curves of one panel apart, the others the panels.
     fn by_mass(&self, stretches: &[Stretch]) -> Vec<Panel> {
+        if self.drawing.study.draws().is_some() {
+            return self.by_percentiles(stretches);
+        }
         let outer = |stretch: &Stretch| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
         let groups: Vec<(&[Stretch], String)> =
             stretches.chunk_by(|a, b| outer(a) == outer(b)).map(|group| (group, outer(&group[0]))).collect();
@@ -652,10 +659,52 @@ impl Drawn<'_> {
         of_masses.chain(of_joints).take(MOST_PANELS).collect()
     }
 
+    /// Of many draws a panel for every mass (or for the largest of them) and for every joint, with their percentiles for each combination of
+    /// `vary`.
+    fn by_percentiles(&self, stretches: &[Stretch]) -> Vec<Panel> {
+        let groups = self.drawing.by_listed(stretches);
+        let draws = self.drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
+        let some = (groups.len() > SINGLE).then(|| format!("the first {SINGLE} of {} cases", groups.len()));
+        let panel = |mut panel: Panel, name: &str, curve: &dyn Fn(&Stretch) -> (Vec<f64>, Vec<f64>)| {
+            panel.title = join([name.to_owned(), draws.clone()].into_iter().chain(some.clone()));
+            for (colour, (words, group)) in groups.iter().take(SINGLE).enumerate() {
+                let curves: Vec<_> = group.iter().map(|stretch| curve(stretch)).collect();
+                panel.series.extend(percentiles(&curves, words, colour));
+            }
+            panel
+        };
+        let of = |stretch: &Stretch, column: &str| {
+            let of = |column: &str, factor: f64| -> Vec<f64> {
+                numbers(self.curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
+            };
+            (of(DRIVE, self.factor.0), of(column, self.factor.1))
+        };
+        let mut panels = Vec::new();
+        if self.single() {
+            for (name, _) in &self.shown {
+                panels.push(panel(self.panel(String::new()), name, &|stretch| of(stretch, &amplitude_of(name))));
+            }
+        } else {
+            let name = format!("largest of {} masses", self.shown.len());
+            panels.push(panel(self.panel(String::new()), &name, &|stretch| {
+                let (x, y, _) = self.envelope(stretch);
+                (x, y)
+            }));
+        }
+        for joint in &self.joints {
+            panels.push(panel(self.force_panel(String::new()), joint, &|stretch| self.force_line(stretch, joint)));
+        }
+        panels.truncate(MOST_PANELS);
+        panels
+    }
+
     /// The cases of a group, for one mass of so many panels, or for the largest amplitude of all.
     fn cases_of_mass(&self, mass: Option<&str>, group: &[Stretch], outer: &str, panels: usize) -> Panel {
         let named = mass.filter(|_| panels > 1).map(str::to_owned);
-        let thinned_out = (group.len() > MOST_CURVES).then(|| format!("{MOST_CURVES} of {} cases", group.len()));
+        let thinned_out = match group.len() > MOST_CURVES {
+            true => Some(format!("{MOST_CURVES} of {} cases", group.len())),
+            false => self.left_out.clone(),
+        };
         let mut panel = self.panel(join(named.into_iter().chain([outer.to_owned()]).chain(thinned_out)));
         if mass.is_none() {
             panel.y.quantity = format!("largest amplitude of {} masses", self.shown.len());

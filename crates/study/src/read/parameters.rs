@@ -5,9 +5,11 @@ use crate::document::{Content, Entry, Node, Table};
 use crate::error::Problem;
 use crate::expression::is_reserved;
 use crate::near::{nearest, one_of, shown};
-use crate::schema::{self, MOST_POINTS};
-use crate::statement::{Stated, StatedTable};
+use crate::sample::{DESIGNS, DISTRIBUTIONS, Design, Drawn, MOST_SOBOL, Sample, WITHIN};
+use crate::schema::{self, Key, MOST_CASES, MOST_POINTS, SAMPLE, Takes};
+use crate::statement::{Quantity, Stated, StatedTable};
 use crate::study::{Parameter, Replaced, Varied, VariedPoints, evaluate};
+use crate::values::Given;
 use std::collections::HashMap;
 use stickslip::model::is_identifier;
 
@@ -112,15 +114,7 @@ impl Reader {
         };
         let mut varied = Vec::new();
         for entry in &table.entries {
-            let Some(&index) = self.index.get(&entry.key) else {
-                let message = format!("there is no parameter `{}` to vary", shown(&entry.key));
-                let help = match nearest(&entry.key, self.names.iter().map(String::as_str)) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("add it to [parameters] and use it in the model: {} = \"…\"", shown(&entry.key)),
-                };
-                self.problems.push(Problem::new(&entry.key_place, shown(&entry.key), message).help(help));
-                continue;
-            };
+            let Some(index) = self.parameter(entry, "vary") else { continue };
             let points = match &entry.node.value {
                 Content::List(list) => self.quantities(&entry.key, list, &entry.node.place).map(VariedPoints::List),
                 Content::Table(table) => self
@@ -135,6 +129,131 @@ impl Reader {
             self.settle_dimensions(parameters, &which)?;
         }
         Some(varied)
+    }
+
+    /// `[sample]`: how the draws are made, and the parameters that are drawn.
+    pub(super) fn sample(
+        &mut self,
+        root: &Table,
+        parameters: &mut [Parameter],
+        listed: &[Varied],
+    ) -> Option<(Option<Sample>, Vec<Varied>)> {
+        let Some(entry) = root.get("sample") else { return Some((None, Vec::new())) };
+        let Content::Table(table) = &entry.node.value else {
+            let message = format!("expected a table, found {}", entry.node.value.described());
+            let help = "write [sample] and below it count = 1000 and of = { Ft = { normal = [\"2 N\", \"0.2 N\"] } }";
+            self.problems.push(Problem::new(&entry.node.place, "sample", message).help(help));
+            return None;
+        };
+        self.check_keys(table, SAMPLE, "`[sample]`");
+        let rest: Vec<Key> = SAMPLE.iter().copied().filter(|key| !matches!(key.takes, Takes::Distributions)).collect();
+        let stated = self.stated(table, &rest);
+        let count = |key: &str| match stated.entry(key).map(|entry| &entry.value) {
+            Some(Stated::Fixed(Given::Count(count))) => Some(*count),
+            _ => None,
+        };
+        let design = match stated.entry("design").map(|entry| &entry.value) {
+            Some(Stated::Fixed(Given::Text(name))) => DESIGNS.iter().find(|(known, ..)| known == name).map(|row| row.2),
+            _ => None,
+        };
+        let of = &table.get("of")?.node;
+        let Content::Table(of) = &of.value else {
+            let message = format!("expected a table from parameters to distributions, found {}", of.value.described());
+            let help = "write it as in of = { Ft = { normal = [\"2 N\", \"0.2 N\"] } }";
+            self.problems.push(Problem::new(&table.get("of")?.node.place, "of", message).help(help));
+            return None;
+        };
+        let sample = Sample { count: usize::try_from(count("count")?).ok()?, seed: count("seed")?, design: design? };
+        if of.entries.is_empty() {
+            let message = "no parameter is drawn: name one at least";
+            self.problems.push(Problem::new(&table.get("of")?.node.place, "of", message));
+        }
+        if sample.design == Design::Sobol && of.entries.len() > MOST_SOBOL {
+            let message =
+                format!("a Sobol sequence has up to {MOST_SOBOL} parameters here, found {}", of.entries.len());
+            let help = "take design = \"latin-hypercube\"";
+            self.problems.push(Problem::new(&table.get("of")?.node.place, "design", message).help(help));
+        }
+        let mut drawn = Vec::new();
+        for (coordinate, entry) in of.entries.iter().enumerate() {
+            let Some(index) = self.parameter(entry, "draw") else { continue };
+            if listed.iter().any(|varied| varied.index == index) {
+                let message = format!("`{}` is in `vary` too: a parameter is listed or drawn", shown(&entry.key));
+                self.problems.push(Problem::new(&entry.key_place, shown(&entry.key), message));
+                continue;
+            }
+            let Some((distribution, numbers, within)) = self.distribution(entry) else { continue };
+            let points = VariedPoints::Drawn(Drawn { sample, coordinate, distribution, numbers, within });
+            drawn.push(Varied { index, place: entry.node.place.clone(), points });
+        }
+        let which: Vec<usize> = drawn.iter().map(|drawn| drawn.index).collect();
+        if self.problems.is_empty() {
+            self.settle_dimensions(parameters, &which)?;
+        }
+        Some((Some(sample), drawn))
+    }
+
+    /// A distribution: `{ normal = [mean, deviation], within = [least, most] }`.
+    fn distribution(&mut self, entry: &Entry) -> Option<(&'static str, Vec<Quantity>, Option<[Quantity; 2]>)> {
+        let names = || DISTRIBUTIONS.iter().map(|(name, ..)| *name);
+        let example = "write it as in { normal = [\"2 N\", \"0.2 N\"] }";
+        let Content::Table(table) = &entry.node.value else {
+            let message = format!("expected a distribution, found {}", entry.node.value.described());
+            self.problems.push(Problem::new(&entry.node.place, shown(&entry.key), message).help(example));
+            return None;
+        };
+        let (mut found, mut within) = (None, None);
+        for part in &table.entries {
+            let Content::List(list) = &part.node.value else {
+                let message = format!("expected a list of quantities, found {}", part.node.value.described());
+                self.problems.push(Problem::new(&part.node.place, shown(&part.key), message).help(example));
+                return None;
+            };
+            let quantities = self.quantities(&entry.key, list, &part.node.place)?;
+            let row = DISTRIBUTIONS.iter().find(|(name, ..)| *name == part.key);
+            match (row, <[Quantity; 2]>::try_from(quantities)) {
+                (None, Ok(bounds)) if part.key == WITHIN => within = Some(bounds),
+                (None, Err(_)) if part.key == WITHIN => {
+                    let message = "expected two bounds: the least and the largest value";
+                    self.problems.push(Problem::new(&part.node.place, WITHIN, message));
+                    return None;
+                }
+                (Some((name, ..)), quantities) if found.is_none() => {
+                    found = Some((*name, quantities.map_or_else(|all| all, Vec::from)));
+                }
+                (Some(_), _) => {
+                    let message = "a parameter has one distribution";
+                    self.problems.push(Problem::new(&part.key_place, shown(&part.key), message));
+                    return None;
+                }
+                (None, _) => {
+                    self.unknown_word("distribution", &part.key, &part.key_place, names().chain([WITHIN]).collect());
+                    return None;
+                }
+            }
+        }
+        match found {
+            Some((name, numbers)) => Some((name, numbers, within)),
+            None => {
+                let message = format!("a distribution is missing: one of {}", one_of(names()));
+                self.problems.push(Problem::new(&entry.node.place, shown(&entry.key), message).help(example));
+                None
+            }
+        }
+    }
+
+    /// The parameter that an entry of `vary` or of a sample names.
+    fn parameter(&mut self, entry: &Entry, what: &str) -> Option<usize> {
+        if let Some(&index) = self.index.get(&entry.key) {
+            return Some(index);
+        }
+        let message = format!("there is no parameter `{}` to {what}", shown(&entry.key));
+        let help = match nearest(&entry.key, self.names.iter().map(String::as_str)) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("add it to [parameters] and use it in the model: {} = \"…\"", shown(&entry.key)),
+        };
+        self.problems.push(Problem::new(&entry.key_place, shown(&entry.key), message).help(help));
+        None
     }
 
     /// A value from outside the file stands for all values that `vary` gives its parameter: one case has it.
@@ -185,15 +304,22 @@ impl Reader {
         }
     }
 
-    pub(super) fn limit_points(&mut self, study: &StatedTable, varied: &[Varied]) -> Option<()> {
-        let cases = varied.iter().fold(1usize, |product, varied| product.saturating_mul(varied.points.len()));
+    pub(super) fn limit_points(
+        &mut self,
+        study: &StatedTable,
+        varied: &[Varied],
+        sample: Option<Sample>,
+    ) -> Option<()> {
+        let listed = varied.iter().filter(|varied| !matches!(varied.points, VariedPoints::Drawn(_)));
+        let draws = sample.map_or(1, |sample| sample.count);
+        let cases = listed.fold(draws, |product, varied| product.saturating_mul(varied.points.len()));
         let frequency = study.entry("frequency");
         let frequencies = match frequency.map(|entry| &entry.value) {
             Some(Stated::List(list)) => list.len(),
             Some(Stated::Range { points, .. }) => *points,
             _ => 1,
         };
-        if cases.saturating_mul(frequencies) <= MOST_POINTS {
+        if cases <= MOST_CASES && cases.saturating_mul(frequencies) <= MOST_POINTS {
             return Some(());
         }
         let (place, key) = match (frequency, varied.first()) {
@@ -201,8 +327,9 @@ impl Reader {
             (_, Some(varied)) => (&varied.place, "vary"),
             _ => (&study.place, "frequency"),
         };
-        let message =
-            format!("{cases} cases times {frequencies} frequencies are too many: the limit is {MOST_POINTS} points");
+        let message = format!(
+            "{cases} cases times {frequencies} frequencies are too many: the limit is {MOST_CASES} cases and {MOST_POINTS} points"
+        );
         self.problems.push(Problem::new(place, key, message).help("split the study, or take fewer points"));
         None
     }

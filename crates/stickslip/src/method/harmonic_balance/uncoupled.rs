@@ -16,6 +16,8 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Damping between modes that counts as the rounding of matrices: relative to that of the two, and to the largest of all.
 const UNCOUPLED: [f64; 2] = [1e-9, 1e-13];
+/// Springs that hold free motions, relative to the lowest ratio of stiffness and mass on the diagonals.
+const SHIFT: f64 = 1e-3;
 /// Degrees of freedom up to which modes are sought: the decomposition of so many takes a minute.
 const MOST: usize = 4000;
 /// A dynamic stiffness below this share of its parts is their rounding: a resonance without damping.
@@ -131,16 +133,26 @@ fn diagonal(structure: &Structure) -> Option<Vec<[f64; 3]>> {
     Some(own)
 }
 
-/// Modes of unit mass.
+/// Modes `X` with `Xᵀ (K + σ M) X = 1` and `Xᵀ M X = θ`, so that motions without mass have their place: mass θ and stiffness `1 - σ θ`.
 fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
     let Matrices { mass, damping, stiffness } = matrices;
     let n = mass.nrows();
-    // M = L Lᵀ; with q = Lᵀ x the masses are ones
-    let lower = mass.clone().cholesky()?.unpack();
-    let half = lower.solve_lower_triangular(stiffness)?;
+    let mut ratios: Vec<f64> =
+        (0..n).map(|i| stiffness[(i, i)] / mass[(i, i)]).filter(|v| v.is_finite() && *v > 0.0).collect();
+    ratios.sort_by(f64::total_cmp);
+    let shift = SHIFT * ratios.first().copied().unwrap_or(1.0);
+    let held = stiffness + mass * shift;
+    // ones on the diagonal, so that coordinates of any unit count alike
+    let unit = held.diagonal().map(|v| 1.0 / v.sqrt());
+    let scaled = |matrix: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, k| unit[i] * matrix[(i, k)] * unit[k]);
+    let lower = scaled(&held).cholesky()?.unpack();
+    let half = lower.solve_lower_triangular(&scaled(mass))?;
     let whole = lower.solve_lower_triangular(&half.transpose())?;
     let (values, vectors) = eigen::symmetric_in_blocks(&whole)?;
-    let shapes = lower.tr_solve_lower_triangular(&vectors)?;
+    let mut shapes = lower.tr_solve_lower_triangular(&vectors)?;
+    for mut column in shapes.column_iter_mut() {
+        column.component_mul_assign(&unit);
+    }
     let product = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
         let mut out = DMatrix::zeros(n, n);
         multiply_in_blocks(a.as_slice(), b.as_slice(), out.as_mut_slice(), (n, n, n), false);
@@ -148,12 +160,70 @@ fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
     };
     let modal = product(&shapes.transpose(), &product(damping, &shapes));
     let size = modal.diagonal().amax();
-    let apart = (0..n).flat_map(|k| (0..n).map(move |i| (i, k))).filter(|(i, k)| i != k);
-    if apart.into_iter().any(|(i, k)| {
+    for (i, k) in (0..n).flat_map(|k| (0..k).map(move |i| (i, k))) {
         let both = (modal[(i, i)] * modal[(k, k)]).abs().sqrt();
-        modal[(i, k)].abs() > UNCOUPLED[0] * both + UNCOUPLED[1] * size
-    }) {
-        return None;
+        let beside = modal[(i, k)].abs().max(modal[(k, i)].abs());
+        if beside > UNCOUPLED[0] * both + UNCOUPLED[1] * size {
+            return None;
+        }
     }
-    Some((values.iter().enumerate().map(|(m, value)| [1.0, modal[(m, m)], *value]).collect(), shapes))
+    // a mass below zero is the rounding of none
+    let own = values.iter().enumerate().map(|(m, theta)| {
+        let mass = theta.max(0.0);
+        [mass, modal[(m, m)], 1.0 - shift * mass]
+    });
+    Some((own.collect(), shapes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(i: usize) -> f64 {
+        ((i * 7919 + 13) as f64).sin()
+    }
+
+    /// Modes answer as the dynamic stiffness does that they are those of: also motions without mass, and free ones; damping that couples them is told.
+    #[test]
+    fn modes_answer_as_the_dynamic_stiffness() {
+        let n = 12;
+        let spread = DMatrix::from_fn(n, n - 1, |i, k| noise(i * n + k));
+        let stiffness = &spread * spread.transpose();
+        let mut light = DMatrix::from_fn(n, n, |i, k| noise(i + n * k + 500));
+        light = &light * light.transpose() + DMatrix::identity(n, n) * 0.1;
+        // no mass in two places
+        for i in [3, 7] {
+            light.fill_row(i, 0.0);
+            light.fill_column(i, 0.0);
+        }
+        let damping = &light * 0.03 + &stiffness * 0.002;
+        let names = || (0..n).map(|i| i.to_string()).collect::<Vec<_>>();
+        let structure = Structure::new(names(), light.clone(), damping.clone(), stiffness.clone()).unwrap();
+        let directions = [vec![(0, 1.0), (4, -0.5)], vec![(3, 1.0)], vec![(7, 2.0), (1, 1.0)]];
+        let modes = Uncoupled::new(&structure, &directions).unwrap();
+        for (s, omega) in
+            [(Complex64::new(0.0, 0.8), 0.8), (Complex64::new(0.0, 2.4), 0.8), (Complex64::new(1.5, 0.0), 0.8)]
+        {
+            let receptance = modes.receptance(s, omega).unwrap();
+            let gains = modes.gains(s, omega).unwrap();
+            let own = modes.own_receptance(&gains);
+            for (b, direction) in directions.iter().enumerate() {
+                let mut x = DVector::from_element(n, ZERO);
+                direction.iter().for_each(|&(i, w)| x[i] += Complex64::new(w, 0.0));
+                let answer = modes.respond(s, omega, &x).unwrap();
+                structure.dynamic_stiffness(s).unwrap().solve(x.as_mut_slice());
+                let size = x.iter().map(|x| x.norm()).fold(0.0, f64::max);
+                assert!(x.iter().zip(answer.iter()).all(|(x, a)| (x - a).norm() < 1e-9 * size), "{s}: {x} {answer}");
+                for (a, direction) in directions.iter().enumerate() {
+                    let along: Complex64 = direction.iter().map(|&(i, w)| x[i] * w).sum();
+                    assert!((receptance[(a, b)] - along).norm() < 1e-9 * size);
+                }
+                assert!((own[b] - receptance[(b, b)]).norm() < 1e-12 * size);
+            }
+        }
+        let mut coupled = damping;
+        coupled[(0, 0)] += 0.01;
+        let structure = Structure::new(names(), light, coupled, stiffness).unwrap();
+        assert!(Uncoupled::new(&structure, &directions).is_none());
+    }
 }

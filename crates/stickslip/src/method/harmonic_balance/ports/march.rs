@@ -18,8 +18,6 @@ use stickslip_numerics::dense::multiply_in_blocks;
 const REPEATS: f64 = 1e-12;
 /// The same where they come no closer.
 const ROUNDED: f64 = 1e-9;
-/// Share of the distance that a period leaves, at most, where more of them are cheaper than one with its derivative.
-const FORGETS: f64 = 0.3;
 /// Periods, at most: hysteresis that slips forgets in a few.
 const PERIODS: usize = 60;
 /// Singular values of `1 - Π` below this belong to states that nothing forgets.
@@ -96,23 +94,13 @@ impl Alternation {
         z = self.period(march, &z, None)?;
         let scale = march.state_scale();
         let mut last = f64::INFINITY;
-        // what slips forgets its beginning in a few periods: as long as it does no derivative is needed
-        for _ in 0..PERIODS {
-            let after = self.period(march, &z, None)?;
-            let gap = (&after - &z).amax() / scale;
-            if gap <= REPEATS && !linear {
-                self.state.clear();
-                self.state.extend(z.iter());
-                return Some(DMatrix::zeros(m, m));
-            }
-            if gap <= REPEATS || gap > FORGETS * last {
-                break;
-            }
-            (z, last) = (after, gap);
-        }
-        last = f64::INFINITY;
-        for _ in 0..PERIODS {
-            let (after, product) = self.linear_period(march, &z, memory)?;
+        for round in 0..PERIODS {
+            // what slips has mostly forgotten its beginning after a period: no derivative is needed to see that
+            let plain = if round == 0 && !linear { Some(self.period(march, &z, None)?) } else { None };
+            let (after, product) = match plain.filter(|after| (after - &z).amax() <= REPEATS * scale) {
+                Some(after) => (after, DMatrix::zeros(m, m)),
+                None => self.linear_period(march, &z, memory)?,
+            };
             let gap = (&after - &z).amax() / scale;
             if m == 0 || gap <= REPEATS || (gap <= ROUNDED && gap >= 0.5 * last) {
                 self.state.clear();

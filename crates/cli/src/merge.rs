@@ -1,0 +1,41 @@
+//! `stickslip merge`: the parts of a study, joined.
+
+use crate::{Ending, run};
+use std::path::{Path, PathBuf};
+use stickslip_report::assemble::{Parts, assemble};
+use stickslip_report::stored::study_of;
+use stickslip_report::{check_writable, stream};
+
+/// Joins parts into `out/NAME/`.
+pub fn merge(folders: &[PathBuf], out: &Path, (only, also): (&[String], &[String]), open: bool) -> Ending {
+    let outputs = match run::outputs(only, also) {
+        Ok(outputs) => outputs,
+        Err(ending) => return ending,
+    };
+    let wrong = |message: String| {
+        crate::speak::error(&message);
+        Ending::WrongInput
+    };
+    let journals = match stream::merged(folders) {
+        Ok(journals) => journals,
+        Err(error) => return wrong(error.to_string()),
+    };
+    let Some(first) = journals.first() else { return wrong("there is nothing to join".to_owned()) };
+    let mut outline = first.head().outline.clone();
+    // the times of all are added up, that of each check too
+    outline.record.wall_time_s = journals.iter().map(|journal| journal.head().outline.record.wall_time_s).sum();
+    let study = match study_of(&outline.record.study, first.folder()) {
+        Ok(study) => study,
+        Err(error) => return wrong(error.to_string()),
+    };
+    let folder = out.join(&outline.name);
+    if let Err(error) = check_writable(&folder) {
+        return Ending::Failed(error.to_string());
+    }
+    let aside = out.join(format!("{}.merging.{}", outline.name, std::process::id()));
+    let parts = Parts { outline: &outline, journals: &journals, rest: &[] };
+    match assemble(&parts, &study, &outputs, out, &aside) {
+        Err(error) => Ending::Failed(error.to_string()),
+        Ok(assembled) => run::told(&assembled, &[], (false, open)),
+    }
+}

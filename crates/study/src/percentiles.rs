@@ -1,0 +1,78 @@
+//! Percentiles of the curves of many draws, as a band with its median.
+
+use crate::dataset::{Series, Style};
+
+/// The ends of the band and the line in it, as shares.
+const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
+
+/// Median and band of curves `(x, y)` over the abscissae of the first one. A point that a curve has not, because it failed or lies outside, does
+/// not count there.
+pub(crate) fn percentiles(curves: &[(Vec<f64>, Vec<f64>)], label: &str, colour: usize) -> Vec<Series> {
+    let Some((grid, _)) = curves.first() else { return Vec::new() };
+    let mut bounds: [Vec<f64>; 3] = Default::default();
+    let all: Vec<Vec<f64>> = curves.iter().map(|(x, y)| over(grid, x, y)).collect();
+    for at in 0..grid.len() {
+        let mut values: Vec<f64> = all.iter().map(|y| y[at]).filter(|value| !value.is_nan()).collect();
+        values.sort_by(f64::total_cmp);
+        for (bound, share) in bounds.iter_mut().zip(SHARES) {
+            bound.push(quantile(&values, share));
+        }
+    }
+    let [low, middle, high] = bounds;
+    let named = |what: &str| if label.is_empty() { what.to_owned() } else { format!("{label}, {what}") };
+    vec![
+        Series::band(named("5 % to 95 %"), grid.clone(), low, high, colour),
+        Series { style: Style::Solid, ..Series::line(named("median"), grid.clone(), middle, colour) },
+    ]
+}
+
+/// The value of a share of rising values, between two of them in proportion (definition 7 of Hyndman and Fan, 1996).
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let Some(last) = values.len().checked_sub(1) else { return f64::NAN };
+    let at = share * last as f64;
+    let (below, above) = (values[at.floor() as usize], values[at.ceil() as usize]);
+    below + (above - below) * at.fract()
+}
+
+/// A curve at other abscissae, in straight lines between its points; nothing outside.
+fn over(grid: &[f64], x: &[f64], y: &[f64]) -> Vec<f64> {
+    if grid == x {
+        return y.to_vec();
+    }
+    grid.iter()
+        .map(|at| match x.partition_point(|x| x < at) {
+            above if x.get(above) == Some(at) => y[above],
+            above @ 1.. if above < x.len() => {
+                let share = (at - x[above - 1]) / (x[above] - x[above - 1]);
+                y[above - 1] + share * (y[above] - y[above - 1])
+            }
+            _ => f64::NAN,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// NumPy 2: `np.percentile([1, 2, 4, 8, 16], [5, 50, 95])` is 1.2, 4, 14.4.
+    #[test]
+    fn bands_are_percentiles_at_every_abscissa() {
+        let x = vec![1.0, 2.0, 3.0];
+        let mut curves: Vec<(Vec<f64>, Vec<f64>)> =
+            [8.0, 1.0, 16.0, 2.0, 4.0].iter().map(|y| (x.clone(), vec![*y, 2.0 * y, f64::NAN])).collect();
+        curves[4].1[2] = 7.0;
+        let series = percentiles(&curves, "blade1", 2);
+        let near = |found: &[f64], expected: [f64; 3]| {
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{found:?} {expected:?}");
+        };
+        near(&series[0].base, [1.2, 2.4, 7.0]);
+        near(&series[0].y, [14.4, 28.8, 7.0]);
+        near(&series[1].y, [4.0, 8.0, 7.0]);
+        assert_eq!((series[0].style, series[1].label.as_str()), (Style::Band, "blade1, median"));
+        // a curve with other points counts between them, and not beyond
+        let other = (vec![1.0, 3.0], vec![10.0, 30.0]);
+        let series = percentiles(&[(vec![0.0, 2.0], vec![5.0, 20.0]), other], "", 0);
+        assert_eq!(series[1].y, [5.0, 20.0]);
+    }
+}

@@ -1,0 +1,270 @@
+//! What the figure of long tables needs, in the memory of a short one.
+//!
+//! Tables of up to [`MOST_ROWS`] rows are kept as they are. Of longer ones the rows of some cases are kept: of a study that draws its parameters
+//! the first ones, which are a sample themselves, of others cases evenly; figures say how many of how many. Where the rows of these are still
+//! too many, of every stretch of neighbouring rows those with the least and the largest value of each column stay: a curve through them has the
+//! same envelope as the curve through all, and every point of it was computed.
+
+use crate::dataset::{Column, Table, Values};
+use crate::drawing::MOST_CURVES;
+use crate::study::Study;
+
+/// Rows of a table that are held in memory to draw its figure.
+pub const MOST_ROWS: usize = 500_000;
+
+/// Takes tables in, block after block, and keeps what their figure shows.
+///
+/// # Example
+/// ```
+/// use stickslip_study::{read_study, run::{Context, check}, thinning::Thinning};
+/// let text = stickslip_study::templates::find("blade-couple").unwrap().study;
+/// let study = read_study("couple.toml", text, &[]).unwrap();
+/// let block = check(&study).unwrap().block(0..4, &Context::unwatched(1)).unwrap();
+/// let rows: Vec<_> = block.tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
+/// let mut thinning = Thinning::new(&study, &rows);
+/// block.tables.iter().cloned().for_each(|table| thinning.add(table));
+/// assert!(thinning.keeps_all());
+/// assert_eq!(thinning.tables(), block.tables);
+/// ```
+#[derive(Debug)]
+pub struct Thinning {
+    tables: Vec<Kept>,
+}
+
+impl Thinning {
+    /// For tables of a study with these names and so many rows.
+    pub fn new(study: &Study, tables: &[(&str, usize)]) -> Thinning {
+        Thinning { tables: tables.iter().map(|(name, rows)| Kept::new(study, name, *rows, MOST_ROWS)).collect() }
+    }
+
+    /// Whether every row is kept.
+    pub fn keeps_all(&self) -> bool {
+        self.tables.iter().all(|table| table.cases == Cases::All && table.bin.is_none())
+    }
+
+    /// The next rows of a table.
+    pub fn add(&mut self, table: Table) {
+        if let Some(known) = self.tables.iter_mut().find(|known| known.rows.name == table.name) {
+            known.add(table);
+        }
+    }
+
+    /// What is kept.
+    pub fn tables(self) -> Vec<Table> {
+        self.tables.into_iter().map(Kept::finished).collect()
+    }
+}
+
+/// Which cases of a table are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cases {
+    All,
+    /// So many.
+    First(usize),
+    /// Every one of so many.
+    Each(usize),
+}
+
+/// What is kept of a table.
+#[derive(Debug)]
+struct Kept {
+    rows: Table,
+    cases: Cases,
+    /// Neighbouring rows of which only the extremes stay.
+    bin: Option<usize>,
+    /// Columns that tell the cases apart, the first ones.
+    keys: usize,
+    /// The case that is being taken in: its key and its number.
+    now: Option<(Vec<u64>, usize)>,
+    open: Table,
+}
+
+impl Kept {
+    fn new(study: &Study, name: &str, rows: usize, most: usize) -> Kept {
+        let empty = Table { name: name.to_owned(), columns: Vec::new() };
+        let keys = study.varied().len();
+        let (mut cases, mut bin) = (Cases::All, None);
+        if rows > most {
+            let of_case = rows.div_ceil(study.cases());
+            let kept = if study.draws().is_some() {
+                let first = (most / of_case).clamp(1, study.cases());
+                cases = Cases::First(first);
+                first
+            } else {
+                let each = study.cases().div_ceil(MOST_CURVES);
+                cases = Cases::Each(each);
+                study.cases().div_ceil(each)
+            };
+            // a bin keeps two rows for every column at most: a few dozen
+            bin = (kept * of_case > most).then(|| (of_case * kept).div_ceil(most).max(1) * EXTREMES);
+        }
+        Kept { rows: empty.clone(), cases, bin, keys, now: None, open: empty }
+    }
+
+    fn add(&mut self, table: Table) {
+        if self.cases == Cases::All && self.bin.is_none() {
+            return self.rows.append(table);
+        }
+        let mut from = 0;
+        while from < table.rows() {
+            let key = key(&table, from, self.keys);
+            if self.now.as_ref().is_none_or(|(now, _)| *now != key) {
+                self.close();
+                let number = self.now.as_ref().map_or(0, |(_, number)| number + 1);
+                self.now = Some((key, number));
+            }
+            let (now, number) = match &self.now {
+                Some((now, number)) => (now, *number),
+                None => return,
+            };
+            let room = self.bin.map_or(usize::MAX, |bin| bin - self.open.rows());
+            let more = table.rows().min(from.saturating_add(room));
+            let to = (from + 1..more).find(|row| key_differs(&table, *row, now)).unwrap_or(more);
+            let keeps = match self.cases {
+                Cases::All => true,
+                Cases::First(first) => number < first,
+                Cases::Each(each) => number % each == 0,
+            };
+            if keeps {
+                self.open.append(rows(&table, &(from..to).collect::<Vec<_>>()));
+                if self.bin.is_none_or(|bin| self.open.rows() >= bin) {
+                    self.close();
+                }
+            }
+            from = to;
+        }
+    }
+
+    /// Keeps what is open: all of it, or its extremes.
+    fn close(&mut self) {
+        let open = Table { name: self.open.name.clone(), columns: std::mem::take(&mut self.open.columns) };
+        if open.rows() == 0 {
+            return;
+        }
+        if self.bin.is_none() {
+            return self.rows.append(open);
+        }
+        let mut kept = vec![0, open.rows() - 1];
+        for column in &open.columns {
+            if let Values::Number(values) = &column.values {
+                let by = |a: &&usize, b: &&usize| values[**a].total_cmp(&values[**b]);
+                // a gap in a curve stays one
+                let (there, gaps): (Vec<usize>, Vec<usize>) = (0..values.len()).partition(|row| !values[*row].is_nan());
+                kept.extend(there.iter().min_by(by).into_iter().chain(there.iter().max_by(by)).chain(gaps.first()));
+            }
+        }
+        kept.sort_unstable();
+        kept.dedup();
+        self.rows.append(rows(&open, &kept));
+    }
+
+    fn finished(mut self) -> Table {
+        self.close();
+        self.rows
+    }
+}
+
+/// Rows that a bin keeps, more or less: a table has a dozen columns whose extremes stand at different rows.
+const EXTREMES: usize = 24;
+
+fn key(table: &Table, row: usize, keys: usize) -> Vec<u64> {
+    let columns = table.columns.iter().take(keys);
+    columns.map(|column| if let Values::Number(v) = &column.values { v[row].to_bits() } else { 0 }).collect()
+}
+
+fn key_differs(table: &Table, row: usize, key: &[u64]) -> bool {
+    table.columns.iter().zip(key).any(|(column, bits)| match &column.values {
+        Values::Number(values) => values[row].to_bits() != *bits,
+        _ => false,
+    })
+}
+
+/// Some rows of a table.
+fn rows(table: &Table, which: &[usize]) -> Table {
+    let column = |column: &Column| Column {
+        name: column.name.clone(),
+        values: match &column.values {
+            Values::Number(v) => Values::Number(which.iter().map(|row| v[*row]).collect()),
+            Values::Integer(v) => Values::Integer(which.iter().map(|row| v[*row]).collect()),
+            Values::Text(v) => Values::Text(which.iter().map(|row| v[*row].clone()).collect()),
+            Values::Flag(v) => Values::Flag(which.iter().map(|row| v[*row]).collect()),
+        },
+    };
+    Table { name: table.name.clone(), columns: table.columns.iter().map(column).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read_study;
+
+    fn study(extra: &str) -> Study {
+        let text = crate::templates::find("blade-couple").unwrap().study;
+        let text = text.replace("vary = { Ft = [\"2 N\", \"4 N\", \"6 N\", \"8 N\"] }", extra);
+        read_study("couple.toml", &text, &[]).unwrap()
+    }
+
+    fn table(cases: usize, rows: usize) -> Table {
+        let all = 0..cases * rows;
+        let numbers = |value: &dyn Fn(usize) -> f64| Values::Number(all.clone().map(value).collect());
+        let column = |name: &str, values| Column { name: name.to_owned(), values };
+        Table {
+            name: "curve".to_owned(),
+            columns: vec![
+                column("Ft_N", numbers(&|i| (i / rows) as f64)),
+                column("x", numbers(&|i| (i % rows) as f64)),
+                column("y", numbers(&|i| (i as f64 * 0.1).sin() + if i % rows == rows / 3 { 50.0 } else { 0.0 })),
+                column("z", numbers(&|i| if i % 100_000 == 777 { f64::NAN } else { -(i as f64 * 0.01).cos() })),
+                column("status", Values::Text(all.clone().map(|_| "converged".to_owned()).collect())),
+            ],
+        }
+    }
+
+    fn fed(mut kept: Kept, table: &Table, step: usize) -> Table {
+        let all: Vec<usize> = (0..table.rows()).collect();
+        all.chunks(step).for_each(|chunk| kept.add(rows(table, chunk)));
+        kept.finished()
+    }
+
+    /// The least and the largest value of every column in every stretch of bins stay, at their places; the memory is bounded.
+    #[test]
+    fn a_long_curve_keeps_its_envelope() {
+        let (study, most) = (study("vary = { Ft = [\"2 N\"] }"), 5000);
+        let table = table(1, 400_000);
+        let kept = fed(Kept::new(&study, "curve", table.rows(), most), &table, 1009);
+        assert!(kept.rows() < most && kept.rows() > most / 10, "{}", kept.rows());
+        let (x, y) = (kept.numbers("x").unwrap(), kept.numbers("y").unwrap());
+        assert!(x.is_sorted_by(|a, b| a < b));
+        let all = table.numbers("y").unwrap();
+        // ten stretches of the figure: the same heights as all points have
+        for part in 0..10 {
+            let within = |x: f64| (part * 40_000..(part + 1) * 40_000).contains(&(x as usize));
+            let highest = |points: &mut dyn Iterator<Item = (f64, f64)>| {
+                points.filter(|(x, _)| within(*x)).map(|(_, y)| y).fold(f64::NEG_INFINITY, f64::max)
+            };
+            let found = highest(&mut x.iter().copied().zip(y.iter().copied()));
+            assert_eq!(found, highest(&mut (0..400_000).map(|i| (i as f64, all[i]))), "{part}");
+        }
+        assert!(y.contains(&all[400_000 / 3]));
+        let gaps = kept.numbers("z").unwrap().iter().filter(|value| value.is_nan()).count();
+        assert_eq!(gaps, 4);
+        // however the rows come
+        let other = fed(Kept::new(&study, "curve", table.rows(), most), &table, 70_001);
+        assert!(format!("{other:?}") == format!("{kept:?}"));
+    }
+
+    #[test]
+    fn of_many_cases_some_are_kept_whole() {
+        let listed = study("vary = { Ft = { from = \"1 N\", to = \"9 N\", points = 1000 } }");
+        let table = table(1000, 20);
+        let kept = fed(Kept::new(&listed, "curve", table.rows(), 10_000), &table, 33);
+        let cases = kept.numbers("Ft_N").unwrap();
+        assert!(cases.iter().all(|case| *case as usize % 3 == 0), "every third");
+        assert_eq!(kept.rows(), 334 * 20);
+        // of draws the first ones
+        let drawn = study("[sample]\ncount = 1000\nof = { Ft = { uniform = [\"1 N\", \"9 N\"] } }");
+        let kept = fed(Kept::new(&drawn, "curve", table.rows(), 10_000), &table, 33);
+        // with numbers that do not exist
+        assert!(format!("{kept:?}") == format!("{:?}", rows(&table, &(0..10_000).collect::<Vec<_>>())));
+    }
+}
