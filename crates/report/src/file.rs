@@ -19,13 +19,16 @@ pub struct Output {
     pub usual: bool,
 }
 
+/// Begins a file for the rows of a table, whose columns it has.
+pub type Begin = for<'a> fn(&Table, Box<dyn Write + 'a>) -> Result<Box<dyn Rows + 'a>, ReportError>;
+
 /// A file per table, to which rows are written as they come.
 #[derive(Debug, Clone, Copy)]
 pub struct Sink {
     /// What the name of the file ends in, after the name of the table and a dot.
     pub extension: &'static str,
     /// Begins the file of a table with these columns, whose rows do not count, in a writer.
-    pub begin: for<'a> fn(&Table, Box<dyn Write + 'a>) -> Result<Box<dyn Rows + 'a>, ReportError>,
+    pub begin: Begin,
 }
 
 /// The file of a table that is being written.

@@ -1,7 +1,7 @@
 //! Each table as `<name>.parquet`, for polars, pandas, DuckDB and every other reader of columns: a tenth of the time of CSV to read, and half of
 //! its size.
 //!
-//! Numbers are doubles, a number that does not exist (NaN) and an unknown flag are null. Rows stand in groups of [`GROUP`], each column of a group
+//! Numbers are doubles, a number that does not exist (NaN) and an unknown flag are null. Rows stand in groups of `GROUP`, each column of a group
 //! is one page: by a dictionary where values repeat, else with the bytes of the doubles split into streams, compressed by deflate. Same rows,
 //! same bytes, however they came.
 //!

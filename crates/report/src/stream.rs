@@ -1,7 +1,7 @@
 //! A run whose results go to the disk while it goes on, which a later run can take up, and of which a part may be computed elsewhere.
 //!
 //! While the run of `NAME` goes on, its [`Journal`] stands in `out/NAME.running/`; [`assemble`](crate::assemble::assemble) makes the results of it.
-//! The journal of a shard stays, in `out/NAME.shard-3-of-16/`, until all are [merged](merged).
+//! The journal of a shard stays, in `out/NAME.shard-3-of-16/`, until all are [`merged`].
 
 use crate::file::{ReportError, file_name};
 use crate::journal::{FILE, Head, Journal, JournalError};

@@ -301,6 +301,8 @@ const POINT: f64 = 3e-6;
 const EVENT_DRIVEN: (f64, f64) = (2e-4, 3e-3);
 /// Masses and joints of the second number.
 const EVENT_DRIVEN_SIZE: f64 = 16.0;
+/// The tolerance of harmonic balance for which its time was measured.
+const SERIES_TOLERANCE: f64 = 1e-3;
 /// Harmonic balance per mass and joint at 15 harmonics. Measured with springs before the sliders: 0.3 ms for the
 /// couple, 21 ms at 32 blades.
 const SERIES: f64 = 5e-4;
@@ -380,7 +382,12 @@ impl Costing<'_> {
             (true, _, Some(_)) => HARD_SMOOTH,
             (false, true, Some(_)) => HARD_RIGID,
         };
-        let length = (harmonics.unwrap_or(SERIES_HARMONICS) / SERIES_HARMONICS).max(1.0);
+        // the error of a series with corners falls with the square of its length
+        let asked = self.case.method.options.get("tolerance").copied().unwrap_or(SERIES_TOLERANCE);
+        let length = match harmonics {
+            Some(harmonics) => (harmonics / SERIES_HARMONICS).max(1.0),
+            None => (SERIES_TOLERANCE / asked).sqrt().max(1.0),
+        };
         SERIES * (self.masses + self.joints).max(1.0) * factor * length * length
     }
 

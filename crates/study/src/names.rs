@@ -107,7 +107,13 @@ impl Names {
         match self.all(key, what, name)? {
             [one] => Ok(one),
             several => {
-                let message = format!("`{name}` stands for {} places, and one is needed", several.len());
+                let of_node =
+                    several.iter().all(|label| label.strip_prefix(name).is_some_and(|rest| rest.starts_with('.')));
+                let message = match of_node {
+                    true => format!("`{name}` has several directions, and one is needed"),
+                    // of a disk, what has this name in every sector
+                    false => format!("`{name}` stands for {} places, and one is needed", several.len()),
+                };
                 let help = format!("say {}", one_of(several.iter().take(LISTED).map(String::as_str)));
                 Err(Complaint { name: Some(name.to_owned()), ..Complaint::new(key, message, help) })
             }

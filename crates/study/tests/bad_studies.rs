@@ -182,7 +182,7 @@ fn a_velocity_is_no_motion() {
         &belt.replace("velocity", "speed"),
         (43, 1),
         "speed",
-        &["the keys of motion 1 are `on`, `amplitude`, `phase`, `harmonic`, `repeat`"],
+        &["the keys of motion 1 are `on`, `amplitude`, `phase`, `harmonic`, `engine_order`"],
     );
 }
 

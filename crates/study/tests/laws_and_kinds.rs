@@ -16,6 +16,8 @@ const STUDIES: &[(&str, &str)] = &[
     ("branch", "frequency = { from = \"12 Hz\", to = \"13 Hz\", points = 2 }\nsteps = 2\nharmonics = 3\nsamples = 64"),
     ("modes", "amplitude = { from = \"1 um\", to = \"1 mm\", points = 3 }\nharmonics = 3\nsamples = 64"),
     ("transient", "frequency = \"15 Hz\"\ncycles = 1"),
+    ("campbell", "speed = { from = \"1 Hz\", to = \"10 Hz\", points = 3 }"),
+    ("nodal-diameter", "modes = 2\n[disk]\nsectors = 3"),
 ];
 
 /// A node with the directions of the law, each held by a spring, and the law between it and the ground.

@@ -391,6 +391,9 @@ struct Drawn<'a> {
     left_out: Option<String>,
 }
 
+/// x and y of one draw.
+type CurveOf<'a> = &'a dyn Fn(&Stretch) -> (Vec<f64>, Vec<f64>);
+
 impl Drawn<'_> {
     /// Amplitudes of one mass in some rows; NaN where there are none.
     fn amplitudes(&self, name: &str, rows: Range<usize>) -> Vec<f64> {
@@ -665,7 +668,7 @@ impl Drawn<'_> {
         let groups = self.drawing.by_listed(stretches);
         let draws = self.drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
         let some = (groups.len() > SINGLE).then(|| format!("the first {SINGLE} of {} cases", groups.len()));
-        let panel = |mut panel: Panel, name: &str, curve: &dyn Fn(&Stretch) -> (Vec<f64>, Vec<f64>)| {
+        let panel = |mut panel: Panel, name: &str, curve: CurveOf<'_>| {
             panel.title = join([name.to_owned(), draws.clone()].into_iter().chain(some.clone()));
             for (colour, (words, group)) in groups.iter().take(SINGLE).enumerate() {
                 let curves: Vec<_> = group.iter().map(|stretch| curve(stretch)).collect();

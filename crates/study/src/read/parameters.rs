@@ -13,6 +13,9 @@ use crate::values::Given;
 use std::collections::HashMap;
 use stickslip::model::is_identifier;
 
+/// Its name, its numbers, and within which bounds.
+type StatedDistribution = (&'static str, Vec<Quantity>, Option<[Quantity; 2]>);
+
 impl Reader {
     /// The parameters: those `given` by a template, whose values the file may replace, and those that the file adds.
     pub(super) fn parameters(
@@ -194,7 +197,7 @@ impl Reader {
     }
 
     /// A distribution: `{ normal = [mean, deviation], within = [least, most] }`.
-    fn distribution(&mut self, entry: &Entry) -> Option<(&'static str, Vec<Quantity>, Option<[Quantity; 2]>)> {
+    fn distribution(&mut self, entry: &Entry) -> Option<StatedDistribution> {
         let names = || DISTRIBUTIONS.iter().map(|(name, ..)| *name);
         let example = "write it as in { normal = [\"2 N\", \"0.2 N\"] }";
         let Content::Table(table) = &entry.node.value else {

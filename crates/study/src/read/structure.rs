@@ -79,6 +79,10 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, usize), Probl
             return Err(problem(key, message).help("export both from the same model, with the same constraints"));
         }
     }
+    if stiffness.1.entries() == mass.1.entries() {
+        let message = "this is the stiffness matrix once more".to_owned();
+        return Err(problem("mass", message).help("name the file of the mass matrix, or its `name` in the file"));
+    }
     let names = row_names(stated, folder, [&stiffness.1, &mass.1])?;
     let all: Vec<Read> = [Some(stiffness), Some(mass), damping].into_iter().flatten().collect();
     let kept = kept(&all, rows);

@@ -102,6 +102,9 @@ pub fn study_text(chance: &mut Chance) -> String {
     study(chance, &scales, kind, &names, &mut text);
     method(chance, &scales, &mut text);
     figure(chance, &names, &mut text);
+    if kind == "nodal-diameter" {
+        let _ = writeln!(text, "[disk]\nsectors = {}", chance.count(2, 12));
+    }
     text
 }
 
@@ -286,7 +289,7 @@ fn study(chance: &mut Chance, scales: &Scales, kind: &str, names: &Names, text: 
     let mass = |chance: &mut Chance| names.masses.get(chance.count(0, names.masses.len().max(1) - 1)).cloned();
     let free_decay = kind == "transient" && chance.one_in(3);
     let run_up = kind == "transient" && !free_decay && chance.one_in(3);
-    if kind != "modes" && !free_decay && !run_up {
+    if !["modes", "nodal-diameter", "campbell"].contains(&kind) && !free_decay && !run_up {
         lines.push(format!("frequency = {}", frequencies(chance, scales, kind)));
     }
     if ["response", "orbit", "branch"].contains(&kind) && chance.one_in(5) {
@@ -303,6 +306,14 @@ fn study(chance: &mut Chance, scales: &Scales, kind: &str, names: &Names, text: 
         }
     };
     match kind {
+        "nodal-diameter" => lines.push(format!("modes = {}", chance.count(1, 6))),
+        "campbell" => {
+            let (from, to) = (scales.hertz * chance.between(0.0, 0.5), scales.hertz * chance.between(0.6, 3.0));
+            lines.push(format!(
+                "speed = {{ from = \"{from:e} Hz\", to = \"{to:e} Hz\", points = {} }}",
+                chance.count(2, 20)
+            ));
+        }
         "response" if chance.one_in(3) => lines.push("peaks = false".to_owned()),
         "hysteresis" => {
             lines.push(format!("samples = {}", chance.count(8, 400)));

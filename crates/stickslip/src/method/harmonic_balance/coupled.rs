@@ -20,9 +20,16 @@ use stickslip_numerics::krylov::{Gmres, Limits};
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Unknowns from which products are faster than elimination: 16 nodes of three directions with six harmonics have 576.
-pub(super) const MANY: usize = 400;
+const MANY: usize = 400;
+/// Directions of joints from which they are: few with many harmonics have steps that are hard to find by products, and a small matrix.
+const DIRECTIONS: usize = 24;
 /// Unknowns up to which a matrix is formed all the same where products do not lead to the step: 130 MB, seconds.
 pub(super) const FORMED: usize = 4096;
+/// Whether a level with so many unknowns along so many directions is solved by products.
+pub(super) fn by_products(size: usize, directions: usize) -> bool {
+    size > FORMED || (size >= MANY && directions >= DIRECTIONS)
+}
+
 /// Share of Newton's residual to which its equations are solved, and at most: derivatives of laws cost as much as tens of products, so that fewer steps
 /// count for more.
 const SHARE: f64 = 0.1;

@@ -15,7 +15,7 @@
 //!
 //! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian frequency-time method".
 
-use super::coupled::{Coupled, MANY};
+use super::coupled::{Coupled, by_products};
 use super::hold::{CLEAR, stay};
 use super::ports::{Alternation, Port, Ports, block, blocks};
 use super::receptance::{Modal, Receptance};
@@ -132,7 +132,7 @@ impl Level {
     pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, sparse: Option<Sparse>) -> Self {
         let mut level = Level::unassembled(Alternation::new(harmonics, samples), ports, sparse);
         let size = level.residual.len();
-        level.coupled = (level.sparse.is_none() && size >= MANY).then(Coupled::default);
+        level.coupled = (level.sparse.is_none() && by_products(size, ports.count())).then(Coupled::default);
         level
     }
 

@@ -39,6 +39,8 @@ const MARCHED: usize = 3_000_000;
 const EVALUATIONS: usize = 800;
 /// Periods that a law with a memory is followed for one of them, roughly.
 const PERIODS: usize = 4;
+/// Samples of a period that count for that: series of more are so long that a search of hundreds of evaluations would take minutes.
+const SAMPLES: usize = 1024;
 /// Products with the derivative that a step takes, roughly.
 const PRODUCTS: f64 = 30.0;
 
@@ -132,7 +134,7 @@ impl Level {
             None if self.coupled.is_some() => PRODUCTS * 2.0 * size * axes,
             None => size * size * size / 3.0,
         };
-        let marched = EVALUATIONS * PERIODS * self.alternation.samples() * ports.len();
+        let marched = EVALUATIONS * PERIODS * self.alternation.samples().min(SAMPLES) * ports.len();
         self.assembled as f64 > (WORK / one).max(FEWEST) || self.alternation.marched > MARCHED.max(marched)
     }
 
