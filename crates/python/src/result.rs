@@ -4,11 +4,10 @@ use crate::{arrow, error, lend};
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList, PyTuple};
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use stickslip_report::{Outputs, html, png, svg, terminal::Terminal, write_dataset};
-use stickslip_study::dataset::{self, Dataset, Figure, Record, Values};
+use stickslip_study::dataset::{self, Dataset, Values};
 use stickslip_study::results::worst_evidence;
 
 /// What a run yields: tables, a figure, notes, and the record of how it was made.
@@ -227,27 +226,7 @@ pub struct Table {
 impl Table {
     /// A table that belongs to no result.
     pub fn alone(table: dataset::Table) -> Table {
-        let record = Record {
-            version: String::new(),
-            study: serde_json::Value::Null,
-            methods: Vec::new(),
-            seed: None,
-            threads: 1,
-            wall_time_s: 0.0,
-            points: BTreeMap::new(),
-            interrupted: false,
-        };
-        let dataset = Dataset {
-            name: String::new(),
-            title: String::new(),
-            source: None,
-            kind: String::new(),
-            tables: vec![table],
-            figure: Figure::default(),
-            notes: Vec::new(),
-            failures: Vec::new(),
-            record,
-        };
+        let dataset = Dataset { tables: vec![table], ..Dataset::default() };
         Table { dataset: Arc::new(dataset), index: 0 }
     }
 

@@ -8,11 +8,11 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList, PyString};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 use stickslip::dimension::Dimension;
-use stickslip_study::batch;
 use stickslip_study::block::{Block, Tally};
 use stickslip_study::dataset::{self, Column, Values};
-use stickslip_study::run::{Checked, check};
+use stickslip_study::run::{Checked, check, redrawn, units};
 use stickslip_study::{StudyError, read_bytes, read_file, templates};
 
 /// What a study file asks for, read and checked.
@@ -217,7 +217,7 @@ impl PyStudy {
     /// Number of units of work, which know nothing of each other.
     #[getter]
     fn units(&self) -> usize {
-        batch::units(&self.study)
+        units(&self.study)
     }
 
     /// Number of points: cases times frequencies.
@@ -290,7 +290,7 @@ impl PyStudy {
     fn _batch<'py>(&self, py: Python<'py>, start: usize, stop: usize) -> PyResult<Bound<'py, PyDict>> {
         let checked = self.checked(py)?;
         let watch = Watch { threads: Some(1), progress: None, total: None };
-        let batch = watched(py, &watch, |context| batch::batch(&checked, start..stop, context))?;
+        let batch = watched(py, &watch, |context| checked.block(start..stop, context))?;
         let Block { tables, tally, .. } = batch.map_err(|cause| error::study(py, &cause))?;
         let out = PyDict::new(py);
         out.set_item("told", serde_json::to_string(&tally).map_err(|cause| error::report(py, cause))?)?;
@@ -367,7 +367,13 @@ pub fn _joined<'py>(
     for text in &told {
         tally.append(serde_json::from_str(text).map_err(|cause| error::report(py, cause))?);
     }
-    Ok(PyResultSet::new(py.detach(|| batch::joined(&checked, all, tally, 1, seconds))))
+    let mut whole = py.detach(|| {
+        let figure = redrawn(checked.study(), &all);
+        checked.outline(1).completed(all, figure, tally, Duration::ZERO)
+    });
+    // that of all batches, wherever they were computed
+    whole.record.wall_time_s = seconds;
+    Ok(PyResultSet::new(whole))
 }
 
 /// What `progress` asks for: `None`, a bar, or the function that was given.

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 
 /// The result of one study.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Dataset {
     /// Name of the study: the stem of its file. Also the name of its folder of results.
     pub name: String,
@@ -389,7 +389,7 @@ impl fmt::Display for Failure {
 }
 
 /// How a run was made, so that it can be repeated.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Version of Stickslip.
     pub version: String,

@@ -3,7 +3,6 @@
 //! [`read_study`] turns a text into a [`Study`]: tree ([`toml`]), statements (every expression compiled, every place known), then every
 //! case once, so that whatever is wrong is found before anything is written. [`schema`] describes all tables and keys as data.
 
-pub mod batch;
 pub mod block;
 pub mod book;
 mod columns;

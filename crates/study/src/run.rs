@@ -104,7 +104,7 @@ impl Checked {
 
     /// Number of its units of work, which know nothing of each other.
     pub fn units(&self) -> usize {
-        units(&self.study).len()
+        units(&self.study)
     }
 
     /// Computes it, with all of its tables in memory.
@@ -125,10 +125,7 @@ impl Checked {
     /// Computes the units of a range, with what they yield in memory.
     ///
     /// # Errors
-    /// [`StudyError`]: a search between the cases met a model that the method cannot take.
-    ///
-    /// # Panics
-    /// If there are no such units.
+    /// [`StudyError`]: there are no such units, or a search between the cases met a model that the method cannot take.
     ///
     /// # Example
     /// ```
@@ -154,18 +151,19 @@ impl Checked {
     /// that is stopped the units that were not finished come too, with their points as [`NOT_REACHED`].
     ///
     /// # Errors
-    /// A [`StudyError`]: a search between the cases met a model that the method cannot take; or what `take` returns, after which nothing more
-    /// is computed.
-    ///
-    /// # Panics
-    /// If there are no such units.
+    /// A [`StudyError`]: there are no such units, or a search between the cases met a model that the method cannot take; or what `take`
+    /// returns, after which nothing more is computed.
     pub fn each<E: From<StudyError>>(
         &self,
         range: Range<usize>,
         context: &Context,
         take: &mut dyn FnMut(Block) -> Result<(), E>,
     ) -> Result<(), E> {
-        assert!(range.end <= self.units(), "units {range:?} of {}", self.units());
+        let all = self.units();
+        if range.start > range.end || range.end > all {
+            let message = format!("there are no units {} to {}, the study has {all}", range.start, range.end);
+            return Err(self.study.error_at("study", 0, "kind", message, None).into());
+        }
         let first = match &self.first {
             Some(first) => first.clone(),
             None => Arc::new(Prepared::new(&self.study, 0)?),
@@ -241,8 +239,13 @@ fn recorded(study: &Study, summary: &ModelSummary) -> serde_json::Value {
     record
 }
 
+/// Number of the units of work of a study, checked or not.
+pub fn units(study: &Study) -> usize {
+    cut(study).len()
+}
+
 /// The units of a study.
-fn units(study: &Study) -> Units {
+fn cut(study: &Study) -> Units {
     Units::of(study, (kinds::of(study).grain)(study))
 }
 
@@ -264,7 +267,7 @@ fn parts<E: From<StudyError>>(
     context: &Context,
     take: &mut dyn FnMut(usize, Part) -> Result<(), E>,
 ) -> Result<(), E> {
-    let units = units(study);
+    let units = cut(study);
     let shared = Arc::new(study.clone());
     let (send, receive) = mpsc::channel();
     let mut waiting: BTreeMap<usize, Part> = BTreeMap::new();
@@ -323,13 +326,8 @@ fn next(receive: &mpsc::Receiver<Finished>) -> Option<Finished> {
     None
 }
 
-pub(crate) fn compute(
-    study: &Study,
-    first: &Arc<Prepared>,
-    index: usize,
-    context: &Context,
-) -> Result<Part, StudyError> {
-    let unit = units(study).get(index);
+fn compute(study: &Study, first: &Arc<Prepared>, index: usize, context: &Context) -> Result<Part, StudyError> {
+    let unit = cut(study).get(index);
     if context.stopped() {
         return Ok(Part::not_reached(unit.len()));
     }

@@ -20,7 +20,7 @@ use crate::stored::{COMPARISON, Stored, StoredError};
 use differences::Differences;
 use labels::{folder_name, labels};
 use overlay::overlay;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Dataset, Figure, Record};
 /// Why runs cannot be compared.
@@ -100,12 +100,8 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
         record: Record {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             study: serde_json::json!({ "runs": about.collect::<Vec<_>>() }),
-            methods: Vec::new(),
-            seed: None,
             threads: 1,
-            wall_time_s: 0.0,
-            points: BTreeMap::new(),
-            interrupted: false,
+            ..Record::default()
         },
     })
 }
