@@ -286,6 +286,12 @@ impl PyStudy {
         outcome?.map(PyResultSet::new).map_err(|cause| error::study(py, &cause))
     }
 
+    /// What tells the matrices of its files from others; `None` without such files.
+    #[getter]
+    fn _matrices(&self) -> Option<String> {
+        self.study.matrices_check()
+    }
+
     /// Computes units `start` to `stop` (excluded), on one thread: their tables, and what is to be said of them, for `_joined`.
     fn _batch<'py>(&self, py: Python<'py>, start: usize, stop: usize) -> PyResult<Bound<'py, PyDict>> {
         let checked = self.checked(py)?;

@@ -128,6 +128,30 @@ def test_a_folder_of_another_study_is_refused(study, tmp_path):
         stickslip.Campaign(tmp_path)
 
 
+def test_matrices_that_change_are_refused(tmp_path):
+    def matrix(name, value):
+        (tmp_path / name).write_text(f"%%MatrixMarket matrix coordinate real symmetric\n1 1 1\n1 1 {value}\n")
+
+    file = tmp_path / "blade.toml"
+    file.write_text(
+        """schema = 1
+        structure = { stiffness = "k.mtx", mass = "m.mtx", units = "m-kg-s", modal_damping = 0.01 }
+        place = [{ name = "tip", dof = "1" }]
+        force = [{ on = "tip", amplitude = "1 N" }]
+        study = { kind = "response", frequency = { from = "20 Hz", to = "40 Hz", points = 40 } }"""
+    )
+    matrix("m.mtx", 2.0)
+    matrix("k.mtx", 8e4)
+    study = stickslip.Study.from_file(file)
+    stickslip.campaign(study, out=tmp_path / "c", processes=1)
+    matrix("k.mtx", 8.1e4)
+    with pytest.raises(stickslip.CampaignError, match="other matrices"):
+        stickslip.campaign(stickslip.Study.from_file(file), out=tmp_path / "c")
+    # a worker whose files are not those of the one who asked
+    failed = stickslip.campaign(study, out=tmp_path / "d", processes=1).failed
+    assert failed and all("other matrices" in reason for reason in failed.values())
+
+
 class Scripted:
     """Workers that fail as they are told, in this process."""
 

@@ -91,6 +91,9 @@ impl Head {
         if method(&ours.study) != method(&theirs.study) {
             return differs("it is of a run with the method", &method(&ours.study), &method(&theirs.study));
         }
+        if of(&ours.study, "matrices") != of(&theirs.study, "matrices") {
+            return Some("the files of its [structure] hold other matrices now than when it began".to_owned());
+        }
         if of(&ours.study, "cases") != of(&theirs.study, "cases") || self.units != other.units {
             return Some("a file that the study reads has changed since: its cases have other values".to_owned());
         }
@@ -755,5 +758,27 @@ mod tests {
             let difference = own.difference(&other).unwrap();
             assert!(difference.contains(words), "{difference}");
         }
+    }
+
+    #[test]
+    fn a_journal_of_other_matrices_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| folder.path().join(name);
+        let matrix = |value: f64| format!("%%MatrixMarket matrix coordinate real symmetric\n1 1 1\n1 1 {value}\n");
+        let text = "schema = 1\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\nunits = \"m-kg-s\"\nmodal_damping = 0.01\n\
+            [[place]]\nname = \"tip\"\ndof = \"1\"\n[[force]]\non = \"tip\"\namplitude = \"1 N\"\n\
+            [study]\nkind = \"response\"\nfrequency = [\"1 Hz\"]\n";
+        std::fs::write(file("blade.toml"), text).unwrap();
+        std::fs::write(file("m.mtx"), matrix(2.0)).unwrap();
+        let head = |stiffness: f64| {
+            std::fs::write(file("k.mtx"), matrix(stiffness)).unwrap();
+            let study = stickslip_study::read_file(&file("blade.toml"), &[]).unwrap();
+            Head::new(&check(&study).unwrap(), 0..1, 1)
+        };
+        let own = head(8e4);
+        assert_eq!(own.difference(&head(8e4)), None);
+        // the last digit counts
+        let difference = own.difference(&head(8e4f64.next_up())).unwrap();
+        assert!(difference.contains("other matrices"), "{difference}");
     }
 }

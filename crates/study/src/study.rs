@@ -22,6 +22,7 @@ use stickslip::law::{SharedLaw, TANGENTS};
 use stickslip::method::{self, Options};
 use stickslip::model::{Around, Element, Force, Joint, Mass, Model, ModelError, Motion, Spring};
 use stickslip::structure::{Component, Reduction};
+use stickslip_numerics::sparse::Matrix;
 
 /// A study file, read and checked.
 #[derive(Debug, Clone)]
@@ -119,6 +120,24 @@ pub(crate) struct Matrices {
     pub component: Option<Component>,
     /// Rows of the files that are constrained, and not in it.
     pub left_out: usize,
+}
+
+impl Matrices {
+    /// CRC-32 of the rows' names and of all entries, by which files that changed between two runs are told apart.
+    fn check(&self) -> Option<String> {
+        let component = self.component.as_ref()?;
+        let mut hasher = crc32fast::Hasher::new();
+        component.rows().iter().for_each(|name| hasher.update(name.as_bytes()));
+        let (mass, damping, stiffness) = component.matrices();
+        for (number, matrix) in [Some(mass), damping, Some(stiffness)].into_iter().enumerate() {
+            for (row, column, value) in matrix.into_iter().flat_map(Matrix::entries) {
+                let place = [number, row, column].map(|index| index as u64);
+                place.iter().for_each(|index| hasher.update(&index.to_le_bytes()));
+                hasher.update(&value.to_le_bytes());
+            }
+        }
+        Some(format!("{:08x}", hasher.finalize()))
+    }
 }
 
 /// The template that a study names.
@@ -502,6 +521,11 @@ impl Study {
         StudyError::at(&self.sources, Problem::new(place, key, message).maybe_help(help))
     }
 
+    /// What tells the matrices of `[structure]` from others; none of a study without them.
+    pub fn matrices_check(&self) -> Option<String> {
+        self.structure.matrices.as_ref().and_then(Matrices::check)
+    }
+
     /// The study as it was understood, all values in SI, for the record of a run. The text of the file is in it.
     pub fn resolved(&self) -> Json {
         let mut cases = Vec::new();
@@ -530,6 +554,7 @@ impl Study {
                 .collect::<Vec<_>>(),
             "number_of_cases": self.cases(),
             "seed": self.seed(),
+            "matrices": self.matrices_check(),
             "cases": cases,
         })
     }

@@ -158,6 +158,11 @@ _STUDIES: dict[bytes, Study] = {}
 _MOST_STUDIES = 4
 
 
+def _pickled(study: Study) -> bytes:
+    """What a worker needs, and by which it sees that the files which it reads are the same."""
+    return pickle.dumps((study, study._matrices))
+
+
 def _work(pickled: bytes, start: int, stop: int) -> dict:
     """Computes units on a worker: the tables as Parquet, and what is to be said of them."""
     import pyarrow
@@ -167,8 +172,11 @@ def _work(pickled: bytes, start: int, stop: int) -> dict:
     if study is None:
         while len(_STUDIES) >= _MOST_STUDIES:
             _STUDIES.pop(next(iter(_STUDIES)))
-        study = _STUDIES[pickled] = pickle.loads(pickled)
+        study, matrices = pickle.loads(pickled)
+        if study._matrices != matrices:
+            raise CampaignError("the files of [structure] hold other matrices than where the campaign began")
         study._batch(0, 0)  # checks it: no cost of a batch
+        _STUDIES[pickled] = study
     begin = time.perf_counter()
     batch = study._batch(start, stop)
     tables = {}
@@ -207,7 +215,7 @@ class _Dask:
     def __init__(self, client, study) -> None:
         from distributed import as_completed
 
-        self._client, self._name, self._study = client, study.name, pickle.dumps(study)
+        self._client, self._name, self._study = client, study.name, _pickled(study)
         self._finished = as_completed([], with_results=False)
         self._running: set = set()
         self._known, self._threads = float("-inf"), 1
@@ -253,7 +261,7 @@ class _Local:
 
     def __init__(self, processes, study) -> None:
         self.threads = processes or os.cpu_count() or 1
-        self._study = pickle.dumps(study)
+        self._study = _pickled(study)
         self._pool: ProcessPoolExecutor | None = None
 
     def submit(self, start: int, stop: int, tries: int, _avoid):
@@ -323,6 +331,7 @@ class Campaign:
             "kind": study.kind,
             "units": study.units,
             "study": list(study.__reduce__()[1]),
+            "matrices": study._matrices,
         }
         head = json.loads(json.dumps(head))
         if (out / "campaign.json").exists():
@@ -332,6 +341,8 @@ class Campaign:
                 if what(there._head) != what(head):
                     found = f": version {there._head['version']}, and this is {head['version']}" if key == "version" else ""
                     raise CampaignError(f"{out} holds the campaign of another {key}{found}; choose another folder, or remove that one")
+            if there._head.get("matrices") != head["matrices"]:
+                raise CampaignError(f"{out} holds a campaign with other matrices: the files of [structure] have changed; choose another folder")
             return there
         for folder in ("parts", "done"):
             (out / folder).mkdir(parents=True, exist_ok=True)
