@@ -174,7 +174,7 @@ class Scripted:
         for unit in range(start, stop):
             if self.fails(unit, sum(first <= unit < last for first, last, _ in self.tried)):
                 raise _campaign._Failed(f"unit {unit} broke down", "tcp://first")
-        return _campaign._work(_campaign.pickle.dumps(self.study), start, stop)
+        return _campaign._work(_campaign._pickled(self.study), start, stop)
 
     def close(self):
         pass

@@ -1,6 +1,8 @@
 """Studies and results: against the command, against themselves, against closed forms."""
 
+import _thread
 import pickle
+import signal
 import threading
 import time
 
@@ -156,10 +158,16 @@ def test_a_run_is_stopped_by_what_progress_raises_and_tells_its_points():
     assert seen[-1][1] == 200_001 and seen[-1][0] > 100
 
 
-def test_ctrl_c_ends_a_run():
-    import _thread
+@pytest.fixture
+def ctrl_c():
+    """A process that Ctrl-C ends: a shell lets what it runs in the background ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield threading.Timer(0.7, _thread.interrupt_main)
+    signal.signal(signal.SIGINT, before)
 
-    threading.Timer(0.7, _thread.interrupt_main).start()
+
+def test_ctrl_c_ends_a_run(ctrl_c):
+    ctrl_c.start()
     begun = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         stickslip.Study.from_text(LONG).run()

@@ -1,5 +1,5 @@
-//! Each table as `<name>.parquet`, for polars, pandas, DuckDB and every other reader of columns: a tenth of the time of CSV to read, and half of
-//! its size.
+//! Each table as `<name>.parquet`, for polars, pandas, DuckDB and every other reader of columns: a fifth of the size of CSV, and read twice as fast
+//! (polars, 200,000 rows of a response).
 //!
 //! Numbers are doubles, a number that does not exist (NaN) and an unknown flag are null. Rows stand in groups of `GROUP`, each column of a group
 //! is one page: by a dictionary where values repeat, else with the bytes of the doubles split into streams, compressed by deflate. Same rows,
