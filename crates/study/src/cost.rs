@@ -297,10 +297,10 @@ const CELL: f64 = 3e-7;
 /// Work on a point of a figure, s. Measured: 1 s for 800,000 in HTML, as much for SVG.
 const POINT: f64 = 3e-6;
 /// Event-driven: a closed form per segment, and a decomposition for each new pattern of stick and slip, whose number
-/// grows with the joints. Measured: 3 ms at 8 masses and joints, 40 ms at 16, 0.23 s at 24.
+/// grows with the joints. Measured: 3 ms at 8 masses and joints, 40 ms at 16, 0.23 s at 24; 0.8 ms at 32 masses without a joint.
 const EVENT_DRIVEN: (f64, f64) = (2e-4, 3e-3);
-/// Masses and joints of the second number.
-const EVENT_DRIVEN_SIZE: f64 = 16.0;
+/// Masses and joints together, and joints, of the second number.
+const EVENT_DRIVEN_SIZE: (f64, f64) = (16.0, 8.0);
 /// The tolerance of harmonic balance for which its time was measured.
 const SERIES_TOLERANCE: f64 = 1e-3;
 /// Harmonic balance per mass and joint at 15 harmonics. Measured with springs before the sliders: 0.3 ms for the
@@ -350,7 +350,8 @@ impl Costing<'_> {
     pub fn orbit(&self) -> f64 {
         let case = self.case;
         let size = self.masses + self.joints;
-        let events = EVENT_DRIVEN.0 + EVENT_DRIVEN.1 * (size / EVENT_DRIVEN_SIZE).powi(4);
+        let patterns = self.joints / EVENT_DRIVEN_SIZE.1;
+        let events = EVENT_DRIVEN.0 + EVENT_DRIVEN.1 * patterns * (size / EVENT_DRIVEN_SIZE.0).powi(3);
         let shooting = size * size * if self.has_states { SHOOTING.1 } else { SHOOTING.0 };
         let series = self.series(case.method.options.get("harmonics").copied());
         match case.method.name.as_str() {
