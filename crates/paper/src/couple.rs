@@ -565,6 +565,7 @@ pub fn laws(results: &Results) -> Option<Part> {
                 ..Series::default()
             })
             .collect(),
+        ..Panel::default()
     });
     let figure = Figure {
         title: "Fig. 6 in the arctangent law minus Fig. 6 in the exact law".to_owned(),

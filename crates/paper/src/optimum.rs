@@ -66,6 +66,7 @@ pub fn figure(curves: &[(&str, &Optimum)]) -> Figure {
             x: Axis::new("slip limit Ft", "N"),
             y: Axis::new("peak amplitude", "mm"),
             series,
+            ..Panel::default()
         }],
         ..Figure::default()
     }

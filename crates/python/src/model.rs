@@ -324,7 +324,7 @@ impl PyModel {
             None => Reduction::None,
             Some(reduce) => Reduction::up_to(quantity::si(&reduce, Dimension::FREQUENCY, "reduce")?),
         };
-        let substructure = Some(Substructure { component, damping, reduction });
+        let substructure = Some(Substructure { component, damping, reduction, disk: None });
         let made = PyModel::from_model(Model { substructure, places, ..Model::default() });
         py.detach(|| made.model.assemble()).map_err(|cause| refused(py, &cause))?;
         Ok(made)
@@ -679,6 +679,7 @@ impl PyModel {
                 table.numbers(column).unwrap_or_default().to_vec(),
                 0,
             )],
+            ..Panel::default()
         };
         let panels = vec![line("frequency", "Hz", "frequency_Hz"), line("damping ratio", "", "damping_ratio")];
         let mut told = Told::of(&[], &|_| String::new(), Vec::new(), 1, start);
@@ -774,12 +775,15 @@ fn curves(table: &Table, system: &System, along: Option<&str>) -> Figure {
     let series =
         series.map(|(i, place)| Series::line(place, values.clone(), numbers(&format!("{place}_amplitude_m")), i));
     let y = Axis::new("amplitude", "m").log();
-    Figure { panels: vec![Panel { title: String::new(), x, y, series: series.collect() }], ..Figure::default() }
+    Figure {
+        panels: vec![Panel { title: String::new(), x, y, series: series.collect(), ..Panel::default() }],
+        ..Figure::default()
+    }
 }
 
 fn loop_panel(joint: String, displacement: &[f64], force: &[f64]) -> Panel {
     // closed by its first point
     let closed = |values: &[f64]| values.iter().chain(values.first()).copied().collect();
     let series = vec![Series::line("", closed(displacement), closed(force), 0)];
-    Panel { title: joint, x: Axis::new("displacement", "m"), y: Axis::new("force", "N"), series }
+    Panel { title: joint, x: Axis::new("displacement", "m"), y: Axis::new("force", "N"), series, ..Panel::default() }
 }

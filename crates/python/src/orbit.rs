@@ -88,6 +88,18 @@ impl PyOrbit {
         dict(py, self.orbit.joints.iter().map(|joint| (&joint.name, joint.slip_fraction)))
     }
 
+    /// Fraction of the period in which the faces of every joint stick.
+    #[getter]
+    fn stick_fraction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        dict(py, self.orbit.joints.iter().map(|joint| (&joint.name, joint.stick_fraction)))
+    }
+
+    /// Fraction of the period in which they are apart.
+    #[getter]
+    fn open_fraction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        dict(py, self.orbit.joints.iter().map(|joint| (&joint.name, joint.open_fraction)))
+    }
+
     /// Energies per period, J: ``work_in``, ``viscous``, ``friction``.
     #[getter]
     fn energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

@@ -171,6 +171,25 @@ pub(crate) fn ticks(range: Range, count: f64) -> Ticks {
     }
 }
 
+/// The same, with the names of an axis that has such.
+pub(crate) fn ticks_of(axis: &Axis, range: Range, count: f64) -> Ticks {
+    if axis.names.is_empty() { ticks(range, count) } else { named(&axis.names, range, count) }
+}
+
+/// Names stand closer than numbers: so many for each of those.
+const NAMES: f64 = 2.0;
+
+/// All names, or every second, fifth, tenth … of them.
+fn named(names: &[String], range: Range, count: f64) -> Ticks {
+    let inside: Vec<usize> = (0..names.len()).filter(|i| range.contains(*i as f64)).collect();
+    let steps = (0..6).flat_map(|power| [1, 2, 5].map(|digit| digit * 10usize.pow(power)));
+    let fits = |step: &usize| inside.len().div_ceil(*step) as f64 <= NAMES * count;
+    let step = steps.into_iter().find(fits).unwrap_or(usize::MAX);
+    let shown: Vec<usize> = inside.into_iter().filter(|i| i.is_multiple_of(step)).collect();
+    let labels = shown.iter().map(|i| names[*i].clone()).collect();
+    Ticks { at: shown.iter().map(|i| *i as f64).collect(), labels, minor: vec![], power: 0 }
+}
+
 fn linear(range: Range, count: f64) -> Ticks {
     let span = range.to - range.from;
     let rough = span / count.max(1.0);

@@ -60,7 +60,7 @@ pub(crate) fn layers(panel: &Panel) -> Vec<&Series> {
     series.sort_by_key(|s| match (s.style, s.emphasis) {
         (Style::Marks, _) => 5,
         (_, Emphasis::Reference) => 0,
-        (Style::Band, _) => 1,
+        (Style::Band | Style::Stripe, _) => 1,
         (Style::Bars, _) => 2,
         (_, Emphasis::Pale) => 3,
         _ => 4,
@@ -101,11 +101,14 @@ impl Shades {
             .collect();
         values.sort_by(f64::total_cmp);
         values.dedup();
+        let stripes = figure.panels.iter().flat_map(|panel| &panel.series).flat_map(|series| &series.shades);
+        let shaded: Vec<f64> = stripes.copied().filter(|v| v.is_finite()).collect();
         let positive = values.first().is_some_and(|v| *v > 0.0);
         // one value that is zero makes a logarithmic scale impossible, not the figure
         let axis = Axis { scale: if positive { axis.scale } else { Scale::Linear }, ..axis.clone() };
-        let range = Range::fixed(&axis).or_else(|| Range::around(values.iter().copied(), axis.scale))?.widened(0.0);
-        (values.len() > NAMED).then_some((axis, range))
+        let all = values.iter().chain(&shaded).copied();
+        let range = Range::fixed(&axis).or_else(|| Range::around(all, axis.scale))?.widened(0.0);
+        (values.len() > NAMED || !shaded.is_empty()).then_some((axis, range))
     }
 
     /// The value of a series in words, if its colour shows it: `kt = 8 N/mm`.
@@ -122,6 +125,41 @@ impl Shades {
             _ if series.emphasis == Emphasis::Reference => Colour::reference(),
             (Some((_, range)), Some(value)) if value.is_finite() => Colour::sequential(range.part(value)),
             _ => Colour::palette(series.colour),
+        }
+    }
+}
+
+/// A piece of a stripe: from and to where, its value.
+pub(crate) type Cell = (f64, f64, f64);
+
+/// The cells of a stripe: every point has the place around it up to half way to its neighbours, points of one colour share a cell.
+pub(crate) fn cells(series: &Series, x: Range, shades: &Shades) -> Vec<(Cell, Colour)> {
+    let Some((_, range)) = &shades.bar else { return Vec::new() };
+    let count = series.x.len().min(series.shades.len());
+    let edges = edges(&series.x[..count], x);
+    let mut cells: Vec<(Cell, Colour)> = Vec::new();
+    for (i, value) in series.shades[..count].iter().enumerate().filter(|(_, value)| value.is_finite()) {
+        let step = (range.part(*value).clamp(0.0, 1.0) * SHADES).round() / SHADES;
+        let colour = Colour::sequential(step);
+        match cells.last_mut() {
+            Some((cell, same)) if *same == colour && cell.1 == edges[i] => cell.1 = edges[i + 1],
+            _ => cells.push(((edges[i], edges[i + 1], *value), colour)),
+        }
+    }
+    cells
+}
+
+/// Steps of colour that look continuous.
+const SHADES: f64 = 100.0;
+
+/// The borders of the cells of rising points, those at the ends at the points themselves; a lone point has the whole axis.
+pub(crate) fn edges(points: &[f64], x: Range) -> Vec<f64> {
+    match points {
+        [] => Vec::new(),
+        [_] => vec![x.from, x.to],
+        [first, .., last] => {
+            let between = points.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
+            std::iter::once(*first).chain(between).chain([*last]).collect()
         }
     }
 }
@@ -292,6 +330,16 @@ fn extent(panel: &Panel) -> Option<(Range, Range)> {
         (results, references) => results.or(references).unwrap_or(Range::unit(panel.y.scale)),
     };
     Some((x, y))
+}
+
+/// Two ranges, one of them widened, so that a unit is as long on both axes of a plot so many times as wide as high.
+pub(crate) fn level(x: Range, y: Range, aspect: f64) -> (Range, Range) {
+    let around = |range: Range, span: f64| {
+        let middle = 0.5 * (range.from + range.to);
+        Range { from: middle - 0.5 * span, to: middle + 0.5 * span, ..range }
+    };
+    let high = y.span().max(x.span() / aspect);
+    (around(x, high * aspect), around(y, high))
 }
 
 /// Bars take this part of the smallest distance between two of them.

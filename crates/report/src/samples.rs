@@ -30,7 +30,58 @@ fn record(points: &[(&str, u64)]) -> Record {
 }
 
 pub(crate) fn all() -> Vec<Dataset> {
-    vec![response(), hysteresis(), hostile(), many(), cases(5), cases(400), masses(), envelope(), spectrum(), modes()]
+    vec![
+        response(),
+        hysteresis(),
+        hostile(),
+        many(),
+        cases(5),
+        cases(400),
+        masses(),
+        envelope(),
+        spectrum(),
+        modes(),
+        ring(),
+    ]
+}
+
+/// A ring: what its joints do over the frequency, and how it stands at one.
+pub(crate) fn ring() -> Dataset {
+    let x: Vec<f64> = (0..=60).map(|i| 110.0 + 0.2 * f64::from(i)).collect();
+    let shade = |joint: f64, x: f64| 100.0 * (-((x - 114.0 - 0.4 * joint) / 1.5).powi(2)).exp();
+    let stripe = |joint: u32| {
+        let joint = f64::from(joint);
+        Series::stripe(
+            x.clone(),
+            joint,
+            x.iter().map(|x| if *x == 116.0 { f64::NAN } else { shade(joint, *x) }).collect(),
+        )
+    };
+    let map = Panel {
+        title: "share of the period in which a joint slips".into(),
+        x: Axis::new("frequency", "Hz"),
+        y: Axis {
+            names: (0..12).map(|j| format!("shroud_{j}")).collect(),
+            ..Axis::new("joint", "").between(-0.5, 11.5)
+        },
+        series: (0..12).map(stripe).collect(),
+        ..Panel::default()
+    };
+    let turn = |i: u32| std::f64::consts::TAU * f64::from(i) / 96.0;
+    let circle = |label: &str, deflection: f64| {
+        let radius = |i: u32| 1.0 + deflection * (3.0 * turn(i)).cos();
+        let x = (0..=96).map(|i| radius(i) * turn(i).sin()).collect();
+        Series::line(label, x, (0..=96).map(|i| radius(i) * turn(i).cos()).collect(), 0)
+    };
+    let wheel = Panel {
+        title: "three nodal diameters".into(),
+        series: vec![circle("at rest", 0.0).reference(), circle("blade", 0.3)],
+        picture: true,
+        ..Panel::default()
+    };
+    let mut dataset = bare("ring", "A ring of twelve", vec![map, wheel]);
+    dataset.figure.varied = Some(Axis::new("share of the period", "%").between(0.0, 100.0));
+    dataset
 }
 
 /// Response curves of two weakly coupled blades and their contact: four limits of friction.
@@ -70,6 +121,7 @@ pub(crate) fn response() -> Dataset {
             x: axis("frequency", "Hz"),
             y: axis("amplitude", "cm"),
             series: list,
+            ..Panel::default()
         });
     }
     let [limits, a1, a2, a3] = rows;
@@ -132,6 +184,7 @@ pub(crate) fn hysteresis() -> Dataset {
             x: axis("displacement", "mm"),
             y: axis("force", "mN"),
             series: list,
+            ..Panel::default()
         });
     }
     Dataset {
@@ -168,6 +221,7 @@ pub(crate) fn hostile() -> Dataset {
         x: axis("time", "s"),
         y: axis("x < y & \"z\"", unit),
         series,
+        ..Panel::default()
     };
     let panels = vec![
         panel(
@@ -245,6 +299,7 @@ pub(crate) fn many() -> Dataset {
                 x: axis("time", "s"),
                 y: axis("displacement", "mm"),
                 series: list.collect(),
+                ..Panel::default()
             }],
             ..Figure::default()
         },
@@ -283,7 +338,13 @@ pub(crate) fn cases(count: usize) -> Dataset {
     }
     list.push(Series::line("free", f.clone(), curve(120.0, 0.001), 0).reference());
     list.push(Series { style: Style::Dotted, ..Series::line("stuck", f.clone(), curve(140.0, 0.004), 0).reference() });
-    let panel = Panel { title: "blade".into(), x: axis("frequency", "Hz"), y: axis("amplitude", "mm"), series: list };
+    let panel = Panel {
+        title: "blade".into(),
+        x: axis("frequency", "Hz"),
+        y: axis("amplitude", "mm"),
+        series: list,
+        ..Panel::default()
+    };
     let mut dataset =
         bare(&format!("cases{count}"), "Response of a blade under a damper, slip limits compared", vec![panel]);
     dataset.figure.varied = Some(axis("Ft", "N"));
@@ -298,7 +359,13 @@ pub(crate) fn masses() -> Dataset {
             let y = f.iter().map(|f| height * resonance(*f, 115.0 + 2.5 * f64::from(k), 0.02)).collect();
             Series::line(name, f.clone(), y, k as usize).of(f64::from(1u32 << k))
         });
-        Panel { title: name.into(), x: axis("frequency", "Hz"), y: axis("amplitude", "mm"), series: list.collect() }
+        Panel {
+            title: name.into(),
+            x: axis("frequency", "Hz"),
+            y: axis("amplitude", "mm"),
+            series: list.collect(),
+            ..Panel::default()
+        }
     };
     let panels = vec![panel("blade", 1.0), panel("contact", 0.04), panel("shroud", 0.3)];
     let mut dataset = bare("masses", "Influence of the contact stiffness on all masses", panels);
@@ -323,6 +390,7 @@ pub(crate) fn envelope() -> Dataset {
         x: axis("frequency", "Hz").between(110.0, 140.0),
         y: axis("amplitude", "mm").log().between(0.1, 10.0),
         series: list,
+        ..Panel::default()
     };
     let scaled = |by: f64| largest.iter().map(|v| by * v).collect::<Vec<f64>>();
     let second = Panel {
@@ -333,6 +401,7 @@ pub(crate) fn envelope() -> Dataset {
             Series::line("median", f.clone(), scaled(0.5), 2),
             Series::band("5 % to 95 %", f.clone(), scaled(0.3), scaled(0.9), 2),
         ],
+        ..Panel::default()
     };
     bare("envelope", "Mistuned ring of 48 blades", vec![first, second])
 }
@@ -344,8 +413,13 @@ pub(crate) fn spectrum() -> Dataset {
         let y = order.iter().map(|n| (3.0 + k as f64) / n.powi(2)).collect();
         Series::bars(*name, order.clone(), y, k)
     });
-    let panel =
-        Panel { title: String::new(), x: axis("harmonic", ""), y: axis("amplitude", "µm"), series: list.collect() };
+    let panel = Panel {
+        title: String::new(),
+        x: axis("harmonic", ""),
+        y: axis("amplitude", "µm"),
+        series: list.collect(),
+        ..Panel::default()
+    };
     bare("spectrum", "Harmonics of the motion", vec![panel])
 }
 
@@ -357,6 +431,7 @@ pub(crate) fn modes() -> Dataset {
         x: axis("amplitude", "µm").log(),
         y: axis(quantity, unit),
         series: vec![Series::line("mode 1", a.clone(), a.iter().map(|a| y(*a)).collect(), 0)],
+        ..Panel::default()
     };
     let mut panels = vec![
         panel("frequency", "Hz", &|a| 120.0 + 20.0 / (1.0 + a)),

@@ -1,6 +1,6 @@
 //! Contact nodes of three directions on a block of steel, all coupled through it: time per point of a resonance curve by their number.
 //!
-//! `cargo bench -p stickslip --bench contacts [-- NODES…]`.
+//! `cargo bench -p stickslip --bench contacts [-- NODES[:DOFS]…]`; without a number of degrees of freedom the block is 12 elements long.
 
 #![allow(clippy::print_stdout)] // a bench prints its result
 
@@ -22,32 +22,39 @@ const HARMONICS: usize = 5;
 const POINTS: usize = 9;
 
 fn main() {
-    let numbers: Vec<usize> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
-    let nodes = if numbers.is_empty() { vec![10, 30, 100] } else { numbers };
-    for nodes in nodes {
-        row(nodes);
-    }
+    let number = |a: &str| a.parse::<usize>().ok();
+    let asked = |a: String| match a.split_once(':') {
+        Some((nodes, dofs)) => Some((number(nodes)?, number(dofs)?)),
+        None => Some((number(&a)?, 0)),
+    };
+    let rows: Vec<_> = std::env::args().skip(1).filter_map(asked).collect();
+    let rows = if rows.is_empty() { vec![(10, 0), (30, 0), (100, 0)] } else { rows };
+    rows.into_iter().for_each(|(nodes, dofs)| row(nodes, dofs));
 }
 
-fn row(nodes: usize) {
+fn row(nodes: usize, dofs: usize) {
     let edge = ((nodes as f64).sqrt().ceil() as usize).max(6);
+    let long = dofs.div_ceil(3 * edge * edge).max(12);
     let begin = seconds();
-    let brick = Brick::new([12, edge - 1, edge - 1], [0.2, 0.08, 0.06], true);
+    let brick = Brick::new([long, edge - 1, edge - 1], [0.2, 0.08, 0.06], true);
     let ports = brick.face(nodes);
     let axes = ports.len();
     let damping = Damping::Ratio { ratio: 0.005, up_to: 4e4 };
     let whole = Whole::new(brick.mass.clone(), damping, brick.stiffness.clone(), ports).unwrap();
     let modes = whole.modes(8e4).unwrap();
+    println!("{nodes} nodes: matrices and modes in {:.1} s, {}", seconds() - begin, memory());
     let first = modes.values[0].sqrt();
+    let begin = seconds();
     let free = Free::new(&whole, &modes, 0.0, 1).unwrap();
     let reduced = free.reduced(MODES.min(free.modes()), 1).unwrap();
     println!(
-        "{nodes} nodes: {} dofs, {} modes, first {:.0} rad/s, reduced to {} in {:.1} s",
+        "  {} dofs, {} modes, first {:.0} rad/s, reduced to {} in {:.1} s, {}",
         brick.dofs(),
         free.modes(),
         first,
         reduced.dofs(),
-        seconds() - begin
+        seconds() - begin,
+        memory()
     );
     let begin = seconds();
     let names = (0..reduced.dofs()).map(|i| format!("q{i}")).collect();
@@ -76,11 +83,11 @@ fn row(nodes: usize) {
         builder = builder.force(k, 1, Complex64::new(f, 0.0));
     }
     let system = builder.build().unwrap();
-    println!("  system in {:.1} s", seconds() - begin);
+    println!("  system in {:.1} s, {}", seconds() - begin, memory());
     let method = HarmonicBalance { harmonics: Some(HARMONICS), ..HarmonicBalance::default() };
     let begin = seconds();
     let mut solver = method.solver(&system).unwrap();
-    println!("  solver in {:.2} s", seconds() - begin);
+    println!("  solver in {:.2} s, {}", seconds() - begin, memory());
     let mut start: Option<Vec<f64>> = None;
     for i in 0..POINTS {
         let omega = first * (0.8 + 1.2 * i as f64 / (POINTS - 1) as f64);
@@ -101,6 +108,13 @@ fn row(nodes: usize) {
             Err(error) => println!("  {omega:8.1} rad/s: {:.4} s, {error}", seconds() - begin),
         }
     }
+}
+
+/// The most memory that was held.
+fn memory() -> String {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let most = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or("").trim();
+    format!("{most} at most")
 }
 
 /// Seconds of this processor, so that other work on the machine does not count.

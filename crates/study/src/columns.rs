@@ -17,3 +17,23 @@ pub(crate) const REDUCTION_ERROR: &str = "reduction_error";
 pub(crate) fn amplitude_of(place: &str) -> String {
     format!("{place}_amplitude_m")
 }
+
+/// The phase of its first harmonic against the drive, degrees.
+pub(crate) fn phase_of(place: &str) -> String {
+    format!("{place}_phase_deg")
+}
+
+/// The fraction of the period in which a joint slips.
+pub(crate) fn slips(joint: &str) -> String {
+    format!("{joint}_slip_fraction")
+}
+
+/// The fraction in which its faces stick.
+pub(crate) fn sticks(joint: &str) -> String {
+    format!("{joint}_stick_fraction")
+}
+
+/// The fraction in which they are apart.
+pub(crate) fn open(joint: &str) -> String {
+    format!("{joint}_open_fraction")
+}

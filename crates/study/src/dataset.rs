@@ -238,6 +238,9 @@ pub struct Panel {
     pub y: Axis,
     /// The curves.
     pub series: Vec<Series>,
+    /// Whether it is a picture of a plane: both axes have one measure, and are not drawn.
+    #[serde(default)]
+    pub picture: bool,
 }
 
 /// An axis: what it shows and in which unit. The values of the series are already in this unit.
@@ -254,6 +257,9 @@ pub struct Axis {
     /// on a logarithmic axis count as absent.
     #[serde(default)]
     pub range: Option<[f64; 2]>,
+    /// What stands at 0, 1, 2 … instead of numbers.
+    #[serde(default)]
+    pub names: Vec<String>,
 }
 
 /// How the values of an axis become lengths.
@@ -306,6 +312,9 @@ pub struct Series {
     /// Lower edge of a band, foot of a bar, in the axis' unit; empty: zero, or the lower end of the axis.
     #[serde(default)]
     pub base: Vec<f64>,
+    /// Of a stripe the value of every point, in the unit of [`Figure::varied`].
+    #[serde(default)]
+    pub shades: Vec<f64>,
 }
 
 impl Series {
@@ -324,6 +333,11 @@ impl Series {
     /// Bars from zero, for example harmonics.
     pub fn bars(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
         Series { style: Style::Bars, ..Series::line(label, x, y, colour) }
+    }
+    /// A stripe at the height `y`, coloured along `x`, which rises, by the scale of [`Figure::varied`].
+    pub fn stripe(x: Vec<f64>, y: f64, shades: Vec<f64>) -> Series {
+        let y = vec![y; x.len()];
+        Series { style: Style::Stripe, shades, ..Series::line("", x, y, 0) }
     }
     /// The same curve, pale: one of many behind the one that matters.
     pub fn pale(self) -> Series {
@@ -367,6 +381,8 @@ pub enum Style {
     Band,
     /// A bar at every abscissa, from [`Series::base`] to `y`; several series of bars stand side by side.
     Bars,
+    /// A stripe of height one whose colours are [`Series::shades`]; several make a map.
+    Stripe,
 }
 
 /// A point that did not converge: where, and why.

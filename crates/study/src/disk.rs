@@ -6,8 +6,10 @@ use crate::near::{nearest, shown};
 use crate::schema::MOST_MASSES;
 use crate::statement::{Environment, Stated, StatedTable};
 use crate::study::{Structure, problem_of, sector_of};
-use crate::values::Values;
-use stickslip::model::{Around, Disk, Element, LEAST_SECTORS, Model, normal_pattern};
+use crate::values::{Given, Values};
+use std::collections::HashMap;
+use stickslip::model::{Around, Disk, DiskPart, Element, LEAST_SECTORS, Model, normal_pattern};
+use stickslip::structure::{Axis, Boundary, Component, Reduction};
 
 /// `[disk]` as it is stated.
 #[derive(Debug, Clone)]
@@ -15,6 +17,10 @@ pub(crate) struct StatedDisk {
     pub table: StatedTable,
     /// The deviations of a file.
     pub pattern: Option<Vec<f64>>,
+    /// Nodes of the low and the high side of a sector by its matrices.
+    pub boundary: Option<Vec<(String, String)>>,
+    /// Nodes of its blade.
+    pub blade: Option<Vec<String>>,
 }
 
 impl StatedDisk {
@@ -34,7 +40,32 @@ enum Mistuned {
     Parameter(usize),
     Mass(String),
     Spring([String; 2]),
+    /// The blade of a sector by its matrices.
+    Blade(BladePart),
 }
+
+/// What of a blade deviates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum BladePart {
+    Stiffness,
+    Frequency,
+}
+
+impl BladePart {
+    const NAMES: [(&'static str, BladePart); 2] =
+        [("blade.stiffness", BladePart::Stiffness), ("blade.frequency", BladePart::Frequency)];
+
+    /// Deviation of the stiffness. Every cantilever frequency deviates by the same share.
+    fn of_stiffness(self, deviation: f64) -> f64 {
+        match self {
+            BladePart::Stiffness => deviation,
+            BladePart::Frequency => deviation * (2.0 + deviation),
+        }
+    }
+}
+
+/// Rows of all sectors of a disk that are not reduced, at most: matrices of some GB.
+const MOST_ROWS: usize = 1_000_000;
 
 /// Largest whole number that a quantity can be read as.
 const MOST: f64 = 1e9;
@@ -51,9 +82,13 @@ pub(crate) fn ring_of(
     problems: &mut Vec<Problem>,
 ) -> Model {
     let before = problems.len();
-    let (first, forces, motions) = sector_of(structure, environment, problems);
+    let (mut first, forces, motions) = sector_of(structure, environment, problems);
     let values = disk.table.values(environment, problems);
     if problems.len() > before {
+        return first;
+    }
+    if let Err(problem) = tied(structure, disk, &mut first) {
+        problems.push(problem);
         return first;
     }
     let made = sectors(disk, &values).and_then(|sectors| {
@@ -68,6 +103,15 @@ pub(crate) fn ring_of(
             let message = format!("{sectors} sectors of {} masses; the limit is {MOST_MASSES}", first.masses.len());
             return Err(vec![Problem::new(disk.table.place_of("sectors", None), "sectors", message)]);
         }
+        let rows = first.substructure.as_ref().filter(|own| matches!(own.reduction, Reduction::None));
+        let rows = rows.map_or(0, |own| own.component.dofs());
+        if rows * sectors > MOST_ROWS {
+            let message = format!("{sectors} sectors of {rows} rows; the limit without a reduction is {MOST_ROWS}");
+            let problem = Problem::new(disk.table.place_of("sectors", None), "sectors", message);
+            return Err(vec![
+                problem.help("leave out `reduce = false` in [structure]: few coordinates then serve all sectors"),
+            ]);
+        }
         let ring = around.ring(|s| all.get(s).unwrap_or(&first).clone());
         ring.map_err(|error| {
             vec![if error.element == Element::Whole {
@@ -81,6 +125,55 @@ pub(crate) fn ring_of(
         problems.extend(found);
         first
     })
+}
+
+/// Ties a sector by its matrices to the next.
+fn tied(structure: &Structure, disk: &StatedDisk, sector: &mut Model) -> Result<(), Problem> {
+    let table = &disk.table;
+    let problem = |key: &'static str, message: String| Problem::new(table.place_of(key, None), key, message);
+    if structure.matrices.is_none() {
+        return match ["boundary", "axis", "blade"].into_iter().find(|key| table.entry(key).is_some()) {
+            Some(key) => {
+                Err(problem(key, format!("`{key}` belongs to a sector by its matrices, and there is no [structure]"))
+                    .help("masses and springs of neighbouring sectors are joined by `next.NAME`"))
+            }
+            None => Ok(()),
+        };
+    }
+    let Some(substructure) = &mut sector.substructure else { return Ok(()) }; // names alone
+    let Some(pairs) = &disk.boundary else {
+        let message =
+            "a sector by its matrices needs `boundary`: the node pairs of its low and its high side".to_owned();
+        return Err(problem("boundary", message)
+            .help("write boundary = \"pairs.csv\", a file with the columns low,high, and axis = \"z\""));
+    };
+    let axis = match table.entry("axis").map(|entry| &entry.value) {
+        Some(Stated::Fixed(Given::Text(axis))) => [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)]
+            .into_iter()
+            .find_map(|(name, known)| (name == axis).then_some(known)),
+        _ => None,
+    };
+    let component = &substructure.component;
+    let boundary =
+        Boundary::of_nodes(component, pairs, axis).map_err(|error| problem("boundary", error.to_string()))?;
+    let blade = blade_rows(component, disk.blade.as_deref().unwrap_or_default());
+    let blade =
+        blade.map_err(|node| problem("blade", format!("the structure has no rows of node `{}`", shown(node))))?;
+    substructure.disk = Some(DiskPart { boundary, blade, deviations: Vec::new() });
+    Ok(())
+}
+
+/// The rows of these nodes, or a node that has none.
+fn blade_rows<'a>(component: &Component, nodes: &'a [String]) -> Result<Vec<usize>, &'a str> {
+    let mut met: HashMap<&str, bool> = nodes.iter().map(|node| (node.as_str(), false)).collect();
+    let mut rows = Vec::new();
+    for (row, name) in component.rows().iter().enumerate() {
+        if let Some(met) = name.rsplit_once('.').and_then(|(node, _)| met.get_mut(node)) {
+            *met = true;
+            rows.push(row);
+        }
+    }
+    nodes.iter().find(|node| !met[node.as_str()]).map_or(Ok(rows), |node| Err(node))
 }
 
 /// A whole number that a key must have.
@@ -168,7 +261,7 @@ fn mistuned(
     let Some(Stated::Table(table)) = disk.table.entry("mistuning").map(|entry| &entry.value) else {
         return Ok(Vec::new());
     };
-    let of = target(table, environment, first).map_err(|problem| vec![problem])?;
+    let of = target(disk, table, environment, first).map_err(|problem| vec![problem])?;
     if let Some(sector) = deviations.iter().position(|deviation| *deviation <= -1.0) {
         let key = if disk.pattern.is_some() { "file" } else { "deviation" };
         let message = format!("sector {sector} deviates by {:.1} %: nothing is left", 100.0 * deviations[sector]);
@@ -187,6 +280,25 @@ fn mistuned(
                 if !problems.is_empty() {
                     problems.iter_mut().for_each(|problem| problem.message += &format!(" (sector {sector})"));
                     return Err(problems);
+                }
+                let mut model = model;
+                if let Some((own, first)) = model.substructure.as_mut().zip(first.substructure.as_ref()) {
+                    own.disk.clone_from(&first.disk);
+                }
+                if model.substructure != first.substructure || model.places != first.places {
+                    let name = &environment.names[*index];
+                    let message = format!(
+                        "[structure] or a [[place]] depends on `{name}`, and they are the same in every sector"
+                    );
+                    let problem = Problem::new(table.place_of("of", None), "of", message);
+                    return Err(vec![problem.help("blades by their matrices differ by of = \"blade.frequency\"")]);
+                }
+                model
+            }
+            Mistuned::Blade(part) => {
+                let mut model = first.clone();
+                if let Some(disk) = model.substructure.as_mut().and_then(|own| own.disk.as_mut()) {
+                    disk.deviations = vec![part.of_stiffness(*deviation)];
                 }
                 model
             }
@@ -211,7 +323,12 @@ fn joins([a, b]: &[String; 2], [c, d]: &[String; 2]) -> bool {
 }
 
 /// What `of` names.
-fn target(table: &StatedTable, environment: &Environment<'_>, sector: &Model) -> Result<Mistuned, Problem> {
+fn target(
+    disk: &StatedDisk,
+    table: &StatedTable,
+    environment: &Environment<'_>,
+    sector: &Model,
+) -> Result<Mistuned, Problem> {
     let names = match table.entry("of").map(|entry| &entry.value) {
         Some(Stated::Names(names)) => names.iter().map(|(name, _)| name.clone()).collect(),
         _ => Vec::new(),
@@ -219,6 +336,14 @@ fn target(table: &StatedTable, environment: &Environment<'_>, sector: &Model) ->
     let place = table.place_of("of", None);
     match &names[..] {
         [name] => {
+            if let Some((_, part)) = BladePart::NAMES.into_iter().find(|(known, _)| known == name) {
+                if disk.table.entry("blade").is_some() {
+                    return Ok(Mistuned::Blade(part));
+                }
+                let message = format!("`{name}` needs to know what of the sector is the blade");
+                let help = "add blade = \"blade_nodes.csv\" to [disk], a file with the column node";
+                return Err(Problem::new(place, "of", message).help(help));
+            }
             if let Some(index) = environment.names.iter().position(|known| known == name) {
                 return Ok(Mistuned::Parameter(index));
             }

@@ -1,11 +1,12 @@
 //! What a table gives of an orbit beside amplitude, mean and phase, if `output` asks for it. One row of [`TABLE`] each.
 
+use crate::columns;
 use crate::study::Case;
 use crate::work::Prepared;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use stickslip::model::System;
-use stickslip::orbit::{Orbit, Sample};
+use stickslip::model::{System, SystemJoint};
+use stickslip::orbit::{JointMotion, Orbit, Sample};
 
 /// Something that `output` can ask for.
 pub(crate) struct Extra {
@@ -38,6 +39,23 @@ pub(crate) const TABLE: &[Extra] = &[
         values: |_, orbit, _| {
             let axes = orbit.joints.iter().flat_map(|joint| &joint.displacement);
             axes.map(|(low, high)| 0.5 * (high - low).abs()).collect()
+        },
+    },
+    Extra {
+        name: "contact",
+        doc: "shares of the period in which the faces of every joint stick and are apart, beside that in which they slip",
+        columns: |system| {
+            let joints = system.joints().iter();
+            joints.flat_map(|joint| [columns::sticks(joint.name()), columns::open(joint.name())]).collect()
+        },
+        values: |prepared, orbit, _| {
+            let joints = prepared.system.joints().iter().zip(&orbit.joints);
+            // a spring has no faces
+            let shares = |(joint, motion): (&SystemJoint, &JointMotion)| match joint.law().has_faces() {
+                true => [motion.stick_fraction, motion.open_fraction],
+                false => [f64::NAN; 2],
+            };
+            joints.flat_map(shares).collect()
         },
     },
     Extra {

@@ -16,6 +16,7 @@ mod error;
 pub mod expression;
 mod extra;
 mod figure;
+mod histogram;
 mod immovable;
 mod info;
 mod key;
@@ -46,6 +47,7 @@ pub mod unit_sets;
 pub mod units;
 mod values;
 mod warnings;
+mod weibull;
 mod words;
 pub mod work;
 

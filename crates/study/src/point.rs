@@ -89,11 +89,11 @@ impl Summary {
         for (place, [amplitude, mean, phase]) in system.places().iter().zip(&self.places) {
             rows.number(&columns::amplitude_of(place), *amplitude);
             rows.number(&format!("{place}_mean_m"), *mean);
-            rows.number(&format!("{place}_phase_deg"), *phase);
+            rows.number(&columns::phase_of(place), *phase);
         }
         for (joint, [dissipation, slip]) in system.joints().iter().zip(&self.joints) {
             rows.number(&format!("{}_dissipation_J", joint.name()), *dissipation);
-            rows.number(&format!("{}_slip_fraction", joint.name()), *slip);
+            rows.number(&columns::slips(joint.name()), *slip);
         }
         extra::columns(&prepared.case, &prepared.system)
             .iter()

@@ -324,6 +324,26 @@ const DISK: &[Key] = &[
         "24",
     ),
     optional(
+        "boundary",
+        Takes::Text,
+        "of a sector by its matrices: a CSV file with the columns low, high, nodes of one side and their counterparts on the other; what lies \
+         on the high side is the low side of the next sector",
+        "\"sector_boundary.csv\"",
+    ),
+    optional(
+        "axis",
+        Takes::Choice(axes),
+        "the axis of the disk, if rows are along x, y, z: the next sector is turned about it by the right-hand rule, and the high side lies \
+         that way; absent: rows turn with the sectors",
+        "\"z\"",
+    ),
+    optional(
+        "blade",
+        Takes::Text,
+        "of a sector by its matrices: a CSV file with the column node, the nodes of the blade without those of the disk, for its mistuning",
+        "\"blade_nodes.csv\"",
+    ),
+    optional(
         "mistuning",
         Takes::Table(MISTUNING),
         "how sectors differ; absent: all alike, and a travelling wave is solved on one",
@@ -331,11 +351,16 @@ const DISK: &[Key] = &[
     ),
 ];
 
+fn axes() -> Vec<(&'static str, &'static str)> {
+    vec![("x", "the x axis of the matrices"), ("y", "the y axis"), ("z", "the z axis")]
+}
+
 const MISTUNING: &[Key] = &[
     required(
         "of",
         Takes::Names,
-        "what differs: a parameter, a mass, or the two ends of a spring; it is multiplied by 1 + deviation",
+        "what differs: a parameter, a mass, or the two ends of a spring; of a sector by its matrices `blade.frequency`, the cantilever \
+         frequencies of the blade, or `blade.stiffness`; it is multiplied by 1 + deviation",
         "\"k\"",
     ),
     optional(

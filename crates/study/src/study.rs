@@ -478,6 +478,21 @@ impl Study {
         Ok(self)
     }
 
+    /// Whether a flag of `[study]` is set.
+    pub(crate) fn wants(&self, key: &str) -> bool {
+        matches!(self.study.entry(key).map(|entry| &entry.value), Some(Stated::Fixed(Given::Flag(true))))
+    }
+
+    /// The same study without the mistuning of its disk.
+    pub(crate) fn tuned(&self) -> Study {
+        let mut study = self.clone();
+        if let Some(disk) = &mut study.structure.lists.disk {
+            disk.table.entries.retain(|entry| entry.key != "mistuning");
+            disk.pattern = None;
+        }
+        study
+    }
+
     /// Whether `[figure]` asks for reference curves, which a run computes.
     pub fn wants_references(&self) -> bool {
         self.figure_values().flag("references") == Some(true)

@@ -40,7 +40,7 @@ pub(crate) fn of(
         (None, Some(false)) => Reduction::None,
         _ => Reduction::up_to(0.0),
     };
-    Substructure { component: component.clone(), damping, reduction }
+    Substructure { component: component.clone(), damping, reduction, disk: None }
 }
 
 fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'static str, &'static str)> {

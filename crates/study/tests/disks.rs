@@ -221,3 +221,137 @@ fn campbell_crossings() {
         assert_eq!(*diameter, turns.min(6 - turns));
     }
 }
+
+/// A disk mass, low and high side of it, and a blade of two masses; kg and N/m.
+const STIFFNESS: &str = "%%MatrixMarket matrix coordinate real symmetric\n4 4 7\n1 1 5.5e5\n2 1 -2e5\n2 2 2e5\n3 1 -5e4\n3 3 8e4\n\
+                         4 3 -3e4\n4 4 3e4\n";
+const MASS: &str = "%%MatrixMarket matrix coordinate real symmetric\n4 4 4\n1 1 1.5\n2 2 0.5\n3 3 0.3\n4 4 0.2\n";
+
+/// A study of a sector by its matrices, beside its files.
+fn by_matrices(disk: &str, more: &str) -> Result<Study, StudyError> {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("k.mtx", STIFFNESS);
+    write("m.mtx", MASS);
+    write("rows.csv", "row,name\n1,1.x\n2,2.x\n3,3.x\n4,4.x\n");
+    write("pairs.csv", "high,low\n2,1\n");
+    write("strange.csv", "low,high\n1,9\n");
+    write("wrong.csv", "left,right\n1,2\n");
+    write("blade.csv", "node\n3\n4\n");
+    let text = format!(
+        "schema = 1\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\ndofs = \"rows.csv\"\nunits = \"m-kg-s\"\n\
+         modal_damping = 0.002\nreduce = {{ modes = 3 }}\n[disk]\nsectors = 6\n{disk}\n[[place]]\nname = \"tip\"\ndof = \"4.x\"\n{more}"
+    );
+    write("disk.toml", &text);
+    stickslip_study::read_file(&folder.path().join("disk.toml"), &[])
+}
+
+const SHROUD: &str = "[[joint]]\nname = \"shroud\"\nbetween = [\"tip\", \"next.tip\"]\n\
+                      law = { kind = \"jenkins\", stiffness = \"2e3 N/m\", limit = \"Ft\" }\n\
+                      [[force]]\non = \"tip\"\namplitude = \"1 N\"\nengine_order = 2\n";
+
+/// Joints between neighbours, blades that deviate, and drawn parameters, all on one sector by its matrices.
+#[test]
+fn samples_of_a_disk_by_its_matrices() {
+    let disk = "boundary = \"pairs.csv\"\nblade = \"blade.csv\"\n\
+                mistuning = { of = \"blade.frequency\", deviation = \"1 %\", seed = \"pattern\" }";
+    let more = format!(
+        "{SHROUD}[parameters]\nFt = \"1 N\"\npattern = 3\n[sample]\ncount = 3\nseed = 1\n\
+         of = {{ Ft = {{ uniform = [\"1 N\", \"2 N\"] }} }}\n\
+         [study]\nkind = \"response\"\nfrequency = \"44 Hz\"\nvary = {{ pattern = [3, 4] }}\n\
+         [method]\nkind = \"harmonic-balance\"\nharmonics = 3\n"
+    );
+    let study = by_matrices(disk, &more).unwrap();
+    assert_eq!(study.cases(), 6);
+    let model = study.case(0).unwrap().model;
+    assert_eq!(model.joints[5].between, ["tip_5", "tip_0"]);
+    let disk = model.substructure.unwrap().disk.unwrap();
+    for (own, drawn) in disk.deviations.iter().zip(stickslip::model::normal_pattern(6, 0.01, 3)) {
+        assert!((own - ((1.0 + drawn).powi(2) - 1.0)).abs() < 1e-15, "a share of frequency is nearly two of stiffness");
+    }
+    let data = run(&study, &Context::unwatched(1)).unwrap();
+    assert!(data.failures.is_empty(), "{:?}", data.failures);
+    let tip = data.tables[0].numbers("tip_5_amplitude_m").unwrap();
+    assert!(
+        tip.len() == 6 && tip.iter().all(|tip| *tip > 0.0) && tip.windows(2).all(|pair| pair[0] != pair[1]),
+        "{tip:?}"
+    );
+}
+
+#[test]
+fn wrong_sectors_by_matrices_are_refused_at_their_place() {
+    let study = "[study]\nkind = \"nodal-diameter\"\n";
+    let refused = |disk: &str| {
+        let error = by_matrices(disk, study).unwrap_err();
+        format!("{} {}", error.message(), error.help_text().unwrap_or_default())
+    };
+    assert!(by_matrices("boundary = \"pairs.csv\"", study).is_ok());
+    for (disk, words) in [
+        ("", "needs `boundary`"),
+        ("boundary = \"none.csv\"", "cannot be read"),
+        ("boundary = \"wrong.csv\"", "expected the columns low,high, found `left,right`"),
+        ("boundary = \"strange.csv\"", "constrain both alike"),
+        ("boundary = \"pairs.csv\"\naxis = \"z\"", "constrain both alike"),
+        ("boundary = \"pairs.csv\"\nblade = \"pairs.csv\"", "expected the columns node"),
+        ("boundary = \"pairs.csv\"\nmistuning = { of = \"blade.stiffness\", deviation = 0.1 }", "add blade = "),
+    ] {
+        assert!(refused(disk).contains(words), "{disk}: {}", refused(disk));
+    }
+    let error = read("", "boundary = \"pairs.csv\"", STUDY).unwrap_err();
+    assert!(
+        error.message().contains("cannot be read") || error.message().contains("no [structure]"),
+        "{}",
+        error.message()
+    );
+}
+
+/// The amplification of a case is the ratio of the highest peaks of two studies, one of them without mistuning; without deviation it is one.
+/// Of many disks the figure has the distribution.
+#[test]
+fn amplification_is_the_ratio_of_two_studies() {
+    let text = |deviation: &str, more: &str| {
+        format!(
+            "schema = 1\nmodel = {{ template = \"bladed-disk\" }}\n[parameters]\nseed = 1\nFt = \"0 N\"\n[disk]\nsectors = 6\n\
+             mistuning = {{ of = \"kb\", deviation = \"{deviation}\", seed = \"seed\" }}\n[study]\nkind = \"response\"\n\
+             frequency = {{ from = \"90 Hz\", to = \"125 Hz\", points = 71 }}\npeak_of = \"blade\"\n{more}\n\
+             [method]\nkind = \"harmonic-balance\"\nharmonics = 1\ntolerance = 0.9\n"
+        )
+    };
+    let result = |text: &str| run(&read_study("disk.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap();
+    let column = |text: &str, table: &str, name: &str| {
+        let found = result(text);
+        let table = found.tables.iter().find(|found| found.name == table).unwrap();
+        table.numbers(name).unwrap().to_vec()
+    };
+    let highest = |text: &str| column(text, "peaks", "amplitude_m").into_iter().fold(0.0f64, f64::max);
+    let seeds = "amplification = true\nvary = { seed = { from = 1, to = 24, points = 24 } }";
+    let ratios = column(&text("3 %", seeds), "amplification", "amplification");
+    assert_eq!(ratios.len(), 24);
+    for seed in [1, 9] {
+        let one = text("3 %", &format!("vary = {{ seed = [{seed}] }}"));
+        let expected = highest(&one) / highest(&text("0 %", ""));
+        let found = ratios[seed - 1];
+        assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
+    }
+    let tuned = column(&text("0 %", "amplification = true"), "amplification", "amplification");
+    assert!((tuned[0] - 1.0).abs() < 1e-9, "{tuned:?}");
+    // Whitehead's bound of six blades in the linear limit
+    assert!(ratios.iter().all(|ratio| *ratio < 0.5 * (1.0 + 6f64.sqrt())), "{ratios:?}");
+    let found = result(&text("3 %", seeds));
+    let panel = found.figure.panels.last().unwrap();
+    assert_eq!(panel.series[0].label, "24 disks");
+    assert!(panel.title.contains("99.9 % below"), "{}", panel.title);
+    // a disk of one case shows its shape
+    let one = result(&text("3 %", ""));
+    assert!(one.figure.panels.iter().any(|panel| panel.picture), "{:?}", one.figure.panels.len());
+}
+
+#[test]
+fn an_amplification_needs_a_disk_and_peaks() {
+    let error = |text: String| read_study("disk.toml", &text, &[]).unwrap_err().to_string();
+    let study = "kind = \"response\"\nfrequency = [\"1 Hz\", \"2 Hz\", \"3 Hz\"]\namplification = true\n";
+    let couple = error(format!("schema = 1\nmodel = {{ template = \"blade-couple\" }}\n[study]\n{study}"));
+    assert!(couple.contains("only a bladed disk"), "{couple}");
+    let disk = error(format!("schema = 1\nmodel = {{ template = \"bladed-disk\" }}\n[study]\n{study}peaks = false"));
+    assert!(disk.contains("`peaks` is false"), "{disk}");
+}

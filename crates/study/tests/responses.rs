@@ -108,6 +108,107 @@ fn a_slipping_joint_carries_its_limit() {
     assert!((numbers(&found, "curve", "foot_force_amplitude_N")[0] - 0.5).abs() < 1e-12);
 }
 
+/// Faces that an imposed motion `a cos φ` drags along. A slider behind a spring rests from every turning point until the motion has gone back
+/// `2 Ft/kt`: `cos φ = 1 - 2 Ft/(kt a)`. A stop at `g` touches while `a cos φ > g`.
+#[test]
+fn shares_of_the_period_are_closed_forms() {
+    let half_turn = std::f64::consts::PI;
+    let stick = (1.0f64 - 2.0 * 0.15 / (0.2 * 2.0)).acos() / half_turn;
+    let open = 1.0 - (1.2f64 / 2.0).acos() / half_turn;
+    // no faces
+    let spring = "[[joint]]\nname = \"spring\"\nbetween = [\"m\", \"ground\"]\nlaw = { kind = \"cubic\", stiffness = \"1e3 N/m^3\" }";
+    // as finely as each method samples contact
+    for (method, near) in
+        [("event-driven", 1e-9), ("shooting", 2e-3), ("transient", 2e-3), ("harmonic-balance", 1.0 / 256.0)]
+    {
+        let found = dataset(&format!(
+            r#"
+schema = 1
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[mass]]
+name = "free"
+mass = "1 kg"
+[[spring]]
+between = ["free", "ground"]
+stiffness = "1 N/mm"
+damping = "1 N s/m"
+[[force]]
+on = "free"
+amplitude = "1 N"
+[[motion]]
+on = "m"
+amplitude = "2 mm"
+[[joint]]
+name = "pad"
+between = ["m", "ground"]
+law = {{ kind = "jenkins", stiffness = "0.2 N/mm", limit = "0.15 N" }}
+[[joint]]
+name = "stop"
+between = ["m", "ground"]
+law = {{ kind = "gap", gap = "1.2 mm", stiffness = "1 N/mm" }}
+{}
+[study]
+kind = "response"
+frequency = ["1 Hz"]
+output = "contact"
+[method]
+kind = "{method}"
+{}
+"#,
+            if method == "event-driven" { "" } else { spring },
+            if method == "harmonic-balance" { "harmonics = 9\nsamples = 512\ntolerance = 0.9" } else { "" }
+        ));
+        let share = |name: &str| numbers(&found, "curve", &format!("{name}_fraction"))[0];
+        for (name, expected) in [
+            ("pad_stick", stick),
+            ("pad_slip", 1.0 - stick),
+            ("pad_open", 0.0),
+            ("stop_stick", 0.0),
+            ("stop_slip", 0.0),
+            ("stop_open", open),
+        ] {
+            assert!((share(name) - expected).abs() <= near, "{method}, {name}: {} {expected}", share(name));
+        }
+        assert!(method == "event-driven" || share("spring_stick").is_nan(), "{method}");
+    }
+}
+
+/// A ring of joints is a map with a stripe for every one, whose shades are the columns; a few are areas that fill the period.
+#[test]
+fn contacts_are_drawn_as_a_map_or_as_areas() {
+    let text = |sectors: usize, extra: &str| {
+        format!(
+            "schema = 1\nmodel = {{ template = \"bladed-ring\" }}\n[disk]\nsectors = {sectors}\n{extra}\n[study]\nkind = \"response\"\n\
+             frequency = {{ from = \"110 Hz\", to = \"120 Hz\", points = 7 }}\noutput = \"contact\"\nvary = {{ Ft = [\"4 N\"] }}\n\
+             [method]\nkind = \"harmonic-balance\"\nharmonics = 3\ntolerance = 0.9\n"
+        )
+    };
+    let found = dataset(&text(8, ""));
+    let map = found.figure.panels.iter().find(|panel| !panel.y.names.is_empty()).unwrap();
+    assert_eq!((map.y.names.len(), map.series.len()), (8, 8));
+    for (joint, stripe) in map.series.iter().enumerate() {
+        let slip = numbers(&found, "curve", &format!("{}_slip_fraction", map.y.names[joint]));
+        assert!(stripe.shades.iter().zip(slip).all(|(shade, share)| *shade == 100.0 * share), "{joint}");
+        assert_eq!(stripe.y, [joint as f64; 7]);
+    }
+    assert_eq!(found.figure.varied.as_ref().unwrap().range, Some([0.0, 100.0]));
+    // two sectors: a panel each, and the areas together are the whole period
+    let found = dataset(&text(2, ""));
+    let areas = found.figure.panels.iter().filter(|panel| panel.y.quantity == "share of the period");
+    let tops: Vec<&[f64]> = areas.map(|panel| &panel.series.last().unwrap().y[..]).collect();
+    assert!(tops.len() == 2 && tops.iter().all(|top| top.iter().all(|y| (y - 100.0).abs() < 1e-9)), "{tops:?}");
+    // of many cases the share with slip is a curve for each, of many joints their mean
+    let limits = "vary = { Ft = { from = \"1 N\", to = \"9 N\", points = 8 } }";
+    let found = dataset(&text(8, "").replace("vary = { Ft = [\"4 N\"] }", limits));
+    let panel = found.figure.panels.last().unwrap();
+    assert_eq!((panel.title.as_str(), panel.series.len()), ("mean of 8 joints", 8));
+    let slip = |joint: usize| numbers(&found, "curve", &format!("damper_{joint}_slip_fraction"))[10];
+    let mean = (0..8).map(slip).sum::<f64>() / 8.0;
+    assert!((panel.series[1].y[3] - 100.0 * mean).abs() < 1e-9, "{} {mean}", panel.series[1].y[3]);
+}
+
 /// Two masses: of the named ones the worst counts, at every frequency anew.
 #[test]
 fn the_worst_of_several_masses_counts() {

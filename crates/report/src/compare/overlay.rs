@@ -165,8 +165,13 @@ mod tests {
             Series::marks("peak", vec![2.0], vec![y], 0),
             Series::line("all joints free", vec![1.0, 2.0], vec![7.0, 7.0], 0).reference(),
         ];
-        let panel =
-            Panel { title: title.into(), x: Axis::new("frequency", "Hz"), y: Axis::new("amplitude", unit), series };
+        let panel = Panel {
+            title: title.into(),
+            x: Axis::new("frequency", "Hz"),
+            y: Axis::new("amplitude", unit),
+            series,
+            ..Panel::default()
+        };
         Figure { panels: vec![panel], ..Figure::default() }
     }
 

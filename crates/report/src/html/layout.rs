@@ -6,7 +6,7 @@ use crate::colour::Colour;
 use crate::font;
 use crate::frame::{self, Axes};
 use serde_json::{Value, json};
-use stickslip_study::dataset::{Axis, Figure, Scale};
+use stickslip_study::dataset::{Axis, Figure, Panel, Scale};
 
 /// Sizes of the interactive figure, px. The toolbar stands in the upper margin, above the titles of the panels.
 const TOOLBAR: f64 = 36.0;
@@ -38,6 +38,9 @@ fn broken(lines: &[String]) -> String {
     lines.iter().map(|l| plain(l)).collect::<Vec<_>>().join("<br>")
 }
 
+/// Numbers on an axis that has names, of which twice as many fit.
+const NAMED: f64 = 6.0;
+
 /// The page that a layout is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Page {
@@ -58,15 +61,16 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
         _ => 270.0,
     };
     let axes = frame::axes(figure);
-    let widest = |axes: &Axes| {
-        let ticks = axis::ticks(axes.y, 6.0);
+    let widest = |(panel, axes): (&Panel, &Axes)| {
+        let ticks = axis::ticks_of(&panel.y, axes.y, NAMED);
         ticks.labels.iter().map(|l| font::width(l, TICK, font::Weight::Regular)).fold(0.0, f64::max)
     };
     let most = |lines: &[Vec<String>]| lines.iter().map(Vec::len).max().unwrap_or(0).max(1) as f64 - 1.0;
     let least = NARROW[columns.clamp(1, 3) - 1] - PAGE_MARGINS;
     let y_titles: Vec<Vec<String>> =
         (figure.panels.iter().zip(&axes)).map(|(p, a)| axis_title(&p.y, a.y, a.own_y, plot_height)).collect();
-    let beside = axes.iter().map(widest).fold(0.0, f64::max) + 60.0 + LEADING * LABEL * most(&y_titles);
+    let beside =
+        figure.panels.iter().zip(&axes).map(widest).fold(0.0, f64::max) + 60.0 + LEADING * LABEL * most(&y_titles);
     let column_gap = if columns == 1 { 0.0 } else { COLUMN_GAP.max(beside) / least };
     let plot_width = ((1.0 - column_gap * (columns as f64 - 1.0)) / columns as f64).max(0.1);
     let limit = if narrow { NARROW_LINE } else { least * plot_width };
@@ -102,18 +106,30 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
         let top = (1.0 - row * (plot_height + row_gap) / inside).clamp(0.0, 1.0);
         let bottom = (top - plot_height / inside).max(0.0);
         let panels = &figure.panels;
-        let x_partner = (0..i).find(|&j| frame::alike(&panels[j].x, &panel.x) && axes[j].x == own.x);
-        let y_partner = (0..i).find(|&j| frame::alike(&panels[j].y, &panel.y) && axes[j].y == own.y);
+        let x_partner = (0..i).find(|&j| !panel.picture && frame::alike(&panels[j].x, &panel.x) && axes[j].x == own.x);
+        let y_partner = (0..i).find(|&j| !panel.picture && frame::alike(&panels[j].y, &panel.y) && axes[j].y == own.y);
         let mut x =
             axis(own.x, [left, right], axis_name("y", i), x_partner.map(|j| axis_name("x", j)), [limit, ROOM[0]]);
         x["title"]["text"] = json!(broken(&x_titles[i]));
         if own.x.scale == Scale::Linear {
             x["nticks"] = json!(if narrow || columns == 3 { 6 } else { 8 });
         }
-        layout[axis_name("xaxis", i)] = x;
         let mut y =
             axis(own.y, [bottom, top], axis_name("x", i), y_partner.map(|j| axis_name("y", j)), [plot_height, ROOM[1]]);
         y["title"]["text"] = json!(broken(&y_titles[i]));
+        for (shown, range, made) in [(&panel.x, own.x, &mut x), (&panel.y, own.y, &mut y)] {
+            if !shown.names.is_empty() {
+                let ticks = axis::ticks_of(shown, range, NAMED);
+                made["tickmode"] = json!("array");
+                made["tickvals"] = json!(ticks.at);
+                made["ticktext"] = json!(ticks.labels.iter().map(|name| plain(name)).collect::<Vec<_>>());
+            }
+        }
+        if panel.picture {
+            (x["visible"], y["visible"]) = (json!(false), json!(false));
+            y["scaleanchor"] = json!(axis_name("x", i));
+        }
+        layout[axis_name("xaxis", i)] = x;
         layout[axis_name("yaxis", i)] = y;
         let note = json!({ "x": (left + right) / 2.0, "xref": "paper", "yref": "paper", "xanchor": "center", "showarrow": false });
         let mut title = note.clone();

@@ -56,6 +56,9 @@ fn bar_trace(range: Range) -> Value {
 /// Curves of more points are drawn by the graphics processor.
 const MANY_POINTS: usize = 5000;
 
+/// How far a stripe lies under the next one, so that no seam shows.
+const OVERLAP: f64 = 0.03;
+
 /// A panel whose curves are drawn.
 struct Drawn<'f> {
     index: usize,
@@ -88,6 +91,7 @@ impl Drawn<'_> {
                 self.band(series, &mut trace, &colour);
             }
             Style::Bars => self.bars(series, &mut trace, &colour),
+            Style::Stripe => return self.stripe(series, ink).into_iter().collect(),
             Style::Solid | Style::Dashed | Style::Dotted => {
                 let dots = self.lonely_points(series, &trace, &colour);
                 let width = if series.emphasis == Emphasis::Pale || crowd { 1.0 } else { 2.0 };
@@ -149,6 +153,21 @@ impl Drawn<'_> {
         trace["y"] = json!(self.y.numbers(heights));
     }
 
+    /// A stripe as a map of one row.
+    fn stripe(&self, series: &Series, ink: &Ink) -> Option<Value> {
+        let ((shown, range), y) = (ink.shades.bar.as_ref()?, series.y.first()?);
+        let count = series.x.len().min(series.shades.len());
+        let shades = Form::of(*range);
+        let name = self.panel.y.names.get(*y as usize).cloned().unwrap_or_default();
+        let value = format!("{} = %{{z:.4~g}} {}", plain(&shown.quantity), plain(&axis::unit(shown, 0)));
+        Some(json!({
+            "type": "heatmap", "xaxis": axis_name("x", self.index), "yaxis": axis_name("y", self.index),
+            "x": self.x.numbers(frame::edges(&series.x[..count], self.axes.x).into_iter()), "y": [y - 0.5, y + 0.5 + OVERLAP],
+            "z": [shades.numbers(series.shades[..count].iter().copied())], "coloraxis": "coloraxis", "showlegend": false,
+            "hovertemplate": format!("{}<br>{value}<extra>{}</extra>", hover("x", &self.panel.x, self.x.power), plain(&name)),
+        }))
+    }
+
     /// Points that a line alone would not show.
     fn lonely_points(&self, series: &Series, trace: &Value, colour: &str) -> Option<Value> {
         let points = lonely(self.panel, series);
@@ -184,7 +203,7 @@ fn dash(style: Style) -> &'static str {
     match style {
         Style::Dashed => "7px,4px",
         Style::Dotted => "2px,3px",
-        Style::Solid | Style::Marks | Style::Band | Style::Bars => "solid",
+        Style::Solid | Style::Marks | Style::Band | Style::Bars | Style::Stripe => "solid",
     }
 }
 

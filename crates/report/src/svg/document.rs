@@ -103,6 +103,14 @@ impl Svg {
         self.0.push_str("/>\n");
     }
 
+    /// A filled polygon without seams to its neighbours.
+    pub(super) fn tile(&mut self, points: &[Point], colour: &str) {
+        if points.len() >= 3 {
+            self.path(points);
+            let _ = writeln!(self.0, "Z\" fill=\"{colour}\" shape-rendering=\"crispEdges\"/>");
+        }
+    }
+
     /// The beginning of a path, up to its last point.
     pub(super) fn path(&mut self, points: &[Point]) {
         self.0.push_str("<path d=\"");

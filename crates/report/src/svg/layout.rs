@@ -146,13 +146,16 @@ impl Bar {
 
 impl Place {
     pub(super) fn new(panel: &Panel, axes: &Axes, width: f64, height: f64) -> Place {
+        if panel.picture {
+            return Place::of_picture(panel, axes, width, height);
+        }
         let Axes { x, y, own_x, own_y } = *axes;
-        let y_ticks = axis::ticks(y, height / 46.0);
+        let y_ticks = axis::ticks_of(&panel.y, y, height / 46.0);
         // as many ticks as their labels leave room for
         let fits =
             |ticks: &Ticks| (widest(ticks) + 16.0) * ticks.labels.len() as f64 <= width && apart(ticks, x, width);
-        let x_ticks =
-            (3..=8).rev().map(|n| axis::ticks(x, f64::from(n))).find(fits).unwrap_or_else(|| axis::ticks(x, 2.0));
+        let x_ticks = (3..=8).rev().map(|n| axis::ticks_of(&panel.x, x, f64::from(n))).find(fits);
+        let x_ticks = x_ticks.unwrap_or_else(|| axis::ticks_of(&panel.x, x, 2.0));
         let y_title_offset = TICK_LENGTH + 5.0 + widest(&y_ticks) + 9.0;
         Place {
             left: 0.0,
@@ -169,6 +172,27 @@ impl Place {
             x_ticks,
             y_ticks,
             y_title_offset,
+        }
+    }
+
+    /// Of a picture: equal lengths on both axes, and nothing beside it.
+    fn of_picture(panel: &Panel, axes: &Axes, width: f64, height: f64) -> Place {
+        let (x, y) = frame::level(axes.x, axes.y, width / height);
+        Place {
+            left: 0.0,
+            top: 0.0,
+            width,
+            height,
+            title: font::wrap(&panel.title, PANEL_TITLE, Weight::Bold, width),
+            x_title: Vec::new(),
+            y_title: Vec::new(),
+            x,
+            y,
+            own_x: true,
+            own_y: true,
+            x_ticks: Ticks::default(),
+            y_ticks: Ticks::default(),
+            y_title_offset: 0.0,
         }
     }
 

@@ -73,7 +73,7 @@ pub fn to_svg(figure: &Figure) -> String {
 /// The dashes of a line style, if it has any.
 fn dashes(style: Style) -> Option<&'static str> {
     match style {
-        Style::Solid | Style::Marks | Style::Band | Style::Bars => None,
+        Style::Solid | Style::Marks | Style::Band | Style::Bars | Style::Stripe => None,
         Style::Dashed => Some("7 4"),
         Style::Dotted => Some("2 3"),
     }
@@ -150,15 +150,21 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, place: &Place, shades: &Shades) {
         }
     }
     // the axes through zero of a loop
+    let zeros = if panel.picture { 0 } else { 2 };
     for (inside, from, to) in [
         (place.x.from < 0.0 && place.x.to > 0.0, place.map((0.0, place.y.from)), place.map((0.0, place.y.to))),
         (place.y.from < 0.0 && place.y.to > 0.0, place.map((place.x.from, 0.0)), place.map((place.x.to, 0.0))),
-    ] {
+    ]
+    .into_iter()
+    .take(zeros)
+    {
         if inside {
             svg.line(from, to, "#b0b0b0");
         }
     }
-    svg.frame(place.left, place.top, place.width, place.height);
+    if !panel.picture {
+        svg.frame(place.left, place.top, place.width, place.height);
+    }
     for x in place.x_ticks.minor.iter().map(x_of) {
         svg.line((x, bottom), (x, bottom + MINOR_LENGTH), AXIS);
     }
@@ -197,6 +203,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, place: &Place, shades: &Shades) {
                     svg.mark(point, colour, size);
                 }
             }
+            Style::Stripe => draw_stripe(svg, series, place, shades),
             Style::Band => draw_band(svg, panel, series, place, colour),
             Style::Bars => {
                 let slot = frame::bar_slot(panel, place.x);
@@ -250,6 +257,16 @@ fn draw_band(svg: &mut Svg, panel: &Panel, series: &Series, place: &Place, colou
         let lower = clip::visible(piece.iter().map(|((x, _), base)| (*x, *base)).collect());
         let outline: Vec<Point> = upper.into_iter().chain(lower.into_iter().rev()).collect();
         svg.area(&place.window().polygon(&outline), colour, AREA);
+    }
+}
+
+/// The cells of a stripe, as high as the distance to the next one.
+fn draw_stripe(svg: &mut Svg, series: &Series, place: &Place, shades: &Shades) {
+    let Some(y) = series.y.first() else { return };
+    for ((from, to, _), colour) in frame::cells(series, place.x, shades) {
+        let ((left, top), (right, bottom)) = (place.map((from, y + 0.5)), place.map((to, y - 0.5)));
+        let corners = box_around(left, top, right - left, bottom - top);
+        svg.tile(&place.window().polygon(&corners), &colour.light);
     }
 }
 

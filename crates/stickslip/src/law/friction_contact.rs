@@ -11,7 +11,7 @@
 //! with an arctangent slider has no limit for its rate as the load goes to zero.
 
 use super::plane;
-use super::{Contact, Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Step, StepLaw, TANGENTS};
+use super::{Contact, Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Step, StepLaw, StepSlopes, TANGENTS};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
@@ -167,6 +167,80 @@ impl StepLaw for FrictionContact {
         out[self.tangents] = after;
         out
     }
+    fn tangent(
+        &self,
+        from: &[f64; MOST_DIRECTIONS],
+        to: &[f64; MOST_DIRECTIONS],
+        z: &mut [f64],
+        slopes: StepSlopes<'_>,
+    ) -> Option<[f64; MOST_DIRECTIONS]> {
+        let (t, directions) = (self.tangents, slopes.directions);
+        let load = |u: &[f64; MOST_DIRECTIONS]| u[t] * self.normal + self.preload;
+        let (before, after) = (load(from), load(to));
+        slopes.force.fill(0.0);
+        slopes.state.fill(0.0);
+        let mut out = [0.0; MOST_DIRECTIONS];
+        if after <= 0.0 {
+            z.fill(0.0);
+            return Some(out);
+        }
+        let closes = before < 0.0;
+        // the closed part of the way, and its derivatives by the normal motion before and after
+        let (closed, by_normal) = if closes {
+            z.fill(0.0);
+            let whole = after - before;
+            (after / whole, [after / whole, -before / whole].map(|part| part * self.normal / whole))
+        } else {
+            (1.0, [0.0; 2])
+        };
+        let limits = [if closes { 0.0 } else { before * self.friction }, after * self.friction];
+        let way: [f64; 2] = std::array::from_fn(|a| if a < t { (to[a] - from[a]) * closed } else { 0.0 });
+        let (force, own) = match z {
+            [force] => {
+                let (force, own) = along_a_line(*force, way[0], self.tangential, limits[1]);
+                ([force, 0.0], own)
+            }
+            _ => plane::step_with_slopes([z[0], z[1]], way, self.tangential, limits),
+        };
+        z.copy_from_slice(&force[..t]);
+        let slip = [if closes { 0.0 } else { self.friction }, self.friction].map(|by| by * self.normal);
+        let width = 2 * directions + t;
+        for (a, row) in slopes.state.chunks_exact_mut(width).enumerate() {
+            for b in 0..t {
+                let by = own.by_way[a][b];
+                row[b] = -by * closed;
+                row[directions + b] = by * closed;
+                row[t] += by * (to[b] - from[b]) * by_normal[0];
+                row[directions + t] += by * (to[b] - from[b]) * by_normal[1];
+                row[2 * directions + b] = if closes { 0.0 } else { own.by_force[a][b] };
+            }
+            row[t] += own.by_limits[a][0] * slip[0];
+            row[directions + t] += own.by_limits[a][1] * slip[1];
+        }
+        slopes.force[..t * width].copy_from_slice(slopes.state);
+        slopes.force[t * width + directions + t] = self.normal;
+        out[..t].copy_from_slice(z);
+        out[t] = after;
+        Some(out)
+    }
+    fn holds(&self, mean: &[f64; MOST_DIRECTIONS], reach: &[f64; MOST_DIRECTIONS]) -> bool {
+        let t = self.tangents;
+        let least = self.preload + self.normal * (mean[t] - reach[t]);
+        let pull = self.tangential * reach[..t].iter().map(|u| u * u).sum::<f64>().sqrt();
+        self.preload > 0.0 && least > 0.0 && pull < self.friction * least
+    }
+}
+
+/// As [`plane::step_with_slopes`], along the first direction alone: the limit where the step ends decides.
+fn along_a_line(force: f64, way: f64, stiffness: f64, limit: f64) -> (f64, plane::Slopes) {
+    let trial = force + way * stiffness;
+    let mut slopes = plane::Slopes::NONE;
+    if trial.abs() > limit {
+        slopes.by_limits[0][1] = trial.signum();
+        return (limit.copysign(trial), slopes);
+    }
+    (slopes.by_force[0][0], slopes.by_way[0][0]) = (1.0, stiffness);
+    (trial, slopes)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! step by Krieg and Key (1977), exact for straight steps.
 
 use super::plane;
-use super::{Jenkins, Jenkins2dArctan, Law, LawInfo, MOST_DIRECTIONS, Parameter, SharedLaw, Step, StepLaw};
+use super::{Jenkins, Jenkins2dArctan, Law, LawInfo, MOST_DIRECTIONS, Parameter, SharedLaw, Step, StepLaw, StepSlopes};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -88,5 +88,25 @@ impl StepLaw for Jenkins2d {
         let force = plane::step([z[0], z[1]], way, self.stiffness, [S::from(self.limit); 2]);
         z.copy_from_slice(&force);
         [force[0], force[1], S::from(0.0)]
+    }
+    fn tangent(
+        &self,
+        from: &[f64; MOST_DIRECTIONS],
+        to: &[f64; MOST_DIRECTIONS],
+        z: &mut [f64],
+        StepSlopes { force: forces, state: states, .. }: StepSlopes<'_>,
+    ) -> Option<[f64; MOST_DIRECTIONS]> {
+        let way = [to[0] - from[0], to[1] - from[1]];
+        let (force, slopes) = plane::step_with_slopes([z[0], z[1]], way, self.stiffness, [self.limit; 2]);
+        z.copy_from_slice(&force);
+        for (a, row) in states.chunks_exact_mut(6).enumerate() {
+            let (way, before) = (slopes.by_way[a], slopes.by_force[a]);
+            row.copy_from_slice(&[-way[0], -way[1], way[0], way[1], before[0], before[1]]);
+        }
+        forces.copy_from_slice(states);
+        Some([force[0], force[1], 0.0])
+    }
+    fn holds(&self, _mean: &[f64; MOST_DIRECTIONS], reach: &[f64; MOST_DIRECTIONS]) -> bool {
+        self.stiffness * reach[0].hypot(reach[1]) < self.limit
     }
 }

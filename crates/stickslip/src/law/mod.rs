@@ -66,7 +66,7 @@ pub use lugre::LuGre;
 pub use parameter::{BuildError, LawError, LawInfo, Parameter, Range};
 pub use prox::{Mean, Prox};
 pub use rate::{Rate, RateLaw, RatePoint, Relative};
-pub use step::{Step, StepLaw, StepPoint};
+pub use step::{Step, StepLaw, StepPoint, StepSlopes};
 pub use stribeck::Stribeck;
 pub use stribeck_arctan::StribeckArctan;
 pub use valanis::Valanis;

@@ -23,6 +23,7 @@ fn beyond<S: Real>(a: [S; 2], s: S, b: [S; 2]) -> [S; 2] {
 const FLAT: f64 = 1e-3;
 
 /// `ln(to / from) / (to - from)`: one over the logarithmic mean.
+#[inline]
 fn inverse_mean<S: Real>(from: S, to: S) -> S {
     let change = to / from - 1.0;
     if change.re().abs() < FLAT {
@@ -35,6 +36,7 @@ fn inverse_mean<S: Real>(from: S, to: S) -> S {
 
 /// The force (N) of a spring and slider after a straight `way` (m), from the `force` before it. The slip limit goes from the first to the second of
 /// `limits` (N, not negative) meanwhile; the force before is not above the first.
+#[inline]
 pub(super) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, limits: [S; 2]) -> [S; 2] {
     let [first, last] = limits;
     let zero = S::from(0.0);
@@ -90,9 +92,204 @@ pub(super) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, limits: 
     [out[0] * last, out[1] * last]
 }
 
+/// Derivatives of the force after a step, [component][by component], and by the limits before and after it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Slopes {
+    pub(super) by_force: [[f64; 2]; 2],
+    pub(super) by_way: [[f64; 2]; 2],
+    pub(super) by_limits: [[f64; 2]; 2],
+}
+
+impl Slopes {
+    pub(super) const NONE: Slopes = Slopes { by_force: [[0.0; 2]; 2], by_way: [[0.0; 2]; 2], by_limits: [[0.0; 2]; 2] };
+}
+
+/// Derivatives of a scalar by the components of the force, those of the way, and the limits.
+#[derive(Debug, Clone, Copy)]
+struct Gradient {
+    force: [f64; 2],
+    way: [f64; 2],
+    limits: [f64; 2],
+}
+
+impl Gradient {
+    const NONE: Gradient = Gradient { force: [0.0; 2], way: [0.0; 2], limits: [0.0; 2] };
+
+    /// `a self + b other`.
+    fn combined(self, a: f64, other: Gradient, b: f64) -> Gradient {
+        let pair = |x: [f64; 2], y: [f64; 2]| [a * x[0] + b * y[0], a * x[1] + b * y[1]];
+        Gradient {
+            force: pair(self.force, other.force),
+            way: pair(self.way, other.way),
+            limits: pair(self.limits, other.limits),
+        }
+    }
+}
+
+/// `radial δsize + size across δangle`, of a force `size radial`.
+#[inline]
+fn turning(radial: [f64; 2], last: f64, angle: Gradient) -> Slopes {
+    let across = [-radial[1] * last, radial[0] * last];
+    let outer = |by: [f64; 2]| across.map(|across| [across * by[0], across * by[1]]);
+    let mut slopes = Slopes { by_force: outer(angle.force), by_way: outer(angle.way), by_limits: outer(angle.limits) };
+    for (slope, radial) in slopes.by_limits.iter_mut().zip(radial) {
+        slope[1] += radial;
+    }
+    slopes
+}
+
+/// [`step`] with its derivatives. While it slips the force is `R (cos α, sin α)` at its end: with the angle `ψ₁` where slip begins,
+/// `tan(ψ₂/2) = e⁻ᴱ tan(ψ₁/2)` has `δψ₂ = t δψ₁ - sin ψ₂ δE`, `t = sin ψ₂ / sin ψ₁`.
+#[inline]
+pub(super) fn step_with_slopes(force: [f64; 2], way: [f64; 2], stiffness: f64, limits: [f64; 2]) -> ([f64; 2], Slopes) {
+    let [first, last] = limits;
+    if last <= 0.0 {
+        return ([0.0; 2], Slopes::NONE);
+    }
+    let trial = beyond(force, stiffness, way);
+    if dot(trial, trial) <= last * last {
+        let one = [[1.0, 0.0], [0.0, 1.0]];
+        return (trial, Slopes { by_force: one, by_way: one.map(|row| row.map(|x| stiffness * x)), ..Slopes::NONE });
+    }
+    let length = dot(way, way).sqrt();
+    if length == 0.0 {
+        let size = dot(trial, trial).sqrt();
+        let radial = [trial[0] / size, trial[1] / size];
+        let by_force = [-radial[1] / size, radial[0] / size];
+        let angle = Gradient { force: by_force, way: by_force.map(|x| stiffness * x), ..Gradient::NONE };
+        return ([radial[0] * last, radial[1] * last], turning(radial, last, angle));
+    }
+    let ahead = [way[0] / length, way[1] / length];
+    let heading = Gradient { way: [-ahead[1] / length, ahead[0] / length], ..Gradient::NONE };
+    // where slip begins
+    let change = last - first;
+    let a = length * length * (stiffness * stiffness) - change * change;
+    let b = (dot(force, way) * stiffness - first * change) * 2.0;
+    let c = dot(force, force) - first * first;
+    let discriminant = b * b - a * c * 4.0;
+    let root = discriminant.max(0.0).sqrt();
+    let share = if discriminant <= 0.0 {
+        0.0
+    } else if b > 0.0 {
+        c * -2.0 / (b + root)
+    } else {
+        (root - b) / (a * 2.0)
+    };
+    let held = beyond(force, share * stiffness, way);
+    let size = dot(held, held).sqrt();
+    if size <= 0.0 {
+        return ([ahead[0] * last, ahead[1] * last], turning(ahead, last, heading));
+    }
+    let direction = [held[0] / size, held[1] / size];
+    // |held| = first + share change, by its derivative
+    let begins = if discriminant > 0.0 {
+        let by = -2.0 / root;
+        Gradient {
+            force: [by * held[0], by * held[1]],
+            way: held.map(|x| by * share * stiffness * x),
+            limits: [-by * size * (1.0 - share), -by * size * share],
+        }
+    } else {
+        Gradient::NONE
+    };
+    // what a vector has of the change of `held`
+    let of_held = |along: [f64; 2]| {
+        let own = Gradient { force: along, way: along.map(|x| share * stiffness * x), ..Gradient::NONE };
+        own.combined(1.0, begins, stiffness * dot(way, along))
+    };
+    let turns = of_held([-direction[1] / size, direction[0] / size]);
+    let (mean, by_last) = inverse_mean_with_slope(size, last);
+    let by_size = -(mean + last * by_last) / size;
+    let rest = length * (1.0 - share) * stiffness;
+    let factor = (-rest * mean).exp();
+    let cosine = dot(direction, ahead);
+    let (plus, minus) = ((1.0 + cosine).max(0.0), (1.0 - cosine).max(0.0));
+    let denominator = plus + minus * factor * factor;
+    if denominator <= 0.0 {
+        return ([direction[0] * last, direction[1] * last], turning(direction, last, turns));
+    }
+    let along = (plus - minus * factor * factor) / denominator;
+    let turned = factor * 2.0 / denominator;
+    let across = beyond(direction, -cosine, ahead);
+    let out = beyond([ahead[0] * along, ahead[1] * along], turned, across);
+    // the sine of the angle from the way to the force, signed
+    let sine = ahead[0] * out[1] - ahead[1] * out[0];
+    let of_rest = Gradient {
+        way: ahead.map(|x| (1.0 - share) * stiffness * mean * x),
+        limits: [0.0, rest * by_last],
+        ..Gradient::NONE
+    };
+    let exponent =
+        of_rest.combined(1.0, begins, -length * stiffness * mean).combined(1.0, of_held(direction), rest * by_size);
+    let angle = heading.combined(1.0 - turned, turns, turned).combined(1.0, exponent, -sine);
+    ([out[0] * last, out[1] * last], turning(out, last, angle))
+}
+
+/// [`inverse_mean`] with its derivative by the second; that by the first follows, since it is of the order -1 in both.
+#[inline]
+fn inverse_mean_with_slope(from: f64, to: f64) -> (f64, f64) {
+    let change = to / from - 1.0;
+    let mean = inverse_mean(from, to);
+    let slope = if change.abs() < FLAT {
+        (((change * 0.8 - 0.75) * change + 2.0 / 3.0) * change - 0.5) / (from * from)
+    } else {
+        (1.0 / to - mean) / (to - from)
+    };
+    (mean, slope)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stickslip_numerics::dual::{Dual, partials, variable};
+
+    /// Derivatives by hand against those of dual numbers, on every way through the step.
+    #[test]
+    fn slopes_are_those_of_dual_numbers() {
+        let mut slid = 0;
+        for k in 0..3000usize {
+            let noise = |i: usize| ((k * 7919 + i * 104_729 + 13) as f64).sin();
+            let limits = match k % 7 {
+                0 => [0.8, 0.8],
+                1 => [0.8, 0.8 + 4e-4 * noise(1)],
+                2 => [0.0, 0.5],
+                3 => [0.6, 0.0],
+                _ => [1.0 + 0.9 * noise(2), 1.0 + 0.9 * noise(3)],
+            };
+            let start = [0.0, 0.5, 1.0][k % 3] * limits[0];
+            let turn = 3.0 * noise(4);
+            let force = [start * turn.cos(), start * turn.sin()];
+            let way = match k % 11 {
+                0 => [0.0; 2],
+                1 => force.map(|f| 2.0 * f),
+                _ => [3.0 * noise(5), 3.0 * noise(6)],
+            };
+            let stiffness = 0.7;
+            let (found, slopes) = step_with_slopes(force, way, stiffness, limits);
+            let seeded = |x: f64, i: usize| -> Dual<6> { variable(x, i) };
+            let dual = step(
+                [seeded(force[0], 0), seeded(force[1], 1)],
+                [seeded(way[0], 2), seeded(way[1], 3)],
+                stiffness,
+                [seeded(limits[0], 4), seeded(limits[1], 5)],
+            );
+            slid += usize::from(found[0].hypot(found[1]) > 0.999_999 * limits[1] && limits[1] > 0.0);
+            for a in 0..2 {
+                assert!((dual[a].re - found[a]).abs() <= 1e-13, "{k}: {found:?}");
+                let by_hand = [slopes.by_force[a], slopes.by_way[a], slopes.by_limits[a]].concat();
+                let exact = partials(&dual[a]);
+                if exact.iter().any(|x| !x.is_finite()) {
+                    continue; // where a square root of zero has no derivative
+                }
+                // where slip begins along a tangent of the disk derivatives grow, and their rounding with them
+                let size = exact.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+                for (hand, exact) in by_hand.iter().zip(exact) {
+                    assert!((hand - exact).abs() <= 1e-10 * size * size, "{k}: {by_hand:?} {:?}", partials(&dual[a]));
+                }
+            }
+        }
+        assert!(slid > 1000, "{slid}");
+    }
 
     /// Radial return in many small steps, which is of first order.
     fn in_small_steps(mut force: [f64; 2], way: [f64; 2], stiffness: f64, limits: [f64; 2], steps: u32) -> [f64; 2] {

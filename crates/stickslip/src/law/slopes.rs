@@ -38,6 +38,11 @@ impl Slopes {
         &mut self.values
     }
 
+    /// Those of the forces, and those of the states, row by row.
+    pub fn parts_mut(&mut self) -> (&mut [f64], &mut [f64]) {
+        self.values.split_at_mut(self.directions * self.arguments)
+    }
+
     /// Keeps what a pass found by the arguments from `first` on, for a force or, behind the forces, a state.
     #[inline]
     pub fn keep<const N: usize>(&mut self, row: usize, first: usize, value: &Dual<N>) {

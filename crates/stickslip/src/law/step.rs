@@ -21,6 +21,33 @@ pub trait StepLaw {
         to: &[S; MOST_DIRECTIONS],
         z: &mut [S],
     ) -> [S; MOST_DIRECTIONS];
+    /// The same for numbers, with derivatives by hand, if the author has any: they cost a fifth of those by dual numbers. One row for each of the first
+    /// `directions` forces and one for each state, of derivatives by the displacement before along all directions, the one after, and the states before.
+    fn tangent(
+        &self,
+        _from: &[f64; MOST_DIRECTIONS],
+        _to: &[f64; MOST_DIRECTIONS],
+        _z: &mut [f64],
+        _slopes: StepSlopes<'_>,
+    ) -> Option<[f64; MOST_DIRECTIONS]> {
+        None
+    }
+    /// Whether motion that stays within `reach` of the position `mean` (m), where its states were zero, is followed as at rest all the time: force
+    /// and states are linear in it. `false` is always right.
+    fn holds(&self, _mean: &[f64; MOST_DIRECTIONS], _reach: &[f64; MOST_DIRECTIONS]) -> bool {
+        false
+    }
+}
+
+/// Where the derivatives of a step go: rows of the forces, and rows of the states.
+#[derive(Debug)]
+pub struct StepSlopes<'a> {
+    /// Directions of the joint.
+    pub directions: usize,
+    /// Row after row, one for each direction.
+    pub force: &'a mut [f64],
+    /// Row after row, one for each state.
+    pub state: &'a mut [f64],
 }
 
 /// The step view as methods see it; every [`StepLaw`] has it.
@@ -45,6 +72,19 @@ pub trait Step: Debug + Send + Sync {
         z: &[f64],
         point: &mut StepPoint,
     );
+    /// Steps around a closed way, [direction][point], from its first point to the next and in the end from the last to the first: forces at the points,
+    /// and with `rows` the derivatives of the step to every point along the first `directions`: rows of the states, then of the forces, as long as in
+    /// [`StepPoint`]. `z` are the states at the first point, before and after.
+    fn around(
+        &self,
+        directions: usize,
+        way: &[Vec<f64>; MOST_DIRECTIONS],
+        z: &mut [f64],
+        force: &mut [Vec<f64>; MOST_DIRECTIONS],
+        rows: Option<&mut [f64]>,
+    );
+    /// See [`StepLaw::holds`].
+    fn holds(&self, mean: &[f64; MOST_DIRECTIONS], reach: &[f64; MOST_DIRECTIONS]) -> bool;
 }
 
 /// Force and states at the end of a step, with derivatives by its arguments: the displacement before along all directions, the one after along
@@ -100,6 +140,13 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
         z: &[f64],
         point: &mut StepPoint,
     ) {
+        point.state.copy_from_slice(z);
+        let (force, state) = point.slopes.parts_mut();
+        let slopes = StepSlopes { directions, force, state };
+        if let Some(force) = self.tangent(from, to, &mut point.state, slopes) {
+            point.force = force;
+            return;
+        }
         match 2 * directions + z.len() {
             0..=3 => pass::<3, L>(self, directions, (from, to), z, 0, point),
             4 | 5 => pass::<5, L>(self, directions, (from, to), z, 0, point),
@@ -109,6 +156,53 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
                 }
             }
         }
+    }
+    fn around(
+        &self,
+        directions: usize,
+        way: &[Vec<f64>; MOST_DIRECTIONS],
+        z: &mut [f64],
+        force: &mut [Vec<f64>; MOST_DIRECTIONS],
+        rows: Option<&mut [f64]>,
+    ) {
+        let n = way[0].len();
+        let at = |i: usize| std::array::from_fn(|a| if a < directions { way[a][i] } else { 0.0 });
+        let mut keep = |i: usize, now: [f64; MOST_DIRECTIONS]| {
+            force.iter_mut().zip(now).take(directions).for_each(|(force, now)| force[i] = now);
+        };
+        let Some(rows) = rows else {
+            let mut from = at(0);
+            for step in 1..=n {
+                let i = step % n;
+                let to = at(i);
+                keep(i, self.advance(&from, &to, z));
+                from = to;
+            }
+            return;
+        };
+        let (states, width) = (z.len(), 2 * directions + z.len());
+        let mut point = StepPoint::new(directions, states);
+        let mut from = at(0);
+        for step in 1..=n {
+            let i = step % n;
+            let to = at(i);
+            let rows = &mut rows[i * (states + directions) * width..][..(states + directions) * width];
+            let (state, slopes) = rows.split_at_mut(states * width);
+            let own = StepSlopes { directions, force: &mut *slopes, state: &mut *state };
+            let now = self.tangent(&from, &to, z, own).unwrap_or_else(|| {
+                self.linearise(directions, &from, &to, z, &mut point);
+                let (of_forces, of_states) = point.slopes.parts_mut();
+                slopes.copy_from_slice(of_forces);
+                state.copy_from_slice(of_states);
+                z.copy_from_slice(&point.state);
+                point.force
+            });
+            keep(i, now);
+            from = to;
+        }
+    }
+    fn holds(&self, mean: &[f64; MOST_DIRECTIONS], reach: &[f64; MOST_DIRECTIONS]) -> bool {
+        StepLaw::holds(self, mean, reach)
     }
 }
 

@@ -4,7 +4,7 @@ use super::assembly::Assembly;
 use super::drive::Drive;
 use crate::law::{Contact, Relative};
 use crate::model::{Axis, System};
-use crate::orbit::measure::{Signals, Slip, extremes};
+use crate::orbit::measure::{Faces, Shares, Signals, extremes};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
 use num_complex::Complex64;
 use std::convert::Infallible;
@@ -307,13 +307,9 @@ impl Signals for SteppedPath {
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(|step| self.relative_ends(step, axis)))
     }
-    fn slip(&self, joint: usize) -> Slip {
-        // both sums run in one order, so that a joint that always slips has a share of exactly one
-        let time = |counts: &dyn Fn(&Node) -> bool| -> f64 {
-            let nodes = self.steps.values.iter().enumerate();
-            nodes.map(|(i, node)| if counts(node) { self.steps.node(i).1 } else { 0.0 }).sum()
-        };
-        let share = time(&|node| node.contact[joint].slips()) / time(&|_| true);
+    fn faces(&self, joint: usize) -> Faces {
+        let nodes = self.steps.values.iter().enumerate();
+        let shares = Shares::of(nodes.map(|(i, node)| (node.contact[joint], self.steps.node(i).1)));
         let count = self.steps.nodes.len();
         let at_end = |step: usize| self.steps.values[(step + 1) * count - 1].contact[joint];
         let steps = self.steps.spans.len();
@@ -323,6 +319,6 @@ impl Signals for SteppedPath {
             let before = if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last };
             switches += usize::from(before != at_end(0));
         }
-        Slip { share, switches, rests: self.steps.values.iter().all(|node| node.contact[joint] == Contact::Stick) }
+        Faces { shares, switches, rests: self.steps.values.iter().all(|node| node.contact[joint] == Contact::Stick) }
     }
 }

@@ -1,19 +1,20 @@
 //! The coordinates of a model, and its places as weighted sums of them.
 //!
-//! They are those of its substructure (all its rows, or the few of its reduction), then one for each mass along each of its directions. Places
-//! with an imposed motion are coordinates too: each takes the place of the one that it depends on most, so that `x = T (q, u)` with the moved
+//! They are those of its substructure (all its rows, or the few of its reduction), then one for each mass along each of its directions; of a ring those
+//! of the first sector, then those of the second, and so on. Places with an imposed motion are coordinates too: each takes the place of the one that it depends on most, so that `x = T (q, u)` with the moved
 //! displacements `u` at the end, and `Tᵀ M T` has what they share with the others.
 
+use super::Model;
 use super::assemble::{Element, ModelError};
+use super::part::Part;
 use super::places::{Of, Places};
-use super::{Model, Substructure, SubstructureDamping};
-use crate::structure::reduction::{Damping, Reduced, Row};
-use crate::structure::{ReducedComponent, Reduction};
+use crate::structure::ReducedComponent;
+use crate::structure::reduction::Row;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Row, column, value.
-type Entries = Vec<(usize, usize, f64)>;
+pub(super) type Entries = Vec<(usize, usize, f64)>;
 
 /// Coordinates of a model.
 pub(super) struct Coordinates {
@@ -36,26 +37,38 @@ const DEPENDENT: f64 = 1e-10;
 impl Coordinates {
     pub fn new(model: &Model, places: &Places) -> Result<Self, ModelError> {
         let part = model.substructure.as_ref().map_or_else(|| Ok(Part::default()), |own| Part::new(own, model))?;
-        let mut names = part.names;
-        let first = names.len();
-        let mut own = first;
+        let of_disk = model.substructure.as_ref().is_some_and(|own| own.disk.is_some());
+        let sectors = model.ring.filter(|_| of_disk).map_or(1, |ring| ring.sectors);
+        let masses: usize = model.masses.iter().map(|mass| mass.directions.len().max(1)).sum();
+        let order = Order { sectors, part: part.names.len() / sectors, own: masses / sectors };
+        let mut names = vec![String::new(); part.names.len() + masses];
+        part.names.into_iter().enumerate().for_each(|(at, name)| names[order.of_part(at)] = name);
+        let mut own = 0;
         let mut rows: Vec<Row> = Vec::with_capacity(places.stated.len());
         for place in &places.stated {
             rows.push(match place.of {
                 Of::Component(index, along) => match part.places.get(index) {
-                    Some(rows) => rows[along].clone(),
+                    Some(rows) => rows[along].iter().map(|(at, weight)| (order.of_part(*at), *weight)).collect(),
                     None => {
                         let message = "there is no structure that it could be a place of; add [structure]";
                         return Err(ModelError::new(Element::Place(index), "name", message));
                     }
                 },
                 Of::Own(_) => {
-                    names.push(place.name.clone());
+                    let at = if own < masses { order.of_mass(own) } else { names.len() };
+                    match names.get_mut(at) {
+                        Some(name) => name.clone_from(&place.name),
+                        None => names.push(place.name.clone()),
+                    }
                     own += 1;
-                    vec![(own - 1, 1.0)]
+                    vec![(at, 1.0)]
                 }
             });
         }
+        let of_part = |entries: Entries| -> Entries {
+            entries.into_iter().map(|(row, column, v)| (order.of_part(row), order.of_part(column), v)).collect()
+        };
+        let entries = part.entries.map(of_part);
         let moved: Vec<(&str, &Row)> = places
             .stated
             .iter()
@@ -71,7 +84,7 @@ impl Coordinates {
             moved: moved.len(),
             names: names.into_iter().zip(&turned.pivot).filter(|(_, pivot)| !**pivot).map(|(name, _)| name).collect(),
             places: placed,
-            entries: part.entries.map(|entries| turned.entries(entries)),
+            entries: entries.map(|entries| turned.entries(entries)),
             reduced: part.reduced,
         })
     }
@@ -79,6 +92,24 @@ impl Coordinates {
     /// The number of a stated place among those that are moved.
     pub fn moved_number(&self, places: &Places, place: usize) -> Option<usize> {
         places.stated[place].moved.then(|| places.stated[..place].iter().filter(|place| place.moved).count())
+    }
+}
+
+/// Where coordinates of a substructure and of masses stand: sector by sector.
+struct Order {
+    sectors: usize,
+    /// Coordinates of the substructure, and of masses, in a sector.
+    part: usize,
+    own: usize,
+}
+
+impl Order {
+    fn of_part(&self, at: usize) -> usize {
+        at + at / self.part * self.own
+    }
+
+    fn of_mass(&self, at: usize) -> usize {
+        at + (at / self.own.max(1) + 1).min(self.sectors) * self.part
     }
 }
 
@@ -99,98 +130,6 @@ fn follows(model: &Model, places: &Places, rows: &[Row], free: usize) -> Result<
         return Err(ModelError::new(Element::Motion(motion), "on", message));
     }
     Ok(())
-}
-
-/// The substructure in coordinates of its own.
-#[derive(Default)]
-struct Part {
-    names: Vec<String>,
-    /// For each place of the model, each of its directions.
-    places: Vec<Vec<Row>>,
-    entries: [Entries; 3],
-    reduced: Option<Arc<ReducedComponent>>,
-}
-
-impl Part {
-    fn new(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
-        let n = substructure.component.dofs();
-        for (i, place) in model.places.iter().enumerate() {
-            for row in &place.rows {
-                let wrong = |key, message: String| Err(ModelError::new(Element::Place(i), key, message));
-                if let Some((at, _)) = row.iter().find(|(at, _)| *at >= n) {
-                    return wrong("dof", format!("row {} of a structure of {n} rows", at + 1));
-                }
-                if row.iter().all(|(_, weight)| *weight == 0.0) || row.iter().any(|(_, weight)| !weight.is_finite()) {
-                    return wrong("dof", "its weights must be finite numbers, not all zero".to_owned());
-                }
-            }
-        }
-        match substructure.reduction {
-            Reduction::None => Part::whole(substructure, model),
-            _ => Part::reduced(substructure, model),
-        }
-    }
-
-    fn whole(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
-        let (mass, own, stiffness) = substructure.component.matrices();
-        let entries: Entries = mass.entries().collect();
-        let springs: Entries = stiffness.entries().collect();
-        let damping = match substructure.damping {
-            SubstructureDamping::Own => own.map_or_else(Vec::new, |own| own.entries().collect()),
-            SubstructureDamping::Rayleigh { mass, stiffness } => {
-                let times = |entries: &Entries, factor: f64| -> Entries {
-                    let all = entries.iter().filter(|_| factor != 0.0);
-                    all.map(|(row, column, value)| (*row, *column, factor * value)).collect()
-                };
-                [times(&entries, mass), times(&springs, stiffness)].concat()
-            }
-            SubstructureDamping::Ratio(_) => {
-                let message = "a damping ratio belongs to modes, and without a reduction there are none";
-                let help = "; state `rayleigh`, a damping matrix, or leave out `reduce = false`";
-                return Err(ModelError::new(Element::Substructure, "modal_damping", format!("{message}{help}")));
-            }
-        };
-        let named = |(at, name): (usize, &String)| {
-            if name.is_empty() { format!("row {}", at + 1) } else { format!("row {name}") }
-        };
-        Ok(Part {
-            names: substructure.component.rows().iter().enumerate().map(named).collect(),
-            places: model.places.iter().map(|place| place.displacements(&place.rows)).collect(),
-            entries: [entries, damping, springs],
-            reduced: None,
-        })
-    }
-
-    fn reduced(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
-        let seen: Vec<Row> = model.places.iter().flat_map(|place| place.rows.iter().cloned()).collect();
-        let failed = |error: crate::structure::reduction::ReductionError| {
-            ModelError::new(Element::Substructure, "reduce", error.to_string())
-        };
-        let component = substructure.component.reduced(&seen, &substructure.reduction).map_err(failed)?;
-        let damping = match substructure.damping {
-            SubstructureDamping::Own => None,
-            SubstructureDamping::Ratio(ratio) => Some(Damping::Ratio { ratio, up_to: component.up_to() }),
-            SubstructureDamping::Rayleigh { mass, stiffness } => Some(Damping::Rayleigh { mass, stiffness }),
-        };
-        let reduced = component.matrices(damping.as_ref()).map_err(failed)?;
-        let entries = |matrix: &nalgebra::DMatrix<f64>| -> Entries {
-            let all = (0..matrix.ncols()).flat_map(|k| (0..matrix.nrows()).map(move |i| (i, k)));
-            all.map(|at| (at.0, at.1, matrix[at])).filter(|entry| entry.2 != 0.0).collect()
-        };
-        let Reduced { mass, damping, stiffness, ports, .. } = &reduced;
-        let row = |port: usize| ports.row(port).iter().copied().enumerate().filter(|(_, w)| *w != 0.0).collect();
-        let mut next = 0;
-        let of_place = |place: &super::Place| -> Vec<Row> {
-            next += place.rows.len();
-            place.displacements(&(next - place.rows.len()..next).map(row).collect::<Vec<_>>())
-        };
-        Ok(Part {
-            names: (1..=reduced.dofs()).map(|number| format!("coordinate {number}")).collect(),
-            places: model.places.iter().map(of_place).collect(),
-            entries: [entries(mass), entries(damping), entries(stiffness)],
-            reduced: Some(component),
-        })
-    }
 }
 
 /// `x = T (q, u)`: coordinates of which some have given way to moved displacements.

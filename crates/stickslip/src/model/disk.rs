@@ -113,15 +113,19 @@ impl Disk {
         let first = sector(0);
         self.check(&first)?;
         let count = |model: &Model| {
-            [model.masses.len(), model.springs.len(), model.joints.len(), model.forces.len(), model.motions.len()]
+            let Model { places, masses, springs, joints, forces, motions, .. } = model;
+            [places.len(), masses.len(), springs.len(), joints.len(), forces.len(), motions.len()]
         };
-        let mut model = Model::default();
+        let mut model = Model { substructure: first.substructure.clone(), ..Model::default() };
+        let mut deviations = Vec::new();
         let mut equal = true;
         for s in 0..self.sectors {
             let mut one = if s == 0 { first.clone() } else { sector(s) };
             assert_eq!(count(&one), count(&first), "sector {s} has other elements than the first");
             equal &= s == 0 || one == first;
             let name = |name: &String| self.name(name.as_str(), s);
+            deviations.extend(one.substructure.iter().flat_map(|own| &own.disk).flat_map(|disk| &disk.deviations));
+            one.places.iter_mut().for_each(|place| place.name = name(&place.name));
             one.masses.iter_mut().for_each(|mass| mass.name = name(&mass.name));
             one.springs.iter_mut().for_each(|spring| spring.between = spring.between.each_ref().map(name));
             for joint in &mut one.joints {
@@ -138,11 +142,15 @@ impl Disk {
                 motion.on = name(&motion.on);
                 (motion.amplitude, motion.phase) = (motion.amplitude * share, motion.phase + lead);
             }
+            model.places.append(&mut one.places);
             model.masses.append(&mut one.masses);
             model.springs.append(&mut one.springs);
             model.joints.append(&mut one.joints);
             model.forces.append(&mut one.forces);
             model.motions.append(&mut one.motions);
+        }
+        if let Some(disk) = model.substructure.as_mut().and_then(|own| own.disk.as_mut()) {
+            disk.deviations = deviations;
         }
         let order = if equal { self.order(&first) } else { None };
         model.ring = Some(Ring { sectors: self.sectors, equal, order });
@@ -191,22 +199,23 @@ impl Disk {
             let message = format!("a disk has {LEAST_SECTORS} sectors or more, found {}", self.sectors);
             return refuse(Element::Whole, "sectors", message);
         }
-        if sector.substructure.is_some() {
-            let message = "a sector is stated by masses and springs".to_owned();
-            return refuse(Element::Substructure, "stiffness", message);
-        }
-        if sector.substructure.is_some() {
-            let message = "a structure by its matrices cannot be a sector yet; masses and springs can";
+        if sector.substructure.as_ref().is_some_and(|own| own.disk.is_none()) {
+            let message = "the matrices of a sector need to know what ties it to the next: the node pairs of its low and high side";
             return refuse(Element::Substructure, "stiffness", message.to_owned());
         }
+        let next = |name: &str| NEXT.strip_suffix('.') == Some(name);
+        if let Some(i) = sector.places.iter().position(|place| next(&place.name)) {
+            let message = "`next` stands for the next sector of a disk and cannot be declared".to_owned();
+            return refuse(Element::Place(i), "name", message);
+        }
         for (i, mass) in sector.masses.iter().enumerate() {
-            if NEXT.strip_suffix('.') == Some(&mass.name) {
+            if next(&mass.name) {
                 let message = "`next` stands for the next sector of a disk and cannot be declared".to_owned();
                 return refuse(Element::Mass(i), "name", message);
             }
         }
         let mut known: BTreeSet<String> = sector.place_names().into_iter().collect();
-        known.extend(sector.masses.iter().map(|mass| mass.name.clone()));
+        known.extend(sector.nodes().map(|(name, _)| name.to_owned()));
         let find = |name: &String, element: Element, key: &'static str| {
             let place = name.strip_prefix(NEXT).unwrap_or(name);
             if known.contains(place) && (place != GROUND || name == place) {
@@ -278,7 +287,8 @@ impl Ring {
             Element::Joint(i) => Element::Joint(own(i, model.joints.len())),
             Element::Force(i) => Element::Force(own(i, model.forces.len())),
             Element::Motion(i) => Element::Motion(own(i, model.motions.len())),
-            Element::Place(_) | Element::Substructure | Element::Whole => element,
+            Element::Place(i) => Element::Place(own(i, model.places.len())),
+            Element::Substructure | Element::Whole => element,
         }
     }
 }

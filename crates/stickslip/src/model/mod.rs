@@ -7,6 +7,7 @@ mod contraction;
 mod coordinates;
 mod disk;
 pub mod example;
+mod part;
 mod place;
 mod places;
 mod survey;
@@ -20,7 +21,7 @@ pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey, WaveModes};
 pub use system::{Axis, Cyclic, Load, MovedPlace, System, SystemBuilder, SystemError, SystemJoint};
 
 use crate::law::SharedLaw;
-use crate::structure::{Component, Reduction};
+use crate::structure::{Boundary, Component, Reduction};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -60,6 +61,19 @@ pub struct Substructure {
     pub damping: SubstructureDamping,
     /// How it is brought into few coordinates.
     pub reduction: Reduction,
+    /// If it is a sector of a [`Disk`]: how it goes on.
+    pub disk: Option<DiskPart>,
+}
+
+/// A structure by its matrices as a sector of a disk.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DiskPart {
+    /// How it is tied to the next sector.
+    pub boundary: Boundary,
+    /// Rows of the matrices that belong to the blade; none if the blades do not differ.
+    pub blade: Vec<usize>,
+    /// Deviation of the blade's stiffness, relative: that of this sector, and of a ring those of all sectors. None if they do not differ.
+    pub deviations: Vec<f64>,
 }
 
 /// Damping of a substructure.

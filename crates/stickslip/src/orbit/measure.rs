@@ -4,6 +4,7 @@
 //! written once, here, and is independent of how the motion was found.
 
 use super::{Energy, JointMotion, PlaceMotion, Symmetry};
+use crate::law::Contact;
 use crate::model::{Axis, System};
 use num_complex::Complex64;
 use stickslip_numerics::radau::quintic;
@@ -36,8 +37,8 @@ pub(crate) trait Signals {
     fn range(&self, place: &Axis) -> Result<(f64, f64), Self::Error>;
     /// Least and largest relative displacement along an axis, m.
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Self::Error>;
-    /// When a joint slips.
-    fn slip(&self, joint: usize) -> Slip;
+    /// What the faces of a joint do.
+    fn faces(&self, joint: usize) -> Faces;
     /// Of signals of the degrees of freedom that of a place.
     fn along(&self, place: &Axis, of: impl Fn(usize) -> Self::Signal) -> Self::Signal {
         match *place.rows() {
@@ -55,14 +56,36 @@ pub(crate) trait Signals {
     }
 }
 
-/// When a joint slips in a return.
-pub(crate) struct Slip {
-    /// In which share of it.
-    pub share: f64,
-    /// How often that, or its direction, changes.
+/// What the faces of a joint do in a return.
+pub(crate) struct Faces {
+    /// In which shares of it.
+    pub shares: Shares,
+    /// How often that, or the direction of slip, changes.
     pub switches: usize,
     /// Whether it sticks all the time; one that is open all the time neither slips nor sticks.
     pub rests: bool,
+}
+
+/// Shares of a return in which the faces of a joint rest on each other, slide, and are apart. What is missing to one is a stop that touches.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Shares {
+    pub stick: f64,
+    pub slip: f64,
+    pub open: f64,
+}
+
+impl Shares {
+    /// Of contacts, each as long as its weight. All sums run in one order, so that a joint that always slips has a share of exactly one.
+    pub fn of(contacts: impl Iterator<Item = (Contact, f64)>) -> Shares {
+        let (mut times, mut all) = (Shares::default(), 0.0);
+        for (contact, weight) in contacts {
+            all += weight;
+            times.stick += if contact == Contact::Stick { weight } else { 0.0 };
+            times.slip += if contact.slips() { weight } else { 0.0 };
+            times.open += if contact == Contact::Open { weight } else { 0.0 };
+        }
+        Shares { stick: times.stick / all, slip: times.slip / all, open: times.open / all }
+    }
 }
 
 /// The numbers of a periodic motion.
@@ -109,7 +132,7 @@ pub(crate) fn measure<S: Signals>(
         first = axes.end;
         let dissipation: f64 = axes.clone().map(|axis| signals.dissipation(axis, &forces[axis])).sum();
         let displacement = axes.map(|axis| signals.relative_range(axis).map(mirrored)).collect::<Result<_, _>>()?;
-        let Slip { share, switches, rests } = signals.slip(j);
+        let Faces { shares, switches, rests } = signals.faces(j);
         // a law without a limit never slips: it is not stuck, and its orbit is none of many
         if rests && joint.law().scale().is_finite() {
             stuck.push(joint.name().to_owned());
@@ -117,7 +140,9 @@ pub(crate) fn measure<S: Signals>(
         joints.push(JointMotion {
             name: joint.name().to_owned(),
             dissipation: times * dissipation,
-            slip_fraction: share,
+            slip_fraction: shares.slip,
+            stick_fraction: shares.stick,
+            open_fraction: shares.open,
             displacement,
             switches: switches * if half { 2 } else { 1 },
         });

@@ -98,6 +98,10 @@ pub struct JointMotion {
     pub dissipation: f64,
     /// Fraction of the period in which the joint slips.
     pub slip_fraction: f64,
+    /// Fraction of the period in which its faces rest on each other.
+    pub stick_fraction: f64,
+    /// Fraction of the period in which its faces are apart. What the three fractions leave of one is a stop that touches.
+    pub open_fraction: f64,
     /// Smallest and largest relative displacement along each of its directions, m.
     pub displacement: Vec<(f64, f64)>,
     /// Changes between stick and slip, or of the slip direction, per period.

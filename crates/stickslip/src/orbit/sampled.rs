@@ -1,6 +1,6 @@
 //! The numbers of any path, from its samples alone: Gauss quadrature between its switches.
 
-use super::measure::{Signals, Slip, extremes};
+use super::measure::{Faces, Shares, Signals, extremes};
 use super::{Path, Sample};
 use crate::law::Contact;
 use crate::model::{Axis, System};
@@ -119,16 +119,11 @@ impl Signals for Sampled<'_> {
         };
         Ok(self.range_of(at))
     }
-    fn slip(&self, joint: usize) -> Slip {
+    fn faces(&self, joint: usize) -> Faces {
         let contact = |i: usize| self.samples[i % self.nodes.len()].joints[joint].contact;
-        // both sums run in one order, so that a joint that always slips has a share of exactly one
-        let time = |counts: &dyn Fn(usize) -> bool| -> f64 {
-            (0..self.nodes.len()).map(|i| if counts(i) { self.nodes[i].1 } else { 0.0 }).sum()
-        };
-        let share = time(&|i| contact(i).slips()) / time(&|_| true);
         let count = self.nodes.len();
-        Slip {
-            share,
+        Faces {
+            shares: Shares::of((0..count).map(|i| (contact(i), self.nodes[i].1))),
             switches: (0..count).filter(|&i| contact(i) != contact(i + 1)).count(),
             rests: (0..count).all(|i| contact(i) == Contact::Stick),
         }

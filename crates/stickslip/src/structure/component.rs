@@ -1,7 +1,10 @@
 //! A structure by its matrices, as finite-element programs write them, before it becomes a part of a model: what its rows are called, and what
 //! a model sees of it, in few coordinates or in all.
 
-use super::reduction::{Damping, Deviation, Free, Reduce, Reduced, ReductionError, Reference, Row, Whole};
+use super::cyclic::{BladeError, Boundary, CyclicSector};
+use super::reduction::{
+    Damping, Deviation, Free, Reduce, Reduced, ReducedSector, ReductionError, Reference, Row, Whole,
+};
 use super::{StructureError, symmetric};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -39,7 +42,23 @@ struct Kept {
     whole: Whole,
     /// What was asked for, and what came of it: cases of a study ask the same.
     reductions: Mutex<Vec<(Asked, Answer)>>,
+    /// As one of so many sectors of a ring.
+    sectors: Mutex<Vec<(Boundary, usize, Arc<KeptSector>)>>,
 }
+
+/// A component as a sector of a ring, and what was asked of it.
+#[derive(Debug)]
+pub(crate) struct KeptSector {
+    pub sector: CyclicSector,
+    reductions: Mutex<Vec<(Asked, Answer)>>,
+    blades: Mutex<Vec<(OfBlade, Relieved)>>,
+}
+
+/// Rows of a blade, and the reduction in whose coordinates it is asked for.
+type OfBlade = (Vec<usize>, Option<Asked>);
+
+/// What a share of one of the blade's stiffness adds, over the coordinates of a sector.
+type Relieved = Result<Arc<Vec<(usize, usize, f64)>>, BladeError>;
 
 type Asked = (Vec<Row>, Reduction);
 type Answer = Result<Arc<ReducedComponent>, ReductionError>;
@@ -89,8 +108,7 @@ impl Reduction {
 /// A component in few coordinates, and how far it is from the whole.
 #[derive(Debug, Clone)]
 pub struct ReducedComponent {
-    /// Without its basis.
-    reduced: Reduced,
+    form: Form,
     deviation: Deviation,
     /// Frequencies of the whole, rad/s, as far as they were computed.
     frequencies: Vec<f64>,
@@ -98,6 +116,15 @@ pub struct ReducedComponent {
     free: usize,
     /// The error holds up to there, rad/s.
     up_to: f64,
+}
+
+/// Small matrices.
+#[derive(Debug, Clone)]
+pub(crate) enum Form {
+    /// Of a component; without its basis.
+    Alone(Reduced),
+    /// Of one sector of a ring.
+    Sector(ReducedSector),
 }
 
 /// A mode that is kept, in multiples of the frequency up to which it serves: the last ones only complete those below.
@@ -132,8 +159,8 @@ impl Component {
         let damping = damping.map_or(Damping::Rayleigh { mass: 0.0, stiffness: 0.0 }, Damping::Matrix);
         // sizes and symmetry were looked at
         let whole = Whole::unseen(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
-        let (index, reductions) = (OnceLock::new(), Mutex::default());
-        Ok(Component(Arc::new(Kept { rows, index, whole, reductions })))
+        let (index, reductions, sectors) = (OnceLock::new(), Mutex::default(), Mutex::default());
+        Ok(Component(Arc::new(Kept { rows, index, whole, reductions, sectors })))
     }
 
     /// Rows of the matrices.
@@ -180,14 +207,61 @@ impl Component {
     /// # Errors
     /// [`ReductionError`]: no place, modes that cannot be had, or no reduction that is close enough.
     pub fn reduced(&self, seen: &[Row], how: &Reduction) -> Answer {
-        // whoever asks the same at the same time waits for the one who computes
-        let mut known = self.0.reductions.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, answer)) = known.iter().find(|((rows, asked), _)| rows == seen && asked == how) {
-            return answer.clone();
+        once(&self.0.reductions, &(seen.to_vec(), *how), || {
+            self.0.whole.seen_at(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new)
+        })
+    }
+
+    /// The component as one of `sectors` sectors of a ring.
+    pub(crate) fn sector(&self, boundary: &Boundary, sectors: usize) -> Arc<KeptSector> {
+        let mut known = self.0.sectors.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((.., kept)) = known.iter().find(|(own, count, _)| own == boundary && *count == sectors) {
+            return kept.clone();
         }
-        let answer = self.0.whole.seen_at(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new);
-        known.push(((seen.to_vec(), *how), answer.clone()));
-        answer
+        let sector = CyclicSector::new(self, boundary, sectors);
+        let kept = Arc::new(KeptSector { sector, reductions: Mutex::default(), blades: Mutex::default() });
+        known.push((boundary.clone(), sectors, kept.clone()));
+        kept
+    }
+}
+
+/// An answer that is computed once: whoever asks the same at the same time waits for the one who computes.
+fn once<K: PartialEq + Clone, V: Clone>(known: &Mutex<Vec<(K, V)>>, asked: &K, compute: impl FnOnce() -> V) -> V {
+    let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, answer)) = known.iter().find(|(key, _)| key == asked) {
+        return answer.clone();
+    }
+    let answer = compute();
+    known.push((asked.clone(), answer.clone()));
+    answer
+}
+
+impl KeptSector {
+    /// The sector in few coordinates.
+    pub fn reduced(&self, seen: &[Row], how: &Reduction) -> Answer {
+        once(&self.reductions, &(seen.to_vec(), *how), || {
+            let chosen = self.sector.reduced(seen, how)?;
+            let (deviation, frequencies) = (chosen.deviation, chosen.frequencies);
+            let form = Form::Sector(chosen.reduced);
+            Ok(Arc::new(ReducedComponent { form, deviation, frequencies, free: chosen.free, up_to: chosen.up_to }))
+        })
+    }
+
+    /// What a share of one of the stiffness of the blade, the rows `blade` of the component, adds: over the coordinates of that reduction, or
+    /// over all rows that are left.
+    pub fn blade(&self, component: &Component, blade: &[usize], reduced: Option<(&[Row], &Reduction)>) -> Relieved {
+        let asked = reduced.map(|(seen, how)| (seen.to_vec(), *how));
+        once(&self.blades, &(blade.to_vec(), asked), || {
+            let own = self.sector.blade(component, blade)?;
+            let Some((seen, how)) = reduced else { return Ok(Arc::new(own.entries())) };
+            let reduced = self.reduced(seen, how).ok();
+            let Some(Form::Sector(sector)) = reduced.as_deref().map(ReducedComponent::form) else {
+                return Ok(Arc::default()); // its reduction has failed before
+            };
+            let small = own.along(sector.n, &sector.basis);
+            let all = (0..small.ncols()).flat_map(|k| (0..small.nrows()).map(move |i| (i, k)));
+            Ok(Arc::new(all.map(|at| (at.0, at.1, small[at])).collect()))
+        })
     }
 }
 
@@ -229,18 +303,24 @@ fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionE
         }
     };
     let (frequencies, free) = (natural(&modes), modes.free());
-    Ok(ReducedComponent { reduced: reduced.in_metres(), deviation, frequencies, free, up_to })
+    Ok(ReducedComponent { form: Form::Alone(reduced.in_metres()), deviation, frequencies, free, up_to })
 }
 
 impl ReducedComponent {
-    /// Coordinates.
+    /// Coordinates; of a sector of a ring those of one sector.
     pub fn dofs(&self) -> usize {
-        self.reduced.dofs()
+        match &self.form {
+            Form::Alone(reduced) => reduced.dofs(),
+            Form::Sector(sector) => sector.dofs(),
+        }
     }
 
     /// What it is made of, in words.
     pub fn kind(&self) -> &str {
-        &self.reduced.kind
+        match &self.form {
+            Form::Alone(reduced) => &reduced.kind,
+            Form::Sector(sector) => &sector.kind,
+        }
     }
 
     /// The largest relative error of what is seen, up to [`ReducedComponent::up_to`].
@@ -268,9 +348,9 @@ impl ReducedComponent {
         self.free
     }
 
-    /// Its small matrices, with a damping that is not a matrix of the component, if it is given, in place of the component's own.
-    pub(crate) fn matrices(&self, damping: Option<&Damping>) -> Result<Reduced, ReductionError> {
-        damping.map_or_else(|| Ok(self.reduced.clone()), |damping| self.reduced.damped(damping))
+    /// Its small matrices.
+    pub(crate) fn form(&self) -> &Form {
+        &self.form
     }
 }
 

@@ -1,11 +1,15 @@
 //! The linear part of a system: the only owner of mass, damping and stiffness.
 
 mod component;
+mod cyclic;
 mod dynamic;
 pub mod reduction;
 mod sector;
 
 pub use component::{Component, ReducedComponent, Reduction, ReductionKind};
+pub(crate) use component::{Form as ReducedForm, KeptSector};
+pub use cyclic::{Axis, BladeError, Boundary, BoundaryError};
+pub(crate) use cyclic::{CyclicSector, RingEntry, RingRow};
 pub use dynamic::DynamicStiffness;
 pub(crate) use sector::turn;
 pub use sector::{Sector, Wave, WaveStiffness};

@@ -51,6 +51,33 @@ pub(crate) fn turn(k: i64, n: usize) -> Complex64 {
     }
 }
 
+/// Whether the matrices of a wave are real: neighbours move alike, or against each other.
+pub(crate) fn is_real(diameter: usize, sectors: usize) -> bool {
+    (2 * diameter).is_multiple_of(sectors)
+}
+
+/// What a matrix of a ring is in a wave, of its entries in the rows of a sector, of which there are so many, over its columns: row, column, by how many
+/// sectors the column lies further, value. As (row, column, value) of a sector twice, or once where the wave is real.
+pub(super) fn in_wave(
+    entries: impl Iterator<Item = (usize, usize, i64, f64)>,
+    [rows, columns]: [usize; 2],
+    diameter: usize,
+    sectors: usize,
+) -> Vec<(usize, usize, f64)> {
+    let real = is_real(diameter, sectors);
+    let mut triplets = Vec::new();
+    for (row, column, shift, value) in entries {
+        let phase = turn(diameter as i64 * shift, sectors);
+        triplets.push((row, column, value * phase.re));
+        if !real {
+            triplets.push((rows + row, columns + column, value * phase.re));
+            triplets.push((row, columns + column, -value * phase.im));
+            triplets.push((rows + row, column, value * phase.im));
+        }
+    }
+    triplets
+}
+
 impl Sector {
     /// The first of `sectors` equal ones, whose degrees of freedom stand sector by sector in `ring`. `None` if they are not equal.
     pub fn of(ring: &Structure, sectors: usize) -> Option<Sector> {
@@ -121,21 +148,14 @@ impl Sector {
     /// ```
     pub fn wave(&self, diameter: usize) -> Result<Wave, StructureError> {
         let (n, diameter) = (self.dofs(), diameter % self.sectors);
-        // the matrices are real where neighbours move alike, or against each other
-        let real = (2 * diameter).is_multiple_of(self.sectors);
+        let real = is_real(diameter, self.sectors);
         let copies = if real { 1 } else { 2 };
-        let mut triplets: [Vec<(usize, usize, f64)>; 3] = Default::default();
-        for &(row, column, shift, values) in &self.entries {
-            let phase = turn((diameter * shift) as i64, self.sectors);
-            for (triplets, value) in triplets.iter_mut().zip(values).filter(|(_, value)| *value != 0.0) {
-                triplets.push((row, column, value * phase.re));
-                if !real {
-                    triplets.push((n + row, n + column, value * phase.re));
-                    triplets.push((row, n + column, -value * phase.im));
-                    triplets.push((n + row, column, value * phase.im));
-                }
-            }
-        }
+        let matrix = |kind: usize| {
+            let all =
+                self.entries.iter().map(|&(row, column, shift, values)| (row, column, shift as i64, values[kind]));
+            in_wave(all.filter(|entry| entry.3 != 0.0), [n, n], diameter, self.sectors)
+        };
+        let triplets = [0, 1, 2].map(matrix);
         let [mass, damping, stiffness] = triplets.map(|entries| {
             Matrix::from_triplets(copies * n, entries).map_err(|error| StructureError::of("sector's", &error))
         });

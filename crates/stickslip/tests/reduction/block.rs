@@ -105,6 +105,25 @@ fn reductions_of_the_block() {
     assert!(deviation.error < step.powi(8), "{deviation:?}");
 }
 
+/// Where ports are many they are loaded together, and the error is about that of few of them, each loaded alone: of modes without residual vectors,
+/// which are the same for any ports.
+#[test]
+fn many_ports_are_judged_together() {
+    let brick = brick([4, 6, 6], true);
+    let up_to = TAU * 30e3;
+    let ports = brick.face(49);
+    let error = |ports: Vec<Vec<(usize, f64)>>| {
+        let damping = Damping::Ratio { ratio: 0.005, up_to };
+        let whole = Whole::new(brick.mass.clone(), damping, brick.stiffness.clone(), ports).unwrap();
+        let modes = whole.modes(2.0 * up_to).unwrap();
+        let reduced = Free::new(&whole, &modes, 0.0, 0).unwrap().reduced(modes.count(), 0).unwrap();
+        Reference::at(&whole, &[0.3 * up_to, 0.8 * up_to]).unwrap().deviation(&reduced).error
+    };
+    assert_eq!(ports.len(), 147);
+    let (all, few) = (error(ports.clone()), error(ports.into_iter().step_by(2).collect()));
+    assert!(all > 0.5 * few && all < 2.0 * few && few > 1e-3, "{all:.2e} {few:.2e}");
+}
+
 /// As many modes and vectors as the error asks for.
 #[test]
 fn the_error_chooses_the_size() {

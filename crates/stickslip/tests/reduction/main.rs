@@ -2,4 +2,5 @@
 
 mod block;
 mod brick;
+mod contacts;
 mod dense;

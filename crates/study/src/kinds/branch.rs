@@ -286,7 +286,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         }
     }
     let quantity = if along.is_some() { name } else { "frequency".to_owned() };
-    let panel = Panel { title: String::new(), x: Axis::new(quantity, along_unit), y, series };
+    let panel = Panel { title: String::new(), x: Axis::new(quantity, along_unit), y, series, ..Panel::default() };
     Figure { panels: vec![panel], ..Figure::default() }
 }
 

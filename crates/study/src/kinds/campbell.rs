@@ -120,7 +120,7 @@ fn naturals(model: &Model, most: usize) -> Result<Vec<Natural>, String> {
         found.extend(all.map(|(mode, one)| Natural { state, diameter, mode, omega: one.omega }));
     };
     if model.ring.is_some_and(|ring| ring.equal) {
-        for wave in waves(model)? {
+        for wave in waves(model, most)? {
             add(0, Some(wave.diameter), &wave.free);
             add(1, Some(wave.diameter), &wave.stuck);
         }
@@ -321,7 +321,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 series.push(Series::marks("crossings", column(SPEED, x_factor), column(FREQUENCY, y_factor), colour));
             }
         }
-        Panel { title: stretch.label(), x: x.clone(), y: y.clone().between(0.0, top), series }
+        Panel { title: stretch.label(), x: x.clone(), y: y.clone().between(0.0, top), series, ..Panel::default() }
     };
     Figure { panels: drawing.stretches(table).iter().take(MOST_PANELS).map(panel).collect(), ..Figure::default() }
 }

@@ -350,7 +350,13 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             }
             let label = if label.is_empty() { joints[from].clone() } else { label.join(", ") };
             let at = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
-                panels.push(Panel { title, x: x_axis.clone(), y: y_axis.clone(), series: Vec::new() });
+                panels.push(Panel {
+                    title,
+                    x: x_axis.clone(),
+                    y: y_axis.clone(),
+                    series: Vec::new(),
+                    ..Panel::default()
+                });
                 panels.len() - 1
             });
             let x = numbers(table, DISPLACEMENT, rows.clone()).iter().map(|u| u * x_factor).collect();

@@ -13,6 +13,7 @@ mod orbits;
 mod peak_of;
 pub mod performance;
 pub mod response;
+mod shares;
 mod transient;
 
 use crate::extra;

@@ -257,6 +257,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 lines.collect()
             })
             .collect(),
+        ..Panel::default()
     };
     let panels = vec![
         panel("frequency", "Hz", "frequency_Hz", 1.0),

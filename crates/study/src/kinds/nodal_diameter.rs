@@ -72,11 +72,15 @@ fn cost(costing: &Costing<'_>) -> Cost {
 /// Time of an eigenvalue problem over the cube of its size, s.
 const EIGEN: f64 = 1e-8;
 
-/// The modes by nodal diameter, or that the sectors are too large for that.
-pub(super) fn waves(model: &Model) -> Result<Vec<WaveModes>, String> {
-    match model.wave_modes() {
+/// What is wrong with sectors that have no modes.
+const TOO_LARGE: &str = "the sectors are too large for all of their modes, or without masses; of a sector by its matrices take fewer coordinates \
+                         with `reduce`";
+
+/// The lowest modes by nodal diameter, or that the sectors are too large for that.
+pub(super) fn waves(model: &Model, most: usize) -> Result<Vec<WaveModes>, String> {
+    match model.wave_modes(most) {
         Ok(Some(waves)) => Ok(waves),
-        Ok(None) => Err("the sectors are too large for all of their modes, or without masses".to_owned()),
+        Ok(None) => Err(TOO_LARGE.to_owned()),
         Err(error) => Err(error.to_string()),
     }
 }
@@ -85,7 +89,8 @@ fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
     let mut part = Part::default();
     let mut rows = Rows::default();
-    match waves(&prepared.case.model) {
+    let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
+    match waves(&prepared.case.model, most) {
         Ok(waves) => {
             part.count(|| place_of(prepared), CONVERGED, None);
             write(prepared, &waves, &mut rows);
@@ -128,6 +133,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         x: Axis::new("nodal diameters", ""),
         y: y.clone(),
         series: lines(table, stretch, factor),
+        ..Panel::default()
     };
     Figure { panels: drawing.stretches(table).iter().take(MOST_PANELS).map(panel).collect(), ..Figure::default() }
 }

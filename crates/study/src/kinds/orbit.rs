@@ -178,6 +178,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                     x: Axis::new("time", time_unit.clone()),
                     y: Axis::new(what, unit),
                     series: columns.iter().enumerate().map(line).collect(),
+                    ..Panel::default()
                 }
             };
             if !system.places().is_empty() {

@@ -230,6 +230,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         x: Axis::new(&inner.name, inner.on_axis().1),
         y: y_axis.clone(),
         series,
+        ..Panel::default()
     };
     if drawing.study.draws().is_some() {
         // the stretches are of all parameters but the last: their first case stands for them

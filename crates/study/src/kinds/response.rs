@@ -1,16 +1,20 @@
 //! Response curves: amplitude over drive frequency.
 
+mod amplification;
 mod tables;
+mod wheel;
 
 pub use tables::{Curve, MassCurve, curves};
 
 use super::keys::{FREQUENCY, OUTPUT, anything, check_output};
 use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of, named_places, worst};
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, amplitude_of};
+use super::shares;
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, amplitude_of, phase_of};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Column, Figure, Panel, Series, Sharing, Style, Table, column_name};
 use crate::drawing::{Drawing, Layout, MOST_CURVES, MOST_PANELS, Stretch, largest, numbers, thinned, words};
+use crate::histogram;
 use crate::info::KindInfo;
 use crate::key::{Key, Takes, default};
 use crate::kind::Kind;
@@ -50,19 +54,25 @@ pub(super) const KIND: Kind = Kind {
                 doc: "the masses of which the worst counts in peaks.csv, or \"all\"; absent: every mass for itself",
                 ..PEAK_OF
             },
+            amplification::KEY,
             OUTPUT,
         ],
         check: |values, model, _| {
             check_peak_of(values, model)?;
+            amplification::check(values, model)?;
             check_output(values)
         },
         axes: [Some(Dimension::FREQUENCY), Some(Dimension::LENGTH)],
         uses_method: true,
         needs: anything,
         adapts: true,
-        tables: &[tables::CURVE, tables::PEAKS, tables::REFERENCES],
+        tables: &[tables::CURVE, tables::PEAKS, tables::REFERENCES, tables::AMPLIFICATION],
     },
-    grain: |study| if study.is_adaptive() { Grain::Case } else { Grain::Frequencies },
+    // an amplification is that of a whole curve
+    grain: |study| match study.is_adaptive() || study.wants(amplification::KEY.name) {
+        true => Grain::Case,
+        false => Grain::Frequencies,
+    },
     cost,
     warnings: sampled,
     compute,
@@ -82,16 +92,20 @@ fn cost(costing: &Costing<'_>) -> Cost {
         None => (costing.cases * costing.masses * PEAKS).floor(),
     };
     let linear = if costing.study.wants_references() { costing.frequencies * REFERENCE_POINTS as f64 } else { 0.0 };
+    // a tuned disk takes a sector's time, and its curve the frequencies of the other
+    let tuned = if values.flag(amplification::KEY.name) == Some(true) { costing.cases } else { 0.0 };
     let curves = costing.cases.min(MOST_CURVES as f64) * costing.masses.min(MOST_PANELS as f64 + SINGLE as f64);
     Cost {
         tables: vec![
             costing.orbits(points),
             Shape { rows: peaks, numbers: costing.varied + 3.0, words: 1.0 },
             Shape { rows: linear, numbers: 1.0 + 2.0 * costing.masses, words: 0.0 },
+            Shape { rows: tuned, numbers: costing.varied + 5.0, words: 1.0 },
         ],
         drawn: curves * costing.frequencies,
         unit: costing.orbit_bytes(),
-        work: points * costing.extra() + (points + REFINING * peaks + 2.0 * linear) * costing.orbit(),
+        work: points * costing.extra()
+            + (points + REFINING * peaks + 2.0 * linear + tuned * costing.frequencies) * costing.orbit(),
     }
 }
 
@@ -125,9 +139,11 @@ fn compute(work: &Work<'_>) -> Computed {
     let of = part.points.values().sum::<u64>() as usize;
     part.notes.push(Note::Stuck { case: case.label(), points: stretch.stuck, of });
     part.tables = vec![stretch.rows];
+    let mut amplified = Rows::default();
     if !points.is_empty() && !work.context.stopped() {
         let mut peaks = Rows::default();
-        for found in peaks_of(work, points).map_err(|error| (case.index, error))? {
+        let all = peaks_of(work, points).map_err(|error| (case.index, error))?;
+        for found in &all {
             if found.peak.unsettled {
                 let at = || {
                     format!("peak of {}, {}", prepared.system.places()[found.mass], place_of(case, found.peak.omega))
@@ -144,6 +160,11 @@ fn compute(work: &Work<'_>) -> Computed {
             peaks.end();
         }
         part.tables.push(peaks);
+        if work.study.wants(amplification::KEY.name) {
+            if let Err(why) = amplification::row(work, &all, &mut amplified) {
+                part.notes.push(Note::Said(format!("{WARNING}no amplification, {}: {why}.", case.label())));
+            }
+        }
     } else {
         part.tables.push(Rows::default());
     }
@@ -151,7 +172,10 @@ fn compute(work: &Work<'_>) -> Computed {
         let (rows, absent) = references(work, &stretch.omegas);
         part.tables.push(rows);
         part.notes.extend(absent.into_iter().map(Note::Said));
+    } else {
+        part.tables.push(Rows::default());
     }
+    part.tables.push(amplified);
     Ok(part)
 }
 
@@ -380,6 +404,8 @@ struct Drawn<'a> {
     peaks: Vec<(usize, (String, f64, f64))>,
     /// Names of the joints whose forces are shown.
     joints: Vec<String>,
+    /// Names of the joints whose shares of stick and slip are shown.
+    faces: Vec<String>,
     /// The first case's; the others differ in numbers only.
     system: &'a System,
     axes: (Axis, Axis),
@@ -488,7 +514,10 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let names = system.joints().iter().flat_map(|joint| joint.labels());
     let joints: Vec<String> =
         names.filter(|name| drawing.shows(name) && curve.numbers(&force(name)).is_some()).collect();
-    if shown.is_empty() && joints.is_empty() {
+    // with `output = "contact"` only
+    let names = system.joints().iter().map(|joint| joint.name().to_owned());
+    let faces: Vec<String> = names.filter(|name| drawing.shows(name) && shares::has(curve, name)).collect();
+    if shown.is_empty() && joints.is_empty() && faces.is_empty() {
         return Figure::default();
     }
     let columns = || shown.iter().map(|(name, _)| amplitude_of(name));
@@ -510,17 +539,26 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         system: &system,
         shown,
         joints,
+        faces,
         left_out: drawing.left_out(stretches.len()),
     };
-    match layout {
-        Layout::Cases => Figure { panels: drawn.by_case(&stretches), ..Figure::default() },
+    let mut figure = match layout {
+        Layout::Cases => {
+            // colours are those of maps: the curves of one panel have names
+            let varied = (!drawn.faces.is_empty()).then(|| shares::axis("share of the period"));
+            Figure { panels: drawn.by_case(&stretches), varied, ..Figure::default() }
+        }
         Layout::Masses => Figure {
             panels: drawn.by_mass(&stretches),
             sharing: Sharing::Always,
             varied: drawing.varied_axis(&stretches, drawing.study.varied().len().saturating_sub(1)),
             ..Figure::default()
         },
-    }
+    };
+    let amplified = amplification::panels(drawing);
+    figure.panels.extend(if amplified.is_empty() { drawn.heights() } else { amplified });
+    figure.panels.truncate(MOST_PANELS);
+    figure
 }
 
 /// What a place of a ring is called in its sector, and the number of that: `blade` and 3 for `blade_3`, `blade.x` and 3 for `blade_3.x`.
@@ -538,11 +576,39 @@ fn force(joint: &str) -> String {
 
 impl Drawn<'_> {
     fn panel(&self, title: String) -> Panel {
-        Panel { title, x: self.axes.0.clone(), y: self.axes.1.clone(), series: Vec::new() }
+        Panel { title, x: self.axes.0.clone(), y: self.axes.1.clone(), ..Panel::default() }
     }
 
     fn force_panel(&self, title: String) -> Panel {
         Panel { y: self.force_axis.clone(), ..self.panel(title) }
+    }
+
+    /// Of many draws how high their largest peak is.
+    fn heights(&self) -> Vec<Panel> {
+        let (Some(table), Some(_)) = (self.drawing.table(tables::PEAKS), self.drawing.study.draws()) else {
+            return Vec::new();
+        };
+        let stretches = self.drawing.stretches(table);
+        let x = Axis { quantity: "largest peak".to_owned(), ..Axis::new("", &self.axes.1.unit) };
+        let of_group = |(words, group): (String, Vec<&Stretch>)| {
+            let highest = |stretch: &&Stretch| {
+                let heights = numbers(table, AMPLITUDE, stretch.rows.clone());
+                heights.into_iter().fold(f64::NAN, f64::max) * self.factor.1
+            };
+            let heights: Vec<f64> = group.iter().map(highest).collect();
+            histogram::panel(&heights, &x, &join([words, "largest peak".to_owned()]), "draws")
+        };
+        self.drawing.by_listed(&stretches).into_iter().filter_map(of_group).collect()
+    }
+
+    fn slip_panel(&self, title: String) -> Panel {
+        Panel { y: shares::axis("share of the period with slip"), ..self.panel(title) }
+    }
+
+    /// The share in which joints slip.
+    fn slip_line(&self, stretch: &Stretch, joints: &[String]) -> (Vec<f64>, Vec<f64>) {
+        let x = numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
+        (x, shares::slipping(self.curve, joints, &stretch.rows))
     }
 
     fn force_line(&self, stretch: &Stretch, joint: &str) -> (Vec<f64>, Vec<f64>) {
@@ -568,7 +634,7 @@ impl Drawn<'_> {
             if !self.shown.is_empty() {
                 panels.push(self.masses_of(stretch));
             }
-            panels.extend(self.sectors_of(stretch));
+            panels.extend(self.sectors_of(stretch).into_iter().flatten().flatten());
             if !self.joints.is_empty() {
                 let mut panel = self.force_panel(stretch.label());
                 for (i, joint) in self.joints.iter().enumerate() {
@@ -578,6 +644,10 @@ impl Drawn<'_> {
                 }
                 panels.push(panel);
             }
+            let x: Vec<f64> =
+                numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
+            let over = (&x[..], &self.axes.0);
+            panels.extend(shares::panels(self.curve, &self.faces, &stretch.rows, over, &stretch.label()));
         }
         panels
     }
@@ -615,23 +685,27 @@ impl Drawn<'_> {
         panel
     }
 
-    /// Of a disk a bar for every sector, at the frequency where the largest amplitude is.
-    fn sectors_of(&self, stretch: &Stretch) -> Option<Panel> {
-        self.drawing.study.structure.lists.disk.as_ref()?;
+    /// Of a disk a bar for every sector, at the frequency where the largest amplitude is, and its shape there.
+    fn sectors_of(&self, stretch: &Stretch) -> Option<[Option<Panel>; 2]> {
+        let ring = self.drawing.study.case(0).ok()?.model.ring?;
         let columns: Vec<(&str, Vec<f64>)> =
             self.shown.iter().map(|(name, _)| (name.as_str(), self.amplitudes(name, stretch.rows.clone()))).collect();
         let highest = |row: usize| columns.iter().map(|(_, values)| values[row]).fold(f64::NEG_INFINITY, f64::max);
         let row = (0..stretch.rows.len()).max_by(|a, b| highest(*a).total_cmp(&highest(*b)))?;
         // what is one place in a sector has one colour
         let mut series: Vec<Series> = Vec::new();
+        let mut shape: Vec<wheel::Around> = Vec::new();
         for (name, values) in &columns {
             let (place, sector) = of_sector(name)?;
             let at = series.iter().position(|bars| bars.label == place).unwrap_or_else(|| {
+                shape.push((place.clone(), Vec::new()));
                 series.push(Series::bars(place, Vec::new(), Vec::new(), series.len()));
                 series.len() - 1
             });
             series[at].x.push(sector as f64);
             series[at].y.push(values[row] * self.factor.1);
+            let phase = numbers(self.curve, &phase_of(name), stretch.rows.start + row..stretch.rows.start + row + 1)[0];
+            shape[at].1.push((sector, values[row], phase));
         }
         if series.iter().all(|bars| bars.x.len() < 2) {
             return None;
@@ -639,7 +713,8 @@ impl Drawn<'_> {
         let frequency = shown_hertz(numbers(self.curve, DRIVE, stretch.rows.clone())[row]);
         let title = join([stretch.label(), format!("at {frequency}")]);
         let (x, y) = (Axis::new("sector", ""), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
-        Some(Panel { title, x, y, series })
+        let wheel = wheel::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone()]));
+        Some([Some(Panel { title, x, y, series, ..Panel::default() }), wheel])
     }
 
     /// A panel for every mass (or for the largest of them), with a curve for every case, and then for every joint the same. The last varied
@@ -659,7 +734,10 @@ impl Drawn<'_> {
         let of_joints = groups
             .iter()
             .flat_map(|(group, outer)| self.joints.iter().map(|joint| self.cases_of_joint(joint, group, outer)));
-        of_masses.chain(of_joints).take(MOST_PANELS).collect()
+        let of_faces = groups.iter().flat_map(|(group, outer)| {
+            shares::groups(&self.faces).into_iter().map(move |joints| self.slipping_in_cases(joints, group, outer))
+        });
+        of_masses.chain(of_joints).chain(of_faces).take(MOST_PANELS).collect()
     }
 
     /// Of many draws a panel for every mass (or for the largest of them) and for every joint, with their percentiles for each combination of
@@ -696,6 +774,9 @@ impl Drawn<'_> {
         }
         for joint in &self.joints {
             panels.push(panel(self.force_panel(String::new()), joint, &|stretch| self.force_line(stretch, joint)));
+        }
+        for (name, joints) in shares::groups(&self.faces) {
+            panels.push(panel(self.slip_panel(String::new()), &name, &|stretch| self.slip_line(stretch, &joints)));
         }
         panels.truncate(MOST_PANELS);
         panels
@@ -742,6 +823,16 @@ impl Drawn<'_> {
             // one curve has a colour of its own, beside those of the masses
             let colour = if stretch.varied.is_empty() { self.system.places().len() } else { colour };
             panel.series.push(of_case(stretch, joint, x, y, colour));
+        }
+        panel
+    }
+
+    /// The cases of a group, for the slip of a joint, or of all.
+    fn slipping_in_cases(&self, (name, joints): (String, Vec<String>), group: &[Stretch], outer: &str) -> Panel {
+        let mut panel = self.slip_panel(join([name.clone(), outer.to_owned()]));
+        for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
+            let (x, y) = self.slip_line(stretch, &joints);
+            panel.series.push(of_case(stretch, &name, x, y, colour));
         }
         panel
     }

@@ -355,6 +355,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                     .filter(|(_, place)| drawing.shows(place))
                     .map(line)
                     .collect(),
+                ..Panel::default()
             });
             from = to;
         }

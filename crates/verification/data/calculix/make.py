@@ -133,7 +133,7 @@ def sector(folder):
     deck = mesh.deck({"BORE": bore, "RIGHT": right, "LEFT": left}, "BORE")
     run(folder, "sector", deck + MATRICES)
     keep_matrices(folder, "sector")
-    keep("sector_boundary.csv", "right,left\n" + "".join(f"{a},{b}\n" for a, b in zip(right, left)))
+    keep("sector_boundary.csv", "low,high\n" + "".join(f"{a},{b}\n" for a, b in zip(right, left)))
     keep("sector_nodes.csv", "node,x,y,z\n" + "".join(f"{n},{x:.15g},{y:.15g},{z:.15g}\n" for n, (x, y, z) in mesh.nodes.items()))
     cyclic = ("*SURFACE, TYPE=NODE, NAME=SLEFT\nLEFT\n*SURFACE, TYPE=NODE, NAME=SRIGHT\nRIGHT\n"
               "*TIE, NAME=T1, CYCLIC SYMMETRY\nSLEFT, SRIGHT\n"

@@ -7,7 +7,7 @@ use crate::law::Contact;
 use crate::method::Breakdown;
 use crate::method::periodic::Closed;
 use crate::model::{Axis, System};
-use crate::orbit::measure::{NO_WORK, Signals, Slip, measure};
+use crate::orbit::measure::{Faces, NO_WORK, Shares, Signals, measure};
 use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -100,6 +100,17 @@ impl ExactPath {
     /// The parts of a joint.
     fn of_joint(&self, joint: usize) -> impl Iterator<Item = usize> {
         self.parts.iter().enumerate().filter(move |(_, part)| part.joint == joint).map(|(s, _)| s)
+    }
+
+    /// What the faces of a joint do in a segment: they slip if a slider of it does, rest if one does, touch if a stop does, and else are open.
+    /// `None` of a joint that holds nothing.
+    fn contact_of(&self, joint: usize, segment: &Segment) -> Option<Contact> {
+        let of_part = |s: usize| match segment.contacts[s] {
+            Contact::Stick if !self.parts[s].is_slider() => Contact::Touch,
+            contact => contact,
+        };
+        let of_parts = || self.of_joint(joint).map(of_part);
+        of_parts().find(|contact| contact.slips()).or_else(|| of_parts().min())
     }
 
     /// What the contact at the end of the return goes on as after it.
@@ -338,15 +349,14 @@ impl Signals for Measuring<'_> {
         }
         sum
     }
-    fn slip(&self, joint: usize) -> Slip {
+    fn faces(&self, joint: usize) -> Faces {
         let path = self.path;
         if path.of_joint(joint).next().is_none() {
-            return Slip { share: 1.0, switches: 0, rests: false }; // a joint that holds nothing slips all the time
+            // a joint that holds nothing slips all the time
+            return Faces { shares: Shares { slip: 1.0, ..Shares::default() }, switches: 0, rests: false };
         }
-        // both sums run in one order, so that a joint that always slips has a share of exactly one
-        let time = |counts: &dyn Fn(&Segment) -> bool| -> f64 {
-            path.pieces.iter().map(|piece| if counts(&piece.segment) { piece.segment.length } else { 0.0 }).sum()
-        };
+        let contact = |piece: &Piece| path.contact_of(joint, &piece.segment).unwrap_or(Contact::Open);
+        let shares = Shares::of(path.pieces.iter().map(|piece| (contact(piece), piece.segment.length)));
         let slips = |segment: &Segment| path.of_joint(joint).any(|s| segment.contacts[s].slips());
         let pairs = path.pieces.windows(2).map(|pair| (&pair[0].segment.contacts, &pair[1].segment.contacts));
         let mut switches: usize =
@@ -356,7 +366,7 @@ impl Signals for Measuring<'_> {
             switches += path.of_joint(joint).filter(|&s| path.next_of(last[s]) != first[s]).count();
         }
         let rests = !path.pieces.iter().any(|piece| slips(&piece.segment));
-        Slip { share: time(&slips) / time(&|_| true), switches, rests }
+        Faces { shares, switches, rests }
     }
 }
 
@@ -477,21 +487,14 @@ impl Path for ExactPath {
                 let mut speed = vec![ZERO; nb];
                 piece.basis().differentiate(&imposed, &mut speed);
                 let along = |v: &[f64]| joint.axes()[0].along(v);
-                let mine = || self.of_joint(j);
                 let joint_velocity = along(&velocity) + sign * real_dot(&speed, &values);
-                let of_part = |s: usize| match piece.segment.contacts[s] {
-                    Contact::Stick if !self.parts[s].is_slider() => Contact::Touch,
-                    contact => contact,
-                };
-                let of_parts = || mine().map(of_part);
-                // a joint slips if a slider of it does, rests if one does, touches if a stop does, and else is open
-                let contact = match of_parts().find(|c| c.slips()).or_else(|| of_parts().min()) {
+                let contact = match self.contact_of(j, &piece.segment) {
                     None => Contact::slip(joint_velocity),
                     Some(contact) if sign < 0.0 => contact.mirrored(),
                     Some(contact) => contact,
                 };
                 let joint_displacement = along(&displacement) + sign * real_dot(&imposed, &values);
-                let force = mine().map(|s| row(&piece.segment.force, s)).sum();
+                let force = self.of_joint(j).map(|s| row(&piece.segment.force, s)).sum();
                 JointSample::along(joint_displacement, joint_velocity, force, contact)
             })
             .collect();

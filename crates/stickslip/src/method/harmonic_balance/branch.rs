@@ -61,8 +61,9 @@ impl<'a> BranchEquations<'a> {
         let (ports, around) = Ports::of_sector(&system).map_err(|error| error.with_ways(&system))?;
         let rest = Rest::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
-        let level = |top: usize| Level::new(kept.up_to(top), method.samples_at(top, &ports), &ports, None);
-        super::check_size(2 * ports.count() * kept.up_to(top).len())?;
+        let level =
+            |top: usize| Level::new(kept.up_to(top), method.samples_at(top, &ports), &ports, None).with_matrix();
+        super::check_memory(&ports, &rest, (kept.up_to(top).len(), 1), true)?;
         let few = 2 * ports.count() * kept.up_to(kept.double(top)).len() <= LARGEST;
         let (finer, level) = (few.then(|| level(kept.double(top))), level(top));
         let motion = Motion::rest(level.linear.len());

@@ -63,6 +63,8 @@ pub(super) struct Level {
     pub sparse: Option<Sparse>,
     /// In place of the Jacobian, for many joints that the structure couples.
     pub(super) coupled: Option<Coupled>,
+    /// Whether its matrix is needed, and with it receptances as matrices.
+    with_matrix: bool,
     /// How often the derivative was multiplied with in the present search.
     pub products: usize,
     /// K or T of every port, one after the other, see [`blocks`].
@@ -78,6 +80,8 @@ pub(super) struct Level {
     pub(super) best: Motion,
     pub(super) step: Vec<f64>,
     image: Vec<Complex64>,
+    /// Of ports with a memory, the states at t = 0 in the motion that was evaluated last.
+    states: Vec<Vec<f64>>,
     /// Motions along the axes under their forces, [axis][harmonic].
     moved: Vec<Complex64>,
     product: Vec<f64>,
@@ -136,6 +140,11 @@ impl Level {
         level
     }
 
+    /// The same with a derivative that is a matrix, whatever its size.
+    pub fn with_matrix(self) -> Self {
+        Level { with_matrix: true, ..self }
+    }
+
     /// Without what Newton's steps need.
     fn unassembled(alternation: Alternation, ports: &Ports, sparse: Option<Sparse>) -> Self {
         let (nh, axes) = (alternation.harmonics.len(), ports.count());
@@ -156,6 +165,7 @@ impl Level {
             forces: ports.iter().flat_map(|port| vec![port.is_force(); port.axes]).collect(),
             jacobian: Vec::new(),
             coupled: None,
+            with_matrix: false,
             products: 0,
             sparse,
             residual: vec![0.0; size],
@@ -164,6 +174,7 @@ impl Level {
             best: Motion::rest(nh * axes),
             step: vec![0.0; size],
             image: vec![ZERO; nh * widest],
+            states: vec![Vec::new(); ports.len()],
             moved: vec![ZERO; nh * axes],
             product: vec![0.0; (2 * nh * widest).pow(2)],
         }
@@ -259,7 +270,7 @@ impl Level {
     /// Receptances of the axes with the springs in series, as matrices unless these would be many and modes are at hand.
     fn receptance(&self, ports: &Ports, rest: &Rest, omega: f64) -> Result<Receptance, f64> {
         let harmonics = self.harmonics();
-        if let Some(structure) = rest.modes_for(ports) {
+        if let Some(structure) = rest.modes_for(ports).filter(|_| !self.with_matrix) {
             let modal = Modal::new(structure, (harmonics, omega), &self.series);
             return modal.map(Receptance::Modal).map_err(|_| omega);
         }
@@ -317,6 +328,9 @@ impl Level {
             let slot = wanted.then_some(&mut self.tangents[block(&self.blocks, p, port, nh)]);
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
             self.alternation.respond(port, (omega, ease.limits), c, force, slot);
+            if port.marches() {
+                self.states[p].clone_from(&self.alternation.state);
+            }
         }
         // what the structure does: into the residual of motions, and into the motions whose force is unknown
         if self.sparse.is_none() {
@@ -374,13 +388,14 @@ impl Level {
         sum.sqrt()
     }
 
-    /// The derivatives that [`Slopes::Cheap`] left out.
+    /// The derivatives that [`Slopes::Cheap`] left out, at the motion that was evaluated last.
     pub fn follow_slopes(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, ease: Ease) {
         let nh = self.harmonics().len();
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.marches()) {
             let range = port.first * nh..(port.first + port.axes) * nh;
             let slot = &mut self.tangents[block(&self.blocks, p, port, nh)];
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
+            self.alternation.begin.clone_from(&self.states[p]);
             self.alternation.respond(port, (omega, ease.limits), c, force, Some(slot));
         }
     }

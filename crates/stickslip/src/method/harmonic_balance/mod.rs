@@ -97,8 +97,6 @@ const NEARBY: usize = 20;
 const RECENT: usize = 8;
 /// Unknowns beyond which no error is estimated: the elimination would take seconds.
 const LARGEST: usize = 2100;
-/// Unknowns beyond which no branch is begun: its matrices are formed, and would fill gigabytes.
-const POSSIBLE: usize = 8192;
 /// Memory of the equations, bytes, beyond which nothing is begun: 1000 nodes of three directions with five harmonics need half of it without modes.
 const MEMORY: f64 = 4e9;
 /// Harmonics times axes squared up to which products with all of them take a tenth of a second, so that an error is estimated.
@@ -199,24 +197,19 @@ impl HarmonicBalance {
     }
 }
 
-/// Whether so many harmonics along so many coordinates can be solved at all.
-fn check_size(unknowns: usize) -> Result<(), MethodError> {
-    if unknowns <= POSSIBLE {
-        return Ok(());
-    }
-    let message =
-        format!("there would be {unknowns} unknowns, and {POSSIBLE} are possible: fewer harmonics, or fewer joints");
-    Err(MethodError::Option { method: NAME, key: "harmonics", message })
-}
-
 /// What there may be less of: a motion of several periods of the drive has as many times the harmonics.
 fn fewer(periods: usize) -> (&'static str, &'static str) {
     if periods > 1 { (PERIOD.key, "fewer periods, ") } else { ("harmonics", "") }
 }
 
-/// Whether what equations with so many harmonics need fits into memory.
-fn check_memory(ports: &Ports, rest: &Rest, (harmonics, periods): (usize, usize)) -> Result<(), MethodError> {
-    let bytes = memory(ports, rest, harmonics);
+/// Whether what equations with so many harmonics need fits into memory; `formed` if their matrix is needed in any case.
+fn check_memory(
+    ports: &Ports,
+    rest: &Rest,
+    (harmonics, periods): (usize, usize),
+    formed: bool,
+) -> Result<(), MethodError> {
+    let bytes = memory(ports, rest, harmonics, formed);
     if bytes <= MEMORY {
         return Ok(());
     }
@@ -232,15 +225,20 @@ fn check_memory(ports: &Ports, rest: &Rest, (harmonics, periods): (usize, usize)
 
 /// Memory of a level that is not banded, bytes: derivatives of the ports; receptances and their factors, or modes along the axes with the factor of
 /// what most of them add; and where a matrix may be formed, that.
-fn memory(ports: &Ports, rest: &Rest, harmonics: usize) -> f64 {
+fn memory(ports: &Ports, rest: &Rest, harmonics: usize, always: bool) -> f64 {
     let (axes, pair) = (ports.count() as f64, 2.0 * harmonics as f64);
     let size = pair * axes;
     let tangents: f64 = ports.iter().map(|port| (pair * port.axes as f64).powi(2)).sum();
-    let structure = match rest.modes_for(ports) {
+    let structure = match rest.modes_for(ports).filter(|_| !always) {
         Some(structure) => structure.at.len() as f64 + 3.0 * axes * axes,
         None => 4.0 * harmonics as f64 * axes * axes,
     };
-    let formed = if size <= coupled::FORMED as f64 { size * size } else { 0.0 };
+    // whoever needs it in any case has it beside a factor of it and that of the step before
+    let formed = match always {
+        true => 3.0 * size * size,
+        false if size <= coupled::FORMED as f64 => size * size,
+        false => 0.0,
+    };
     8.0 * (tangents + structure + formed)
 }
 
@@ -465,7 +463,7 @@ impl<'a> Balance<'a> {
         let first = (FIRST * kept.scale).max(kept.highest);
         let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
         if Sparse::new(&system, &ports, &[1]).is_none() {
-            check_memory(&ports, &rest, (harmonics.len(), periods))?;
+            check_memory(&ports, &rest, (harmonics.len(), periods), false)?;
         }
         Ok(Balance {
             method,
@@ -507,7 +505,7 @@ impl Balance<'_> {
         let axes = self.ports.count();
         let products = (harmonics * axes * axes) as f64;
         2 * axes * harmonics <= LARGEST
-            || (products <= ESTIMATED && memory(&self.ports, &self.rest, harmonics) <= MEMORY)
+            || (products <= ESTIMATED && memory(&self.ports, &self.rest, harmonics, false) <= MEMORY)
     }
 
     /// Solves at `top`, from a motion at another number of harmonics or from the first guess.

@@ -6,7 +6,7 @@ use super::rest::Rest;
 use crate::law::{Contact, MOST_DIRECTIONS};
 use crate::method::evidence::{Judge, Judged};
 use crate::model::{Axis, MovedPlace, System};
-use crate::orbit::measure::{Signals, Slip, measure};
+use crate::orbit::measure::{Faces, Shares, Signals, measure};
 use crate::orbit::{Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -344,12 +344,12 @@ impl Signals for Measuring<'_> {
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(&relative(self.axes[axis], self.harmonics, self.x)))
     }
-    fn slip(&self, joint: usize) -> Slip {
+    fn faces(&self, joint: usize) -> Faces {
         let contact = &self.contact[joint];
         let samples = contact.len();
         let switches = (0..samples).filter(|&i| contact[i] != contact[(i + 1) % samples]).count();
-        Slip {
-            share: contact.iter().filter(|contact| contact.slips()).count() as f64 / samples as f64,
+        Faces {
+            shares: Shares::of(contact.iter().map(|contact| (*contact, 1.0))),
             switches: switches / self.halves,
             rests: contact.iter().all(|contact| *contact == Contact::Stick),
         }

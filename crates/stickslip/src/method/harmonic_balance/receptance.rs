@@ -1,11 +1,10 @@
 //! What forces along the axes do to the motions along them: matrices, or where these would be too large their product alone.
 
-use super::uncoupled::Uncoupled;
+use super::uncoupled::{Resonant, Uncoupled};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::dense::multiply_in_blocks;
-use stickslip_numerics::sparse::Singular;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -40,7 +39,7 @@ impl Modal {
         structure: &Arc<Uncoupled>,
         (harmonics, omega): (&[usize], f64),
         series: &[f64],
-    ) -> Result<Self, Singular> {
+    ) -> Result<Self, Resonant> {
         let rates: Vec<Complex64> = harmonics.iter().map(|h| Complex64::new(0.0, *h as f64 * omega)).collect();
         let gains = rates.iter().map(|s| structure.gains(*s, omega)).collect::<Result<Vec<_>, _>>()?;
         let mean = match harmonics[0] {

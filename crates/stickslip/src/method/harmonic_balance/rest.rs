@@ -9,7 +9,7 @@
 
 use super::hold::HOLD;
 use super::ports::Ports;
-use super::uncoupled::Uncoupled;
+use super::uncoupled::{Resonant, Uncoupled};
 use crate::model::{Cyclic, System};
 use crate::structure::{DynamicStiffness, Matrices, Sector, Structure, Wave, WaveStiffness, turn};
 use nalgebra::{DMatrix, DVector};
@@ -18,7 +18,6 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip_numerics::modes::Modes;
-use stickslip_numerics::sparse::Singular;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -57,7 +56,7 @@ pub(super) struct Rest {
 struct Factored<F = DynamicStiffness> {
     rate: Complex64,
     omega: f64,
-    factor: Result<Arc<F>, Singular>,
+    factor: Result<Arc<F>, Resonant>,
 }
 
 /// The waves on a ring: one per nodal diameter that a harmonic has met.
@@ -65,7 +64,7 @@ struct Factored<F = DynamicStiffness> {
 struct Waves {
     cyclic: Cyclic,
     sector: Sector,
-    met: RefCell<BTreeMap<usize, Result<Arc<Wave>, Singular>>>,
+    met: RefCell<BTreeMap<usize, Result<Arc<Wave>, Resonant>>>,
     factors: RefCell<Vec<(usize, Factored<WaveStiffness>)>>,
 }
 
@@ -76,13 +75,13 @@ impl Waves {
     }
 
     /// Displacements of the first sector in a wave under complex forces on it, in place, columns one after the other.
-    fn solve(&self, diameter: usize, (s, omega): (Complex64, f64), loads: &mut [Complex64]) -> Result<(), Singular> {
+    fn solve(&self, diameter: usize, (s, omega): (Complex64, f64), loads: &mut [Complex64]) -> Result<(), Resonant> {
         self.factor(diameter, s, omega)?.solve(loads);
         Ok(())
     }
 
     /// Kept as long as the drive frequency stays.
-    fn factor(&self, diameter: usize, s: Complex64, omega: f64) -> Result<Arc<WaveStiffness>, Singular> {
+    fn factor(&self, diameter: usize, s: Complex64, omega: f64) -> Result<Arc<WaveStiffness>, Resonant> {
         let mut factors = self.factors.borrow_mut();
         factors.retain(|(_, kept)| kept.omega == omega);
         if let Some((_, kept)) = factors.iter().find(|(d, kept)| *d == diameter && kept.rate == s) {
@@ -91,9 +90,9 @@ impl Waves {
         let mut met = self.met.borrow_mut();
         let wave = met
             .entry(diameter)
-            .or_insert_with(|| self.sector.wave(diameter).map(Arc::new).map_err(|_| Singular { row: 0 }))
+            .or_insert_with(|| self.sector.wave(diameter).map(Arc::new).map_err(|_| Resonant))
             .clone()?;
-        let factor = wave.dynamic_stiffness(s, hold(s, omega)).map(Arc::new);
+        let factor = wave.dynamic_stiffness(s, hold(s, omega)).map(Arc::new).map_err(|_| Resonant);
         factors.push((diameter, Factored { rate: s, omega, factor: factor.clone() }));
         factor
     }
@@ -117,7 +116,7 @@ impl Waves {
         diameter: usize,
         at: (Complex64, f64),
         directions: &[Vec<(usize, f64)>],
-    ) -> Result<DMatrix<Complex64>, Singular> {
+    ) -> Result<DMatrix<Complex64>, Resonant> {
         let columns = self.columns(diameter, directions);
         let mut moved = columns.clone();
         self.solve(diameter, at, moved.as_mut_slice())?;
@@ -125,7 +124,7 @@ impl Waves {
     }
 
     /// Displacements along the axes under unit forces along each alone, without its neighbours': the mean of all waves. At a real rate.
-    fn own(&self, (rate, omega): (f64, f64), directions: &[Vec<(usize, f64)>]) -> Result<Vec<f64>, Singular> {
+    fn own(&self, (rate, omega): (f64, f64), directions: &[Vec<(usize, f64)>]) -> Result<Vec<f64>, Resonant> {
         let sectors = self.cyclic.sectors;
         let mut own = vec![0.0; directions.len()];
         for diameter in 0..=sectors / 2 {
@@ -143,7 +142,7 @@ impl Waves {
         diameter: usize,
         at: (Complex64, f64),
         force: &DVector<Complex64>,
-    ) -> Result<DVector<Complex64>, Singular> {
+    ) -> Result<DVector<Complex64>, Resonant> {
         let n = self.sector.dofs();
         let mut one = force.as_slice()[..n].to_vec();
         self.solve(diameter, at, &mut one)?;
@@ -199,7 +198,7 @@ impl Rest {
     ///
     /// # Errors
     /// A resonance without damping.
-    pub fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, Singular> {
+    pub fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
         match &self.waves {
             Some(waves) => waves.receptance(waves.cyclic.diameter(harmonic), (s, omega), &self.directions),
@@ -211,7 +210,7 @@ impl Rest {
     ///
     /// # Errors
     /// A structure that is singular there all the same.
-    pub fn own_at(&self, rate: f64, omega: f64) -> Result<Vec<f64>, Singular> {
+    pub fn own_at(&self, rate: f64, omega: f64) -> Result<Vec<f64>, Resonant> {
         match &self.waves {
             Some(waves) => waves.own((rate, omega), &self.directions),
             None => {
@@ -221,7 +220,7 @@ impl Rest {
         }
     }
 
-    fn receptance_at(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, Singular> {
+    fn receptance_at(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
         let q = self.directions.len();
         if let Some(uncoupled) = &self.uncoupled {
             return uncoupled.receptance(s, omega);
@@ -242,7 +241,7 @@ impl Rest {
             return Ok(receptance);
         }
         let Some(modal) = &self.modal else {
-            let inverse = self.dynamic(s).try_inverse().ok_or(Singular { row: 0 })?;
+            let inverse = self.dynamic(s).try_inverse().ok_or(Resonant)?;
             let direction = columns(self.n, &self.directions).map(|w| Complex64::new(w, 0.0));
             return Ok(direction.transpose() * inverse * direction);
         };
@@ -276,7 +275,7 @@ impl Rest {
         harmonic: usize,
         omega: f64,
         force: &DVector<Complex64>,
-    ) -> Result<DVector<Complex64>, Singular> {
+    ) -> Result<DVector<Complex64>, Resonant> {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
         if let Some(uncoupled) = &self.uncoupled {
             return uncoupled.respond(s, omega, force);
@@ -290,7 +289,7 @@ impl Rest {
             return Ok(x);
         }
         let Some(modal) = &self.modal else {
-            return self.dynamic(s).lu().solve(force).ok_or(Singular { row: 0 });
+            return self.dynamic(s).lu().solve(force).ok_or(Resonant);
         };
         let mut x = DVector::from_element(self.n, ZERO);
         for (m, &lambda) in modal.lambda.iter().enumerate() {
@@ -320,7 +319,7 @@ impl Rest {
     ///
     /// # Errors
     /// A structure that is singular at rest.
-    pub fn settle(&self, omega: f64, x: &mut DVector<Complex64>, along: impl Fn(usize) -> f64) -> Result<(), Singular> {
+    pub fn settle(&self, omega: f64, x: &mut DVector<Complex64>, along: impl Fn(usize) -> f64) -> Result<(), Resonant> {
         let q = self.directions.len();
         let unheld = free_fraction(ZERO, omega).re / self.structure.largest()[0];
         if let Some(uncoupled) = &self.uncoupled {
@@ -383,13 +382,13 @@ impl Rest {
     }
 
     /// Of a large structure: kept as long as the drive frequency stays.
-    fn factor(&self, s: Complex64, omega: f64) -> Result<Arc<DynamicStiffness>, Singular> {
+    fn factor(&self, s: Complex64, omega: f64) -> Result<Arc<DynamicStiffness>, Resonant> {
         let mut factors = self.factors.borrow_mut();
         factors.retain(|kept| kept.omega == omega);
         if let Some(kept) = factors.iter().find(|kept| kept.rate == s) {
             return kept.factor.clone();
         }
-        let factor = self.structure.held_stiffness(s, hold(s, omega)).map(Arc::new);
+        let factor = self.structure.held_stiffness(s, hold(s, omega)).map(Arc::new).map_err(|_| Resonant);
         factors.push(Factored { rate: s, omega, factor: factor.clone() });
         factor
     }

@@ -10,7 +10,6 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::dense::multiply_in_blocks;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::Singular;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -22,6 +21,10 @@ const SHIFT: f64 = 1e-3;
 const MOST: usize = 4000;
 /// A dynamic stiffness below this share of its parts is their rounding: a resonance without damping.
 const RESONANT: f64 = 1e-14;
+
+/// A dynamic stiffness without an inverse: a resonance without damping.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Resonant;
 
 /// A structure in its own modes.
 #[derive(Debug, Clone)]
@@ -61,22 +64,22 @@ impl Uncoupled {
     }
 
     /// `m s² + c s + k` of mode `m`, held as all are at rest; not a number that could be divided by at a resonance without damping.
-    pub fn stiffness(&self, m: usize, s: Complex64, omega: f64) -> Result<Complex64, Singular> {
+    pub fn stiffness(&self, m: usize, s: Complex64, omega: f64) -> Result<Complex64, Resonant> {
         let [mass, damping, stiffness] = self.own[m];
         let hold = if s == ZERO { (HOLD * omega).powi(2) } else { 0.0 };
         let of_mass = (s * s + hold) * mass;
         let sum = of_mass + s * damping + stiffness;
         let size = of_mass.norm() + (s * damping).norm() + stiffness.abs();
-        if sum.norm() > RESONANT * size { Ok(sum) } else { Err(Singular { row: m }) }
+        if sum.norm() > RESONANT * size { Ok(sum) } else { Err(Resonant) }
     }
 
     /// The inverse of that, of all modes.
-    pub fn gains(&self, s: Complex64, omega: f64) -> Result<Vec<Complex64>, Singular> {
+    pub fn gains(&self, s: Complex64, omega: f64) -> Result<Vec<Complex64>, Resonant> {
         (0..self.own.len()).map(|m| Ok(1.0 / self.stiffness(m, s, omega)?)).collect()
     }
 
     /// Receptance of the axes, p × p.
-    pub fn receptance(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, Singular> {
+    pub fn receptance(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
         let (p, n) = (self.axes, self.own.len());
         let gains = self.gains(s, omega)?;
         let part = |read: fn(&Complex64) -> f64| {
@@ -107,7 +110,7 @@ impl Uncoupled {
         s: Complex64,
         omega: f64,
         force: &DVector<Complex64>,
-    ) -> Result<DVector<Complex64>, Singular> {
+    ) -> Result<DVector<Complex64>, Resonant> {
         let gains = self.gains(s, omega)?;
         let Some(shapes) = &self.shapes else {
             return Ok(DVector::from_iterator(force.len(), force.iter().zip(&gains).map(|(f, g)| f * g)));

@@ -63,9 +63,10 @@ impl Linear {
         let finite = values.partition_point(|value| value.is_finite());
         let usual = values[finite / 2..finite].first().copied().unwrap_or(0.0);
         let free = values[..finite].partition_point(|value| *value < FREE * usual);
+        let forces = &damping * shapes.columns(free, finite - free);
         let mode = |k: usize| {
-            let (omega, shape) = (values[k].max(0.0).sqrt(), shapes.column(k));
-            LinearMode { omega, damping: shape.dot(&(&damping * shape)) / (2.0 * omega) }
+            let omega = values[k].max(0.0).sqrt();
+            LinearMode { omega, damping: shapes.column(k).dot(&forces.column(k - free)) / (2.0 * omega) }
         };
         let modes = Modes { elastic: (free..finite).map(mode).collect(), rigid: free, lost: 0 };
         Linear { modes, shapes: Some(turn * shapes.columns(free, finite - free)) }

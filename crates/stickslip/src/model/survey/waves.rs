@@ -5,9 +5,10 @@
 
 use super::hold::{Hold, Stuck};
 use super::linear::{LARGEST, Linear, Link};
-use super::{Model, ModelError, Modes};
-use crate::structure::turn;
+use super::{LinearMode, Model, ModelError, Modes, System};
+use crate::structure::{Sector, Structure, turn};
 use std::collections::{BTreeMap, HashMap};
+use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
 
 /// The modes of one nodal diameter.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +53,8 @@ impl Turned {
 }
 
 impl Model {
-    /// The modes of a ring of equal sectors by nodal diameter; `None` if the model is none, or if its sectors are too large.
+    /// The `lowest` modes of a ring of equal sectors by nodal diameter; `None` if the model is none, or if its sectors are too large. Sectors by
+    /// their matrices may be large, if no joint is rigid.
     ///
     /// # Errors
     /// [`ModelError`] as [`Model::assemble`].
@@ -69,14 +71,17 @@ impl Model {
     ///     ..Model::default()
     /// };
     /// let ring = Disk { sectors: 12, ..Disk::default() }.ring(|_| sector.clone()).unwrap();
-    /// let waves = ring.wave_modes().unwrap().unwrap();
+    /// let waves = ring.wave_modes(1).unwrap().unwrap();
     /// assert_eq!(waves.len(), 7);
     /// assert!((waves[3].free.elastic[0].omega - 1.4f64.sqrt()).abs() < 1e-12);
     /// ```
-    pub fn wave_modes(&self) -> Result<Option<Vec<WaveModes>>, ModelError> {
+    pub fn wave_modes(&self, lowest: usize) -> Result<Option<Vec<WaveModes>>, ModelError> {
         let Some(ring) = self.ring.filter(|ring| ring.equal) else { return Ok(None) };
         let system = self.assemble()?;
         let (sectors, n) = (ring.sectors, system.dofs() / ring.sectors);
+        if self.substructure.is_some() {
+            return Ok(of_matrices(&system, sectors, lowest));
+        }
         if n == 0 || 2 * n > LARGEST {
             return Ok(None);
         }
@@ -106,14 +111,7 @@ impl Model {
                     Hold::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
                 }
             }
-            let once = |linear: Linear| {
-                let mut modes = linear.modes;
-                if double {
-                    modes.elastic = modes.elastic.into_iter().step_by(2).collect();
-                    (modes.rigid, modes.lost) = (modes.rigid / 2, modes.lost / 2);
-                }
-                modes
-            };
+            let once = |linear: Linear| once(linear.modes, double, lowest);
             let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
             WaveModes {
                 diameter,
@@ -124,6 +122,79 @@ impl Model {
         Ok(Some((0..=sectors / 2).map(wave).collect()))
     }
 }
+
+/// Each mode of a wave that travels either way once, and the lowest of them.
+fn once(mut modes: Modes, double: bool, lowest: usize) -> Modes {
+    if double {
+        modes.elastic = modes.elastic.into_iter().step_by(2).collect();
+        (modes.rigid, modes.lost) = (modes.rigid / 2, modes.lost / 2);
+    }
+    modes.elastic.truncate(lowest);
+    modes
+}
+
+/// The modes of the waves of equal sectors that are stated by their matrices.
+fn of_matrices(system: &System, sectors: usize, lowest: usize) -> Option<Vec<WaveModes>> {
+    let sector = Sector::of(system.structure(), sectors)?;
+    let joints = &system.joints()[..system.joints().len() / sectors];
+    let stuck: Vec<Stuck> = joints.iter().enumerate().flat_map(Stuck::of_joint).collect();
+    let wave = |diameter: usize| {
+        let wave = sector.wave(diameter).ok()?;
+        let (structure, double) = (wave.structure(), wave.is_double());
+        let turned = Turned { dofs: sector.dofs(), sectors, diameter, double };
+        let (mut held, mut rigid) = (Vec::new(), Vec::new());
+        for joint in &stuck {
+            match joint.hold {
+                Hold::Nothing => {}
+                Hold::Spring { stiffness, .. } => {
+                    held.extend(turned.rows(&joint.at).into_iter().map(|at| Link { at, stiffness, damping: 0.0 }));
+                }
+                Hold::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
+            }
+        }
+        let modes = |links: &[Link], rigid: &[Row]| -> Option<Modes> {
+            if structure.dofs() <= LARGEST {
+                let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
+                return Some(once(Linear::of_matrices(structure.full(), links, &rigid).modes, double, lowest));
+            }
+            if !rigid.is_empty() {
+                return None;
+            }
+            Some(once(of_large(structure, links, if double { 2 * lowest } else { lowest })?, double, lowest))
+        };
+        Some(WaveModes { diameter, free: modes(&[], &[])?, stuck: modes(&held, &rigid)? })
+    };
+    (0..=sectors / 2).map(wave).collect()
+}
+
+/// The lowest modes of a large structure, each of a pair among them.
+fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<Modes> {
+    let n = structure.dofs();
+    let part = |kind: usize, more: Vec<(usize, usize, f64)>| {
+        let own = structure.entries().map(|(row, column, values)| (row, column, values[kind]));
+        Matrix::from_triplets(n, own.filter(|entry| entry.2 != 0.0).chain(more)).ok()
+    };
+    let mut springs = Vec::new();
+    for link in links {
+        for &(i, a) in &link.at {
+            springs.extend(link.at.iter().map(|&(k, b)| (i, k, link.stiffness * (a * b))));
+        }
+    }
+    let (mass, damping, stiffness) = (part(0, Vec::new())?, part(1, Vec::new())?, part(2, springs)?);
+    // free motions are none of the elastic ones that are asked for
+    let wanted = Wanted::Lowest((count.saturating_add(FREE_AT_MOST)).min(n));
+    let found = NaturalModes::new(&Analysis::new(&[&stiffness, &mass]), &stiffness, &mass, wanted).ok()?;
+    let free = found.free();
+    let mode = |k: usize| {
+        let (omega, shape) = (found.values[k].max(0.0).sqrt(), found.shape(k));
+        let power: f64 = damping.times(shape).iter().zip(shape).map(|(c, x)| c * x).sum();
+        LinearMode { omega, damping: power / (2.0 * omega) }
+    };
+    Some(Modes { elastic: (free..found.count()).map(mode).collect(), rigid: free, lost: 0 })
+}
+
+/// Free motions of a body, twice: a wave either way.
+const FREE_AT_MOST: usize = 12;
 
 #[cfg(test)]
 mod tests {
@@ -150,7 +221,7 @@ mod tests {
             for sectors in [2, 3, 8, 9] {
                 let sector = sector(law.clone());
                 let ring = Disk { sectors, ..Disk::default() }.ring(|_| sector.clone()).unwrap();
-                let (survey, waves) = (ring.survey().unwrap(), ring.wave_modes().unwrap().unwrap());
+                let (survey, waves) = (ring.survey().unwrap(), ring.wave_modes(usize::MAX).unwrap().unwrap());
                 for stuck in [false, true] {
                     let mut all = Vec::new();
                     let mut drifts = 0;

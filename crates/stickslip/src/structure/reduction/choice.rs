@@ -8,6 +8,8 @@ use stickslip_numerics::sparse::NaturalModes;
 const EXTENTS: [f64; 2] = [1.5, 3.0];
 /// Of these, up to these shares are tried.
 const SHARES: [f64; 4] = [0.67, 0.8, 0.9, 1.0];
+/// Ports beyond which all modes are taken at once: beside hundreds of residual vectors some modes fewer are no gain.
+const MANY: usize = 300;
 /// Orders of residual vectors that are tried.
 const ORDERS: usize = 3;
 /// Numbers of all residual vectors that are held at once: 1 GB.
@@ -123,8 +125,9 @@ impl Reduce {
             let bound = (share * extent * self.up_to).powi(2);
             if share < 1.0 { modes.values.partition_point(|value| *value <= bound) } else { modes.count() }
         };
+        let shares = if ports > MANY { &SHARES[SHARES.len() - 1..] } else { &SHARES[..] };
         let mut sizes: Vec<(usize, usize)> =
-            (1..=orders(whole)).flat_map(|order| SHARES.map(|share| (count(share), order))).collect();
+            (1..=orders(whole)).flat_map(|order| shares.iter().map(move |share| (count(*share), order))).collect();
         sizes.sort_by_key(|&(count, order)| (count + order * ports, order));
         sizes.dedup();
         sizes

@@ -23,14 +23,22 @@ const NUDGE: f64 = 3e-5;
 /// Attempts to sample beside a mode.
 const ATTEMPTS: usize = 5;
 
+/// Ports beyond which not each is loaded alone, but all together in as many ways as [`PROBES`]: each loaded alone would take as many solutions, for
+/// every sample. The norm of what loads of random signs do is on the average that of the matrix, here to a tenth of it.
+const ALONE: usize = 96;
+const PROBES: usize = 48;
+
 /// Receptances of the whole structure.
 #[derive(Debug, Clone)]
 pub struct Reference {
-    /// (ω, receptance), rad/s and p × p, m/N.
+    /// (ω, displacements of the ports under the loads), rad/s and m.
     samples: Vec<(f64, DMatrix<Complex<f64>>)>,
+    /// Forces on the ports, side by side.
+    loads: DMatrix<f64>,
     damped: bool,
-    /// One by the usual size of every port, √(N/m).
+    /// One by the usual size of every port, √(N/m), and the same of the loads.
     scales: Vec<f64>,
+    of_loads: Vec<f64>,
 }
 
 /// How far a reduction is from the whole.
@@ -48,7 +56,12 @@ impl Reference {
     /// # Errors
     /// [`ReductionError::Singular`] if a sample stays at a mode.
     pub fn new(whole: &Whole, modes: &NaturalModes, up_to: f64) -> Result<Self, ReductionError> {
-        Self::at(whole, &frequencies(whole, modes, up_to))
+        Self::few(whole, modes, up_to, SAMPLES)
+    }
+
+    /// The same of so many samples at most.
+    pub(super) fn few(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> Result<Self, ReductionError> {
+        Self::at(whole, &frequencies(whole, modes, up_to, most))
     }
 
     /// Samples at these frequencies, rad/s.
@@ -56,14 +69,24 @@ impl Reference {
     /// # Errors
     /// [`ReductionError::Singular`] if a sample stays at a mode.
     pub fn at(whole: &Whole, frequencies: &[f64]) -> Result<Self, ReductionError> {
-        let samples: Vec<_> = frequencies.iter().map(|omega| sample(whole, *omega)).collect::<Result<_, _>>()?;
+        let ports = whole.ports.len();
+        let alone = ports <= ALONE;
+        let local = local_sizes(whole);
+        let loads = match alone {
+            true => DMatrix::identity(ports, ports),
+            false => DMatrix::from_fn(ports, PROBES, |i, k| sign(i * PROBES + k) / local[i].sqrt()),
+        };
+        let samples: Vec<_> =
+            frequencies.iter().map(|omega| sample(whole, *omega, &loads)).collect::<Result<_, _>>()?;
         let usual = |port: usize| {
             let mut sizes: Vec<f64> = samples.iter().map(|(_, r)| r[(port, port)].norm()).collect();
             sizes.sort_by(f64::total_cmp);
             sizes.get(sizes.len() / 2).copied().unwrap_or(1.0)
         };
-        let scales = (0..whole.ports.len()).map(|port| usual(port).max(f64::MIN_POSITIVE).sqrt().recip()).collect();
-        Ok(Reference { samples, damped: matches!(whole.damping, Damping::Matrix(_)), scales })
+        let size = |port: usize| if alone { usual(port) } else { local[port] };
+        let scales: Vec<f64> = (0..ports).map(|port| size(port).max(f64::MIN_POSITIVE).sqrt().recip()).collect();
+        let of_loads = if alone { scales.clone() } else { vec![1.0; PROBES] };
+        Ok(Reference { samples, loads, damped: matches!(whole.damping, Damping::Matrix(_)), scales, of_loads })
     }
 
     /// Frequencies of the samples, rad/s.
@@ -73,21 +96,22 @@ impl Reference {
 
     /// How far a reduced structure is from the whole; infinite where it is singular.
     pub fn deviation(&self, reduced: &Reduced) -> Deviation {
-        let bare = Reduced { damping: &reduced.damping * 0.0, basis: vec![], n: 0, ..reduced.clone() };
+        let bare = Reduced { damping: &reduced.damping * 0.0, ..reduced.clone() };
         let reduced = if self.damped { reduced } else { &bare };
-        self.worst(|omega| reduced.receptance(omega).ok())
+        self.worst(|omega| reduced.answers(omega, &self.loads).ok())
     }
 
     /// How far a series is from the whole.
     pub fn deviation_of_series(&self, series: &Series) -> Deviation {
-        self.worst(|omega| Some(series.undamped(omega)))
+        let loads = self.loads.map(|v| Complex::new(v, 0.0));
+        self.worst(|omega| Some(series.undamped(omega) * &loads))
     }
 
     fn worst(&self, receptance: impl Fn(f64) -> Option<DMatrix<Complex<f64>>>) -> Deviation {
         let mut worst = Deviation { error: 0.0, omega: 0.0 };
         for (omega, whole) in &self.samples {
             let norm = |matrix: &DMatrix<Complex<f64>>| {
-                let scaled = |i: usize, k: usize| (matrix[(i, k)] * self.scales[i] * self.scales[k]).norm_sqr();
+                let scaled = |i: usize, k: usize| (matrix[(i, k)] * self.scales[i] * self.of_loads[k]).norm_sqr();
                 let columns = (0..matrix.ncols()).flat_map(|k| (0..matrix.nrows()).map(move |i| (i, k)));
                 columns.map(|(i, k)| scaled(i, k)).sum::<f64>().sqrt()
             };
@@ -103,11 +127,11 @@ impl Reference {
 }
 
 /// Receptance of the whole structure at ω, or a little further where that is a mode.
-fn sample(whole: &Whole, omega: f64) -> Result<(f64, DMatrix<Complex<f64>>), ReductionError> {
+fn sample(whole: &Whole, omega: f64, loads: &DMatrix<f64>) -> Result<(f64, DMatrix<Complex<f64>>), ReductionError> {
     let mut failed = ReductionError::OutOfRange;
     for attempt in 0..ATTEMPTS {
         let omega = omega * (1.0 + NUDGE * attempt as f64);
-        match receptance(whole, omega) {
+        match answers(whole, omega, loads) {
             Ok(receptance) => return Ok((omega, receptance)),
             Err(error) => failed = error,
         }
@@ -115,13 +139,18 @@ fn sample(whole: &Whole, omega: f64) -> Result<(f64, DMatrix<Complex<f64>>), Red
     Err(failed)
 }
 
-fn receptance(whole: &Whole, omega: f64) -> Result<DMatrix<Complex<f64>>, ReductionError> {
-    let (n, p) = (whole.dofs(), whole.ports.len());
+fn answers(whole: &Whole, omega: f64, loads: &DMatrix<f64>) -> Result<DMatrix<Complex<f64>>, ReductionError> {
+    let n = whole.dofs();
     let (mass, stiffness): (&Matrix, &Matrix) = (&whole.mass, &whole.stiffness);
     let singular = |singular| ReductionError::Singular { omega, singular };
-    let mut real = whole.forces();
+    let mut real = vec![0.0; n * loads.ncols()];
+    for (k, (port, row)) in (0..loads.ncols()).flat_map(|k| whole.ports.iter().enumerate().map(move |row| (k, row))) {
+        row.iter().for_each(|(at, weight)| real[k * n + at] += weight * loads[(port, k)]);
+    }
     let see = |value: &dyn Fn(usize) -> Complex<f64>| {
-        DMatrix::from_fn(p, p, |i, k| whole.ports[i].iter().map(|(at, weight)| value(k * n + at) * *weight).sum())
+        DMatrix::from_fn(whole.ports.len(), loads.ncols(), |i, k| {
+            whole.ports[i].iter().map(|(at, weight)| value(k * n + at) * *weight).sum()
+        })
     };
     if let Damping::Matrix(damping) = &whole.damping {
         let sum = [(1.0, 0.0), (0.0, omega), (-omega * omega, 0.0)].map(|(re, im)| Complex::new(re, im));
@@ -136,18 +165,36 @@ fn receptance(whole: &Whole, omega: f64) -> Result<DMatrix<Complex<f64>>, Reduct
     Ok(see(&|at| Complex::new(real[at], 0.0)))
 }
 
+/// Compliances that the ports would have if every row stood on its own stiffness alone, m/N: the order of their receptances, in their units.
+fn local_sizes(whole: &Whole) -> Vec<f64> {
+    let own = |at: usize| whole.stiffness.get(at, at);
+    let size = |row: &super::Row| row.iter().filter(|(at, _)| own(*at) > 0.0).map(|(at, w)| w * w / own(*at)).sum();
+    whole.ports.iter().map(size).map(|size: f64| if size > 0.0 { size } else { 1.0 }).collect()
+}
+
+/// ±1 without a pattern, the same everywhere.
+fn sign(number: usize) -> f64 {
+    // by the mixing of splitmix64: Steele, Lea, Flood (2014)
+    let mut z = (number as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    if (z ^ (z >> 31)) & 1 == 0 { 1.0 } else { -1.0 }
+}
+
 /// Where to sample: beside modes and between them by turns, from the first elastic mode to the end of the range.
-fn frequencies(whole: &Whole, modes: &NaturalModes, up_to: f64) -> Vec<f64> {
+fn frequencies(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> Vec<f64> {
     let beside = match whole.damping {
         Damping::Ratio { ratio, .. } => ratio.max(BESIDE),
         _ => BESIDE,
     };
-    let inside: Vec<f64> = modes
+    let mut inside: Vec<f64> = modes
         .values
         .iter()
         .map(|value| value.max(0.0).sqrt())
         .filter(|omega| *omega > SAME * up_to && *omega < up_to)
         .collect();
+    // between two modes that are one, as those of a wave either way, there is no middle
+    inside.dedup_by(|next, kept| *next - *kept < SAME * *kept);
     let mut all = Vec::new();
     for (k, omega) in inside.iter().enumerate() {
         let next = inside.get(k + 1).copied().unwrap_or(up_to);
@@ -160,7 +207,7 @@ fn frequencies(whole: &Whole, modes: &NaturalModes, up_to: f64) -> Vec<f64> {
     all.dedup_by(|next, kept| *next - *kept < SAME * *kept);
     // not of one parity, so that both sorts remain
     let last = all.len() - 1;
-    let mut at: Vec<usize> = (0..SAMPLES.min(all.len())).map(|i| i * last / (SAMPLES - 1).min(last).max(1)).collect();
+    let mut at: Vec<usize> = (0..most.min(all.len())).map(|i| i * last / (most - 1).min(last).max(1)).collect();
     at.dedup();
     at.into_iter().map(|i| all[i]).collect()
 }

@@ -8,8 +8,9 @@
 //!
 //! Sources: as in `residual`; Craig and Chang (1977), "On the use of attachment modes in substructure coupling for dynamic analysis".
 
-use super::{Damping, Reduced, ReductionError, Whole, damping, residual, symmetric};
+use super::{AT_ONCE, Damping, Reduced, ReductionError, Whole, damping, product, residual, symmetric};
 use nalgebra::DMatrix;
+use std::sync::Arc;
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{Matrix, NaturalModes, columns};
 
@@ -29,7 +30,7 @@ pub struct Free<'a> {
     /// Ports, orders of the residual vectors.
     pub(super) counts: (usize, usize),
     /// Modes, then the residual vectors order by order: n × (k + p J).
-    basis: Vec<f64>,
+    basis: Arc<Vec<f64>>,
     /// `Bᵀ M B`, `Bᵀ K B`, of a damping matrix `Bᵀ C B`, and the ports' rows over B.
     pub(super) mass: DMatrix<f64>,
     stiffness: DMatrix<f64>,
@@ -45,23 +46,36 @@ impl<'a> Free<'a> {
     /// [`ReductionError::Singular`] if the modes lack a free motion, or the shift stays at an eigenvalue.
     pub fn new(whole: &'a Whole, modes: &NaturalModes, shift: f64, order: usize) -> Result<Self, ReductionError> {
         let n = whole.dofs();
-        let (blocks, shift) = residual::blocks(whole, modes, shift, order)?;
-        let mut basis = modes.shapes.clone();
-        blocks.iter().for_each(|block| basis.extend(block));
-        let square = |matrix: &Matrix| columns::products(n, &basis, &matrix.times_columns(&basis));
+        let (basis, shift) = residual::basis(whole, modes, shift, order)?;
         let own = match &whole.damping {
-            Damping::Matrix(c) => Some(square(c)),
+            Damping::Matrix(c) => Some(columns::products(n, &basis, &c.times_columns(&basis))),
             _ => None,
         };
-        let (mass, stiffness) = (symmetric(square(&whole.mass)), symmetric(square(&whole.stiffness)));
-        let ports = columns::products(n, &whole.forces(), &basis);
+        let mass = square(&whole.mass, &basis);
+        let ports = whole.rows_of(&basis);
         let counts = (whole.ports().len(), order);
-        Ok(Free { whole, values: modes.values.clone(), shift, counts, basis, mass, stiffness, damping: own, ports })
+        let stiffness = stiffness(&modes.values, shift, counts, &mass, &ports);
+        Ok(Free {
+            whole,
+            values: modes.values.clone(),
+            shift,
+            counts,
+            basis: Arc::new(basis),
+            mass,
+            stiffness,
+            damping: own,
+            ports,
+        })
     }
 
     /// The whole structure.
     pub(super) fn whole(&self) -> &Whole {
         self.whole
+    }
+
+    /// All modes and residual vectors, by columns.
+    pub(super) fn into_basis(self) -> Vec<f64> {
+        Arc::unwrap_or_clone(self.basis)
     }
 
     /// How many modes there are.
@@ -94,41 +108,90 @@ impl<'a> Free<'a> {
         assert!(modes <= self.modes() && order <= self.counts.1, "of {} modes, {} orders", self.modes(), self.counts.1);
         // all modes leave nothing to the residual vectors but rounding
         let order = if modes < self.whole.dofs() { order } else { 0 };
-        let small = self.combination(modes, order).ok_or(ReductionError::OutOfRange)?;
-        let project = |matrix: &DMatrix<f64>| symmetric(small.transpose() * matrix * &small);
-        let (mass, stiffness) = (project(&self.mass), project(&self.stiffness));
-        let own = self.damping.as_ref().map(|c| small.transpose() * c * &small);
+        let (small, heavy) = self.combination(modes, order).ok_or(ReductionError::OutOfRange)?;
+        // what is beside the diagonals is rounding
+        let diagonal = |of_mode: &dyn Fn(usize) -> f64, of_vector: &dyn Fn(usize) -> f64| {
+            DMatrix::from_fn(small.ncols(), small.ncols(), |i, k| match i.checked_sub(modes) {
+                _ if i != k => 0.0,
+                None => of_mode(i),
+                Some(vector) => of_vector(vector),
+            })
+        };
+        let mass = diagonal(&|_| 1.0, &|vector| heavy[vector]);
+        let stiffness = diagonal(&|mode| self.values[mode], &|_| 1.0);
+        let own = self.damping.as_ref().map(|c| product(&small.transpose(), &product(c, &small)));
         let damping = damping(&self.whole.damping, &mass, &stiffness, own)?;
         let n = self.whole.dofs();
-        let basis = columns::combination(n, &self.basis, &small);
         let kind = format!("{modes} free modes, {} residual vectors of {order} orders", small.ncols() - modes);
-        Ok(Reduced { kind, mass, damping, stiffness, ports: &self.ports * small, basis, n })
+        let ports = product(&self.ports, &small);
+        Ok(Reduced { kind, mass, damping, stiffness, ports, basis: self.basis.clone(), weights: small, n })
     }
 
-    /// Modes, then independent residual vectors of unit stiffness whose mass is diagonal.
-    fn combination(&self, modes: usize, order: usize) -> Option<DMatrix<f64>> {
+    /// Modes, then independent residual vectors of unit stiffness whose mass is diagonal; and that mass.
+    fn combination(&self, modes: usize, order: usize) -> Option<(DMatrix<f64>, Vec<f64>)> {
         let all = self.mass.nrows();
         let mut vectors = DMatrix::zeros(all, 0);
         // twice: the second time rounding of the first is projected out
         for order in 0..order {
             let mut block = self.block(modes, order);
             for _ in 0..2 {
-                let along = vectors.transpose() * &self.stiffness * &block;
-                block -= &vectors * along;
+                let along = columns::products(all, vectors.as_slice(), product(&self.stiffness, &block).as_slice());
+                block -= product(&vectors, &along);
                 block = independent(&block, &self.stiffness)?;
             }
             vectors = join(&vectors, &block);
         }
+        let mut heavy = Vec::new();
         if vectors.ncols() > 0 {
-            let mass = symmetric(vectors.transpose() * &self.mass * &vectors);
-            let eigen = eigen::symmetric(mass)?;
+            let mass = columns::products(all, vectors.as_slice(), product(&self.mass, &vectors).as_slice());
+            let eigen = eigen::symmetric(symmetric(mass))?;
             let mut rising: Vec<usize> = (0..vectors.ncols()).collect();
             rising.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-            vectors *= eigen.eigenvectors.select_columns(&rising);
+            vectors = product(&vectors, &eigen.eigenvectors.select_columns(&rising));
+            heavy.extend(rising.iter().map(|&k| eigen.eigenvalues[k]));
         }
         let chosen = DMatrix::from_fn(all, modes, |i, k| f64::from(u8::from(i == k)));
-        Some(join(&chosen, &vectors))
+        Some((join(&chosen, &vectors), heavy))
     }
+}
+
+/// `Bᵀ A B` of a symmetric matrix, some columns at a time.
+fn square(matrix: &Matrix, basis: &[f64]) -> DMatrix<f64> {
+    let n = matrix.n().max(1);
+    let all = basis.len() / n;
+    let mut square = DMatrix::zeros(all, all);
+    for first in (0..all).step_by(AT_ONCE) {
+        let last = all.min(first + AT_ONCE);
+        let moved = matrix.times_columns(&basis[first * n..last * n]);
+        let below = columns::products(n, &basis[first * n..], &moved);
+        for (k, i) in (first..last).flat_map(|k| (k..all).map(move |i| (k, i))) {
+            let value = below[(i - first, k - first)];
+            (square[(i, k)], square[(k, i)]) = (value, value);
+        }
+    }
+    square
+}
+
+/// `Bᵀ K B`, by what the residual vectors solve: `K Xⱼ = σ M Xⱼ + M Xⱼ₋₁`, at first with the forces in place of `M Xⱼ₋₁`, beside what the modes answer, of
+/// which they have nothing.
+fn stiffness(
+    values: &[f64],
+    shift: f64,
+    (ports, order): (usize, usize),
+    mass: &DMatrix<f64>,
+    seen: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let modes = values.len();
+    let mut stiffness = DMatrix::zeros(mass.nrows(), mass.ncols());
+    values.iter().enumerate().for_each(|(mode, value)| stiffness[(mode, mode)] = *value);
+    for column in 0..ports * order {
+        let k = modes + column;
+        for i in modes..mass.nrows() {
+            let pull = if column < ports { seen[(column, i)] } else { mass[(i, k - ports)] };
+            stiffness[(i, k)] = shift * mass[(i, k)] + pull;
+        }
+    }
+    symmetric(stiffness)
 }
 
 fn join(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
@@ -143,7 +206,8 @@ fn join(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// Combinations of columns that `stiffness` makes orthonormal, without those that depend on the others.
 fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let energies = symmetric(vectors.transpose() * stiffness * vectors);
+    let energies = columns::products(vectors.nrows(), vectors.as_slice(), product(stiffness, vectors).as_slice());
+    let energies = symmetric(energies);
     let size = |i: usize| energies[(i, i)].max(0.0).sqrt();
     let moving: Vec<usize> = (0..vectors.ncols()).filter(|&i| size(i) > 0.0).collect();
     if moving.is_empty() {
@@ -159,5 +223,5 @@ fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<DMatr
     let weights = DMatrix::from_fn(moving.len(), kept.len(), |i, k| {
         eigen.eigenvectors[(i, kept[k])] / (eigen.eigenvalues[kept[k]].sqrt() * size(moving[i]))
     });
-    Some(vectors.select_columns(&moving) * weights)
+    Some(product(&vectors.select_columns(&moving), &weights))
 }

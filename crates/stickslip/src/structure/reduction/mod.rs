@@ -9,7 +9,8 @@
 //! | Craig-Bampton | modes with the ports held, and static answers to unit motions of the ports | `craig_bampton` |
 //!
 //! and harmonic balance, which wants receptances only, may take modes and a series of residuals (`series`). Every reduction can be held against the
-//! whole structure (`evidence`), and [`Reduce`] takes as many modes as a given error asks for.
+//! whole structure (`evidence`), and [`Reduce`] takes as many modes as a given error asks for. A sector of a ring is reduced for all its waves at once
+//! (`ring`).
 //!
 //! Damping is a part of the whole structure and is reduced like the other matrices; [`Damping`] says what a modal damping ratio means
 //! beyond the modes that
@@ -20,14 +21,17 @@ mod craig_bampton;
 mod evidence;
 mod free;
 mod residual;
+mod ring;
 mod series;
 
 pub use choice::{Chosen, Reduce};
 pub use evidence::{Deviation, Reference};
 pub use free::Free;
+pub(crate) use ring::ReducedSector;
 pub use series::Series;
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
+use std::ops::Range;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{Analysis, Matrix, ModesError, NaturalModes, Singular, Wanted, columns};
@@ -37,6 +41,8 @@ pub type Row = Vec<(usize, f64)>;
 
 /// Modes beyond these are refused: as many numbers as degrees of freedom for each.
 const MOST_MODES: usize = 600;
+/// Columns as long as the structure that are worked on at once: more would fill the memory where there are thousands.
+const AT_ONCE: usize = 64;
 /// Kinetic energy of a reduced mode relative to its stiffness, in the units of the largest, below which it has no frequency.
 const MASSLESS: f64 = 1e-14;
 /// A negative shift, relative to the ratio of stiffness and mass, by which free motions have a factor.
@@ -293,11 +299,16 @@ impl Whole {
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, Wanted::Lowest(count))?)
     }
 
-    /// Unit forces at the ports, n × p.
-    fn forces(&self) -> Vec<f64> {
+    /// The ports' displacements over columns as long as the structure.
+    fn rows_of(&self, columns: &[f64]) -> DMatrix<f64> {
+        seen(&self.ports, self.dofs(), columns)
+    }
+
+    /// Unit forces at some of the ports, n × their number.
+    fn forces(&self, ports: Range<usize>) -> Vec<f64> {
         let n = self.dofs();
-        let mut forces = vec![0.0; n * self.ports.len()];
-        for (port, row) in self.ports.iter().enumerate() {
+        let mut forces = vec![0.0; n * ports.len()];
+        for (port, row) in self.ports[ports].iter().enumerate() {
             row.iter().for_each(|(at, weight)| forces[port * n + at] += weight);
         }
         forces
@@ -317,8 +328,9 @@ pub struct Reduced {
     pub stiffness: DMatrix<f64>,
     /// The ports' displacements as rows over the coordinates, p × r.
     pub ports: DMatrix<f64>,
-    /// T, n × r, by columns.
-    basis: Vec<f64>,
+    /// Columns as long as the whole structure, and T as combinations of them.
+    basis: Arc<Vec<f64>>,
+    weights: DMatrix<f64>,
     n: usize,
 }
 
@@ -333,9 +345,8 @@ impl Reduced {
             _ => None,
         };
         let damping = damping(&whole.damping, &mass, &stiffness, own)?;
-        let mut reduced = Reduced { kind, mass, damping, stiffness, ports: DMatrix::zeros(0, 0), basis, n };
-        reduced.ports = reduced.rows(&whole.ports);
-        Ok(reduced)
+        let (ports, weights) = (whole.rows_of(&basis), DMatrix::identity(mass.nrows(), mass.nrows()));
+        Ok(Reduced { kind, mass, damping, stiffness, ports, basis: Arc::new(basis), weights, n })
     }
 
     /// Coordinates, r.
@@ -357,11 +368,19 @@ impl Reduced {
     /// forgotten.
     #[must_use]
     pub(super) fn in_metres(mut self) -> Self {
+        let most = |column: &[f64]| column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let sizes: Vec<f64> = self.basis.chunks_exact(self.n.max(1)).map(most).collect();
         for k in 0..self.dofs() {
-            let column = &self.basis[k * self.n..(k + 1) * self.n];
-            let largest = column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
             let port = if self.ports.nrows() > 0 { self.ports.column(k).amax() } else { 0.0 };
-            let size = if port > UNSEEN * largest { port } else { largest };
+            // what the column cannot pass is known before the column
+            let bound: f64 = self.weights.column(k).iter().zip(&sizes).map(|(w, size)| (w * size).abs()).sum();
+            let size = if port > UNSEEN * bound {
+                port
+            } else {
+                let largest =
+                    most(&columns::combination(self.n, &self.basis, &self.weights.columns(k, 1).into_owned()));
+                if port > UNSEEN * largest { port } else { largest }
+            };
             if size == 0.0 {
                 continue;
             }
@@ -373,7 +392,7 @@ impl Reduced {
             }
         }
         // as large as the whole, and whoever asks for metres asks at the ports
-        (self.basis, self.n) = (Vec::new(), 0);
+        (self.basis, self.weights, self.n) = (Arc::default(), DMatrix::zeros(0, 0), 0);
         self
     }
 
@@ -382,9 +401,7 @@ impl Reduced {
     /// # Panics
     /// If a row lies outside of the whole structure.
     pub fn rows(&self, rows: &[Row]) -> DMatrix<f64> {
-        DMatrix::from_fn(rows.len(), self.dofs(), |i, k| {
-            rows[i].iter().map(|(at, weight)| weight * self.basis[k * self.n + at]).sum()
-        })
+        product(&seen(rows, self.n, &self.basis), &self.weights)
     }
 
     /// All displacements of the whole structure that belong to coordinates `q`.
@@ -392,7 +409,8 @@ impl Reduced {
     /// # Panics
     /// If `q` has not r entries.
     pub fn expand(&self, q: &[f64]) -> Vec<f64> {
-        columns::combination(self.n, &self.basis, &DMatrix::from_column_slice(q.len(), 1, q))
+        let weights = product(&self.weights, &DMatrix::from_column_slice(q.len(), 1, q));
+        columns::combination(self.n, &self.basis, &weights)
     }
 
     /// Natural frequencies of the reduced structure, rad/s, rising; those of coordinates without mass are infinite.
@@ -405,14 +423,47 @@ impl Reduced {
     /// # Errors
     /// [`ReductionError::Singular`] at an undamped resonance.
     pub fn receptance(&self, omega: f64) -> Result<DMatrix<Complex<f64>>, ReductionError> {
-        let stiffness = DMatrix::from_fn(self.dofs(), self.dofs(), |i, k| {
+        self.answers(omega, &DMatrix::identity(self.ports.nrows(), self.ports.nrows()))
+    }
+
+    /// Displacements of the ports under forces on them, columns side by side.
+    fn answers(&self, omega: f64, loads: &DMatrix<f64>) -> Result<DMatrix<Complex<f64>>, ReductionError> {
+        let at = |i: usize, k: usize| {
             let (m, c, s) = (self.mass[(i, k)], self.damping[(i, k)], self.stiffness[(i, k)]);
             Complex::new(s - omega * omega * m, omega * c)
-        });
-        let ports = self.ports.map(|v| Complex::new(v, 0.0));
+        };
         let free = ReductionError::Singular { omega, singular: Singular { row: 0 } };
-        Ok(&ports * stiffness.lu().solve(&ports.transpose()).ok_or(free)?)
+        let forces = columns::products(self.ports.nrows(), self.ports.as_slice(), loads.as_slice());
+        let moved = if [&self.mass, &self.damping, &self.stiffness].into_iter().all(is_diagonal) {
+            let own: Vec<Complex<f64>> = (0..self.dofs()).map(|i| at(i, i)).collect();
+            if own.contains(&Complex::new(0.0, 0.0)) {
+                return Err(free);
+            }
+            DMatrix::from_fn(forces.nrows(), forces.ncols(), |i, k| forces[(i, k)] / own[i])
+        } else {
+            let stiffness = DMatrix::from_fn(self.dofs(), self.dofs(), at);
+            stiffness.lu().solve(&forces.map(|v| Complex::new(v, 0.0))).ok_or(free)?
+        };
+        let part = |read: fn(&Complex<f64>) -> f64| product(&self.ports, &moved.map(|z| read(&z)));
+        Ok(part(|z| z.re).zip_map(&part(|z| z.im), Complex::new))
     }
+}
+
+/// `A B`.
+fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    DMatrix::from_vec(a.nrows(), b.ncols(), columns::combination(a.nrows(), a.as_slice(), b))
+}
+
+fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
+    let n = matrix.nrows();
+    matrix.as_slice().iter().enumerate().all(|(at, value)| *value == 0.0 || at % n == at / n)
+}
+
+/// Weighted sums of rows over columns of length `n`.
+fn seen(rows: &[Row], n: usize, columns: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(rows.len(), columns.len() / n.max(1), |i, k| {
+        rows[i].iter().map(|(at, weight)| weight * columns[k * n + at]).sum()
+    })
 }
 
 /// The mean of a matrix and its mirror image.
@@ -451,6 +502,9 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
     if r == 0 {
         return Some((vec![], DMatrix::zeros(0, 0)));
     }
+    if is_diagonal(mass) && is_diagonal(stiffness) && mass.diagonal().iter().all(|m| *m >= 0.0) {
+        return Some(natural_by_themselves(&mass.diagonal(), &stiffness.diagonal()));
+    }
     let ratio = |i: usize| stiffness[(i, i)] / mass[(i, i)];
     let mut ratios: Vec<f64> = (0..r).map(ratio).filter(|v| v.is_finite() && *v > 0.0).collect();
     ratios.sort_by(f64::total_cmp);
@@ -470,4 +524,16 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
     let size = |theta: f64| if massless(theta) { 1.0 } else { theta.sqrt() };
     let values = order.iter().map(|&k| value(eigen.eigenvalues[k])).collect();
     Some((values, DMatrix::from_fn(r, r, |i, k| shapes[(i, order[k])] / size(eigen.eigenvalues[order[k]]))))
+}
+
+/// The same of coordinates that do not move each other.
+fn natural_by_themselves(mass: &DVector<f64>, stiffness: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
+    let n = mass.len();
+    let value = |i: usize| if mass[i] > 0.0 { stiffness[i] / mass[i] } else { f64::INFINITY };
+    let size = |i: usize| if mass[i] > 0.0 { mass[i] } else { stiffness[i] }.sqrt();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| value(a).total_cmp(&value(b)));
+    let mut shapes = DMatrix::zeros(n, n);
+    order.iter().enumerate().for_each(|(k, &i)| shapes[(i, k)] = 1.0 / size(i));
+    (order.into_iter().map(value).collect(), shapes)
 }

@@ -12,41 +12,50 @@
 //! dynamic analysis"; Hansteen and Bell (1979), "On the accuracy of mode superposition analysis in structural dynamics"; Dickens, Nakagawa and
 //! Wittbrodt (1997), "A critique of mode acceleration and modal truncation augmentation methods for modal response analysis".
 
-use super::{ReductionError, Whole};
+use super::{AT_ONCE, ReductionError, Whole};
 use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes, columns};
 
 /// Attempts to factor beside an eigenvalue, each further by `STEP` of the shift.
 const ATTEMPTS: usize = 8;
 const STEP: f64 = 1e-3;
 
-/// The blocks `X₀, …`, as many as `order`, n × p each, with the modes projected out. Also the shift that was taken, rad²/s².
-pub(super) fn blocks(
+/// The modes, then the blocks `X₀, …`, as many as `order`, n × (k + p J), with the modes projected out of the blocks. Also the shift that was taken,
+/// rad²/s².
+pub(super) fn basis(
     whole: &Whole,
     modes: &NaturalModes,
     shift: f64,
     order: usize,
-) -> Result<(Vec<Vec<f64>>, f64), ReductionError> {
-    let n = whole.dofs();
+) -> Result<(Vec<f64>, f64), ReductionError> {
+    let (n, ports) = (whole.dofs(), whole.ports().len());
     let (factor, shift) = factor(whole, modes, shift)?;
-    let clear = |block: &mut Vec<f64>| {
-        let along = columns::products(n, &modes.shapes, &whole.mass.times_columns(block));
-        columns::add(n, block, -1.0, &modes.shapes, &along);
+    let heavy = whole.mass.times_columns(&modes.shapes);
+    let clear = |some: &mut [f64]| {
+        let along = columns::products(n, &heavy, some);
+        columns::add(n, some, -1.0, &modes.shapes, &along);
     };
-    let mut blocks: Vec<Vec<f64>> = Vec::with_capacity(order);
-    for _ in 0..order {
-        let mut block = match blocks.last() {
-            Some(last) => whole.mass.times_columns(last),
-            None => whole.forces(),
-        };
-        // forces without the part that the modes answer: A F = (1 - M Φ Φᵀ) F, self-equilibrated with them
-        let along = columns::products(n, &modes.shapes, &block);
-        columns::add(n, &mut block, -1.0, &whole.mass.times_columns(&modes.shapes), &along);
-        factor.solve(&mut block);
-        clear(&mut block);
-        clear(&mut block);
-        blocks.push(block);
+    let mut basis = Vec::with_capacity(modes.shapes.len() + n * ports * order);
+    basis.extend_from_slice(&modes.shapes);
+    for block in 0..order {
+        for first in (0..ports).step_by(AT_ONCE) {
+            let numbers = first..ports.min(first + AT_ONCE);
+            let mut some = match block.checked_sub(1) {
+                Some(last) => {
+                    let at = modes.shapes.len() + last * ports * n;
+                    whole.mass.times_columns(&basis[at + numbers.start * n..at + numbers.end * n])
+                }
+                None => whole.forces(numbers),
+            };
+            // forces without the part that the modes answer: A F = (1 - M Φ Φᵀ) F, self-equilibrated with them
+            let along = columns::products(n, &modes.shapes, &some);
+            columns::add(n, &mut some, -1.0, &heavy, &along);
+            factor.solve(&mut some);
+            clear(&mut some);
+            clear(&mut some);
+            basis.extend_from_slice(&some);
+        }
     }
-    Ok((blocks, shift))
+    Ok((basis, shift))
 }
 
 /// `K - σM`; at zero with springs where a free motion is largest.

@@ -13,6 +13,14 @@ pub(super) const CURVE: &str = "curve";
 pub(super) const PEAKS: &str = "peaks";
 /// All joints free, and all joints stuck.
 pub(super) const REFERENCES: &str = "references";
+/// One row per case of a mistuned disk.
+pub(super) const AMPLIFICATION: &str = "amplification";
+/// The peak of the tuned disk.
+pub(super) const TUNED_FREQUENCY: &str = "tuned_frequency_Hz";
+/// Its height.
+pub(super) const TUNED_AMPLITUDE: &str = "tuned_amplitude_m";
+/// The largest amplitude over that.
+pub(super) const RATIO: &str = "amplification";
 /// The mass that has a peak.
 pub(super) const MASS: &str = "mass";
 

@@ -29,6 +29,8 @@ pub(in super::super) struct Alternation {
     pub by_frequency: Option<Vec<Complex64>>,
     /// Internal states at t = 0 of the port evaluated last.
     pub state: Vec<f64>,
+    /// States at t = 0 from which the next port with a memory begins, if they are known; used up by it.
+    pub begin: Vec<f64>,
     /// `e^{2πji/N}`.
     pub(super) turns: Vec<Complex64>,
     pub(super) argument: Vec<Complex64>,
@@ -60,6 +62,7 @@ impl Alternation {
             slips: vec![false; samples],
             by_frequency: None,
             state: Vec::new(),
+            begin: Vec::new(),
             turns: (0..samples).map(|i| Complex64::cis(i as f64 * TAU / samples as f64)).collect(),
             argument: Vec::new(),
             work: zeros.clone(),

@@ -20,6 +20,10 @@ const REPEATS: f64 = 1e-12;
 const ROUNDED: f64 = 1e-9;
 /// Periods, at most: hysteresis that slips forgets in a few.
 const PERIODS: usize = 60;
+/// Periods that are followed without derivatives, at most, and the share of their distance that the next one may leave: a period with derivatives
+/// costs as much as three without.
+const FORGETS: usize = 6;
+const SLOW: f64 = 0.03;
 /// Singular values of `1 - Π` below this belong to states that nothing forgets.
 const NEUTRAL: f64 = 1e-9;
 /// Harmonics up to which those of a derivative are made by a matrix, not by transforms.
@@ -42,17 +46,11 @@ pub(super) trait March {
     fn waves(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4];
     /// The same for the first movement.
     fn first_waves(&self, h: usize) -> [Complex64; 4];
-    /// The step that ends at sample `i`. `rows`: derivatives of the states after it, then of the forces, by inputs and states before, and by ω if
-    /// it is known.
-    /// False if it has no solution.
-    fn step(
-        &mut self,
-        i: usize,
-        before: &[f64],
-        after: &mut [f64],
-        force: &mut [f64; MOST_DIRECTIONS],
-        rows: Option<&mut [f64]>,
-    ) -> bool;
+    /// The steps of a period, from sample 0 to sample 1 and in the end from the last to sample 0: states at sample 0 before and after, and the forces at
+    /// the samples. `rows`, [sample]: derivatives of the states after the step that ends there, then of the forces, by inputs and states before, and by ω
+    /// if it is known.
+    /// False if some step has no solution.
+    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
     /// The first movement, from the mean position of a joint that has not been moved to sample 0.
     fn first(
         &mut self,
@@ -78,6 +76,7 @@ impl Alternation {
                 force.fill(Complex64::new(f64::NAN, 0.0));
             }
         } else {
+            self.state.clear();
             force.fill(Complex64::new(f64::NAN, 0.0));
         }
         self.march = memory;
@@ -86,21 +85,36 @@ impl Alternation {
     /// States that repeat, into `self.state`, the forces, and the derivatives of all steps if `linear`. Returns Π, or any matrix if not.
     fn repeat(&mut self, march: &mut dyn March, memory: &mut Memory, linear: bool) -> Option<DMatrix<f64>> {
         let m = march.states();
-        let mut z = DVector::zeros(m);
-        let mut force = [0.0; MOST_DIRECTIONS];
-        if !march.first(&vec![0.0; m], z.as_mut_slice(), &mut force, None) {
-            return None;
-        }
-        z = self.period(march, &z, None)?;
         let scale = march.state_scale();
+        let known = std::mem::take(&mut self.begin);
+        let mut z = DVector::zeros(m);
+        if m > 0 && known.len() == m {
+            z.copy_from_slice(&known);
+        } else {
+            let mut force = [0.0; MOST_DIRECTIONS];
+            if !march.first(&vec![0.0; m], z.as_mut_slice(), &mut force, None) {
+                return None;
+            }
+            // what slips forgets its beginning in a few periods: no derivative is needed to see that
+            let mut last = f64::INFINITY;
+            for _ in 0..FORGETS {
+                let after = self.period(march, &z, None)?;
+                let gap = (&after - &z).amax() / scale;
+                z = after;
+                if gap <= REPEATS && !linear {
+                    self.state.clear();
+                    self.state.extend(z.iter());
+                    return Some(DMatrix::zeros(m, m));
+                }
+                if gap <= REPEATS || gap > SLOW * last {
+                    break;
+                }
+                last = gap;
+            }
+        }
         let mut last = f64::INFINITY;
-        for round in 0..PERIODS {
-            // what slips has mostly forgotten its beginning after a period: no derivative is needed to see that
-            let plain = if round == 0 && !linear { Some(self.period(march, &z, None)?) } else { None };
-            let (after, product) = match plain.filter(|after| (after - &z).amax() <= REPEATS * scale) {
-                Some(after) => (after, DMatrix::zeros(m, m)),
-                None => self.linear_period(march, &z, memory)?,
-            };
+        for _ in 0..PERIODS {
+            let (after, product) = self.linear_period(march, &z, memory)?;
             let gap = (&after - &z).amax() / scale;
             if m == 0 || gap <= REPEATS || (gap <= ROUNDED && gap >= 0.5 * last) {
                 self.state.clear();
@@ -131,21 +145,9 @@ impl Alternation {
         if let Some(rows) = rows.as_deref_mut() {
             rows.resize(n * size, 0.0);
         }
-        let (mut z, mut after) = (z.clone(), z.clone());
-        let mut force = [0.0; MOST_DIRECTIONS];
+        let mut z = z.clone();
         self.marched += n;
-        for step in 1..=n {
-            let i = step % n;
-            let slot = rows.as_deref_mut().map(|rows| &mut rows[i * size..(i + 1) * size]);
-            if !march.step(i, z.as_slice(), after.as_mut_slice(), &mut force, slot) {
-                return None;
-            }
-            std::mem::swap(&mut z, &mut after);
-            for (signal, force) in self.force.iter_mut().zip(force).take(d) {
-                signal[i] = force;
-            }
-        }
-        Some(z)
+        march.around(z.as_mut_slice(), &mut self.force, rows.map(|rows| &mut rows[..])).then_some(z)
     }
 
     /// The same with the derivative by the states before, and that of the forces.
@@ -159,25 +161,24 @@ impl Alternation {
         let (m, d) = (march.states(), march.axes());
         let (inputs, width) = (march.inputs() * d, width(march));
         let after = self.period(march, z, Some(&mut memory.rows))?;
-        let mut product = DMatrix::<f64>::identity(m, m);
-        let mut next = product.clone();
+        // Π of the steps so far, row by row
+        let mut product: Vec<f64> = (0..m * m).map(|at| if at % (m + 1) == 0 { 1.0 } else { 0.0 }).collect();
+        let mut next = vec![0.0; m * m];
         memory.by_state.resize(n * d * m, 0.0);
         for step in 1..=n {
             let i = step % n;
-            let rows = &memory.rows[i * (m + d) * width..(i + 1) * (m + d) * width];
-            for t in 0..m {
-                for s in 0..m + d {
-                    let row = &rows[s * width + inputs..s * width + inputs + m];
-                    let value: f64 = row.iter().enumerate().map(|(r, x)| x * product[(r, t)]).sum();
-                    match s.checked_sub(m) {
-                        None => next[(s, t)] = value,
-                        Some(a) => memory.by_state[(i * d + a) * m + t] = value,
-                    }
+            let rows = memory.rows[i * (m + d) * width..(i + 1) * (m + d) * width].chunks_exact(width);
+            let forces = &mut memory.by_state[i * d * m..(i + 1) * d * m];
+            let out = next.chunks_exact_mut(m.max(1)).chain(forces.chunks_exact_mut(m.max(1)));
+            for (row, out) in rows.zip(out) {
+                let row = &row[inputs..inputs + m];
+                for (t, out) in out.iter_mut().enumerate() {
+                    *out = row.iter().zip(product[t..].iter().step_by(m)).map(|(x, p)| x * p).sum();
                 }
             }
             std::mem::swap(&mut product, &mut next);
         }
-        Some((after, product))
+        Some((after, DMatrix::from_row_slice(m, m, &product)))
     }
 
     /// Adds the derivative of the forces. False if the first movement has none.
@@ -207,6 +208,7 @@ impl Alternation {
             None
         };
         let wide = 2 * nh;
+        self.fill_waves(march, &mut memory.waves);
         for b in 0..d {
             let input = Input::Motion { axis: b };
             self.follow(march, memory, (beginning.as_deref(), &inverse), (input, wide));
@@ -268,6 +270,29 @@ impl Alternation {
         }
     }
 
+    /// What the parts of the harmonics of a motion make of the inputs: [sample][kind][part], and behind the samples for the first movement.
+    fn fill_waves(&self, march: &dyn March, waves: &mut Vec<f64>) {
+        let (n, kinds) = (self.samples(), march.inputs());
+        // steps are alike but for where they are on the circle
+        let one = Complex64::new(1.0, 0.0);
+        let fixed: Vec<[Complex64; 4]> = self.harmonics.iter().map(|&h| march.waves(h, TAU / n as f64, one)).collect();
+        waves.clear();
+        let mut at = vec![0; self.harmonics.len()];
+        for _ in 0..n {
+            for kind in 0..kinds {
+                for ((at, fixed), &h) in at.iter().zip(&fixed).zip(&self.harmonics) {
+                    waves.extend(<[f64; 2]>::from(parts(fixed[kind] * self.turns[*at], h)));
+                }
+            }
+            for (at, &h) in at.iter_mut().zip(&self.harmonics) {
+                *at = (*at + h) % n;
+            }
+        }
+        for kind in 0..kinds {
+            waves.extend(self.harmonics.iter().flat_map(|&h| <[f64; 2]>::from(parts(march.first_waves(h)[kind], h))));
+        }
+    }
+
     /// The derivative of the sampled forces by inputs, with states that follow them so that they repeat, into `memory.columns`: [sample][axis][column].
     /// The columns are the parts of the harmonics of a motion along an axis, or the frequency. `beginning`: the steps of the first period, if something
     /// is never forgotten.
@@ -280,38 +305,20 @@ impl Alternation {
     ) {
         let n = self.samples();
         let (m, d) = (march.states(), march.axes());
-        let (width, angle) = (width(march), TAU / n as f64);
+        let width = width(march);
         let size = (m + d) * width;
-        // steps are alike but for where they are on the circle
-        let one = Complex64::new(1.0, 0.0);
-        let fixed: Vec<[Complex64; 4]> = self.harmonics.iter().map(|&h| march.waves(h, angle, one)).collect();
         let by = By { input, kinds: march.inputs(), axes: d, width, wide };
-        let mut waves = vec![0.0; by.kinds * wide];
-        let turn = |i: usize, waves: &mut [f64]| {
-            if matches!(input, Input::Frequency) {
-                return;
-            }
-            for (k, (&h, fixed)) in self.harmonics.iter().zip(&fixed).enumerate() {
-                let at = self.turns[h * i % n];
-                for kind in 0..by.kinds {
-                    let wave = fixed[kind] * at;
-                    (waves[kind * wide + 2 * k], waves[kind * wide + 2 * k + 1]) = parts(wave, h);
-                }
-            }
-        };
         let (mut start, mut next) = (vec![0.0; m * wide], vec![0.0; m * wide]);
+        let table = &memory.waves;
+        let at = |i: usize| &table[i * by.kinds * wide..][..by.kinds * wide];
+        let none = Vec::new();
+        let waves = |i: usize| if matches!(input, Input::Frequency) { &none[..] } else { at(i) };
         if let Some(beginning) = beginning {
-            for (k, &h) in self.harmonics.iter().enumerate().filter(|_| !matches!(input, Input::Frequency)) {
-                let first = march.first_waves(h);
-                for kind in 0..by.kinds {
-                    (waves[kind * wide + 2 * k], waves[kind * wide + 2 * k + 1]) = parts(first[kind], h);
-                }
-            }
-            by.advance(&memory.first[..m * width], &waves, &next, &mut start);
+            // behind those of the samples stand those of the first movement
+            by.advance(&memory.first[..m * width], waves(n), &next, &mut start);
             for step in 1..=n {
                 let i = step % n;
-                turn(i, &mut waves);
-                by.advance(&beginning[i * size..][..m * width], &waves, &start, &mut next);
+                by.advance(&beginning[i * size..][..m * width], waves(i), &start, &mut next);
                 std::mem::swap(&mut start, &mut next);
             }
         }
@@ -320,10 +327,14 @@ impl Alternation {
         let mut s = start.clone();
         for step in 1..=n {
             let i = step % n;
-            turn(i, &mut waves);
-            let rows = &memory.rows[i * size..(i + 1) * size];
-            by.advance(&rows[m * width..], &waves, &s, &mut memory.columns[i * d * wide..][..d * wide]);
-            by.advance(&rows[..m * width], &waves, &s, &mut next);
+            let (states, forces) = memory.rows[i * size..(i + 1) * size].split_at(m * width);
+            by.advance(states, waves(i), &s, &mut next);
+            let columns = &mut memory.columns[i * d * wide..][..d * wide];
+            let same = forces.iter().zip(states).take_while(|(a, b)| a == b).count() / width;
+            // forces that are states
+            let (own, other) = columns.split_at_mut(same * wide);
+            own.copy_from_slice(&next[..same * wide]);
+            by.advance(&forces[same * width..], waves(i), &s, other);
             std::mem::swap(&mut s, &mut next);
         }
         if m == 0 {
@@ -396,7 +407,23 @@ impl By {
     #[inline]
     fn advance(&self, rows: &[f64], waves: &[f64], states: &[f64], out: &mut [f64]) {
         for (row, out) in rows.chunks_exact(self.width).zip(out.chunks_exact_mut(self.wide)) {
+            let before = &row[self.kinds * self.axes..];
             match self.input {
+                // most laws: two inputs and two states, all at once
+                Input::Motion { axis } if self.kinds == 2 && states.len() == 2 * self.wide => {
+                    let weights = [row[axis], row[self.axes + axis], before[0], before[1]];
+                    if weights == [0.0; 4] {
+                        out.fill(0.0);
+                        continue;
+                    }
+                    let (from, to) = waves.split_at(self.wide);
+                    let (one, two) = states.split_at(self.wide);
+                    let inputs = from.iter().zip(&to[..self.wide]).zip(one.iter().zip(&two[..self.wide]));
+                    for (out, ((from, to), (one, two))) in out.iter_mut().zip(inputs) {
+                        *out = (weights[0] * from + weights[1] * to) + (weights[2] * one + weights[3] * two);
+                    }
+                    continue;
+                }
                 Input::Motion { axis } => {
                     out.fill(0.0);
                     for (kind, wave) in waves.chunks_exact(self.wide).enumerate() {
@@ -405,7 +432,7 @@ impl By {
                 }
                 Input::Frequency => out.fill(row[self.width - 1]),
             }
-            for (weight, state) in row[self.kinds * self.axes..].iter().zip(states.chunks_exact(self.wide)) {
+            for (weight, state) in before.iter().zip(states.chunks_exact(self.wide)) {
                 add(out, *weight, state);
             }
         }

@@ -9,6 +9,8 @@ pub(in super::super) struct Memory {
     pub(super) first: Vec<f64>,
     /// Forces by the states at t = 0, per sample.
     pub(super) by_state: Vec<f64>,
+    /// What the harmonics of a motion make of the inputs.
+    pub(super) waves: Vec<f64>,
     /// Forces by inputs: [sample][axis][column].
     pub(super) columns: Vec<f64>,
     /// One of them over the samples.

@@ -377,7 +377,11 @@ impl Alternation {
             return self.sample_slides(parts, c);
         }
         let mut out = vec![ZERO; c.len()];
-        if port.is_force() {
+        if let Kernel::Step(law) = &port.kernel
+            && let Some(step) = law.step()
+        {
+            self.step_by_step(step, port.axes, c, &mut out, None);
+        } else if port.is_force() {
             self.image(port, (omega, penalty, 1.0), (c, force), &mut out, None);
         } else {
             self.respond(port, (omega, 1.0), c, &mut out, None);

@@ -279,20 +279,25 @@ impl March for RateMarch<'_> {
         let rate = (1.0 - mean) * self.omega / (TAU * LEAD);
         [LEFT * mean + (1.0 - LEFT), rate, 1.0, rate].map(|x| Complex64::new(x, 0.0))
     }
-    fn step(
-        &mut self,
-        i: usize,
-        before: &[f64],
-        after: &mut [f64],
-        force: &mut [f64; MOST_DIRECTIONS],
-        rows: Option<&mut [f64]>,
-    ) -> bool {
-        let read = |signals: [&Signals; 2]| Relative {
-            displacement: std::array::from_fn(|a| if a < self.axes { signals[0][a][i] } else { 0.0 }),
-            velocity: std::array::from_fn(|a| if a < self.axes { signals[1][a][i] } else { 0.0 }),
+    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], mut rows: Option<&mut [f64]>) -> bool {
+        let (n, m, d) = (self.at[0][0].len(), z.len(), self.axes);
+        let size = (m + d) * (4 * d + m + usize::from(self.frequency));
+        let read = |signals: [&Signals; 2], i: usize| Relative {
+            displacement: std::array::from_fn(|a| if a < d { signals[0][a][i] } else { 0.0 }),
+            velocity: std::array::from_fn(|a| if a < d { signals[1][a][i] } else { 0.0 }),
         };
-        let motions = [read([&self.stages[0], &self.stages[1]]), read(self.at)];
-        self.advance((self.length, motions), before, after, force, rows)
+        let (mut before, mut now) = (z.to_vec(), [0.0; MOST_DIRECTIONS]);
+        for step in 1..=n {
+            let i = step % n;
+            let motions = [read([&self.stages[0], &self.stages[1]], i), read(self.at, i)];
+            let rows = rows.as_deref_mut().map(|rows| &mut rows[i * size..(i + 1) * size]);
+            if !self.advance((self.length, motions), &before, z, &mut now, rows) {
+                return false;
+            }
+            before.copy_from_slice(z);
+            force.iter_mut().zip(now).take(d).for_each(|(force, now)| force[i] = now);
+        }
+        true
     }
     fn first(
         &mut self,

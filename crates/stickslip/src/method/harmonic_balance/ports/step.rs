@@ -3,14 +3,64 @@
 //! A straight step is exact for elastic-plastic laws along one direction; between samples the motion is curved, and what that
 //! leaves out is `(2π h/N)²/8` of the motion at harmonic h, some 5e-6 at 1024 samples.
 
-use super::alternation::Alternation;
+use super::alternation::{Alternation, add_entries};
 use super::march::March;
 use crate::law::{MOST_DIRECTIONS, Step, StepPoint};
 use num_complex::Complex64;
 
 impl Alternation {
-    /// Adds the harmonics of the force in the motion `c`, [axis][harmonic], to `force`, and their derivative to `tangent`.
+    /// Adds the harmonics of the force in the motion `c`, [axis][harmonic], to `force`, and their derivative to `tangent`. Where it is known that the
+    /// motion holds nothing is sampled.
     pub(super) fn step(
+        &mut self,
+        step: &dyn Step,
+        axes: usize,
+        c: &[Complex64],
+        force: &mut [Complex64],
+        tangent: Option<&mut [f64]>,
+    ) {
+        let nh = self.harmonics.len();
+        let (mut mean, mut reach) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS]);
+        for (a, c) in c.chunks_exact(nh).enumerate() {
+            for (c, h) in c.iter().zip(&self.harmonics) {
+                if *h == 0 {
+                    mean[a] = c.re;
+                } else {
+                    reach[a] += c.norm();
+                }
+            }
+        }
+        if !step.holds(&mean, &reach) {
+            return self.step_by_step(step, axes, c, force, tangent);
+        }
+        self.state.clear();
+        self.begin.clear();
+        let mut point = StepPoint::new(axes, step.states());
+        step.linearise(axes, &mean, &mean, &vec![0.0; step.states()], &mut point);
+        let mut tangent = tangent;
+        for a in 0..axes {
+            let (from, to) = point.force_slope(a)[..2 * axes].split_at(axes);
+            for (k, &h) in self.harmonics.iter().enumerate() {
+                let at = a * nh + k;
+                if h == 0 {
+                    force[at] += point.force[a];
+                }
+                for b in 0..axes {
+                    // the position of rest moves both ends of a step
+                    let slope = if h == 0 { from[b] + to[b] } else { to[b] };
+                    if h > 0 {
+                        force[at] += c[b * nh + k] * slope;
+                    }
+                    if let Some(tangent) = tangent.as_deref_mut() {
+                        add_entries(tangent, 2 * nh * axes, (at, h), (b * nh + k, h), [slope, 0.0, 0.0, slope]);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The same by the samples of a period.
+    pub(super) fn step_by_step(
         &mut self,
         step: &dyn Step,
         axes: usize,
@@ -94,17 +144,9 @@ impl March for StepMarch<'_> {
     fn first_waves(&self, h: usize) -> [Complex64; 4] {
         [if h == 0 { 1.0 } else { 0.0 }, 1.0, 0.0, 0.0].map(|x| Complex64::new(x, 0.0))
     }
-    fn step(
-        &mut self,
-        i: usize,
-        before: &[f64],
-        after: &mut [f64],
-        force: &mut [f64; MOST_DIRECTIONS],
-        rows: Option<&mut [f64]>,
-    ) -> bool {
-        let n = self.at[0].len();
-        let (from, to) = (self.read((i + n - 1) % n), self.read(i));
-        self.advance((&from, &to), before, after, force, rows)
+    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
+        self.step.around(self.axes, self.at, z, force, rows);
+        z.iter().all(|z| z.is_finite())
     }
     fn first(
         &mut self,
@@ -115,5 +157,44 @@ impl March for StepMarch<'_> {
     ) -> bool {
         let (from, to) = (self.mean, self.read(0));
         self.advance((&from, &to), before, after, force, rows)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{FrictionContact, Jenkins2d};
+
+    /// What is known of a motion that holds is what its samples give; a larger motion is not taken for one.
+    #[test]
+    fn motions_that_hold_are_those_of_their_samples() {
+        let contact = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.5, preload: 4.0, tangents: 2 };
+        let line = FrictionContact { tangents: 1, ..contact };
+        let plane = Jenkins2d { stiffness: 3.0, limit: 1.8 };
+        let laws: [(&dyn Step, usize); 3] = [(&contact, 3), (&line, 2), (&plane, 2)];
+        for (law, axes) in laws {
+            for harmonics in [vec![0, 1, 2, 3], vec![1, 3]] {
+                let nh = harmonics.len();
+                let imaginary = |k: usize| if harmonics[k] == 0 { 0.0 } else { 0.1 };
+                let c: Vec<Complex64> = (0..axes * nh)
+                    .map(|i| Complex64::new(0.12 / (1.0 + i as f64), -imaginary(i % nh) / (2.0 + i as f64)))
+                    .collect();
+                let mut alternation = Alternation::new(harmonics, 256);
+                let size = 2 * nh * axes;
+                let mut found = [(); 2].map(|()| (vec![Complex64::new(0.0, 0.0); axes * nh], vec![0.0; size * size]));
+                let [(force, slopes), (sampled, sampled_slopes)] = &mut found;
+                alternation.marched = 0;
+                alternation.step(law, axes, &c, force, Some(slopes));
+                assert_eq!(alternation.marched, 0, "{law:?} was sampled");
+                alternation.step_by_step(law, axes, &c, sampled, Some(sampled_slopes));
+                assert!(force.iter().zip(&*sampled).all(|(a, b)| (a - b).norm() < 1e-12), "{force:?} {sampled:?}");
+                for (i, (a, b)) in slopes.iter().zip(&*sampled_slopes).enumerate() {
+                    assert!((a - b).abs() < 1e-11, "{law:?}, row {}, column {}: {a} {b}", i / size, i % size);
+                }
+                let far: Vec<Complex64> = c.iter().map(|c| c * 9.0).collect();
+                alternation.step(law, axes, &far, force, None);
+                assert!(alternation.marched > 0, "{law:?} slips");
+            }
+        }
     }
 }

@@ -1,0 +1,339 @@
+//! A structure by its matrices, as a part of a model: its coordinates, its matrices over them, and its places; of a disk those of all sectors.
+
+use super::assemble::{Element, ModelError};
+use super::coordinates::Entries;
+use super::{DiskPart, Model, Substructure, SubstructureDamping};
+use crate::structure::reduction::{Damping, Reduced, ReductionError, Row};
+use crate::structure::{KeptSector, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow};
+use std::sync::Arc;
+
+/// The substructure in coordinates of its own; of a ring those of all sectors, one after the other.
+#[derive(Default)]
+pub(super) struct Part {
+    pub names: Vec<String>,
+    /// For each place of the model, each of its directions.
+    pub places: Vec<Vec<Row>>,
+    /// Of mass, damping and stiffness.
+    pub entries: [Entries; 3],
+    pub reduced: Option<Arc<ReducedComponent>>,
+}
+
+impl Part {
+    pub fn new(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
+        let n = substructure.component.dofs();
+        for (i, place) in model.places.iter().enumerate() {
+            for row in &place.rows {
+                let wrong = |key, message: String| Err(ModelError::new(Element::Place(i), key, message));
+                if let Some((at, _)) = row.iter().find(|(at, _)| *at >= n) {
+                    return wrong("dof", format!("row {} of a structure of {n} rows", at + 1));
+                }
+                if row.iter().all(|(_, weight)| *weight == 0.0) || row.iter().any(|(_, weight)| !weight.is_finite()) {
+                    return wrong("dof", "its weights must be finite numbers, not all zero".to_owned());
+                }
+            }
+        }
+        if let (Some(ring), Some(of)) = (model.ring, &substructure.disk) {
+            return Part::ring(substructure, of, ring.sectors, model);
+        }
+        match substructure.reduction {
+            Reduction::None => Part::whole(substructure, model),
+            _ => Part::reduced(substructure, model),
+        }
+    }
+
+    fn whole(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
+        let (mass, own, stiffness) = substructure.component.matrices();
+        let entries: Entries = mass.entries().collect();
+        let springs: Entries = stiffness.entries().collect();
+        let damping = match substructure.damping {
+            SubstructureDamping::Own => own.map_or_else(Vec::new, |own| own.entries().collect()),
+            SubstructureDamping::Rayleigh { mass, stiffness } => {
+                let times = |entries: &Entries, factor: f64| -> Entries {
+                    let all = entries.iter().filter(|_| factor != 0.0);
+                    all.map(|(row, column, value)| (*row, *column, factor * value)).collect()
+                };
+                [times(&entries, mass), times(&springs, stiffness)].concat()
+            }
+            SubstructureDamping::Ratio(_) => return Err(no_modes()),
+        };
+        let named = |(at, name): (usize, &String)| row_name(at, name);
+        Ok(Part {
+            names: substructure.component.rows().iter().enumerate().map(named).collect(),
+            places: model.places.iter().map(|place| place.displacements(&place.rows)).collect(),
+            entries: [entries, damping, springs],
+            reduced: None,
+        })
+    }
+
+    fn reduced(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
+        let seen: Vec<Row> = model.places.iter().flat_map(|place| place.rows.iter().cloned()).collect();
+        let component = substructure.component.reduced(&seen, &substructure.reduction).map_err(failed)?;
+        let ReducedForm::Alone(reduced) = component.form() else { return Ok(Part::default()) };
+        let damped = damping_law(substructure, &component).map(|damping| reduced.damped(&damping));
+        let damped = damped.transpose().map_err(failed)?;
+        let reduced = damped.as_ref().unwrap_or(reduced);
+        let entries = |matrix: &nalgebra::DMatrix<f64>| -> Entries {
+            let all = (0..matrix.ncols()).flat_map(|k| (0..matrix.nrows()).map(move |i| (i, k)));
+            all.map(|at| (at.0, at.1, matrix[at])).filter(|entry| entry.2 != 0.0).collect()
+        };
+        let Reduced { mass, damping, stiffness, ports, .. } = reduced;
+        let row = |port: usize| ports.row(port).iter().copied().enumerate().filter(|(_, w)| *w != 0.0).collect();
+        let mut next = 0;
+        let of_place = |place: &super::Place| -> Vec<Row> {
+            next += place.rows.len();
+            place.displacements(&(next - place.rows.len()..next).map(row).collect::<Vec<_>>())
+        };
+        Ok(Part {
+            names: (1..=reduced.dofs()).map(|number| format!("coordinate {number}")).collect(),
+            places: model.places.iter().map(of_place).collect(),
+            entries: [entries(mass), entries(damping), entries(stiffness)],
+            reduced: Some(component),
+        })
+    }
+
+    /// A sector of a disk, as often as there are sectors.
+    fn ring(substructure: &Substructure, disk: &DiskPart, sectors: usize, model: &Model) -> Result<Self, ModelError> {
+        let Substructure { component, reduction, .. } = substructure;
+        if !model.places.len().is_multiple_of(sectors) {
+            let message = format!("{} places on {sectors} sectors: each has the same", model.places.len());
+            return Err(ModelError::new(Element::Whole, "place", message));
+        }
+        let stated = &model.places[..model.places.len() / sectors];
+        let unlike = model.places.iter().enumerate().find(|(i, place)| place.rows != stated[i % stated.len()].rows);
+        if let Some((i, _)) = unlike {
+            let message = "it has other rows than in the first sector, and all sectors are seen at the same";
+            return Err(ModelError::new(Element::Place(i), "dof", message));
+        }
+        let seen: Vec<Row> = stated.iter().flat_map(|place| place.rows.iter().cloned()).collect();
+        let kept = component.sector(&disk.boundary, sectors);
+        let whole = matches!(reduction, Reduction::None);
+        let one = if whole {
+            OneSector::whole(substructure, &kept, &seen)?
+        } else {
+            OneSector::reduced(substructure, &kept, &seen, sectors)?
+        };
+        let n = one.names.len();
+        let at = |sector: usize, shift: i64, row: usize| {
+            (sector as i64 + shift).rem_euclid(sectors as i64) as usize * n + row
+        };
+        let around = |entries: &[RingEntry]| -> Entries {
+            let all = (0..sectors).flat_map(|s| entries.iter().map(move |entry| (s, entry)));
+            all.map(|(s, &(row, column, shift, value))| (at(s, 0, row), at(s, shift, column), value)).collect()
+        };
+        let [mass, damping, mut stiffness] = one.entries.each_ref().map(|entries| around(entries));
+        if disk.deviations.iter().any(|deviation| *deviation != 0.0) {
+            let asked = (!whole).then_some((seen.as_slice(), reduction));
+            let blade = kept.blade(component, &disk.blade, asked);
+            let blade = blade.map_err(|error| ModelError::new(Element::Substructure, "blade", error.to_string()))?;
+            for (s, &deviation) in disk.deviations.iter().enumerate().filter(|(_, deviation)| **deviation != 0.0) {
+                stiffness.extend(blade.iter().map(|(i, k, value)| (at(s, 0, *i), at(s, 0, *k), deviation * value)));
+            }
+        }
+        let mut next = 0;
+        let mut places = Vec::with_capacity(model.places.len());
+        for (i, place) in model.places.iter().enumerate() {
+            let s = i / stated.len();
+            next = if i % stated.len() == 0 { 0 } else { next };
+            let rows = one.places[next..next + place.rows.len()].iter();
+            let rows = rows.map(|row| row.iter().map(|&(to, shift, weight)| (at(s, shift, to), weight)).collect());
+            next += place.rows.len();
+            places.push(place.displacements(&rows.collect::<Vec<Row>>()));
+        }
+        let names = (0..sectors).flat_map(|s| one.names.iter().map(move |name| format!("{name}, sector {s}")));
+        Ok(Part { names: names.collect(), places, entries: [mass, damping, stiffness], reduced: one.reduced })
+    }
+}
+
+/// A sector as it stands in a ring.
+struct OneSector {
+    names: Vec<String>,
+    /// Of everything that is seen of it.
+    places: Vec<RingRow>,
+    entries: [Vec<RingEntry>; 3],
+    reduced: Option<Arc<ReducedComponent>>,
+}
+
+impl OneSector {
+    fn whole(substructure: &Substructure, kept: &KeptSector, seen: &[Row]) -> Result<Self, ModelError> {
+        let sector = &kept.sector;
+        let damping = match substructure.damping {
+            SubstructureDamping::Own => sector.damping.clone().unwrap_or_default(),
+            SubstructureDamping::Rayleigh { mass, stiffness } => {
+                [scaled(&sector.mass, mass), scaled(&sector.stiffness, stiffness)].concat()
+            }
+            SubstructureDamping::Ratio(_) => return Err(no_modes()),
+        };
+        let rows = substructure.component.rows();
+        Ok(OneSector {
+            names: sector.kept.iter().map(|&row| row_name(row, &rows[row])).collect(),
+            places: seen.iter().map(|row| sector.row(row)).collect(),
+            entries: [sector.mass.clone(), damping, sector.stiffness.clone()],
+            reduced: None,
+        })
+    }
+
+    fn reduced(
+        substructure: &Substructure,
+        kept: &KeptSector,
+        seen: &[Row],
+        sectors: usize,
+    ) -> Result<Self, ModelError> {
+        let component = kept.reduced(seen, &substructure.reduction).map_err(failed)?;
+        let ReducedForm::Sector(sector) = component.form() else { return Err(failed(ReductionError::NoPorts)) };
+        let damping = match damping_law(substructure, &component) {
+            Some(law) => sector.damped(&law, sectors).map_err(failed)?,
+            None => sector.damping.clone().unwrap_or_default(),
+        };
+        let mut places = vec![RingRow::new(); seen.len()];
+        sector.ports.iter().for_each(|&(port, at, shift, weight)| places[port].push((at, shift, weight)));
+        Ok(OneSector {
+            names: (1..=sector.dofs()).map(|number| format!("coordinate {number}")).collect(),
+            places,
+            entries: [sector.mass.clone(), damping, sector.stiffness.clone()],
+            reduced: Some(component),
+        })
+    }
+}
+
+/// What a row of the matrices is called.
+fn row_name(at: usize, name: &str) -> String {
+    if name.is_empty() { format!("row {}", at + 1) } else { format!("row {name}") }
+}
+
+fn scaled(entries: &[RingEntry], factor: f64) -> Vec<RingEntry> {
+    let all = entries.iter().filter(|_| factor != 0.0);
+    all.map(|&(row, column, shift, value)| (row, column, shift, factor * value)).collect()
+}
+
+fn failed(error: ReductionError) -> ModelError {
+    ModelError::new(Element::Substructure, "reduce", error.to_string())
+}
+
+/// The damping of a reduced component, if it is none by a matrix.
+fn damping_law(substructure: &Substructure, component: &ReducedComponent) -> Option<Damping> {
+    match substructure.damping {
+        SubstructureDamping::Own => None,
+        SubstructureDamping::Ratio(ratio) => Some(Damping::Ratio { ratio, up_to: component.up_to() }),
+        SubstructureDamping::Rayleigh { mass, stiffness } => Some(Damping::Rayleigh { mass, stiffness }),
+    }
+}
+
+fn no_modes() -> ModelError {
+    let message = "a damping ratio belongs to modes, and without a reduction there are none; state `rayleigh`, a damping matrix, or leave \
+                   out `reduce = false`";
+    ModelError::new(Element::Substructure, "modal_damping", message)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Around, Disk, Force, GROUND, Mass, Place, Spring};
+    use crate::structure::{Boundary, Component};
+    use stickslip_numerics::sparse::Matrix;
+
+    const DEVIATIONS: [f64; 5] = [0.03, -0.02, 0.0, 0.01, -0.04];
+
+    fn force() -> Vec<Force> {
+        vec![Force { on: "tip".into(), amplitude: 1.0, phase: 0.0, harmonic: 1 }]
+    }
+
+    /// A disk mass that a spring joins to the next, and on it a blade of two masses, whose springs deviate.
+    fn by_masses(deviation: f64) -> Model {
+        let spring = |a: &str, b: &str, stiffness| Spring { between: [a.into(), b.into()], stiffness, damping: 0.0 };
+        let blade = 1.0 + deviation;
+        Model {
+            masses: vec![Mass::new("disk", 2.0), Mass::new("middle", 0.3), Mass::new("tip", 0.2)],
+            springs: vec![
+                spring("disk", GROUND, 30.0),
+                spring("disk", "next.disk", 20.0),
+                spring("disk", "middle", 5.0 * blade),
+                spring("middle", "tip", 3.0 * blade),
+            ],
+            forces: force(),
+            ..Model::default()
+        }
+    }
+
+    /// The same by matrices: rows 0 and 1 are the disk at its low and high side, 2 and 3 the blade.
+    fn by_matrices(deviation: f64, reduction: Reduction, damping: SubstructureDamping) -> Model {
+        let springs = [(0, 1, 20.0), (0, 2, 5.0), (2, 3, 3.0)];
+        let linked = springs.into_iter().flat_map(|(a, b, k)| [(a, a, k), (b, b, k), (a, b, -k), (b, a, -k)]);
+        let stiffness = Matrix::from_triplets(4, linked.chain([(0, 0, 30.0)])).unwrap();
+        // what the boundary carries may stand on either side
+        let mass = Matrix::from_triplets(4, [(0, 0, 1.5), (1, 1, 0.5), (2, 2, 0.3), (3, 3, 0.2)]).unwrap();
+        let names = ["1.x", "2.x", "3.x", "4.x"].map(str::to_owned).to_vec();
+        let component = Component::new(names, mass, None, stiffness).unwrap();
+        let boundary = Boundary::of_nodes(&component, &[("1".into(), "2".into())], None).unwrap();
+        let disk = Some(DiskPart { boundary, blade: vec![2, 3], deviations: vec![deviation] });
+        Model {
+            substructure: Some(Substructure { component, damping, reduction, disk }),
+            places: vec![Place::new("rim", vec![(1, 1.0)]), Place::new("tip", vec![(3, 1.0)])],
+            forces: force(),
+            ..Model::default()
+        }
+    }
+
+    fn ring(sector: impl Fn(f64) -> Model, around: Around, deviations: &[f64]) -> Model {
+        let disk = Disk { sectors: 5, forces: vec![around], motions: vec![] };
+        disk.ring(|s| sector(deviations.get(s).copied().unwrap_or(0.0))).unwrap()
+    }
+
+    /// Where one row carries a blade its own energy is all that its springs have: the matrices are those of masses and springs.
+    #[test]
+    fn a_ring_of_matrices_is_that_of_its_masses() {
+        for deviations in [&[][..], &DEVIATIONS] {
+            let own = |d| by_matrices(d, Reduction::None, SubstructureDamping::Own);
+            let wave = Around::EngineOrder(2);
+            let (matrices, masses) = (ring(own, wave, deviations), ring(by_masses, wave, deviations));
+            assert_eq!(matrices.ring, masses.ring);
+            let (matrices, masses) = (matrices.assemble().unwrap(), masses.assemble().unwrap());
+            assert_eq!(matrices.places()[2..4], ["rim_1", "tip_1"]);
+            assert_eq!(
+                matrices.seen()[8].rows(),
+                [(0, 1.0)],
+                "the high side of the last sector is the low one of the first"
+            );
+            for (a, b) in [
+                (matrices.structure().mass(), masses.structure().mass()),
+                (matrices.structure().stiffness(), masses.structure().stiffness()),
+            ] {
+                assert!((a - b).amax() < 1e-13, "{a} {b}");
+            }
+            assert_eq!(matrices.loads(), masses.loads());
+            assert_eq!(matrices.cyclic().is_some(), deviations.is_empty());
+        }
+    }
+
+    /// As many modes as a sector has rows leave nothing out; a damping ratio is that of every mode of the ring.
+    #[test]
+    fn all_coordinates_are_the_whole_ring() {
+        let how = Reduction::Modes { modes: 3, kind: crate::structure::ReductionKind::Rubin };
+        let damped = |d| by_matrices(d, how, SubstructureDamping::Ratio(0.01));
+        for deviations in [&[][..], &DEVIATIONS] {
+            let few = ring(damped, Around::Sector(1), deviations);
+            let whole = ring(by_masses, Around::Sector(1), deviations);
+            let (few, whole) = (few.survey().unwrap(), whole.survey().unwrap());
+            assert_eq!(few.dofs(), 15);
+            for (a, b) in few.free().elastic.iter().zip(&whole.free().elastic) {
+                assert!((a.omega / b.omega - 1.0).abs() < 1e-10, "{} {}", a.omega, b.omega);
+                // up to two thirds of the highest mode, of the tuned ring
+                if deviations.is_empty() && a.omega < 4.0 {
+                    assert!((a.damping / 0.01 - 1.0).abs() < 1e-9, "{} {}", a.omega, a.damping);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn wrong_sectors_are_refused() {
+        let mut model = by_matrices(0.1, Reduction::None, SubstructureDamping::Own);
+        let assembled = |model: &Model| ring(|_| model.clone(), Around::EngineOrder(1), &[]).assemble();
+        model.substructure.as_mut().unwrap().disk.as_mut().unwrap().blade = vec![1];
+        assert!(assembled(&model).unwrap_err().message.contains("boundary of the sector"));
+        model.substructure.as_mut().unwrap().disk.as_mut().unwrap().blade = vec![];
+        assert!(assembled(&model).unwrap_err().message.contains("name all nodes"));
+        model.substructure.as_mut().unwrap().disk = None;
+        let disk = Disk { sectors: 5, ..Disk::default() };
+        assert!(disk.ring(|_| model.clone()).unwrap_err().message.contains("node pairs"));
+    }
+}

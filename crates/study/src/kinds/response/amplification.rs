@@ -1,0 +1,126 @@
+//! Amplification: the largest amplitude of a mistuned disk over that of the same disk tuned, each at its own peak.
+
+use super::super::peak_of::{named_places, worst};
+use super::{Found, tables};
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
+use crate::dataset::{Axis, Panel};
+use crate::drawing::{Drawing, Stretch, numbers};
+use crate::histogram;
+use crate::info::Complaint;
+use crate::key::{Key, Takes, default};
+use crate::rows::Rows;
+use crate::study::varied_text;
+use crate::values::{Frequencies, Values, hertz};
+use crate::work::Work;
+use stickslip::curve::adaptive::Adaptive;
+use stickslip::curve::peak::{self, Peak, Point};
+use stickslip::model::Model;
+use stickslip::orbit::Orbit;
+
+/// The key.
+pub(super) const KEY: Key = default(
+    "amplification",
+    Takes::Flag,
+    "false",
+    "of a mistuned disk the largest peak over that of the same disk tuned, case by case in amplification.csv, with its distribution over the cases",
+    "true",
+);
+
+/// What it needs.
+pub(super) fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+    if values.flag(KEY.name) != Some(true) {
+        return Ok(());
+    }
+    let (message, help) = if model.ring.is_none() {
+        (
+            "only a bladed disk has an amplification by mistuning",
+            "state one sector, and add [disk] with `sectors` and `mistuning`",
+        )
+    } else if values.flag("peaks") == Some(false) {
+        ("the amplification is that of peaks, and `peaks` is false", "leave `peaks` out")
+    } else {
+        return Ok(());
+    };
+    Err(Complaint::new(KEY.name, message, help))
+}
+
+/// The row of a case whose peaks are `found`; and why it has none.
+pub(super) fn row(work: &Work<'_>, found: &[Found], rows: &mut Rows) -> Result<(), String> {
+    let (prepared, largest) = (work.case(), |a: &&Found, b: &&Found| a.peak.value.total_cmp(&b.peak.value));
+    let highest = found.iter().max_by(largest).ok_or("no peak was found")?;
+    let tuned = tuned(work)?.ok_or("the tuned disk has no peak")?;
+    rows.varied(&prepared.case);
+    rows.text(tables::MASS, &prepared.system.places()[highest.mass]);
+    rows.number(FREQUENCY, hertz(highest.peak.omega));
+    rows.number(AMPLITUDE, highest.peak.value);
+    rows.number(tables::TUNED_FREQUENCY, hertz(tuned.omega));
+    rows.number(tables::TUNED_AMPLITUDE, tuned.value);
+    rows.number(tables::RATIO, highest.peak.value / tuned.value);
+    rows.flag(AT_RANGE_END, Some(highest.peak.at_end || tuned.at_end));
+    rows.end();
+    Ok(())
+}
+
+/// The highest peak of the case without its mistuning, over the same frequencies.
+fn tuned(work: &Work<'_>) -> Result<Option<Peak>, String> {
+    let prepared = work.case();
+    let case = work.study.tuned().case(prepared.case.index).map_err(|error| error.to_string())?;
+    let system = case.model.assemble().map_err(|error| error.to_string())?;
+    let mut places = named_places(prepared);
+    if places.is_empty() {
+        places = (0..system.places().len()).collect();
+    }
+    let quantities = |orbit: &Orbit| vec![worst(orbit, &places)];
+    let method = &*prepared.method;
+    let points: Vec<Point> = match &case.frequencies {
+        Some(Frequencies::Adaptive { from, to, tolerance }) => {
+            let adaptive = Adaptive { range: (*from, *to), tolerance: *tolerance };
+            let stop = || work.context.stopped();
+            let curve =
+                adaptive.curve(method, &system, &quantities, &|_| (), &stop).map_err(|error| error.to_string())?;
+            curve.into_iter().map(|(point, ())| point).collect()
+        }
+        _ => {
+            let mut solver = method.solver(&system).map_err(|error| error.to_string())?;
+            let mut points: Vec<Point> = Vec::new();
+            for index in work.points.clone().take_while(|_| !work.context.stopped()) {
+                let start = points.last().and_then(|point| point.start.as_deref());
+                let found = solver.orbit(work.omega(index), start);
+                points.push(
+                    found.map_or_else(|_| Point::failed(work.omega(index)), |orbit| Point::new(&orbit, &quantities)),
+                );
+            }
+            points
+        }
+    };
+    let inner = peak::all(method, &system, &points, 1, &quantities).map_err(|error| error.to_string())?;
+    let end = |point: &Point| {
+        Some(Peak { omega: point.omega, value: *point.values.first()?, at_end: true, unsettled: false })
+    };
+    let ends = [points.first(), points.last()].into_iter().flatten().filter_map(end);
+    Ok(inner.into_iter().map(|peak| peak.peak).chain(ends).max_by(|a, b| a.value.total_cmp(&b.value)))
+}
+
+/// Of many disks how often each amplification is; draws, or the values of the last parameter of `vary`, make one histogram.
+pub(super) fn panels(drawing: &Drawing<'_>) -> Vec<Panel> {
+    let Some(table) = drawing.table(tables::AMPLIFICATION) else { return Vec::new() };
+    let stretches = drawing.stretches(table);
+    let outer = |stretch: &Stretch| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
+    let groups: Vec<(String, Vec<&Stretch>)> = match drawing.study.draws() {
+        Some(_) => drawing.by_listed(&stretches),
+        None => {
+            stretches.chunk_by(|a, b| outer(a) == outer(b)).map(|all| (outer(&all[0]), all.iter().collect())).collect()
+        }
+    };
+    let x = Axis::new("amplification of the worst place", "");
+    let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
+    let of_group = |(words, group): (String, Vec<&Stretch>)| {
+        let rows = || group.iter().flat_map(|stretch| stretch.rows.clone());
+        let values: Vec<f64> = rows().flat_map(|row| numbers(table, tables::RATIO, row..row + 1)).collect();
+        let ends = rows().filter(|row| at_end.get(*row) == Some(&Some(true))).count();
+        let ends = if ends > 0 { format!("{ends} peaks at the end of the range") } else { String::new() };
+        let title = [words, "amplification".to_owned(), ends].into_iter().filter(|part| !part.is_empty());
+        histogram::panel_of_maxima(&values, &x, &title.collect::<Vec<_>>().join(", "), "disks")
+    };
+    groups.into_iter().filter_map(of_group).collect()
+}

@@ -1,0 +1,110 @@
+//! The shares of the period in which the faces of joints stick, slip, touch and are apart, as panels: areas on each other for a few joints,
+//! a map with a stripe for every joint of a ring.
+
+use crate::columns;
+use crate::dataset::{Axis, Panel, Series, Style, Table};
+use crate::drawing::numbers;
+use std::ops::Range;
+
+/// Up to this many joints each has a panel of its own.
+const FEW: usize = 3;
+/// Shares below this are rounding.
+const NOTHING: f64 = 1e-9;
+/// What a share is given in.
+const PERCENT: f64 = 100.0;
+
+/// What faces do: how a panel calls it, and its colour in the palette.
+const STATES: [(&str, usize); 4] = [("sticks", 0), ("slips", 1), ("touches", 2), ("is apart", 6)];
+
+/// Whether a table has the shares of a joint.
+pub(super) fn has(table: &Table, joint: &str) -> bool {
+    table.numbers(&columns::sticks(joint)).is_some_and(|shares| shares.iter().any(|share| share.is_finite()))
+}
+
+/// Shares in percent of the period, in the order of [`STATES`], row by row.
+fn of_joint(table: &Table, joint: &str, rows: &Range<usize>) -> [Vec<f64>; 4] {
+    let [stick, slip, open] = [columns::sticks(joint), columns::slips(joint), columns::open(joint)]
+        .map(|column| numbers(table, &column, rows.clone()));
+    // what is left is a stop, of which nobody knows whether it slides
+    let touch = (0..stick.len()).map(|i| 1.0 - stick[i] - slip[i] - open[i]);
+    let touch = touch.map(|share| if share.abs() < NOTHING { 0.0 } else { share }).collect();
+    [stick, slip, touch, open].map(|shares: Vec<f64>| shares.into_iter().map(|share| share * PERCENT).collect())
+}
+
+/// The axis of a share, and the scale of its colours.
+pub(super) fn axis(quantity: &str) -> Axis {
+    Axis::new(quantity, "%").between(0.0, PERCENT)
+}
+
+/// The share of the period in which a joint slips, or of several their mean, in percent.
+pub(super) fn slipping(table: &Table, joints: &[String], rows: &Range<usize>) -> Vec<f64> {
+    let all: Vec<Vec<f64>> = joints.iter().map(|joint| numbers(table, &columns::slips(joint), rows.clone())).collect();
+    let mean = |i: usize| all.iter().map(|shares| shares[i]).sum::<f64>() / all.len() as f64;
+    rows.clone().enumerate().map(|(i, _)| PERCENT * mean(i)).collect()
+}
+
+/// The joints of panels that show one quantity of each: each for itself, or all together.
+pub(super) fn groups(joints: &[String]) -> Vec<(String, Vec<String>)> {
+    match joints.len() {
+        0..=FEW => joints.iter().map(|joint| (joint.clone(), vec![joint.clone()])).collect(),
+        many => vec![(format!("mean of {many} joints"), joints.to_vec())],
+    }
+}
+
+/// The panels of some rows over `x`, whose axis is `over`.
+pub(super) fn panels(
+    table: &Table,
+    joints: &[String],
+    rows: &Range<usize>,
+    (x, over): (&[f64], &Axis),
+    title: &str,
+) -> Vec<Panel> {
+    let all: Vec<[Vec<f64>; 4]> = joints.iter().map(|joint| of_joint(table, joint, rows)).collect();
+    let titled = |words: &str| if title.is_empty() { words.to_owned() } else { format!("{words}, {title}") };
+    if joints.len() <= FEW {
+        let of_joint = |(joint, shares): (&String, &[Vec<f64>; 4])| Panel {
+            title: titled(joint),
+            x: over.clone(),
+            y: axis("share of the period"),
+            series: areas(shares, x),
+            ..Panel::default()
+        };
+        return joints.iter().zip(&all).map(of_joint).collect();
+    }
+    let names = Axis { names: joints.to_vec(), ..Axis::new("joint", "").between(-0.5, joints.len() as f64 - 0.5) };
+    let map = |state: usize| Panel {
+        title: titled(&format!("share of the period in which a joint {}", STATES[state].0)),
+        x: over.clone(),
+        y: names.clone(),
+        series: all
+            .iter()
+            .enumerate()
+            .map(|(j, shares)| Series::stripe(x.to_vec(), j as f64, shares[state].clone()))
+            .collect(),
+        ..Panel::default()
+    };
+    // what sticks is what the others leave
+    let shown = (1..STATES.len()).filter(|state| *state == 1 || all.iter().any(|shares| occurs(&shares[*state])));
+    shown.map(map).collect()
+}
+
+fn occurs(shares: &[f64]) -> bool {
+    shares.iter().any(|share| *share > 0.0)
+}
+
+/// The shares of one joint on each other.
+fn areas(shares: &[Vec<f64>; 4], x: &[f64]) -> Vec<Series> {
+    let mut below = vec![0.0; x.len()];
+    let mut areas = Vec::new();
+    for ((what, colour), shares) in STATES.into_iter().zip(shares) {
+        if occurs(shares) {
+            let above: Vec<f64> = below.iter().zip(shares).map(|(below, share)| below + share).collect();
+            areas.push(Series::band(what, x.to_vec(), below, above.clone(), colour));
+            areas.push(Series { style: Style::Solid, ..Series::line("", x.to_vec(), above.clone(), colour) });
+            below = above;
+        }
+    }
+    // the upper edge of the last one is that of the panel
+    areas.pop();
+    areas
+}
