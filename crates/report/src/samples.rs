@@ -67,7 +67,7 @@ pub(crate) fn ring() -> Dataset {
         series: (0..12).map(stripe).collect(),
         ..Panel::default()
     };
-    let turn = |i: u32| std::f64::consts::TAU * f64::from(i) / 96.0;
+    let turn = |i: u32| TAU * f64::from(i) / 96.0;
     let circle = |label: &str, deflection: f64| {
         let radius = |i: u32| 1.0 + deflection * (3.0 * turn(i)).cos();
         let x = (0..=96).map(|i| radius(i) * turn(i).sin()).collect();

@@ -19,7 +19,7 @@ use stickslip::structure::reduction::{Damping, Free, Whole};
 /// Modes that are kept, beside the residual vectors of the contacts.
 const MODES: usize = 20;
 const HARMONICS: usize = 5;
-const POINTS: usize = 9;
+const POINTS: usize = 25;
 
 fn main() {
     let number = |a: &str| a.parse::<usize>().ok();

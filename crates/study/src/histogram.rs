@@ -49,7 +49,7 @@ fn width_of(sorted: &[f64]) -> f64 {
     range / (range / width).clamp(BARS.0, BARS.1).ceil()
 }
 
-/// The same of the largest of many, with their Weibull distribution; its high percentiles stand in the title.
+/// The same of the largest of many, with their Weibull distribution; its high percentiles stand in the title if it fits.
 pub(crate) fn panel_of_maxima(values: &[f64], x: &Axis, title: &str, each: &str) -> Option<Panel> {
     let mut panel = panel(values, x, title, each)?;
     let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).take(MOST_FITTED).collect();
@@ -62,6 +62,10 @@ pub(crate) fn panel_of_maxima(values: &[f64], x: &Axis, title: &str, each: &str)
     let abscissae: Vec<f64> = (0..=CURVE.0).map(|i| low + (end - low) * i as f64 / CURVE.0 as f64).collect();
     let ordinates = abscissae.iter().map(|x| fit.density(*x) * all * width).collect();
     panel.series.push(Series::line("Weibull distribution", abscissae, ordinates, 1));
+    if !fit.is_of(&finite) {
+        panel.title += "; no Weibull distribution: peaks of several kinds?";
+        return Some(panel);
+    }
     for ((share, words), style) in HIGH.into_iter().zip([Style::Dashed, Style::Dotted]) {
         let (at, (from, to)) = (fit.quantile(share), fit.interval(share));
         let line = Series::line(words, vec![at; 2], vec![0.0, top], 1);

@@ -160,10 +160,10 @@ fn compute(work: &Work<'_>) -> Computed {
             peaks.end();
         }
         part.tables.push(peaks);
-        if work.study.wants(amplification::KEY.name) {
-            if let Err(why) = amplification::row(work, &all, &mut amplified) {
-                part.notes.push(Note::Said(format!("{WARNING}no amplification, {}: {why}.", case.label())));
-            }
+        if work.study.wants(amplification::KEY.name)
+            && let Err(why) = amplification::row(work, &all, &mut amplified)
+        {
+            part.notes.push(Note::Said(format!("{WARNING}no amplification, {}: {why}.", case.label())));
         }
     } else {
         part.tables.push(Rows::default());

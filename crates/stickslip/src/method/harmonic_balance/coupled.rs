@@ -14,6 +14,7 @@ use super::hold::{CLEAR, stay};
 use super::ports::{Port, Ports, block};
 use super::receptance::{Modal, Receptance};
 use num_complex::Complex64;
+use std::sync::Arc;
 use stickslip_numerics::dense::{ComplexLu, Lu, multiply_in_blocks};
 use stickslip_numerics::krylov::{Gmres, Limits};
 
@@ -34,6 +35,8 @@ pub(super) fn by_products(size: usize, directions: usize) -> bool {
 /// count for more.
 const SHARE: f64 = 0.1;
 const COARSEST: f64 = 1e-6;
+/// The same at most by products with modes, which cost more than derivatives do: of 1000 nodes one takes 50 ms, all derivatives 0.3 s.
+const COARSEST_OF_MODES: f64 = 1e-2;
 /// Vectors that are kept, and products in all.
 const VECTORS: usize = 80;
 const PRODUCTS: usize = 320;
@@ -44,11 +47,15 @@ const STALE: usize = 25;
 /// Modes with frequencies above this multiple of the highest harmonic answer it nearly as at rest.
 const ABOVE: f64 = 3.0;
 
+/// What modes above a bound add, of a split that was given up.
+type Above = (f64, Arc<Vec<f64>>);
+
 /// What Newton's steps by products keep.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Coupled {
     gmres: Gmres,
     split: Option<Split>,
+    above: Option<Above>,
     /// Unknowns as forces, and what they move.
     force: Vec<Complex64>,
     moved: Vec<Complex64>,
@@ -88,14 +95,15 @@ impl Level {
             blocks: &self.blocks,
             units: &self.units,
         };
-        let wanted = (SHARE * residual).min(COARSEST).max(SHARE * SOLVED / residual.max(SOLVED));
+        let coarsest = if matches!(self.receptance, Receptance::Modal(_)) { COARSEST_OF_MODES } else { COARSEST };
+        let wanted = (SHARE * residual).min(coarsest).max(SHARE * SOLVED / residual.max(SOLVED));
         let limits = Limits { tolerance: wanted, vectors: VECTORS, products: PRODUCTS };
         let right = self.step.clone();
         let mut fresh = false;
-        let Coupled { gmres, split, force, moved } = &mut coupled;
+        let Coupled { gmres, split, above, force, moved } = &mut coupled;
         let receptance = &mut self.receptance;
         let found = loop {
-            let Some(preconditioner) = linear.preconditioner(receptance, split, &mut fresh) else {
+            let Some(preconditioner) = linear.preconditioner(receptance, (&mut *split, &mut *above), &mut fresh) else {
                 break false;
             };
             let most = if fresh { limits } else { Limits { products: STALE, vectors: STALE, ..limits } };
@@ -110,7 +118,7 @@ impl Level {
                 break outcome.solved || outcome.residual <= USEFUL;
             }
             // a stiffness of another motion
-            *split = None;
+            *above = split.take().map(|split| (split.bound, split.above));
             self.step.copy_from_slice(&right);
         };
         self.coupled = Some(coupled);
@@ -205,7 +213,7 @@ impl Linear<'_> {
     fn preconditioner<'b>(
         &self,
         receptance: &Receptance,
-        kept: &'b mut Option<Split>,
+        (kept, above): (&'b mut Option<Split>, &mut Option<Above>),
         fresh: &mut bool,
     ) -> Option<Preconditioner<'b>> {
         match receptance {
@@ -222,7 +230,7 @@ impl Linear<'_> {
                     Some(split) => split,
                     None => Split::new(
                         modal,
-                        bound,
+                        (bound, above.take().filter(|(of, _)| *of == bound).map(|(_, above)| above)),
                         |p, port, a, b| {
                             let tangent = self.tangent(p, port);
                             let count = self.harmonics.len();
@@ -323,6 +331,8 @@ struct Split {
     bound: f64,
     /// Their numbers.
     low: Vec<usize>,
+    /// What the other modes and springs in series add, S: the same for any stiffness of the joints.
+    above: Arc<Vec<f64>>,
     /// `1 + S K`.
     factor: Lu<f64>,
     /// `Φᵀ K`, modes × axes, and `(1 + S K)⁻¹ Φ`, axes × modes.
@@ -342,10 +352,10 @@ impl Split {
         ABOVE * top.log2().ceil().exp2()
     }
 
-    /// `stiffness(p, port, a, b)` of the joints.
+    /// `stiffness(p, port, a, b)` of the joints; `above` if it is known of the same bound.
     fn new(
         modal: &Modal,
-        bound: f64,
+        (bound, above): (f64, Option<Arc<Vec<f64>>>),
         stiffness: impl Fn(usize, &Port, usize, usize) -> f64,
         ports: &Ports,
     ) -> Option<Self> {
@@ -354,21 +364,22 @@ impl Split {
         let is_low = |own: &[f64; 3]| own[2] <= bound * bound * own[0];
         let (low, high): (Vec<usize>, Vec<usize>) = (0..n).partition(|&m| is_low(&structure.own[m]));
         let column = |m: usize| &structure.at[m * p..(m + 1) * p];
-        // S, and S K
-        let above: Vec<f64> = high.iter().flat_map(|&m| column(m)).copied().collect();
-        let weighted: Vec<f64> =
-            high.iter().flat_map(|&m| column(m).iter().map(move |a| a / structure.own[m][2])).collect();
-        let mut rest = vec![0.0; p * p];
-        multiply_in_blocks(&weighted, &above, &mut rest, (p, high.len(), p), true);
-        drop((above, weighted));
-        (0..p).for_each(|q| rest[q * p + q] += modal.series[q]);
+        let above = above.unwrap_or_else(|| {
+            let above: Vec<f64> = high.iter().flat_map(|&m| column(m)).copied().collect();
+            let weighted: Vec<f64> =
+                high.iter().flat_map(|&m| column(m).iter().map(move |a| a / structure.own[m][2])).collect();
+            let mut sum = vec![0.0; p * p];
+            multiply_in_blocks(&weighted, &above, &mut sum, (p, high.len(), p), true);
+            (0..p).for_each(|q| sum[q * p + q] += modal.series[q]);
+            Arc::new(sum)
+        });
         let mut matrix = vec![0.0; p * p];
         let mut pull = vec![0.0; low.len() * p];
         for (number, port) in ports.iter().enumerate() {
             for (a, row) in port.range().enumerate() {
                 for (b, q) in port.range().enumerate() {
                     let k = stiffness(number, port, a, b);
-                    let moved = &rest[row * p..(row + 1) * p];
+                    let moved = &above[row * p..(row + 1) * p];
                     matrix[q * p..(q + 1) * p].iter_mut().zip(moved).for_each(|(out, s)| *out += s * k);
                     for (pull, &m) in pull[q * low.len()..].iter_mut().zip(&low) {
                         *pull += structure.at[m * p + row] * k;
@@ -376,7 +387,6 @@ impl Split {
                 }
             }
         }
-        drop(rest);
         (0..p).for_each(|q| matrix[q * p + q] += 1.0);
         let factor = Lu::new(matrix, p).ok()?;
         let mut moved: Vec<f64> = low.iter().flat_map(|&m| column(m)).copied().collect();
@@ -384,7 +394,7 @@ impl Split {
         let l = low.len();
         let mut core = vec![0.0; l * l];
         multiply_in_blocks(&pull, &moved, &mut core, (l, p, l), false);
-        Some(Split { bound, low, factor, pull, moved, core, harmonics: Vec::new(), omega: f64::NAN })
+        Some(Split { bound, low, above, factor, pull, moved, core, harmonics: Vec::new(), omega: f64::NAN })
     }
 
     /// Prepares for a drive frequency.
@@ -442,7 +452,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::equations::Motion;
+    use super::super::equations::{GIVEN, Motion};
     use super::super::rest::Rest;
     use super::super::uncoupled::Uncoupled;
     use super::*;
@@ -541,5 +551,24 @@ mod tests {
         ];
         let joints: Vec<_> = (0..18).map(|i| (laws[i % 3].clone(), 1)).collect();
         agree(&system(&joints), &[1, 3, 5], &[Form::Formed]);
+    }
+
+    /// Who needs the derivative as a matrix gets it where modes would stand for receptances too.
+    #[test]
+    fn the_matrix_is_formed_where_it_is_needed() {
+        let contacts: Vec<(SharedLaw, usize)> =
+            (0..201).map(|_| (Arc::new(Jenkins { stiffness: 2.0, limit: 0.3 }) as SharedLaw, 1)).collect();
+        let system = system(&contacts);
+        let ports = Ports::new(&system).unwrap();
+        let rest = Rest::new(&system, &ports);
+        assert!(rest.modes_for(&ports).is_some());
+        for needed in [false, true] {
+            let level = Level::new(vec![1], 64, &ports, None);
+            let mut level = if needed { level.with_matrix() } else { level };
+            level.drive(&system, &ports, &rest, 0.7).unwrap();
+            let mut motion = level.begin(&system, &ports, None, 0.7);
+            level.evaluate(&ports, 0.7, &mut motion, GIVEN, 1.0, super::super::equations::Slopes::All);
+            assert_eq!(level.assemble(&ports, 0.7, GIVEN, 1.0), needed);
+        }
     }
 }

@@ -200,9 +200,10 @@ fn frequencies(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> 
         let next = inside.get(k + 1).copied().unwrap_or(up_to);
         all.extend([omega * (1.0 + beside), 0.5 * (omega + next)]);
     }
+    all.push(0.5 * inside.first().copied().unwrap_or(up_to));
+    // between equal modes, as those of a square section, there is no middle: at a mode rounding would be the error
+    all.retain(|omega| *omega <= up_to && inside.iter().all(|mode| (omega - mode).abs() >= 0.5 * beside * mode));
     all.push(up_to);
-    all.insert(0, 0.5 * inside.first().copied().unwrap_or(up_to));
-    all.retain(|omega| *omega <= up_to);
     all.sort_by(f64::total_cmp);
     all.dedup_by(|next, kept| *next - *kept < SAME * *kept);
     // not of one parity, so that both sorts remain
