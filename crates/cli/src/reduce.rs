@@ -22,6 +22,11 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
     let Some(substructure) = &model.substructure else {
         return Ending::Failed(format!("{}: there is no [structure] that could be reduced", file.display()));
     };
+    if model.ring.is_some() {
+        let message =
+            "a sector of a disk is reduced for all of its waves by every study of it, and has no files of its own";
+        return Ending::Failed(format!("{}: {message}", file.display()));
+    }
     let alone = Model { substructure: Some(substructure.clone()), places: model.places.clone(), ..Model::default() };
     let system = match alone.assemble() {
         Ok(system) => system,

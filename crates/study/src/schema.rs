@@ -47,7 +47,12 @@ pub const FILE: &[Key] = &[
         "a structure by its matrices, from a finite-element program; masses, springs and joints may be added to it at places",
         "{ stiffness = \"blade.sti\", mass = \"blade.mas\", dofs = \"blade.dof\", units = \"mm-t-s\" }",
     ),
-    optional("place", Takes::List(PLACE), "places of the structure, which joints, forces and results speak of", "[]"),
+    optional(
+        "place",
+        Takes::List(PLACE),
+        "places of the structure, or faces of masses that are turned, which joints, forces and results speak of",
+        "[]",
+    ),
     optional("mass", Takes::List(MASS), "point masses, each with one displacement", "[]"),
     optional("spring", Takes::List(SPRING), "springs and dampers", "[]"),
     optional("joint", Takes::List(JOINT), "places that rub", "[]"),
@@ -221,6 +226,12 @@ pub(crate) const CRAIG_BAMPTON: &str = "craig-bampton";
 
 const PLACE: &[Key] = &[
     required("name", Takes::Name, "name, for joints, forces and results", "\"tip\""),
+    optional(
+        "of",
+        Takes::Text,
+        "the node of a [[mass]] that it is another view of, with `normal`: a face that is turned; needs no [structure]",
+        "\"damper\"",
+    ),
     optional(
         "dof",
         Takes::Row,

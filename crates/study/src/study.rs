@@ -889,6 +889,11 @@ pub(crate) fn model_of(
     }
 }
 
+/// The places of the structure by matrices.
+fn own(lists: &Lists) -> impl Iterator<Item = &StatedTable> {
+    lists.place.iter().filter(|table| table.entry("of").is_none())
+}
+
 /// What the lists state, and how its forces and imposed motions go around a disk.
 pub(crate) fn sector_of(
     structure: &Structure,
@@ -902,19 +907,19 @@ pub(crate) fn sector_of(
     match (matrices, component) {
         (Some(matrices), Some(component)) => {
             model.substructure = Some(substructure::of(&matrices.table, component, environment, problems));
-            for table in &lists.place {
+            for table in own(lists) {
                 model.places.extend(substructure::place(table, component, environment, problems));
             }
         }
         // names alone: masses stand for the places
         (Some(_), None) => {
-            let values = lists.place.iter().map(|table| (table, table.values(environment, problems)));
+            let values = own(lists).map(|table| (table, table.values(environment, problems)));
             model.masses.extend(values.map(|(table, values)| substructure::stand_in(table, &values)));
         }
         (None, _) => {
-            if let Some(place) = lists.place.first() {
+            if let Some(place) = own(lists).next() {
                 let message = "a place is one of a structure, and there is none";
-                let help = "add [structure] with `stiffness` and `mass`; a point mass is a [[mass]]";
+                let help = "add [structure] with `stiffness` and `mass`; a point mass is a [[mass]], a turned face of one is a place with `of`";
                 problems.push(Problem::new(&place.place, "place", message).help(help));
             }
         }
@@ -941,6 +946,13 @@ pub(crate) fn sector_of(
             mass: number(&values, "mass"),
             directions: values.names("directions").unwrap_or_default().to_vec(),
         });
+    }
+    for (i, table) in lists.place.iter().enumerate().filter(|(_, table)| table.entry("of").is_some()) {
+        let values = resolve(Element::Place(i), table);
+        match substructure::view(table, &values, &model.masses) {
+            Ok(place) => model.places.push(place),
+            Err(problem) => wrong.push(*problem),
+        }
     }
     for (i, table) in lists.spring.iter().enumerate() {
         let values = resolve(Element::Spring(i), table);

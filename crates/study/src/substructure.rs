@@ -100,6 +100,76 @@ pub(crate) fn place(
     }
 }
 
+/// Directions of a turned face of a node in a plane.
+const IN_PLANE: [&str; 2] = ["t", "n"];
+
+/// A `[[place]]` that is another view of a node of masses: its directions are a tangent, or two, and the normal.
+pub(crate) fn view(table: &StatedTable, values: &Values, masses: &[Mass]) -> Result<Place, Box<Problem>> {
+    let problem =
+        |key: &str, message: String| Box::new(Problem::new(table.place_of(key, None), key, table.with_turn(&message)));
+    if let Some(key) = ["dof", "dofs", "nodes", "sum"].into_iter().find(|key| table.entry(key).is_some()) {
+        let message = format!("`of` makes it a place of a mass, and `{key}` of a structure");
+        return Err(problem(key, message).map_help("take one of the two out"));
+    }
+    let of = values.text("of").unwrap_or_default();
+    let Some(mass) = masses.iter().find(|mass| mass.name == of) else {
+        let help = match nearest(of, masses.iter().map(|mass| mass.name.as_str())) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => "name a [[mass]] with `directions`".to_owned(),
+        };
+        return Err(problem("of", format!("there is no mass `{}`", shown(of))).map_help(&help));
+    };
+    // which of x, y, z each of its directions is
+    let axes: Option<Vec<usize>> =
+        mass.directions.iter().map(|along| CARTESIAN.iter().position(|axis| axis == along)).collect();
+    let Some(axes) = axes.filter(|axes| axes.len() > 1) else {
+        let message = format!(
+            "a face of `{}` is turned among x, y, z, and it moves along {}",
+            mass.name,
+            match &mass.directions[..] {
+                [] => "one direction without a name".to_owned(),
+                all => all.join(", "),
+            }
+        );
+        return Err(problem("of", message).map_help("give the mass directions = [\"x\", \"z\"], or all three"));
+    };
+    let Some(normal) = values.vector("normal") else {
+        return Err(problem("normal", "a turned face needs its normal".to_owned()).map_help("add normal = [0, 0, 1]"));
+    };
+    let missing = (0..CARTESIAN.len()).find(|axis| !axes.contains(axis));
+    let tangent = match missing {
+        None => values.vector("tangent"),
+        Some(axis) if normal[axis] != 0.0 => {
+            let message =
+                format!("`{}` does not move along {}, and the normal has a part along it", mass.name, CARTESIAN[axis]);
+            return Err(problem("normal", message).map_help("make that part 0"));
+        }
+        // in a plane there is but one: the axis across the plane times the normal
+        Some(axis) => {
+            let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+            let mut tangent = [0.0; 3];
+            (tangent[next], tangent[last]) = (-normal[last], normal[next]);
+            Some(tangent)
+        }
+    };
+    let frame = Frame::new(normal, tangent).map_err(|error| problem("normal", error.to_string()))?;
+    let row = |along: &[f64; 3]| -> Row { axes.iter().enumerate().map(|(at, axis)| (at, along[*axis])).collect() };
+    let [first, second, normal] = frame.axes();
+    let (rows, names) = match missing {
+        None => (vec![row(first), row(second), row(normal)], &IN_FRAME[..]),
+        Some(_) => (vec![row(first), row(normal)], &IN_PLANE[..]),
+    };
+    let directions = values
+        .names("directions")
+        .map_or_else(|| names.iter().map(|&name| name.to_owned()).collect(), <[String]>::to_vec);
+    if directions.len() != rows.len() {
+        let message = format!("{} directions for {}", directions.len(), names.join(", "));
+        return Err(problem("directions", message).map_help("name each tangent and the normal, or leave it out"));
+    }
+    let name = values.text("name").unwrap_or_default().to_owned();
+    Ok(Place { name, directions, rows, frame: None, of: Some(of.to_owned()) })
+}
+
 /// A mass in the stead of a place, where only names are known.
 pub(crate) fn stand_in(table: &StatedTable, values: &Values) -> Mass {
     let (directions, _) = directions(table, values).unwrap_or_default();
@@ -218,7 +288,7 @@ fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<P
         }
         None => None,
     };
-    Ok(Place { name: values.text("name").unwrap_or_default().to_owned(), directions, rows, frame })
+    Ok(Place { name: values.text("name").unwrap_or_default().to_owned(), directions, rows, frame, of: None })
 }
 
 /// A row of a node.

@@ -177,3 +177,62 @@ fn a_missing_reference_has_its_reason() {
     let references = |series: &stickslip_study::dataset::Series| series.label.contains("all joints");
     assert!(!found.figure.panels.iter().flat_map(|panel| &panel.series).any(references), "an empty line is drawn");
 }
+
+/// What a model is turned by turns its motion: a mass on equal springs rests on a face along its axes, or on one that stands at an angle and is
+/// pushed along its own tangent and normal.
+#[test]
+fn a_turned_face_is_the_same_contact() {
+    let text = |between: &str, place: &str| {
+        format!(
+            "schema = 1\n[parameters]\na = \"0.3 rad\"\n[[mass]]\nname = \"m\"\nmass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n{place}\n\
+             [[spring]]\nbetween = [\"m.x\", \"ground\"]\nstiffness = \"200 N/m\"\ndamping = \"2 N s/m\"\n\
+             [[spring]]\nbetween = [\"m.z\", \"ground\"]\nstiffness = \"200 N/m\"\ndamping = \"2 N s/m\"\n\
+             [[joint]]\nname = \"pad\"\nbetween = [\"{between}\", \"ground\"]\n\
+             law = {{ kind = \"friction-contact\", tangential = 50, normal = 80, friction = 0.2, preload = 3 }}\n\
+             [[force]]\non = \"{between}.{}\"\namplitude = \"2 N\"\n[[force]]\non = \"{between}.{}\"\namplitude = \"1 N\"\nphase = \"70 deg\"\n\
+             [study]\nkind = \"response\"\nfrequency = [\"2 Hz\", \"2.6 Hz\"]\npeaks = false\n\
+             [method]\nkind = \"harmonic-balance\"\nharmonics = 9\ntolerance = 0.5\n",
+            if place.is_empty() { "x" } else { "t" },
+            if place.is_empty() { "z" } else { "n" },
+        )
+    };
+    let result = |text: &str| run(&read_study("turned.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap();
+    let straight = result(&text("m", ""));
+    let turned = result(&text("face", "[[place]]\nname = \"face\"\nof = \"m\"\nnormal = [\"-sin(a)\", 0, \"cos(a)\"]"));
+    let column = |found: &Dataset, name: &str| found.tables[0].numbers(name).unwrap().to_vec();
+    for (one, other) in [("m_x", "face_t"), ("m_z", "face_n")] {
+        for what in ["amplitude_m", "mean_m", "phase_deg"] {
+            let (a, b) = (column(&straight, &format!("{one}_{what}")), column(&turned, &format!("{other}_{what}")));
+            assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= 1e-8 * a.abs()), "{one} {what}: {a:?} {b:?}");
+        }
+    }
+    assert!(column(&straight, "pad_slip_fraction")[0] > 0.0);
+    // x and z of the mass are what the face moves by, turned back
+    let mean = |name: &str| column(&turned, &format!("{name}_mean_m"))[0];
+    let back = 0.3f64.cos() * mean("face_t") - 0.3f64.sin() * mean("face_n");
+    assert!((mean("m_x") - back).abs() < 1e-9 * back.abs());
+}
+
+#[test]
+fn a_turned_face_that_cannot_be_is_refused_with_the_reason() {
+    let error = |place: &str, directions: &str| {
+        let text = format!(
+            "schema = 1\n[[mass]]\nname = \"m\"\nmass = \"1 kg\"\n{directions}\n[[place]]\nname = \"face\"\n{place}\n\
+             [study]\nkind = \"response\"\nfrequency = \"1 Hz\"\n"
+        );
+        read_study("face.toml", &text, &[]).unwrap_err().to_string()
+    };
+    let both = "directions = [\"x\", \"z\"]";
+    for (place, directions, words) in [
+        ("of = \"n\"\nnormal = [0, 0, 1]", both, "there is no mass `n`"),
+        ("of = \"m\"", both, "needs its normal"),
+        ("of = \"m\"\nnormal = [0, 1, 1]", both, "does not move along y"),
+        ("of = \"m\"\nnormal = [0, 0, 0]", both, "not all zero"),
+        ("of = \"m\"\nnormal = [0, 0, 1]", "", "turned among x, y, z"),
+        ("of = \"m\"\nnormal = [0, 0, 1]\ndof = 1", both, "a place of a mass"),
+        ("dof = 1", both, "there is none"),
+    ] {
+        let found = error(place, directions);
+        assert!(found.contains(words), "{place}: {found}");
+    }
+}

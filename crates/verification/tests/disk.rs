@@ -7,7 +7,7 @@ use stickslip::law::{Coulomb, FrictionContact, Gap, Jenkins, JenkinsArctan, Shar
 use stickslip::method::event_driven::EventDriven;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::shooting::Shooting;
-use stickslip::model::{Around, Disk};
+use stickslip::model::{Around, Disk, normal_pattern};
 use stickslip::{Force, GROUND, Joint, Mass, Method, Model, Orbit, Spring};
 
 fn between(a: &str, b: &str) -> [String; 2] {
@@ -201,5 +201,61 @@ fn eq10_5_optimum_of_dampers_between_blades() {
     assert!((found / amplitude - 1.0).abs() < 1e-7, "{found} {amplitude}");
     for limit in [0.97 * best, 1.03 * best] {
         assert!(peak(limit, 1.0, 1.06) > amplitude * (1.0 + 1e-5));
+    }
+}
+
+/// Blades of unit mass and stiffness on a ring, alike but for their stiffness, with springs `COUPLING` between them, all modes damped alike: the
+/// largest amplitude of any blade at the resonances of the ring under engine order 0, relative to that of the tuned ring.
+fn amplification(pattern: &[f64]) -> f64 {
+    let one = |s: usize| Model {
+        masses: vec![Mass::new("blade", 1.0)],
+        springs: vec![spring("blade", GROUND, 1.0 + pattern[s], DAMPING), spring("blade", "next.blade", COUPLING, 0.0)],
+        forces: vec![force("blade", 1.0, 1)],
+        ..Model::default()
+    };
+    let disk = Disk { sectors: pattern.len(), forces: vec![Around::EngineOrder(0)], motions: Vec::new() };
+    let ring = disk.ring(one).unwrap();
+    let survey = ring.survey().unwrap();
+    let system = survey.system();
+    // half widths of a resonance around each; between two that overlap lies a larger one
+    let detunings = (-8..=8).map(|step| 0.25 * f64::from(step) * DAMPING);
+    let around = |omega: f64| detunings.clone().map(move |detuning| omega + detuning);
+    let largest = |omega: f64| {
+        let mut x = system.excitation(omega)[0].1.clone();
+        system.structure().dynamic_stiffness(Complex64::new(0.0, omega)).unwrap().solve(x.as_mut_slice());
+        x.iter().fold(0.0f64, |most, z| most.max(z.norm()))
+    };
+    let found = survey.free().elastic.iter().flat_map(|mode| around(mode.omega)).map(largest).fold(0.0, f64::max);
+    // force over damping at ω = 1, to the square of the damping ratio
+    found * DAMPING
+}
+
+/// N/m and kg/s: damping far below the coupling, both far below the stiffness.
+const COUPLING: f64 = 1e-3;
+const DAMPING: f64 = 1e-6;
+
+/// Theory 12, Whitehead's bound `(1 + √N)/2` for small mistuning and the same damping of every mode. It is that of a mode in which one blade moves
+/// `1 + √N` times as much as each of the others, and each blade's stiffness follows from its equation of motion at ω = 1.
+#[test]
+fn whiteheads_bound_is_reached_and_not_passed() {
+    for sectors in [4, 12] {
+        let bound = 0.5 * (1.0 + (sectors as f64).sqrt());
+        assert!((amplification(&vec![0.0; sectors]) - 1.0).abs() < 1e-5, "the tuned ring");
+        let shape = |s: usize| if s == 0 { 1.0 + (sectors as f64).sqrt() } else { 1.0 };
+        let best: Vec<f64> = (0..sectors)
+            .map(|s| {
+                let beside = shape((s + 1) % sectors) + shape((s + sectors - 1) % sectors);
+                -COUPLING * (2.0 - beside / shape(s))
+            })
+            .collect();
+        let reached = amplification(&best);
+        assert!((reached / bound - 1.0).abs() < 1e-4, "{sectors}: {reached} of {bound}");
+        let mut worst = 0.0f64;
+        for seed in 0..60 {
+            // weaker and stronger than the coupling by turns
+            let deviation = COUPLING * [0.1, 1.0, 5.0][seed as usize % 3];
+            worst = worst.max(amplification(&normal_pattern(sectors, deviation, seed)));
+        }
+        assert!(worst > 1.2 && worst < bound, "{sectors}: {worst} of {bound}");
     }
 }

@@ -7,6 +7,7 @@
 use super::Model;
 use super::assemble::{Element, ModelError};
 use super::part::Part;
+use super::place::Place;
 use super::places::{Of, Places};
 use crate::structure::ReducedComponent;
 use crate::structure::reduction::Row;
@@ -54,6 +55,8 @@ impl Coordinates {
                         return Err(ModelError::new(Element::Place(index), "name", message));
                     }
                 },
+                // once the masses have theirs
+                Of::View(..) => Row::new(),
                 Of::Own(_) => {
                     let at = if own < masses { order.of_mass(own) } else { names.len() };
                     match names.get_mut(at) {
@@ -64,6 +67,11 @@ impl Coordinates {
                     vec![(at, 1.0)]
                 }
             });
+        }
+        for (place, stated) in places.stated.iter().enumerate() {
+            if let Of::View(index, along) = stated.of {
+                rows[place] = view(&model.places[index], along, places, &rows);
+            }
         }
         let of_part = |entries: Entries| -> Entries {
             entries.into_iter().map(|(row, column, v)| (order.of_part(row), order.of_part(column), v)).collect()
@@ -93,6 +101,19 @@ impl Coordinates {
     pub fn moved_number(&self, places: &Places, place: usize) -> Option<usize> {
         places.stated[place].moved.then(|| places.stated[..place].iter().filter(|place| place.moved).count())
     }
+}
+
+/// A direction of a place that is another view of a node, over the coordinates of that node.
+fn view(place: &Place, along: usize, places: &Places, rows: &[Row]) -> Row {
+    let of = place.of.as_deref().unwrap_or_default();
+    let is_of = |name: &str| name == of || name.split_once('.').is_some_and(|(node, _)| node == of);
+    let node: Vec<&Row> =
+        places.stated.iter().zip(rows).filter(|(stated, _)| is_of(&stated.name)).map(|(_, row)| row).collect();
+    let shares = &place.displacements(&place.rows)[along];
+    shares
+        .iter()
+        .flat_map(|(direction, share)| node[*direction].iter().map(move |(at, weight)| (*at, weight * share)))
+        .collect()
 }
 
 /// Where coordinates of a substructure and of masses stand: sector by sector.

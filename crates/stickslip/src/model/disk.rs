@@ -126,6 +126,7 @@ impl Disk {
             let name = |name: &String| self.name(name.as_str(), s);
             deviations.extend(one.substructure.iter().flat_map(|own| &own.disk).flat_map(|disk| &disk.deviations));
             one.places.iter_mut().for_each(|place| place.name = name(&place.name));
+            one.places.iter_mut().for_each(|place| place.of = place.of.as_ref().map(name));
             one.masses.iter_mut().for_each(|mass| mass.name = name(&mass.name));
             one.springs.iter_mut().for_each(|spring| spring.between = spring.between.each_ref().map(name));
             for joint in &mut one.joints {

@@ -21,7 +21,7 @@ pub(super) struct Part {
 impl Part {
     pub fn new(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
         let n = substructure.component.dofs();
-        for (i, place) in model.places.iter().enumerate() {
+        for (i, place) in model.places.iter().enumerate().filter(|(_, place)| place.of.is_none()) {
             for row in &place.rows {
                 let wrong = |key, message: String| Err(ModelError::new(Element::Place(i), key, message));
                 if let Some((at, _)) = row.iter().find(|(at, _)| *at >= n) {
@@ -66,7 +66,8 @@ impl Part {
     }
 
     fn reduced(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
-        let seen: Vec<Row> = model.places.iter().flat_map(|place| place.rows.iter().cloned()).collect();
+        let own = model.places.iter().filter(|place| place.of.is_none());
+        let seen: Vec<Row> = own.flat_map(|place| place.rows.iter().cloned()).collect();
         let component = substructure.component.reduced(&seen, &substructure.reduction).map_err(failed)?;
         let ReducedForm::Alone(reduced) = component.form() else { return Ok(Part::default()) };
         let damped = damping_law(substructure, &component).map(|damping| reduced.damped(&damping));
@@ -80,6 +81,9 @@ impl Part {
         let row = |port: usize| ports.row(port).iter().copied().enumerate().filter(|(_, w)| *w != 0.0).collect();
         let mut next = 0;
         let of_place = |place: &super::Place| -> Vec<Row> {
+            if place.of.is_some() {
+                return Vec::new();
+            }
             next += place.rows.len();
             place.displacements(&(next - place.rows.len()..next).map(row).collect::<Vec<_>>())
         };
@@ -94,6 +98,10 @@ impl Part {
     /// A sector of a disk, as often as there are sectors.
     fn ring(substructure: &Substructure, disk: &DiskPart, sectors: usize, model: &Model) -> Result<Self, ModelError> {
         let Substructure { component, reduction, .. } = substructure;
+        if let Some(i) = model.places.iter().position(|place| place.of.is_some()) {
+            let message = "a turned face of a mass cannot stand in a disk by the matrices of a sector yet; state the blade by masses";
+            return Err(ModelError::new(Element::Place(i), "of", message));
+        }
         if !model.places.len().is_multiple_of(sectors) {
             let message = format!("{} places on {sectors} sectors: each has the same", model.places.len());
             return Err(ModelError::new(Element::Whole, "place", message));

@@ -1,9 +1,11 @@
-//! Places of a structure that came by its matrices: weighted sums of its rows, nodes with directions, and local frames.
+//! Places of a structure that came by its matrices, or of a node of masses: weighted sums of their rows, nodes with directions, and local
+//! frames.
 
 use crate::structure::reduction::Row;
 use serde::Serialize;
 
-/// A place of a model's [`Substructure`](super::Substructure): one displacement, or up to three of a node.
+/// A place of a model's [`Substructure`](super::Substructure), or of one of its nodes of masses seen in another frame: one displacement, or up to
+/// three of a node.
 ///
 /// # Example
 /// ```
@@ -26,24 +28,45 @@ pub struct Place {
     pub rows: Vec<Row>,
     /// The axes that its directions have; those of the structure without it.
     pub frame: Option<Frame>,
+    /// The node of a mass that it is another view of: its rows count that node's directions, from 0. Without it they are rows of the substructure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
 }
 
 impl Place {
     /// With one displacement.
     pub fn new(name: impl Into<String>, row: Row) -> Self {
-        Place { name: name.into(), directions: Vec::new(), rows: vec![row], frame: None }
+        Place { name: name.into(), directions: Vec::new(), rows: vec![row], frame: None, of: None }
     }
 
     /// A node with a displacement along each direction.
     pub fn node(name: impl Into<String>, directions: &[&str], rows: Vec<Row>) -> Self {
         let directions = directions.iter().map(|&along| along.to_owned()).collect();
-        Place { name: name.into(), directions, rows, frame: None }
+        Place { name: name.into(), directions, rows, frame: None, of: None }
     }
 
     /// The same along the axes of a local frame; its rows are those of x, y, z.
     #[must_use]
     pub fn turned(self, frame: Frame) -> Self {
         Place { frame: Some(frame), ..self }
+    }
+
+    /// The same, of a node of masses instead of the substructure: a face of a rigid body that is turned against the axes along which it moves.
+    ///
+    /// # Example
+    /// A mass that moves along x and z has a face inclined by 30 degrees, which joints and forces may then name.
+    /// ```
+    /// use stickslip::model::Place;
+    /// use stickslip::{Mass, Model};
+    /// let (sin, cos) = (0.5, 0.75f64.sqrt());
+    /// let node = Mass { directions: vec!["x".into(), "z".into()], ..Mass::new("block", 2.0) };
+    /// let face = Place::node("face", &["t", "n"], vec![vec![(0, cos), (1, sin)], vec![(0, -sin), (1, cos)]]).of_node("block");
+    /// let model = Model { masses: vec![node], places: vec![face], ..Model::default() };
+    /// assert_eq!(model.assemble().unwrap().places(), ["block.x", "block.z", "face.t", "face.n"]);
+    /// ```
+    #[must_use]
+    pub fn of_node(self, node: impl Into<String>) -> Self {
+        Place { of: Some(node.into()), ..self }
     }
 
     /// The displacement along each direction, of `rows` that are its own, whatever they count.

@@ -1,7 +1,9 @@
 //! Where the names of a model lead: each a weighted sum of coordinates, the ground, or a place that is moved.
 
 use super::assemble::{Element, ModelError};
+use super::place::Place;
 use super::{GROUND, Mass, Model};
+use crate::structure::reduction::Row;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What a name stands for.
@@ -17,6 +19,8 @@ pub(super) enum End {
 pub(super) enum Of {
     /// Rows of the component: its place by number, and which of its directions.
     Component(usize, usize),
+    /// Another view of a node of masses: its place by number, and which of its directions.
+    View(usize, usize),
     /// A coordinate of its own with this mass, kg.
     Own(f64),
 }
@@ -34,7 +38,7 @@ pub(super) type Along<'a> = (Option<&'a str>, [End; 2]);
 
 /// Every place of a model, and the directions of every node.
 pub(super) struct Places {
-    /// In their order: those of the component, the masses, those that exist by their motion alone.
+    /// In their order: those of the component, the masses, other views of these, those that exist by their motion alone.
     pub stated: Vec<Stated>,
     ends: BTreeMap<String, End>,
     /// Directions in their order, of names that have any.
@@ -104,11 +108,16 @@ impl Places {
                 let message = "a local frame turns three displacements, those along x, y and z";
                 return Err(ModelError::new(element, "normal", message));
             }
-            let of = |along: usize| Of::Component(i, along);
-            collected.node(element, (&place.name, &place.directions), of)?;
+            if place.of.is_none() {
+                collected.node(element, (&place.name, &place.directions), |along| Of::Component(i, along))?;
+            }
         }
         for (i, mass) in model.masses.iter().enumerate() {
             collected.node(Element::Mass(i), (&mass.name, &mass.directions), |_| Of::Own(mass.mass))?;
+        }
+        for (i, place) in model.places.iter().enumerate().filter(|(_, place)| place.of.is_some()) {
+            viewed(model, place, Element::Place(i))?;
+            collected.node(Element::Place(i), (&place.name, &place.directions), |along| Of::View(i, along))?;
         }
         collected.moved(model)?;
         let Collected { places, columns, .. } = collected;
@@ -181,6 +190,23 @@ impl Places {
             })
             .collect()
     }
+}
+
+/// Whether the node that a place is a view of has the directions that its rows count.
+fn viewed(model: &Model, place: &Place, element: Element) -> Result<(), ModelError> {
+    let Some(of) = &place.of else { return Ok(()) };
+    let Some(node) = model.masses.iter().find(|mass| mass.name == *of) else {
+        let message = format!("there is no mass `{of}` that `{}` could be a place of", place.name);
+        return Err(ModelError { wrong_name: Some(of.clone()), ..ModelError::new(element, "of", message) });
+    };
+    let count = node.places().len();
+    let weights = || place.rows.iter().flatten();
+    let usable = |row: &Row| row.iter().any(|(_, weight)| *weight != 0.0);
+    if weights().any(|(at, weight)| *at >= count || !weight.is_finite()) || !place.rows.iter().all(usable) {
+        let message = format!("its weights must be finite numbers, not all zero, of the {count} directions of `{of}`");
+        return Err(ModelError::new(element, "of", message));
+    }
+    Ok(())
 }
 
 /// Places while they are collected.

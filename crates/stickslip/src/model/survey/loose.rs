@@ -14,7 +14,8 @@ impl Model {
         }
         // a component is one body, which is held if it has no free motion of its own
         let held = system.reduced().is_none_or(|component| component.free() == 0);
-        let of_component: Vec<String> = self.places.iter().flat_map(Place::places).collect();
+        let own = self.places.iter().filter(|place| place.of.is_none());
+        let of_component: Vec<String> = own.flat_map(Place::places).collect();
         let mut places: Vec<String> = self.masses.iter().flat_map(Mass::places).collect();
         for (i, place) in places.iter().enumerate() {
             index.entry(place.clone()).or_insert(i + 1);
@@ -26,8 +27,17 @@ impl Model {
         if !held {
             places.extend(of_component);
         }
-        let ends = |between: &[String; 2]| Some((*index.get(&between[0])?, *index.get(&between[1])?));
         let mut bodies = Groups::new(component + 1);
+        for place in &self.places {
+            // another view of a node takes hold of the node
+            let node = self.masses.iter().find(|mass| place.of.as_ref() == Some(&mass.name)).map(Mass::places);
+            let node: Vec<usize> = node.unwrap_or_default().iter().map(|name| index[name]).collect();
+            node.windows(2).for_each(|pair| bodies.join((pair[0], pair[1])));
+            if let Some(first) = node.first() {
+                index.extend(place.places().into_iter().map(|name| (name, *first)));
+            }
+        }
+        let ends = |between: &[String; 2]| Some((*index.get(&between[0])?, *index.get(&between[1])?));
         self.springs.iter().filter(|s| s.stiffness > 0.0).filter_map(|s| ends(&s.between)).for_each(|e| bodies.join(e));
         let mut gripped = bodies.clone();
         let carry: BTreeSet<usize> = joints.iter().filter(|j| j.hold != Hold::Nothing).map(|j| j.joint).collect();

@@ -132,7 +132,8 @@ impl Model {
         let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
         let ends = |between: &[String; 2]| -> Vec<(usize, f64)> {
             let ends = between.iter().zip([1.0, -1.0]);
-            ends.filter_map(|(name, sign)| Some((*index.get(name.as_str())?, sign))).collect()
+            let rows = ends.filter_map(|(name, sign)| Some((system.seen()[*index.get(name.as_str())?].rows(), sign)));
+            rows.flat_map(|(rows, sign)| rows.iter().map(move |(row, weight)| (*row, sign * weight))).collect()
         };
         let springs: Vec<Link> = self
             .springs

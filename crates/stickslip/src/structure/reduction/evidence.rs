@@ -187,14 +187,12 @@ fn frequencies(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> 
         Damping::Ratio { ratio, .. } => ratio.max(BESIDE),
         _ => BESIDE,
     };
-    let mut inside: Vec<f64> = modes
+    let inside: Vec<f64> = modes
         .values
         .iter()
         .map(|value| value.max(0.0).sqrt())
         .filter(|omega| *omega > SAME * up_to && *omega < up_to)
         .collect();
-    // between two modes that are one, as those of a wave either way, there is no middle
-    inside.dedup_by(|next, kept| *next - *kept < SAME * *kept);
     let mut all = Vec::new();
     for (k, omega) in inside.iter().enumerate() {
         let next = inside.get(k + 1).copied().unwrap_or(up_to);
