@@ -92,7 +92,7 @@ impl Head {
             return differs("it is of a run with the method", &method(&ours.study), &method(&theirs.study));
         }
         if of(&ours.study, "matrices") != of(&theirs.study, "matrices") {
-            return Some("the files of its [structure] hold other matrices now than when it began".to_owned());
+            return Some("the files of its [structure] and [disk] hold other matrices, nodes or deviations now than when it began".to_owned());
         }
         if of(&ours.study, "cases") != of(&theirs.study, "cases") || self.units != other.units {
             return Some("a file that the study reads has changed since: its cases have other values".to_owned());

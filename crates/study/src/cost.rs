@@ -92,8 +92,10 @@ pub struct Costing<'a> {
     pub frequencies: f64,
     /// Varied parameters, a column each.
     pub varied: f64,
-    /// Masses.
+    /// Degrees of freedom, a few for each mass.
     pub masses: f64,
+    /// Places that results are given at: of masses every degree of freedom.
+    pub places: f64,
     /// Joints.
     pub joints: f64,
     surveyed: &'a Surveyed,
@@ -123,6 +125,7 @@ impl<'a> Costing<'a> {
             frequencies: if study.is_adaptive() { ADAPTIVE } else { given },
             varied: case.varied.len() as f64,
             masses: system.dofs() as f64,
+            places: system.places().len() as f64,
             joints: system.joints().len() as f64,
             surveyed,
             smooth: laws.iter().any(|law| law.pieces().is_none()),
@@ -152,14 +155,14 @@ impl<'a> Costing<'a> {
     /// what `output` asks for, evidence, status.
     pub fn orbits(&self, rows: f64) -> Shape {
         let extra = extra::columns(self.case, self.surveyed.survey.system()).len() as f64;
-        let numbers = self.varied + 3.0 * self.masses + 2.0 * self.joints + extra + 6.0;
+        let numbers = self.varied + 3.0 * self.places + 2.0 * self.joints + extra + 6.0;
         Shape { rows, numbers, words: 1.0 }
     }
 
     /// A table with a row for each of `rows` instants: time and frequency, displacement and velocity of each mass, three of each joint and
     /// its contact.
     pub fn motion(&self, rows: f64) -> Shape {
-        Shape { rows, numbers: self.varied + 2.0 + 2.0 * self.masses + 3.0 * self.joints, words: self.joints }
+        Shape { rows, numbers: self.varied + 2.0 + 2.0 * self.places + 3.0 * self.joints, words: self.joints }
     }
 
     /// Instants of a period in a table: `samples` steps, both ends, and the switches.
@@ -237,7 +240,7 @@ impl Costing<'_> {
         // units wait for their turn; of the tables as many rows are read back as a figure shows
         let waiting = tables * ((AHEAD * threads) as f64 / units.max(1) as f64).min(1.0);
         let shown = cost.shown(NUMBER + WRITTEN, WORD + WRITTEN);
-        let drawn = DRAWN * cost.drawn.min(MOST_ROWS as f64 * (self.masses + self.joints));
+        let drawn = DRAWN * cost.drawn.min(MOST_ROWS as f64 * (self.places + self.joints));
         let working = units.min(threads) as f64 * cost.unit;
         // a float that is too large for the type becomes its largest value
         let whole = |value: f64| value as u64;
@@ -389,7 +392,9 @@ impl Costing<'_> {
             Some(harmonics) => (harmonics / SERIES_HARMONICS).max(1.0),
             None => (SERIES_TOLERANCE / asked).sqrt().max(1.0),
         };
-        SERIES * (self.masses + self.joints).max(1.0) * factor * length * length
+        // of a ring in a travelling wave one sector of twice the size is solved
+        let share = system.cyclic().map_or(1.0, |ring| 2.0 / ring.sectors as f64).min(1.0);
+        SERIES * (share * (self.masses + self.joints)).max(1.0) * factor * length * length
     }
 
     /// Time of a period of a transient, s.

@@ -536,9 +536,14 @@ impl Study {
         StudyError::at(&self.sources, Problem::new(place, key, message).maybe_help(help))
     }
 
-    /// What tells the matrices of `[structure]` from others; none of a study without them.
+    /// What tells the matrices of `[structure]`, and what files say of it as a sector, from others; none of a study without them.
     pub fn matrices_check(&self) -> Option<String> {
-        self.structure.matrices.as_ref().and_then(Matrices::check)
+        let own = self.structure.matrices.as_ref().and_then(Matrices::check)?;
+        let sector = self.structure.lists.disk.as_ref().map_or(0, |disk| {
+            let files = format!("{:?} {:?} {:?}", disk.pattern, disk.boundary, disk.blade);
+            crc32fast::hash(files.as_bytes())
+        });
+        Some(format!("{own}{sector:08x}"))
     }
 
     /// The study as it was understood, all values in SI, for the record of a run. The text of the file is in it.

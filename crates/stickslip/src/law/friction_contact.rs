@@ -285,6 +285,61 @@ mod tests {
         }
     }
 
+    /// The same law without its derivatives by hand.
+    #[derive(Debug)]
+    struct ByDuals(FrictionContact);
+
+    impl StepLaw for ByDuals {
+        fn states(&self) -> usize {
+            self.0.tangents
+        }
+        fn advance<S: Real>(
+            &self,
+            from: &[S; MOST_DIRECTIONS],
+            to: &[S; MOST_DIRECTIONS],
+            z: &mut [S],
+        ) -> [S; MOST_DIRECTIONS] {
+            self.0.advance(from, to, z)
+        }
+    }
+
+    /// Derivatives by hand are those of dual numbers: sticking, slipping, closing, opening, apart.
+    #[test]
+    fn derivatives_by_hand_are_those_of_dual_numbers() {
+        use crate::law::StepPoint;
+        let mut met = [0; 3];
+        for k in 0..2000usize {
+            let noise = |i: usize| ((k * 7919 + i * 104_729 + 13) as f64).sin();
+            let tangents = 1 + k % 2;
+            let preload = noise(9) + (k % 3) as f64;
+            let law = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.5, preload, tangents };
+            let (mut start, mut from, mut to) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+            for a in 0..=tangents {
+                (start[a], from[a], to[a]) = (noise(a), noise(a + 3), noise(a + 6));
+            }
+            // within the limit that the contact has before the step
+            let mut z = vec![0.0; tangents];
+            law.advance(&start, &from, &mut z);
+            z.iter_mut().for_each(|z| *z *= 0.99);
+            let n = tangents + 1;
+            let (mut hand, mut dual) = (StepPoint::new(n, tangents), StepPoint::new(n, tangents));
+            Step::linearise(&law, n, &from, &to, &z, &mut hand);
+            Step::linearise(&ByDuals(law), n, &from, &to, &z, &mut dual);
+            let load = |u: &[f64; 3]| law.preload + law.normal * u[tangents];
+            met[if load(&to) <= 0.0 { 0 } else { 1 + usize::from(load(&from) < 0.0) }] += 1;
+            let rows = |point: &StepPoint| -> Vec<f64> {
+                let slopes = (0..n).flat_map(|a| point.force_slope(a).to_vec());
+                slopes.chain((0..tangents).flat_map(|s| point.state_slope(s).to_vec())).chain(point.force).collect()
+            };
+            let (hand, dual) = (rows(&hand), rows(&dual));
+            let size = dual.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+            for (a, b) in hand.iter().zip(&dual) {
+                assert!((a - b).abs() <= 1e-11 * size * size, "{k}: {law:?}\n{hand:?}\n{dual:?}");
+            }
+        }
+        assert!(met.iter().all(|count| *count > 100), "{met:?}");
+    }
+
     #[test]
     fn faces_say_what_they_do() {
         let law = FrictionContact { tangential: 1.0, normal: 1.0, friction: 0.5, preload: 1.0, tangents: 2 };

@@ -294,14 +294,6 @@ impl Structure {
         self.0.largest
     }
 
-    /// `K x` of displacements `x` (m), N.
-    pub fn spring_forces(&self, x: &[f64]) -> Vec<f64> {
-        match &self.0.form {
-            Form::Full(full) => (&full.stiffness * nalgebra::DVector::from_column_slice(x)).as_slice().to_vec(),
-            Form::Sparse { stiffness, .. } => stiffness.times(x),
-        }
-    }
-
     /// The entries of (mass, damping, stiffness) that are not all zero: row, column, values. Full matrices row by row, others column by column.
     pub fn entries(&self) -> Box<dyn Iterator<Item = (usize, usize, [f64; 3])> + '_> {
         let n = self.dofs();
@@ -532,10 +524,6 @@ mod tests {
             all
         };
         assert_eq!(sorted(&sparse), sorted(&full));
-        let x: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
-        for (a, b) in sparse.spring_forces(&x).iter().zip(full.spring_forces(&x)) {
-            assert!((a - b).abs() < 1e-14);
-        }
         for s in [Complex64::ZERO, Complex64::new(0.0, 0.7), Complex64::new(0.4, 0.0)] {
             let [mut a, mut b] = [(); 2].map(|()| vec![Complex64::new(1.0, -0.5); 2 * n]);
             sparse.dynamic_stiffness(s).unwrap().solve(&mut a);

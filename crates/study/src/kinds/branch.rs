@@ -76,8 +76,8 @@ pub(super) const KIND: Kind = Kind {
 /// Points of a branch for each of the steps that were asked for: it shortens them where it bends. Measured: 3 to 15,
 /// and 109 for a ring of three whose branch turns at every border of stick.
 const POINTS: f64 = 5.0;
-/// Solutions per step that was asked for.
-const FOLLOWED: f64 = 15.0;
+/// Solutions per step that was asked for, each of full equations.
+const FOLLOWED: f64 = 150.0;
 /// Peaks and turns of a branch.
 const MARKS: f64 = 2.0;
 
@@ -89,7 +89,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let rows = steps * POINTS;
     Cost {
         tables: vec![costing.orbits(rows), Shape { rows: branches * MARKS, numbers: costing.varied + 2.0, words: 0.0 }],
-        drawn: rows * costing.masses,
+        drawn: rows * costing.places,
         unit: rows / branches * costing.series_bytes(harmonics.unwrap_or(HARMONICS as f64)),
         work: rows * costing.extra() + steps * FOLLOWED * costing.series(harmonics),
     }

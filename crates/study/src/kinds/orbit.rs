@@ -61,7 +61,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
             Shape { rows: multipliers, numbers: costing.varied + 5.0, words: 0.0 },
         ],
         // the panels beyond the most that are drawn are made all the same
-        drawn: rows * (costing.masses + costing.joints),
+        drawn: rows * (costing.places + costing.joints),
         unit: costing.kept_orbits(),
         work: points * (costing.orbit() + costing.extra() + costing.reading(costing.instants())),
     }

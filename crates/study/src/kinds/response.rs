@@ -89,17 +89,17 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let peaks = match values.names("peak_of") {
         _ if !sought => 0.0,
         Some(_) => costing.cases,
-        None => (costing.cases * costing.masses * PEAKS).floor(),
+        None => (costing.cases * costing.places * PEAKS).floor(),
     };
     let linear = if costing.study.wants_references() { costing.frequencies * REFERENCE_POINTS as f64 } else { 0.0 };
     // a tuned disk takes a sector's time, and its curve the frequencies of the other
     let tuned = if values.flag(amplification::KEY.name) == Some(true) { costing.cases } else { 0.0 };
-    let curves = costing.cases.min(MOST_CURVES as f64) * costing.masses.min(MOST_PANELS as f64 + SINGLE as f64);
+    let curves = costing.cases.min(MOST_CURVES as f64) * costing.places.min(MOST_PANELS as f64 + SINGLE as f64);
     Cost {
         tables: vec![
             costing.orbits(points),
             Shape { rows: peaks, numbers: costing.varied + 3.0, words: 1.0 },
-            Shape { rows: linear, numbers: 1.0 + 2.0 * costing.masses, words: 0.0 },
+            Shape { rows: linear, numbers: 1.0 + 2.0 * costing.places, words: 0.0 },
             Shape { rows: tuned, numbers: costing.varied + 5.0, words: 1.0 },
         ],
         drawn: curves * costing.frequencies,

@@ -128,11 +128,11 @@ fn cost(costing: &Costing<'_>) -> Cost {
     Cost {
         tables: vec![
             Shape { numbers: table.numbers + costing.several(), ..table },
-            Shape { rows: points * costing.masses, numbers: costing.varied + costing.several() + 2.0, words: 1.0 },
+            Shape { rows: points * costing.places, numbers: costing.varied + costing.several() + 2.0, words: 1.0 },
             Shape { rows: cycles, numbers: costing.varied + 4.0, words: 1.0 },
             Shape { rows: summaries, numbers: costing.varied + 10.0, words: 1.0 },
         ],
-        drawn: points.min(MOST_PANELS as f64) * samples * costing.masses,
+        drawn: points.min(MOST_PANELS as f64) * samples * costing.places,
         unit: 0.0,
         work: points * (duration * fastest / TAU * costing.period() + costing.reading(samples)),
     }

@@ -52,6 +52,8 @@ pub(super) fn places(
 /// Share of the mean forces that may be left over: a direction that nothing holds was given a spring to have a mean position at all, and
 /// what that spring carries is missing elsewhere.
 const UNHELD: f64 = 1e-6;
+/// What sums of spring forces lose to rounding, in roundings of their largest terms: positions are exact to some of their own.
+const ROUNDING: f64 = 1e3;
 
 /// Whether the mean forces balance without the springs that hold free directions.
 pub(super) fn stays(context: &Context, level: &Level, motion: &Motion, x: &[DVector<Complex64>]) -> bool {
@@ -71,10 +73,18 @@ pub(super) fn stays(context: &Context, level: &Level, motion: &Motion, x: &[DVec
         left -= direction.map(|w| Complex64::new(w * force, 0.0));
         size += direction.norm() * force.abs();
     }
-    let held = system.structure().spring_forces(x[0].map(|z| z.re).as_slice());
-    // positions far away have forces that are rounding
-    let rounding = f64::EPSILON * system.structure().largest()[2] * x[0].iter().fold(0.0, |m: f64, z| m.max(z.norm()));
-    (left.map(|z| z.re) - DVector::from_vec(held)).norm() <= UNHELD * size + 1e3 * rounding
+    // far away the forces of the springs are rounding, where there are any
+    let (mut held, mut rounding) = (vec![0.0; system.dofs()], vec![0.0; system.dofs()]);
+    for (row, column, [.., stiffness]) in system.structure().entries() {
+        let force = stiffness * x[0][column].re;
+        held[row] += force;
+        rounding[row] += ROUNDING * f64::EPSILON * force.abs();
+    }
+    let missing = left.iter().zip(held).zip(rounding).map(|((left, held), rounding)| {
+        let missing = (left.re - held).abs() - rounding;
+        missing.max(0.0).powi(2)
+    });
+    missing.sum::<f64>().sqrt() <= UNHELD * size
 }
 
 #[derive(Debug, Clone)]

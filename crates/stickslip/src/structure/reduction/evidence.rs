@@ -200,7 +200,7 @@ fn frequencies(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> 
     }
     all.push(0.5 * inside.first().copied().unwrap_or(up_to));
     // between equal modes, as those of a square section, there is no middle: at a mode rounding would be the error
-    all.retain(|omega| *omega <= up_to && inside.iter().all(|mode| (omega - mode).abs() >= 0.5 * beside * mode));
+    all.retain(|omega| *omega <= up_to && inside.iter().all(|mode| (omega - mode).abs() >= SAME * mode));
     all.push(up_to);
     all.sort_by(f64::total_cmp);
     all.dedup_by(|next, kept| *next - *kept < SAME * *kept);

@@ -19,6 +19,9 @@ use stickslip_numerics::sparse::{Matrix, NaturalModes, columns};
 /// makes of it.
 const DEPENDENT: f64 = 1e-11;
 
+/// What is beside the diagonal of a reduced matrix, relative to the two on it, up to which it is the rounding of vectors that do not move each other.
+const ROUNDED: f64 = 1e-9;
+
 /// Modes and residual vectors, from which reductions are made.
 #[derive(Debug, Clone)]
 pub struct Free<'a> {
@@ -54,18 +57,11 @@ impl<'a> Free<'a> {
         let mass = square(&whole.mass, &basis);
         let ports = whole.rows_of(&basis);
         let counts = (whole.ports().len(), order);
-        let stiffness = stiffness(&modes.values, shift, counts, &mass, &ports);
-        Ok(Free {
-            whole,
-            values: modes.values.clone(),
-            shift,
-            counts,
-            basis: Arc::new(basis),
-            mass,
-            stiffness,
-            damping: own,
-            ports,
-        })
+        let stiffness = square(&whole.stiffness, &basis);
+        // rounding would hold a free motion, and a constant load find its balance kilometres away
+        let mut values = modes.values.clone();
+        values[..modes.free()].fill(0.0);
+        Ok(Free { whole, values, shift, counts, basis: Arc::new(basis), mass, stiffness, damping: own, ports })
     }
 
     /// The whole structure.
@@ -108,17 +104,12 @@ impl<'a> Free<'a> {
         assert!(modes <= self.modes() && order <= self.counts.1, "of {} modes, {} orders", self.modes(), self.counts.1);
         // all modes leave nothing to the residual vectors but rounding
         let order = if modes < self.whole.dofs() { order } else { 0 };
-        let (small, heavy) = self.combination(modes, order).ok_or(ReductionError::OutOfRange)?;
-        // what is beside the diagonals is rounding
-        let diagonal = |of_mode: &dyn Fn(usize) -> f64, of_vector: &dyn Fn(usize) -> f64| {
-            DMatrix::from_fn(small.ncols(), small.ncols(), |i, k| match i.checked_sub(modes) {
-                _ if i != k => 0.0,
-                None => of_mode(i),
-                Some(vector) => of_vector(vector),
-            })
+        let small = self.combination(modes, order).ok_or(ReductionError::OutOfRange)?;
+        let all = self.mass.nrows();
+        let project = |matrix: &DMatrix<f64>| {
+            without_rounding(symmetric(columns::products(all, small.as_slice(), product(matrix, &small).as_slice())))
         };
-        let mass = diagonal(&|_| 1.0, &|vector| heavy[vector]);
-        let stiffness = diagonal(&|mode| self.values[mode], &|_| 1.0);
+        let (mass, stiffness) = (project(&self.mass), project(&self.stiffness));
         let own = self.damping.as_ref().map(|c| product(&small.transpose(), &product(c, &small)));
         let damping = damping(&self.whole.damping, &mass, &stiffness, own)?;
         let n = self.whole.dofs();
@@ -127,8 +118,8 @@ impl<'a> Free<'a> {
         Ok(Reduced { kind, mass, damping, stiffness, ports, basis: self.basis.clone(), weights: small, n })
     }
 
-    /// Modes, then independent residual vectors of unit stiffness whose mass is diagonal; and that mass.
-    fn combination(&self, modes: usize, order: usize) -> Option<(DMatrix<f64>, Vec<f64>)> {
+    /// Modes, then independent residual vectors of unit stiffness whose mass is diagonal.
+    fn combination(&self, modes: usize, order: usize) -> Option<DMatrix<f64>> {
         let all = self.mass.nrows();
         let mut vectors = DMatrix::zeros(all, 0);
         // twice: the second time rounding of the first is projected out
@@ -141,17 +132,15 @@ impl<'a> Free<'a> {
             }
             vectors = join(&vectors, &block);
         }
-        let mut heavy = Vec::new();
         if vectors.ncols() > 0 {
             let mass = columns::products(all, vectors.as_slice(), product(&self.mass, &vectors).as_slice());
             let eigen = eigen::symmetric(symmetric(mass))?;
             let mut rising: Vec<usize> = (0..vectors.ncols()).collect();
             rising.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
             vectors = product(&vectors, &eigen.eigenvectors.select_columns(&rising));
-            heavy.extend(rising.iter().map(|&k| eigen.eigenvalues[k]));
         }
         let chosen = DMatrix::from_fn(all, modes, |i, k| f64::from(u8::from(i == k)));
-        Some((join(&chosen, &vectors), heavy))
+        Some(join(&chosen, &vectors))
     }
 }
 
@@ -172,26 +161,15 @@ fn square(matrix: &Matrix, basis: &[f64]) -> DMatrix<f64> {
     square
 }
 
-/// `Bᵀ K B`, by what the residual vectors solve: `K Xⱼ = σ M Xⱼ + M Xⱼ₋₁`, at first with the forces in place of `M Xⱼ₋₁`, beside what the modes answer, of
-/// which they have nothing.
-fn stiffness(
-    values: &[f64],
-    shift: f64,
-    (ports, order): (usize, usize),
-    mass: &DMatrix<f64>,
-    seen: &DMatrix<f64>,
-) -> DMatrix<f64> {
-    let modes = values.len();
-    let mut stiffness = DMatrix::zeros(mass.nrows(), mass.ncols());
-    values.iter().enumerate().for_each(|(mode, value)| stiffness[(mode, mode)] = *value);
-    for column in 0..ports * order {
-        let k = modes + column;
-        for i in modes..mass.nrows() {
-            let pull = if column < ports { seen[(column, i)] } else { mass[(i, k - ports)] };
-            stiffness[(i, k)] = shift * mass[(i, k)] + pull;
-        }
+/// A symmetric matrix without what is beside its diagonal, if that is rounding.
+fn without_rounding(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let n = matrix.nrows();
+    let own: Vec<f64> = matrix.diagonal().iter().map(|v| v.abs().sqrt()).collect();
+    let beside = |i: usize, k: usize| i != k && matrix[(i, k)].abs() > ROUNDED * own[i] * own[k];
+    if (0..n).any(|k| (0..n).any(|i| beside(i, k))) {
+        return matrix;
     }
-    symmetric(stiffness)
+    DMatrix::from_diagonal(&matrix.diagonal())
 }
 
 fn join(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {

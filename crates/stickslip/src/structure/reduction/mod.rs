@@ -502,7 +502,8 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
     if r == 0 {
         return Some((vec![], DMatrix::zeros(0, 0)));
     }
-    if is_diagonal(mass) && is_diagonal(stiffness) && mass.diagonal().iter().all(|m| *m >= 0.0) {
+    let moves = |i: usize| mass[(i, i)] > 0.0 || (mass[(i, i)] == 0.0 && stiffness[(i, i)] > 0.0);
+    if is_diagonal(mass) && is_diagonal(stiffness) && (0..r).all(moves) {
         return Some(natural_by_themselves(&mass.diagonal(), &stiffness.diagonal()));
     }
     let ratio = |i: usize| stiffness[(i, i)] / mass[(i, i)];
