@@ -358,7 +358,10 @@ impl Costing<'_> {
         let shooting = size * size * if self.has_states { SHOOTING.1 } else { SHOOTING.0 };
         let series = self.series(case.method.options.get("harmonics").copied());
         match case.method.name.as_str() {
-            _ if self.is_series() => series,
+            // of a ring in a travelling wave one sector of twice the size is solved
+            _ if self.is_series() => {
+                series * self.surveyed.survey.system().cyclic().map_or(1.0, |ring| 2.0 / ring.sectors as f64).min(1.0)
+            }
             "transient" => {
                 let modes = &self.surveyed.survey.free().elastic;
                 let damping = modes.iter().map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE);
@@ -392,9 +395,7 @@ impl Costing<'_> {
             Some(harmonics) => (harmonics / SERIES_HARMONICS).max(1.0),
             None => (SERIES_TOLERANCE / asked).sqrt().max(1.0),
         };
-        // of a ring in a travelling wave one sector of twice the size is solved
-        let share = system.cyclic().map_or(1.0, |ring| 2.0 / ring.sectors as f64).min(1.0);
-        SERIES * (share * (self.masses + self.joints)).max(1.0) * factor * length * length
+        SERIES * (self.masses + self.joints).max(1.0) * factor * length * length
     }
 
     /// Time of a period of a transient, s.
