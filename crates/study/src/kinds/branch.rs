@@ -77,7 +77,7 @@ pub(super) const KIND: Kind = Kind {
 /// and 109 for a ring of three whose branch turns at every border of stick.
 const POINTS: f64 = 5.0;
 /// Solutions per step that was asked for, each of full equations.
-const FOLLOWED: f64 = 150.0;
+const FOLLOWED: f64 = 15.0;
 /// Peaks and turns of a branch.
 const MARKS: f64 = 2.0;
 

@@ -61,7 +61,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// Solutions per point, each of full equations. Measured: 0.3 s a point for a disk of 24 sectors.
-const FOLLOWED: f64 = 80.0;
+const FOLLOWED: f64 = 8.0;
 
 fn cost(costing: &Costing<'_>) -> Cost {
     let values = &costing.case.values;
