@@ -72,7 +72,7 @@ pub trait Step: Debug + Send + Sync {
         z: &[f64],
         point: &mut StepPoint,
     );
-    /// Steps around a closed way, [direction][point], from its first point to the next and in the end from the last to the first: forces at the points,
+    /// Steps around a closed way, `[direction][point]`, from its first point to the next and in the end from the last to the first: forces at the points,
     /// and with `rows` the derivatives of the step to every point along the first `directions`: rows of the states, then of the forces, as long as in
     /// [`StepPoint`]. `z` are the states at the first point, before and after.
     fn around(
