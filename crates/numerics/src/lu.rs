@@ -85,6 +85,35 @@ impl Lu {
             right[i] = (right[i] - sum) / row[i];
         }
     }
+
+    /// Replaces several right sides by their solutions: row after row, each with one entry of every right side.
+    pub fn solve_rows(&self, right: &mut [f64], columns: usize) {
+        let n = self.n;
+        for k in 0..n {
+            let other = self.exchanged[k];
+            if other != k {
+                let (top, bottom) = right.split_at_mut(other * columns);
+                top[k * columns..(k + 1) * columns].swap_with_slice(&mut bottom[..columns]);
+            }
+        }
+        for i in 1..n {
+            let (above, row) = right[..(i + 1) * columns].split_at_mut(i * columns);
+            subtract(&self.entries[i * n..i * n + i], above, row);
+        }
+        for i in (0..n).rev() {
+            let (row, below) = right[i * columns..n * columns].split_at_mut(columns);
+            subtract(&self.entries[i * n + i + 1..(i + 1) * n], below, row);
+            let pivot = self.entries[i * n + i];
+            row.iter_mut().for_each(|x| *x /= pivot);
+        }
+    }
+}
+
+/// `row -= Σ factor · other row`.
+fn subtract(factors: &[f64], others: &[f64], row: &mut [f64]) {
+    for (factor, other) in factors.iter().zip(others.chunks_exact(row.len().max(1))) {
+        row.iter_mut().zip(other).for_each(|(x, o)| *x -= factor * o);
+    }
 }
 
 #[cfg(test)]
@@ -105,6 +134,13 @@ mod tests {
             lu.solve(&mut right);
             for (i, x) in right.iter().enumerate() {
                 assert!((x - 1.0 - i as f64).abs() < 1e-10, "{n}: {x}");
+            }
+            // the same right side, and twice it
+            let entry_sum = |i: usize| (0..n).map(|k| entry(i, k) * (1.0 + k as f64)).sum::<f64>();
+            let mut rows: Vec<f64> = (0..n).flat_map(|i| [entry_sum(i), 2.0 * entry_sum(i)]).collect();
+            lu.solve_rows(&mut rows, 2);
+            for (i, x) in rows.chunks_exact(2).enumerate() {
+                assert!((x[0] - 1.0 - i as f64).abs() < 1e-10 && (x[1] - 2.0 * x[0]).abs() < 1e-10, "{n}: {x:?}");
             }
         }
         lu.zeros(2).fill(1.0);

@@ -239,61 +239,82 @@ const DECREASE: f64 = 0.95;
 /// Singular values below this fraction of the largest belong to the continuum of stick offsets.
 const CONTINUUM: f64 = 1e-10;
 
+/// Newton's method, and where it comes no further, letting the transient die before the next attempt.
 pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<Closed, OrbitError> {
+    let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
+    let (mut iterations, mut smallest, mut returns) = (0, f64::INFINITY, RETURNS);
+    let mut state = start.to_vec();
+    for rescue in 0..=RESCUES {
+        let end = descended(map, &state, aim, f64::INFINITY, &mut iterations)?;
+        if end.residual <= aim.residual {
+            return Ok(end);
+        }
+        smallest = smallest.min(end.residual);
+        if rescue == RESCUES || iterations >= ITERATIONS {
+            break;
+        }
+        state = end.state;
+        for _ in 0..returns {
+            map.returned(&mut state, None).map_err(broke)?;
+            state.iter_mut().for_each(|z| *z *= aim.sign);
+            if state.iter().any(|z| !z.is_finite()) {
+                return Err(broke(Breakdown::Unbounded { time: f64::INFINITY }));
+            }
+        }
+        returns = returns * 3 / 2;
+    }
+    Err(OrbitError::NotConverged { method: aim.method, omega: aim.omega, iterations, residual: smallest })
+}
+
+/// Steps of Newton's method, shortened where they do not help, until the orbit is closed, no step leaves less of the residual, a whole one
+/// multiplies it by more than `wild`, or `iterations` have been used up: how far it came.
+pub(crate) fn descended(
+    map: &mut dyn ReturnMap,
+    start: &[f64],
+    aim: Aim,
+    wild: f64,
+    iterations: &mut usize,
+) -> Result<Closed, OrbitError> {
     let n = start.len();
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     let mut state = start.to_vec();
     let mut derivative = DMatrix::identity(n, n);
     let mut gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
-    let mut smallest = f64::INFINITY;
-    let (mut returns, mut rescues) = (RETURNS, 0);
-    let mut iterations = 0;
-    for iteration in 1..=ITERATIONS {
-        iterations = iteration;
+    loop {
+        *iterations += 1;
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
-        let residual = norm(map.weights(), gap.as_slice()) / size;
-        smallest = smallest.min(residual);
+        let before = norm(map.weights(), gap.as_slice());
+        let residual = before / size;
         if aim.rest > 0.0 && size > LARGEST * aim.rest {
             // so large that the work of the loads drowns in rounding: an undamped resonance
-            return Err(OrbitError::NotConverged { method: aim.method, omega: aim.omega, iterations, residual: 1.0 });
+            let (method, omega) = (aim.method, aim.omega);
+            return Err(OrbitError::NotConverged { method, omega, iterations: *iterations, residual: 1.0 });
         }
-        if residual <= aim.residual {
-            return Ok(Closed { state, derivative, residual, iterations: iteration, missing: None });
-        }
-        let step = newton_step(&derivative, &gap, aim.sign, map.weights());
-        let before = norm(map.weights(), gap.as_slice());
-        let mut fraction = 1.0;
         let mut accepted = false;
-        for _ in 0..=HALVINGS {
-            let trial: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + fraction * d).collect();
-            let mut trial_derivative = DMatrix::identity(n, n);
-            if let Ok(trial_gap) = evaluate(map, &trial, aim, &mut trial_derivative)
-                && norm(map.weights(), trial_gap.as_slice()) <= DECREASE * before
-            {
-                (state, gap, derivative) = (trial, trial_gap, trial_derivative);
-                accepted = true;
-                break;
+        if residual > aim.residual && *iterations < ITERATIONS {
+            let step = newton_step(&derivative, &gap, aim.sign, map.weights());
+            let mut fraction = 1.0;
+            for _ in 0..=HALVINGS {
+                let trial: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + fraction * d).collect();
+                let mut trial_derivative = DMatrix::identity(n, n);
+                if let Ok(trial_gap) = evaluate(map, &trial, aim, &mut trial_derivative) {
+                    let after = norm(map.weights(), trial_gap.as_slice());
+                    if after <= DECREASE * before {
+                        (state, gap, derivative) = (trial, trial_gap, trial_derivative);
+                        accepted = true;
+                        break;
+                    }
+                    if after > wild * before {
+                        break;
+                    }
+                }
+                fraction *= 0.5;
             }
-            fraction *= 0.5;
         }
         if !accepted {
-            if rescues == RESCUES {
-                break;
-            }
-            rescues += 1;
-            for _ in 0..returns {
-                map.returned(&mut state, None).map_err(broke)?;
-                state.iter_mut().for_each(|z| *z *= aim.sign);
-                if state.iter().any(|z| !z.is_finite()) {
-                    return Err(broke(Breakdown::Unbounded { time: f64::INFINITY }));
-                }
-            }
-            returns = returns * 3 / 2;
-            derivative = DMatrix::identity(n, n);
-            gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
+            return Ok(Closed { state, derivative, residual, iterations: *iterations, missing: None });
         }
     }
-    Err(OrbitError::NotConverged { method: aim.method, omega: aim.omega, iterations, residual: smallest })
 }
 
 /// `z - sign · R(z)`, with the derivative of R.

@@ -10,7 +10,7 @@ use super::flow::Flow;
 use super::followed::Kind;
 use super::guess::Guess;
 use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
-use super::periodic::{Aim, Closed, ReturnMap, Search, approached, close, newton_step, norm};
+use super::periodic::{Aim, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm};
 use super::relaxed::{Closing, Spring, relaxed};
 use super::repeated::Afresh;
 use super::smooth::flow::SmoothFlow;
@@ -31,6 +31,12 @@ const TOLERANCE: f64 = 1e-8;
 const CLOSER: f64 = 0.3;
 /// Residual of the first search, in which every run chooses its steps anew: the map is then smooth only to about their error.
 const NEAR: f64 = 1e-6;
+/// Relative error per step, and residual, of the approach before that search: its runs cost a third of those that are exact enough.
+const LONG_STEPS: f64 = 1e-6;
+const COARSE_RESIDUAL: f64 = 1e-5;
+/// Growth of the residual by a whole step of that approach which says that its steps jump over the layers of the law, so that its derivative means
+/// nothing; where steps are shortened with success it grows to less than twice.
+const WILD: f64 = 3.0;
 /// Residual at which the orbit is closed on the steps of the last free run, on which the map is smooth.
 const CLOSED: f64 = 1e-11;
 /// Meshes made for one orbit: the first is as good as the first search, the second nearly always enough.
@@ -252,8 +258,17 @@ impl<'a> Shooter<'a> {
             self.record(&closed)?;
             return Ok(closed);
         }
-        let near = search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
-        let mut iterations = near.iterations;
+        let mut iterations = 0;
+        let near = self.coarsely(start, aim, &mut iterations);
+        let start = near.as_ref().map(|near| near.state.as_slice()).or(start);
+        let near = match near {
+            Some(near) if near.residual <= COARSE_RESIDUAL => near,
+            _ => {
+                let near = search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
+                iterations += near.iterations;
+                near
+            }
+        };
         let (mut state, mut fits) = match self.brought_near(&near, aim, &mut iterations) {
             Some(state) => (state, true),
             None => (near.state, false),
@@ -280,6 +295,18 @@ impl<'a> Shooter<'a> {
             }
             (state, fits) = (closed.state, false);
         }
+    }
+
+    /// How near to the orbit one comes in long steps, for a third of the work; `None` where they lead nowhere.
+    fn coarsely(&mut self, start: Option<&[f64]>, aim: Aim, iterations: &mut usize) -> Option<Closed> {
+        let first = match start.filter(|state| state.len() == self.weights.len()) {
+            Some(start) => start.to_vec(),
+            None => self.first_state(aim.omega),
+        };
+        let fine = self.set_tolerance(self.tolerance.max(LONG_STEPS));
+        let near = descended(self, &first, Aim { residual: COARSE_RESIDUAL, ..aim }, WILD, iterations);
+        self.set_tolerance(fine);
+        near.ok()
     }
 
     /// From the orbit that the search has found to a state for which the steps of the last run were made, with the derivative of the search and

@@ -55,6 +55,8 @@ pub(crate) struct SmoothFlow {
     slope: Vec<f64>,
     next: Vec<f64>,
     next_slope: Vec<f64>,
+    /// The derivative that a run carries, row after row.
+    derivative: Vec<f64>,
     /// Memory: the unknowns of the last step; an error estimate and a second one; loads and forces at an instant.
     previous: Vec<f64>,
     error: Vec<f64>,
@@ -85,6 +87,7 @@ impl SmoothFlow {
             slope: vec![0.0; states],
             next: vec![0.0; states],
             next_slope: vec![0.0; states],
+            derivative: Vec::new(),
             previous: Vec::new(),
             error: vec![0.0; states],
             second: vec![0.0; states],
@@ -384,6 +387,10 @@ impl Flow for SmoothFlow {
         if self.keep {
             self.keep_instant(state, 0.0);
         }
+        if let Some(sensitivity) = sensitivity.as_deref() {
+            self.derivative.clear();
+            self.derivative.extend_from_slice(sensitivity.transpose().as_slice());
+        }
         let mut length = None;
         while position < total {
             let time = position as f64 * tick;
@@ -414,8 +421,8 @@ impl Flow for SmoothFlow {
             if self.next.iter().any(|z| !z.is_finite()) {
                 return Err(Breakdown::Unbounded { time });
             }
-            if let Some(sensitivity) = sensitivity.as_deref_mut() {
-                self.step.carry(&self.assembly, eliminated, sensitivity);
+            if let Some(sensitivity) = sensitivity.as_deref() {
+                self.step.carry(&self.assembly, eliminated, &mut self.derivative, sensitivity.ncols());
             }
             // the last stage is the end
             self.laws.swap_with_slice(&mut self.step.points[(STAGES - 1) * joints..]);
@@ -443,6 +450,12 @@ impl Flow for SmoothFlow {
                 && error * 2f64.powf(ORDER) < SAFETY
             {
                 self.level -= 1;
+            }
+        }
+        if let Some(sensitivity) = sensitivity.as_deref_mut() {
+            let columns = sensitivity.ncols();
+            for (at, entry) in self.derivative.iter().enumerate() {
+                sensitivity[(at / columns, at % columns)] = *entry;
             }
         }
         Ok(())

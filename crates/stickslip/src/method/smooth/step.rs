@@ -145,9 +145,10 @@ pub(crate) struct Step {
     structural: Vec<f64>,
     residual: Vec<f64>,
     lu: Lu,
-    right: DMatrix<f64>,
-    direct: DMatrix<f64>,
-    carried: DMatrix<f64>,
+    /// Of a derivative that is carried: stage velocities and internal states, forces of the laws, the end of the step.
+    right: Vec<f64>,
+    answer: Vec<f64>,
+    carried: Vec<f64>,
     filter: Filter,
 }
 
@@ -173,9 +174,9 @@ impl Step {
             structural: vec![0.0; j],
             residual: vec![0.0; unknowns],
             lu: Lu::default(),
-            right: DMatrix::zeros(0, 0),
-            direct: DMatrix::zeros(0, 0),
-            carried: DMatrix::zeros(0, 0),
+            right: Vec::new(),
+            answer: Vec::new(),
+            carried: Vec::new(),
             filter: Filter::new(assembly),
         }
     }
@@ -365,75 +366,86 @@ impl Step {
         out.gemv(1.0, force, &self.force, 1.0);
     }
 
-    /// Carries the columns of `sensitivity` over the step that was solved last.
-    pub fn carry(&mut self, assembly: &Assembly, eliminated: &Eliminated, sensitivity: &mut DMatrix<f64>) {
-        let (n, j, internal, h) = (assembly.n, assembly.axes.len(), assembly.internal, eliminated.length);
-        let (columns, joints) = (sensitivity.ncols(), assembly.joints.len());
-        if columns == 0 {
+    /// Carries a derivative over the step that was solved last: row after row, states × columns. Whole rows are added to each other, since these
+    /// matrices are small and rows are all that is long in them.
+    pub fn carry(&mut self, assembly: &Assembly, eliminated: &Eliminated, derivative: &mut [f64], columns: usize) {
+        if derivative.is_empty() {
             return; // a joint that is only moved, without states
         }
-        if self.right.ncols() != columns {
-            self.right = DMatrix::zeros(self.unknown.len(), columns);
-            self.direct = DMatrix::zeros(STAGES * j, columns);
-            self.carried = DMatrix::zeros(2 * n, columns);
+        let (n, velocities, internal) = (assembly.n, STAGES * assembly.axes.len(), assembly.internal);
+        for (memory, rows) in
+            [(&mut self.right, self.unknown.len()), (&mut self.answer, velocities), (&mut self.carried, 2 * n)]
+        {
+            memory.clear();
+            memory.resize(rows * columns, 0.0);
         }
-        let linear = sensitivity.rows(0, 2 * n);
-        self.right.rows_mut(0, STAGES * j).gemm(1.0, &eliminated.velocity_from_state, &linear, 0.0);
-        // what the displacement at the start does through the laws
-        for c in 0..columns {
-            let column = sensitivity.column(c);
-            let column = column.as_slice();
-            for (q, joint) in assembly.joints.iter().enumerate() {
-                let mut u = [0.0; crate::law::MOST_DIRECTIONS];
-                joint.axes().enumerate().for_each(|(d, axis)| u[d] = assembly.axes[axis].along(&column[..n]));
-                let along = |slope: &[f64]| -> f64 { (0..joint.directions).map(|e| slope[e] * u[e]).sum() };
-                for stage in 0..STAGES {
-                    let point = &self.points[stage * joints + q];
-                    for (d, axis) in joint.axes().enumerate() {
-                        self.direct[(stage * j + axis, c)] = along(point.force_slope(d));
+        add_product(&eliminated.velocity_from_state, derivative, &mut self.right, columns);
+        self.answer_to_start(assembly, eliminated.length, derivative, columns);
+        add_product(&eliminated.velocity_from_force, &self.answer, &mut self.right, columns);
+        self.lu.solve_rows(&mut self.right, columns);
+        self.answer_to_stages(assembly, eliminated.length, columns);
+        add_product(&eliminated.end[0], derivative, &mut self.carried, columns);
+        add_product(&eliminated.end[2], &self.answer, &mut self.carried, columns);
+        let (linear, inside) = derivative.split_at_mut(2 * n * columns);
+        linear.copy_from_slice(&self.carried);
+        let last = at_state(assembly, STAGES - 1, 0) * columns;
+        inside.copy_from_slice(&self.right[last..last + internal * columns]);
+    }
+
+    /// What the displacements and internal states at the start of a step do through the laws: the forces into `answer`, the internal states
+    /// into `right`.
+    fn answer_to_start(&mut self, assembly: &Assembly, h: f64, start: &[f64], columns: usize) {
+        let (n, j, joints) = (assembly.n, assembly.axes.len(), assembly.joints.len());
+        for (q, joint) in assembly.joints.iter().enumerate() {
+            for stage in 0..STAGES {
+                for (d, axis) in joint.axes().enumerate() {
+                    let slope = self.points[stage * joints + q].force_slope(d);
+                    let out = row_mut(&mut self.answer, stage * j + axis, columns);
+                    for (e, moved) in joint.axes().enumerate() {
+                        for &(place, weight) in assembly.axes[moved].rows() {
+                            add(slope[e] * weight, row(start, place, columns), out);
+                        }
                     }
-                    for s in 0..joint.states {
-                        let through: f64 = (0..STAGES)
-                            .map(|k| h * A[stage][k] * along(self.points[k * joints + q].rate_slope(s)))
-                            .sum();
-                        let row = at_state(assembly, stage, joint.first_state + s);
-                        self.right[(row, c)] = column[2 * n + joint.first_state + s] + through;
+                }
+                for s in 0..joint.states {
+                    let at = at_state(assembly, stage, joint.first_state + s);
+                    let out = row_mut(&mut self.right, at, columns);
+                    add(1.0, row(start, 2 * n + joint.first_state + s, columns), out);
+                    for (e, moved) in joint.axes().enumerate() {
+                        let slope = |k: usize| h * A[stage][k] * self.points[k * joints + q].rate_slope(s)[e];
+                        let through: f64 = (0..STAGES).map(slope).sum();
+                        for &(place, weight) in assembly.axes[moved].rows() {
+                            add(through * weight, row(start, place, columns), out);
+                        }
                     }
                 }
             }
         }
-        self.right.rows_mut(0, STAGES * j).gemm(1.0, &eliminated.velocity_from_force, &self.direct, 1.0);
-        for mut column in self.right.column_iter_mut() {
-            self.lu.solve(column.as_mut_slice());
-        }
-        for c in 0..columns {
-            let right = self.right.column(c);
-            for stage in 0..STAGES {
-                for (q, joint) in assembly.joints.iter().enumerate() {
-                    let point = &self.points[stage * joints + q];
-                    let first = at_state(assembly, stage, joint.first_state);
-                    for (d, axis) in joint.axes().enumerate() {
-                        let slope = point.force_slope(d);
-                        let mut value = 0.0;
-                        for (e, other) in joint.axes().enumerate() {
-                            value += slope[joint.directions + e] * right[stage * j + other];
+    }
+
+    /// Adds to `answer` what the stages in `right` do through the laws.
+    fn answer_to_stages(&mut self, assembly: &Assembly, h: f64, columns: usize) {
+        let (j, joints) = (assembly.axes.len(), assembly.joints.len());
+        for stage in 0..STAGES {
+            for (q, joint) in assembly.joints.iter().enumerate() {
+                let first = at_state(assembly, stage, joint.first_state);
+                for (d, axis) in joint.axes().enumerate() {
+                    let slope = self.points[stage * joints + q].force_slope(d);
+                    let out = row_mut(&mut self.answer, stage * j + axis, columns);
+                    for (e, other) in joint.axes().enumerate() {
+                        add(slope[joint.directions + e], row(&self.right, stage * j + other, columns), out);
+                        if slope[e] != 0.0 {
                             for k in 0..STAGES {
-                                value += slope[e] * h * A[stage][k] * right[k * j + other];
+                                add(slope[e] * h * A[stage][k], row(&self.right, k * j + other, columns), out);
                             }
                         }
-                        for s in 0..joint.states {
-                            value += slope[2 * joint.directions + s] * right[first + s];
-                        }
-                        self.direct[(stage * j + axis, c)] += value;
+                    }
+                    for s in 0..joint.states {
+                        add(slope[2 * joint.directions + s], row(&self.right, first + s, columns), out);
                     }
                 }
             }
         }
-        self.carried.gemm(1.0, &eliminated.end[0], &sensitivity.rows(0, 2 * n), 0.0);
-        self.carried.gemm(1.0, &eliminated.end[2], &self.direct, 1.0);
-        sensitivity.rows_mut(0, 2 * n).copy_from(&self.carried);
-        let last = at_state(assembly, STAGES - 1, 0);
-        sensitivity.rows_mut(2 * n, internal).copy_from(&self.right.rows(last, internal));
     }
 
     /// The embedded estimate of the error of the step that was solved last, before its filter: `slope` is the time derivative of the state at
@@ -465,6 +477,28 @@ impl Step {
     /// Replaces an error estimate by the filtered one, so that stiff components do not dominate it.
     pub fn filter(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint], error: &mut [f64]) {
         self.filter.apply(assembly, eliminated, at, error);
+    }
+}
+
+fn row(matrix: &[f64], at: usize, columns: usize) -> &[f64] {
+    &matrix[at * columns..(at + 1) * columns]
+}
+
+fn row_mut(matrix: &mut [f64], at: usize, columns: usize) -> &mut [f64] {
+    &mut matrix[at * columns..(at + 1) * columns]
+}
+
+/// Adds a multiple of one row to another.
+fn add(factor: f64, row: &[f64], out: &mut [f64]) {
+    out.iter_mut().zip(row).for_each(|(out, entry)| *out += factor * entry);
+}
+
+/// Adds `matrix x` to the first rows of `out`; `x` and `out` row after row.
+fn add_product(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64], columns: usize) {
+    for (i, out) in out.chunks_exact_mut(columns).take(matrix.nrows()).enumerate() {
+        for (k, row) in x.chunks_exact(columns).take(matrix.ncols()).enumerate() {
+            add(matrix[(i, k)], row, out);
+        }
     }
 }
 
