@@ -108,10 +108,20 @@ pub struct Costing<'a> {
     falls: bool,
     /// Whether nothing bounds the force of a law.
     unbounded: bool,
+    pace: Pace,
+}
+
+/// How hard orbits are to find.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Pace {
+    /// As they mostly are.
+    Usual,
+    /// Where many are not found, or only after long searches.
+    Slow,
 }
 
 impl<'a> Costing<'a> {
-    pub(crate) fn new(study: &'a Study, surveyed: &'a Surveyed) -> Self {
+    pub(crate) fn new(study: &'a Study, surveyed: &'a Surveyed, pace: Pace) -> Self {
         let (case, system) = (&surveyed.case, surveyed.survey.system());
         // a width makes exact laws smooth
         let width = case.method.options.get("width");
@@ -133,6 +143,7 @@ impl<'a> Costing<'a> {
             falls: laws.iter().any(|law| law.prox().is_some() && !law.is_incrementally_passive()),
             unbounded: laws.iter().any(|law| law.scale().is_infinite()),
             has_states: laws.iter().any(|law| law.rate().is_some_and(|rate| rate.states() > 0)),
+            pace,
         }
     }
 
@@ -302,6 +313,8 @@ const POINT: f64 = 3e-6;
 /// Event-driven: a closed form per segment, and a decomposition for each new pattern of stick and slip, whose number
 /// grows with the joints. Measured: 3 ms at 8 masses and joints, 40 ms at 16, 0.23 s at 24; 0.8 ms at 32 masses without a joint.
 const EVENT_DRIVEN: (f64, f64) = (2e-4, 3e-3);
+/// The first number where the neighbour's orbit is near. Measured: 19 to 49 µs for the couple.
+const EVENT_DRIVEN_USUAL: f64 = 3e-5;
 /// Masses and joints together, and joints, of the second number.
 const EVENT_DRIVEN_SIZE: (f64, f64) = (16.0, 8.0);
 /// The tolerance of harmonic balance for which its time was measured.
@@ -309,6 +322,8 @@ const SERIES_TOLERANCE: f64 = 1e-3;
 /// Harmonic balance per mass and joint at 15 harmonics. Measured with springs before the sliders: 54 µs for the massless couple, 3 ms for a
 /// ring of 48 blades and joints, 12 ms for a chain of 300; a tenth of this, but points that are not found take the rest.
 const SERIES: f64 = 5e-4;
+/// The same where they are found.
+const SERIES_USUAL: f64 = 1.5e-5;
 /// Rigid sliders and smooth laws need more harmonics and more steps: measured 20 ms at 4 blades, 0.9 s at 32. Where
 /// the harmonics are given they need more steps only.
 const HARD: f64 = 40.0;
@@ -354,7 +369,8 @@ impl Costing<'_> {
         let case = self.case;
         let size = self.masses + self.joints;
         let patterns = self.joints / EVENT_DRIVEN_SIZE.1;
-        let events = EVENT_DRIVEN.0 + EVENT_DRIVEN.1 * patterns * (size / EVENT_DRIVEN_SIZE.0).powi(3);
+        let least = if self.pace == Pace::Usual { EVENT_DRIVEN_USUAL } else { EVENT_DRIVEN.0 };
+        let events = least + EVENT_DRIVEN.1 * patterns * (size / EVENT_DRIVEN_SIZE.0).powi(3);
         let shooting = size * size * if self.has_states { SHOOTING.1 } else { SHOOTING.0 };
         let series = self.series(case.method.options.get("harmonics").copied());
         match case.method.name.as_str() {
@@ -395,7 +411,8 @@ impl Costing<'_> {
             Some(harmonics) => (harmonics / SERIES_HARMONICS).max(1.0),
             None => (SERIES_TOLERANCE / asked).sqrt().max(1.0),
         };
-        SERIES * (self.masses + self.joints).max(1.0) * factor * length * length
+        let each = if self.pace == Pace::Usual { SERIES_USUAL } else { SERIES };
+        each * (self.masses + self.joints).max(1.0) * factor * length * length
     }
 
     /// Time of a period of a transient, s.

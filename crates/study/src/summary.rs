@@ -9,7 +9,7 @@ mod warnings;
 
 pub use structure::StructureSummary;
 
-use crate::cost::{Costing, Size};
+use crate::cost::{Costing, Pace, Size};
 use crate::error::StudyError;
 use crate::kinds;
 use crate::study::Study;
@@ -44,7 +44,9 @@ pub struct ModelSummary {
     pub warnings: Vec<String>,
     /// What it will hold.
     pub size: Size,
-    /// What it will take on one thread, s; rough, and rather too long than too short.
+    /// What it will mostly take on one thread, s; rough.
+    pub usual_seconds: f64,
+    /// What it may take where orbits are hard to find, s; rough, and rather too long than too short.
     pub seconds: f64,
 }
 
@@ -68,6 +70,9 @@ pub struct JointSummary {
 /// Cases that are looked at for warnings, evenly spread over all of them: a warning about the model holds for each of
 /// these.
 const LOOKED_AT: usize = 9;
+/// The longest time that a study may take is told if it is longer than what it usually takes by this factor, and not soon over, s.
+const WIDE: f64 = 3.0;
+const SOON: f64 = 60.0;
 /// A run that takes longer says so at its start, s.
 const LONG_RUN: f64 = 3600.0;
 /// Degrees of freedom beyond which only the first case is looked at, so that a summary takes no longer than a second.
@@ -110,8 +115,11 @@ impl ModelSummary {
         });
         let joints = joints.collect();
         let kind = kinds::of(study);
-        let costing = Costing::new(study, &cases[0]);
-        let (size, seconds) = costing.total(&(kind.cost)(&costing), Units::of(study, (kind.grain)(study)).len());
+        let total = |pace| {
+            let costing = Costing::new(study, &cases[0], pace);
+            costing.total(&(kind.cost)(&costing), Units::of(study, (kind.grain)(study)).len())
+        };
+        let ((size, seconds), (_, usual_seconds)) = (total(Pace::Slow), total(Pace::Usual));
         Ok(ModelSummary {
             case: shown.case.label(),
             cases: study.cases(),
@@ -124,6 +132,7 @@ impl ModelSummary {
             range,
             warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
             size,
+            usual_seconds,
             seconds,
         })
     }
@@ -131,9 +140,18 @@ impl ModelSummary {
     /// That a run takes so long that it should be known before; `None` of short ones. The estimate is rough, and of one thread.
     pub fn long_run(&self) -> Option<String> {
         (self.seconds >= LONG_RUN).then(|| {
-            let time = crate::words::about(self.seconds);
-            format!("this takes {time} on one thread; `check` says it before, and Ctrl-C ends the run and keeps the finished points")
+            let time = self.time();
+            format!("this takes {time}; `check` says it before, and Ctrl-C ends the run and keeps the finished points")
         })
+    }
+
+    /// How long it will take, in words.
+    pub(crate) fn time(&self) -> String {
+        let usual = format!("{} on one thread", crate::words::about(self.usual_seconds));
+        if self.seconds < WIDE * self.usual_seconds || self.seconds < SOON {
+            return usual;
+        }
+        format!("{usual}, up to {} where orbits are hard to find", crate::words::duration(self.seconds))
     }
 
     /// For the record of a run, SI but for the frequencies in Hz.
@@ -168,6 +186,7 @@ impl ModelSummary {
             "rows": self.size.rows,
             "result_bytes": self.size.results,
             "memory_bytes": self.size.memory,
+            "usual_time_s": self.usual_seconds,
             "estimated_time_s": self.seconds,
         })
     }

@@ -57,12 +57,16 @@ pub fn bytes_text(bytes: u64) -> String {
 
 /// A time for people, rounded as roughly as it is known.
 pub(crate) fn about(seconds: f64) -> String {
+    if seconds < 1.0 { "below a second".to_owned() } else { format!("about {}", duration(seconds)) }
+}
+
+/// A time in the unit that it is counted in.
+pub(crate) fn duration(seconds: f64) -> String {
     match seconds {
-        s if s < 1.0 => "below a second".to_owned(),
-        s if s < 100.0 => format!("about {} s", significant(s, 1)),
-        s if s < 2.0 * 3600.0 => format!("about {} minutes", significant(s / 60.0, 1)),
-        s if s < 48.0 * 3600.0 => format!("about {} hours", significant(s / 3600.0, 1)),
-        s => format!("about {} days", significant(s / 86_400.0, 1)),
+        s if s < 100.0 => format!("{} s", significant(s, 1)),
+        s if s < 2.0 * 3600.0 => format!("{} minutes", significant(s / 60.0, 1)),
+        s if s < 48.0 * 3600.0 => format!("{} hours", significant(s / 3600.0, 1)),
+        s => format!("{} days", significant(s / 86_400.0, 1)),
     }
 }
 

@@ -130,6 +130,7 @@ struct Done {
     /// Time that it took and that was estimated, s; zero if it was not run for being too long.
     seconds: f64,
     estimate: f64,
+    usual: f64,
     /// Points by status.
     points: BTreeMap<String, u64>,
 }
@@ -142,10 +143,11 @@ fn one(seed: u64, text: &str, slot: &Mutex<Option<Running>>) -> Result<Option<Do
     if check(&study).is_err() {
         return Ok(None);
     }
-    let estimate = ModelSummary::new(&study).map_err(|error| error.to_string())?.seconds;
+    let summary = ModelSummary::new(&study).map_err(|error| error.to_string())?;
+    let (estimate, usual) = (summary.seconds, summary.usual_seconds);
     if estimate > number("STICKSLIP_RANDOM_LONG").map_or(LONG, |long| long as f64) {
         let kind = study.kind().name;
-        return Ok(Some(Done { kind, seconds: 0.0, estimate: 0.0, points: BTreeMap::new() }));
+        return Ok(Some(Done { kind, seconds: 0.0, estimate: 0.0, usual: 0.0, points: BTreeMap::new() }));
     }
     *slot.lock().unwrap() = running(SLACK + FACTOR * estimate);
     if number("STICKSLIP_RANDOM_STUDIES") == Some(1) {
@@ -158,7 +160,7 @@ fn one(seed: u64, text: &str, slot: &Mutex<Option<Running>>) -> Result<Option<Do
         Some(fault) => Err(fault),
         None => {
             let kind = study.kind().name;
-            Ok(Some(Done { kind, seconds: clock.seconds(), estimate, points: dataset.record.points }))
+            Ok(Some(Done { kind, seconds: clock.seconds(), estimate, usual, points: dataset.record.points }))
         }
     }
 }
@@ -220,12 +222,18 @@ fn random_studies_end_in_time() {
     assert!(done.len() * 100 >= ACCEPTED * count, "{} of {count} are accepted", done.len());
     for kind in stickslip_study::kinds::TABLE {
         let of_kind: Vec<&Done> = done.iter().filter(|one| one.kind == kind.info.name).collect();
-        let (time, estimate) = of_kind.iter().fold((0.0, 0.0), |(a, b), one| (a + one.seconds, b + one.estimate));
+        let sum = |of: fn(&Done) -> f64| of_kind.iter().map(|one| of(one)).sum::<f64>();
+        let (time, estimate, usual) = (sum(|one| one.seconds), sum(|one| one.estimate), sum(|one| one.usual));
+        let longer = of_kind.iter().filter(|one| one.seconds > 2.0 * one.usual + 0.05).count();
         let mut points: BTreeMap<&str, u64> = BTreeMap::new();
         for (status, count) in of_kind.iter().flat_map(|one| &one.points) {
             *points.entry(status).or_default() += count;
         }
-        println!("{}: {} studies, {time:.1} s, estimated {estimate:.1} s; {points:?}", kind.info.name, of_kind.len());
+        println!(
+            "{}: {} studies, {time:.1} s, estimated {usual:.1} to {estimate:.1} s, {longer} take longer than twice the first; {points:?}",
+            kind.info.name,
+            of_kind.len()
+        );
         assert!(of_kind.len() * 30 >= count / 2, "{} of {count} are of the kind {}", of_kind.len(), kind.info.name);
     }
     if let Some(peak) = peak_memory() {

@@ -339,6 +339,23 @@ fn the_time_is_estimated_within_bounds() {
     assert!(many > 50.0 * few && many < 100.0 * few, "{few} {many}");
 }
 
+/// What ten million orbits of the couple take was measured: 282 s of processor. What they may take is told beside it.
+#[test]
+fn the_usual_time_is_told_beside_the_longest() {
+    let text = template(
+        "blade-couple",
+        &[
+            ("points = 241", "points = 1000"),
+            (r#"["2 N", "4 N", "6 N", "8 N"]"#, r#"{ from = "1 N", to = "10 N", points = 10000 }"#),
+        ],
+    );
+    let summary = summary(&text);
+    assert!((140.0..1000.0).contains(&summary.usual_seconds), "{}", summary.usual_seconds);
+    assert!(summary.usual_seconds < summary.seconds);
+    let said = summary.to_string();
+    assert!(said.contains("minutes on one thread, up to "), "{said}");
+}
+
 /// A stop 1 kg may hit, with a bare gap, and a figure with references.
 fn stop(law: &str, figure: &str) -> String {
     format!(
@@ -399,5 +416,5 @@ fn a_long_run_says_so_at_its_start() {
     };
     assert_eq!(points("points = 11"), None);
     let said = points("points = 1000000").unwrap();
-    assert!(said.contains("days on one thread") && said.contains("Ctrl-C"), "{said}");
+    assert!(said.contains("hours on one thread, up to") && said.contains("days") && said.contains("Ctrl-C"), "{said}");
 }

@@ -1,7 +1,7 @@
 //! The summary in words, for a terminal.
 
 use super::{JointSummary, ModelSummary};
-use crate::words::{about, bytes_text, plural, quantity, significant};
+use crate::words::{bytes_text, plural, quantity, significant};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::fmt;
@@ -139,6 +139,6 @@ impl fmt::Display for ModelSummary {
         let cases = format!("{cases} case{}", plural(*cases));
         let results =
             format!("{cases}, {rows}, {} of numbers, {} of memory", bytes_text(size.results), bytes_text(size.memory));
-        line("results", &format!("{results}; {} on one thread", about(self.seconds)))
+        line("results", &format!("{results}; {}", self.time()))
     }
 }

@@ -363,7 +363,7 @@ impl Flow for SmoothFlow {
         &mut self,
         state: &mut [f64],
         duration: f64,
-        mut sensitivity: Option<&mut DMatrix<f64>>,
+        sensitivity: Option<&mut DMatrix<f64>>,
     ) -> Result<(), Breakdown> {
         if self.stretch != duration {
             self.stretch = duration;
@@ -452,7 +452,7 @@ impl Flow for SmoothFlow {
                 self.level -= 1;
             }
         }
-        if let Some(sensitivity) = sensitivity.as_deref_mut() {
+        if let Some(sensitivity) = sensitivity {
             let columns = sensitivity.ncols();
             for (at, entry) in self.derivative.iter().enumerate() {
                 sensitivity[(at / columns, at % columns)] = *entry;
