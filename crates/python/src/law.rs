@@ -7,7 +7,7 @@ use pyo3::types::PyDict;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
-use stickslip::law::{self, LawInfo, Parameter, SharedLaw};
+use stickslip::law::{self, LawInfo, MOST_DIRECTIONS, Parameter, SharedLaw};
 
 /// What happens where two places rub or touch; made by `stickslip.law` or `stickslip.rate_law`.
 #[pyclass(frozen, module = "stickslip", name = "Law")]
@@ -110,4 +110,36 @@ pub fn laws(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         all.set_item(row.name, entry)?;
     }
     Ok(all)
+}
+
+/// A law in rate form from Python's functions; `stickslip.rate_law` wraps it.
+#[pyfunction]
+#[pyo3(signature = (name, value, linearise, *, directions, states, state_scale, scale, odd, passive))]
+#[allow(clippy::too_many_arguments)] // one for each keyword of `rate_law`
+pub fn _rate_law(
+    py: Python<'_>,
+    name: &str,
+    value: Py<PyAny>,
+    linearise: Py<PyAny>,
+    directions: usize,
+    states: usize,
+    state_scale: f64,
+    scale: f64,
+    odd: bool,
+    passive: bool,
+) -> PyResult<PyLaw> {
+    if !(1..=MOST_DIRECTIONS).contains(&directions) {
+        return Err(error::model(py, format!("a law has 1 to {MOST_DIRECTIONS} directions, found {directions}")));
+    }
+    if !(state_scale.is_finite() && state_scale > 0.0 && scale > 0.0) {
+        let message = format!(
+            "`scale` and `state_scale` of law `{name}` must be more than zero, found {scale} and {state_scale}"
+        );
+        return Err(error::model(py, message));
+    }
+    let mut law = Written::new(name, value, linearise);
+    (law.directions, law.states, law.odd, law.passive) = (directions, states, odd, passive);
+    (law.state_scale, law.scale) = (state_scale, scale);
+    let written = Arc::new(law);
+    Ok(PyLaw { law: written.law(), written: Some(written) })
 }

@@ -7,6 +7,7 @@ mod lend;
 mod matrices;
 mod model;
 mod orbit;
+mod progress;
 mod python_law;
 mod quantity;
 mod result;
@@ -23,13 +24,13 @@ mod _core {
     use pyo3::types::PyDict;
 
     #[pymodule_export]
+    use crate::law::_rate_law;
+    #[pymodule_export]
     use crate::law::{PyLaw, laws, named};
     #[pymodule_export]
     use crate::model::PyModel;
     #[pymodule_export]
     use crate::orbit::PyOrbit;
-    #[pymodule_export]
-    use crate::python_law::_rate_law;
     #[pymodule_export]
     use crate::result::{_result, PyResultSet, Table};
     #[pymodule_export]

@@ -2,10 +2,10 @@
 
 use crate::law::PyLaw;
 use crate::orbit::PyOrbit;
+use crate::progress::{bar, close};
 use crate::python_law::Written;
 use crate::result::PyResultSet;
 use crate::rows::{self, Row};
-use crate::study::{bar, close};
 use crate::watch::{Watch, watched};
 use crate::{error, matrices, quantity};
 use numpy::{PyArray1, PyArrayMethods};

@@ -4,7 +4,6 @@
 //! What a call raises is kept, the motion is answered with NaN so that the method gives up, and the exception is raised when it has.
 
 use crate::error;
-use crate::law::PyLaw;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
@@ -22,12 +21,12 @@ pub struct Written {
     value: Py<PyAny>,
     /// The same with the derivatives by `u, v, z`: arrays of rows of forces and rates, columns of arguments, instant.
     linearise: Py<PyAny>,
-    directions: usize,
-    states: usize,
-    state_scale: f64,
-    scale: f64,
-    odd: bool,
-    passive: bool,
+    pub directions: usize,
+    pub states: usize,
+    pub state_scale: f64,
+    pub scale: f64,
+    pub odd: bool,
+    pub passive: bool,
     wrong: Mutex<Option<PyErr>>,
 }
 
@@ -56,6 +55,28 @@ fn row(name: &str) -> &'static LawInfo {
 }
 
 impl Written {
+    /// A law of one direction without states, to be told what else it is.
+    pub fn new(name: &str, value: Py<PyAny>, linearise: Py<PyAny>) -> Self {
+        Written {
+            info: row(name),
+            number: NUMBER.fetch_add(1, Ordering::Relaxed) as f64,
+            value,
+            linearise,
+            directions: 1,
+            states: 0,
+            state_scale: 1.0,
+            scale: f64::INFINITY,
+            odd: false,
+            passive: false,
+            wrong: Mutex::new(None),
+        }
+    }
+
+    /// The law.
+    pub fn law(self: &Arc<Self>) -> SharedLaw {
+        Arc::new(Shown(self.clone()))
+    }
+
     /// What a call raised since this was asked last.
     pub fn raised(&self) -> Option<PyErr> {
         self.wrong.lock().unwrap_or_else(PoisonError::into_inner).take()
@@ -162,48 +183,4 @@ impl Rate for Shown {
         point.force[..directions].copy_from_slice(&out[..directions]);
         point.rate.copy_from_slice(&out[directions..]);
     }
-}
-
-/// A law in rate form from Python's functions; `stickslip.rate_law` wraps it.
-#[pyfunction]
-#[pyo3(signature = (name, value, linearise, *, directions, states, state_scale, scale, odd, passive))]
-#[allow(clippy::too_many_arguments)] // one for each keyword of `rate_law`
-pub fn _rate_law(
-    py: Python<'_>,
-    name: &str,
-    value: Py<PyAny>,
-    linearise: Py<PyAny>,
-    directions: usize,
-    states: usize,
-    state_scale: f64,
-    scale: f64,
-    odd: bool,
-    passive: bool,
-) -> PyResult<PyLaw> {
-    if !(1..=MOST_DIRECTIONS).contains(&directions) {
-        return Err(error::model(py, format!("a law has 1 to {MOST_DIRECTIONS} directions, found {directions}")));
-    }
-    if !(state_scale.is_finite() && state_scale > 0.0 && scale > 0.0) {
-        let message = format!(
-            "`scale` and `state_scale` of law `{name}` must be more than zero, found {scale} and {state_scale}"
-        );
-        return Err(error::model(py, message));
-    }
-    let number = NUMBER.fetch_add(1, Ordering::Relaxed) as f64;
-    let (info, wrong) = (row(name), Mutex::new(None));
-    let written = Arc::new(Written {
-        info,
-        number,
-        value,
-        linearise,
-        directions,
-        states,
-        state_scale,
-        scale,
-        odd,
-        passive,
-        wrong,
-    });
-    let law: SharedLaw = Arc::new(Shown(written.clone()));
-    Ok(PyLaw { law, written: Some(written) })
 }

@@ -2,10 +2,11 @@
 
 use crate::error;
 use crate::model::PyModel;
+use crate::progress::{bar, close};
 use crate::result::{PyResultSet, Table};
 use crate::watch::{Watch, watched};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyList, PyString};
+use pyo3::types::{PyDict, PyList, PyString};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -380,33 +381,4 @@ pub fn _joined<'py>(
     // that of all batches, wherever they were computed
     whole.record.wall_time_s = seconds;
     Ok(PyResultSet::new(whole))
-}
-
-/// What `progress` asks for: `None`, a bar, or the function that was given.
-pub fn bar<'py>(
-    py: Python<'py>,
-    progress: Option<Bound<'py, PyAny>>,
-    name: &str,
-) -> PyResult<Option<Bound<'py, PyAny>>> {
-    match progress {
-        None => Ok(None),
-        Some(progress) if progress.is_none() => Ok(None),
-        Some(progress) => match progress.cast::<PyBool>() {
-            Ok(flag) if !flag.is_true() => Ok(None),
-            // without tqdm there is none
-            Ok(_) => {
-                let bar = py.import("stickslip._progress")?.call_method1("bar", (name,))?;
-                Ok((!bar.is_none()).then_some(bar))
-            }
-            Err(_) => Ok(Some(progress)),
-        },
-    }
-}
-
-/// Closes a bar that was made here; a function from elsewhere has nothing to close.
-pub fn close(bar: Option<Bound<'_, PyAny>>) -> PyResult<()> {
-    match bar {
-        Some(bar) if bar.hasattr("_stickslip_close")? => bar.call_method0("_stickslip_close").map(|_| ()),
-        _ => Ok(()),
-    }
 }

@@ -3,11 +3,11 @@
 
 use crate::error::{Problem, StudyError};
 use crate::extra;
-use crate::run::AHEAD;
 use crate::study::{Case, Study};
 use crate::survey::{Surveyed, range};
 use crate::thinning::MOST_ROWS;
 use crate::words::bytes_text;
+use crate::work::AHEAD;
 use std::f64::consts::TAU;
 use stickslip::curve::sweep::BLOCK;
 use stickslip::law::SharedLaw;

@@ -2,8 +2,8 @@
 
 use crate::error::Problem;
 use crate::expression::Value;
+use crate::key::MOST_MASSES;
 use crate::near::{nearest, shown};
-use crate::schema::MOST_MASSES;
 use crate::statement::{Environment, Stated, StatedTable};
 use crate::study::{Structure, problem_of, sector_of};
 use crate::values::{Given, Values};

@@ -9,7 +9,7 @@ use crate::kinds;
 use crate::study::Study;
 use crate::summary::ModelSummary;
 use crate::thinning::Thinning;
-use crate::work::{Part, Units, Work, refused};
+use crate::work::{AHEAD, Part, Units, Work, refused};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -249,8 +249,6 @@ fn cut(study: &Study) -> Units {
     Units::of(study, (kinds::of(study).grain)(study))
 }
 
-/// Units that may be under way or waiting for their turn, per thread: enough that none waits for a long one, few enough to keep little.
-pub(crate) const AHEAD: usize = 8;
 /// How often a run looks whether it is to stop.
 const LOOK: Duration = Duration::from_millis(20);
 /// How long an interrupted run waits for what is under way, which ends with the orbit that it is at: less than the second that a user

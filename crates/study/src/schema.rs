@@ -5,21 +5,18 @@
 
 use crate::kind::Kind;
 use crate::sample::{DESIGNS, DISTRIBUTIONS, WITHIN};
+use crate::substructure::REDUCTIONS;
 use crate::{kinds, templates};
 use serde_json::{Map, Value, json};
 use stickslip::dimension::Dimension;
 use stickslip::{law, method};
 
 pub use crate::key::{
-    Key, MOST_CASES, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, refused, required,
+    Key, MOST_CASES, MOST_MASSES, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, refused, required,
 };
 
 /// Most elements in one list (`[[spring]]`, …), repetitions counted.
 pub const MOST_ELEMENTS: usize = 40_000;
-
-/// Most masses, repetitions counted. Measured: a ring of 20,000 masses and joints is read and checked in 1.2 s of processor time, and the time
-/// grows with their number.
-pub const MOST_MASSES: usize = 20_000;
 
 /// Most bytes of a study file.
 pub const MOST_BYTES: u64 = 4 * 1024 * 1024;
@@ -214,15 +211,8 @@ fn unit_sets() -> Vec<(&'static str, &'static str)> {
 }
 
 fn reduction_kinds() -> Vec<(&'static str, &'static str)> {
-    vec![
-        (RUBIN, "free modes and residual flexibility"),
-        (CRAIG_BAMPTON, "modes with the places held, and what static forces at them do"),
-    ]
+    REDUCTIONS.iter().map(|(name, summary, _)| (*name, *summary)).collect()
 }
-
-/// Names of the kinds of reduction.
-pub(crate) const RUBIN: &str = "rubin";
-pub(crate) const CRAIG_BAMPTON: &str = "craig-bampton";
 
 const PLACE: &[Key] = &[
     required("name", Takes::Name, "name, for joints, forces and results", "\"tip\""),

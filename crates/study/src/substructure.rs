@@ -2,7 +2,6 @@
 
 use crate::error::Problem;
 use crate::near::{nearest, one_of, shown};
-use crate::schema::{CRAIG_BAMPTON, RUBIN};
 use crate::statement::{Environment, StatedTable};
 use crate::values::Values;
 use stickslip::model::{Frame, Mass, Model, Place, Substructure, SubstructureDamping};
@@ -15,6 +14,12 @@ const HARMONICS: f64 = 5.0;
 const IN_FRAME: [&str; 3] = ["t1", "t2", "n"];
 /// What the rows of a node with a normal are called.
 const CARTESIAN: [&str; 3] = ["x", "y", "z"];
+
+/// The kinds of reduction: name, summary.
+pub(crate) const REDUCTIONS: [(&str, &str, ReductionKind); 2] = [
+    ("rubin", "free modes and residual flexibility", ReductionKind::Rubin),
+    ("craig-bampton", "modes with the places held, and what static forces at them do", ReductionKind::CraigBampton),
+];
 
 /// The structure of `[structure]`. Where nothing is said of its reduction, [`settle`] decides.
 pub(crate) fn of(
@@ -44,11 +49,8 @@ pub(crate) fn of(
 }
 
 fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'static str, &'static str)> {
-    let kind = reduce.text("kind").and_then(|kind| match kind {
-        RUBIN => Some(ReductionKind::Rubin),
-        CRAIG_BAMPTON => Some(ReductionKind::CraigBampton),
-        _ => None,
-    });
+    let named = |name: &str| REDUCTIONS.iter().find(|(known, _, _)| *known == name);
+    let kind = reduce.text("kind").and_then(named).map(|(_, _, kind)| *kind);
     let tolerance = reduce.quantity("tolerance").unwrap_or(Reduction::TOLERANCE);
     match (reduce.quantity("up_to"), reduce.count("modes")) {
         (Some(_), Some(_)) => Err((

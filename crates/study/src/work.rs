@@ -19,6 +19,9 @@ use stickslip::dimension::Dimension;
 use stickslip::method::{self, Method, MethodError, Options, WIDTH, Ways};
 use stickslip::model::System;
 
+/// Units that may be under way or waiting for their turn, per thread: enough that none waits for a long one, few enough to keep little.
+pub(crate) const AHEAD: usize = 8;
+
 /// How a study is run.
 #[derive(Clone)]
 pub struct Context {

@@ -1,7 +1,9 @@
 //! From a model to a system: checks, and the matrices of `M x'' + C x' + K x + Σ W f = F(t)`.
 
 use super::coordinates::{Coordinates, combined};
-use super::places::{End, Of, Places, places_of};
+use super::error::{Element, ModelError};
+use super::place::places_of;
+use super::places::{End, Of, Places};
 use super::system::{Axis, MovedPlace, System, SystemBuilder};
 use super::{GROUND, Joint, Model, Ring};
 use crate::structure::Structure;
@@ -11,56 +13,6 @@ use num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use stickslip_numerics::sparse::Matrix;
-
-/// The element of a model that an error is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[allow(missing_docs)] // index into the list of the model that has the same name
-pub enum Element {
-    Mass(usize),
-    Spring(usize),
-    Joint(usize),
-    Force(usize),
-    Motion(usize),
-    Place(usize),
-    Substructure,
-    Whole,
-}
-
-impl fmt::Display for Element {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (what, index) = match self {
-            Element::Mass(i) => ("mass", i),
-            Element::Spring(i) => ("spring", i),
-            Element::Joint(i) => ("joint", i),
-            Element::Force(i) => ("force", i),
-            Element::Motion(i) => ("motion", i),
-            Element::Place(i) => ("place", i),
-            Element::Substructure => return write!(f, "structure"),
-            Element::Whole => return write!(f, "model"),
-        };
-        write!(f, "{what} {}", index + 1)
-    }
-}
-
-/// Why a model is refused: which element, which key of it, what is wrong.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{element}, `{key}`: {message}")]
-pub struct ModelError {
-    /// The element.
-    pub element: Element,
-    /// Its key (as in the study file).
-    pub key: &'static str,
-    /// What is wrong and what was expected.
-    pub message: String,
-    /// The name that was probably meant, if there is one like it.
-    pub wrong_name: Option<String>,
-}
-
-impl ModelError {
-    pub(super) fn new(element: Element, key: &'static str, message: impl Into<String>) -> Self {
-        ModelError { element, key, message: message.into(), wrong_name: None }
-    }
-}
 
 impl Model {
     /// The names of all places: ground, those of the substructure and the masses with their directions, the moved places.

@@ -5,17 +5,14 @@
 //! displacements `u` at the end, and `Tᵀ M T` has what they share with the others.
 
 use super::Model;
-use super::assemble::{Element, ModelError};
-use super::part::Part;
+use super::error::{Element, ModelError};
+use super::part::{Entries, Part};
 use super::place::Place;
 use super::places::{Of, Places};
 use crate::structure::ReducedComponent;
 use crate::structure::reduction::Row;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Row, column, value.
-pub(super) type Entries = Vec<(usize, usize, f64)>;
 
 /// Coordinates of a model.
 pub(super) struct Coordinates {

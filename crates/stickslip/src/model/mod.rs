@@ -6,6 +6,7 @@ mod assemble;
 mod contraction;
 mod coordinates;
 mod disk;
+mod error;
 pub mod example;
 mod part;
 mod place;
@@ -13,8 +14,8 @@ mod places;
 mod survey;
 mod system;
 
-pub use assemble::{Element, ModelError};
 pub use disk::{Around, Disk, LEAST_SECTORS, NEXT, Ring, normal_pattern};
+pub use error::{Element, ModelError};
 pub use place::{Frame, FrameError, Place};
 pub use places::{is_identifier, is_place};
 pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey, WaveModes};

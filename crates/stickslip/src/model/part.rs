@@ -1,11 +1,13 @@
 //! A structure by its matrices, as a part of a model: its coordinates, its matrices over them, and its places; of a disk those of all sectors.
 
-use super::assemble::{Element, ModelError};
-use super::coordinates::Entries;
+use super::error::{Element, ModelError};
 use super::{DiskPart, Model, Substructure, SubstructureDamping};
 use crate::structure::reduction::{Damping, Reduced, ReductionError, Row};
 use crate::structure::{KeptSector, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow};
 use std::sync::Arc;
+
+/// Row, column, value.
+pub(super) type Entries = Vec<(usize, usize, f64)>;
 
 /// The substructure in coordinates of its own; of a ring those of all sectors, one after the other.
 #[derive(Default)]

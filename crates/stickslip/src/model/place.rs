@@ -4,6 +4,14 @@
 use crate::structure::reduction::Row;
 use serde::Serialize;
 
+/// The places of a name with these directions: itself, or one for each.
+pub(super) fn places_of(name: &str, directions: &[String]) -> Vec<String> {
+    if directions.is_empty() {
+        return vec![name.to_owned()];
+    }
+    directions.iter().map(|along| format!("{name}.{along}")).collect()
+}
+
 /// A place of a model's [`Substructure`](super::Substructure), or of one of its nodes of masses seen in another frame: one displacement, or up to
 /// three of a node.
 ///
@@ -81,7 +89,7 @@ impl Place {
 
     /// The places that it makes: itself, or one for each of its directions.
     pub fn places(&self) -> Vec<String> {
-        super::places::places_of(&self.name, &self.directions)
+        places_of(&self.name, &self.directions)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Where the names of a model lead: each a weighted sum of coordinates, the ground, or a place that is moved.
 
-use super::assemble::{Element, ModelError};
-use super::place::Place;
+use super::error::{Element, ModelError};
+use super::place::{Place, places_of};
 use super::{GROUND, Mass, Model};
 use crate::structure::reduction::Row;
 use std::collections::{BTreeMap, BTreeSet};
@@ -54,14 +54,6 @@ pub fn is_identifier(name: &str) -> bool {
 pub fn is_place(name: &str) -> bool {
     name.split_once('.')
         .map_or_else(|| is_identifier(name), |(node, along)| is_identifier(node) && is_identifier(along))
-}
-
-/// The places of a name with these directions: itself, or one for each.
-pub(super) fn places_of(name: &str, directions: &[String]) -> Vec<String> {
-    if directions.is_empty() {
-        return vec![name.to_owned()];
-    }
-    directions.iter().map(|along| format!("{name}.{along}")).collect()
 }
 
 impl Mass {
