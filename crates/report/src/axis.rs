@@ -171,9 +171,23 @@ pub(crate) fn ticks(range: Range, count: f64) -> Ticks {
     }
 }
 
-/// The same, with the names of an axis that has such.
+/// The same, with the names of an axis that has such, and at whole numbers only where the values are.
 pub(crate) fn ticks_of(axis: &Axis, range: Range, count: f64) -> Ticks {
-    if axis.names.is_empty() { ticks(range, count) } else { named(&axis.names, range, count) }
+    if !axis.names.is_empty() {
+        return named(&axis.names, range, count);
+    }
+    let ticks = ticks(range, count);
+    if axis.whole && ticks.at.iter().any(|at| at.fract() != 0.0) { whole(range, count) } else { ticks }
+}
+
+/// Ticks at every whole number, every second or every fifth; wider steps are whole anyway.
+fn whole(range: Range, count: f64) -> Ticks {
+    let steps = [1.0, 2.0, 5.0];
+    let step = steps.into_iter().find(|step| range.to - range.from <= step * count).unwrap_or(steps[2]);
+    let (first, last) = ((range.from / step).ceil() as i64, (range.to / step).floor() as i64);
+    let at: Vec<f64> = (first..=last).map(|i| i as f64 * step).collect();
+    let labels = at.iter().map(|v| signed(format!("{v:.0}"))).collect();
+    Ticks { at, labels, minor: vec![], power: 0 }
 }
 
 /// Names stand closer than numbers: so many for each of those.
@@ -325,6 +339,16 @@ mod tests {
             distinct.dedup();
             assert_eq!(distinct, t.labels);
         }
+    }
+
+    #[test]
+    fn no_tick_stands_between_whole_numbers() {
+        let count = |from, to, count| ticks_of(&Axis::new("disks", "").whole(), range(from, to, Scale::Linear), count);
+        assert_eq!(count(0.0, 2.1, 7.0).labels, ["0", "1", "2"]);
+        assert_eq!(count(-0.4, 5.4, 3.0).labels, ["0", "2", "4"]);
+        assert_eq!(count(0.0, 12.0, 5.0).labels, ["0", "5", "10"]);
+        assert_eq!(count(0.0, 120.0, 5.0).labels, ["0", "25", "50", "75", "100"]);
+        assert!(count(0.2, 0.8, 5.0).at.is_empty());
     }
 
     #[test]

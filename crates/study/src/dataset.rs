@@ -260,6 +260,9 @@ pub struct Axis {
     /// What stands at 0, 1, 2 … instead of numbers.
     #[serde(default)]
     pub names: Vec<String>,
+    /// Whether the values are whole numbers, as counts and the numbers of sectors are: no tick stands between two of them.
+    #[serde(default)]
+    pub whole: bool,
 }
 
 /// How the values of an axis become lengths.
@@ -280,6 +283,10 @@ impl Axis {
     /// The same axis, logarithmic.
     pub fn log(self) -> Axis {
         Axis { scale: Scale::Log, ..self }
+    }
+    /// The same axis, of whole numbers.
+    pub fn whole(self) -> Axis {
+        Axis { whole: true, ..self }
     }
     /// The same axis between two fixed ends.
     pub fn between(self, from: f64, to: f64) -> Axis {

@@ -99,7 +99,11 @@ impl<'a> Drawing<'a> {
         let last = stretches.first()?.varied.get(which)?;
         let values: Vec<f64> =
             stretches.iter().filter_map(|stretch| Some(stretch.varied.get(which)?.on_axis().0)).collect();
-        let axis = Axis::new(&last.name, last.on_axis().1);
+        let unit = last.on_axis().1;
+        let axis = Axis {
+            whole: unit.is_empty() && values.iter().all(|value| value.fract() == 0.0),
+            ..Axis::new(&last.name, unit)
+        };
         // values that are spaced by ratios belong on a logarithmic scale
         let positive = values.iter().all(|value| *value > 0.0);
         let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(*v), high.max(*v)));

@@ -11,8 +11,8 @@ const BARS: (f64, f64) = (6.0, 60.0);
 const MOST_FITTED: usize = 20_000;
 /// Percentiles that designs are made for.
 const HIGH: [(f64, &str); 2] = [(0.99, "99 %"), (0.999, "99.9 %")];
-/// Points of the fitted curve, up to the share that is drawn.
-const CURVE: (usize, f64) = (120, 0.9995);
+/// Points of the fitted curve, and the shares between which it is drawn, and in any case from the first bar on.
+const CURVE: (usize, [f64; 2]) = (120, [0.0005, 0.9995]);
 
 /// The bars of `values`, which are in the unit of `x`: what they are the values of, `each`, is counted.
 pub(crate) fn panel(values: &[f64], x: &Axis, title: &str, each: &str) -> Option<Panel> {
@@ -30,7 +30,7 @@ pub(crate) fn panel(values: &[f64], x: &Axis, title: &str, each: &str) -> Option
     Some(Panel {
         title: title.to_owned(),
         x: x.clone(),
-        y: Axis::new(format!("{each} per bar"), ""),
+        y: Axis::new(format!("{each} per bar"), "").whole(),
         series: vec![Series::bars(format!("{} {each}", sorted.len()), middles, counts, 0)],
         ..Panel::default()
     })
@@ -55,11 +55,11 @@ pub(crate) fn panel_of_maxima(values: &[f64], x: &Axis, title: &str, each: &str)
     let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).take(MOST_FITTED).collect();
     let Some(fit) = Maxima::fit(&finite) else { return Some(panel) };
     let bars = &panel.series[0];
-    let (low, top) = (bars.x[0], bars.y.iter().copied().fold(0.0, f64::max));
-    let width = bars.x.get(1).map_or(0.0, |second| second - low);
+    let top = bars.y.iter().copied().fold(0.0, f64::max);
+    let width = bars.x.get(1).map_or(0.0, |second| second - bars.x[0]);
     let all: f64 = bars.y.iter().sum();
-    let end = fit.quantile(CURVE.1);
-    let abscissae: Vec<f64> = (0..=CURVE.0).map(|i| low + (end - low) * i as f64 / CURVE.0 as f64).collect();
+    let (from, to) = (fit.quantile(CURVE.1[0]).min(bars.x[0] - 0.5 * width), fit.quantile(CURVE.1[1]));
+    let abscissae: Vec<f64> = (0..=CURVE.0).map(|i| from + (to - from) * i as f64 / CURVE.0 as f64).collect();
     let ordinates = abscissae.iter().map(|x| fit.density(*x) * all * width).collect();
     panel.series.push(Series::line("Weibull distribution", abscissae, ordinates, 1));
     if !fit.is_of(&finite) {

@@ -118,8 +118,11 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
             axis(own.y, [bottom, top], axis_name("x", i), y_partner.map(|j| axis_name("y", j)), [plot_height, ROOM[1]]);
         y["title"]["text"] = json!(broken(&y_titles[i]));
         for (shown, range, made) in [(&panel.x, own.x, &mut x), (&panel.y, own.y, &mut y)] {
+            let ticks = axis::ticks_of(shown, range, NAMED);
+            if shown.whole && ticks.at.windows(2).all(|pair| pair[1] - pair[0] <= 1.0) {
+                (made["tick0"], made["dtick"]) = (json!(0), json!(1));
+            }
             if !shown.names.is_empty() {
-                let ticks = axis::ticks_of(shown, range, NAMED);
                 made["tickmode"] = json!("array");
                 made["tickvals"] = json!(ticks.at);
                 made["ticktext"] = json!(ticks.labels.iter().map(|name| plain(name)).collect::<Vec<_>>());
@@ -162,7 +165,7 @@ fn colour_axis(shown: &Axis, range: Range, narrow: bool, below: f64, ink: &mut I
         .map(|i| f64::from(i) / f64::from(STEPS))
         .map(|part| json!([part, ink.use_of(&Colour::sequential(part))]))
         .collect();
-    let ticks = axis::ticks(range, if narrow { 5.0 } else { 7.0 });
+    let ticks = axis::ticks_of(shown, range, if narrow { 5.0 } else { 7.0 });
     let title = plain(&axis::axis_title(shown, ticks.power));
     let mut bar = json!({
         "thickness": 16, "outlinecolor": LINE, "outlinewidth": 1, "ticks": "outside", "tickcolor": LINE,

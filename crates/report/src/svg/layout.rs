@@ -79,7 +79,9 @@ impl Layout {
             }
         }
         for i in (0..panels.len()).rev() {
-            if i % columns > 0 && !panels[i].own_y && panels[i].y_title == panels[i - 1].y_title {
+            // beside another quantity along x a reader does not look for it there
+            let same = i > 0 && frame::alike(&figure.panels[i].x, &figure.panels[i - 1].x);
+            if same && i % columns > 0 && !panels[i].own_y && panels[i].y_title == panels[i - 1].y_title {
                 panels[i].y_title.clear();
             }
         }
@@ -133,7 +135,7 @@ fn title(axis: &Axis, ticks: &Ticks, own: bool, limit: f64) -> Vec<String> {
 
 impl Bar {
     pub(super) fn new(axis: &Axis, range: Range, left: f64, height: f64) -> Bar {
-        let ticks = axis::ticks(range, height / 46.0);
+        let ticks = axis::ticks_of(axis, range, height / 46.0);
         let title_offset = BAR + TICK_LENGTH + 5.0 + widest(&ticks) + 9.0;
         let title = title(axis, &ticks, false, height);
         Bar { left, top: 0.0, height, range, ticks, title, title_offset }

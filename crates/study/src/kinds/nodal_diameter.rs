@@ -130,7 +130,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let (y, factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
     let panel = |stretch: &Stretch| Panel {
         title: stretch.label(),
-        x: Axis::new("nodal diameters", ""),
+        x: Axis::new("nodal diameters", "").whole(),
         y: y.clone(),
         series: lines(table, stretch, factor),
         ..Panel::default()

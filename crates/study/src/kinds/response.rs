@@ -115,6 +115,8 @@ const ROUNDING: f64 = 1e-10;
 const LIGHT: f64 = 0.5;
 /// Masses that are drawn one by one; of more the largest amplitude is, with the single ones pale behind it.
 const SINGLE: usize = 7;
+/// Colours that the curves of many masses take: the single ones and the largest of them.
+const MANY: usize = 2;
 /// Two points before a peak that differ from it by less than this share are level with it: more than the rounding of an orbit, and less
 /// than a resonance falls between two points of any curve that can be drawn.
 const LEVEL: f64 = 1e-8;
@@ -611,11 +613,31 @@ impl Drawn<'_> {
         (x, shares::slipping(self.curve, joints, &stretch.rows))
     }
 
-    fn force_line(&self, stretch: &Stretch, joint: &str) -> (Vec<f64>, Vec<f64>) {
-        let of = |column: &str, factor: f64| {
+    /// The force of a joint, or the largest of several.
+    fn force_line(&self, stretch: &Stretch, joints: &[String]) -> (Vec<f64>, Vec<f64>) {
+        let of = |column: &str, factor: f64| -> Vec<f64> {
             numbers(self.curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
         };
-        (of("frequency_Hz", self.factor.0), of(&force(joint), self.force_factor))
+        let all: Vec<Vec<f64>> = joints.iter().map(|joint| of(&force(joint), self.force_factor)).collect();
+        let largest = |i: usize| all.iter().map(|forces| forces[i]).fold(f64::NAN, f64::max);
+        (of(DRIVE, self.factor.0), (0..stretch.rows.len()).map(largest).collect())
+    }
+
+    /// The joints whose forces are drawn as one line, with its name: each for itself, of many those that are one joint in a sector.
+    fn pulling(&self) -> Vec<(String, Vec<String>)> {
+        if self.joints.len() <= SINGLE {
+            return self.joints.iter().map(|joint| (joint.clone(), vec![joint.clone()])).collect();
+        }
+        let mut groups: Vec<(String, Vec<String>)> = Vec::new();
+        for joint in &self.joints {
+            let place = of_sector(joint).map_or_else(|| "joint".to_owned(), |(place, _)| place);
+            match groups.iter_mut().find(|(name, _)| *name == place) {
+                Some((_, group)) => group.push(joint.clone()),
+                None => groups.push((place, vec![joint.clone()])),
+            }
+        }
+        let named = |(place, group): (String, Vec<String>)| (format!("{place}, largest of {}", group.len()), group);
+        groups.into_iter().map(named).collect()
     }
 
     /// Whether the masses are drawn one by one.
@@ -637,10 +659,11 @@ impl Drawn<'_> {
             panels.extend(self.sectors_of(stretch).into_iter().flatten().flatten());
             if !self.joints.is_empty() {
                 let mut panel = self.force_panel(stretch.label());
-                for (i, joint) in self.joints.iter().enumerate() {
-                    let (x, y) = self.force_line(stretch, joint);
-                    // beside the colours of the masses
-                    panel.series.push(Series::line(joint, x, y, self.shown.len() + i));
+                // beside the colours of the masses
+                let beside = if self.single() { self.shown.len() } else { MANY };
+                for (i, (name, joints)) in self.pulling().into_iter().enumerate() {
+                    let (x, y) = self.force_line(stretch, &joints);
+                    panel.series.push(Series::line(name, x, y, beside + i));
                 }
                 panels.push(panel);
             }
@@ -712,7 +735,7 @@ impl Drawn<'_> {
         }
         let frequency = shown_hertz(numbers(self.curve, DRIVE, stretch.rows.clone())[row]);
         let title = join([stretch.label(), format!("at {frequency}")]);
-        let (x, y) = (Axis::new("sector", ""), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
+        let (x, y) = (Axis::new("sector", "").whole(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
         let wheel = wheel::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone()]));
         Some([Some(Panel { title, x, y, series, ..Panel::default() }), wheel])
     }
@@ -731,9 +754,9 @@ impl Drawn<'_> {
         let of_masses = groups.iter().flat_map(|(group, outer)| {
             masses.iter().map(|mass| self.cases_of_mass(*mass, group, outer, masses.len())).collect::<Vec<_>>()
         });
-        let of_joints = groups
-            .iter()
-            .flat_map(|(group, outer)| self.joints.iter().map(|joint| self.cases_of_joint(joint, group, outer)));
+        let of_joints = groups.iter().flat_map(|(group, outer)| {
+            self.pulling().into_iter().map(move |joint| self.cases_of_joint(&joint, group, outer))
+        });
         let of_faces = groups.iter().flat_map(|(group, outer)| {
             shares::groups(&self.faces).into_iter().map(move |joints| self.slipping_in_cases(joints, group, outer))
         });
@@ -772,8 +795,8 @@ impl Drawn<'_> {
                 (x, y)
             }));
         }
-        for joint in &self.joints {
-            panels.push(panel(self.force_panel(String::new()), joint, &|stretch| self.force_line(stretch, joint)));
+        for (name, joints) in self.pulling() {
+            panels.push(panel(self.force_panel(String::new()), &name, &|stretch| self.force_line(stretch, &joints)));
         }
         for (name, joints) in shares::groups(&self.faces) {
             panels.push(panel(self.slip_panel(String::new()), &name, &|stretch| self.slip_line(stretch, &joints)));
@@ -814,12 +837,12 @@ impl Drawn<'_> {
         panel
     }
 
-    /// The cases of a group, for the force of one joint.
-    fn cases_of_joint(&self, joint: &str, group: &[Stretch], outer: &str) -> Panel {
-        let named = Some(joint.to_owned()).filter(|_| self.joints.len() > 1 || self.system.joints().len() > 1);
+    /// The cases of a group, for the force of one joint, or the largest of several.
+    fn cases_of_joint(&self, (joint, all): &(String, Vec<String>), group: &[Stretch], outer: &str) -> Panel {
+        let named = Some(joint.clone()).filter(|_| self.joints.len() > 1 || self.system.joints().len() > 1);
         let mut panel = self.force_panel(join(named.into_iter().chain([outer.to_owned()])));
         for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
-            let (x, y) = self.force_line(stretch, joint);
+            let (x, y) = self.force_line(stretch, all);
             // one curve has a colour of its own, beside those of the masses
             let colour = if stretch.varied.is_empty() { self.system.places().len() } else { colour };
             panel.series.push(of_case(stretch, joint, x, y, colour));
