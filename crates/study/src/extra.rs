@@ -33,6 +33,20 @@ pub(crate) const TABLE: &[Extra] = &[
         },
     },
     Extra {
+        name: "joint_mean",
+        doc: "mean of every joint's force over the period: of a contact its normal load",
+        columns: |system| of_joints(system, "force_mean_N"),
+        values: |prepared, _, samples| {
+            let joints = prepared.system.joints().iter().enumerate();
+            let axes = joints.flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)));
+            // switches stand behind the instants, which are evenly spaced
+            let sum = |j: usize, a: usize| -> f64 {
+                samples[..INSTANTS].iter().map(|sample| sample.joints[j].force[a]).sum()
+            };
+            axes.map(|(j, a)| sum(j, a) / INSTANTS as f64).collect()
+        },
+    },
+    Extra {
         name: "joint_motion",
         doc: "half of peak to peak of every joint's relative displacement",
         columns: |system| of_joints(system, "amplitude_m"),

@@ -37,6 +37,7 @@ pub mod run;
 mod sample;
 pub mod schema;
 mod statement;
+mod stiffened;
 mod study;
 mod substructure;
 pub mod summary;

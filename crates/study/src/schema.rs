@@ -123,6 +123,13 @@ pub const STRUCTURE: &[Key] = &[
         "\"blade.sti\"",
     ),
     required("mass", Takes::File, "file of the mass matrix", "\"blade.mas\""),
+    optional(
+        "stiffened",
+        Takes::Table(STIFFENED),
+        "what rotation adds to the stiffness: a second file of it, exported with the stress of a speed, of which the square of the speed decides \
+         the share",
+        "{ file = \"blade_6000.sti\", at = \"6000 rpm\", speed = \"speed\" }",
+    ),
     optional("damping", Takes::File, "file of a damping matrix", "\"blade.dam\""),
     optional(
         "dofs",
@@ -163,6 +170,19 @@ pub(crate) const FILE_KEYS: &[Key] = &[
     required("file", Takes::Text, "its path", "\"blade.mat\""),
     optional("name", Takes::Text, "which matrix in it, if it has several", "\"K\""),
     optional("format", Takes::Choice(format_names), "its format, if that is not seen from its content", "\"mat5\""),
+];
+
+const STIFFENED: &[Key] = &[
+    FILE_KEYS[0],
+    FILE_KEYS[1],
+    FILE_KEYS[2],
+    required("at", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "speed of that file", "\"6000 rpm\""),
+    required(
+        "speed",
+        Takes::Quantity(Dimension::FREQUENCY, Within::AtLeastZero),
+        "speed of rotation, an expression over a parameter",
+        "\"speed\"",
+    ),
 ];
 
 fn format_names() -> Vec<(&'static str, &'static str)> {

@@ -12,6 +12,7 @@ use crate::names::Names;
 use crate::near::{nearest, one_of, shown};
 use crate::sample::{Drawn, Sample};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
+use crate::stiffened::Stiffened;
 use crate::substructure;
 use crate::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
 use serde_json::{Value as Json, json};
@@ -118,6 +119,8 @@ pub(crate) struct Matrices {
     pub table: StatedTable,
     /// None of a study whose files were not read.
     pub component: Option<Component>,
+    /// What rotation adds to its stiffness.
+    pub stiffened: Option<Stiffened>,
     /// Rows of the files that are constrained, and not in it.
     pub left_out: usize,
 }
@@ -129,7 +132,8 @@ impl Matrices {
         let mut hasher = crc32fast::Hasher::new();
         component.rows().iter().for_each(|name| hasher.update(name.as_bytes()));
         let (mass, damping, stiffness) = component.matrices();
-        for (number, matrix) in [Some(mass), damping, Some(stiffness)].into_iter().enumerate() {
+        let more = self.stiffened.as_ref().map(Stiffened::more);
+        for (number, matrix) in [Some(mass), damping, Some(stiffness), more].into_iter().enumerate() {
             for (row, column, value) in matrix.into_iter().flat_map(Matrix::entries) {
                 let place = [number, row, column].map(|index| index as u64);
                 place.iter().for_each(|index| hasher.update(&index.to_le_bytes()));
@@ -911,7 +915,7 @@ pub(crate) fn sector_of(
     let component = matrices.as_ref().and_then(|matrices| matrices.component.as_ref());
     match (matrices, component) {
         (Some(matrices), Some(component)) => {
-            model.substructure = Some(substructure::of(&matrices.table, component, environment, problems));
+            model.substructure = Some(substructure::of(matrices, component, environment, problems));
             for table in own(lists) {
                 model.places.extend(substructure::place(table, component, environment, problems));
             }

@@ -3,6 +3,7 @@
 use crate::error::Problem;
 use crate::near::{nearest, one_of, shown};
 use crate::statement::{Environment, StatedTable};
+use crate::study::Matrices;
 use crate::values::Values;
 use stickslip::model::{Frame, Mass, Model, Place, Substructure, SubstructureDamping};
 use stickslip::structure::reduction::Row;
@@ -23,12 +24,18 @@ pub(crate) const REDUCTIONS: [(&str, &str, ReductionKind); 2] = [
 
 /// The structure of `[structure]`. Where nothing is said of its reduction, [`settle`] decides.
 pub(crate) fn of(
-    table: &StatedTable,
+    Matrices { table, stiffened, .. }: &Matrices,
     component: &Component,
     environment: &Environment<'_>,
     problems: &mut Vec<Problem>,
 ) -> Substructure {
     let values = table.values(environment, problems);
+    let share = values.table("stiffened").and_then(|spin| Some(spin.quantity("speed")? / spin.quantity("at")?));
+    let spinning = stiffened.as_ref().zip(share).map(|(stiffened, share)| stiffened.at(component, share * share));
+    let component = spinning.unwrap_or_else(|| Ok(component.clone())).unwrap_or_else(|error| {
+        problems.push(Problem::new(table.place_of("stiffened", None), "stiffened", error.to_string()));
+        component.clone()
+    });
     let damping = match (values.quantity("modal_damping"), values.table("rayleigh")) {
         (Some(ratio), _) => SubstructureDamping::Ratio(ratio),
         (None, Some(rayleigh)) => SubstructureDamping::Rayleigh {
@@ -45,7 +52,7 @@ pub(crate) fn of(
         (None, Some(false)) => Reduction::None,
         _ => Reduction::up_to(0.0),
     };
-    Substructure { component: component.clone(), damping, reduction, disk: None }
+    Substructure { component, damping, reduction, disk: None }
 }
 
 fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'static str, &'static str)> {

@@ -32,6 +32,7 @@ pub const TABLE: &[Template] = templates![
     "bladed-disk",
     "shroud",
     "rim-ring",
+    "under-platform-wedge",
 ];
 
 /// The template with this name.

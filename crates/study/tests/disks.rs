@@ -229,10 +229,17 @@ const MASS: &str = "%%MatrixMarket matrix coordinate real symmetric\n4 4 4\n1 1 
 
 /// A study of a sector by its matrices, beside its files.
 fn by_matrices(disk: &str, more: &str) -> Result<Study, StudyError> {
+    stiffened("", disk, more)
+}
+
+/// The same with another key of `[structure]`.
+fn stiffened(key: &str, disk: &str, more: &str) -> Result<Study, StudyError> {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     write("k.mtx", STIFFNESS);
     write("m.mtx", MASS);
+    write("k100.mtx", &STIFFNESS.replace("4 4 3e4", "4 4 3.5e4").replace("3 3 8e4", "3 3 8.2e4"));
+    write("small.mtx", "%%MatrixMarket matrix coordinate real symmetric\n1 1 1\n1 1 1\n");
     write("rows.csv", "row,name\n1,1.x\n2,2.x\n3,3.x\n4,4.x\n");
     write("pairs.csv", "high,low\n2,1\n");
     write("strange.csv", "low,high\n1,9\n");
@@ -240,7 +247,7 @@ fn by_matrices(disk: &str, more: &str) -> Result<Study, StudyError> {
     write("blade.csv", "node\n3\n4\n");
     let text = format!(
         "schema = 1\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\ndofs = \"rows.csv\"\nunits = \"m-kg-s\"\n\
-         modal_damping = 0.002\nreduce = {{ modes = 3 }}\n[disk]\nsectors = 6\n{disk}\n[[place]]\nname = \"tip\"\ndof = \"4.x\"\n{more}"
+         modal_damping = 0.002\nreduce = {{ modes = 3 }}\n{key}\n[disk]\nsectors = 6\n{disk}\n[[place]]\nname = \"tip\"\ndof = \"4.x\"\n{more}"
     );
     write("disk.toml", &text);
     stickslip_study::read_file(&folder.path().join("disk.toml"), &[])
@@ -276,6 +283,63 @@ fn samples_of_a_disk_by_its_matrices() {
         tip.len() == 6 && tip.iter().all(|tip| *tip > 0.0) && tip.windows(2).all(|pair| pair[0] != pair[1]),
         "{tip:?}"
     );
+}
+
+/// With `x₂ = x₁ e^{jθ}` the waves of the sector have real matrices of three rows, to which rotation adds `(Ω/100 Hz)²` of what the second file
+/// has more. The lines and, on them, the crossings are their eigenvalues.
+#[test]
+fn a_campbell_diagram_of_a_sector_that_rotation_stiffens() {
+    let kind = "[parameters]\nspeed = \"0 Hz\"\nFt = \"1 N\"\n[study]\nkind = \"campbell\"\nspeed = { from = \"5 Hz\", to = \"80 Hz\", points = 6 }\n\
+                engine_orders = 8\nmodes = 3\n";
+    let key = "stiffened = { file = \"k100.mtx\", at = \"100 Hz\", speed = \"speed\" }";
+    let study = stiffened(key, "boundary = \"pairs.csv\"", &format!("{SHROUD}{kind}")).unwrap();
+    let data = run(&study, &Context::unwatched(1)).unwrap();
+    assert!(data.failures.is_empty(), "{:?}", data.failures);
+    let expected = |diameter: u64, speed: f64, stuck: bool| -> Vec<f64> {
+        let waves = 2.0 * (1.0 - (std::f64::consts::TAU * diameter as f64 / 6.0).cos());
+        let (share, shroud) = ((speed / 100.0).powi(2), if stuck { 2e3 * waves } else { 0.0 });
+        let stiffness = nalgebra::Matrix3::new(
+            3.5e5 + 2e5 * waves,
+            -5e4,
+            0.0, //
+            -5e4,
+            8e4 + 2e3 * share,
+            -3e4, //
+            0.0,
+            -3e4,
+            3e4 + 5e3 * share + shroud,
+        );
+        let root = nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::new(2.0f64, 0.3, 0.2).map(|m| 1.0 / m.sqrt()));
+        let mut all: Vec<f64> = (root * stiffness * root).symmetric_eigenvalues().iter().map(|v| v.sqrt()).collect();
+        all.sort_by(f64::total_cmp);
+        all.into_iter().map(|omega| omega / std::f64::consts::TAU).collect()
+    };
+    let mut rows = 0;
+    for table in &data.tables {
+        let (diameters, modes) = (table.integers("nodal_diameter").unwrap(), table.integers("mode").unwrap());
+        let (speeds, found) = (table.numbers("speed_Hz").unwrap(), table.numbers("frequency_Hz").unwrap());
+        let joints = table.texts("joints").unwrap();
+        for row in 0..table.rows() {
+            let exact = expected(diameters[row], speeds[row], joints[row] == "stuck")[modes[row] as usize - 1];
+            assert!((found[row] / exact - 1.0).abs() < 1e-9, "{} row {row}: {} {exact}", table.name, found[row]);
+            rows += 1;
+        }
+        if let Some(orders) = table.integers("engine_order") {
+            assert!(table.rows() > 8, "{} crossings", table.rows());
+            assert!((0..table.rows()).all(|row| (found[row] / speeds[row] - orders[row] as f64).abs() < 1e-9));
+        }
+    }
+    assert!(rows > 6 * 4 * 2 * 3, "{rows}");
+    for (key, words) in [
+        ("stiffened = { file = \"k.mtx\", at = \"100 Hz\", speed = \"speed\" }", "at rest once more"),
+        ("stiffened = { file = \"small.mtx\", at = \"100 Hz\", speed = \"speed\" }", "has 1 rows"),
+        ("stiffened = { file = \"k100.mtx\", at = \"0 Hz\", speed = \"speed\" }", "more than zero"),
+        ("stiffened = { file = \"k100.mtx\", at = \"100 Hz\" }", "`speed` is missing"),
+    ] {
+        let error = stiffened(key, "boundary = \"pairs.csv\"", kind).unwrap_err();
+        let text = format!("{} {}", error.message(), error.help_text().unwrap_or_default());
+        assert!(text.contains(words), "{key}: {text}");
+    }
 }
 
 #[test]

@@ -52,7 +52,7 @@ pub(super) const FREQUENCY: Key = required(
 pub(super) const OUTPUT: Key = optional(
     "output",
     Takes::Names,
-    "further columns: joint_force, joint_motion, contact, velocity, acceleration, harmonics, receptance",
+    "further columns: joint_force, joint_mean, joint_motion, contact, velocity, acceleration, harmonics, receptance",
     "[\"joint_force\", \"harmonics\"]",
 );
 

@@ -7,6 +7,7 @@ use crate::document::Table;
 use crate::error::Problem;
 use crate::schema::STRUCTURE;
 use crate::statement::{Stated, StatedTable};
+use crate::stiffened::Stiffened;
 use crate::study::Matrices;
 use crate::unit_sets;
 use crate::values::Given;
@@ -34,11 +35,13 @@ impl Reader {
             return None;
         }
         if self.without_files {
-            return Some(Matrices { table: stated, component: None, left_out: 0 });
+            return Some(Matrices { table: stated, component: None, stiffened: None, left_out: 0 });
         }
         let folder = Path::new(study_file).parent().unwrap_or(Path::new(""));
         match read(&stated, folder) {
-            Ok((component, left_out)) => Some(Matrices { table: stated, component: Some(component), left_out }),
+            Ok((component, stiffened, left_out)) => {
+                Some(Matrices { table: stated, component: Some(component), stiffened, left_out })
+            }
             Err(problem) => {
                 self.problems.push(problem);
                 None
@@ -50,7 +53,7 @@ impl Reader {
 /// A matrix of the table with the key that it stands under.
 type Read = (&'static str, formats::Matrix);
 
-fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, usize), Problem> {
+fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffened>, usize), Problem> {
     let problem = |key: &str, message: String| Problem::new(stated.place_of(key, None), key, message);
     let one = |key: &'static str| -> Result<Option<Read>, Problem> {
         let Some(file) = file(stated, key) else { return Ok(None) };
@@ -72,8 +75,9 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, usize), Probl
     };
     let mass = ordered(one("mass")?.ok_or_else(|| missing("mass"))?)?;
     let damping = one("damping")?.map(ordered).transpose()?;
+    let stiffened = one("stiffened")?.map(ordered).transpose()?;
     let rows = stiffness.1.rows();
-    for (key, matrix) in [Some(&mass), damping.as_ref()].into_iter().flatten() {
+    for (key, matrix) in [Some(&mass), damping.as_ref(), stiffened.as_ref()].into_iter().flatten() {
         if matrix.rows() != rows {
             let message = format!("the {key} matrix has {} rows, and the stiffness matrix {rows}", matrix.rows());
             return Err(problem(key, message).help("export both from the same model, with the same constraints"));
@@ -83,8 +87,15 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, usize), Probl
         let message = "this is the stiffness matrix once more".to_owned();
         return Err(problem("mass", message).help("name the file of the mass matrix, or its `name` in the file"));
     }
+    if stiffened.as_ref().is_some_and(|(_, matrix)| matrix.entries() == stiffness.1.entries()) {
+        let message = "this is the stiffness at rest once more".to_owned();
+        return Err(
+            problem("stiffened", message).help("name the file of the prestressed model, or its `name` in the file")
+        );
+    }
     let names = row_names(stated, folder, [&stiffness.1, &mass.1])?;
-    let all: Vec<Read> = [Some(stiffness), Some(mass), damping].into_iter().flatten().collect();
+    let (damped, spins) = (damping.is_some(), stiffened.is_some());
+    let all: Vec<Read> = [Some(stiffness), Some(mass), damping, stiffened].into_iter().flatten().collect();
     let kept = kept(&all, rows);
     let units = match stated.entry("units").map(|entry| &entry.value) {
         Some(Stated::Fixed(Given::Text(text))) => unit_sets::find(text),
@@ -95,7 +106,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, usize), Probl
     kept.iter().enumerate().for_each(|(at, row)| new[*row] = at);
     let matrix = |(key, matrix): &Read| {
         let unit = match *key {
-            "stiffness" => units.stiffness(),
+            "stiffness" | "stiffened" => units.stiffness(),
             "mass" => units.mass,
             _ => units.damping(),
         };
@@ -107,8 +118,12 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, usize), Probl
     };
     let mut made = all.iter().map(matrix);
     let mut next = || made.next().transpose();
-    let (stiffness, mass, damping) = (next()?, next()?, next()?);
+    let (stiffness, mass) = (next()?, next()?);
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else { return Err(missing("mass")) };
+    let damping = if damped { next()? } else { None };
+    let stiffened = if spins { next()? } else { None };
+    let stiffened = stiffened.map(|there| Stiffened::new(&stiffness, &there));
+    let stiffened = stiffened.transpose().map_err(|error| problem("stiffened", error.to_string()))?;
     let names = kept.iter().map(|row| names[*row].clone()).collect();
     let component = Component::new(names, mass, damping, stiffness).map_err(|error| match &error {
         StructureError::NegativeMass => problem("mass", error.to_string())
@@ -123,7 +138,11 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, usize), Probl
         }
         _ => problem("stiffness", error.to_string()),
     })?;
-    Ok((component, rows - kept.len()))
+    // what is wrong with the second file is wrong at its own speed
+    if let Some(Err(error)) = stiffened.as_ref().map(|stiffened| stiffened.at(&component, 1.0)) {
+        return Err(problem("stiffened", error.to_string()));
+    }
+    Ok((component, stiffened, rows - kept.len()))
 }
 
 /// What is wrong with a file, in the words of the formats, and what to do.

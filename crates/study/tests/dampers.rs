@@ -1,0 +1,248 @@
+//! The ready models of dampers against closed forms: loads at rest, frequencies by nodal diameter with joints free and stuck, where slip begins,
+//! what slipping takes.
+
+use num_complex::Complex64;
+use std::f64::consts::{PI, TAU};
+use stickslip_study::dataset::{Dataset, Table};
+use stickslip_study::read_study;
+use stickslip_study::run::{Context, run};
+
+/// A study of a ready model with other parameters.
+fn study(template: &str, parameters: &[(&str, String)], study: &str) -> Dataset {
+    let parameters: String = parameters.iter().map(|(name, value)| format!("{name} = \"{value}\"\n")).collect();
+    let text = format!("schema = 1\nmodel = {{ template = \"{template}\" }}\n[parameters]\n{parameters}\n{study}");
+    let study = read_study("damper.toml", &text, &[]).unwrap_or_else(|error| panic!("{template}: {error}"));
+    let found = run(&study, &Context::unwatched(1)).unwrap_or_else(|error| panic!("{template}: {error}"));
+    assert!(found.failures.is_empty(), "{template}: {:?}", found.failures);
+    found
+}
+
+fn numbers<'a>(found: &'a Dataset, table: &str, column: &str) -> &'a [f64] {
+    let table: &Table = found.tables.iter().find(|found| found.name == table).unwrap();
+    table.numbers(column).unwrap_or_else(|| panic!("no column {column}"))
+}
+
+fn near(what: &str, found: f64, expected: f64, share: f64) {
+    assert!((found - expected).abs() <= share * expected.abs(), "{what}: {found} instead of {expected}");
+}
+
+/// The lowest frequencies (rad/s) of the joints in one state, as `expected` has them for the angle between two sectors.
+fn frequencies(
+    (template, sectors, modes): (&str, usize, usize),
+    parameters: &[(&str, String)],
+    share: f64,
+    expected: impl Fn(bool, f64) -> Vec<f64>,
+) {
+    let found = study(template, parameters, &format!("[study]\nkind = \"nodal-diameter\"\nmodes = {modes}\n"));
+    let table = &found.tables[0];
+    let (diameters, numbers) = (table.integers("nodal_diameter").unwrap(), table.integers("mode").unwrap());
+    let (joints, values) = (table.texts("joints").unwrap(), table.numbers("frequency_Hz").unwrap());
+    let mut seen = 0;
+    for diameter in 0..=sectors / 2 {
+        for state in ["free", "stuck"] {
+            let all = expected(state == "stuck", TAU * diameter as f64 / sectors as f64);
+            let of = |row: &usize| diameters[*row] == diameter as u64 && joints[*row] == state;
+            let rows: Vec<usize> = (0..table.rows()).filter(of).collect();
+            assert_eq!(rows.len(), all.len(), "{template}, {diameter} nodal diameters, {state}");
+            for (row, omega) in rows.into_iter().zip(all) {
+                let what = format!("{template}, {diameter} nodal diameters, {state}, mode {}", numbers[row]);
+                near(&what, values[row] * TAU, omega, share);
+                seen += 1;
+            }
+        }
+    }
+    assert_eq!(seen, table.rows());
+}
+
+/// The wedge alone: both loads from its balance along and across the radius, by Cramer's rule; no place moves from where the loads are stated.
+#[test]
+fn a_wedge_is_pressed_by_its_balance() {
+    for (a1, a2, rpm) in
+        [(30.0f64, 30.0f64, 3000.0f64), (15.0, 40.0, 6000.0), (60.0, 10.0, 1500.0), (45.0, 44.0, 9000.0)]
+    {
+        let parameters = [
+            ("a1", format!("{a1} deg")),
+            ("a2", format!("{a2} deg")),
+            ("speed", format!("{rpm} rpm")),
+            ("F0", "1e-3 N".to_owned()),
+            ("m", "4 g".to_owned()),
+            ("r", "200 mm".to_owned()),
+        ];
+        let found = study(
+            "under-platform-wedge",
+            &parameters,
+            "[study]\nkind = \"response\"\nfrequency = [\"60 Hz\"]\noutput = \"joint_mean\"\n\
+             [method]\nkind = \"harmonic-balance\"\nharmonics = 3\n",
+        );
+        let load = 0.004 * 0.2 * (rpm * TAU / 60.0).powi(2);
+        let ([s1, s2], [c1, c2]) = ([a1, a2].map(|a| a.to_radians().sin()), [a1, a2].map(|a| a.to_radians().cos()));
+        // s1 N1 - s2 N2 = 0, c1 N1 + c2 N2 = C
+        let determinant = s1 * c2 + s2 * c1;
+        let at = |column: &str| numbers(&found, "curve", column)[0];
+        near("N1", at("face1_0_n_force_mean_N"), load * s2 / determinant, 1e-6);
+        near("N2", at("face2_3_n_force_mean_N"), load * s1 / determinant, 1e-6);
+        for place in ["wedge_0_x", "wedge_0_z", "blade_0_x", "blade_0_z"] {
+            let rest = at(&format!("{place}_mean_m"));
+            assert!(rest.abs() < 1e-6 * load / 50e3, "{place} rests at {rest} m");
+        }
+        for joint in ["face1_0_t", "face2_0_t"] {
+            let friction = at(&format!("{joint}_force_mean_N"));
+            assert!(friction.abs() < 1e-6 * load, "{joint} carries {friction} N at rest");
+        }
+    }
+}
+
+/// The flexibilities of both faces in series, `D = Σ t tᵀ/kt + n nᵀ/kn`, couple neighbours by `kc = (D⁻¹)ₓₓ` where the wedge has next to no mass and
+/// platforms do not move outwards: `m ω² = k + 2 kc (1 - cos θ)`.
+#[test]
+fn a_stuck_wedge_is_two_springs_at_angles() {
+    let (mass, k, kt, kn): (f64, f64, f64, f64) = (0.4, 250e3, 40e3, 50e3);
+    for (a1, a2) in [(30.0f64, 30.0f64), (20.0, 50.0)] {
+        let faces = [-a1.to_radians(), a2.to_radians()].map(|a| {
+            let ((tx, tz), (nx, nz)) = ((a.cos(), -a.sin()), (a.sin(), a.cos()));
+            [tx * tx / kt + nx * nx / kn, tx * tz / kt + nx * nz / kn, tz * tz / kt + nz * nz / kn]
+        });
+        let [xx, xz, zz]: [f64; 3] = std::array::from_fn(|i| faces[0][i] + faces[1][i]);
+        let kc = zz / (xx * zz - xz * xz);
+        let parameters = [
+            ("a1", format!("{a1} deg")),
+            ("a2", format!("{a2} deg")),
+            ("m", "1e-4 g".to_owned()),
+            ("kz", "1e7 N/mm".to_owned()),
+            ("kw", "0 N/m".to_owned()),
+        ];
+        frequencies(("under-platform-wedge", 12, 1), &parameters, 2e-6, |stuck, theta| {
+            vec![((k + if stuck { 2.0 * kc * (1.0 - theta.cos()) } else { 0.0 }) / mass).sqrt()]
+        });
+        if a1 == a2 {
+            let (s, c) = a1.to_radians().sin_cos();
+            near("equal angles", kc, kt * kn / (2.0 * (kt * s * s + kn * c * c)), 1e-12);
+        }
+    }
+}
+
+/// While blades close, the wedge is pushed inwards against friction, while they open it slides outwards: between the blades it holds
+/// `C/2 tan(a ± ρ)` with `μ = tan ρ`, and a cycle loses `h (Δ - h/kc)`, with h the
+/// difference of both and Δ the range of the blades' distance.
+#[test]
+fn a_slipping_wedge_loses_what_its_limits_say() {
+    let (kt, kn, mu): (f64, f64, f64) = (40e3, 50e3, 0.3);
+    for a in [30.0f64, 40.0] {
+        let parameters = [
+            ("a1", format!("{a} deg")),
+            ("a2", format!("{a} deg")),
+            ("speed", "2550 rpm".to_owned()),
+            // next to no inertia of the wedge, and its load
+            ("m", "0.01 g".to_owned()),
+            ("r", "40 m".to_owned()),
+            ("kz", "1e5 N/mm".to_owned()),
+        ];
+        let load = 1e-5 * 40.0 * (2550.0 * TAU / 60.0f64).powi(2);
+        let found = study(
+            "under-platform-wedge",
+            &parameters,
+            "[study]\nkind = \"response\"\nfrequency = [\"131 Hz\"]\noutput = \"joint_force\"\n\
+             [method]\nkind = \"harmonic-balance\"\nharmonics = 9\ntolerance = 0.02\n",
+        );
+        let held = |sign: f64| 0.5 * load * (a.to_radians() + sign * mu.atan()).tan();
+        let height = held(1.0) - held(-1.0);
+        let (s, c) = a.to_radians().sin_cos();
+        let kc = kt * kn / (2.0 * (kt * s * s + kn * c * c));
+        let at = |column: &str| numbers(&found, "curve", column)[0];
+        // neighbours are a quarter of a turn apart
+        let range = 2.0 * 2.0 * at("blade_0_x_amplitude_m") * (PI / 4.0).sin();
+        let lost = at("face1_0_dissipation_J") + at("face2_0_dissipation_J");
+        assert!(range > 1.5 * height / kc, "slips for much of the period");
+        // blades move by little more than a sine
+        near("loss", lost, height * (range - height / kc), 5e-3);
+    }
+}
+
+/// A disk mass and a piece of the ring by nodal diameter: two masses, with the contact's spring between them where it sticks.
+#[test]
+fn a_rim_ring_has_the_frequencies_of_two_masses() {
+    let (md, kd, kc, mr, kr, kt): (f64, f64, f64, f64, f64, f64) = (1.5, 8e5, 9e5, 0.005, 4e6, 3e5);
+    frequencies(("rim-ring", 20, 2), &[], 1e-9, |stuck, theta| {
+        let waves = 2.0 * (1.0 - theta.cos());
+        let (rim, ring, held) = (kd + kc * waves, kr * waves, if stuck { kt } else { 0.0 });
+        // (a - md w)(b - mr w) = held²
+        let (a, b) = (rim + held, ring + held);
+        let (sum, product) = (a / md + b / mr, (a * b - held * held) / (md * mr));
+        let high = 0.5 * (sum + (sum * sum - 4.0 * product).sqrt());
+        // a ring that is free to turn has no frequency
+        [product / high, high].into_iter().filter(|square| *square > 1e-6 * rim / md).map(f64::sqrt).collect()
+    });
+}
+
+/// The contact carries `kt (x - y)` with `y (kt + 2 kr (1 - cos θ) - mr ω²) = kt x`, and slips from its limit on.
+#[test]
+fn a_rim_ring_begins_to_slip_at_its_limit() {
+    let (mr, kr, kt): (f64, f64, f64) = (0.005, 4e6, 3e5);
+    let limit = 0.25 * mr * 0.2 * (6000.0 * TAU / 60.0f64).powi(2);
+    let omega = TAU * 150.0;
+    let waves = 2.0 * (1.0 - (TAU * 3.0 / 20.0).cos());
+    let ring = kr * waves - mr * omega * omega;
+    let carried = kt * ring / (kt + ring);
+    let stiffness = Complex64::new(8e5 + 9e5 * waves + carried - 1.5 * omega * omega, 4.0 * omega);
+    let force = stiffness.norm() * limit / carried;
+    slips_from("rim-ring", &[], ("rim_0", 150.0), force, limit / carried, "groove_0");
+}
+
+/// Half a percent below a force nothing slips, and the place moves as it must; half a percent above something does.
+fn slips_from(
+    template: &str,
+    parameters: &[(&str, String)],
+    (place, hertz): (&str, f64),
+    force: f64,
+    amplitude: f64,
+    joint: &str,
+) {
+    let at = |share: f64| {
+        let parameters = [parameters, &[("F0", format!("{} N", share * force))]].concat();
+        let found = study(
+            template,
+            &parameters,
+            &format!(
+                "[study]\nkind = \"response\"\nfrequency = [\"{hertz} Hz\"]\n[method]\nkind = \"harmonic-balance\"\n\
+                 harmonics = 9\ntolerance = 0.02\n"
+            ),
+        );
+        let number = |column: &str| numbers(&found, "curve", column)[0];
+        (number(&format!("{place}_amplitude_m")), number(&format!("{joint}_dissipation_J")))
+    };
+    let (below, above) = (at(0.995), at(1.005));
+    near(template, below.0, 0.995 * amplitude, 1e-6);
+    // a cycle of as wide a slip would lose this
+    let whole = force * amplitude;
+    assert!(below.1.abs() < 1e-12 * whole, "{template} slips below {force} N: {} J", below.1);
+    assert!(above.1 > 1e-5 * whole, "{template} holds above {force} N: {} J", above.1);
+}
+
+/// Along the faces and across them a blade has a spring of its own and those of two shrouds.
+#[test]
+fn shrouds_have_the_frequencies_of_a_chain() {
+    frequencies(("shroud", 16, 2), &[], 1e-9, |stuck, theta| {
+        let waves = if stuck { 2.0 * (1.0 - theta.cos()) } else { 0.0 };
+        let mut both = [180e3 + 15e3 * waves, 320e3 + 20e3 * waves].map(|k: f64| (k / 0.25).sqrt());
+        both.sort_by(f64::total_cmp);
+        both.to_vec()
+    });
+}
+
+/// With displacements `X` along and `Z` across the faces friction holds while `|kt ΔX ∓ μ kn ΔZ| < μ N₀`: tangential and normal load are sines of
+/// different phase.
+#[test]
+fn shrouds_begin_to_slip_where_their_load_falls() {
+    let (kt, kn, mu, preload): (f64, f64, f64, f64) = (15e3, 20e3, 0.3, 10.0);
+    let omega = TAU * 138.0;
+    let theta = TAU * 2.0 / 16.0;
+    let waves = 2.0 * (1.0 - theta.cos());
+    let answer = |stiffness: f64, load: Complex64| load / Complex64::new(stiffness - 0.25 * omega * omega, 0.4 * omega);
+    // per unit of F0; the next blade leads by θ
+    let along = answer(180e3 + kt * waves, Complex64::new(1.0, 0.0));
+    let across = answer(320e3 + kn * waves, Complex64::new(0.0, 0.5));
+    let neighbour = Complex64::new(1.0, 0.0) - Complex64::from_polar(1.0, theta);
+    let load = |sign: f64| (kt * along * neighbour - sign * mu * kn * across * neighbour).norm();
+    let force = mu * preload / load(1.0).max(load(-1.0));
+    slips_from("shroud", &[], ("blade_0_x", 138.0), force, force * along.norm(), "shroud_0");
+}
