@@ -215,6 +215,32 @@ impl Structure {
         Structure::checked(places, form)
     }
 
+    /// The same with springs along directions, by their rows with weights, and stiffnesses, N/m. `None` if some entry is no number then.
+    pub(crate) fn with_springs(&self, springs: &[(Vec<(usize, f64)>, f64)]) -> Option<Structure> {
+        let added = springs.iter().flat_map(|(rows, k)| {
+            rows.iter().flat_map(move |&(i, w)| rows.iter().map(move |&(l, v)| (i, l, w * v * k)))
+        });
+        let form = match &self.0.form {
+            Form::Full(full) => {
+                let mut full = Matrices::clone(full);
+                added.for_each(|(i, l, k)| full.stiffness[(i, l)] += k);
+                Form::Full(Arc::new(full))
+            }
+            Form::Sparse { mass, damping, stiffness, .. } => {
+                let stiffness = Matrix::from_triplets(self.dofs(), stiffness.entries().chain(added)).ok()?;
+                let (mass, damping) = (mass.clone(), damping.clone());
+                Form::Sparse { mass, damping, stiffness, analysis: OnceLock::new(), full: OnceLock::new() }
+            }
+        };
+        let largest = match &form {
+            Form::Full(full) => full.stiffness.amax(),
+            Form::Sparse { stiffness, .. } => stiffness.largest(),
+        };
+        let [mass, damping, _] = self.0.largest;
+        let (places, largest) = (self.0.places.clone(), [mass, damping, largest]);
+        largest[2].is_finite().then(|| Structure(Arc::new(Kept { places, form, largest, dissipates: OnceLock::new() })))
+    }
+
     fn checked(places: Vec<String>, form: Form) -> Result<Self, StructureError> {
         let mut names: Vec<&String> = places.iter().collect();
         names.sort_unstable();

@@ -233,8 +233,9 @@ impl Linear<'_> {
                         (bound, above.take().filter(|(of, _)| *of == bound).map(|(_, above)| above)),
                         |p, port, a, b| {
                             let tangent = self.tangent(p, port);
-                            let count = self.harmonics.len();
-                            (0..count).map(|k| self.mean(tangent, port.axes, (a, b), k).re).sum::<f64>() / count as f64
+                            let (first, count) = (usize::from(modal.closed.is_some()), self.harmonics.len());
+                            let means = (first..count).map(|k| self.mean(tangent, port.axes, (a, b), k).re);
+                            means.sum::<f64>() / (count - first).max(1) as f64
                         },
                         self.ports,
                     )?,
@@ -329,6 +330,8 @@ impl Preconditioner<'_> {
 struct Split {
     /// Frequency, rad/s, up to which modes are taken as they are.
     bound: f64,
+    /// Whether the mean is that with closed contacts: these are what precondition it.
+    closed: bool,
     /// Their numbers.
     low: Vec<usize>,
     /// What the other modes and springs in series add, S: the same for any stiffness of the joints.
@@ -394,7 +397,8 @@ impl Split {
         let l = low.len();
         let mut core = vec![0.0; l * l];
         multiply_in_blocks(&pull, &moved, &mut core, (l, p, l), false);
-        Some(Split { bound, low, above, factor, pull, moved, core, harmonics: Vec::new(), omega: f64::NAN })
+        let closed = modal.closed.is_some();
+        Some(Split { bound, closed, low, above, factor, pull, moved, core, harmonics: Vec::new(), omega: f64::NAN })
     }
 
     /// Prepares for a drive frequency.
@@ -441,7 +445,8 @@ impl Split {
             columns.iter_mut().zip(&moved).for_each(|(c, m)| *c -= m);
         }
         for (q, v) in v.chunks_exact_mut(wide).enumerate() {
-            v.iter_mut().enumerate().for_each(|(i, v)| *v = columns[i * p + q]);
+            let first = if self.closed { 2 } else { 0 };
+            v.iter_mut().enumerate().skip(first).for_each(|(i, v)| *v = columns[i * p + q]);
         }
     }
 }
@@ -506,7 +511,7 @@ mod tests {
             let directions: Vec<_> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();
             let structure = Arc::new(Uncoupled::new(system.structure(), &directions).unwrap());
             let series = vec![0.0; ports.count()];
-            level.receptance = Receptance::Modal(Modal::new(&structure, (harmonics, omega), &series).unwrap());
+            level.receptance = Receptance::Modal(Modal::new((&structure, None), (harmonics, omega), &series).unwrap());
         }
         let start = level.begin(system, &ports, None, omega);
         let found = level.solve(&ports, omega, start);

@@ -10,6 +10,8 @@
 //! The derivative is one formula for both: `δ_qp r_y - r_u R_qp f_y`, with `r_y = 1`, `-r_u = 1`, `f_y = K` for motions and `r_y = 1 - T`,
 //! `-r_u = T ε d/dt`, `f_y = 1` for forces.
 //!
+//! Where nothing but contacts holds a body, the mean has the springs of closed contacts in `R`, and their force is taken off `f`: see `closed`.
+//!
 //! `ε` is no free parameter: it is the impedance of the structure at the contact at the highest harmonic, the resolution of the series
 //! ([`RIPPLE`]). Another ε changes the solution no more than the missing harmonics do.
 //!
@@ -57,6 +59,10 @@ pub(super) struct Level {
     imposed: Vec<f64>,
     /// Compliances in series with the axes, m/N.
     series: Vec<f64>,
+    /// Stiffness of closed contacts along the axes (N/m) that the structure has for the mean; empty if it is held without them.
+    springs: Vec<f64>,
+    /// What acts on it: forces less those of these springs, [axis][harmonic], N.
+    acting: Vec<Complex64>,
     /// Motion of all places without friction, per harmonic.
     pub free: Vec<DVector<Complex64>>,
     /// In place of receptance and Jacobian, for large systems.
@@ -159,6 +165,8 @@ impl Level {
             linear: vec![ZERO; nh * axes],
             imposed: vec![0.0; axes],
             series: ports.iter().flat_map(|port| vec![port.series; port.axes]).collect(),
+            springs: Vec::new(),
+            acting: Vec::new(),
             free: Vec::new(),
             tangents: vec![0.0; tangents],
             blocks,
@@ -211,9 +219,13 @@ impl Level {
         for port in ports.iter() {
             self.series[port.range()].fill(port.series);
         }
+        let closed = if self.alternation.harmonics[0] == 0 { rest.closed(omega) } else { None };
+        self.springs.clear();
+        self.springs.extend(closed.iter().flat_map(|closed| &closed.springs));
         self.free.clear();
         if let Some(sparse) = &mut self.sparse {
             // at a singular frequency: the next number has none of its zeros
+            sparse.close(&self.springs);
             sparse.drive(omega).or_else(|_| sparse.drive(omega * (1.0 + f64::EPSILON)))?;
         } else {
             self.receptance = self.receptance(ports, rest, omega)?;
@@ -271,7 +283,8 @@ impl Level {
     fn receptance(&self, ports: &Ports, rest: &Rest, omega: f64) -> Result<Receptance, f64> {
         let harmonics = self.harmonics();
         if let Some(structure) = rest.modes_for(ports).filter(|_| !self.with_matrix) {
-            let modal = Modal::new(structure, (harmonics, omega), &self.series);
+            let closed = if harmonics[0] == 0 { rest.closed(omega) } else { None };
+            let modal = Modal::new((structure, closed), (harmonics, omega), &self.series);
             return modal.map(Receptance::Modal).map_err(|_| omega);
         }
         let formed = harmonics.iter().map(|&h| {
@@ -282,10 +295,14 @@ impl Level {
         Ok(Receptance::Formed(formed.collect::<Result<_, f64>>()?))
     }
 
-    /// The motion to begin with: that of the describing functions, or without friction.
+    /// The motion to begin with: that of the describing functions, or without friction; where contacts alone hold, static rest on them, from which
+    /// a step leads to the motion that sticks.
     pub fn begin(&self, system: &System, ports: &Ports, guess: Option<&Guess>, omega: f64) -> Motion {
         let nh = self.harmonics().len();
         let mut motion = Motion { c: self.linear.clone(), ..Motion::rest(self.linear.len()) };
+        if self.stands() {
+            return self.at_rest(1.0);
+        }
         let Some(guess) = guess else { return motion };
         for port in ports.iter() {
             let axes = system.joints()[port.joint].axes();
@@ -328,20 +345,27 @@ impl Level {
             let slot = wanted.then_some(&mut self.tangents[block(&self.blocks, p, port, nh)]);
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
             self.alternation.respond(port, (omega, ease.limits), c, force, slot);
+            if wanted {
+                self.open(p, port);
+            }
             if port.marches() {
                 self.states[p].clone_from(&self.alternation.state);
             }
         }
+        let share = self.load(ease);
+        self.act(motion, share);
         // what the structure does: into the residual of motions, and into the motions whose force is unknown
+        let acting = if self.springs.is_empty() { &motion.force } else { &self.acting };
         if self.sparse.is_none() {
-            self.receptance.apply(&motion.force, &mut self.moved);
+            self.receptance.apply(acting, &mut self.moved);
         }
         for k in 0..nh {
             let (residual, linear, forces) = (&mut self.residual, &self.linear, &self.forces);
-            let (c, force) = (&mut motion.c, &motion.force);
+            let c = &mut motion.c;
+            let share = if self.alternation.harmonics[k] == 0 { share } else { 1.0 };
             let mut follow = |q: usize, u: Complex64| {
                 let at = q * nh + k;
-                let moved = linear[at] - u;
+                let moved = linear[at] * share - u;
                 if forces[q] {
                     c[at] = moved;
                 } else {
@@ -351,7 +375,7 @@ impl Level {
             };
             match &mut self.sparse {
                 Some(sparse) => {
-                    sparse.receive(k, |q| force[q * nh + k], follow);
+                    sparse.receive(k, |q| acting[q * nh + k], follow);
                 }
                 None => {
                     self.moved.chunks_exact(nh).enumerate().for_each(|(q, u)| follow(q, u[k]));
@@ -397,6 +421,55 @@ impl Level {
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
             self.alternation.begin.clone_from(&self.states[p]);
             self.alternation.respond(port, (omega, ease.limits), c, force, Some(slot));
+            self.open(p, port);
+        }
+    }
+
+    /// Whether nothing but contacts holds some body.
+    pub fn stands(&self) -> bool {
+        !self.springs.is_empty()
+    }
+
+    /// Rest on closed contacts under so many times the constant loads.
+    pub fn at_rest(&self, share: f64) -> Motion {
+        let nh = self.harmonics().len();
+        let mut motion = Motion::rest(self.linear.len());
+        motion.c.iter_mut().zip(&self.linear).step_by(nh).for_each(|(c, linear)| *c = linear * share);
+        motion
+    }
+
+    /// How much of the constant loads there is: where contacts carry them they grow with the limits, so that what sticks under all of them sticks
+    /// on the way too. The excitation is then so many times smaller beside them.
+    fn load(&self, ease: Ease) -> f64 {
+        if self.stands() { ease.limits } else { 1.0 }
+    }
+
+    /// The forces less those of the springs that the structure has, into `self.acting`.
+    fn act(&mut self, motion: &Motion, share: f64) {
+        if !self.stands() {
+            return;
+        }
+        let nh = self.alternation.harmonics.len();
+        self.acting.clone_from(&motion.force);
+        for (q, (k, imposed)) in self.springs.iter().zip(&self.imposed).enumerate() {
+            self.acting[q * nh] -= (motion.c[q * nh] - imposed * share) * *k;
+        }
+    }
+
+    /// What acts on the structure in a motion, [axis][harmonic], N, see [`Level::springs`].
+    pub fn acting<'a>(&'a mut self, motion: &'a Motion) -> &'a [Complex64] {
+        self.act(motion, 1.0);
+        if self.stands() { &self.acting } else { &motion.force }
+    }
+
+    /// Takes these springs off the derivative of a port.
+    fn open(&mut self, p: usize, port: &Port) {
+        let nh = self.alternation.harmonics.len();
+        let tall = 2 * nh * port.axes;
+        let tangent = &mut self.tangents[block(&self.blocks, p, port, nh)];
+        for (a, k) in self.springs.iter().skip(port.first).take(port.axes).enumerate() {
+            let at = 2 * nh * a;
+            tangent[at * tall + at] -= k;
         }
     }
 

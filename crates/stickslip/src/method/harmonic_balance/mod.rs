@@ -2,6 +2,7 @@
 //!
 //! - `ports`: from the harmonics of relative motions to those of the laws' forces, with the exact derivative;
 //! - `rest`: the receptance of the linear rest, in closed form from its modes;
+//! - `closed`: the mean of bodies that nothing but contacts holds;
 //! - `equations`: those along the joints, and their derivative;
 //! - `solve`: Newton's method on them;
 //! - `path`: the orbit's numbers from its harmonics.
@@ -13,6 +14,7 @@
 
 mod arc;
 mod branch;
+mod closed;
 mod coupled;
 mod equations;
 mod hold;

@@ -28,10 +28,11 @@ pub(super) fn places(
     motion: &Motion,
 ) -> Result<Vec<DVector<Complex64>>, f64> {
     let nh = level.harmonics().len();
+    let acting = level.acting(motion).to_vec();
     (0..nh)
         .map(|k| {
             let h = level.harmonics()[k];
-            let forces = rest.spread(h, |q| motion.force[q * nh + k]);
+            let forces = rest.spread(h, |q| acting[q * nh + k]);
             let Some(sparse) = &mut level.sparse else {
                 let singular = |_| h as f64 * omega;
                 let mut x = &level.free[k] - rest.respond(h, omega, &forces).map_err(singular)?;

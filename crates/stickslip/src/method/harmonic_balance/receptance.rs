@@ -1,10 +1,11 @@
 //! What forces along the axes do to the motions along them: matrices, or where these would be too large their product alone.
 
+use super::closed::Closed;
 use super::uncoupled::{Resonant, Uncoupled};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::dense::multiply_in_blocks;
+use stickslip_numerics::dense::{Lu, multiply_in_blocks};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -25,6 +26,8 @@ pub(super) struct Modal {
     pub omega: f64,
     pub rates: Vec<Complex64>,
     gains: Vec<Vec<Complex64>>,
+    /// In place of the first of these, where the mean is that with closed contacts.
+    pub closed: Option<Arc<Lu<f64>>>,
     /// Compliances in series with the axes, m/N.
     pub series: Vec<f64>,
     /// Of the mean motions along the axes by their own forces.
@@ -36,14 +39,16 @@ pub(super) struct Modal {
 
 impl Modal {
     pub fn new(
-        structure: &Arc<Uncoupled>,
+        (structure, closed): (&Arc<Uncoupled>, Option<&Closed>),
         (harmonics, omega): (&[usize], f64),
         series: &[f64],
     ) -> Result<Self, Resonant> {
         let rates: Vec<Complex64> = harmonics.iter().map(|h| Complex64::new(0.0, *h as f64 * omega)).collect();
         let gains = rates.iter().map(|s| structure.gains(*s, omega)).collect::<Result<Vec<_>, _>>()?;
-        let mean = match harmonics[0] {
-            0 => structure.own_receptance(&gains[0]).iter().zip(series).map(|(r, s)| r.norm() + s).collect(),
+        let mean = match (harmonics[0], closed) {
+            // a spring carries its force at most as far as it gives way
+            (0, Some(closed)) => closed.springs.iter().map(|k| if *k > 0.0 { k.recip() } else { 0.0 }).collect(),
+            (0, None) => structure.own_receptance(&gains[0]).iter().zip(series).map(|(r, s)| r.norm() + s).collect(),
             _ => vec![0.0; structure.axes],
         };
         Ok(Modal {
@@ -51,6 +56,7 @@ impl Modal {
             omega,
             rates,
             gains,
+            closed: closed.and_then(|closed| closed.of_the_modes(omega)).transpose()?,
             series: series.to_vec(),
             mean,
             forces: Vec::new(),
@@ -67,8 +73,14 @@ impl Modal {
         self.forces.extend(force.iter().flat_map(|f| [f.re, f.im]));
         self.modal.resize(tall * n, 0.0);
         multiply_in_blocks(&self.forces, &self.structure.at, &mut self.modal, (tall, p, n), false);
+        let coupled = usize::from(self.closed.is_some());
+        if let Some(closed) = &self.closed {
+            let mut mean: Vec<f64> = self.modal.chunks_exact(tall).map(|column| column[0]).collect();
+            closed.solve(&mut mean);
+            self.modal.chunks_exact_mut(tall).zip(mean).for_each(|(column, x)| column[..2].copy_from_slice(&[x, 0.0]));
+        }
         for (m, column) in self.modal.chunks_exact_mut(tall).enumerate() {
-            for (k, pair) in column.chunks_exact_mut(2).enumerate() {
+            for (k, pair) in column.chunks_exact_mut(2).enumerate().skip(coupled) {
                 let z = Complex64::new(pair[0], pair[1]) * self.gains[k][m];
                 (pair[0], pair[1]) = (z.re, z.im);
             }

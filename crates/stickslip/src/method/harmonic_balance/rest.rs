@@ -7,6 +7,7 @@
 //! Of a ring in a travelling wave only the joints of the first sector have ports: harmonic h moves as the wave of its nodal diameter, whose
 //! matrices are those of one sector. Displacements and forces are those of the whole ring all the same.
 
+use super::closed::{self, Closed};
 use super::hold::HOLD;
 use super::ports::Ports;
 use super::uncoupled::{Resonant, Uncoupled};
@@ -14,7 +15,7 @@ use crate::model::{Cyclic, System};
 use crate::structure::{DynamicStiffness, Matrices, Sector, Structure, Wave, WaveStiffness, turn};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip_numerics::modes::Modes;
@@ -42,6 +43,8 @@ pub(super) struct Rest {
     modal: Option<Modal>,
     /// Of large structures whose damping couples no modes.
     uncoupled: Option<Arc<Uncoupled>>,
+    /// Whether the dynamic stiffness is factored at every frequency.
+    factored: bool,
     /// Dynamic stiffnesses of large structures at the last drive frequency, by their rates.
     factors: RefCell<Vec<Factored>>,
     structure: Structure,
@@ -49,6 +52,10 @@ pub(super) struct Rest {
     directions: Vec<Vec<(usize, f64)>>,
     /// Of a ring in a travelling wave.
     waves: Option<Waves>,
+    /// Stiffness of closed contacts along the axes, N/m.
+    springs: Vec<f64>,
+    /// With these, if they alone hold some motion of it.
+    closed: OnceCell<Option<Closed>>,
 }
 
 /// A dynamic stiffness at a rate (1/s), made at a drive frequency (rad/s); singular at a resonance without damping.
@@ -177,16 +184,83 @@ impl Rest {
             })
             .collect::<Vec<Vec<(usize, f64)>>>();
         let waves = ports.wave().and_then(|wave| Waves::new(system, wave));
-        let factored = waves.is_none() && is_factored(system.structure());
+        let factored = is_factored(system.structure());
+        let alone = waves.is_none();
         Rest {
             n,
-            modal: if factored || waves.is_some() { None } else { modal(system, &columns(n, &directions)) },
-            uncoupled: if factored { Uncoupled::new(system.structure(), &directions).map(Arc::new) } else { None },
+            modal: if factored || !alone { None } else { modal(system, &columns(n, &directions)) },
+            uncoupled: if factored && alone {
+                Uncoupled::new(system.structure(), &directions).map(Arc::new)
+            } else {
+                None
+            },
+            factored,
             factors: RefCell::default(),
             structure: system.structure().clone(),
+            springs: closed::springs(ports),
+            closed: OnceCell::new(),
             directions,
             waves,
         }
+    }
+
+    /// The structure at rest with its contacts closed, where these alone hold some motion of it: asked once, at the first frequency.
+    pub fn closed(&self, omega: f64) -> Option<&Closed> {
+        let own = |omega: f64| self.own_at_rest(omega);
+        let find = || if closed::hold(&self.springs, own, omega) { self.with_closed_contacts() } else { None };
+        self.closed.get_or_init(find).as_ref()
+    }
+
+    fn with_closed_contacts(&self) -> Option<Closed> {
+        let springs = self.springs.clone();
+        if let Some(uncoupled) = &self.uncoupled {
+            return Some(Closed::of_modes(springs, uncoupled));
+        }
+        let (sectors, size) = self.sectors();
+        // around a ring, each direction in every sector
+        let around: Vec<(Vec<(usize, f64)>, f64)> = (0..sectors)
+            .flat_map(|sector| self.directions.iter().zip(&springs).map(move |(rows, k)| (sector, rows, *k)))
+            .map(|(sector, rows, k)| (rows.iter().map(|&(i, w)| ((i + sector * size) % self.n, w)).collect(), k))
+            .collect();
+        let structure = self.structure.with_springs(&around)?;
+        let waves = match &self.waves {
+            Some(waves) => {
+                let sector = Sector::of(&structure, sectors)?;
+                Some(Waves { cyclic: waves.cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
+            }
+            None => None,
+        };
+        let rest = Rest {
+            n: self.n,
+            modal: None,
+            uncoupled: None,
+            factored: true,
+            factors: RefCell::default(),
+            structure,
+            directions: self.directions.clone(),
+            waves,
+            springs: Vec::new(),
+            closed: OnceCell::from(None),
+        };
+        Some(Closed::of_rows(springs, rest))
+    }
+
+    /// Displacement along each axis at rest under a constant unit force along it alone, m/N.
+    fn own_at_rest(&self, omega: f64) -> Result<Vec<f64>, Resonant> {
+        if let Some(uncoupled) = &self.uncoupled {
+            let own = uncoupled.own_receptance(&uncoupled.gains(ZERO, omega)?);
+            return Ok(own.iter().map(|r| r.norm()).collect());
+        }
+        let receptance = match &self.waves {
+            Some(waves) => waves.receptance(0, (ZERO, omega), &self.directions)?,
+            None => self.receptance_at(ZERO, omega)?,
+        };
+        Ok((0..self.directions.len()).map(|q| receptance[(q, q)].norm()).collect())
+    }
+
+    /// How many sectors of a ring there are, and how large one is; of any other structure one, of no size that counts.
+    fn sectors(&self) -> (usize, usize) {
+        self.waves.as_ref().map_or((1, 0), |waves| (waves.cyclic.sectors, waves.sector.dofs()))
     }
 
     /// Modes in place of receptances, where these would be large matrices and no port asks for more than their products.
@@ -194,11 +268,20 @@ impl Rest {
         self.uncoupled.as_ref().filter(|_| ports.count() >= MANY && !ports.has_forces())
     }
 
-    /// Displacements along the axes under unit forces along them, at `s = jhΩ`, q × q, m/N.
+    /// The same for a harmonic: the mean alone is at rest.
+    fn closed_at(&self, harmonic: usize, omega: f64) -> Option<&Closed> {
+        if harmonic == 0 { self.closed(omega) } else { None }
+    }
+
+    /// Displacements along the axes under unit forces along them, at `s = jhΩ`, q × q, m/N. Of the mean with closed contacts, where these alone
+    /// hold it, see [`Rest::closed`].
     ///
     /// # Errors
     /// A resonance without damping.
     pub fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+        if let Some(closed) = self.closed_at(harmonic, omega) {
+            return closed.receptance(omega);
+        }
         let s = Complex64::new(0.0, harmonic as f64 * omega);
         match &self.waves {
             Some(waves) => waves.receptance(waves.cyclic.diameter(harmonic), (s, omega), &self.directions),
@@ -225,7 +308,7 @@ impl Rest {
         if let Some(uncoupled) = &self.uncoupled {
             return uncoupled.receptance(s, omega);
         }
-        if self.is_factored() {
+        if self.factored {
             let factor = self.factor(s, omega)?;
             let mut receptance = DMatrix::from_element(q, q, ZERO);
             // some at a time: all at once would fill the memory
@@ -266,7 +349,7 @@ impl Rest {
         Ok(sum)
     }
 
-    /// Displacements of all places under the complex forces `force` (length n, N), m.
+    /// Displacements of all places under the complex forces `force` (length n, N), m; of the mean as in [`Rest::receptance`].
     ///
     /// # Errors
     /// A resonance without damping.
@@ -276,6 +359,9 @@ impl Rest {
         omega: f64,
         force: &DVector<Complex64>,
     ) -> Result<DVector<Complex64>, Resonant> {
+        if let Some(closed) = self.closed_at(harmonic, omega) {
+            return closed.respond(omega, force);
+        }
         let s = Complex64::new(0.0, harmonic as f64 * omega);
         if let Some(uncoupled) = &self.uncoupled {
             return uncoupled.respond(s, omega, force);
@@ -283,7 +369,7 @@ impl Rest {
         if let Some(waves) = &self.waves {
             return waves.respond(waves.cyclic.diameter(harmonic), (s, omega), force);
         }
-        if self.is_factored() {
+        if self.factored {
             let mut x = force.clone();
             self.factor(s, omega)?.solve(x.as_mut_slice());
             return Ok(x);
@@ -360,7 +446,7 @@ impl Rest {
     /// `W f`: forces on all places from forces along the axes, those of a harmonic.
     pub fn spread(&self, harmonic: usize, along: impl Fn(usize) -> Complex64) -> DVector<Complex64> {
         let mut force = DVector::from_element(self.n, ZERO);
-        let (sectors, size) = self.waves.as_ref().map_or((1, 0), |waves| (waves.cyclic.sectors, waves.sector.dofs()));
+        let (sectors, size) = self.sectors();
         for sector in 0..sectors {
             let lead = self.waves.as_ref().map(|waves| waves.cyclic.lead(harmonic, sector));
             for (q, rows) in self.directions.iter().enumerate() {
@@ -375,10 +461,6 @@ impl Rest {
     fn dynamic(&self, s: Complex64) -> DMatrix<Complex64> {
         let Matrices { mass, damping, stiffness } = &**self.structure.full();
         DMatrix::from_fn(self.n, self.n, |i, k| s * s * mass[(i, k)] + s * damping[(i, k)] + stiffness[(i, k)])
-    }
-
-    fn is_factored(&self) -> bool {
-        is_factored(&self.structure)
     }
 
     /// Of a large structure: kept as long as the drive frequency stays.

@@ -222,6 +222,9 @@ impl Level {
         let mut held = Err(Lost { iterations: good.iterations, residual: f64::INFINITY, resonance: None });
         for _ in 0..60 {
             limits *= 4.0;
+            if self.stands() {
+                good = Motion { iterations: good.iterations, ..self.at_rest(limits) };
+            }
             held = self.newton(ports, omega, &mut good, Ease { limits, ..GIVEN }, ITERATIONS);
             if held.is_ok() || self.is_exhausted(ports) || good.iterations - motion.iterations > MOST_RAISING {
                 break;

@@ -35,6 +35,8 @@ pub(super) struct Sparse {
     forces: Vec<Option<usize>>,
     /// Per axis: (place, direction).
     ends: Vec<Vec<(usize, f64)>>,
+    /// Stiffness of closed contacts along the axes that the mean has, N/m; or empty.
+    springs: Vec<f64>,
     harmonics: Vec<f64>,
     omega: f64,
     /// Z per harmonic, factored.
@@ -91,6 +93,7 @@ impl Sparse {
             entries,
             forces,
             ends,
+            springs: Vec::new(),
             harmonics: harmonics.iter().map(|h| *h as f64).collect(),
             omega: 0.0,
             factors: vec![Banded::new(2 * whole, 2 * band + 1); nh],
@@ -101,12 +104,29 @@ impl Sparse {
         })
     }
 
+    /// The mean has closed contacts as stiff as this.
+    pub fn close(&mut self, springs: &[f64]) {
+        self.springs.clear();
+        self.springs.extend(springs);
+    }
+
+    /// What these springs add to the stiffness: positions of row and column, value.
+    fn closed(&self) -> Vec<(usize, usize, f64)> {
+        let pairs = |ends: &[(usize, f64)]| {
+            let all = ends.iter().flat_map(|a| ends.iter().map(move |b| (*a, *b)));
+            all.map(|((i, w), (l, v))| (self.position[i], self.position[l], w * v)).collect::<Vec<_>>()
+        };
+        let springs = self.ends.iter().zip(&self.springs);
+        springs.flat_map(|(ends, k)| pairs(ends).into_iter().map(move |(i, l, w)| (i, l, w * k))).collect()
+    }
+
     /// Factors the dynamic stiffness.
     ///
     /// # Errors
     /// The frequency, rad/s, of a harmonic at which it is singular.
     pub fn drive(&mut self, omega: f64) -> Result<(), f64> {
         self.omega = omega;
+        let closed = self.closed();
         for (k, factor) in self.factors.iter_mut().enumerate() {
             factor.clear();
             let rate = self.harmonics[k] * omega;
@@ -117,6 +137,10 @@ impl Sparse {
                 factor.add(row, column + 1, -z.im);
                 factor.add(row + 1, column, z.im);
                 factor.add(row + 1, column + 1, z.re);
+            }
+            for &(row, column, stiffness) in closed.iter().filter(|_| rate == 0.0) {
+                factor.add(2 * row, 2 * column, stiffness);
+                factor.add(2 * row + 1, 2 * column + 1, stiffness);
             }
             // the rows of unknown forces play no part here
             for &force in self.forces.iter().flatten() {
@@ -206,6 +230,11 @@ impl Sparse {
                 self.tangent.add(row + 1, column, z.im);
                 self.tangent.add(row + 1, column + 1, z.re);
             }
+        }
+        for (row, column, stiffness) in self.closed() {
+            // of the mean, which comes first
+            self.tangent.add(row * size, column * size, stiffness);
+            self.tangent.add(row * size + 1, column * size + 1, stiffness);
         }
         self.whole.fill(0.0);
         for (p, port) in ports.iter().enumerate() {

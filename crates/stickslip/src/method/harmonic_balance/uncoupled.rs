@@ -104,6 +104,16 @@ impl Uncoupled {
         sum
     }
 
+    /// Forces on the modes from those on all places.
+    pub fn onto_modes(&self, force: &DVector<f64>) -> DVector<f64> {
+        self.shapes.as_ref().map_or_else(|| force.clone(), |shapes| shapes.tr_mul(force))
+    }
+
+    /// Displacements of all places from those of the modes.
+    pub fn of_modes(&self, modal: &DVector<f64>) -> DVector<f64> {
+        self.shapes.as_ref().map_or_else(|| modal.clone(), |shapes| shapes * modal)
+    }
+
     /// Displacements of all places under the forces `force` on them.
     pub fn respond(
         &self,

@@ -120,6 +120,18 @@ impl Port {
         }
     }
 
+    /// Stiffness along one of its axes while its faces are closed and stick, N/m; zero where it is rigid, so that its force is an unknown.
+    pub fn closed(&self, axis: usize) -> f64 {
+        match &self.kernel {
+            Kernel::Sliders(parts) => parts.iter().map(Part::closed).sum(),
+            Kernel::Rigid(_) | Kernel::Prox(_) => 0.0,
+            Kernel::Step(law) | Kernel::Rate(law) => match law.closed() {
+                Some(closed) => closed[axis],
+                None => crate::method::guess::at_rest(&**law, 1.0)[(axis, axis)].re,
+            },
+        }
+    }
+
     /// How far its springs reach before they slip, m; zero if there are none.
     pub fn reach(&self) -> f64 {
         match &self.kernel {

@@ -36,6 +36,13 @@ impl Part {
         }
     }
 
+    /// While it touches, N/m.
+    pub fn closed(&self) -> f64 {
+        match *self {
+            Part::Slider { stiffness, .. } | Part::Stop { stiffness, .. } => stiffness,
+        }
+    }
+
     /// How far the spring of a slider reaches, m.
     pub fn reach(&self) -> f64 {
         match *self {

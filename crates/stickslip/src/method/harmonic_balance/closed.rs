@@ -1,0 +1,360 @@
+//! Bodies that nothing but contacts holds: the structure at rest with its contacts closed.
+//!
+//! The static receptance `R` of a structure that can move freely is that of the soft springs ([`HOLD`]) that stand for what is missing, ten orders
+//! above the compliance of contacts: mean positions would be the small difference of large ones, and residuals their rounding. So the springs `k`
+//! that the joints are while they stick, faces closed, are added to the structure, and taken off the forces:
+//!
+//! `(K + W k Wᵀ) x = F - W (f - k u)`, `u = Wᵀ x`,
+//!
+//! for the mean alone. That is the same equation for any `k`; all that is in it now has the size of the motion. A joint that sticks makes
+//! `f - k u` constant, so that static rest is one Newton step away.
+
+use super::hold::HOLD;
+use super::ports::Ports;
+use super::rest::Rest;
+use super::uncoupled::{Resonant, Uncoupled};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use std::cell::RefCell;
+use std::sync::Arc;
+use stickslip_numerics::dense::{Lu, multiply_in_blocks};
+
+/// Receptance of the structure alone, relative to the compliance of a closed contact, below which springs hold it well enough: two digits are lost.
+const SOFT: f64 = 1e2;
+/// A direction is held by [`HOLD`] alone if it moves so many times less at twice the frequency: of what is free the spring is four times as stiff
+/// there, and of what a damper alone holds twice.
+const FREE: f64 = 1.5;
+
+/// Stiffness along the axes of closed contacts, N/m.
+pub(super) fn springs(ports: &Ports) -> Vec<f64> {
+    let all = ports.iter().flat_map(|port| (0..port.axes).map(|axis| port.closed(axis)));
+    all.map(|k| if k.is_finite() && k > 0.0 { k } else { 0.0 }).collect()
+}
+
+/// Whether contacts of these stiffnesses hold what nothing else does: `own` are receptances at rest along each axis alone, with
+/// [`HOLD`] of a frequency.
+pub(super) fn hold(springs: &[f64], own: impl Fn(f64) -> Result<Vec<f64>, Resonant>, omega: f64) -> bool {
+    if springs.iter().all(|k| *k == 0.0) {
+        return false;
+    }
+    let Ok(once) = own(omega) else { return false };
+    if springs.iter().zip(&once).all(|(k, own)| k * own <= SOFT) {
+        return false;
+    }
+    let Ok(stiffer) = own(2.0 * omega) else { return false };
+    let free = once.iter().zip(&stiffer).map(|(once, stiffer)| *once > FREE * stiffer);
+    springs.iter().zip(&once).zip(free).any(|((k, own), free)| free && k * own > SOFT)
+}
+
+/// The structure at rest with its contacts closed.
+#[derive(Debug, Clone)]
+pub(super) struct Closed {
+    /// Stiffness along the axes, N/m.
+    pub springs: Vec<f64>,
+    form: Form,
+}
+
+#[derive(Debug, Clone)]
+enum Form {
+    Rows(Box<Rest>),
+    Modes(Modes),
+}
+
+/// Of a structure in modes: these are coupled by the contacts.
+#[derive(Debug, Clone)]
+pub(super) struct Modes {
+    structure: Arc<Uncoupled>,
+    /// `Φᵀ k Φ`.
+    coupling: Vec<f64>,
+    factor: RefCell<Option<(f64, Arc<Lu<f64>>)>>,
+}
+
+impl Closed {
+    pub fn of_rows(springs: Vec<f64>, with_springs: Rest) -> Self {
+        Closed { springs, form: Form::Rows(Box::new(with_springs)) }
+    }
+
+    pub fn of_modes(springs: Vec<f64>, structure: &Arc<Uncoupled>) -> Self {
+        let (p, n) = (structure.axes, structure.own.len());
+        let weighted: Vec<f64> =
+            structure.at.chunks_exact(p.max(1)).flat_map(|at| at.iter().zip(&springs).map(|(a, k)| a * k)).collect();
+        let mut coupling = vec![0.0; n * n];
+        // the columns of `at` are its modes, so that the first factor stands transposed
+        let rows: Vec<f64> =
+            (0..p).flat_map(|q| (0..n).map(move |m| (q, m))).map(|(q, m)| weighted[m * p + q]).collect();
+        multiply_in_blocks(&rows, &structure.at, &mut coupling, (n, p, n), false);
+        Closed {
+            springs,
+            form: Form::Modes(Modes { structure: structure.clone(), coupling, factor: RefCell::default() }),
+        }
+    }
+
+    /// Displacements of all places (m) under constant forces on them, N.
+    pub fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, Resonant> {
+        match &self.form {
+            Form::Rows(rest) => rest.respond(0, omega, force),
+            Form::Modes(modes) => modes.respond(omega, force),
+        }
+    }
+
+    /// Displacements along the axes under unit forces along them, m/N.
+    pub fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+        match &self.form {
+            Form::Rows(rest) => rest.receptance(0, omega),
+            Form::Modes(modes) => modes.receptance(omega),
+        }
+    }
+
+    /// The stiffness between modes, if the structure is in these.
+    pub fn of_the_modes(&self, omega: f64) -> Option<Result<Arc<Lu<f64>>, Resonant>> {
+        match &self.form {
+            Form::Rows(_) => None,
+            Form::Modes(modes) => Some(modes.factor(omega)),
+        }
+    }
+}
+
+impl Modes {
+    /// Kept as long as the drive frequency stays.
+    fn factor(&self, omega: f64) -> Result<Arc<Lu<f64>>, Resonant> {
+        let mut kept = self.factor.borrow_mut();
+        if let Some((of, factor)) = &*kept
+            && *of == omega
+        {
+            return Ok(factor.clone());
+        }
+        let n = self.structure.own.len();
+        let mut matrix = self.coupling.clone();
+        for (m, [mass, _, stiffness]) in self.structure.own.iter().enumerate() {
+            matrix[m * n + m] += stiffness + (HOLD * omega).powi(2) * mass;
+        }
+        let factor = Arc::new(Lu::new(matrix, n).map_err(|_| Resonant)?);
+        *kept = Some((omega, factor.clone()));
+        Ok(factor)
+    }
+
+    fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, Resonant> {
+        let factor = self.factor(omega)?;
+        // a mean has no imaginary part
+        let mut modal = self.structure.onto_modes(&force.map(|f| f.re));
+        factor.solve(modal.as_mut_slice());
+        Ok(self.structure.of_modes(&modal).map(|x| Complex64::new(x, 0.0)))
+    }
+
+    fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+        let factor = self.factor(omega)?;
+        let (p, n) = (self.structure.axes, self.structure.own.len());
+        let at = &self.structure.at;
+        let mut moved: Vec<f64> = (0..p).flat_map(|q| (0..n).map(move |m| at[m * p + q])).collect();
+        factor.solve(&mut moved);
+        let mut product = vec![0.0; p * p];
+        multiply_in_blocks(at, &moved, &mut product, (p, n, p), false);
+        Ok(DMatrix::from_iterator(p, p, product.into_iter().map(|r| Complex64::new(r, 0.0))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::HarmonicBalance;
+    use super::super::sparse::Sparse;
+    use super::*;
+    use crate::law::{FrictionContact, SharedLaw};
+    use crate::method::{Method, OrbitError};
+    use crate::model::{Axis, Cyclic, System};
+    use crate::orbit::Orbit;
+    use crate::structure::Structure;
+
+    const TANGENTIAL: f64 = 1.5e5;
+    const NORMAL: f64 = 2e5;
+    const FRICTION: f64 = 0.5;
+
+    fn contact(preload: f64) -> SharedLaw {
+        let (tangential, normal) = (TANGENTIAL, NORMAL);
+        Arc::new(FrictionContact { tangential, normal, friction: FRICTION, preload, tangents: 1 })
+    }
+
+    fn structure(mass: DMatrix<f64>, stiffness: DMatrix<f64>) -> Structure {
+        let n = mass.nrows();
+        let names = (0..n).map(|i| i.to_string()).collect();
+        Structure::new(names, mass, &stiffness * 1e-5, stiffness).unwrap()
+    }
+
+    fn orbit(system: &System, harmonics: usize, omega: f64) -> Result<Orbit, OrbitError> {
+        let method = HarmonicBalance { harmonics: Some(harmonics), ..HarmonicBalance::default() };
+        method.solver(system).unwrap().orbit(omega, None)
+    }
+
+    /// A mass along (x, z) on one contact of preload 10 N with the ground, with constant forces and a harmonic one along x.
+    fn block(constant: [f64; 2], amplitude: f64) -> System {
+        let structure = structure(DMatrix::identity(2, 2) * 0.7, DMatrix::zeros(2, 2));
+        let axes = vec![Axis::new(vec![(0, 1.0)]), Axis::new(vec![(1, 1.0)])];
+        let force = |i: usize| Complex64::new(constant[i], 0.0);
+        let builder = System::builder(structure).joint("contact", contact(10.0), axes);
+        let builder = builder.force(0, 0, force(0)).force(1, 0, force(1));
+        builder.force(0, 1, Complex64::new(amplitude, 0.0)).build().unwrap()
+    }
+
+    /// While the contact sticks, a free block is an oscillator on its springs: `F/|kt - m Ω²|`, below and above its resonance, and the normal
+    /// force is what presses it, to rounding.
+    #[test]
+    fn a_free_block_on_a_contact_that_sticks() {
+        for (pressed, ratio) in [(10.0, 0.01), (10.0, 0.6), (10.0, 1.7), (10.0, 20.0), (25.0, 0.6), (4.0, 0.6)] {
+            let omega = ratio * (TANGENTIAL / 0.7).sqrt();
+            let found = orbit(&block([0.0, pressed], 0.3), 3, omega).unwrap();
+            let amplitude = 0.3 / (TANGENTIAL - 0.7 * omega * omega).abs();
+            let (x, z) = (&found.places[0], &found.places[1]);
+            assert!((x.amplitude() / amplitude - 1.0).abs() < 1e-9, "{ratio}: {} {amplitude}", x.amplitude());
+            assert!((z.mean - (pressed - 10.0) / NORMAL).abs() < 1e-9 * 10.0 / NORMAL, "{pressed}: {}", z.mean);
+            assert!(found.evidence.residual < 1e-10, "{:?}", found.evidence);
+            assert!((found.sample(0.0).joints[0].force[1] / pressed - 1.0).abs() < 1e-9);
+        }
+    }
+
+    /// What presses it away, or drags it more than friction can, is no rest.
+    #[test]
+    fn loads_that_no_contact_carries_are_refused() {
+        for constant in [[0.0, -1.0], [6.0, 10.0]] {
+            let error = orbit(&block(constant, 0.3), 3, 200.0).unwrap_err();
+            assert_eq!(error.status(), "drifts", "{constant:?}: {error}");
+        }
+    }
+
+    /// A wedge between two faces at the angles `a` to the circumference: `N1 = C sin a2/sin(a1 + a2)`, and the other way round, whether the
+    /// faces are pressed as much before, otherwise, or not at all.
+    #[test]
+    fn a_wedge_between_two_faces() {
+        let (angles, pull) = ([0.4f64, 0.7], 30.0);
+        let sum = (angles[0] + angles[1]).sin();
+        let balance = [pull * angles[1].sin() / sum, pull * angles[0].sin() / sum];
+        for preloads in [balance, [12.0, 12.0], [0.0, 0.0]] {
+            let mut builder = System::builder(structure(DMatrix::identity(2, 2) * 0.004, DMatrix::zeros(2, 2)));
+            for (i, (a, preload)) in angles.iter().zip(preloads).enumerate() {
+                let side = if i == 0 { -1.0 } else { 1.0 };
+                let tangent = Axis::new(vec![(0, a.cos()), (1, -side * a.sin())]);
+                let normal = Axis::new(vec![(0, side * a.sin()), (1, a.cos())]);
+                builder = builder.joint(format!("face{i}"), contact(preload), vec![tangent, normal]);
+            }
+            let builder = builder.force(1, 0, Complex64::new(pull, 0.0));
+            let system = builder.force(0, 1, Complex64::new(0.5, 0.2)).build().unwrap();
+            let found = orbit(&system, 5, 900.0).unwrap();
+            assert!(found.joints.iter().all(|joint| joint.stick_fraction == 1.0), "{:?}", found.joints);
+            for (i, expected) in balance.iter().enumerate() {
+                let samples = 64;
+                let force = |k: usize| found.sample(found.period() * k as f64 / samples as f64).joints[i].force[1];
+                let mean = (0..samples).map(force).sum::<f64>() / samples as f64;
+                assert!((mean / expected - 1.0).abs() < 1e-9, "{preloads:?}: {mean} {expected}");
+            }
+        }
+    }
+
+    /// Small motion about rest on closed contacts of preload 10 N, one equation for the mean and one for the first harmonic: what the series of one
+    /// harmonic is while all stick.
+    fn stands(what: &str, system: &System, omega: f64) {
+        let structure = system.structure();
+        let n = structure.dofs();
+        let (mut held, mut loads) =
+            (structure.stiffness().clone(), [(); 2].map(|()| DVector::from_element(n, Complex64::ZERO)));
+        for (harmonic, force) in system.excitation(omega) {
+            loads[harmonic as usize] += force;
+        }
+        for joint in system.joints() {
+            for (axis, k) in joint.axes().iter().zip([TANGENTIAL, NORMAL]) {
+                let w = axis.dense(n);
+                held += &w * w.transpose() * k;
+                if k == NORMAL {
+                    loads[0] -= w.map(|w| Complex64::new(10.0 * w, 0.0));
+                }
+            }
+        }
+        let found = orbit(system, 1, omega).unwrap_or_else(|error| panic!("{what}: {error}"));
+        assert_eq!(found.evidence.stuck.len(), system.joints().len(), "{what}");
+        for (h, load) in loads.into_iter().enumerate() {
+            let s = Complex64::new(0.0, h as f64 * omega);
+            let at = |i, k| s * s * structure.mass()[(i, k)] + s * structure.damping()[(i, k)] + held[(i, k)];
+            let x = DMatrix::from_fn(n, n, at).lu().solve(&load).unwrap();
+            let size = x.iter().map(|x| x.norm()).fold(0.0, f64::max);
+            assert!(size > 0.0);
+            for (place, x) in found.places.iter().zip(x.iter()) {
+                let is = if h == 0 { Complex64::new(place.mean, 0.0) } else { place.first_harmonic };
+                assert!((is - x).norm() < 1e-8 * size, "{what}, harmonic {h}: {is} {x}");
+            }
+        }
+    }
+
+    /// Each contact is pressed by other than its preload.
+    fn pressed(i: usize) -> Complex64 {
+        Complex64::new(10.0 + ((i * 7) % 5) as f64, 0.0)
+    }
+
+    /// Free chains along (x, z) on contacts, in every form that receptances are kept in.
+    #[test]
+    fn chains_stand_on_their_contacts() {
+        for (masses, every, banded) in [(4, 1, false), (30, 1, true), (110, 36, false)] {
+            let n = 2 * masses;
+            let mut stiffness = DMatrix::zeros(n, n);
+            for a in 0..n - 2 {
+                let b = a + 2;
+                for (r, c, k) in [(a, a, 3e6), (b, b, 3e6), (a, b, -3e6), (b, a, -3e6)] {
+                    stiffness[(r, c)] += k;
+                }
+            }
+            let mut builder = System::builder(structure(DMatrix::identity(n, n) * 0.5, stiffness));
+            for i in (0..masses).step_by(every) {
+                let axes = vec![Axis::new(vec![(2 * i, 1.0)]), Axis::new(vec![(2 * i + 1, 1.0)])];
+                builder = builder.joint(format!("contact{i}"), contact(10.0), axes).force(2 * i + 1, 0, pressed(i));
+            }
+            let system = builder.force(0, 1, Complex64::new(0.2, 0.0)).build().unwrap();
+            assert_eq!(Sparse::new(&system, &Ports::new(&system).unwrap(), &[0, 1]).is_some(), banded);
+            stands(&format!("{masses} masses"), &system, 300.0);
+        }
+    }
+
+    /// A free bar in its modes, along (x, z): `cos πmξ`, also where so many contacts stand on it that receptances are not formed.
+    #[test]
+    fn modes_stand_on_their_contacts() {
+        let modes = 30;
+        for contacts in [8, 80] {
+            let n = 2 * modes;
+            let diagonal =
+                |of: &dyn Fn(usize) -> f64| DMatrix::from_fn(n, n, |i, k| if i == k { of(i / 2) } else { 0.0 });
+            let mut builder = System::builder(structure(diagonal(&|_| 1.0), diagonal(&|m| 2e5 * (m as f64).powi(4))));
+            let mut load = vec![Complex64::ZERO; n];
+            for i in 0..contacts {
+                let place = (i as f64 + 0.5) / contacts as f64;
+                let shape = |m: usize| (std::f64::consts::PI * m as f64 * place).cos();
+                let along = |axis: usize| Axis::new((0..modes).map(|m| (2 * m + axis, shape(m))).collect());
+                builder = builder.joint(format!("contact{i}"), contact(10.0), vec![along(0), along(1)]);
+                (0..modes).for_each(|m| load[2 * m + 1] += pressed(i) * shape(m));
+            }
+            for (i, force) in load.into_iter().enumerate() {
+                builder = builder.force(i, 0, force);
+            }
+            let system = builder.force(4, 1, Complex64::new(0.2, 0.0)).build().unwrap();
+            let ports = Ports::new(&system).unwrap();
+            assert_eq!(Rest::new(&system, &ports).modes_for(&ports).is_some(), contacts == 80);
+            stands(&format!("{contacts} contacts"), &system, 300.0);
+        }
+    }
+
+    /// One sector of a free ring.
+    #[test]
+    fn rings_stand_on_their_contacts() {
+        let (sectors, order) = (7, 2);
+        let n = 2 * sectors;
+        let mut stiffness = DMatrix::zeros(n, n);
+        for a in 0..n {
+            let b = (a + 2) % n;
+            for (r, c, k) in [(a, a, 3e5), (b, b, 3e5), (a, b, -3e5), (b, a, -3e5)] {
+                stiffness[(r, c)] += k;
+            }
+        }
+        let cyclic = Cyclic { sectors, order };
+        let mut builder = System::builder(structure(DMatrix::identity(n, n) * 0.5, stiffness));
+        for i in 0..sectors {
+            let axes = vec![Axis::new(vec![(2 * i, 1.0)]), Axis::new(vec![(2 * i + 1, 1.0)])];
+            builder = builder.joint(format!("contact{i}"), contact(10.0), axes).force(2 * i + 1, 0, pressed(1));
+            builder = builder.force(2 * i, 1, cyclic.lead(1, i) * 0.2);
+        }
+        stands("ring", &builder.build().unwrap().travelling(cyclic).unwrap(), 300.0);
+    }
+}
