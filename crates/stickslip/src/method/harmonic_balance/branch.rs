@@ -185,7 +185,7 @@ impl Equations for BranchEquations<'_> {
     }
 
     fn tolerance(&self) -> f64 {
-        super::equations::SOLVED / RESONANCE
+        super::ease::SOLVED / RESONANCE
     }
 
     fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool {

@@ -9,7 +9,7 @@
 //!
 //! Memory: per harmonic two complex matrices over the axes, or in modes two real ones over the axes and one over axes and modes.
 
-use super::equations::{Ease, Level, SOLVED, unit};
+use super::ease::{Ease, SOLVED};
 use super::hold::{CLEAR, stay};
 use super::ports::{Port, Ports, block};
 use super::receptance::{Modal, Receptance};
@@ -62,70 +62,57 @@ pub(super) struct Coupled {
 }
 
 /// The equations at a motion, as a product needs them.
-struct Linear<'a> {
-    ports: &'a Ports,
-    harmonics: &'a [usize],
-    omega: f64,
-    ease: Ease,
-    length: f64,
-    penalty: &'a [f64],
-    tangents: &'a [f64],
-    blocks: &'a [usize],
-    units: &'a [f64],
+pub(super) struct Linear<'a> {
+    pub ports: &'a Ports,
+    pub harmonics: &'a [usize],
+    pub omega: f64,
+    pub ease: Ease,
+    pub length: f64,
+    pub penalty: &'a [f64],
+    pub tangents: &'a [f64],
+    pub blocks: &'a [usize],
+    pub units: &'a [f64],
 }
 
-impl Level {
-    /// The Newton step from `self.step`, the residual in units, into it; `residual` is the size of that. False if it was not found.
-    pub(super) fn coupled_step(
+impl Coupled {
+    /// The Newton step from the residual in units, in `step`, into it; `residual` is the size of that. Whether it was found, and the products that it
+    /// took; a step that was not found is the residual still.
+    pub(super) fn step(
         &mut self,
-        ports: &Ports,
-        omega: f64,
-        ease: Ease,
-        (length, residual): (f64, f64),
-    ) -> bool {
-        let Some(mut coupled) = self.coupled.take() else { return false };
-        let linear = Linear {
-            ports,
-            harmonics: &self.alternation.harmonics,
-            omega,
-            ease,
-            length,
-            penalty: &self.penalty,
-            tangents: &self.tangents,
-            blocks: &self.blocks,
-            units: &self.units,
-        };
-        let coarsest = if matches!(self.receptance, Receptance::Modal(_)) { COARSEST_OF_MODES } else { COARSEST };
+        linear: &Linear<'_>,
+        receptance: &mut Receptance,
+        step: &mut [f64],
+        residual: f64,
+    ) -> (bool, usize) {
+        let coarsest = if matches!(receptance, Receptance::Modal(_)) { COARSEST_OF_MODES } else { COARSEST };
         let wanted = (SHARE * residual).min(coarsest).max(SHARE * SOLVED / residual.max(SOLVED));
         let limits = Limits { tolerance: wanted, vectors: VECTORS, products: PRODUCTS };
-        let right = self.step.clone();
-        let mut fresh = false;
-        let Coupled { gmres, split, above, force, moved } = &mut coupled;
-        let receptance = &mut self.receptance;
+        let right = step.to_vec();
+        let (mut fresh, mut products) = (false, 0);
+        let Coupled { gmres, split, above, force, moved } = self;
         let found = loop {
             let Some(preconditioner) = linear.preconditioner(receptance, (&mut *split, &mut *above), &mut fresh) else {
                 break false;
             };
             let most = if fresh { limits } else { Limits { products: STALE, vectors: STALE, ..limits } };
             let outcome = gmres.solve(
-                &mut self.step,
+                step,
                 most,
                 |v, out| linear.multiply(receptance, (&mut *force, &mut *moved), v, out),
-                |v| preconditioner.apply(&linear, v),
+                |v| preconditioner.apply(linear, v),
             );
-            self.products += outcome.products;
+            products += outcome.products;
             if fresh || outcome.solved {
                 break outcome.solved || outcome.residual <= USEFUL;
             }
             // a stiffness of another motion
             *above = split.take().map(|split| (split.bound, split.above));
-            self.step.copy_from_slice(&right);
+            step.copy_from_slice(&right);
         };
-        self.coupled = Some(coupled);
         if !found {
-            self.step.copy_from_slice(&right);
+            step.copy_from_slice(&right);
         }
-        found && self.step.iter().all(|d| d.is_finite())
+        (found && step.iter().all(|d| d.is_finite()), products)
     }
 }
 
@@ -153,7 +140,7 @@ impl Linear<'_> {
         // f_y
         for (p, port) in self.ports.iter().enumerate() {
             let wide = pair * port.axes;
-            let unit = unit(port, self.length);
+            let unit = port.unit(self.length);
             let v = &v[port.first * pair..][..wide];
             let force = &mut force[port.first * nh..][..wide / 2];
             if port.is_force() {
@@ -169,7 +156,7 @@ impl Linear<'_> {
         for (p, port) in self.ports.iter().enumerate() {
             let wide = pair * port.axes;
             let range = port.first * pair..port.first * pair + wide;
-            let unit = unit(port, self.length);
+            let unit = port.unit(self.length);
             let (v, out, units) = (&v[range.clone()], &mut out[range.clone()], &self.units[range]);
             let moved = &moved[port.first * nh..][..wide / 2];
             if !port.is_force() {
@@ -319,7 +306,7 @@ impl Preconditioner<'_> {
             Preconditioner::Split(split) => split.apply(v),
         }
         for port in linear.ports.iter() {
-            let unit = unit(port, linear.length);
+            let unit = port.unit(linear.length);
             v[2 * nh * port.first..2 * nh * (port.first + port.axes)].iter_mut().for_each(|v| *v /= unit);
         }
     }
@@ -457,7 +444,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::equations::{GIVEN, Motion};
+    use super::super::ease::GIVEN;
+    use super::super::equations::{Level, Motion};
     use super::super::rest::Rest;
     use super::super::uncoupled::Uncoupled;
     use super::*;

@@ -17,7 +17,8 @@
 //!
 //! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian frequency-time method".
 
-use super::coupled::{Coupled, by_products};
+use super::coupled::{Coupled, Linear, by_products};
+use super::ease::{Ease, GIVEN};
 use super::hold::{CLEAR, stay};
 use super::ports::{Alternation, Port, Ports, block, blocks};
 use super::receptance::{Modal, Receptance};
@@ -30,9 +31,6 @@ use num_complex::Complex64;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Residual relative to the motion, and to the slip limits, at which the equations count as solved: a thousand times the rounding of a
-/// stiff system.
-pub(super) const SOLVED: f64 = 1e-10;
 /// The penalty ε is the contact's impedance at the highest harmonic times `1 + RIPPLE / highest`. Above that harmonic a series cannot
 /// follow the force: with a larger ε it chatters in stick, with a smaller one a passage through zero is blurred. The second term
 /// makes the passage sharp where the harmonics are few and do not chatter, so that one harmonic is the describing function.
@@ -117,16 +115,6 @@ impl Motion {
     }
 }
 
-/// The equations between the given ones and those that are easier to solve.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Ease {
-    /// Every law gives this many times the force that it has at the inverse share of the motion: with a large one slip limits are high, and
-    /// whatever is not linear is far away.
-    pub limits: f64,
-    /// Factor on the penalty.
-    pub penalty: f64,
-}
-
 /// Which ports' derivatives an evaluation makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Slopes {
@@ -135,8 +123,6 @@ pub(super) enum Slopes {
     Cheap,
     All,
 }
-
-pub(super) const GIVEN: Ease = Ease { limits: 1.0, penalty: 1.0 };
 
 impl Level {
     pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, sparse: Option<Sparse>) -> Self {
@@ -478,7 +464,7 @@ impl Level {
     fn measure(&mut self, ports: &Ports, motion: &Motion, length: f64) {
         let nh = self.harmonics().len();
         for port in ports.iter() {
-            let unit = unit(port, length);
+            let unit = port.unit(length);
             self.units[2 * nh * port.first..2 * nh * (port.first + port.axes)].fill(unit);
             if port.is_force() || self.alternation.harmonics[0] != 0 {
                 continue;
@@ -512,6 +498,31 @@ impl Level {
             }
         }
         forces
+    }
+
+    /// The Newton step by products, from `self.step`, the residual in units, into it; `residual` is the size of that. False if it was not found.
+    pub(super) fn coupled_step(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        ease: Ease,
+        (length, residual): (f64, f64),
+    ) -> bool {
+        let Some(coupled) = &mut self.coupled else { return false };
+        let linear = Linear {
+            ports,
+            harmonics: &self.alternation.harmonics,
+            omega,
+            ease,
+            length,
+            penalty: &self.penalty,
+            tangents: &self.tangents,
+            blocks: &self.blocks,
+            units: &self.units,
+        };
+        let (found, products) = coupled.step(&linear, &mut self.receptance, &mut self.step, residual);
+        self.products += products;
+        found
     }
 
     /// The Jacobian from the tangents: rows and columns in units. False where receptances are no matrices.
@@ -607,7 +618,7 @@ impl Level {
                 }
                 let unit_of_row = self.units[at];
                 for column in ports.iter() {
-                    let scale = unit(column, length) / unit_of_row;
+                    let scale = column.unit(length) / unit_of_row;
                     if scale != 1.0 {
                         let columns = column.first * pair..(column.first + column.axes) * pair;
                         line[columns].iter_mut().for_each(|j| *j *= scale);
@@ -657,7 +668,7 @@ impl Level {
         for port in ports.iter() {
             let values = if port.is_force() { &motion.force } else { &motion.c };
             for value in &values[port.first * nh..(port.first + port.axes) * nh] {
-                let value = value / unit(port, length);
+                let value = value / port.unit(length);
                 out.extend([value.re, value.im]);
             }
         }
@@ -671,7 +682,7 @@ impl Level {
             let values = if port.is_force() { &mut motion.force } else { &mut motion.c };
             let range = port.first * nh..(port.first + port.axes) * nh;
             for (value, pair) in values[range.clone()].iter_mut().zip(unknowns[2 * range.start..].chunks_exact(2)) {
-                *value = Complex64::new(pair[0], pair[1]) * unit(port, length);
+                *value = Complex64::new(pair[0], pair[1]) * port.unit(length);
             }
         }
     }
@@ -692,11 +703,6 @@ impl Level {
 pub(super) fn penalty(receptance: f64, top: usize, omega: f64) -> f64 {
     let impedance = 1.0 / (receptance * top as f64 * omega);
     impedance * (1.0 + RIPPLE / top as f64)
-}
-
-/// Unit of a port's unknowns: the motion's length, m, or the law's scale, N.
-pub(super) fn unit(port: &Port, length: f64) -> f64 {
-    if port.is_force() { port.scale } else { length }
 }
 
 /// Weight of a harmonic in norms: that of its velocity.

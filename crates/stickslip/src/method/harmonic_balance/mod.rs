@@ -16,6 +16,7 @@ mod arc;
 mod branch;
 mod closed;
 mod coupled;
+mod ease;
 mod equations;
 mod hold;
 mod mode;

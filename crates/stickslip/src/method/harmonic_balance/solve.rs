@@ -2,7 +2,8 @@
 //! lowered from where everything sticks.
 
 use super::coupled::FORMED;
-use super::equations::{Ease, GIVEN, Level, Motion, SOLVED, Slopes, unit};
+use super::ease::{Ease, GIVEN, SOLVED};
+use super::equations::{Level, Motion, Slopes};
 use super::ports::Ports;
 use super::sparse::Along;
 use num_complex::Complex64;
@@ -150,7 +151,7 @@ impl Level {
                 }
                 for port in ports.iter() {
                     let steps = &mut self.step[pair * port.first..pair * (port.first + port.axes)];
-                    steps.iter_mut().for_each(|d| *d /= unit(port, length));
+                    steps.iter_mut().for_each(|d| *d /= port.unit(length));
                 }
                 true
             }
@@ -179,7 +180,7 @@ impl Level {
                 if port.is_force() { (&mut motion.force, &self.before.force) } else { (&mut motion.c, &self.before.c) };
             for i in range {
                 let d = Complex64::new(self.step[2 * i], self.step[2 * i + 1]);
-                values[i] = before[i] - d * (fraction * unit(port, length));
+                values[i] = before[i] - d * (fraction * port.unit(length));
             }
         }
     }

@@ -66,6 +66,11 @@ impl Port {
         matches!(self.kernel, Kernel::Rigid(_) | Kernel::Prox(_))
     }
 
+    /// Unit of its unknowns: the motion's length, m, or the law's scale, N.
+    pub fn unit(&self, length: f64) -> f64 {
+        if self.is_force() { self.scale } else { length }
+    }
+
     /// Whether its law is followed through the period, step by step, so that derivatives cost many times what forces cost.
     pub fn marches(&self) -> bool {
         matches!(self.kernel, Kernel::Step(_))
