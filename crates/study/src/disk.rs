@@ -7,9 +7,10 @@ use crate::near::{nearest, shown};
 use crate::statement::{Environment, Stated, StatedTable};
 use crate::study::{Structure, problem_of, sector_of};
 use crate::values::{Given, Values};
-use std::collections::HashMap;
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
 use stickslip::model::{Around, Disk, DiskPart, Element, LEAST_SECTORS, Model, normal_pattern};
-use stickslip::structure::{Axis, Boundary, Component, Reduction};
+use stickslip::structure::{Axis, Boundary, Component, Faces, FacesError, Node, Reduction};
 
 /// `[disk]` as it is stated.
 #[derive(Debug, Clone)]
@@ -19,6 +20,8 @@ pub(crate) struct StatedDisk {
     pub pattern: Option<Vec<f64>>,
     /// Nodes of the low and the high side of a sector by its matrices.
     pub boundary: Option<Vec<(String, String)>>,
+    /// Where its nodes stand.
+    pub nodes: Option<Vec<Node>>,
     /// Nodes of its blade.
     pub blade: Option<Vec<String>>,
 }
@@ -87,11 +90,8 @@ pub(crate) fn ring_of(
     if problems.len() > before {
         return first;
     }
-    if let Err(problem) = tied(structure, disk, &mut first) {
-        problems.push(problem);
-        return first;
-    }
     let made = sectors(disk, &values).and_then(|sectors| {
+        tied(structure, disk, sectors, &mut first).map_err(|problem| vec![problem])?;
         let around = Disk { sectors, forces, motions };
         let deviations = deviations(disk, &values, sectors)?;
         let all = match &deviations {
@@ -128,11 +128,11 @@ pub(crate) fn ring_of(
 }
 
 /// Ties a sector by its matrices to the next.
-fn tied(structure: &Structure, disk: &StatedDisk, sector: &mut Model) -> Result<(), Problem> {
+fn tied(structure: &Structure, disk: &StatedDisk, sectors: usize, sector: &mut Model) -> Result<(), Problem> {
     let table = &disk.table;
     let problem = |key: &'static str, message: String| Problem::new(table.place_of(key, None), key, message);
     if structure.matrices.is_none() {
-        return match ["boundary", "axis", "blade"].into_iter().find(|key| table.entry(key).is_some()) {
+        return match ["boundary", "nodes", "axis", "blade"].into_iter().find(|key| table.entry(key).is_some()) {
             Some(key) => {
                 Err(problem(key, format!("`{key}` belongs to a sector by its matrices, and there is no [structure]"))
                     .help("masses and springs of neighbouring sectors are joined by `next.NAME`"))
@@ -141,12 +141,6 @@ fn tied(structure: &Structure, disk: &StatedDisk, sector: &mut Model) -> Result<
         };
     }
     let Some(substructure) = &mut sector.substructure else { return Ok(()) }; // names alone
-    let Some(pairs) = &disk.boundary else {
-        let message =
-            "a sector by its matrices needs `boundary`: the node pairs of its low and its high side".to_owned();
-        return Err(problem("boundary", message)
-            .help("write boundary = \"pairs.csv\", a file with the columns low,high, and axis = \"z\""));
-    };
     let axis = match table.entry("axis").map(|entry| &entry.value) {
         Some(Stated::Fixed(Given::Text(axis))) => [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)]
             .into_iter()
@@ -154,13 +148,71 @@ fn tied(structure: &Structure, disk: &StatedDisk, sector: &mut Model) -> Result<
         _ => None,
     };
     let component = &substructure.component;
+    let pairs = pairs(disk, component, axis, sectors)?;
     let boundary =
-        Boundary::of_nodes(component, pairs, axis).map_err(|error| problem("boundary", error.to_string()))?;
-    let blade = blade_rows(component, disk.blade.as_deref().unwrap_or_default());
+        Boundary::of_nodes(component, &pairs, axis).map_err(|error| problem("boundary", error.to_string()))?;
+    let nodes = disk.blade.as_deref();
+    let blade = blade_rows(component, nodes.unwrap_or_default());
     let blade =
         blade.map_err(|node| problem("blade", format!("the structure has no rows of node `{}`", shown(node))))?;
+    if nodes.is_some() && blade.is_empty() {
+        let help = "name all nodes of the blade, and not those of the disk that it stands on";
+        return Err(problem("blade", "the file names no node".to_owned()).help(help));
+    }
+    let shared: HashSet<usize> = boundary.low_rows().chain(boundary.high_rows()).collect();
+    if let Some(row) = blade.iter().find(|row| shared.contains(*row)) {
+        let message = format!(
+            "row `{}` of the blade stands on the boundary of the sector, and belongs to two blades then",
+            shown(&component.rows()[*row])
+        );
+        return Err(problem("blade", message).help("leave out the nodes that `boundary` names"));
+    }
     substructure.disk = Some(DiskPart { boundary, blade, deviations: Vec::new() });
     Ok(())
+}
+
+/// The node pairs of both sides: those that are named, which are those of the coordinates where these are known, or the latter.
+fn pairs<'a>(
+    disk: &'a StatedDisk,
+    component: &Component,
+    axis: Option<Axis>,
+    sectors: usize,
+) -> Result<Cow<'a, [(String, String)]>, Problem> {
+    let table = &disk.table;
+    let problem = |key: &'static str, message: String| Problem::new(table.place_of(key, None), key, message);
+    let Some(nodes) = &disk.nodes else {
+        return disk.boundary.as_deref().map(Cow::from).ok_or_else(|| {
+            let message = "a sector by its matrices needs `boundary`: the node pairs of its low and its high side";
+            problem("boundary", message.to_owned()).help(
+                "write boundary = \"pairs.csv\", a file with the columns low,high, and axis = \"z\"; or nodes = \"sector.inp\", and the pairs follow",
+            )
+        });
+    };
+    let Some(axis) = axis else {
+        let message = "coordinates tell the sides of a sector by a turn about the axis, and there is no `axis`";
+        return Err(problem("nodes", message.to_owned()).help("add axis = \"z\", or leave `nodes` out"));
+    };
+    // a node that is held, or a centre of rotation, has no rows and cannot be tied
+    let moving = component.rows().iter().filter_map(|row| Some(row.rsplit_once('.')?.0));
+    let named = disk.boundary.iter().flatten().flat_map(|(low, high)| [low.as_str(), high.as_str()]);
+    let counts: HashSet<&str> = moving.chain(named).collect();
+    let stand: Vec<Node> = nodes.iter().filter(|(name, _)| counts.contains(name.as_str())).cloned().collect();
+    let faces = Faces::new(&stand, axis, sectors);
+    let key = if disk.boundary.is_some() { "boundary" } else { "nodes" };
+    let found = match &disk.boundary {
+        Some(named) => faces.check(named).map(|()| Cow::from(named.as_slice())),
+        None => faces.pairs().map(Cow::from),
+    };
+    found.map_err(|error| {
+        let help = match &error {
+            FacesError::Unknown(_) => "name every node of both sides in `nodes`",
+            FacesError::Missing { .. } => "add the pair, or leave `boundary` out: the pairs follow from `nodes`",
+            FacesError::Apart { .. } | FacesError::None { .. } => {
+                "mend the pairs, `axis` or `sectors`; without `boundary` the pairs follow from `nodes`"
+            }
+        };
+        problem(key, error.to_string()).help(help)
+    })
 }
 
 /// The rows of these nodes, or a node that has none.

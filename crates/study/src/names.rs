@@ -34,6 +34,7 @@ impl Names {
         let places = model.places.iter().flat_map(|place| entries(&place.name, place.places()));
         let mut names = Names { known: places.chain(of_masses(model)).collect() };
         names.around(model, model.masses.iter().map(|mass| (mass.name.as_str(), mass.places())).collect());
+        names.around(model, model.places.iter().map(|place| (place.name.as_str(), place.places())).collect());
         names
     }
 

@@ -352,6 +352,13 @@ const DISK: &[Key] = &[
         "\"sector_boundary.csv\"",
     ),
     optional(
+        "nodes",
+        Takes::Text,
+        "where the nodes of that sector stand: a CSV file with the columns node, x, y, z, or an input deck with *NODE; `boundary` is held against it, \
+         and follows from it if it is absent",
+        "\"sector.inp\"",
+    ),
+    optional(
         "axis",
         Takes::Choice(axes),
         "the axis of the disk, if rows are along x, y, z: the next sector is turned about it by the right-hand rule, and the high side lies \

@@ -544,7 +544,7 @@ impl Study {
     pub fn matrices_check(&self) -> Option<String> {
         let own = self.structure.matrices.as_ref().and_then(Matrices::check)?;
         let sector = self.structure.lists.disk.as_ref().map_or(0, |disk| {
-            let files = format!("{:?} {:?} {:?}", disk.pattern, disk.boundary, disk.blade);
+            let files = format!("{:?} {:?} {:?} {:?}", disk.pattern, disk.boundary, disk.nodes, disk.blade);
             crc32fast::hash(files.as_bytes())
         });
         Some(format!("{own}{sector:08x}"))

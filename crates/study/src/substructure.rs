@@ -11,6 +11,8 @@ use stickslip::structure::{Component, Reduction, ReductionKind};
 
 /// So many harmonics of the highest drive frequency count where the file does not say how far a reduction must reach.
 const HARMONICS: f64 = 5.0;
+/// Damping ratio from which a mode creeps.
+const CRITICAL: f64 = 1.0;
 /// Names of the directions of a node with a normal.
 const IN_FRAME: [&str; 3] = ["t1", "t2", "n"];
 /// What the rows of a node with a normal are called.
@@ -36,6 +38,11 @@ pub(crate) fn of(
         problems.push(Problem::new(table.place_of("stiffened", None), "stiffened", error.to_string()));
         component.clone()
     });
+    if let Some(ratio) = values.quantity("modal_damping").filter(|ratio| *ratio >= CRITICAL) {
+        let message = format!("a damping ratio of {ratio}, and from 1 on no mode vibrates");
+        let problem = Problem::new(table.place_of("modal_damping", None), "modal_damping", message);
+        problems.push(problem.help("say percent, as in modal_damping = \"0.1 %\""));
+    }
     let damping = match (values.quantity("modal_damping"), values.table("rayleigh")) {
         (Some(ratio), _) => SubstructureDamping::Ratio(ratio),
         (None, Some(rayleigh)) => SubstructureDamping::Rayleigh {

@@ -245,6 +245,8 @@ fn stiffened(key: &str, disk: &str, more: &str) -> Result<Study, StudyError> {
     write("strange.csv", "low,high\n1,9\n");
     write("wrong.csv", "left,right\n1,2\n");
     write("blade.csv", "node\n3\n4\n");
+    write("rim_blade.csv", "node\n1\n3\n4\n");
+    write("no_blade.csv", "node\n");
     let text = format!(
         "schema = 1\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\ndofs = \"rows.csv\"\nunits = \"m-kg-s\"\n\
          modal_damping = 0.002\nreduce = {{ modes = 3 }}\n{key}\n[disk]\nsectors = 6\n{disk}\n[[place]]\nname = \"tip\"\ndof = \"4.x\"\n{more}"
@@ -357,6 +359,8 @@ fn wrong_sectors_by_matrices_are_refused_at_their_place() {
         ("boundary = \"strange.csv\"", "constrain both alike"),
         ("boundary = \"pairs.csv\"\naxis = \"z\"", "constrain both alike"),
         ("boundary = \"pairs.csv\"\nblade = \"pairs.csv\"", "expected the columns node"),
+        ("boundary = \"pairs.csv\"\nblade = \"rim_blade.csv\"", "row `1.x` of the blade stands on the boundary"),
+        ("boundary = \"pairs.csv\"\nblade = \"no_blade.csv\"", "names no node"),
         ("boundary = \"pairs.csv\"\nmistuning = { of = \"blade.stiffness\", deviation = 0.1 }", "add blade = "),
     ] {
         assert!(refused(disk).contains(words), "{disk}: {}", refused(disk));
@@ -366,6 +370,99 @@ fn wrong_sectors_by_matrices_are_refused_at_their_place() {
         error.message().contains("cannot be read") || error.message().contains("no [structure]"),
         "{}",
         error.message()
+    );
+}
+
+/// A sector of six whose nodes move along x, y and z: a rim of two nodes at either side, and a blade node between them.
+fn in_space(disk: &str, more: &str) -> Result<Study, StudyError> {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let at =
+        |radius: f64, degrees: f64| [radius * degrees.to_radians().cos(), radius * degrees.to_radians().sin(), 0.0];
+    let nodes = [at(50.0, 10.0), at(80.0, 10.0), at(50.0, 70.0), at(80.0, 70.0), at(120.0, 40.0)];
+    let (mut k, mut m, mut rows, mut stand) =
+        (Vec::new(), Vec::new(), "row,name\n".to_owned(), "node,x,y,z\n".to_owned());
+    let tied = [(0, 1, 3e5), (2, 3, 3e5), (0, 2, 2e5), (1, 3, 2e5), (1, 4, 5e4), (3, 4, 4e4)];
+    for (node, [x, y, z]) in nodes.iter().enumerate() {
+        stand += &format!("{},{x:.6},{y:.6},{z}\n", node + 1);
+        for (axis, along) in ["x", "y", "z"].into_iter().enumerate() {
+            let row = 3 * node + axis + 1;
+            rows += &format!("{row},{}.{along}\n", node + 1);
+            let own: f64 = tied.iter().filter(|(a, b, _)| [*a, *b].contains(&node)).map(|(_, _, k)| k).sum();
+            k.push(format!("{row} {row} {}", own + 1e4));
+            m.push(format!("{row} {row} 0.2"));
+        }
+    }
+    for (a, b, stiffness) in tied {
+        (1..=3).for_each(|axis| k.push(format!("{} {} -{stiffness}", 3 * b + axis, 3 * a + axis)));
+    }
+    for (name, entries) in [("k.mtx", &k), ("m.mtx", &m)] {
+        let head = format!("%%MatrixMarket matrix coordinate real symmetric\n15 15 {}\n", entries.len());
+        write(name, &(head + &entries.join("\n") + "\n"));
+    }
+    write("rows.csv", &rows);
+    write("nodes.csv", &stand);
+    for (name, pairs) in [("right", "1,3\n2,4"), ("swapped", "3,1\n4,2"), ("crossed", "1,4\n2,3"), ("few", "1,3")] {
+        write(&format!("{name}.csv"), &format!("low,high\n{pairs}\n"));
+    }
+    let text = format!(
+        "schema = 1\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\ndofs = \"rows.csv\"\nunits = \"m-kg-s\"\n\
+         modal_damping = 0.002\nreduce = {{ modes = 6 }}\n[disk]\n{disk}\n[[place]]\nname = \"tip\"\nnodes = [\"5\"]\n{more}"
+    );
+    write("disk.toml", &text);
+    stickslip_study::read_file(&folder.path().join("disk.toml"), &[])
+}
+
+/// Coordinates tell which nodes of both sides are one, and whether what was said of them is right.
+#[test]
+fn coordinates_tell_a_wrong_sector() {
+    let study = "[study]\nkind = \"nodal-diameter\"\nmodes = 2\n";
+    let frequencies = |disk: &str| {
+        let data = run(&in_space(disk, study).unwrap(), &Context::unwatched(1)).unwrap();
+        data.tables[0].numbers("frequency_Hz").unwrap().to_vec()
+    };
+    let named = frequencies("sectors = 6\naxis = \"z\"\nboundary = \"right.csv\"");
+    assert_eq!(frequencies("sectors = 6\naxis = \"z\"\nnodes = \"nodes.csv\"\nboundary = \"right.csv\""), named);
+    assert_eq!(frequencies("sectors = 6\naxis = \"z\"\nnodes = \"nodes.csv\""), named);
+    // matrices alone do not tell
+    let exchanged = frequencies("sectors = 6\naxis = \"z\"\nboundary = \"swapped.csv\"");
+    assert!(exchanged.iter().zip(&named).any(|(a, b)| (a / b - 1.0).abs() > 1e-3), "{exchanged:?} {named:?}");
+    let refused = |disk: &str| {
+        let error = in_space(&format!("nodes = \"nodes.csv\"\n{disk}"), study).unwrap_err();
+        format!("{} {}", error, error.help_text().unwrap_or_default())
+    };
+    for (disk, words) in [
+        ("sectors = 6\naxis = \"z\"\nboundary = \"swapped.csv\"", "the sides are exchanged"),
+        ("sectors = 6\naxis = \"z\"\nboundary = \"crossed.csv\"", "away from node `4`"),
+        ("sectors = 6\naxis = \"z\"\nboundary = \"few.csv\"", "no pair names them"),
+        ("sectors = 7\naxis = \"z\"\nboundary = \"right.csv\"", "as on a disk of 6.00 sectors"),
+        ("sectors = 7\naxis = \"z\"", "number of sectors"),
+        ("sectors = 6\naxis = \"x\"\nboundary = \"right.csv\"", "they fit about z"),
+        ("sectors = 6\nboundary = \"right.csv\"", "there is no `axis`"),
+    ] {
+        assert!(refused(disk).contains(words), "{disk}: {}", refused(disk));
+    }
+}
+
+/// The peaks of a node of a sector: of all its directions, or of one, in all sectors.
+#[test]
+fn peaks_are_those_of_a_node_in_all_sectors() {
+    let peaks = |of: &str| {
+        let more = format!(
+            "[[force]]\non = \"tip.z\"\namplitude = \"1 N\"\nengine_order = 1\n[[force]]\non = \"tip.x\"\namplitude = \"2 N\"\nengine_order = 1\n\
+             [study]\nkind = \"response\"\nfrequency = {{ from = \"60 Hz\", to = \"130 Hz\", points = 141 }}\npeak_of = \"{of}\"\n\
+             [method]\nkind = \"harmonic-balance\"\nharmonics = 1\ntolerance = 0.9\n"
+        );
+        let study = in_space("sectors = 6\naxis = \"z\"\nboundary = \"right.csv\"", &more).unwrap();
+        let data = run(&study, &Context::unwatched(1)).unwrap();
+        let peaks = data.tables.iter().find(|table| table.name == "peaks").unwrap();
+        peaks.texts("mass").unwrap().to_vec()
+    };
+    assert!(peaks("tip").iter().all(|mass| mass.starts_with("tip_")), "{:?}", peaks("tip"));
+    let along = peaks("tip.z");
+    assert!(
+        !along.is_empty() && along.iter().all(|mass| mass.starts_with("tip_") && mass.ends_with(".z")),
+        "{along:?}"
     );
 }
 
@@ -399,6 +496,11 @@ fn amplification_is_the_ratio_of_two_studies() {
     }
     let tuned = column(&text("0 %", "amplification = true"), "amplification", "amplification");
     assert!((tuned[0] - 1.0).abs() < 1e-9, "{tuned:?}");
+    let warned = |text: &str| {
+        let study = read_study("disk.toml", text, &[]).unwrap();
+        stickslip_study::run::check(&study).unwrap().summary().warnings.join("; ").contains("all blades are alike")
+    };
+    assert!(warned(&text("0 %", "amplification = true")) && !warned(&text("3 %", seeds)));
     // Whitehead's bound of six blades in the linear limit
     assert!(ratios.iter().all(|ratio| *ratio < 0.5 * (1.0 + 6f64.sqrt())), "{ratios:?}");
     let found = result(&text("3 %", seeds));

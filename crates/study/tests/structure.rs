@@ -171,6 +171,32 @@ fn reductions_are_as_good_as_they_say() {
     }
 }
 
+/// Drawn parameters in a study of matrices alone: every draw is the response with its values, all on one reduction.
+#[test]
+fn parameters_of_a_structure_are_drawn() {
+    let brick = blade();
+    let (node, z) = (tip(&brick, 0, 1), brick.row([8, 0, 1], 2).unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "npz", (1.0, 1.0));
+    let more = format!("{DAMPED}\nreduce = {{ up_to = \"5 kHz\", tolerance = 1e-7 }}");
+    let text = structure("npz", "rows.csv", "m-kg-s", &more)
+        + &place("tip", &node)
+        + "[parameters]\nF = \"1 N\"\nk = \"1 N/m\"\n[sample]\ncount = 3\nseed = 5\n\
+           of = { F = { uniform = [\"1 N\", \"2 N\"] }, k = { uniform = [\"1e4 N/m\", \"2e4 N/m\"] } }\n\
+           [[spring]]\nbetween = [\"tip.z\", \"ground\"]\nstiffness = \"k\"\n[[force]]\non = \"tip.z\"\namplitude = \"F\"\n\
+           [study]\nkind = \"response\"\nfrequency = [\"300 Hz\", \"900 Hz\"]\n";
+    let data = results(folder.path(), &text);
+    let drawn = |name: &str| numbers(&data, name).to_vec();
+    let (forces, springs, found) = (drawn("F_N"), drawn("k_N_per_m"), drawn("tip_z_amplitude_m"));
+    assert!(found.len() == 6 && forces[0] != forces[2] && springs[0] != springs[2], "{forces:?} {springs:?}");
+    for row in 0..found.len() {
+        let mut load = DVector::zeros(brick.dofs());
+        load[z] = forces[row];
+        let expected = dense(&brick, [300.0, 900.0][row % 2], &load, &[(z, 0.0, springs[row])])[z].norm();
+        assert!((found[row] / expected - 1.0).abs() < 1e-5, "{row}: {} {expected}", found[row]);
+    }
+}
+
 /// A lumped mass on a spring to the ground, tied to the blade, and a mass that has no other place than a row of it.
 #[test]
 fn masses_and_springs_are_added_at_places() {
@@ -211,7 +237,7 @@ fn rows_can_be_moved() {
     let name = named(&brick)[other].clone();
     let folder = tempfile::tempdir().unwrap();
     write_pair(folder.path(), &brick, "mtx", (1.0, 1.0));
-    for (reduce, tolerance) in [("false", 1e-8)] {
+    for (reduce, tolerance) in [("false", 1e-8), ("{ up_to = \"5 kHz\", tolerance = 1e-7 }", 1e-5)] {
         let text = structure("mtx", "rows.csv", "m-kg-s", &format!("{DAMPED}\nreduce = {reduce}"))
             + &format!(
                 "[[place]]\nname = \"tip\"\ndof = \"{node}.z\"\n[[place]]\nname = \"middle\"\ndof = \"{name}\"\n"
@@ -318,9 +344,20 @@ fn what_is_wrong_is_said() {
     told("dofs = [", "normal = [0, 0, 0]\ndofs = [", &["normal"]);
     told("tip.z", "tip", &["several directions"]);
     told("tip.z", "top.z", &["no place `top.z`"]);
-    // what is moved in few coordinates takes all other places along
-    let moved = format!("{DAMPED}\n[[motion]]\non = \"tip.x\"\namplitude = \"1 mm\"");
-    told(DAMPED, &moved, &["few coordinates", "reduce = false"]);
+    // what is moved takes along what is the same
+    let twin = format!("dofs = [\"{node}.x\", \"{node}.y\", \"{node}.z\"]\n");
+    let moved = format!(
+        "{twin}[[place]]\nname = \"twin\"\ndof = \"{node}.x\"\n[[motion]]\non = \"twin\"\namplitude = \"1 mm\"\n"
+    );
+    told(&twin, &moved, &["`tip.x` follows `twin`", "leave out the place"]);
+    for ratio in ["1e300", "2"] {
+        told(DAMPED, &format!("modal_damping = {ratio}"), &["study.toml:7", "no mode vibrates", "0.1 %"]);
+    }
+    told(
+        DAMPED,
+        &format!("{DAMPED}\nreduce = {{ up_to = \"1e12 Hz\" }}"),
+        &["near those that the structure has", "lowest frequencies"],
+    );
     // stiffness in other units than was said: frequencies of 5e-4 Hz, and of 5e8 Hz
     let other = good.replacen("k.mtx\"\nmass = \"m.mtx", "k.npz\"\nmass = \"m.npz", 1);
     for unit in [1e12, 1e-12] {

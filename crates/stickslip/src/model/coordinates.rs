@@ -11,8 +11,10 @@ use super::place::Place;
 use super::places::{Of, Places};
 use crate::structure::ReducedComponent;
 use crate::structure::reduction::Row;
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use stickslip_numerics::eigen;
 
 /// Coordinates of a model.
 pub(super) struct Coordinates {
@@ -29,6 +31,8 @@ pub(super) struct Coordinates {
     pub reduced: Option<Arc<ReducedComponent>>,
 }
 
+/// Places beyond which moved displacements are not kept from them: their Gram matrix would be large.
+const MOST_UNSEEN: usize = 2000;
 /// A moved place that depends on the others by all but this share is no coordinate of its own.
 const DEPENDENT: f64 = 1e-10;
 
@@ -81,7 +85,9 @@ impl Coordinates {
             .filter(|(place, _)| place.moved)
             .map(|(place, row)| (place.name.as_str(), row))
             .collect();
-        let turned = Turned::new(names.len(), &moved)?;
+        let mut turned = Turned::new(names.len(), &moved)?;
+        let others = places.stated.iter().zip(&rows).filter(|(place, _)| !place.moved);
+        turned.unseen(&others.map(|(_, row)| turned.row(row)).collect::<Vec<Row>>());
         let placed: Vec<Row> = rows.iter().map(|row| turned.row(row)).collect();
         follows(model, places, &placed, turned.free)?;
         Ok(Coordinates {
@@ -131,7 +137,7 @@ impl Order {
     }
 }
 
-/// Refuses places that follow a moved one directly, as all do in few coordinates: results are read off the free coordinates alone.
+/// Refuses places that follow moved ones whatever the structure does: results are read off the free coordinates alone.
 fn follows(model: &Model, places: &Places, rows: &[Row], free: usize) -> Result<(), ModelError> {
     for (place, row) in places.stated.iter().zip(rows).filter(|(place, _)| !place.moved) {
         let size = row.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
@@ -141,8 +147,8 @@ fn follows(model: &Model, places: &Places, rows: &[Row], free: usize) -> Result<
             places.stated.iter().filter(|place| place.moved).nth(at - free).map_or("", |place| place.name.as_str());
         let motion = model.motions.iter().position(|motion| motion.on == name).unwrap_or(0);
         let message = format!(
-            "`{}` follows `{name}`, whose motion is imposed, as places of a structure in few coordinates do; say reduce = false in \
-             [structure], or move another place that a stiff spring ties to it",
+            "`{}` follows `{name}`, whose motion is imposed: they are weighted sums of the same rows, or the few coordinates of a reduction do not \
+             tell them apart; leave out the place, or say reduce = false in [structure]",
             place.name
         );
         return Err(ModelError::new(Element::Motion(motion), "on", message));
@@ -192,6 +198,43 @@ impl Turned {
             None => vec![(renumber(at), 1.0)],
         };
         Ok(Turned { free, rows: (0..count).map(row).collect(), pivot })
+    }
+
+    /// Chooses what the coordinates do with a moved displacement so that none of these places, over free and moved coordinates, sees it directly: in few
+    /// coordinates all places would, as none of them is a coordinate. `x = Z q + t u` is the same structure for every `t` that moves the moved place by
+    /// one, and that with the least norm and no motion of the others is taken. Where there is none the places stay as they are.
+    fn unseen(&mut self, others: &[Row]) {
+        let size = |row: &Row| row.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
+        let moved = self.rows.iter().flatten().map(|(at, _)| (at + 1).saturating_sub(self.free)).max().unwrap_or(0);
+        let follows =
+            |row: &Row| row.iter().any(|(at, weight)| *at >= self.free && weight.abs() > DEPENDENT * size(row));
+        if others.len() > MOST_UNSEEN || !others.iter().any(follows) {
+            return;
+        }
+        let mut parts = DMatrix::zeros(others.len(), self.free + moved);
+        for (place, row) in others.iter().enumerate().filter(|(_, row)| size(row) > 0.0) {
+            row.iter().for_each(|(at, weight)| parts[(place, *at)] += weight / size(row));
+        }
+        let (own, direct) = (parts.columns(0, self.free), parts.columns(self.free, moved));
+        let Some(eigen) = eigen::symmetric(own * own.transpose()) else { return };
+        let least = DEPENDENT * eigen.eigenvalues.amax();
+        let inverse = eigen.eigenvalues.map(|value| if value > least { 1.0 / value } else { 0.0 });
+        let shapes = &eigen.eigenvectors;
+        let weights = shapes * DMatrix::from_diagonal(&inverse) * (shapes.transpose() * direct);
+        let with = own.transpose() * weights * -1.0;
+        for row in &mut self.rows {
+            let more: Row = (0..moved)
+                .map(|k| {
+                    (
+                        self.free + k,
+                        row.iter().filter(|(at, _)| *at < self.free).map(|(at, w)| w * with[(*at, k)]).sum(),
+                    )
+                })
+                .filter(|(_, weight)| *weight != 0.0)
+                .collect();
+            row.extend(more);
+            *row = combined(std::mem::take(row));
+        }
     }
 
     /// A weighted sum of the coordinates over free and then moved ones.

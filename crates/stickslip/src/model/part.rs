@@ -3,7 +3,7 @@
 use super::error::{Element, ModelError};
 use super::{DiskPart, Model, Substructure, SubstructureDamping};
 use crate::structure::reduction::{Damping, Reduced, ReductionError, Row};
-use crate::structure::{KeptSector, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow};
+use crate::structure::{KeptSector, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorBlade};
 use std::sync::Arc;
 
 /// Row, column, value.
@@ -116,11 +116,15 @@ impl Part {
         }
         let seen: Vec<Row> = stated.iter().flat_map(|place| place.rows.iter().cloned()).collect();
         let kept = component.sector(&disk.boundary, sectors);
-        let whole = matches!(reduction, Reduction::None);
-        let one = if whole {
-            OneSector::whole(substructure, &kept, &seen)?
-        } else {
-            OneSector::reduced(substructure, &kept, &seen, sectors)?
+        let blade = match disk.deviations.iter().any(|deviation| *deviation != 0.0) {
+            true => Some(kept.blade(component, &disk.blade)),
+            false => None,
+        };
+        let blade = blade.transpose();
+        let blade = blade.map_err(|error| ModelError::new(Element::Substructure, "blade", error.to_string()))?;
+        let one = match reduction {
+            Reduction::None => OneSector::whole(substructure, &kept, &seen, blade.as_deref())?,
+            _ => OneSector::reduced(substructure, &kept, &seen, blade.as_deref().map(|blade| (blade, disk)), sectors)?,
         };
         let n = one.names.len();
         let at = |sector: usize, shift: i64, row: usize| {
@@ -131,13 +135,8 @@ impl Part {
             all.map(|(s, &(row, column, shift, value))| (at(s, 0, row), at(s, shift, column), value)).collect()
         };
         let [mass, damping, mut stiffness] = one.entries.each_ref().map(|entries| around(entries));
-        if disk.deviations.iter().any(|deviation| *deviation != 0.0) {
-            let asked = (!whole).then_some((seen.as_slice(), reduction));
-            let blade = kept.blade(component, &disk.blade, asked);
-            let blade = blade.map_err(|error| ModelError::new(Element::Substructure, "blade", error.to_string()))?;
-            for (s, &deviation) in disk.deviations.iter().enumerate().filter(|(_, deviation)| **deviation != 0.0) {
-                stiffness.extend(blade.iter().map(|(i, k, value)| (at(s, 0, *i), at(s, 0, *k), deviation * value)));
-            }
+        for (s, &deviation) in disk.deviations.iter().enumerate().filter(|(_, deviation)| **deviation != 0.0) {
+            stiffness.extend(one.of_blade.iter().map(|(i, k, value)| (at(s, 0, *i), at(s, 0, *k), deviation * value)));
         }
         let mut next = 0;
         let mut places = Vec::with_capacity(model.places.len());
@@ -160,11 +159,18 @@ struct OneSector {
     /// Of everything that is seen of it.
     places: Vec<RingRow>,
     entries: [Vec<RingEntry>; 3],
+    /// What a share of one of its blade's stiffness adds, where the blades differ.
+    of_blade: Vec<(usize, usize, f64)>,
     reduced: Option<Arc<ReducedComponent>>,
 }
 
 impl OneSector {
-    fn whole(substructure: &Substructure, kept: &KeptSector, seen: &[Row]) -> Result<Self, ModelError> {
+    fn whole(
+        substructure: &Substructure,
+        kept: &KeptSector,
+        seen: &[Row],
+        blade: Option<&SectorBlade>,
+    ) -> Result<Self, ModelError> {
         let sector = &kept.sector;
         let damping = match substructure.damping {
             SubstructureDamping::Own => sector.damping.clone().unwrap_or_default(),
@@ -178,6 +184,7 @@ impl OneSector {
             names: sector.kept.iter().map(|&row| row_name(row, &rows[row])).collect(),
             places: seen.iter().map(|row| sector.row(row)).collect(),
             entries: [sector.mass.clone(), damping, sector.stiffness.clone()],
+            of_blade: blade.map_or_else(Vec::new, |blade| blade.entries().to_vec()),
             reduced: None,
         })
     }
@@ -186,9 +193,16 @@ impl OneSector {
         substructure: &Substructure,
         kept: &KeptSector,
         seen: &[Row],
+        blade: Option<(&SectorBlade, &DiskPart)>,
         sectors: usize,
     ) -> Result<Self, ModelError> {
-        let component = kept.reduced(seen, &substructure.reduction).map_err(failed)?;
+        let how = &substructure.reduction;
+        let mistuned = blade.map(|(blade, disk)| kept.mistuned(blade, &disk.deviations, seen, how));
+        let mistuned = mistuned.transpose().map_err(failed)?;
+        let component = match &mistuned {
+            Some(mistuned) => mistuned.component.clone(),
+            None => kept.reduced(seen, how).map_err(failed)?,
+        };
         let ReducedForm::Sector(sector) = component.form() else { return Err(failed(ReductionError::NoPorts)) };
         let damping = match damping_law(substructure, &component) {
             Some(law) => sector.damped(&law, sectors).map_err(failed)?,
@@ -200,6 +214,7 @@ impl OneSector {
             names: (1..=sector.dofs()).map(|number| format!("coordinate {number}")).collect(),
             places,
             entries: [sector.mass.clone(), damping, sector.stiffness.clone()],
+            of_blade: mistuned.map_or_else(Vec::new, |mistuned| mistuned.of_blade().to_vec()),
             reduced: Some(component),
         })
     }
@@ -341,7 +356,9 @@ mod tests {
         model.substructure.as_mut().unwrap().disk.as_mut().unwrap().blade = vec![1];
         assert!(assembled(&model).unwrap_err().message.contains("boundary of the sector"));
         model.substructure.as_mut().unwrap().disk.as_mut().unwrap().blade = vec![];
-        assert!(assembled(&model).unwrap_err().message.contains("name all nodes"));
+        assert!(assembled(&model).unwrap_err().message.contains("has no node"));
+        model.substructure.as_mut().unwrap().disk.as_mut().unwrap().blade = vec![0, 2, 3];
+        assert!(assembled(&model).unwrap_err().message.contains("boundary of the sector"));
         model.substructure.as_mut().unwrap().disk = None;
         let disk = Disk { sectors: 5, ..Disk::default() };
         assert!(disk.ring(|_| model.clone()).unwrap_err().message.contains("node pairs"));

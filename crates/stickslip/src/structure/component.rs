@@ -1,16 +1,17 @@
 //! A structure by its matrices, as finite-element programs write them, before it becomes a part of a model: what its rows are called, and what
 //! a model sees of it, in few coordinates or in all.
 
-use super::cyclic::{BladeError, Boundary, CyclicSector};
+use super::cyclic::{Blade, BladeError, Boundary, CyclicSector};
 use super::reduction::{
-    Damping, Deviation, Free, Reduce, Reduced, ReducedSector, ReductionError, Reference, Row, Whole,
+    Damping, Deviation, Free, MistunedRing, Reduce, Reduced, ReducedSector, ReductionError, Reference, Row, STEPS,
+    Whole, alone, lacking_most,
 };
 use super::{StructureError, symmetric};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use stickslip_numerics::definite::sparse_definite;
-use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted};
+use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes, Wanted};
 
 /// Matrices of a structure and the names of their rows. A copy is a reference to the same matrices, and to the reductions made of them.
 ///
@@ -51,14 +52,39 @@ struct Kept {
 pub(crate) struct KeptSector {
     pub sector: CyclicSector,
     reductions: Mutex<Vec<(Asked, Answer)>>,
-    blades: Mutex<Vec<(OfBlade, Relieved)>>,
+    blades: Mutex<Vec<(Vec<usize>, Result<Arc<SectorBlade>, BladeError>)>>,
 }
 
-/// Rows of a blade, and the reduction in whose coordinates it is asked for.
-type OfBlade = (Vec<usize>, Option<Asked>);
+/// The blade of a sector, and what was asked of it.
+#[derive(Debug)]
+pub(crate) struct SectorBlade {
+    blade: Blade,
+    /// The sector with its neighbours held.
+    alone: OnceLock<Result<Factor, ReductionError>>,
+    entries: OnceLock<Vec<(usize, usize, f64)>>,
+    /// In the coordinates of a reduction with that many steps of its vectors.
+    reductions: Mutex<Vec<((Asked, usize), Relieved)>>,
+    /// By the deviations of all blades.
+    mistuned: Mutex<Vec<((Asked, Vec<f64>), MistunedSector)>>,
+}
 
-/// What a share of one of the blade's stiffness adds, over the coordinates of a sector.
-type Relieved = Result<Arc<Vec<(usize, usize, f64)>>, BladeError>;
+type Relieved = Result<Arc<InFew>, ReductionError>;
+
+/// A sector in few coordinates, and what a share of one of its blade's stiffness adds over them.
+#[derive(Debug)]
+struct InFew {
+    component: Arc<ReducedComponent>,
+    of_blade: Vec<(usize, usize, f64)>,
+    /// Frequencies of modes that lack most when the blades differ, rad/s.
+    suspect: Vec<f64>,
+}
+
+/// A sector for a ring whose blades differ.
+#[derive(Debug, Clone)]
+pub(crate) struct MistunedSector {
+    pub component: Arc<ReducedComponent>,
+    few: Arc<InFew>,
+}
 
 type Asked = (Vec<Row>, Reduction);
 type Answer = Result<Arc<ReducedComponent>, ReductionError>;
@@ -124,7 +150,7 @@ pub(crate) enum Form {
     /// Of a component; without its basis.
     Alone(Reduced),
     /// Of one sector of a ring.
-    Sector(ReducedSector),
+    Sector(Arc<ReducedSector>),
 }
 
 /// A mode that is kept, in multiples of the frequency up to which it serves: the last ones only complete those below.
@@ -239,29 +265,120 @@ fn once<K: PartialEq + Clone, V: Clone>(known: &Mutex<Vec<(K, V)>>, asked: &K, c
 impl KeptSector {
     /// The sector in few coordinates.
     pub fn reduced(&self, seen: &[Row], how: &Reduction) -> Answer {
-        once(&self.reductions, &(seen.to_vec(), *how), || {
-            let chosen = self.sector.reduced(seen, how)?;
-            let (deviation, frequencies) = (chosen.deviation, chosen.frequencies);
-            let form = Form::Sector(chosen.reduced);
-            Ok(Arc::new(ReducedComponent { form, deviation, frequencies, free: chosen.free, up_to: chosen.up_to }))
+        once(&self.reductions, &(seen.to_vec(), *how), || self.chosen(seen, how, None))
+    }
+
+    fn chosen(&self, seen: &[Row], how: &Reduction, blade: Option<(&Blade, usize)>) -> Answer {
+        let chosen = self.sector.reduced(seen, how, blade)?;
+        let (deviation, frequencies) = (chosen.deviation, chosen.frequencies);
+        let form = Form::Sector(Arc::new(chosen.reduced));
+        Ok(Arc::new(ReducedComponent { form, deviation, frequencies, free: chosen.free, up_to: chosen.up_to }))
+    }
+
+    /// The blade that the rows `blade` of the component are.
+    pub fn blade(&self, component: &Component, blade: &[usize]) -> Result<Arc<SectorBlade>, BladeError> {
+        once(&self.blades, &blade.to_vec(), || {
+            let blade = self.sector.blade(component, blade)?;
+            let (alone, entries) = (OnceLock::new(), OnceLock::new());
+            Ok(Arc::new(SectorBlade {
+                blade,
+                alone,
+                entries,
+                reductions: Mutex::default(),
+                mistuned: Mutex::default(),
+            }))
         })
     }
 
-    /// What a share of one of the stiffness of the blade, the rows `blade` of the component, adds: over the coordinates of that reduction, or
-    /// over all rows that are left.
-    pub fn blade(&self, component: &Component, blade: &[usize], reduced: Option<(&[Row], &Reduction)>) -> Relieved {
-        let asked = reduced.map(|(seen, how)| (seen.to_vec(), *how));
-        once(&self.blades, &(blade.to_vec(), asked), || {
-            let own = self.sector.blade(component, blade)?;
-            let Some((seen, how)) = reduced else { return Ok(Arc::new(own.entries())) };
-            let reduced = self.reduced(seen, how).ok();
-            let Some(Form::Sector(sector)) = reduced.as_deref().map(ReducedComponent::form) else {
-                return Ok(Arc::default()); // its reduction has failed before
+    /// The sector in few coordinates for a ring whose blades deviate by these shares of their stiffness: with as many vectors of the blade as the
+    /// error of that ring asks for, or with those that come nearest.
+    pub fn mistuned(
+        &self,
+        blade: &SectorBlade,
+        deviations: &[f64],
+        seen: &[Row],
+        how: &Reduction,
+    ) -> Result<MistunedSector, ReductionError> {
+        let asked = ((seen.to_vec(), *how), deviations.to_vec());
+        let known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, answer)) = known.iter().find(|(key, _)| *key == asked) {
+            return Ok(answer.clone());
+        }
+        // others wait for no pattern but their own
+        drop(known);
+        let answer = self.nearest(blade, deviations, seen, how)?;
+        blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner).push((asked, answer.clone()));
+        Ok(answer)
+    }
+
+    fn nearest(
+        &self,
+        blade: &SectorBlade,
+        deviations: &[f64],
+        seen: &[Row],
+        how: &Reduction,
+    ) -> Result<MistunedSector, ReductionError> {
+        let ring = MistunedRing::new(&self.sector, (&blade.blade, blade.alone(&self.sector)?), deviations, seen)?;
+        let (steps, enough) = match *how {
+            Reduction::UpTo { tolerance, .. } => (STEPS.len(), tolerance),
+            _ => (1, f64::INFINITY),
+        };
+        let mut best: Option<MistunedSector> = None;
+        for step in 0..steps {
+            // what has served is kept where more of it fails
+            let few = match (self.few(blade, seen, how, step), &best) {
+                (Ok(few), _) => few,
+                (Err(_), Some(_)) => continue,
+                (Err(error), None) => return Err(error),
             };
-            let small = own.along(sector.n, &sector.basis);
-            let all = (0..small.ncols()).flat_map(|k| (0..small.nrows()).map(move |i| (i, k)));
-            Ok(Arc::new(all.map(|at| (at.0, at.1, small[at])).collect()))
+            let own = &few.component;
+            let Form::Sector(sector) = &own.form else { return Err(ReductionError::NoPorts) };
+            let most = if step + 1 < steps { enough } else { f64::INFINITY };
+            let found = ring.deviation(sector, &few.of_blade, &few.suspect, own.up_to, most)?;
+            let deviation = if found.error > own.deviation.error { found } else { own.deviation };
+            let nearer = best.as_ref().is_none_or(|best| deviation.error < best.component.deviation.error);
+            if nearer {
+                let component = Arc::new(ReducedComponent { deviation, ..ReducedComponent::clone(own) });
+                best = Some(MistunedSector { component, few });
+            }
+            if deviation.error <= enough {
+                break;
+            }
+        }
+        best.ok_or(ReductionError::NoPorts)
+    }
+
+    /// With the vectors of the blade from that step on.
+    fn few(&self, blade: &SectorBlade, seen: &[Row], how: &Reduction, step: usize) -> Relieved {
+        once(&blade.reductions, &((seen.to_vec(), *how), step), || {
+            let component = match step {
+                0 => self.reduced(seen, how)?,
+                _ => self.chosen(seen, how, Some((&blade.blade, step)))?,
+            };
+            let Form::Sector(sector) = &component.form else { return Err(ReductionError::NoPorts) };
+            let of_blade = blade.blade.along(sector.n, &sector.basis);
+            let alone = blade.alone(&self.sector)?;
+            let suspect = lacking_most(&self.sector, &blade.blade, alone, sector, component.up_to)?;
+            Ok(Arc::new(InFew { component, of_blade, suspect }))
         })
+    }
+}
+
+impl SectorBlade {
+    fn alone(&self, sector: &CyclicSector) -> Result<&Factor, ReductionError> {
+        self.alone.get_or_init(|| alone(sector)).as_ref().map_err(Clone::clone)
+    }
+
+    /// What a share of one of its stiffness adds, over all rows that are left.
+    pub fn entries(&self) -> &[(usize, usize, f64)] {
+        self.entries.get_or_init(|| self.blade.entries())
+    }
+}
+
+impl MistunedSector {
+    /// What a share of one of the blade's stiffness adds, over the coordinates.
+    pub fn of_blade(&self) -> &[(usize, usize, f64)] {
+        &self.few.of_blade
     }
 }
 

@@ -9,7 +9,7 @@
 use super::component::Component;
 use super::reduction::{Damping, ReductionError, Row, Whole};
 use super::sector::in_wave;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use stickslip_numerics::sparse::{Analysis, Matrix};
 
@@ -87,9 +87,32 @@ pub enum BoundaryError {
 /// Names of directions that are turned together.
 const DIRECTIONS: [[&str; 3]; 2] = [["x", "y", "z"], ["rx", "ry", "rz"]];
 
+impl std::fmt::Display for Axis {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(DIRECTIONS[0][*self as usize])
+    }
+}
+
 impl Axis {
+    /// Distance of a point from it.
+    pub(super) fn radius(self, at: [f64; 3]) -> f64 {
+        let [a, b] = self.across(at);
+        a.hypot(b)
+    }
+
+    /// The angle from one point to another about it, rad, from -π to π.
+    pub(super) fn angle(self, from: [f64; 3], to: [f64; 3]) -> f64 {
+        let ([a, b], [c, d]) = (self.across(from), self.across(to));
+        (a * d - b * c).atan2(a * c + b * d)
+    }
+
+    fn across(self, at: [f64; 3]) -> [f64; 2] {
+        let own = self as usize;
+        [at[(own + 1) % 3], at[(own + 2) % 3]]
+    }
+
     /// Displacements along fixed axes of what moved along x, y, z of a sector that lies further by `angle` (rad).
-    fn turn(self, angle: f64) -> [[f64; 3]; 3] {
+    pub(super) fn turn(self, angle: f64) -> [[f64; 3]; 3] {
         let (sin, cos) = angle.sin_cos();
         let own = self as usize;
         let (a, b) = ((own + 1) % 3, (own + 2) % 3);
@@ -183,6 +206,12 @@ impl Boundary {
     pub fn high_rows(&self) -> impl Iterator<Item = usize> + '_ {
         let turned = self.turned.iter().flat_map(|[_, high]| high.iter().flatten().copied());
         self.alike.iter().map(|[_, high]| *high).chain(turned)
+    }
+
+    /// The rows of the low side, which the sector before shares.
+    pub fn low_rows(&self) -> impl Iterator<Item = usize> + '_ {
+        let turned = self.turned.iter().flat_map(|[low, _]| low.iter().flatten().copied());
+        self.alike.iter().map(|[low, _]| *low).chain(turned)
     }
 
     /// Every row of the high side as (row, rows of the low side of the next sector with their weights), on a disk of so many sectors.
@@ -279,10 +308,15 @@ impl CyclicSector {
     /// following its foundation, over the rows that are left.
     pub fn blade(&self, component: &Component, blade: &[usize]) -> Result<Blade, BladeError> {
         let (_, _, stiffness) = component.matrices();
+        if blade.is_empty() {
+            return Err(BladeError::Empty);
+        }
+        // what the sector before ends with
+        let low: BTreeSet<usize> = self.rows.iter().flatten().filter(|part| part.1 == 1).map(|part| part.0).collect();
         let mut inside = BTreeMap::new();
         for &row in blade {
             match self.rows[row][..] {
-                [(at, 0, 1.0)] => inside.insert(row, at),
+                [(at, 0, 1.0)] if !low.contains(&at) => inside.insert(row, at),
                 _ => return Err(BladeError::OnBoundary(component.rows()[row].clone())),
             };
         }
@@ -320,6 +354,9 @@ pub enum BladeError {
         "row `{0}` of the blade stands on the boundary of the sector, or beside it: only what one sector has alone can be mistuned"
     )]
     OnBoundary(String),
+    /// There is none.
+    #[error("the blade has no node")]
+    Empty,
     /// It is no cantilever.
     #[error(
         "with all other rows held the blade can still move, or nothing else holds it: name all nodes of the blade, and not those of the disk"
@@ -364,20 +401,25 @@ impl Blade {
         all
     }
 
-    /// The same over columns of length `n` of displacements of the rows that are left: `Gᵀ K_bb⁻¹ G` with `G = K_bb V_b + K_bi V_i`.
-    pub fn along(&self, n: usize, basis: &[f64]) -> nalgebra::DMatrix<f64> {
-        let size = self.at.len();
-        let mut forces = Vec::with_capacity(size * basis.len() / n.max(1));
-        for column in basis.chunks_exact(n) {
-            let moved: Vec<f64> = self.at.iter().map(|at| column[*at]).collect();
-            let mut force = self.own.times(&moved);
-            self.towards.iter().for_each(|(row, at, value)| force[*row] += value * column[*at]);
-            forces.extend(force);
-        }
-        let mut moved = forces.clone();
-        self.factor.solve(&mut moved);
-        let energy = stickslip_numerics::sparse::columns::products(size, &forces, &moved);
-        (&energy + energy.transpose()) * 0.5
+    /// Their product with displacements of the rows that are left: forces on these.
+    pub fn times(&self, displacements: &[f64]) -> Vec<f64> {
+        let moved: Vec<f64> = self.at.iter().map(|at| displacements[*at]).collect();
+        let mut forces = self.own.times(&moved);
+        self.towards.iter().for_each(|(row, at, value)| forces[*row] += value * displacements[*at]);
+        let mut all = vec![0.0; displacements.len()];
+        self.at.iter().zip(&forces).for_each(|(at, force)| all[*at] = *force);
+        // what the foundation feels is what the blade would follow it by
+        self.factor.solve(&mut forces);
+        self.towards.iter().for_each(|(row, at, value)| all[*at] += value * forces[*row]);
+        all
+    }
+
+    /// The same over columns of length `n`, `Vᵀ D V`.
+    pub fn along(&self, n: usize, basis: &[f64]) -> Vec<(usize, usize, f64)> {
+        let forces: Vec<f64> = basis.chunks_exact(n).flat_map(|column| self.times(column)).collect();
+        let energy = stickslip_numerics::sparse::columns::products(n, basis, &forces);
+        let all = (0..energy.ncols()).flat_map(|k| (0..energy.nrows()).map(move |i| (i, k)));
+        all.map(|(i, k)| (i, k, 0.5 * (energy[(i, k)] + energy[(k, i)]))).collect()
     }
 }
 

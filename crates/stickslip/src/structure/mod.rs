@@ -3,14 +3,16 @@
 mod component;
 mod cyclic;
 mod dynamic;
+mod faces;
 pub mod reduction;
 mod sector;
 
 pub use component::{Component, ReducedComponent, Reduction, ReductionKind};
-pub(crate) use component::{Form as ReducedForm, KeptSector};
+pub(crate) use component::{Form as ReducedForm, KeptSector, SectorBlade};
 pub use cyclic::{Axis, BladeError, Boundary, BoundaryError};
 pub(crate) use cyclic::{CyclicSector, RingEntry, RingRow};
 pub use dynamic::DynamicStiffness;
+pub use faces::{Faces, FacesError, Node};
 pub(crate) use sector::turn;
 pub use sector::{Sector, Wave, WaveStiffness};
 

@@ -4,3 +4,4 @@ mod block;
 mod brick;
 mod contacts;
 mod dense;
+mod mistuned;

@@ -74,7 +74,7 @@ pub(super) const KIND: Kind = Kind {
         false => Grain::Frequencies,
     },
     cost,
-    warnings: sampled,
+    warnings: |cases| sampled(cases).into_iter().chain(amplification::none(cases)).collect(),
     compute,
     draw,
 };

@@ -1,5 +1,5 @@
-//! `[disk]`: what must hold between its keys, and the files that it names: a mistuning pattern, the node pairs of a sector's sides, the nodes of
-//! its blade.
+//! `[disk]`: what must hold between its keys, and the files that it names: a mistuning pattern, the node pairs of a sector's sides, where its nodes
+//! stand, the nodes of its blade.
 
 use super::reader::Reader;
 use crate::disk::StatedDisk;
@@ -10,6 +10,7 @@ use crate::near::shown;
 use crate::statement::{Stated, StatedTable};
 use crate::values::Given;
 use std::io::Read;
+use stickslip::structure::Node;
 
 /// Most bytes of a file: lines for a million nodes.
 const MOST_BYTES: u64 = 1 << 26;
@@ -35,7 +36,24 @@ impl Reader {
         );
         let boundary = sides.map(|rows| rows.into_iter().map(|(_, [low, high])| (low, high)).collect());
         let blade = blade.map(|rows| rows.into_iter().map(|(_, [node])| node).collect());
-        Some(StatedDisk { table: stated, pattern, boundary, blade })
+        let nodes = self.nodes(&stated);
+        Some(StatedDisk { table: stated, pattern, boundary, nodes, blade })
+    }
+
+    /// Where the nodes of a sector stand, if a file says so.
+    fn nodes(&mut self, stated: &StatedTable) -> Option<Vec<Node>> {
+        let entry = stated.entry("nodes").filter(|_| !self.without_files)?;
+        let Stated::Fixed(Given::Text(name)) = &entry.value else { return None };
+        let read = self.text_of(name).and_then(|text| {
+            let deck = text.trim_start_matches('\u{feff}').trim_start().starts_with('*');
+            let read = if deck { deck_nodes(&text) } else { csv_nodes(&text) };
+            read.map_err(|(line, message)| {
+                let help = "write a line `node,x,y,z` and below it `12,0.5,0,3` … for every node, or name the input deck with its *NODE";
+                (format!("`{}`, line {line}: {message}", shown(name)), Some(help.to_owned()))
+            })
+        });
+        let refuse = |(message, help): Refused| Problem::new(&entry.place, "nodes", message).maybe_help(help);
+        read.map_err(|problem| self.problems.push(refuse(problem))).ok()
     }
 
     /// The rows of a CSV file that a key names.
@@ -146,6 +164,43 @@ fn csv<const N: usize>(text: &str, columns: [&str; N]) -> Result<Vec<CsvRow<N>>,
     lines.map(row).collect()
 }
 
+/// A node by the fields of its line.
+fn node_of(line: usize, name: &str, at: [&str; 3]) -> Result<Node, (usize, String)> {
+    let number = |text: &str| {
+        // Fortran's exponent
+        let value = text.trim().replace(['d', 'D'], "e").parse::<f64>().ok().filter(|value| value.is_finite());
+        value.ok_or_else(|| (line, format!("`{}` is no coordinate of node `{}`", shown(text), shown(name))))
+    };
+    let [x, y, z] = at.map(number);
+    Ok((name.to_owned(), [x?, y?, z?]))
+}
+
+/// The nodes of a CSV file, or the line that is wrong and why.
+fn csv_nodes(text: &str) -> Result<Vec<Node>, (usize, String)> {
+    let rows = csv(text, ["node", "x", "y", "z"])?.into_iter();
+    rows.map(|(line, [node, x, y, z])| node_of(line, &node, [&x, &y, &z])).collect()
+}
+
+/// The nodes of an input deck of Abaqus or CalculiX, or the line that is wrong and why.
+fn deck_nodes(text: &str) -> Result<Vec<Node>, (usize, String)> {
+    let (mut nodes, mut inside) = (Vec::new(), false);
+    for (line, text) in text.lines().enumerate().map(|(i, line)| (i + 1, line.trim())) {
+        if text.is_empty() || text.starts_with("**") {
+            continue;
+        }
+        if let Some(keyword) = text.strip_prefix('*') {
+            inside = keyword.split(',').next().is_some_and(|word| word.trim().eq_ignore_ascii_case("node"));
+        } else if inside {
+            let fields: Vec<&str> = text.split(',').map(str::trim).collect();
+            let [node, ref at @ ..] = fields[..] else { continue };
+            // what is left out is zero
+            let of = |i: usize| at.get(i).copied().filter(|field| !field.is_empty()).unwrap_or("0");
+            nodes.push(node_of(line, node, [of(0), of(1), of(2)])?);
+        }
+    }
+    if nodes.is_empty() { Err((1, "there is no *NODE with nodes".to_owned())) } else { Ok(nodes) }
+}
+
 /// The deviations of a pattern by sector, or the line that is wrong and why.
 fn pattern(text: &str) -> Result<Vec<f64>, (usize, String)> {
     let mut deviations: Vec<Option<f64>> = Vec::new();
@@ -177,7 +232,21 @@ fn pattern(text: &str) -> Result<Vec<f64>, (usize, String)> {
 
 #[cfg(test)]
 mod tests {
-    use super::pattern;
+    use super::{csv_nodes, deck_nodes, pattern};
+
+    #[test]
+    fn nodes_are_read_from_tables_and_decks() {
+        let expected = vec![("7".to_owned(), [1.0, -25.0, 0.0]), ("12".to_owned(), [0.5, 0.0, 3.0])];
+        assert_eq!(csv_nodes("x,y,node,z\n1,-2.5e1,7,0\n0.5,0,12,3\n").unwrap(), expected);
+        let deck = "** a sector\n*HEADING\n1, 2, 3\n*Node, NSET=all\n7, 1.0, -2.5D1\n** beside\n12, .5, , 3.\n*ELEMENT, TYPE=C3D8\n1, 7, 12\n*NODE PRINT\nU\n";
+        assert_eq!(deck_nodes(deck).unwrap(), expected);
+        assert_eq!(
+            deck_nodes("*STEP\n*NODE\n7, a, 0, 0\n").unwrap_err(),
+            (3, "`a` is no coordinate of node `7`".to_owned())
+        );
+        assert!(deck_nodes("*STEP\n1, 2\n").unwrap_err().1.contains("no *NODE"));
+        assert!(csv_nodes("node,x,y,z\n7,1,2\n").unwrap_err().1.contains("expected node,x,y,z"));
+    }
 
     #[test]
     fn patterns_are_read_in_any_order() {

@@ -173,7 +173,7 @@ fn local_sizes(whole: &Whole) -> Vec<f64> {
 }
 
 /// ±1 without a pattern, the same everywhere.
-fn sign(number: usize) -> f64 {
+pub(super) fn sign(number: usize) -> f64 {
     // by the mixing of splitmix64: Steele, Lea, Flood (2014)
     let mut z = (number as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

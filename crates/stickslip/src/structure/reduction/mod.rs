@@ -9,7 +9,7 @@
 //! | Craig-Bampton | modes with the ports held, and static answers to unit motions of the ports | `craig_bampton` |
 //!
 //! and harmonic balance, which wants receptances only, may take modes and a series of residuals (`series`). Every reduction can be held against the
-//! whole structure (`evidence`), and [`Reduce`] takes as many modes as a given error asks for. A sector of a ring is reduced for all its waves at once
+//! whole structure (`evidence`; `mistuned` for a ring whose blades differ), and [`Reduce`] takes as many modes as a given error asks for. A sector of a ring is reduced for all its waves at once
 //! (`ring`).
 //!
 //! Damping is a part of the whole structure and is reduced like the other matrices; [`Damping`] says what a modal damping ratio means
@@ -20,6 +20,7 @@ mod choice;
 mod craig_bampton;
 mod evidence;
 mod free;
+mod mistuned;
 mod residual;
 mod ring;
 mod series;
@@ -27,7 +28,9 @@ mod series;
 pub use choice::{Chosen, Reduce};
 pub use evidence::{Deviation, Reference};
 pub use free::Free;
+pub(in crate::structure) use mistuned::{MistunedRing, alone, lacking_most};
 pub(crate) use ring::ReducedSector;
+pub(in crate::structure) use ring::STEPS;
 pub use series::Series;
 
 use nalgebra::{Complex, DMatrix, DVector};
@@ -39,6 +42,8 @@ use stickslip_numerics::sparse::{Analysis, Matrix, ModesError, NaturalModes, Sin
 /// A weighted sum of degrees of freedom, as (index from 0, weight).
 pub type Row = Vec<(usize, f64)>;
 
+/// Frequencies above so many times the highest `√(k_ii/m_ii)` are no frequencies of interest, but mistaken ones: no mode is near.
+const ABOVE_ALL: f64 = 100.0;
 /// Modes beyond these are refused: as many numbers as degrees of freedom for each.
 const MOST_MODES: usize = 600;
 /// Columns as long as the structure that are worked on at once: more would fill the memory where there are thousands.
@@ -283,6 +288,14 @@ impl Whole {
     /// # Errors
     /// [`ReductionError::Modes`].
     pub fn modes(&self, omega: f64) -> Result<NaturalModes, ReductionError> {
+        let own = |i: usize| (self.stiffness.get(i, i), self.mass.get(i, i));
+        let ratios =
+            (0..self.dofs()).map(own).filter(|(_, mass)| *mass > 0.0).map(|(stiffness, mass)| stiffness / mass);
+        let highest = ratios.fold(0.0, f64::max).sqrt();
+        if highest > 0.0 && omega > ABOVE_ALL * highest {
+            let what = "the largest frequency of a reduction (rad/s) with what it takes beyond";
+            return Err(ReductionError::Number { what, value: omega, must: "near those that the structure has" });
+        }
         let wanted = Wanted::UpTo { value: omega * omega, most: MOST_MODES };
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, wanted)?)
     }

@@ -4,13 +4,14 @@
 //! imaginary parts of those of some diameters make one real basis of the sector, `q(s) = V p(s)`, and the reduced ring couples neighbours
 //! only, as the whole does: `V* A(θ) V` for every θ at once. It has the modes of these diameters exactly, and is held against the waves of others;
 //! as many diameters are taken as the error asks for. What differs from sector to sector is seen by the same basis, `Vᵀ ΔA V`: the nominal modes
-//! of the ring span what the mistuned ring does.
+//! of the ring span nearly what the mistuned ring does. Where that is not near enough, the residual vectors of the forces `D φ` join them, by which a
+//! blade that deviates answers the modes φ.
 //!
 //! Source: Yang and Griffin (2001), "A reduced-order model of mistuning using a subset of nominal system modes", J. Eng. Gas Turbines Power 123,
 //! 893-900.
 
-use super::{Damping, Deviation, Free, Reduced, ReductionError, Reference, Row, Whole, damping};
-use crate::structure::cyclic::symmetrised;
+use super::{Damping, Deviation, Free, Reduced, ReductionError, Reference, Row, Whole, damping, residual};
+use crate::structure::cyclic::{Blade, symmetrised};
 use crate::structure::sector::{in_wave, is_real};
 use crate::structure::{CyclicSector, Reduction, ReductionKind, RingEntry, turn};
 use nalgebra::DMatrix;
@@ -23,9 +24,11 @@ use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, columns};
 const SIZES: [(usize, f64); 5] = [(1, 1e-6), (1, 1e-9), (2, 1e-9), (3, 1e-9), (3, 1e-12)];
 /// Modes of every wave up to these multiples of the frequency of interest are tried.
 const EXTENTS: [f64; 2] = [1.5, 3.0];
+/// From which of these, extent by extent, blades that differ take their vectors: the first is that of the tuned ring, without any.
+pub(in crate::structure) const STEPS: [usize; 5] = [0, 1, 2, 7, 9];
 /// What a relative shift of a natural frequency counts as an error of the receptance: as much as at a resonance of this half width. Modes that no
 /// port sees are held against the whole so.
-const HALF_WIDTH: f64 = 1e-3;
+pub(super) const HALF_WIDTH: f64 = 1e-3;
 /// Samples by which a wave is compared with the whole at most: each takes a factor of a sector twice.
 const SAMPLES: usize = 5;
 
@@ -71,25 +74,36 @@ struct Computed {
 struct Waves<'a> {
     sector: &'a CyclicSector,
     seen: &'a [Row],
+    /// Of blades that differ, and up to which frequency.
+    blade: Option<(&'a Blade, f64)>,
     met: Vec<Computed>,
 }
 
 impl CyclicSector {
-    /// The sector in few coordinates, seen at these weighted sums of the component's rows.
-    pub(in crate::structure) fn reduced(&self, seen: &[Row], how: &Reduction) -> Result<ChosenSector, ReductionError> {
+    /// The sector in few coordinates, seen at these weighted sums of the component's rows; with vectors of a blade that differs from that one of the
+    /// [`STEPS`] on.
+    pub(in crate::structure) fn reduced(
+        &self,
+        seen: &[Row],
+        how: &Reduction,
+        blade: Option<(&Blade, usize)>,
+    ) -> Result<ChosenSector, ReductionError> {
         if seen.is_empty() {
             return Err(ReductionError::NoPorts);
         }
-        let mut waves = Waves { sector: self, seen, met: Vec::new() };
+        let mut waves = Waves { sector: self, seen, blade: None, met: Vec::new() };
         match *how {
             Reduction::None => Err(ReductionError::NoPorts),
-            Reduction::UpTo { up_to, tolerance, kind } => waves.up_to(up_to, tolerance, kind),
+            Reduction::UpTo { up_to, tolerance, kind } => {
+                waves.blade = blade.map(|(blade, _)| (blade, up_to));
+                waves.up_to(up_to, tolerance, kind, blade.map_or(0, |(_, step)| STEPS[step]))
+            }
             Reduction::Modes { modes, kind } => waves.with_modes(modes, kind),
         }
     }
 
     /// Nodal diameters that are computed at a level: all from the last one on.
-    fn diameters(&self, level: usize) -> Vec<usize> {
+    pub(super) fn diameters(&self, level: usize) -> Vec<usize> {
         let (half, parts) = (self.sectors / 2, 2usize << level);
         let mut all: Vec<usize> = (0..=parts).map(|part| (part * half + parts / 2) / parts).collect();
         all.dedup();
@@ -123,6 +137,7 @@ impl Waves<'_> {
         up_to: f64,
         tolerance: f64,
         kind: Option<ReductionKind>,
+        from: usize,
     ) -> Result<ChosenSector, ReductionError> {
         for (what, value) in [("the largest frequency of a reduction (rad/s)", up_to), ("its tolerance", tolerance)] {
             if !(value.is_finite() && value > 0.0) {
@@ -132,27 +147,26 @@ impl Waves<'_> {
         let kind = kind.unwrap_or(ReductionKind::Rubin);
         let mut best: Option<(Deviation, usize)> = None;
         let mut level = 0;
-        for extent in EXTENTS {
-            for (order, share) in SIZES {
-                loop {
-                    let taken = self.sector.diameters(level);
-                    let between = self.sector.diameters(level + 1);
-                    self.meet(&between, up_to, extent)?;
-                    let reduced = self.basis(&taken, (order, share), kind)?;
-                    let at = |diameters: &[usize]| self.deviation(&reduced, diameters, up_to);
-                    let (own, all) = (at(&taken)?, at(&between)?);
-                    if best.is_none_or(|(least, _)| all.error < least.error) {
-                        best = Some((all, reduced.dofs()));
-                    }
-                    if all.error <= tolerance {
-                        return Ok(self.chosen(reduced, all, up_to));
-                    }
-                    // where the waves that were taken are close, it is others that are missing
-                    if own.error > tolerance || taken == between {
-                        break;
-                    }
-                    level += 1;
+        let tried = EXTENTS.into_iter().flat_map(|extent| SIZES.map(|size| (extent, size)));
+        for (extent, size) in tried.skip(from) {
+            loop {
+                let taken = self.sector.diameters(level);
+                let between = self.sector.diameters(level + 1);
+                self.meet(&between, up_to, extent)?;
+                let reduced = self.basis(&taken, size, kind)?;
+                let at = |diameters: &[usize]| self.deviation(&reduced, diameters, up_to);
+                let (own, all) = (at(&taken)?, at(&between)?);
+                if best.is_none_or(|(least, _)| all.error < least.error) {
+                    best = Some((all, reduced.dofs()));
                 }
+                if all.error <= tolerance {
+                    return Ok(self.chosen(reduced, all, up_to));
+                }
+                // where the waves that were taken are close, it is others that are missing
+                if own.error > tolerance || taken == between {
+                    break;
+                }
+                level += 1;
             }
         }
         let (least, dofs) = best.unwrap_or((Deviation { error: f64::INFINITY, omega: up_to }, 0));
@@ -214,6 +228,9 @@ impl Waves<'_> {
                 }
             };
             vectors.extend(basis);
+            if let Some((blade, up_to)) = self.blade {
+                vectors.extend(self.relieved(wave, blade, up_to, order)?);
+            }
         }
         let modes = taken().map(|wave| wave.modes.count()).max().unwrap_or(0);
         let basis = self.independent(&vectors, share)?;
@@ -222,8 +239,26 @@ impl Waves<'_> {
             ReductionKind::CraigBampton => "Craig-Bampton",
         };
         let count = diameters.len();
-        let kind = format!("a sector, {name} of {count} nodal diameters with up to {} modes", modes.div_ceil(2).max(1));
+        let differing = if self.blade.is_some() { ", and of its blade" } else { "" };
+        let modes = modes.div_ceil(2).max(1);
+        let kind = format!("a sector, {name} of {count} nodal diameters with up to {modes} modes{differing}");
         Ok(self.projected(kind, basis, n))
+    }
+
+    /// What a wave answers to the forces of a blade that deviates, in its modes up to a frequency: residual vectors, both parts of the wave.
+    fn relieved(&self, wave: &Computed, blade: &Blade, up_to: f64, order: usize) -> Result<Vec<f64>, ReductionError> {
+        let (n, modes) = (self.sector.dofs, &wave.modes);
+        let inside = modes.values.partition_point(|value| *value <= up_to * up_to);
+        let forces = (modes.free()..inside).map(|mode| -> Row {
+            let parts = modes.shape(mode).chunks_exact(n).flat_map(|part| blade.times(part));
+            parts.enumerate().filter(|(_, force)| *force != 0.0).collect()
+        });
+        let forces: Vec<Row> = forces.filter(|row| !row.is_empty()).collect();
+        if forces.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (mut basis, _) = residual::basis(&wave.whole.seen_at(forces)?, modes, 0.0, order)?;
+        Ok(basis.split_off(modes.shapes.len()))
     }
 
     /// Combinations of columns over the rows that are left, orthogonal in the sector's own energy, without those that hardly differ from
@@ -374,7 +409,7 @@ impl ReducedSector {
     }
 
     /// The reduced structure in a wave.
-    fn wave(&self, diameter: usize, sectors: usize) -> Result<Reduced, ReductionError> {
+    pub(super) fn wave(&self, diameter: usize, sectors: usize) -> Result<Reduced, ReductionError> {
         let r = self.dofs();
         let copies = if is_real(diameter, sectors) { 1 } else { 2 };
         let matrix = |entries: &[RingEntry], rows: usize| {

@@ -10,6 +10,7 @@ use crate::info::Complaint;
 use crate::key::{Key, Takes, default};
 use crate::rows::Rows;
 use crate::study::varied_text;
+use crate::survey::Surveyed;
 use crate::values::{Frequencies, Values, hertz};
 use crate::work::Work;
 use stickslip::curve::adaptive::Adaptive;
@@ -42,6 +43,15 @@ pub(super) fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
         return Ok(());
     };
     Err(Complaint::new(KEY.name, message, help))
+}
+
+/// That no blade differs, in any case: all amplifications are one then.
+pub(super) fn none(cases: &[Surveyed]) -> Option<String> {
+    let asked = cases.iter().any(|one| one.case.values.flag(KEY.name) == Some(true));
+    let tuned = cases.iter().all(|one| one.case.model.ring.is_some_and(|ring| ring.equal));
+    (asked && tuned).then(|| {
+        "all blades are alike, and the amplification of a tuned disk is 1; add `mistuning` to [disk], with a deviation".to_owned()
+    })
 }
 
 /// The row of a case whose peaks are `found`; and why it has none.

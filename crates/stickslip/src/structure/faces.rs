@@ -1,0 +1,263 @@
+//! Where the nodes of a sector stand, and which of its low side are which of its high side.
+//!
+//! Turned by `2π/N` about the axis, the low side of a sector is its high side, node on node. Matrices do not say where a node stands: a wrong pair
+//! makes another disk, whose matrices are as good as those of the right one. Coordinates tell.
+
+use super::Axis;
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+/// A node and where it stands, in any unit of length.
+pub type Node = (String, [f64; 3]);
+
+/// Distance of a node from where its counterpart is turned to, relative to the distance of the farthest node from the axis: meshes are written with
+/// six digits or more, and elements are larger.
+const TOGETHER: f64 = 1e-4;
+
+/// Why pairs of nodes are not the two sides of a sector.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FacesError {
+    /// A node stands nowhere.
+    #[error("node `{0}` has no coordinates")]
+    Unknown(String),
+    /// A pair that does not lie together.
+    #[error(
+        "node `{low}` of the low side, turned by 360°/{sectors} about {axis}, is {apart:.3e} away from node `{high}` (sector's radius {radius:.3e}){}",
+        hint.as_ref().map_or_else(String::new, |hint| format!("; {hint}"))
+    )]
+    Apart {
+        /// Of the low side.
+        low: String,
+        /// Of the high side.
+        high: String,
+        /// Number of sectors.
+        sectors: usize,
+        /// The axis.
+        axis: Axis,
+        /// Distance, in the unit of the coordinates.
+        apart: f64,
+        /// Largest distance of a node from the axis.
+        radius: f64,
+        /// What would fit.
+        hint: Option<String>,
+    },
+    /// Nodes of both sides that no pair names.
+    #[error(
+        "node `{low}` lies on the low side and node `{high}` is its counterpart, and no pair names them ({count} like it)"
+    )]
+    Missing {
+        /// Of the low side.
+        low: String,
+        /// Of the high side.
+        high: String,
+        /// How many pairs are missing.
+        count: usize,
+    },
+    /// No two nodes are one turn apart.
+    #[error(
+        "no node turned by 360°/{sectors} about {axis} meets another: are the axis and the number of sectors right?"
+    )]
+    None {
+        /// Number of sectors.
+        sectors: usize,
+        /// The axis.
+        axis: Axis,
+    },
+}
+
+/// The nodes of a sector by their coordinates.
+///
+/// # Example
+/// A quarter of a disk: nodes 1 and 2 are its low side, 3 and 4 its high side.
+/// ```
+/// use stickslip::structure::{Axis, Faces};
+/// let nodes = [("1", [1.0, 0.0]), ("2", [2.0, 0.0]), ("3", [0.0, 1.0]), ("4", [0.0, 2.0]), ("5", [1.0, 1.0])];
+/// let nodes = nodes.map(|(name, [x, y])| (name.to_owned(), [x, y, 0.0]));
+/// let faces = Faces::new(&nodes, Axis::Z, 4);
+/// let pairs = faces.pairs().unwrap();
+/// assert_eq!(pairs, [("1".into(), "3".into()), ("2".into(), "4".into())]);
+/// assert!(faces.check(&pairs).is_ok());
+/// assert!(faces.check(&[("3".into(), "1".into())]).unwrap_err().to_string().contains("exchanged"));
+/// ```
+#[derive(Debug, Clone)]
+pub struct Faces<'a> {
+    nodes: &'a [Node],
+    axis: Axis,
+    sectors: usize,
+    radius: f64,
+    /// Nodes by the cell that they stand in.
+    cells: BTreeMap<[i64; 3], Vec<usize>>,
+}
+
+impl<'a> Faces<'a> {
+    /// Of all nodes of a sector, or of those that count, on a disk of so many sectors.
+    pub fn new(nodes: &'a [Node], axis: Axis, sectors: usize) -> Self {
+        let radius = nodes.iter().map(|(_, at)| axis.radius(*at)).fold(0.0, f64::max);
+        let mut faces = Faces { nodes, axis, sectors, radius, cells: BTreeMap::new() };
+        for (index, (_, at)) in nodes.iter().enumerate() {
+            faces.cells.entry(faces.cell(*at)).or_default().push(index);
+        }
+        faces
+    }
+
+    fn tolerance(&self) -> f64 {
+        TOGETHER * self.radius
+    }
+
+    fn cell(&self, at: [f64; 3]) -> [i64; 3] {
+        at.map(|x| (x / self.tolerance().max(f64::MIN_POSITIVE)).floor() as i64)
+    }
+
+    /// The pairs (low, high) that the coordinates tell, in the order of the nodes. Nodes on the axis are none.
+    ///
+    /// # Errors
+    /// [`FacesError::None`].
+    pub fn pairs(&self) -> Result<Vec<(String, String)>, FacesError> {
+        let turn = self.axis.turn(TAU / self.sectors as f64);
+        let off_axis = self.nodes.iter().filter(|(_, at)| self.axis.radius(*at) > self.tolerance());
+        let met = off_axis.filter_map(|(low, at)| {
+            let high = self.nearest(turned(&turn, *at))?;
+            Some((low.clone(), self.nodes[high].0.clone()))
+        });
+        let pairs: Vec<_> = met.collect();
+        if pairs.is_empty() { Err(FacesError::None { sectors: self.sectors, axis: self.axis }) } else { Ok(pairs) }
+    }
+
+    /// The node at a point.
+    fn nearest(&self, point: [f64; 3]) -> Option<usize> {
+        let cell = self.cell(point);
+        let beside = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
+        let cells = beside.filter_map(|step| self.cells.get(&[0, 1, 2].map(|i| cell[i].saturating_add(step[i]))));
+        let near = cells.flatten().map(|&index| (apart(self.nodes[index].1, point), index));
+        near.filter(|(apart, _)| *apart <= self.tolerance()).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, index)| index)
+    }
+
+    /// Whether these pairs (low, high) are those of the coordinates, none wrong and none missing.
+    ///
+    /// # Errors
+    /// [`FacesError`]: a node without coordinates, a pair that does not lie together, or one that is missing.
+    pub fn check(&self, pairs: &[(String, String)]) -> Result<(), FacesError> {
+        let of: BTreeMap<&str, [f64; 3]> = self.nodes.iter().map(|(name, at)| (name.as_str(), *at)).collect();
+        let find = |name: &String| of.get(name.as_str()).copied().ok_or_else(|| FacesError::Unknown(name.clone()));
+        for (low, high) in pairs {
+            let (from, to) = (find(low)?, find(high)?);
+            let apart = self.after_turn(self.axis, TAU / self.sectors as f64, from, to);
+            if apart > self.tolerance() {
+                return Err(FacesError::Apart {
+                    low: low.clone(),
+                    high: high.clone(),
+                    sectors: self.sectors,
+                    axis: self.axis,
+                    apart,
+                    radius: self.radius,
+                    hint: self.hint(from, to),
+                });
+            }
+        }
+        let named: BTreeMap<&str, &str> = pairs.iter().map(|(low, high)| (low.as_str(), high.as_str())).collect();
+        let all = self.pairs()?;
+        let mut missing = all.iter().filter(|(low, _)| !named.contains_key(low.as_str()));
+        match missing.next() {
+            Some((low, high)) => {
+                let count = 1 + missing.count();
+                Err(FacesError::Missing { low: low.clone(), high: high.clone(), count })
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn after_turn(&self, axis: Axis, angle: f64, from: [f64; 3], to: [f64; 3]) -> f64 {
+        apart(turned(&axis.turn(angle), from), to)
+    }
+
+    /// What would make a pair fit.
+    fn hint(&self, from: [f64; 3], to: [f64; 3]) -> Option<String> {
+        let angle = TAU / self.sectors as f64;
+        let fits = |axis: Axis, angle: f64| self.after_turn(axis, angle, from, to) <= self.tolerance();
+        if fits(self.axis, -angle) {
+            return Some(format!(
+                "the sides are exchanged: low is where the sector begins by the right-hand rule about {}",
+                self.axis
+            ));
+        }
+        let others = [Axis::X, Axis::Y, Axis::Z].into_iter().filter(|axis| *axis != self.axis);
+        for axis in others {
+            if fits(axis, angle) {
+                return Some(format!("they fit about {axis}"));
+            }
+        }
+        let between = self.axis.angle(from, to);
+        (fits(self.axis, between) && between.abs() > 0.0).then(|| {
+            format!(
+                "they are {:.3}° apart about {}, as on a disk of {:.2} sectors",
+                between.to_degrees(),
+                self.axis,
+                TAU / between.abs()
+            )
+        })
+    }
+}
+
+fn turned(turn: &[[f64; 3]; 3], at: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|i| (0..3).map(|k| turn[i][k] * at[k]).sum())
+}
+
+fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two radii and two heights on both sides of a sector of ten, and a blade in its middle.
+    fn nodes(axis: Axis) -> Vec<Node> {
+        let turn = |angle: f64, at: [f64; 3]| turned(&axis.turn(angle), at);
+        let mut nodes = Vec::new();
+        for (k, angle) in [0.3, 0.3 + TAU / 10.0, 0.6].into_iter().enumerate() {
+            for (i, (radius, height)) in [(50.0, 0.0), (50.0, 8.0), (90.0, 0.0), (90.0, 8.0)].into_iter().enumerate() {
+                // along the axis and across it
+                let own = axis as usize;
+                let mut at = [0.0; 3];
+                (at[own], at[(own + 1) % 3]) = (height, radius);
+                nodes.push((format!("{}", 10 * k + i), turn(angle, at)));
+            }
+        }
+        nodes
+    }
+
+    fn named(pairs: &[(&str, &str)]) -> Vec<(String, String)> {
+        pairs.iter().map(|(low, high)| ((*low).to_owned(), (*high).to_owned())).collect()
+    }
+
+    #[test]
+    fn coordinates_tell_the_pairs() {
+        for axis in [Axis::X, Axis::Y, Axis::Z] {
+            let nodes = nodes(axis);
+            let pairs = Faces::new(&nodes, axis, 10).pairs().unwrap();
+            assert_eq!(pairs, named(&[("0", "10"), ("1", "11"), ("2", "12"), ("3", "13")]), "{axis}");
+        }
+    }
+
+    #[test]
+    fn wrong_pairs_are_refused_with_what_would_fit() {
+        let nodes = nodes(Axis::Z);
+        let right = [("0", "10"), ("1", "11"), ("2", "12"), ("3", "13")];
+        let refused = |axis: Axis, sectors: usize, pairs: &[(&str, &str)]| {
+            Faces::new(&nodes, axis, sectors).check(&named(pairs)).map_err(|error| error.to_string())
+        };
+        assert_eq!(refused(Axis::Z, 10, &right), Ok(()));
+        for (axis, sectors, pairs, words) in [
+            (Axis::Z, 10, &right.map(|(low, high)| (high, low))[..], "sides are exchanged"),
+            (Axis::Z, 12, &right[..], "as on a disk of 10.00 sectors"),
+            (Axis::X, 10, &right[..], "they fit about z"),
+            (Axis::Z, 10, &[("0", "11"), ("1", "10")][..], "8.000e0 away from node `11`"),
+            (Axis::Z, 10, &right[..3], "node `3` lies on the low side and node `13` is its counterpart"),
+            (Axis::Z, 10, &[("0", "99")][..], "node `99` has no coordinates"),
+        ] {
+            let message = refused(axis, sectors, pairs).unwrap_err();
+            assert!(message.contains(words), "{words}: {message}");
+        }
+        assert!(Faces::new(&nodes, Axis::Z, 11).pairs().unwrap_err().to_string().contains("number of sectors"));
+    }
+}
