@@ -21,9 +21,8 @@ use stickslip_numerics::dense::{Lu, multiply_in_blocks};
 
 /// Receptance of the structure alone, relative to the compliance of a closed contact, below which springs hold it well enough: two digits are lost.
 const SOFT: f64 = 1e2;
-/// A direction is held by [`HOLD`] alone if it moves so many times less at twice the frequency: of what is free the spring is four times as stiff
-/// there, and of what a damper alone holds twice.
-const FREE: f64 = 1.5;
+/// A direction is held by [`HOLD`] alone if it moves so many times less at twice the frequency, where these springs are four times as stiff.
+const FREE: f64 = 2.0;
 
 /// Stiffness along the axes of closed contacts, N/m.
 pub(super) fn springs(ports: &Ports) -> Vec<f64> {
@@ -174,9 +173,15 @@ mod tests {
     }
 
     fn structure(mass: DMatrix<f64>, stiffness: DMatrix<f64>) -> Structure {
+        damped(mass, stiffness, 0.0)
+    }
+
+    /// With a damping of its free motions, 1/s, too.
+    fn damped(mass: DMatrix<f64>, stiffness: DMatrix<f64>, rate: f64) -> Structure {
         let n = mass.nrows();
         let names = (0..n).map(|i| i.to_string()).collect();
-        Structure::new(names, mass, &stiffness * 1e-5, stiffness).unwrap()
+        let damping = &stiffness * 1e-5 + &mass * rate;
+        Structure::new(names, mass, damping, stiffness).unwrap()
     }
 
     fn orbit(system: &System, harmonics: usize, omega: f64) -> Result<Orbit, OrbitError> {
@@ -289,7 +294,9 @@ mod tests {
     /// Free chains along (x, z) on contacts, in every form that receptances are kept in.
     #[test]
     fn chains_stand_on_their_contacts() {
-        for (masses, every, banded) in [(4, 1, false), (30, 1, true), (110, 36, false)] {
+        for (masses, every, damping, banded) in
+            [(4, 1, 0.0, false), (4, 1, 20.0, false), (30, 1, 20.0, true), (110, 36, 20.0, false)]
+        {
             let n = 2 * masses;
             let mut stiffness = DMatrix::zeros(n, n);
             for a in 0..n - 2 {
@@ -298,7 +305,7 @@ mod tests {
                     stiffness[(r, c)] += k;
                 }
             }
-            let mut builder = System::builder(structure(DMatrix::identity(n, n) * 0.5, stiffness));
+            let mut builder = System::builder(damped(DMatrix::identity(n, n) * 0.5, stiffness, damping));
             for i in (0..masses).step_by(every) {
                 let axes = vec![Axis::new(vec![(2 * i, 1.0)]), Axis::new(vec![(2 * i + 1, 1.0)])];
                 builder = builder.joint(format!("contact{i}"), contact(10.0), axes).force(2 * i + 1, 0, pressed(i));

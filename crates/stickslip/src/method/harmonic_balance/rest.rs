@@ -253,7 +253,17 @@ impl Rest {
         }
         let receptance = match &self.waves {
             Some(waves) => waves.receptance(0, (ZERO, omega), &self.directions)?,
-            None => self.receptance_at(ZERO, omega)?,
+            None => {
+                // not from modes: of free motions that are damped these have the rounding of a stiffness
+                let factor = self.factor(ZERO, omega)?;
+                let one = |rows: &Vec<(usize, f64)>| {
+                    let mut moved = vec![ZERO; self.n];
+                    rows.iter().for_each(|&(i, w)| moved[i] += w);
+                    factor.solve(&mut moved);
+                    rows.iter().map(|&(i, w)| moved[i] * w).sum::<Complex64>().norm()
+                };
+                return Ok(self.directions.iter().map(one).collect());
+            }
         };
         Ok((0..self.directions.len()).map(|q| receptance[(q, q)].norm()).collect())
     }

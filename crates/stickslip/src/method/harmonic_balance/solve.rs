@@ -13,6 +13,8 @@ use stickslip_numerics::dense;
 const ITERATIONS: usize = 60;
 /// Newton iterations in all while slip limits are raised: where they hold, one is enough.
 const MOST_RAISING: usize = 200;
+/// Newton iterations at one of these, where contacts alone hold: from rest one leads to what sticks under limits that hold.
+const STICKS: usize = 6;
 /// Newton iterations in all while they are lowered; a few hundred are usual.
 const MOST_ITERATIONS: usize = 3000;
 /// Residual at which a search that comes no closer has found all that there is: forces are differentiable functions of the harmonics, and what is
@@ -226,7 +228,8 @@ impl Level {
             if self.stands() {
                 good = Motion { iterations: good.iterations, ..self.at_rest(limits) };
             }
-            held = self.newton(ports, omega, &mut good, Ease { limits, ..GIVEN }, ITERATIONS);
+            let most = if self.stands() { STICKS } else { ITERATIONS };
+            held = self.newton(ports, omega, &mut good, Ease { limits, ..GIVEN }, most);
             if held.is_ok() || self.is_exhausted(ports) || good.iterations - motion.iterations > MOST_RAISING {
                 break;
             }
