@@ -4,38 +4,14 @@ use crate::error::Problem;
 use crate::expression::Value;
 use crate::key::MOST_MASSES;
 use crate::near::{nearest, shown};
+use crate::sector::{sector_of, whole};
+use crate::stated::{StatedDisk, Structure, problem_of};
 use crate::statement::{Environment, Stated, StatedTable};
-use crate::study::{Structure, problem_of, sector_of};
 use crate::values::{Given, Values};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
-use stickslip::model::{Around, Disk, DiskPart, Element, LEAST_SECTORS, Model, normal_pattern};
+use stickslip::model::{Disk, DiskPart, Element, LEAST_SECTORS, Model, normal_pattern};
 use stickslip::structure::{Axis, Boundary, Component, Faces, FacesError, Node, Reduction};
-
-/// `[disk]` as it is stated.
-#[derive(Debug, Clone)]
-pub(crate) struct StatedDisk {
-    pub table: StatedTable,
-    /// The deviations of a file.
-    pub pattern: Option<Vec<f64>>,
-    /// Nodes of the low and the high side of a sector by its matrices.
-    pub boundary: Option<Vec<(String, String)>>,
-    /// Where its nodes stand.
-    pub nodes: Option<Vec<Node>>,
-    /// Nodes of its blade.
-    pub blade: Option<Vec<String>>,
-}
-
-impl StatedDisk {
-    /// The parameter that differs from sector to sector, if one does.
-    pub fn mistuned(&self, names: &[String]) -> Option<usize> {
-        let Stated::Table(table) = &self.table.entry("mistuning")?.value else { return None };
-        match &table.entry("of")?.value {
-            Stated::Names(of) if of.len() == 1 => names.iter().position(|name| *name == of[0].0),
-            _ => None,
-        }
-    }
-}
 
 /// What differs from sector to sector.
 enum Mistuned {
@@ -69,9 +45,6 @@ impl BladePart {
 
 /// Rows of all sectors of a disk that are not reduced, at most: matrices of some GB.
 const MOST_ROWS: usize = 1_000_000;
-
-/// Largest whole number that a quantity can be read as.
-const MOST: f64 = 1e9;
 
 /// The values of the parameters with some of them changed: (index, value in SI).
 pub(crate) type Again<'a> = &'a dyn Fn(&[(usize, f64)]) -> Result<Vec<Value>, Problem>;
@@ -150,7 +123,7 @@ fn tied(structure: &Structure, disk: &StatedDisk, sectors: usize, sector: &mut M
     let component = &substructure.component;
     let pairs = pairs(disk, component, axis, sectors)?;
     let boundary =
-        Boundary::of_nodes(component, &pairs, axis).map_err(|error| problem("boundary", error.to_string()))?;
+        Boundary::of_nodes(component.rows(), &pairs, axis).map_err(|error| problem("boundary", error.to_string()))?;
     let nodes = disk.blade.as_deref();
     let blade = blade_rows(component, nodes.unwrap_or_default());
     let blade =
@@ -228,58 +201,12 @@ fn blade_rows<'a>(component: &Component, nodes: &'a [String]) -> Result<Vec<usiz
     nodes.iter().find(|node| !met[node.as_str()]).map_or(Ok(rows), |node| Err(node))
 }
 
-/// A whole number that a key must have.
-pub(crate) fn whole(table: &StatedTable, values: &Values, key: &'static str) -> Result<Option<i64>, Problem> {
-    let Some(value) = values.quantity(key) else { return Ok(None) };
-    if value.fract() == 0.0 && value.abs() <= MOST {
-        return Ok(Some(value as i64));
-    }
-    let message = format!("must be a whole number, found {value}");
-    Err(Problem::new(table.place_of(key, None), key, message))
-}
-
 fn sectors(disk: &StatedDisk, values: &Values) -> Result<usize, Vec<Problem>> {
     let sectors = whole(&disk.table, values, "sectors").map_err(|problem| vec![problem])?.unwrap_or(0);
     usize::try_from(sectors).ok().filter(|sectors| *sectors >= LEAST_SECTORS).ok_or_else(|| {
         let message = format!("a disk has {LEAST_SECTORS} sectors or more, found {sectors}");
         vec![Problem::new(disk.table.place_of("sectors", None), "sectors", message)]
     })
-}
-
-/// How an entry of a list is distributed over the sectors.
-pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Problem>) -> Around {
-    let mut found = Vec::new();
-    for key in ["engine_order", "nodal_diameter", "sector"] {
-        match whole(table, values, key) {
-            Ok(Some(number)) => found.push((key, number)),
-            Ok(None) => {}
-            Err(problem) => problems.push(problem),
-        }
-    }
-    match found[..] {
-        [] => Around::EngineOrder(0),
-        [("engine_order", order)] => Around::EngineOrder(order),
-        [("nodal_diameter", diameter)] => Around::NodalDiameter(diameter),
-        [(_, sector)] => Around::Sector(usize::try_from(sector).unwrap_or(usize::MAX)),
-        [(one, _), (other, _), ..] => {
-            let message = format!("`{one}` and `{other}` say different things of the same wave");
-            let help =
-                format!("keep one of them; for two waves write two entries, one with `{one}`, one with `{other}`");
-            problems.push(Problem::new(table.place_of(other, None), other, message).help(help));
-            Around::EngineOrder(0)
-        }
-    }
-}
-
-/// That an entry says how it goes around a disk, where there is none.
-pub(crate) fn none_around(table: &StatedTable, problems: &mut Vec<Problem>) {
-    for key in ["engine_order", "nodal_diameter", "sector"] {
-        if let Some(entry) = table.entry(key) {
-            let message = format!("`{key}` is for bladed disks, and there is no [disk]");
-            let help = "add a table [disk] with `sectors`, and state one sector as the model";
-            problems.push(Problem::new(&entry.place, key, message).help(help));
-        }
-    }
 }
 
 /// The deviation of every sector; `None` if they are tuned.

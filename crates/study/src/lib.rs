@@ -36,6 +36,8 @@ mod rows;
 pub mod run;
 mod sample;
 pub mod schema;
+mod sector;
+mod stated;
 mod statement;
 mod stiffened;
 mod study;

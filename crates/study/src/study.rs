@@ -1,6 +1,6 @@
 //! A study that has been read: its cases, each with its model and the values of its kind.
 
-use crate::disk::{self, Again, StatedDisk};
+use crate::disk::{self, Again};
 use crate::error::{Place, Problem, Source, StudyError};
 use crate::expression::{Value, displayed};
 use crate::figure;
@@ -8,22 +8,19 @@ use crate::immovable::immovable;
 use crate::info::{Complaint, KindInfo};
 use crate::key::VERSION;
 use crate::memory;
-use crate::names::Names;
 use crate::near::{nearest, one_of, shown};
 use crate::sample::{Drawn, Sample};
+use crate::sector::{none_around, sector_of};
+use crate::stated::{Matrices, Structure, problem_of};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
-use crate::stiffened::Stiffened;
 use crate::substructure;
 use crate::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
 use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
-use stickslip::law::{SharedLaw, TANGENTS};
 use stickslip::method::{self, Options};
-use stickslip::model::{Around, Element, Force, Joint, Mass, Model, ModelError, Motion, Spring};
-use stickslip::structure::{Component, Reduction};
-use stickslip_numerics::sparse::Matrix;
+use stickslip::model::{Model, ModelError};
 
 /// A study file, read and checked.
 #[derive(Debug, Clone)]
@@ -102,107 +99,6 @@ impl VariedPoints {
 
     fn is_drawn(&self) -> bool {
         matches!(self, VariedPoints::Drawn(_))
-    }
-}
-
-/// How the model is stated: in lists, of this file or of a template's.
-#[derive(Debug, Clone)]
-pub(crate) struct Structure {
-    pub lists: Lists,
-    pub template: Option<NamedTemplate>,
-    pub matrices: Option<Matrices>,
-}
-
-/// `[structure]`: what was read of its files.
-#[derive(Debug, Clone)]
-pub(crate) struct Matrices {
-    pub table: StatedTable,
-    /// None of a study whose files were not read.
-    pub component: Option<Component>,
-    /// What rotation adds to its stiffness.
-    pub stiffened: Option<Stiffened>,
-    /// Rows of the files that are constrained, and not in it.
-    pub left_out: usize,
-}
-
-impl Matrices {
-    /// CRC-32 of the rows' names and of all entries, by which files that changed between two runs are told apart.
-    fn check(&self) -> Option<String> {
-        let component = self.component.as_ref()?;
-        let mut hasher = crc32fast::Hasher::new();
-        component.rows().iter().for_each(|name| hasher.update(name.as_bytes()));
-        let (mass, damping, stiffness) = component.matrices();
-        let more = self.stiffened.as_ref().map(Stiffened::more);
-        for (number, matrix) in [Some(mass), damping, Some(stiffness), more].into_iter().enumerate() {
-            for (row, column, value) in matrix.into_iter().flat_map(Matrix::entries) {
-                let place = [number, row, column].map(|index| index as u64);
-                place.iter().for_each(|index| hasher.update(&index.to_le_bytes()));
-                hasher.update(&value.to_le_bytes());
-            }
-        }
-        Some(format!("{:08x}", hasher.finalize()))
-    }
-}
-
-/// The template that a study names.
-#[derive(Debug, Clone)]
-pub(crate) struct NamedTemplate {
-    /// `[model]`.
-    pub table: StatedTable,
-    /// Its file among the sources.
-    pub source: usize,
-}
-
-impl NamedTemplate {
-    /// Rewords a problem in the template's file for a user who has not written it: at the place where the template is
-    /// named.
-    fn reword(&self, element: Element, problem: &mut Problem) {
-        if problem.place.source == self.source {
-            problem.message = self.blame(element, &problem.key, &problem.message);
-            problem.place = self.table.place_of("template", None).clone();
-        }
-    }
-
-    fn blame(&self, element: Element, key: &str, message: &str) -> String {
-        format!("these parameters make {element} of the template wrong: `{key}` {message}")
-    }
-}
-
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Lists {
-    pub place: Vec<StatedTable>,
-    pub mass: Vec<StatedTable>,
-    pub spring: Vec<StatedTable>,
-    pub joint: Vec<StatedTable>,
-    pub force: Vec<StatedTable>,
-    pub motion: Vec<StatedTable>,
-    /// The lists state one sector of it.
-    pub disk: Option<StatedDisk>,
-}
-
-impl Lists {
-    pub fn get_mut(&mut self, name: &str) -> Option<&mut Vec<StatedTable>> {
-        match name {
-            "place" => Some(&mut self.place),
-            "mass" => Some(&mut self.mass),
-            "spring" => Some(&mut self.spring),
-            "joint" => Some(&mut self.joint),
-            "force" => Some(&mut self.force),
-            "motion" => Some(&mut self.motion),
-            _ => None,
-        }
-    }
-
-    fn get(&self, name: &str) -> &[StatedTable] {
-        match name {
-            "place" => &self.place,
-            "mass" => &self.mass,
-            "spring" => &self.spring,
-            "joint" => &self.joint,
-            "force" => &self.force,
-            "motion" => &self.motion,
-            _ => &[],
-        }
     }
 }
 
@@ -295,9 +191,6 @@ impl Case {
 pub(crate) fn varied_text(varied: &[VariedValue]) -> String {
     varied.iter().map(|varied| varied.text.as_str()).collect::<Vec<_>>().join(", ")
 }
-
-/// Lowest frequencies that are shown where a structure cannot be reduced.
-const LOWEST: usize = 3;
 
 /// Most cases that [`Study::resolved`] writes out; a run can be repeated from the text in any case.
 const MOST_RESOLVED: usize = 1_000;
@@ -770,66 +663,6 @@ impl Study {
     }
 }
 
-/// What is wrong with a model, at the place in the file that states it; `model` has the names that there are.
-pub(crate) fn problem_of(structure: &Structure, error: &ModelError, model: &Model) -> Problem {
-    let (list, index) = match error.element {
-        Element::Mass(i) => ("mass", i),
-        Element::Spring(i) => ("spring", i),
-        Element::Joint(i) => ("joint", i),
-        Element::Force(i) => ("force", i),
-        Element::Motion(i) => ("motion", i),
-        Element::Place(i) => ("place", i),
-        Element::Substructure => ("structure", 0),
-        Element::Whole => ("", 0),
-    };
-    let whole = Place::default();
-    let (place, message) = match &structure.template {
-        None => {
-            let matrices = structure.matrices.as_ref().filter(|_| list == "structure");
-            let table = matrices.map(|matrices| &matrices.table).or_else(|| structure.lists.get(list).get(index));
-            let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
-            (place, table.map_or_else(|| error.message.clone(), |table| table.with_turn(&error.message)))
-        }
-        Some(template) => {
-            let place = template.table.place_of(if error.key == "law" { "law" } else { "template" }, None);
-            (place, template.blame(error.element, error.key, &error.message))
-        }
-    };
-    let places = model.place_names();
-    let nodes = Names::of_places(model);
-    let help = match &error.wrong_name {
-        Some(wrong) => Some(match (nodes.directions_of(wrong), nearest(wrong, places.iter().map(String::as_str))) {
-            (Some(directions), _) => format!("say {}", one_of(directions.iter().map(String::as_str))),
-            (None, Some(near)) => format!("did you mean `{near}`?"),
-            (None, None) => {
-                format!("the places are {}", one_of(places.iter().take(20).map(String::as_str)).replace(" or ", ", "))
-            }
-        }),
-        None if error.element == Element::Whole && model.substructure.is_some() => {
-            Some("add a [[place]] with a name and a dof".to_owned())
-        }
-        None if error.element == Element::Whole => Some("add a [[mass]] or a [[motion]]".to_owned()),
-        None if error.key == "reduce" => advice_on_reduction(model),
-        None if error.key == "name" => Some("choose another name".to_owned()),
-        None => None,
-    };
-    Problem::new(place, error.key, message).maybe_help(help)
-}
-
-/// What to do where a structure cannot be reduced: units that were mistaken move its frequencies by powers of ten.
-fn advice_on_reduction(model: &Model) -> Option<String> {
-    let substructure = model.substructure.as_ref()?;
-    if matches!(substructure.reduction, Reduction::UpTo { up_to, .. } if up_to <= 0.0) {
-        return Some(
-            "this study has no drive frequency that would tell: add reduce = { up_to = \"5 kHz\" }".to_owned(),
-        );
-    }
-    let component = &substructure.component;
-    let lowest = component.frequencies(LOWEST).ok()?;
-    let listed: Vec<String> = lowest.iter().map(|omega| displayed(*omega, Some(Dimension::FREQUENCY))).collect();
-    Some(format!("its lowest frequencies are {}: are the units right, and `up_to`?", listed.join(", ")))
-}
-
 /// How a case is looked at.
 #[derive(Debug, Clone, Copy)]
 enum Look {
@@ -892,125 +725,9 @@ pub(crate) fn model_of(
         Some(disk) => disk::ring_of(structure, disk, environment, again, problems),
         None => {
             let tables = structure.lists.force.iter().chain(&structure.lists.motion);
-            tables.for_each(|table| disk::none_around(table, problems));
+            tables.for_each(|table| none_around(table, problems));
             sector_of(structure, environment, problems).0
         }
-    }
-}
-
-/// The places of the structure by matrices.
-fn own(lists: &Lists) -> impl Iterator<Item = &StatedTable> {
-    lists.place.iter().filter(|table| table.entry("of").is_none())
-}
-
-/// What the lists state, and how its forces and imposed motions go around a disk.
-pub(crate) fn sector_of(
-    structure: &Structure,
-    environment: &Environment<'_>,
-    problems: &mut Vec<Problem>,
-) -> (Model, Vec<Around>, Vec<Around>) {
-    let Structure { lists, template, matrices } = structure;
-    let (mut forces, mut motions, mut wrong) = (Vec::new(), Vec::new(), Vec::new());
-    let mut model = Model::default();
-    let component = matrices.as_ref().and_then(|matrices| matrices.component.as_ref());
-    match (matrices, component) {
-        (Some(matrices), Some(component)) => {
-            model.substructure = Some(substructure::of(matrices, component, environment, problems));
-            for table in own(lists) {
-                model.places.extend(substructure::place(table, component, environment, problems));
-            }
-        }
-        // names alone: masses stand for the places
-        (Some(_), None) => {
-            let values = own(lists).map(|table| (table, table.values(environment, problems)));
-            model.masses.extend(values.map(|(table, values)| substructure::stand_in(table, &values)));
-        }
-        (None, _) => {
-            if let Some(place) = own(lists).next() {
-                let message = "a place is one of a structure, and there is none";
-                let help = "add [structure] with `stiffness` and `mass`; a point mass is a [[mass]], a turned face of one is a place with `of`";
-                problems.push(Problem::new(&place.place, "place", message).help(help));
-            }
-        }
-    }
-    let mut resolve = |element: Element, table: &StatedTable| {
-        let before = problems.len();
-        let values = table.values(environment, problems);
-        if let Some(template) = template {
-            problems[before..].iter_mut().for_each(|problem| template.reword(element, problem));
-        }
-        values
-    };
-    let text = |values: &Values, key: &str| values.text(key).unwrap_or_default().to_owned();
-    let number = |values: &Values, key: &str| values.quantity(key).unwrap_or(0.0);
-    let between = |values: &Values| match values.names("between") {
-        Some([a, b]) => [a.clone(), b.clone()],
-        _ => Default::default(),
-    };
-    let harmonic = |values: &Values| values.count("harmonic").and_then(|h| u32::try_from(h).ok()).unwrap_or(1);
-    for (i, table) in lists.mass.iter().enumerate() {
-        let values = resolve(Element::Mass(i), table);
-        model.masses.push(Mass {
-            name: text(&values, "name"),
-            mass: number(&values, "mass"),
-            directions: values.names("directions").unwrap_or_default().to_vec(),
-        });
-    }
-    for (i, table) in lists.place.iter().enumerate().filter(|(_, table)| table.entry("of").is_some()) {
-        let values = resolve(Element::Place(i), table);
-        match substructure::view(table, &values, &model.masses) {
-            Ok(place) => model.places.push(place),
-            Err(problem) => wrong.push(*problem),
-        }
-    }
-    for (i, table) in lists.spring.iter().enumerate() {
-        let values = resolve(Element::Spring(i), table);
-        let (stiffness, damping) = (number(&values, "stiffness"), number(&values, "damping"));
-        model.springs.push(Spring { between: between(&values), stiffness, damping });
-    }
-    let nodes: BTreeMap<String, usize> =
-        model.nodes().map(|(name, directions)| (name.to_owned(), directions.len())).collect();
-    for (i, table) in lists.joint.iter().enumerate() {
-        let values = resolve(Element::Joint(i), table);
-        // without a law there is a problem, and the model is not used
-        if let Some(law) = values.law("law") {
-            let between = between(&values);
-            let law = for_nodes(law, table, &between, &nodes);
-            model.joints.push(Joint { name: text(&values, "name"), between, law });
-        }
-    }
-    for (i, table) in lists.force.iter().enumerate() {
-        let values = resolve(Element::Force(i), table);
-        let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
-        forces.push(disk::around(table, &values, &mut wrong));
-        model.forces.push(Force { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
-    }
-    for (i, table) in lists.motion.iter().enumerate() {
-        let values = resolve(Element::Motion(i), table);
-        let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
-        motions.push(disk::around(table, &values, &mut wrong));
-        model.motions.push(Motion { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
-    }
-    problems.append(&mut wrong);
-    (model, forces, motions)
-}
-
-/// A law that leaves its number of tangents open, where the file does too, has those of the nodes that it joins: all their directions but the
-/// normal.
-fn for_nodes(
-    law: &SharedLaw,
-    joint: &StatedTable,
-    between: &[String; 2],
-    nodes: &BTreeMap<String, usize>,
-) -> SharedLaw {
-    let stated = match joint.entry("law").map(|entry| &entry.value) {
-        Some(Stated::Law(_, table)) => table.entry(TANGENTS).is_some(),
-        _ => true,
-    };
-    let directions = between.iter().filter_map(|name| nodes.get(name)).copied().max();
-    match (stated, directions) {
-        (false, Some(directions @ 2..)) => law.with(TANGENTS, (directions - 1) as f64).unwrap_or_else(|| law.clone()),
-        _ => law.clone(),
     }
 }
 

@@ -2,8 +2,8 @@
 
 use crate::error::Problem;
 use crate::near::{nearest, one_of, shown};
+use crate::stated::Matrices;
 use crate::statement::{Environment, StatedTable};
-use crate::study::Matrices;
 use crate::values::Values;
 use stickslip::model::{Frame, Mass, Model, Place, Substructure, SubstructureDamping};
 use stickslip::structure::reduction::Row;

@@ -288,7 +288,7 @@ mod tests {
         let mass = Matrix::from_triplets(4, [(0, 0, 1.5), (1, 1, 0.5), (2, 2, 0.3), (3, 3, 0.2)]).unwrap();
         let names = ["1.x", "2.x", "3.x", "4.x"].map(str::to_owned).to_vec();
         let component = Component::new(names, mass, None, stiffness).unwrap();
-        let boundary = Boundary::of_nodes(&component, &[("1".into(), "2".into())], None).unwrap();
+        let boundary = Boundary::of_nodes(component.rows(), &[("1".into(), "2".into())], None).unwrap();
         let disk = Some(DiskPart { boundary, blade: vec![2, 3], deviations: vec![deviation] });
         Model {
             substructure: Some(Substructure { component, damping, reduction, disk }),

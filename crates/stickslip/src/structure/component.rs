@@ -244,7 +244,7 @@ impl Component {
         if let Some((.., kept)) = known.iter().find(|(own, count, _)| own == boundary && *count == sectors) {
             return kept.clone();
         }
-        let sector = CyclicSector::new(self, boundary, sectors);
+        let sector = CyclicSector::new(self.matrices(), boundary, sectors);
         let kept = Arc::new(KeptSector { sector, reductions: Mutex::default(), blades: Mutex::default() });
         known.push((boundary.clone(), sectors, kept.clone()));
         kept
@@ -278,7 +278,7 @@ impl KeptSector {
     /// The blade that the rows `blade` of the component are.
     pub fn blade(&self, component: &Component, blade: &[usize]) -> Result<Arc<SectorBlade>, BladeError> {
         once(&self.blades, &blade.to_vec(), || {
-            let blade = self.sector.blade(component, blade)?;
+            let blade = self.sector.blade(component.rows(), component.matrices().2, blade)?;
             let (alone, entries) = (OnceLock::new(), OnceLock::new());
             Ok(Arc::new(SectorBlade {
                 blade,

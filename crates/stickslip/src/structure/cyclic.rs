@@ -6,7 +6,6 @@
 //!
 //! Source: Thomas (1979), "Dynamics of rotationally periodic structures", Int. J. Numer. Meth. Engng 14, 81-102.
 
-use super::component::Component;
 use super::reduction::{Damping, ReductionError, Row, Whole};
 use super::sector::in_wave;
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,7 +24,7 @@ use stickslip_numerics::sparse::{Analysis, Matrix};
 /// let mass = Matrix::from_triplets(2, [(0, 0, 0.5), (1, 1, 0.5)]).unwrap();
 /// let rows = vec!["1.x".to_owned(), "2.x".to_owned()];
 /// let sector = Component::new(rows, mass, None, stiffness).unwrap();
-/// let boundary = Boundary::of_nodes(&sector, &[("1".into(), "2".into())], None).unwrap();
+/// let boundary = Boundary::of_nodes(sector.rows(), &[("1".into(), "2".into())], None).unwrap();
 /// assert_eq!(boundary.high_rows().collect::<Vec<_>>(), [1]);
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -124,21 +123,17 @@ impl Axis {
 }
 
 impl Boundary {
-    /// Of nodes (low, high): rows are called `node.direction`. Without an axis the rows of both nodes that have the same direction are the same;
+    /// Of nodes (low, high) of a structure with these rows: they are called `node.direction`. Without an axis the rows of both nodes that have the same direction are the same;
     /// with one their directions are x, y, z (rx, ry, rz), and the high side is where the sector ends by the right-hand rule about it.
     ///
     /// # Errors
     /// [`BoundaryError`]: nodes without rows, or whose rows do not belong together.
-    pub fn of_nodes(
-        component: &Component,
-        pairs: &[(String, String)],
-        axis: Option<Axis>,
-    ) -> Result<Self, BoundaryError> {
+    pub fn of_nodes(rows: &[String], pairs: &[(String, String)], axis: Option<Axis>) -> Result<Self, BoundaryError> {
         if pairs.is_empty() {
             return Err(BoundaryError::Empty);
         }
         let mut of_node: BTreeMap<&str, BTreeMap<&str, usize>> = BTreeMap::new();
-        for (row, name) in component.rows().iter().enumerate() {
+        for (row, name) in rows.iter().enumerate() {
             if let Some((node, along)) = name.rsplit_once('.') {
                 of_node.entry(node).or_default().insert(along, row);
             }
@@ -253,8 +248,13 @@ pub(crate) struct CyclicSector {
 }
 
 impl CyclicSector {
-    pub fn new(component: &Component, boundary: &Boundary, sectors: usize) -> Self {
-        let n = component.dofs();
+    /// Of mass, damping and stiffness of one sector.
+    pub fn new(
+        (mass, damping, stiffness): (&Matrix, Option<&Matrix>, &Matrix),
+        boundary: &Boundary,
+        sectors: usize,
+    ) -> Self {
+        let n = mass.n();
         let ties: BTreeMap<usize, Row> = boundary.ties(sectors).into_iter().collect();
         let kept: Vec<usize> = (0..n).filter(|row| !ties.contains_key(row)).collect();
         let mut new = vec![usize::MAX; n];
@@ -265,7 +265,6 @@ impl CyclicSector {
                 None => vec![(new[row], 0, 1.0)],
             })
             .collect();
-        let (mass, damping, stiffness) = component.matrices();
         let part = |matrix: &Matrix| eliminated(matrix, &rows);
         let symmetric = |matrix: &Matrix| symmetrised(part(matrix), |shift| -shift);
         let (mass, damping, stiffness) = (symmetric(mass), damping.map(part), symmetric(stiffness));
@@ -306,8 +305,7 @@ impl CyclicSector {
 
     /// What `δ` of all stiffness of the component's rows `blade` adds to the stiffness, for `δ` = 1: the energy of the blade beyond that of
     /// following its foundation, over the rows that are left.
-    pub fn blade(&self, component: &Component, blade: &[usize]) -> Result<Blade, BladeError> {
-        let (_, _, stiffness) = component.matrices();
+    pub fn blade(&self, names: &[String], stiffness: &Matrix, blade: &[usize]) -> Result<Blade, BladeError> {
         if blade.is_empty() {
             return Err(BladeError::Empty);
         }
@@ -317,7 +315,7 @@ impl CyclicSector {
         for &row in blade {
             match self.rows[row][..] {
                 [(at, 0, 1.0)] if !low.contains(&at) => inside.insert(row, at),
-                _ => return Err(BladeError::OnBoundary(component.rows()[row].clone())),
+                _ => return Err(BladeError::OnBoundary(names[row].clone())),
             };
         }
         let rows: Vec<usize> = inside.keys().copied().collect();
@@ -330,7 +328,7 @@ impl CyclicSector {
                 } else if value != 0.0 {
                     match self.rows[other][..] {
                         [(at, 0, 1.0)] => towards.push((column, at, value)),
-                        _ => return Err(BladeError::OnBoundary(component.rows()[row].clone())),
+                        _ => return Err(BladeError::OnBoundary(names[row].clone())),
                     }
                 }
             }
@@ -461,9 +459,8 @@ pub(super) fn symmetrised(entries: Vec<RingEntry>, back: impl Fn(i64) -> i64) ->
 mod tests {
     use super::*;
 
-    fn component(rows: &[&str]) -> Component {
-        let unit = || Matrix::from_triplets(rows.len(), (0..rows.len()).map(|i| (i, i, 1.0))).unwrap();
-        Component::new(rows.iter().map(|&name| name.to_owned()).collect(), unit(), None, unit()).unwrap()
+    fn named(rows: &[&str]) -> Vec<String> {
+        rows.iter().map(|&name| name.to_owned()).collect()
     }
 
     fn pairs(pairs: &[(&str, &str)]) -> Vec<(String, String)> {
@@ -475,7 +472,7 @@ mod tests {
     fn the_next_sector_is_turned_by_the_right_hand_rule() {
         let rows = ["1.x", "1.y", "1.z", "2.x", "2.y", "2.z"];
         for (axis, across) in [(Axis::X, [1, 2]), (Axis::Y, [2, 0]), (Axis::Z, [0, 1])] {
-            let boundary = Boundary::of_nodes(&component(&rows), &pairs(&[("1", "2")]), Some(axis)).unwrap();
+            let boundary = Boundary::of_nodes(&named(&rows), &pairs(&[("1", "2")]), Some(axis)).unwrap();
             let angle = TAU / 5.0;
             // along the first of the directions across the axis; the next sector sees it turned back
             let mut next = [0.0; 3];
@@ -491,23 +488,23 @@ mod tests {
 
     #[test]
     fn sides_that_do_not_belong_together_are_refused() {
-        let free = component(&["1.x", "1.y", "1.z", "2.x", "2.y", "2.z"]);
-        let refused = |component: &Component, nodes: &[(&str, &str)], axis| {
-            Boundary::of_nodes(component, &pairs(nodes), axis).unwrap_err().to_string()
+        let free = named(&["1.x", "1.y", "1.z", "2.x", "2.y", "2.z"]);
+        let refused = |rows: &[String], nodes: &[(&str, &str)], axis| {
+            Boundary::of_nodes(rows, &pairs(nodes), axis).unwrap_err().to_string()
         };
         assert!(refused(&free, &[], None).contains("no pair"));
         assert!(refused(&free, &[("1", "1")], None).contains("lies on the axis"));
         assert!(refused(&free, &[("1", "2"), ("1", "3")], None).contains("twice on the low side"));
         assert!(refused(&free, &[("8", "9")], None).contains("no rows of node `9`"));
-        let held = component(&["1.x", "1.z", "2.x", "2.y", "2.z"]);
+        let held = named(&["1.x", "1.z", "2.x", "2.y", "2.z"]);
         assert!(refused(&held, &[("1", "2")], Some(Axis::Z)).contains("constrain both alike"));
         // what both sides lack is held
-        let held = component(&["1.z", "2.z"]);
+        let held = named(&["1.z", "2.z"]);
         assert_eq!(
             Boundary::of_nodes(&held, &pairs(&[("1", "2")]), Some(Axis::Z)).unwrap().ties(7),
             [(1, vec![(0, 1.0)])]
         );
-        let radial = component(&["1.r", "2.r"]);
+        let radial = named(&["1.r", "2.r"]);
         assert!(refused(&radial, &[("1", "2")], Some(Axis::Z)).contains("row `2.r`"));
         assert_eq!(Boundary::of_nodes(&radial, &pairs(&[("1", "2")]), None).unwrap().ties(7), [(1, vec![(0, 1.0)])]);
     }

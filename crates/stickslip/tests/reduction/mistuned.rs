@@ -38,7 +38,7 @@ fn ring(reduction: Reduction) -> System {
     let tip = (0..3).map(|direction| vec![(brick.row([nx, 0, 0], direction).unwrap(), 1.0)]);
     let places: Vec<Place> = tip.enumerate().map(|(k, row)| Place::new(format!("tip{k}"), row)).collect();
     let component = Component::new(rows, brick.mass, None, brick.stiffness).unwrap();
-    let boundary = Boundary::of_nodes(&component, &pairs, None).unwrap();
+    let boundary = Boundary::of_nodes(component.rows(), &pairs, None).unwrap();
     let sector = |deviation: f64| {
         let disk = DiskPart { boundary: boundary.clone(), blade: blade.clone(), deviations: vec![deviation] };
         let (component, damping) = (component.clone(), SubstructureDamping::Own);

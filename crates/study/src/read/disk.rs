@@ -2,11 +2,11 @@
 //! stand, the nodes of its blade.
 
 use super::reader::Reader;
-use crate::disk::StatedDisk;
 use crate::document::Table;
 use crate::error::Problem;
 use crate::key::Key;
 use crate::near::shown;
+use crate::stated::StatedDisk;
 use crate::statement::{Stated, StatedTable};
 use crate::values::Given;
 use std::io::Read;

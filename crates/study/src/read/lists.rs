@@ -7,8 +7,8 @@ use crate::expression::is_reserved;
 use crate::near::shown;
 use crate::repeat::{Index, Repetition};
 use crate::schema::{FILE, Key, MOST_ELEMENTS, MOST_MASSES, Takes};
+use crate::stated::Lists;
 use crate::statement::StatedTable;
-use crate::study::Lists;
 use stickslip::model::is_identifier;
 
 /// Largest value of an index: names stay short, and sums of indices exact.

@@ -1,0 +1,175 @@
+//! What the lists state: the model, or one sector of a disk and how its forces go around.
+
+use crate::error::Problem;
+use crate::stated::{Lists, Structure};
+use crate::statement::{Environment, Stated, StatedTable};
+use crate::substructure;
+use crate::values::Values;
+use std::collections::BTreeMap;
+use stickslip::law::{SharedLaw, TANGENTS};
+use stickslip::model::{Around, Element, Force, Joint, Mass, Model, Motion, Spring};
+
+/// The places of the structure by matrices.
+fn own(lists: &Lists) -> impl Iterator<Item = &StatedTable> {
+    lists.place.iter().filter(|table| table.entry("of").is_none())
+}
+
+/// What the lists state, and how its forces and imposed motions go around a disk.
+pub(crate) fn sector_of(
+    structure: &Structure,
+    environment: &Environment<'_>,
+    problems: &mut Vec<Problem>,
+) -> (Model, Vec<Around>, Vec<Around>) {
+    let Structure { lists, template, matrices } = structure;
+    let (mut forces, mut motions, mut wrong) = (Vec::new(), Vec::new(), Vec::new());
+    let mut model = Model::default();
+    let component = matrices.as_ref().and_then(|matrices| matrices.component.as_ref());
+    match (matrices, component) {
+        (Some(matrices), Some(component)) => {
+            model.substructure = Some(substructure::of(matrices, component, environment, problems));
+            for table in own(lists) {
+                model.places.extend(substructure::place(table, component, environment, problems));
+            }
+        }
+        // names alone: masses stand for the places
+        (Some(_), None) => {
+            let values = own(lists).map(|table| (table, table.values(environment, problems)));
+            model.masses.extend(values.map(|(table, values)| substructure::stand_in(table, &values)));
+        }
+        (None, _) => {
+            if let Some(place) = own(lists).next() {
+                let message = "a place is one of a structure, and there is none";
+                let help = "add [structure] with `stiffness` and `mass`; a point mass is a [[mass]], a turned face of one is a place with `of`";
+                problems.push(Problem::new(&place.place, "place", message).help(help));
+            }
+        }
+    }
+    let mut resolve = |element: Element, table: &StatedTable| {
+        let before = problems.len();
+        let values = table.values(environment, problems);
+        if let Some(template) = template {
+            problems[before..].iter_mut().for_each(|problem| template.reword(element, problem));
+        }
+        values
+    };
+    let text = |values: &Values, key: &str| values.text(key).unwrap_or_default().to_owned();
+    let number = |values: &Values, key: &str| values.quantity(key).unwrap_or(0.0);
+    let between = |values: &Values| match values.names("between") {
+        Some([a, b]) => [a.clone(), b.clone()],
+        _ => Default::default(),
+    };
+    let harmonic = |values: &Values| values.count("harmonic").and_then(|h| u32::try_from(h).ok()).unwrap_or(1);
+    for (i, table) in lists.mass.iter().enumerate() {
+        let values = resolve(Element::Mass(i), table);
+        model.masses.push(Mass {
+            name: text(&values, "name"),
+            mass: number(&values, "mass"),
+            directions: values.names("directions").unwrap_or_default().to_vec(),
+        });
+    }
+    for (i, table) in lists.place.iter().enumerate().filter(|(_, table)| table.entry("of").is_some()) {
+        let values = resolve(Element::Place(i), table);
+        match substructure::view(table, &values, &model.masses) {
+            Ok(place) => model.places.push(place),
+            Err(problem) => wrong.push(*problem),
+        }
+    }
+    for (i, table) in lists.spring.iter().enumerate() {
+        let values = resolve(Element::Spring(i), table);
+        let (stiffness, damping) = (number(&values, "stiffness"), number(&values, "damping"));
+        model.springs.push(Spring { between: between(&values), stiffness, damping });
+    }
+    let nodes: BTreeMap<String, usize> =
+        model.nodes().map(|(name, directions)| (name.to_owned(), directions.len())).collect();
+    for (i, table) in lists.joint.iter().enumerate() {
+        let values = resolve(Element::Joint(i), table);
+        // without a law there is a problem, and the model is not used
+        if let Some(law) = values.law("law") {
+            let between = between(&values);
+            let law = for_nodes(law, table, &between, &nodes);
+            model.joints.push(Joint { name: text(&values, "name"), between, law });
+        }
+    }
+    for (i, table) in lists.force.iter().enumerate() {
+        let values = resolve(Element::Force(i), table);
+        let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
+        forces.push(around(table, &values, &mut wrong));
+        model.forces.push(Force { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
+    }
+    for (i, table) in lists.motion.iter().enumerate() {
+        let values = resolve(Element::Motion(i), table);
+        let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
+        motions.push(around(table, &values, &mut wrong));
+        model.motions.push(Motion { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
+    }
+    problems.append(&mut wrong);
+    (model, forces, motions)
+}
+
+/// A law that leaves its number of tangents open, where the file does too, has those of the nodes that it joins: all their directions but the
+/// normal.
+fn for_nodes(
+    law: &SharedLaw,
+    joint: &StatedTable,
+    between: &[String; 2],
+    nodes: &BTreeMap<String, usize>,
+) -> SharedLaw {
+    let stated = match joint.entry("law").map(|entry| &entry.value) {
+        Some(Stated::Law(_, table)) => table.entry(TANGENTS).is_some(),
+        _ => true,
+    };
+    let directions = between.iter().filter_map(|name| nodes.get(name)).copied().max();
+    match (stated, directions) {
+        (false, Some(directions @ 2..)) => law.with(TANGENTS, (directions - 1) as f64).unwrap_or_else(|| law.clone()),
+        _ => law.clone(),
+    }
+}
+
+/// How an entry of a list is distributed over the sectors.
+pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Problem>) -> Around {
+    let mut found = Vec::new();
+    for key in ["engine_order", "nodal_diameter", "sector"] {
+        match whole(table, values, key) {
+            Ok(Some(number)) => found.push((key, number)),
+            Ok(None) => {}
+            Err(problem) => problems.push(problem),
+        }
+    }
+    match found[..] {
+        [] => Around::EngineOrder(0),
+        [("engine_order", order)] => Around::EngineOrder(order),
+        [("nodal_diameter", diameter)] => Around::NodalDiameter(diameter),
+        [(_, sector)] => Around::Sector(usize::try_from(sector).unwrap_or(usize::MAX)),
+        [(one, _), (other, _), ..] => {
+            let message = format!("`{one}` and `{other}` say different things of the same wave");
+            let help =
+                format!("keep one of them; for two waves write two entries, one with `{one}`, one with `{other}`");
+            problems.push(Problem::new(table.place_of(other, None), other, message).help(help));
+            Around::EngineOrder(0)
+        }
+    }
+}
+
+/// That an entry says how it goes around a disk, where there is none.
+pub(crate) fn none_around(table: &StatedTable, problems: &mut Vec<Problem>) {
+    for key in ["engine_order", "nodal_diameter", "sector"] {
+        if let Some(entry) = table.entry(key) {
+            let message = format!("`{key}` is for bladed disks, and there is no [disk]");
+            let help = "add a table [disk] with `sectors`, and state one sector as the model";
+            problems.push(Problem::new(&entry.place, key, message).help(help));
+        }
+    }
+}
+
+/// Largest whole number that a quantity can be read as.
+const MOST: f64 = 1e9;
+
+/// A whole number that a key must have.
+pub(crate) fn whole(table: &StatedTable, values: &Values, key: &'static str) -> Result<Option<i64>, Problem> {
+    let Some(value) = values.quantity(key) else { return Ok(None) };
+    if value.fract() == 0.0 && value.abs() <= MOST {
+        return Ok(Some(value as i64));
+    }
+    let message = format!("must be a whole number, found {value}");
+    Err(Problem::new(table.place_of(key, None), key, message))
+}

@@ -1,0 +1,201 @@
+//! How a model is stated: the lists, files and template of a study, and where in them a problem of the model is.
+
+use crate::error::{Place, Problem};
+use crate::expression::displayed;
+use crate::names::Names;
+use crate::near::{nearest, one_of};
+use crate::statement::{Stated, StatedTable};
+use crate::stiffened::Stiffened;
+use stickslip::dimension::Dimension;
+use stickslip::model::{Element, Model, ModelError};
+use stickslip::structure::{Component, Node, Reduction};
+use stickslip_numerics::sparse::Matrix;
+
+/// How the model is stated: in lists, of this file or of a template's.
+#[derive(Debug, Clone)]
+pub(crate) struct Structure {
+    pub lists: Lists,
+    pub template: Option<NamedTemplate>,
+    pub matrices: Option<Matrices>,
+}
+
+/// `[structure]`: what was read of its files.
+#[derive(Debug, Clone)]
+pub(crate) struct Matrices {
+    pub table: StatedTable,
+    /// None of a study whose files were not read.
+    pub component: Option<Component>,
+    /// What rotation adds to its stiffness.
+    pub stiffened: Option<Stiffened>,
+    /// Rows of the files that are constrained, and not in it.
+    pub left_out: usize,
+}
+
+impl Matrices {
+    /// CRC-32 of the rows' names and of all entries, by which files that changed between two runs are told apart.
+    pub fn check(&self) -> Option<String> {
+        let component = self.component.as_ref()?;
+        let mut hasher = crc32fast::Hasher::new();
+        component.rows().iter().for_each(|name| hasher.update(name.as_bytes()));
+        let (mass, damping, stiffness) = component.matrices();
+        let more = self.stiffened.as_ref().map(Stiffened::more);
+        for (number, matrix) in [Some(mass), damping, Some(stiffness), more].into_iter().enumerate() {
+            for (row, column, value) in matrix.into_iter().flat_map(Matrix::entries) {
+                let place = [number, row, column].map(|index| index as u64);
+                place.iter().for_each(|index| hasher.update(&index.to_le_bytes()));
+                hasher.update(&value.to_le_bytes());
+            }
+        }
+        Some(format!("{:08x}", hasher.finalize()))
+    }
+}
+
+/// The template that a study names.
+#[derive(Debug, Clone)]
+pub(crate) struct NamedTemplate {
+    /// `[model]`.
+    pub table: StatedTable,
+    /// Its file among the sources.
+    pub source: usize,
+}
+
+impl NamedTemplate {
+    /// Rewords a problem in the template's file for a user who has not written it: at the place where the template is
+    /// named.
+    pub fn reword(&self, element: Element, problem: &mut Problem) {
+        if problem.place.source == self.source {
+            problem.message = self.blame(element, &problem.key, &problem.message);
+            problem.place = self.table.place_of("template", None).clone();
+        }
+    }
+
+    pub fn blame(&self, element: Element, key: &str, message: &str) -> String {
+        format!("these parameters make {element} of the template wrong: `{key}` {message}")
+    }
+}
+
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Lists {
+    pub place: Vec<StatedTable>,
+    pub mass: Vec<StatedTable>,
+    pub spring: Vec<StatedTable>,
+    pub joint: Vec<StatedTable>,
+    pub force: Vec<StatedTable>,
+    pub motion: Vec<StatedTable>,
+    /// The lists state one sector of it.
+    pub disk: Option<StatedDisk>,
+}
+
+impl Lists {
+    pub fn get_mut(&mut self, name: &str) -> Option<&mut Vec<StatedTable>> {
+        match name {
+            "place" => Some(&mut self.place),
+            "mass" => Some(&mut self.mass),
+            "spring" => Some(&mut self.spring),
+            "joint" => Some(&mut self.joint),
+            "force" => Some(&mut self.force),
+            "motion" => Some(&mut self.motion),
+            _ => None,
+        }
+    }
+
+    pub fn get(&self, name: &str) -> &[StatedTable] {
+        match name {
+            "place" => &self.place,
+            "mass" => &self.mass,
+            "spring" => &self.spring,
+            "joint" => &self.joint,
+            "force" => &self.force,
+            "motion" => &self.motion,
+            _ => &[],
+        }
+    }
+}
+
+/// `[disk]` as it is stated.
+#[derive(Debug, Clone)]
+pub(crate) struct StatedDisk {
+    pub table: StatedTable,
+    /// The deviations of a file.
+    pub pattern: Option<Vec<f64>>,
+    /// Nodes of the low and the high side of a sector by its matrices.
+    pub boundary: Option<Vec<(String, String)>>,
+    /// Where its nodes stand.
+    pub nodes: Option<Vec<Node>>,
+    /// Nodes of its blade.
+    pub blade: Option<Vec<String>>,
+}
+
+impl StatedDisk {
+    /// The parameter that differs from sector to sector, if one does.
+    pub fn mistuned(&self, names: &[String]) -> Option<usize> {
+        let Stated::Table(table) = &self.table.entry("mistuning")?.value else { return None };
+        match &table.entry("of")?.value {
+            Stated::Names(of) if of.len() == 1 => names.iter().position(|name| *name == of[0].0),
+            _ => None,
+        }
+    }
+}
+
+/// What is wrong with a model, at the place in the file that states it; `model` has the names that there are.
+pub(crate) fn problem_of(structure: &Structure, error: &ModelError, model: &Model) -> Problem {
+    let (list, index) = match error.element {
+        Element::Mass(i) => ("mass", i),
+        Element::Spring(i) => ("spring", i),
+        Element::Joint(i) => ("joint", i),
+        Element::Force(i) => ("force", i),
+        Element::Motion(i) => ("motion", i),
+        Element::Place(i) => ("place", i),
+        Element::Substructure => ("structure", 0),
+        Element::Whole => ("", 0),
+    };
+    let whole = Place::default();
+    let (place, message) = match &structure.template {
+        None => {
+            let matrices = structure.matrices.as_ref().filter(|_| list == "structure");
+            let table = matrices.map(|matrices| &matrices.table).or_else(|| structure.lists.get(list).get(index));
+            let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
+            (place, table.map_or_else(|| error.message.clone(), |table| table.with_turn(&error.message)))
+        }
+        Some(template) => {
+            let place = template.table.place_of(if error.key == "law" { "law" } else { "template" }, None);
+            (place, template.blame(error.element, error.key, &error.message))
+        }
+    };
+    let places = model.place_names();
+    let nodes = Names::of_places(model);
+    let help = match &error.wrong_name {
+        Some(wrong) => Some(match (nodes.directions_of(wrong), nearest(wrong, places.iter().map(String::as_str))) {
+            (Some(directions), _) => format!("say {}", one_of(directions.iter().map(String::as_str))),
+            (None, Some(near)) => format!("did you mean `{near}`?"),
+            (None, None) => {
+                format!("the places are {}", one_of(places.iter().take(20).map(String::as_str)).replace(" or ", ", "))
+            }
+        }),
+        None if error.element == Element::Whole && model.substructure.is_some() => {
+            Some("add a [[place]] with a name and a dof".to_owned())
+        }
+        None if error.element == Element::Whole => Some("add a [[mass]] or a [[motion]]".to_owned()),
+        None if error.key == "reduce" => advice_on_reduction(model),
+        None if error.key == "name" => Some("choose another name".to_owned()),
+        None => None,
+    };
+    Problem::new(place, error.key, message).maybe_help(help)
+}
+
+/// Lowest frequencies that are shown where a structure cannot be reduced.
+const LOWEST: usize = 3;
+
+/// What to do where a structure cannot be reduced: units that were mistaken move its frequencies by powers of ten.
+fn advice_on_reduction(model: &Model) -> Option<String> {
+    let substructure = model.substructure.as_ref()?;
+    if matches!(substructure.reduction, Reduction::UpTo { up_to, .. } if up_to <= 0.0) {
+        return Some(
+            "this study has no drive frequency that would tell: add reduce = { up_to = \"5 kHz\" }".to_owned(),
+        );
+    }
+    let component = &substructure.component;
+    let lowest = component.frequencies(LOWEST).ok()?;
+    let listed: Vec<String> = lowest.iter().map(|omega| displayed(*omega, Some(Dimension::FREQUENCY))).collect();
+    Some(format!("its lowest frequencies are {}: are the units right, and `up_to`?", listed.join(", ")))
+}
