@@ -28,7 +28,7 @@ pub struct Steps {
     pub direction: f64,
     /// Unit of the parameter in the arc length.
     pub unit: f64,
-    /// Longest and shortest step of the arc, in this unit.
+    /// Longest and shortest step of the arc, in this unit. Where the unknowns are larger than one the longest is in proportion to them.
     pub longest: f64,
     /// See `longest`.
     pub shortest: f64,
@@ -114,6 +114,9 @@ pub fn trace<E: Equations>(
     let mut fresh = true;
     let mut ahead = steps.direction;
     for _ in 1..steps.points {
+        // far out steps are as long as the way is far, so that one that leads to infinity is not followed for ever
+        let longest = steps.longest * x.iter().map(|x| x * x).sum::<f64>().sqrt().max(1.0);
+        length = length.min(longest);
         if fresh {
             work.tangent(equations, &x, p, steps.unit, &mut tangent);
             fresh = false;
@@ -152,7 +155,7 @@ pub fn trace<E: Equations>(
         };
         let Some(iterations) = accepted else {
             length *= 0.5;
-            if length < steps.longest / LEAP {
+            if length < longest / LEAP {
                 // over the kink, by the step that was meant, if the equations know how
                 let q = (p + (4.0 / LEAP) * steps.longest * steps.unit * ahead).clamp(low, high);
                 next.copy_from_slice(&x);
@@ -184,7 +187,7 @@ pub fn trace<E: Equations>(
             return End::Border;
         }
         if iterations <= FEW {
-            length = (1.5 * length).min(steps.longest);
+            length *= 1.5;
         }
     }
     End::Points
@@ -285,5 +288,43 @@ impl Work {
             *p -= self.right[n] * unit;
         }
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `x (1 - p) = 1`, a resonance without damping.
+    struct Pole;
+
+    impl Equations for Pole {
+        fn size(&self) -> usize {
+            1
+        }
+        fn tolerance(&self) -> f64 {
+            1e-10
+        }
+        fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool {
+            (f[0], by_x[0], by_p[0]) = (x[0] * (1.0 - p) - 1.0, 1.0 - p, -x[0]);
+            true
+        }
+        fn leap(&mut self, _: &mut [f64], _: f64) -> bool {
+            false
+        }
+    }
+
+    /// Steps of a tenth of the way out: 193 of them to a hundred million, and not a thousand million.
+    #[test]
+    fn what_leads_to_infinity_takes_few_steps() {
+        let (mut visited, mut farthest) = (0, 0.0f64);
+        let end = trace(&mut Pole, &[1.0], 0.0, Steps::between(0.0, 2.0, 0.2), &mut |_, x, p| {
+            visited += 1;
+            farthest = farthest.max(x[0]);
+            assert!((x[0] * (1.0 - p) - 1.0).abs() < 1e-6, "{x:?} {p}");
+            x[0] < 1e6
+        });
+        assert_eq!(end, End::Stopped);
+        assert!(farthest >= 1e6 && visited < 400, "{farthest} {visited} {end:?}");
     }
 }
