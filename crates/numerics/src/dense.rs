@@ -226,6 +226,11 @@ pub struct Lu<T> {
 pub type ComplexLu = Lu<Complex64>;
 
 impl<T: Number> Lu<T> {
+    /// Memory of its numbers, bytes.
+    pub fn bytes(&self) -> usize {
+        size_of::<T>() * self.factors.len()
+    }
+
     /// Of a matrix column after column, n × n.
     ///
     /// # Errors

@@ -121,6 +121,15 @@ impl Factor {
 }
 
 impl ComplexFactor {
+    /// Memory of its numbers, bytes; roughly, where rows were exchanged.
+    pub fn bytes(&self) -> usize {
+        match &self.kind {
+            Kind::Symmetric(blocks) => size_of::<f64>() * (blocks.values.len() + blocks.beside.len()),
+            Kind::Exchanged(_) => 2 * size_of::<Complex64>() * self.pattern.real().cholesky.len_val(),
+            Kind::Empty => 0,
+        }
+    }
+
     pub(super) fn new(pattern: &Arc<Pattern>, values: Vec<Complex64>) -> Result<Self, Singular> {
         let make = |kind| ComplexFactor { pattern: pattern.clone(), kind };
         if pattern.n == 0 {

@@ -47,6 +47,14 @@ impl Structure {
 }
 
 impl DynamicStiffness {
+    /// Memory of it, bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        match &self.factor {
+            Factor::Full(factor) => factor.bytes(),
+            Factor::Sparse(factor) => factor.bytes(),
+        }
+    }
+
     /// Displacements (m) from forces (N), in place: columns of length n, one after the other.
     ///
     /// # Panics
