@@ -380,22 +380,29 @@ fn in_space(disk: &str, more: &str) -> Result<Study, StudyError> {
     let at =
         |radius: f64, degrees: f64| [radius * degrees.to_radians().cos(), radius * degrees.to_radians().sin(), 0.0];
     let nodes = [at(50.0, 10.0), at(80.0, 10.0), at(50.0, 70.0), at(80.0, 70.0), at(120.0, 40.0)];
-    let (mut k, mut m, mut rows, mut stand) =
-        (Vec::new(), Vec::new(), "row,name\n".to_owned(), "node,x,y,z\n".to_owned());
-    let tied = [(0, 1, 3e5), (2, 3, 3e5), (0, 2, 2e5), (1, 3, 2e5), (1, 4, 5e4), (3, 4, 4e4)];
+    let (mut m, mut rows, mut stand) = (Vec::new(), "row,name\n".to_owned(), "node,x,y,z\n".to_owned());
+    let mut stiffness = nalgebra::DMatrix::<f64>::identity(15, 15) * 1e4;
     for (node, [x, y, z]) in nodes.iter().enumerate() {
         stand += &format!("{},{x:.6},{y:.6},{z}\n", node + 1);
         for (axis, along) in ["x", "y", "z"].into_iter().enumerate() {
             let row = 3 * node + axis + 1;
             rows += &format!("{row},{}.{along}\n", node + 1);
-            let own: f64 = tied.iter().filter(|(a, b, _)| [*a, *b].contains(&node)).map(|(_, _, k)| k).sum();
-            k.push(format!("{row} {row} {}", own + 1e4));
             m.push(format!("{row} {row} 0.2"));
         }
     }
-    for (a, b, stiffness) in tied {
-        (1..=3).for_each(|axis| k.push(format!("{} {} -{stiffness}", 3 * b + axis, 3 * a + axis)));
+    // rods, which carry a tenth across
+    for (a, b, rod) in [(0, 1, 3e5), (2, 3, 3e5), (0, 2, 2e5), (1, 3, 2e5), (1, 4, 5e4), (3, 4, 4e4)] {
+        let line: Vec<f64> = (0..3).map(|i| nodes[b][i] - nodes[a][i]).collect();
+        let square: f64 = line.iter().map(|x| x * x).sum();
+        for (i, j) in (0..9).map(|ij| (ij / 3, ij % 3)) {
+            let value = rod * (line[i] * line[j] / square + if i == j { 0.1 } else { 0.0 });
+            for (p, q, sign) in [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)] {
+                stiffness[(3 * p + i, 3 * q + j)] += sign * value;
+            }
+        }
     }
+    let below = (0..15).flat_map(|row| (0..=row).map(move |column| (row, column)));
+    let k: Vec<String> = below.map(|at| format!("{} {} {:e}", at.0 + 1, at.1 + 1, stiffness[at])).collect();
     for (name, entries) in [("k.mtx", &k), ("m.mtx", &m)] {
         let head = format!("%%MatrixMarket matrix coordinate real symmetric\n15 15 {}\n", entries.len());
         write(name, &(head + &entries.join("\n") + "\n"));
