@@ -15,7 +15,7 @@ const UPDATE: &str = "STICKSLIP_UPDATE_BOOK";
 const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-report --test gallery";
 
 /// The studies, in the order of the page.
-const STUDIES: [&str; 26] = [
+const STUDIES: [&str; 28] = [
     "underplatform_damper",
     "best_slip_force",
     "slip_limit_map",
@@ -27,6 +27,8 @@ const STUDIES: [&str; 26] = [
     "disk_diameters",
     "campbell",
     "mistuned_disk",
+    "disk_contacts",
+    "amplification",
     "bolted_joint",
     "ring_down",
     "nonlinear_modes",
