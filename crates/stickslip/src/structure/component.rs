@@ -42,7 +42,7 @@ struct Kept {
     index: OnceLock<HashMap<String, usize>>,
     whole: Whole,
     /// What was asked for, and what came of it: cases of a study ask the same.
-    reductions: Mutex<Vec<(Asked, Answer)>>,
+    reductions: Known<Asked, Answer>,
     /// As one of so many sectors of a ring.
     sectors: Mutex<Vec<(Boundary, usize, Arc<KeptSector>)>>,
 }
@@ -51,8 +51,8 @@ struct Kept {
 #[derive(Debug)]
 pub(crate) struct KeptSector {
     pub sector: CyclicSector,
-    reductions: Mutex<Vec<(Asked, Answer)>>,
-    blades: Mutex<Vec<(Vec<usize>, Result<Arc<SectorBlade>, BladeError>)>>,
+    reductions: Known<Asked, Answer>,
+    blades: Known<Vec<usize>, Result<Arc<SectorBlade>, BladeError>>,
 }
 
 /// The blade of a sector, and what was asked of it.
@@ -63,9 +63,9 @@ pub(crate) struct SectorBlade {
     alone: OnceLock<Result<Factor, ReductionError>>,
     entries: OnceLock<Vec<(usize, usize, f64)>>,
     /// In the coordinates of a reduction with that many steps of its vectors.
-    reductions: Mutex<Vec<((Asked, usize), Relieved)>>,
+    reductions: Known<(Asked, usize), Relieved>,
     /// By the deviations of all blades.
-    mistuned: Mutex<Vec<((Asked, Vec<f64>), MistunedSector)>>,
+    mistuned: Known<(Asked, Vec<f64>), MistunedSector>,
 }
 
 type Relieved = Result<Arc<InFew>, ReductionError>;
@@ -86,6 +86,8 @@ pub(crate) struct MistunedSector {
     few: Arc<InFew>,
 }
 
+/// What was asked, and the answers.
+type Known<K, V> = Mutex<Vec<(K, V)>>;
 type Asked = (Vec<Row>, Reduction);
 type Answer = Result<Arc<ReducedComponent>, ReductionError>;
 
@@ -148,7 +150,7 @@ pub struct ReducedComponent {
 #[derive(Debug, Clone)]
 pub(crate) enum Form {
     /// Of a component; without its basis.
-    Alone(Reduced),
+    Alone(Box<Reduced>),
     /// Of one sector of a ring.
     Sector(Arc<ReducedSector>),
 }
@@ -252,7 +254,7 @@ impl Component {
 }
 
 /// An answer that is computed once: whoever asks the same at the same time waits for the one who computes.
-fn once<K: PartialEq + Clone, V: Clone>(known: &Mutex<Vec<(K, V)>>, asked: &K, compute: impl FnOnce() -> V) -> V {
+fn once<K: PartialEq + Clone, V: Clone>(known: &Known<K, V>, asked: &K, compute: impl FnOnce() -> V) -> V {
     let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, answer)) = known.iter().find(|(key, _)| key == asked) {
         return answer.clone();
@@ -420,7 +422,7 @@ fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionE
         }
     };
     let (frequencies, free) = (natural(&modes), modes.free());
-    Ok(ReducedComponent { form: Form::Alone(reduced.in_metres()), deviation, frequencies, free, up_to })
+    Ok(ReducedComponent { form: Form::Alone(Box::new(reduced.in_metres())), deviation, frequencies, free, up_to })
 }
 
 impl ReducedComponent {
