@@ -186,8 +186,8 @@ fn an_engine_order_against_a_direct_solution() {
     }
 }
 
-/// Blades that differ: few coordinates against all rows of all sectors with the stiffness of the blades scaled there. What the tuned modes leave
-/// out at one percent of the frequency are 4e-3 of the amplitude at a resonance with a damping ratio of 1.4e-3, a shift by 6e-6, and 1e-4 beside it.
+/// Blades that differ: few coordinates against all rows of all sectors with the stiffness of the blades scaled there, beside a resonance and at one with
+/// a damping ratio of 1.4e-3. The tuned modes alone leave 4e-3 of the amplitude there, a shift by 6e-6.
 #[test]
 #[ignore = "5 s of one core: a whole ring of 6480 rows"]
 fn blades_that_differ_in_few_coordinates_and_in_all() {
@@ -196,12 +196,11 @@ fn blades_that_differ_in_few_coordinates_and_in_all() {
     let tuned = computed(&response("{ up_to = \"5 kHz\" }", "", "engine_order = 2"));
     for point in 0..HERTZ.len() {
         let sectors = 0..12;
-        let bound = [2e-4, 1e-2][point];
         let worst = sectors
             .clone()
             .map(|s| apart(tip_of(&found[1], s, point), tip_of(&found[0], s, point)))
             .fold(0.0, f64::max);
-        assert!(worst < bound, "{} Hz: {worst:e}", HERTZ[point]);
+        assert!(worst < 2e-4, "{} Hz: {worst:e}", HERTZ[point]);
         let moved = sectors.map(|s| apart(tip_of(&found[1], s, point), tip_of(&tuned, s, point))).fold(0.0, f64::max);
         assert!(moved > 0.02, "mistuning that moves nothing tests nothing: {moved:e} at {} Hz", HERTZ[point]);
     }

@@ -52,7 +52,7 @@ struct Kept {
 pub(crate) struct KeptSector {
     pub sector: CyclicSector,
     reductions: Known<Asked, Answer>,
-    blades: Known<Vec<usize>, Result<Arc<SectorBlade>, BladeError>>,
+    blades: Known<Vec<usize>, KeptBlade>,
 }
 
 /// The blade of a sector, and what was asked of it.
@@ -65,9 +65,12 @@ pub(crate) struct SectorBlade {
     /// In the coordinates of a reduction with that many steps of its vectors.
     reductions: Known<(Asked, usize), Relieved>,
     /// By the deviations of all blades.
-    mistuned: Known<(Asked, Vec<f64>), MistunedSector>,
+    mistuned: Known<Pattern, MistunedSector>,
 }
 
+type KeptBlade = Result<Arc<SectorBlade>, BladeError>;
+/// What was asked for, and the deviations of all blades.
+type Pattern = (Asked, Vec<f64>);
 type Relieved = Result<Arc<InFew>, ReductionError>;
 
 /// A sector in few coordinates, and what a share of one of its blade's stiffness adds over them.
@@ -150,10 +153,13 @@ pub struct ReducedComponent {
 #[derive(Debug, Clone)]
 pub(crate) enum Form {
     /// Of a component; without its basis.
-    Alone(Box<Reduced>),
+    Alone(Arc<Reduced>),
     /// Of one sector of a ring.
     Sector(Arc<ReducedSector>),
 }
+
+/// Patterns of blades whose error is remembered: a case is assembled several times in a row, and a campaign has a million.
+const PATTERNS: usize = 64;
 
 /// A mode that is kept, in multiples of the frequency up to which it serves: the last ones only complete those below.
 const BEYOND: f64 = 1.5;
@@ -278,7 +284,7 @@ impl KeptSector {
     }
 
     /// The blade that the rows `blade` of the component are.
-    pub fn blade(&self, component: &Component, blade: &[usize]) -> Result<Arc<SectorBlade>, BladeError> {
+    pub fn blade(&self, component: &Component, blade: &[usize]) -> KeptBlade {
         once(&self.blades, &blade.to_vec(), || {
             let blade = self.sector.blade(component.rows(), component.matrices().2, blade)?;
             let (alone, entries) = (OnceLock::new(), OnceLock::new());
@@ -309,7 +315,11 @@ impl KeptSector {
         // others wait for no pattern but their own
         drop(known);
         let answer = self.nearest(blade, deviations, seen, how)?;
-        blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner).push((asked, answer.clone()));
+        let mut known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
+        if known.len() >= PATTERNS {
+            known.remove(0);
+        }
+        known.push((asked, answer.clone()));
         Ok(answer)
     }
 
@@ -422,7 +432,7 @@ fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionE
         }
     };
     let (frequencies, free) = (natural(&modes), modes.free());
-    Ok(ReducedComponent { form: Form::Alone(Box::new(reduced.in_metres())), deviation, frequencies, free, up_to })
+    Ok(ReducedComponent { form: Form::Alone(Arc::new(reduced.in_metres())), deviation, frequencies, free, up_to })
 }
 
 impl ReducedComponent {

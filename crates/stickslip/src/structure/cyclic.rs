@@ -337,7 +337,7 @@ impl CyclicSector {
         let own = Matrix::from_triplets(n, own).map_err(|_| BladeError::NotHeld)?;
         let analysis = Analysis::new(&[&own]);
         let factor = analysis.factor(&[(1.0, &own)]).map_err(|_| BladeError::NotHeld)?;
-        if factor.negative() > 0 || n == 0 || towards.is_empty() {
+        if factor.negative() > 0 || towards.is_empty() {
             return Err(BladeError::NotHeld);
         }
         Ok(Blade { at: inside.into_values().collect(), own, towards, factor })

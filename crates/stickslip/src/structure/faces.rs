@@ -114,10 +114,11 @@ impl<'a> Faces<'a> {
     /// [`FacesError::None`].
     pub fn pairs(&self) -> Result<Vec<(String, String)>, FacesError> {
         let turn = self.axis.turn(TAU / self.sectors as f64);
-        let off_axis = self.nodes.iter().filter(|(_, at)| self.axis.radius(*at) > self.tolerance());
-        let met = off_axis.filter_map(|(low, at)| {
+        let off_axis = self.nodes.iter().enumerate().filter(|(_, (_, at))| self.axis.radius(*at) > self.tolerance());
+        let met = off_axis.filter_map(|(own, (low, at))| {
             let high = self.nearest(turned(&turn, *at))?;
-            Some((low.clone(), self.nodes[high].0.clone()))
+            // of two sectors each is the next of the other, and every pair is met from both ends
+            (self.sectors != 2 || own < high).then(|| (low.clone(), self.nodes[high].0.clone()))
         });
         let pairs: Vec<_> = met.collect();
         if pairs.is_empty() { Err(FacesError::None { sectors: self.sectors, axis: self.axis }) } else { Ok(pairs) }
@@ -156,7 +157,9 @@ impl<'a> Faces<'a> {
         }
         let named: BTreeMap<&str, &str> = pairs.iter().map(|(low, high)| (low.as_str(), high.as_str())).collect();
         let all = self.pairs()?;
-        let mut missing = all.iter().filter(|(low, _)| !named.contains_key(low.as_str()));
+        let is = |low: &String, high: &String| named.get(low.as_str()) == Some(&high.as_str());
+        let mut missing =
+            all.iter().filter(|(low, high)| !(named.contains_key(low.as_str()) || self.sectors == 2 && is(high, low)));
         match missing.next() {
             Some((low, high)) => {
                 let count = 1 + missing.count();
@@ -258,6 +261,11 @@ mod tests {
             let message = refused(axis, sectors, pairs).unwrap_err();
             assert!(message.contains(words), "{words}: {message}");
         }
+        // of two sectors it does not matter which side is which
+        let half: Vec<Node> = [("1", 3.0), ("2", -3.0)].map(|(name, x)| (name.to_owned(), [x, 0.0, 1.0])).to_vec();
+        let faces = Faces::new(&half, Axis::Z, 2);
+        assert_eq!(faces.pairs().unwrap(), named(&[("1", "2")]));
+        assert!([[("1", "2")], [("2", "1")]].iter().all(|pairs| faces.check(&named(pairs)).is_ok()));
         assert!(Faces::new(&nodes, Axis::Z, 11).pairs().unwrap_err().to_string().contains("number of sectors"));
     }
 }
