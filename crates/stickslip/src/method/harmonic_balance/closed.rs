@@ -11,7 +11,6 @@
 
 use super::hold::HOLD;
 use super::ports::Ports;
-use super::rest::Rest;
 use super::uncoupled::{Resonant, Uncoupled};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -45,20 +44,6 @@ pub(super) fn hold(springs: &[f64], own: impl Fn(f64) -> Result<Vec<f64>, Resona
     springs.iter().zip(&once).zip(free).any(|((k, own), free)| free && k * own > SOFT)
 }
 
-/// The structure at rest with its contacts closed.
-#[derive(Debug, Clone)]
-pub(super) struct Closed {
-    /// Stiffness along the axes, N/m.
-    pub springs: Vec<f64>,
-    form: Form,
-}
-
-#[derive(Debug, Clone)]
-enum Form {
-    Rows(Box<Rest>),
-    Modes(Modes),
-}
-
 /// Of a structure in modes: these are coupled by the contacts.
 #[derive(Debug, Clone)]
 pub(super) struct Modes {
@@ -68,54 +53,22 @@ pub(super) struct Modes {
     factor: RefCell<Option<(f64, Arc<Lu<f64>>)>>,
 }
 
-impl Closed {
-    pub fn of_rows(springs: Vec<f64>, with_springs: Rest) -> Self {
-        Closed { springs, form: Form::Rows(Box::new(with_springs)) }
-    }
-
-    pub fn of_modes(springs: Vec<f64>, structure: &Arc<Uncoupled>) -> Self {
+impl Modes {
+    /// Of a structure in modes, with these springs along the axes, N/m.
+    pub fn new(springs: &[f64], structure: &Arc<Uncoupled>) -> Self {
         let (p, n) = (structure.axes, structure.own.len());
         let weighted: Vec<f64> =
-            structure.at.chunks_exact(p.max(1)).flat_map(|at| at.iter().zip(&springs).map(|(a, k)| a * k)).collect();
+            structure.at.chunks_exact(p.max(1)).flat_map(|at| at.iter().zip(springs).map(|(a, k)| a * k)).collect();
         let mut coupling = vec![0.0; n * n];
         // the columns of `at` are its modes, so that the first factor stands transposed
         let rows: Vec<f64> =
             (0..p).flat_map(|q| (0..n).map(move |m| (q, m))).map(|(q, m)| weighted[m * p + q]).collect();
         multiply_in_blocks(&rows, &structure.at, &mut coupling, (n, p, n), false);
-        Closed {
-            springs,
-            form: Form::Modes(Modes { structure: structure.clone(), coupling, factor: RefCell::default() }),
-        }
+        Modes { structure: structure.clone(), coupling, factor: RefCell::default() }
     }
 
-    /// Displacements of all places (m) under constant forces on them, N.
-    pub fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, Resonant> {
-        match &self.form {
-            Form::Rows(rest) => rest.respond(0, omega, force),
-            Form::Modes(modes) => modes.respond(omega, force),
-        }
-    }
-
-    /// Displacements along the axes under unit forces along them, m/N.
-    pub fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
-        match &self.form {
-            Form::Rows(rest) => rest.receptance(0, omega),
-            Form::Modes(modes) => modes.receptance(omega),
-        }
-    }
-
-    /// The stiffness between modes, if the structure is in these.
-    pub fn of_the_modes(&self, omega: f64) -> Option<Result<Arc<Lu<f64>>, Resonant>> {
-        match &self.form {
-            Form::Rows(_) => None,
-            Form::Modes(modes) => Some(modes.factor(omega)),
-        }
-    }
-}
-
-impl Modes {
-    /// Kept as long as the drive frequency stays.
-    fn factor(&self, omega: f64) -> Result<Arc<Lu<f64>>, Resonant> {
+    /// The stiffness between modes. Kept as long as the drive frequency stays.
+    pub fn factor(&self, omega: f64) -> Result<Arc<Lu<f64>>, Resonant> {
         let mut kept = self.factor.borrow_mut();
         if let Some((of, factor)) = &*kept
             && *of == omega
@@ -132,7 +85,8 @@ impl Modes {
         Ok(factor)
     }
 
-    fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, Resonant> {
+    /// Displacements of all places (m) under constant forces on them, N.
+    pub fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, Resonant> {
         let factor = self.factor(omega)?;
         // a mean has no imaginary part
         let mut modal = self.structure.onto_modes(&force.map(|f| f.re));
@@ -140,7 +94,8 @@ impl Modes {
         Ok(self.structure.of_modes(&modal).map(|x| Complex64::new(x, 0.0)))
     }
 
-    fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+    /// Displacements along the axes under unit forces along them, m/N.
+    pub fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
         let factor = self.factor(omega)?;
         let (p, n) = (self.structure.axes, self.structure.own.len());
         let at = &self.structure.at;
@@ -155,6 +110,7 @@ impl Modes {
 #[cfg(test)]
 mod tests {
     use super::super::HarmonicBalance;
+    use super::super::rest::Rest;
     use super::super::sparse::Sparse;
     use super::*;
     use crate::law::{FrictionContact, SharedLaw};

@@ -1,6 +1,6 @@
 //! What forces along the axes do to the motions along them: matrices, or where these would be too large their product alone.
 
-use super::closed::Closed;
+use super::rest::Closed;
 use super::uncoupled::{Resonant, Uncoupled};
 use nalgebra::DMatrix;
 use num_complex::Complex64;

@@ -7,7 +7,7 @@
 //! Of a ring in a travelling wave only the joints of the first sector have ports: harmonic h moves as the wave of its nodal diameter, whose
 //! matrices are those of one sector. Displacements and forces are those of the whole ring all the same.
 
-use super::closed::{self, Closed};
+use super::closed;
 use super::hold::HOLD;
 use super::ports::Ports;
 use super::uncoupled::{Resonant, Uncoupled};
@@ -18,6 +18,7 @@ use num_complex::Complex64;
 use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use stickslip_numerics::dense::Lu;
 use stickslip_numerics::modes::Modes;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -177,6 +178,44 @@ struct Modal {
     free_at: DMatrix<f64>,
 }
 
+/// The structure at rest with its contacts closed, see [`closed`].
+#[derive(Debug, Clone)]
+pub(super) struct Closed {
+    /// Stiffness along the axes, N/m.
+    pub springs: Vec<f64>,
+    form: Form,
+}
+
+#[derive(Debug, Clone)]
+enum Form {
+    Rows(Box<Rest>),
+    Modes(closed::Modes),
+}
+
+impl Closed {
+    /// The stiffness between modes, if the structure is in these.
+    pub fn of_the_modes(&self, omega: f64) -> Option<Result<Arc<Lu<f64>>, Resonant>> {
+        match &self.form {
+            Form::Rows(_) => None,
+            Form::Modes(modes) => Some(modes.factor(omega)),
+        }
+    }
+
+    fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, Resonant> {
+        match &self.form {
+            Form::Rows(rest) => rest.respond(0, omega, force),
+            Form::Modes(modes) => modes.respond(omega, force),
+        }
+    }
+
+    fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+        match &self.form {
+            Form::Rows(rest) => rest.receptance(0, omega),
+            Form::Modes(modes) => modes.receptance(omega),
+        }
+    }
+}
+
 impl Rest {
     pub fn new(system: &System, ports: &Ports) -> Self {
         let n = system.dofs();
@@ -218,7 +257,8 @@ impl Rest {
     fn with_closed_contacts(&self) -> Option<Closed> {
         let springs = self.springs.clone();
         if let Some(uncoupled) = &self.uncoupled {
-            return Some(Closed::of_modes(springs, uncoupled));
+            let modes = closed::Modes::new(&springs, uncoupled);
+            return Some(Closed { springs, form: Form::Modes(modes) });
         }
         let (sectors, size) = self.sectors();
         // around a ring, each direction in every sector
@@ -246,7 +286,7 @@ impl Rest {
             springs: Vec::new(),
             closed: OnceCell::from(None),
         };
-        Some(Closed::of_rows(springs, rest))
+        Some(Closed { springs, form: Form::Rows(Box::new(rest)) })
     }
 
     /// Displacement along each axis at rest under a constant unit force along it alone, m/N.
