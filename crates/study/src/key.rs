@@ -174,3 +174,30 @@ pub const fn default(
 ) -> Key {
     Key { name, takes, presence: Presence::Default(value), doc, example }
 }
+
+const FROM: Key =
+    required("from", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "first value", "\"119 Hz\"");
+const TO: Key = required("to", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "last value", "\"123 Hz\"");
+
+/// Keys of the range of a frequency.
+pub const RANGE: &[Key] =
+    &[FROM, TO, required("points", Takes::Count(2, MOST_POINTS as i64), "number of values, both ends included", "241")];
+
+/// Keys of a range of frequencies of which the ends count.
+pub const ENDS: &[Key] = &[
+    FROM,
+    TO,
+    default("points", Takes::Count(2, MOST_POINTS as i64), "2", "of a range whose ends alone count, any number", "2"),
+];
+
+/// Keys of a range of frequencies whose points lie where the curve bends.
+pub const ADAPTIVE: &[Key] = &[
+    FROM,
+    TO,
+    required(
+        "tolerance",
+        Takes::Quantity(Dimension::NONE, Within::Positive),
+        "distance of the curve from the straight lines between its points, relative to its largest amplitude",
+        "\"1 %\"",
+    ),
+];

@@ -12,7 +12,8 @@ use stickslip::dimension::Dimension;
 use stickslip::{law, method};
 
 pub use crate::key::{
-    Key, MOST_CASES, MOST_MASSES, MOST_POINTS, Presence, Takes, VERSION, Within, default, optional, refused, required,
+    ADAPTIVE, ENDS, Key, MOST_CASES, MOST_MASSES, MOST_POINTS, Presence, RANGE, Takes, VERSION, Within, default,
+    optional, refused, required,
 };
 
 /// Most elements in one list (`[[spring]]`, …), repetitions counted.
@@ -501,33 +502,6 @@ pub const SAMPLE: &[Key] = &[
 fn design_names() -> Vec<(&'static str, &'static str)> {
     DESIGNS.iter().map(|(name, summary, _)| (*name, *summary)).collect()
 }
-
-const FROM: Key =
-    required("from", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "first value", "\"119 Hz\"");
-const TO: Key = required("to", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "last value", "\"123 Hz\"");
-
-/// Keys of the range of a frequency.
-pub const RANGE: &[Key] =
-    &[FROM, TO, required("points", Takes::Count(2, MOST_POINTS as i64), "number of values, both ends included", "241")];
-
-/// Keys of a range of frequencies of which the ends count.
-pub const ENDS: &[Key] = &[
-    FROM,
-    TO,
-    default("points", Takes::Count(2, MOST_POINTS as i64), "2", "of a range whose ends alone count, any number", "2"),
-];
-
-/// Keys of a range of frequencies whose points lie where the curve bends.
-pub const ADAPTIVE: &[Key] = &[
-    FROM,
-    TO,
-    required(
-        "tolerance",
-        Takes::Quantity(Dimension::NONE, Within::Positive),
-        "distance of the curve from the straight lines between its points, relative to its largest amplitude",
-        "\"1 %\"",
-    ),
-];
 
 /// The choice of `kind` in `[method]`.
 pub const METHOD: &[Key] = &[default("kind", Takes::Choice(method_names), "auto", "the method", "\"event-driven\"")];

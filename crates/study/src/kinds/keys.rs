@@ -2,8 +2,8 @@
 
 use crate::extra;
 use crate::info::Complaint;
+use crate::key::RANGE;
 use crate::key::{Key, Takes, default, optional, required};
-use crate::schema::RANGE;
 use crate::values::Values;
 use stickslip::method::{MethodError, Options};
 use stickslip::model::{Model, System};
