@@ -1,8 +1,8 @@
-//! Modes of `q'' + C q' + K q = g(t)` with symmetric `C`, `K`: the decoupling that makes its motion a closed form.
+//! Modes of `q'' + C q' + K q = g(t)` with symmetric `K`: the decoupling that makes its motion a closed form.
 //!
-//! Every mode `(λ, φ)` solves `(λ² + λ C + K) φ = 0`. With `θ = φᵀ(2λ + C)φ` the modal coordinate
-//! `η = [φᵀ(λ + C) q + φᵀ q'] / θ` obeys `η' = λ η + φᵀg/θ`, and `q = Re Σ φ η` (complex pairs are kept once, with weight 2).
-//! A direction that neither springs nor dampers hold (`Kφ = Cφ = 0`) is a *free* one and keeps its double zero: `ρ'' = φᵀ g`.
+//! Every mode `(λ, φ)` solves `(λ² + λ C + K) φ = 0`, and `ψᵀ (λ² + λ C + K) = 0`; where `C` is symmetric too, `ψ` is `φ`. With
+//! `θ = ψᵀ(2λ + C)φ` the modal coordinate `η = [ψᵀ(λ + C) q + ψᵀ q'] / θ` obeys `η' = λ η + ψᵀg/θ`, and `q = Re Σ φ η` (complex pairs are kept
+//! once, with weight 2). A direction that neither springs nor dampers hold (`Kφ = Cφ = 0`) is a *free* one and keeps its double zero: `ρ'' = φᵀ g`.
 //! Source: Tisseur and Meerbergen, "The quadratic eigenvalue problem", SIAM Review 43 (2001), Sec. 3.
 
 use crate::eigen;
@@ -16,9 +16,9 @@ pub struct Modes {
     pub lambda: Vec<Complex64>,
     /// Columns φ times their weight (2 for a complex pair, 1 for a real mode), m × modes.
     pub shape: DMatrix<Complex64>,
-    /// Rows φᵀ(λ + C)/θ: the part of η that comes from `q`, modes × m.
+    /// Rows ψᵀ(λ + C)/θ: the part of η that comes from `q`, modes × m.
     pub from_displacement: DMatrix<Complex64>,
-    /// Rows φᵀ/θ: the part of η that comes from `q'`, and the modal force of a unit force, modes × m.
+    /// Rows ψᵀ/θ: the part of η that comes from `q'`, and the modal force of a unit force, modes × m.
     pub from_velocity: DMatrix<Complex64>,
     /// Orthonormal free directions, m × r.
     pub free: DMatrix<f64>,
@@ -42,11 +42,13 @@ const COUPLED: f64 = 1e-14;
 const CLUSTER: f64 = 1e-7;
 /// `|θ|` relative to `2|λ| + |C|` below which a mode counts as defective: half of the digits are lost then.
 const DEFECTIVE: f64 = 1e-7;
+/// Entries of a damping matrix across the diagonal that differ by more than this share of the largest are no rounding: it is not symmetric.
+const SKEW: f64 = 1e-12;
 /// Steps of the QR iteration per eigenvalue; 2 to 4 are usual.
 const SCHUR_STEPS: usize = 40;
 
 impl Modes {
-    /// Computes the modes of `q'' + C q' + K q`, both m × m and symmetric.
+    /// Computes the modes of `q'' + C q' + K q`, both m × m; K is symmetric, C may have a gyroscopic part.
     ///
     /// # Errors
     /// [`Defective`] at (nearly) critical damping.
@@ -95,6 +97,7 @@ impl Modes {
         let mut done = vec![false; eigenvalues.len()];
         let part = part.map(|x| Complex64::new(x, 0.0));
         let cc = c.map(|x| Complex64::new(x, 0.0));
+        let skew = is_skew(c);
         for i in 0..eigenvalues.len() {
             // of every pair the one above the real axis; a value within rounding of the axis is real
             let real = eigenvalues[i].im.abs() <= CLUSTER * scale;
@@ -109,26 +112,34 @@ impl Modes {
             if real {
                 lambda.im = 0.0;
             }
-            let mut phi = null_space(&quadratic(&cc, k, lambda), members.len()).ok_or(out_of_range)?;
+            // φ and ψ
+            let vectors = |lambda: Complex64| {
+                let matrix = quadratic(&cc, k, lambda);
+                let phi = null_space(&matrix, members.len())?;
+                let psi = if skew { null_space(&matrix.transpose(), members.len())? } else { phi.clone() };
+                Some((phi, psi))
+            };
+            let (mut phi, mut psi) = vectors(lambda).ok_or(out_of_range)?;
             let two_lambda_c = |lambda: Complex64| DMatrix::from_diagonal_element(r, r, 2.0 * lambda) + &cc;
-            let mut theta = phi.transpose() * two_lambda_c(lambda) * &phi;
+            let mut theta = psi.transpose() * two_lambda_c(lambda) * &phi;
             if members.len() == 1 && theta[0].norm() > DEFECTIVE * scale {
-                // one Newton step on φᵀQ(λ)φ = 0 removes the rounding of the unsymmetric eigenvalue problem
-                let correction = (phi.transpose() * quadratic(&cc, k, lambda) * &phi)[0] / theta[0];
+                // one Newton step on ψᵀQ(λ)φ = 0 removes the rounding of the unsymmetric eigenvalue problem
+                let correction = (psi.transpose() * quadratic(&cc, k, lambda) * &phi)[0] / theta[0];
                 lambda -= if real { Complex64::new(correction.re, 0.0) } else { correction };
-                phi = null_space(&quadratic(&cc, k, lambda), 1).ok_or(out_of_range)?;
-                theta = phi.transpose() * two_lambda_c(lambda) * &phi;
+                (phi, psi) = vectors(lambda).ok_or(out_of_range)?;
+                theta = psi.transpose() * two_lambda_c(lambda) * &phi;
             }
             if real {
                 phi = real_basis(&phi).ok_or(out_of_range)?;
-                theta = phi.transpose() * two_lambda_c(lambda) * &phi;
+                psi = if skew { real_basis(&psi).ok_or(out_of_range)? } else { phi.clone() };
+                theta = psi.transpose() * two_lambda_c(lambda) * &phi;
             }
             let size = (2.0 * lambda.norm() + c.norm()).max(f64::MIN_POSITIVE);
             let values = eigen::singular(theta.clone()).ok_or(out_of_range)?.singular_values;
             let singular = values.min() <= DEFECTIVE * size;
             let inverse = if singular { None } else { theta.try_inverse() };
             let Some(inverse) = inverse else { return Err(Defective { lambda }) };
-            let left = inverse * phi.transpose();
+            let left = inverse * psi.transpose();
             let weight = if real { 1.0 } else { 2.0 };
             let lambda_c = DMatrix::from_diagonal_element(r, r, lambda) + &cc;
             let m = part.nrows();
@@ -167,8 +178,13 @@ fn split_free(
         (0..m).filter(|i| !soft.contains(i)).map(|i| undamped.eigenvectors.column(i).into_owned()).collect();
     if !soft.is_empty() {
         let null = undamped.eigenvectors.select_columns(&soft);
-        let inner = eigen::symmetric(null.transpose() * damping * &null)?;
-        let threshold = RIGID * damping.amax();
+        // of a gyroscopic matrix the energy says nothing: what it does to a direction, and what is done to that, is asked
+        let (resists, threshold) = if is_skew(damping) {
+            (damping.transpose() * damping + damping * damping.transpose(), (RIGID * damping.amax()).powi(2))
+        } else {
+            (damping.clone(), RIGID * damping.amax())
+        };
+        let inner = eigen::symmetric(null.transpose() * resists * &null)?;
         let mut free_columns = Vec::new();
         for i in 0..soft.len() {
             let direction = &null * inner.eigenvectors.column(i);
@@ -181,11 +197,17 @@ fn split_free(
     Some(if columns.is_empty() { DMatrix::zeros(m, 0) } else { DMatrix::from_columns(&columns) })
 }
 
+/// Whether a damping matrix is not symmetric.
+fn is_skew(damping: &DMatrix<f64>) -> bool {
+    (damping - damping.transpose()).amax() > SKEW * damping.amax()
+}
+
 /// Groups of coordinates that damping or stiffness couples.
 fn components(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Vec<usize>> {
     let r = c.nrows();
     let (c_scale, k_scale) = (COUPLED * c.amax(), 10.0 * RIGID * k.amax());
-    let coupled = |i: usize, j: usize| c[(i, j)].abs() > c_scale || k[(i, j)].abs() > k_scale;
+    let one_way = |i: usize, j: usize| c[(i, j)].abs() > c_scale || k[(i, j)].abs() > k_scale;
+    let coupled = |i: usize, j: usize| one_way(i, j) || one_way(j, i);
     let mut left: Vec<usize> = (0..r).collect();
     let mut groups = Vec::new();
     while let Some(first) = left.pop() {
@@ -313,7 +335,31 @@ mod tests {
         assert!(Modes::new(&dmatrix![2.0], &dmatrix![1.0]).is_err(), "critical damping is defective");
     }
 
+    #[test]
+    fn gyroscopic_modes() {
+        use nalgebra::dmatrix;
+        let k = dmatrix![12e3, -3e3; -3e3, 15e3];
+        check(&dmatrix![2.0, 50.0; -50.0, 2.0], &k, 1e-12);
+        check(&dmatrix![2.0, 50.0; 0.0, 2.0], &k, 1e-12); // one way alone
+        check(&dmatrix![0.0, 50.0; -50.0, 0.0], &k, 1e-12);
+        check(&dmatrix![0.1, 0.3; 0.0, 0.2], &dmatrix![1.0, 0.0; 0.0, 4.0], 1e-12);
+        // a charge in a field: two motions circle, and two stand still where they were left
+        check(
+            &dmatrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0],
+            &dmatrix![1.0, 0.0, 0.0; 0.0, 2.0, 0.0; 0.0, 0.0, 0.0],
+            1e-12,
+        );
+    }
+
     proptest! {
+        #[test]
+        fn random_gyroscopic_systems(entries in prop::collection::vec(-1.0..1.0f64, 48), size in 2usize..5) {
+            let part = |first: usize| DMatrix::from_fn(size, size, |i, j| entries[first + i * 4 + j]);
+            let (a, b, g) = (part(0), part(16), part(32));
+            let k = &a * a.transpose() + DMatrix::identity(size, size) * 0.1;
+            check(&(&b * b.transpose() * 0.05 + (&g - g.transpose()) * 0.3), &k, 1e-8);
+        }
+
         #[test]
         fn random_systems(entries in prop::collection::vec(-1.0..1.0f64, 32), size in 1usize..5) {
             let a = DMatrix::from_fn(size, size, |i, j| entries[i * 4 + j]);

@@ -19,6 +19,13 @@ fn entries(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Entries> 
         let message = format!("the {what} matrix is {rows} x {columns}, and there are {n} rows: it must be {n} x {n}");
         Err(error::model(py, message))
     };
+    if py.import("numpy")?.call_method1("iscomplexobj", (value,))?.extract::<bool>()? {
+        let message = format!(
+            "the {what} matrix has complex numbers, and matrices of a structure are real: of a stiffness K (1 + jη) give K, and the loss as \
+             `damping` or `damping_ratio`"
+        );
+        return Err(error::model(py, message));
+    }
     if value.hasattr("tocoo")? {
         let coo = value.call_method0("tocoo")?;
         let (rows, columns): (usize, usize) = coo.getattr("shape")?.extract()?;

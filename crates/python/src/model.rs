@@ -1,7 +1,7 @@
 //! Models by calls, and what is computed of them: orbits, responses, loops, modes.
 
 use crate::law::PyLaw;
-use crate::orbit::PyOrbit;
+use crate::orbit::{PyOrbit, instants};
 use crate::progress::{bar, close};
 use crate::python_law::Written;
 use crate::result::PyResultSet;
@@ -315,6 +315,10 @@ impl PyModel {
         };
         let (names, places) = matrices::places(py, &places, n)?;
         let component = matrices::component(py, names, &mass, damping.as_ref(), &stiffness)?;
+        if damping_ratio.is_some() && reduce.is_none() {
+            let message = "`damping_ratio` is that of modes: give `reduce` too, the highest frequency of interest, as in reduce=\"2 kHz\"";
+            return Err(error::model(py, message));
+        }
         let damping = match (damping_ratio, damping) {
             (None, _) => SubstructureDamping::Own,
             (Some(ratio), None) => SubstructureDamping::Ratio(quantity::si(&ratio, Dimension::NONE, "damping_ratio")?),
@@ -489,6 +493,11 @@ impl PyModel {
     ) -> PyResult<PyOrbit> {
         let omega = one_frequency(frequency)?;
         let start: Option<Vec<f64>> = start.map(|start| start.as_array().to_vec());
+        if start.iter().flatten().any(|value| !value.is_finite()) {
+            let message =
+                "`start` must hold numbers, as the `start` of a neighbouring orbit does; found one that is not finite";
+            return Err(error::model(py, message));
+        }
         // without options a solver that is kept is known by its name alone
         // who waits for it does not keep Python waiting
         let mut ready = self.ready.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
@@ -515,6 +524,14 @@ impl PyModel {
         let outcome = py.detach(|| found.solver.orbit(omega, start.as_deref()));
         self.raised()?;
         let orbit = outcome.map_err(|cause| error::orbit(py, cause))?;
+        if let Some(start) = start.filter(|start| start.len() != orbit.start.len()) {
+            let message = format!(
+                "`start` has {} numbers, and by this method an orbit of this model begins with {}: give the `start` of such an orbit",
+                start.len(),
+                orbit.start.len()
+            );
+            return Err(error::model(py, message));
+        }
         Ok(PyOrbit { orbit, system: found.system.clone() })
     }
 
@@ -579,7 +596,7 @@ impl PyModel {
         method: &str,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyResultSet> {
-        let start = Instant::now();
+        let (start, points) = (Instant::now(), instants(py, points)?);
         let found = self.orbit(py, frequency, method, None, options)?;
         let (mut labels, mut times, mut signals) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new(), Vec::new()]);
         let mut figure = Figure::default();

@@ -1,5 +1,6 @@
 //! An orbit as Python sees it: numbers on demand.
 
+use crate::error;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
@@ -171,7 +172,7 @@ impl PyOrbit {
     ) -> PyResult<Bound<'py, PyDict>> {
         let times: Vec<f64> = match times {
             Some(times) => times.as_array().iter().copied().collect(),
-            None => self.times(points),
+            None => self.times(instants(py, points)?),
         };
         let n = self.orbit.places.len();
         let mut signals: [Vec<f64>; 3] = Default::default();
@@ -207,6 +208,7 @@ impl PyOrbit {
             })?,
         };
         let d = self.system.joints()[index].axes().len();
+        let points = instants(py, points)?;
         let (times, signals) = py.detach(|| self.loop_of(index, points));
         let out = PyDict::new(py);
         out.set_item("time_s", times.to_pyarray(py))?;
@@ -231,6 +233,17 @@ impl PyOrbit {
 
 fn rows<'py>(py: Python<'py>, values: Vec<f64>, rows: usize, columns: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_vec(py, values).reshape([rows, columns])
+}
+
+/// Most instants at which a motion is asked for: some hundred megabytes.
+const MOST_INSTANTS: usize = 10_000_000;
+
+/// A number of instants, or an exception.
+pub fn instants(py: Python<'_>, points: usize) -> PyResult<usize> {
+    if (1..=MOST_INSTANTS).contains(&points) {
+        return Ok(points);
+    }
+    Err(error::model(py, format!("`points` must be a whole number from 1 to {MOST_INSTANTS}, found {points}")))
 }
 
 impl PyOrbit {

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.sparse
 from conftest import CONTACT, DAMPING, FORCE, LIMIT, MASS, STIFFNESS, couple
 
 import stickslip
@@ -245,3 +246,29 @@ def couple_with(change):
     model = couple()
     change(model)
     return model.orbit(121)
+
+
+def test_complex_matrices_are_refused():
+    stiffness = np.array([[2.0, -1.0], [-1.0, 2.0]]) * (1 + 0.05j)
+    for wrap in (np.asarray, scipy.sparse.csr_matrix):
+        with pytest.raises(stickslip.StickslipError, match="stiffness matrix has complex numbers"):
+            stickslip.Model.from_matrices(np.eye(2), wrap(stiffness), places=["a", "b"])
+
+
+def test_a_damping_ratio_asks_for_a_reduction():
+    with pytest.raises(stickslip.StickslipError, match="give `reduce` too"):
+        stickslip.Model.from_matrices(np.eye(2), 2 * np.eye(2), places=["a", "b"], damping_ratio=0.01)
+
+
+def test_instants_and_starts_are_checked():
+    model = couple()
+    orbit = model.orbit(121.0)
+    for points in (0, 10**10):
+        with pytest.raises(stickslip.StickslipError, match="`points` must be"):
+            orbit.sample(points=points)
+        with pytest.raises(stickslip.StickslipError, match="`points` must be"):
+            orbit.hysteresis(points=points)
+    with pytest.raises(stickslip.StickslipError, match="not finite"):
+        model.orbit(121.0, start=np.full(len(orbit.start), np.nan))
+    with pytest.raises(stickslip.StickslipError, match="begins with"):
+        model.orbit(121.0, start=np.zeros(len(orbit.start) + 3))

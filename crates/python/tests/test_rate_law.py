@@ -124,3 +124,25 @@ def test_dual_arrays_have_the_derivatives_that_differences_have(function):
     by_b = (function(a, b + step) - function(a, b - step)) / (2 * step)
     np.testing.assert_allclose(dual.value, function(a, b), rtol=1e-14)
     np.testing.assert_allclose(dual.slope, [by_a, by_b], rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    "function, options, words",
+    [
+        (lambda u, v, z: None, {}, "returned None"),
+        (lambda u, v, z: (u, v), {}, "states=0"),
+        (lambda u, v, z: u, {"states": 1}, "for its 1 states"),
+        (lambda u, v, z: (z[0], v[None]), {"states": 2}, "1 rates for its 2 states"),
+    ],
+)
+def test_wrong_answers_are_named(function, options, words):
+    law = stickslip.rate_law(function, name="mine", **options)
+    with pytest.raises((TypeError, ValueError), match=words):
+        couple(law).orbit(121.0, method="shooting")
+
+
+def test_what_is_not_odd_may_not_say_so():
+    with pytest.raises(ValueError, match="not odd"):
+        stickslip.rate_law(lambda u, v, z: 1e3 * np.maximum(u, 0.0), odd=True)
+    with pytest.raises(TypeError, match="a function of u, v, z"):
+        stickslip.rate_law(3)

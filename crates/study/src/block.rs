@@ -34,6 +34,9 @@ pub struct Tally {
     more_failures: u64,
     /// Points by status.
     points: BTreeMap<String, u64>,
+    /// Whether a unit was stopped before it was finished.
+    #[serde(default)]
+    cut: bool,
 }
 
 impl Block {
@@ -45,11 +48,11 @@ impl Block {
 
     /// The part of unit `unit`.
     pub(crate) fn of(kind: &KindInfo, unit: usize, part: Part) -> Block {
-        let Part { tables: rows, notes, failures, points } = part;
+        let Part { tables: rows, notes, failures, points, cut } = part;
         let mut block = Block { units: unit..unit + 1, ..Block::empty(kind, unit) };
         // a unit that was not reached has no tables
         block.tables.iter_mut().zip(rows).for_each(|(table, rows)| table.columns = rows.table(&table.name).columns);
-        block.tally.append(Tally { notes, failures, more_failures: 0, points });
+        block.tally.append(Tally { notes, failures, more_failures: 0, points, cut });
         block
     }
 
@@ -70,6 +73,7 @@ impl Tally {
     /// Takes in what is said of the next units.
     pub fn append(&mut self, next: Tally) {
         next.notes.into_iter().for_each(|note| note.join(&mut self.notes));
+        self.cut |= next.cut;
         let room = MOST_FAILURES - self.failures.len();
         self.more_failures += next.more_failures + next.failures.len().saturating_sub(room) as u64;
         self.failures.extend(next.failures.into_iter().take(room));
@@ -88,9 +92,9 @@ impl Tally {
         &self.failures
     }
 
-    /// Whether every point was reached, found or not.
+    /// Whether every point was reached, found or not, and what belongs to them.
     pub fn is_whole(&self) -> bool {
-        !self.points.contains_key(NOT_REACHED)
+        !self.cut && !self.points.contains_key(NOT_REACHED)
     }
 
     /// What a reader of the results must know, in sentences.

@@ -336,8 +336,11 @@ fn compute(study: &Study, first: &Arc<Prepared>, index: usize, context: &Context
     let cases = unit.cases.clone().map(prepared).collect::<Result<Vec<_>, _>>()?;
     let work = Work { study, cases, points: unit.points, context };
     let part = (kinds::of(study).compute)(&work);
-    part.map_err(|(index, error)| match work.cases.iter().find(|prepared| prepared.case.index == index) {
-        Some(prepared) => refused(study, &prepared.case, &error),
-        None => study.error_at("study", 0, "kind", error.to_string(), None),
+    // kinds look in many places whether they are to stop
+    part.map(|part| Part { cut: context.stopped(), ..part }).map_err(|(index, error)| {
+        match work.cases.iter().find(|prepared| prepared.case.index == index) {
+            Some(prepared) => refused(study, &prepared.case, &error),
+            None => study.error_at("study", 0, "kind", error.to_string(), None),
+        }
     })
 }

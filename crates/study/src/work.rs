@@ -265,6 +265,8 @@ pub struct Part {
     pub failures: Vec<crate::dataset::Failure>,
     /// Points by status.
     pub points: BTreeMap<String, u64>,
+    /// Whether the run was stopped before it was finished: what follows its points, such as peaks, may be missing though all of them are there.
+    pub cut: bool,
 }
 
 /// The status of a point that converged, [`Accuracy::Converged`](stickslip::orbit::Accuracy::Converged).

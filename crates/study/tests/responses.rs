@@ -480,3 +480,31 @@ fn a_decay_with_creep_has_no_negative_damping() {
     let least = 1.0 / (2.0 * 21_000f64.sqrt());
     assert!(ratios.iter().all(|ratio| *ratio > 0.9 * least), "{ratios:?}");
 }
+
+/// A run that is stopped when all points of a unit are there, and its peaks are not yet looked for, has not finished that unit: who goes on computes it
+/// again, with its peaks.
+#[test]
+fn a_unit_without_its_peaks_is_not_whole() {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+    let text = stickslip_study::templates::find("blade-couple").unwrap().study.replace("points = 241", "points = 41");
+    let checked = stickslip_study::run::check(&read_study("couple.toml", &text, &[]).unwrap()).unwrap();
+    let rows = |block: &stickslip_study::block::Block, name: &str| {
+        block.tables.iter().find(|table| table.name == name).unwrap().rows()
+    };
+    let whole = checked.block(0..1, &Context::unwatched(1)).unwrap();
+    let points = rows(&whole, "curve");
+    assert!(whole.tally.is_whole() && rows(&whole, "peaks") > 0 && points == 41);
+    for last in [points - 1, points] {
+        let (stop, finished) = (Arc::new(AtomicBool::new(false)), AtomicUsize::new(0));
+        let set = stop.clone();
+        let count = move || {
+            if finished.fetch_add(1, Ordering::Relaxed) + 1 == last {
+                set.store(true, Ordering::Relaxed);
+            }
+        };
+        let context = Context { stop, finished: Arc::new(count), ..Context::unwatched(1) };
+        let cut = checked.block(0..1, &context).unwrap();
+        assert!(!cut.tally.is_whole(), "stopped after {last} of {points} points");
+    }
+}

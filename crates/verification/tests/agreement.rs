@@ -4,13 +4,13 @@
 use nalgebra::dmatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip::law::{Gap, Iwan, Jenkins, SharedLaw};
+use stickslip::law::{Gap, Iwan, Jenkins, SharedLaw, Valanis};
 use stickslip::method::Method;
 use stickslip::method::event_driven::EventDriven;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::settling::Settling;
 use stickslip::method::shooting::Shooting;
-use stickslip::model::{Axis, System};
+use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Orbit, Symmetry};
 use stickslip::structure::Structure;
 
@@ -106,4 +106,77 @@ fn a_mirrored_orbit_has_no_history() {
     let orbit = orbit(&EventDriven, &system, 100.0);
     assert_eq!(orbit.symmetry, Symmetry::HalfPeriod);
     assert!(orbit.evidence.history.is_empty());
+}
+
+/// Two masses on a spinning shaft: a gyroscopic damping matrix, and one that acts one way alone, with a direct solution where there is no joint and
+/// with all methods against each other where there is one.
+#[test]
+fn methods_agree_with_gyroscopic_damping() {
+    let (mass, stiffness) = (dmatrix![1.0, 0.0; 0.0, 0.3], dmatrix![12e3, -2e3; -2e3, 4.5e3]);
+    let omega = 100.5;
+    for damping in [dmatrix![2.0, 50.0; -50.0, 2.0], dmatrix![2.0, 3.0; 0.0, 2.0]] {
+        for joint in [false, true] {
+            let names = vec!["a".into(), "b".into()];
+            let structure = Structure::new(names, mass.clone(), damping.clone(), stiffness.clone()).unwrap();
+            let mut builder = System::builder(structure).force(0, 1, Complex64::new(8.0, 0.0));
+            if joint {
+                let law: SharedLaw = Arc::new(Jenkins { stiffness: 2e3, limit: 0.5 });
+                builder = builder.joint("j", law, vec![Axis::new(vec![(0, 1.0), (1, -1.0)])]);
+            }
+            let system = builder.build().unwrap();
+            let amplitudes = |method: &dyn Method| {
+                let orbit = orbit(method, &system, omega);
+                [orbit.places[0].amplitude(), orbit.places[1].amplitude()]
+            };
+            let exact = amplitudes(&EventDriven);
+            let precise = HarmonicBalance { tolerance: Some(1e-5), ..HarmonicBalance::default() };
+            let settled = amplitudes(&Settling::default());
+            for (other, bound) in [(amplitudes(&precise), 3e-5), (settled, 1e-7)] {
+                for (a, b) in exact.iter().zip(other) {
+                    assert!((a / b - 1.0).abs() < bound, "{damping} {joint}: {exact:?} {other:?}");
+                }
+            }
+            if !joint {
+                let complex = |m: &nalgebra::DMatrix<f64>| m.map(|x| Complex64::new(x, 0.0));
+                let s = Complex64::new(0.0, omega);
+                let matrix = complex(&mass) * (s * s) + complex(&damping) * s + complex(&stiffness);
+                let force = nalgebra::dvector![Complex64::new(8.0, 0.0), Complex64::new(0.0, 0.0)];
+                let direct = matrix.lu().solve(&force).unwrap();
+                for (a, b) in exact.iter().zip(direct.iter()) {
+                    assert!((a / b.norm() - 1.0).abs() < 1e-10, "{damping}: {exact:?} {direct}");
+                }
+            }
+        }
+    }
+}
+
+/// The force that an orbit reports of a law with stiffness beyond its slip limit is the one that moves the other mass: `m x'' + c x' + k x`.
+#[test]
+fn forces_beyond_a_slip_limit_are_reported_whole() {
+    let law = Valanis { stiffness: 2e3, slip_stiffness: 200.0, lambda: 3e3, kappa: 0.7 };
+    let model = Model {
+        masses: vec![Mass::new("a", 0.5), Mass::new("b", 0.3)],
+        springs: vec![
+            Spring { between: ["a".into(), GROUND.into()], stiffness: 5e3, damping: 2.0 },
+            Spring { between: ["b".into(), GROUND.into()], stiffness: 2.5e3, damping: 1.5 },
+        ],
+        joints: vec![Joint { name: "j".into(), between: ["a".into(), "b".into()], law: Arc::new(law) }],
+        forces: vec![Force { on: "a".into(), amplitude: 20.0, phase: 0.0, harmonic: 1 }],
+        ..Model::default()
+    };
+    let system = model.assemble().unwrap();
+    let omega = 103.0;
+    for method in [&Shooting::default() as &dyn Method, &Settling::default()] {
+        let orbit = orbit(method, &system, omega);
+        let period = std::f64::consts::TAU / omega;
+        let (mut worst, mut largest) = (0.0f64, 0.0f64);
+        for i in 0..400 {
+            let now = orbit.sample(period * (f64::from(i) + 0.5) / 400.0);
+            let balance = 0.3 * now.acceleration[1] + 1.5 * now.velocity[1] + 2.5e3 * now.displacement[1];
+            worst = worst.max((balance - now.joints[0].force[0]).abs());
+            largest = largest.max(balance.abs());
+        }
+        assert!(largest > 1.2 * stickslip::law::Law::scale(&law), "{largest}: the slip limit is not passed");
+        assert!(worst < 1e-3 * largest, "{}: {worst} of {largest}", method.name());
+    }
 }

@@ -56,7 +56,11 @@ def rate_law(
             passive=passive,
             name=name,
         )
+    if not callable(function):
+        raise TypeError(f"a law is a function of u, v, z, found {function!r}")
     kernel = _Kernel(function, derivatives, directions, states)
+    if odd:
+        kernel.must_be_odd(state_scale)
     return _core._rate_law(
         name or str(getattr(function, "__name__", "law")),
         kernel.value,
@@ -81,10 +85,35 @@ class _Kernel:
         """The rows of forces and rates."""
         if self._directions == 1:
             u, v = u[0], v[0]
-        answer = self._function(u, v, z)
-        force, rates = answer if self._states else (answer[0] if isinstance(answer, tuple) else answer, ())
+        force, rates = self._parts(self._function(u, v, z))
         forces = [force] if self._directions == 1 else [force[i] for i in range(self._directions)]
         return forces + [rates[i] for i in range(self._states)]
+
+    def _parts(self, answer) -> tuple:
+        """Force and rates of what the function returned."""
+        name = getattr(self._function, "__name__", "law")
+        pair = answer if isinstance(answer, tuple) else (answer, ())
+        if pair[0] is None:
+            raise TypeError(f"`{name}` returned None: return the force, or force and rates")
+        if len(pair) != 2 or (self._states > 0) != (answer is pair):
+            wanted = f"(force, rates) for its {self._states} states" if self._states else "the force alone, as it has states=0"
+            raise TypeError(f"`{name}` must return {wanted}, and returned {len(pair) if answer is pair else 1} of them")
+        force, rates = pair
+        if hasattr(rates, "__len__") and len(rates) != self._states:
+            raise ValueError(f"`{name}` returned {len(rates)} rates for its {self._states} states")
+        return force, rates
+
+    def must_be_odd(self, state_scale: float) -> None:
+        """Tries the claim at some instants: who is not odd there is not odd."""
+        n, shape = 13, (self._directions, 13)
+        size = np.logspace(-6.0, 0.0, n)
+        u, v = size * np.where(np.arange(n) % 2, 1.0, -1.0) + np.zeros(shape), 10.0 * size[::-1] + np.zeros(shape)
+        z = state_scale * np.linspace(-0.9, 0.7, n) + np.zeros((self._states, n))
+        with np.errstate(all="ignore"):
+            there, back = self.value(u, v, z)[0], self.value(-u, -v, -z)[0]
+        if not np.allclose(back, -there, rtol=1e-9, atol=1e-12 * np.nanmax(np.abs(there), initial=0.0), equal_nan=True):
+            name = getattr(self._function, "__name__", "law")
+            raise ValueError(f"`{name}` is not odd: its answer to -u, -v, -z is not the negative one; leave out odd=True")
 
     def value(self, u, v, z):
         rows = self._call(u, v, z)

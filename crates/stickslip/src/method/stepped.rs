@@ -11,6 +11,9 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use stickslip_numerics::radau::quintic;
 
+/// Share of a law's scale by which its forces may pass it by rounding.
+const ROUNDED: f64 = 1e-9;
+
 /// The record of a run: the state at instants, and values at the nodes of a quadrature between them.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Steps {
@@ -141,8 +144,9 @@ impl SteppedPath {
         }))
     }
 
-    /// Force along an axis at `s` in [0, 1] of a step: the polynomial through its values at the step's start and at the nodes.
-    fn force_between(&self, step: usize, axis: usize, s: f64, limit: f64) -> f64 {
+    /// Force along an axis at `s` in [0, 1] of a step: the polynomial through its values at the step's start and at the nodes. It may overshoot at a
+    /// layer, where a law that keeps to its `scale` does not; one with a stiffness or damping beyond its slip limit keeps to none.
+    fn force_between(&self, step: usize, axis: usize, s: f64, scale: f64) -> f64 {
         let count = self.steps.nodes.len();
         let node = |i: usize| if i == 0 { 0.0 } else { self.steps.nodes[i - 1].0 };
         let value = |i: usize| match i {
@@ -153,7 +157,8 @@ impl SteppedPath {
             let others = (0..=count).filter(|k| *k != i);
             value(i) * others.map(|k| (s - node(k)) / (node(i) - node(k))).product::<f64>()
         });
-        sum.sum::<f64>().clamp(-limit, limit) // the polynomial may overshoot at a layer, the law never does
+        let (between, largest) = (sum.sum::<f64>(), (0..=count).map(|i| value(i).abs()).fold(0.0, f64::max));
+        if largest > scale * (1.0 + ROUNDED) { between } else { between.clamp(-scale, scale) }
     }
 
     /// The joints at `s` in [0, 1] of a step, at `time`, where the structure has this state; mirrored if `sign` is -1.
@@ -170,8 +175,8 @@ impl SteppedPath {
                 force = rate.value(&motion, &[], &mut []);
             } else {
                 // a limit bounds the force of one direction; of several it bounds their sum of squares or less
-                let limit = if joint.directions == 1 { joint.law.scale() } else { f64::INFINITY };
-                joint.axes().enumerate().for_each(|(d, axis)| force[d] = self.force_between(step, axis, s, limit));
+                let scale = if joint.directions == 1 { joint.law.scale() } else { f64::INFINITY };
+                joint.axes().enumerate().for_each(|(d, axis)| force[d] = self.force_between(step, axis, s, scale));
             }
             for values in [&mut motion.displacement, &mut motion.velocity, &mut force] {
                 values.iter_mut().for_each(|value| *value *= sign);
