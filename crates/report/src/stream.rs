@@ -30,7 +30,9 @@ impl FromStr for Shard {
         let parts = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
         match parts {
             Some((number, of)) if (1..=of).contains(&number) && of <= MOST_SHARDS => Ok(Shard { number, of }),
-            _ => Err(format!("expected a part as in 3/16, from 1/16 to 16/16, found `{text}`")),
+            _ => {
+                Err(format!("expected a part as in 3/16, from 1/16 to 16/16, of {MOST_SHARDS} at most, found `{text}`"))
+            }
         }
     }
 }

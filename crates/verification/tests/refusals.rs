@@ -42,6 +42,21 @@ fn system(laws: &[SharedLaw], mass: f64) -> System {
     builder.force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap()
 }
 
+/// A width is one: without any a law is not smoothed.
+#[test]
+fn a_width_is_more_than_nothing() {
+    for name in ["shooting", "transient"] {
+        let row = method::find(name).unwrap();
+        for width in [0.0, -1.0, f64::NAN] {
+            let refused = (row.build)(&Options::from([(WIDTH.to_owned(), width)])).err().map(|error| error.to_string());
+            assert!(
+                refused.as_ref().is_some_and(|text| text.contains("more than zero")),
+                "{name} {width}: {refused:?}"
+            );
+        }
+    }
+}
+
 fn asked(row: &MethodInfo, width: bool, system: &System) -> Result<(), MethodError> {
     let options = if width { Options::from([(WIDTH.to_owned(), WIDTH_GIVEN)]) } else { Options::new() };
     (row.build)(&options).unwrap().solver(system).map(drop)

@@ -252,6 +252,18 @@ fn periods(method: &'static str, options: &Options) -> Result<usize, MethodError
 /// The key of the velocity over which exact laws are smoothed, of the methods that can do so.
 pub const WIDTH: &str = "width";
 
+/// The option [`WIDTH`] of a method, m/s.
+fn width(method: &'static str, options: &Options) -> Result<Option<f64>, MethodError> {
+    match options.get(WIDTH).copied() {
+        Some(width) if !(width.is_finite() && width > 0.0) => {
+            let message =
+                format!("must be more than zero, found {width}; leave it out where laws are smooth by themselves");
+            Err(MethodError::Option { method, key: WIDTH, message })
+        }
+        width => Ok(width),
+    }
+}
+
 /// Options of a method that were given, by key, SI.
 pub type Options = BTreeMap<String, f64>;
 

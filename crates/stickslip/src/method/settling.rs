@@ -9,7 +9,7 @@ use super::event_driven::Exact;
 use super::followed::Kind;
 use super::periodic::Search;
 use super::shooting::{Shooter, Shooting};
-use super::{Method, MethodError, MethodInfo, MethodOption, PERIOD, Solver, WIDTH, periods};
+use super::{Method, MethodError, MethodInfo, MethodOption, PERIOD, Solver, WIDTH, periods, width};
 use crate::dimension::Dimension;
 use crate::model::System;
 
@@ -52,7 +52,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             return Err(MethodError::Option { method: NAME, key: "tolerance", message });
         }
         let most = options.get("periods").map_or(PERIODS, |periods| *periods as usize);
-        let (width, period) = (options.get(WIDTH).copied(), periods(NAME, options)?);
+        let (width, period) = (width(NAME, options)?, periods(NAME, options)?);
         Ok(Box::new(Settling { tolerance, periods: most, width, period }))
     },
 };

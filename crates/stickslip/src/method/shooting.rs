@@ -15,7 +15,9 @@ use super::relaxed::{Closing, Spring, relaxed};
 use super::repeated::Afresh;
 use super::smooth::flow::SmoothFlow;
 use super::stepped::SteppedPath;
-use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, WIDTH, periods};
+use super::{
+    Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, WIDTH, periods, width,
+};
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::measure::measure;
@@ -83,7 +85,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             let message = format!("must lie between 1e-13 and 1e-3, found {tolerance}");
             return Err(MethodError::Option { method: NAME, key: "tolerance", message });
         }
-        Ok(Box::new(Shooting { tolerance, width: options.get(WIDTH).copied(), period: periods(NAME, options)? }))
+        Ok(Box::new(Shooting { tolerance, width: width(NAME, options)?, period: periods(NAME, options)? }))
     },
 };
 
