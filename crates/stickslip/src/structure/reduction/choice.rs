@@ -94,7 +94,12 @@ impl Reduce {
             if self.kind != Some(ReductionKind::CraigBampton) {
                 let free = Free::new(whole, &modes, 0.0, orders(whole))?;
                 for (count, order) in self.sizes(&modes, extent, whole) {
-                    let reduced = free.reduced(count, order)?;
+                    let reduced = match free.reduced(count, order) {
+                        Ok(reduced) => reduced,
+                        // vectors of which only rounding tells the last apart: other numbers of them have no such one
+                        Err(ReductionError::OutOfRange) => continue,
+                        Err(other) => return Err(other),
+                    };
                     if let Some(deviation) = good(&reduced) {
                         return Ok(Chosen { reduced, deviation, modes });
                     }
