@@ -219,6 +219,22 @@ def test_a_dask_cluster_gives_the_same_bits_though_a_worker_is_killed(study, who
     assert sum(sum(one["points"].values()) for one in told) == study.points
 
 
+def test_what_a_campaign_cannot_begin_with(tmp_path):
+    study = stickslip.Study.from_template("blade-couple", Ft="2 N")
+    file = tmp_path / "file"
+    file.write_text("")
+    for wrong, error, words in [
+        ({"study": "couple.toml"}, TypeError, "stickslip.Study"),
+        ({"processes": 0}, ValueError, "from 1"),
+        ({"seconds": -1.0}, ValueError, "more than zero"),
+        ({"out": file}, NotADirectoryError, "is a file"),
+    ]:
+        given = {"study": study, "out": tmp_path / "out", **wrong}
+        with pytest.raises(error, match=words):
+            stickslip.campaign(given.pop("study"), **given)
+        assert not (tmp_path / "out").exists()
+
+
 def test_sobol_indices_are_those_of_ishigami():
     pytest.importorskip("scipy")
     # Ishigami and Homma (1990), a = 7, b = 0.1: closed forms

@@ -48,6 +48,16 @@ def campaign(study, *, out, client=None, processes=None, seconds=BATCH_SECONDS, 
     A unit that fails is tried once more, elsewhere, and is then kept with its reason: :attr:`Campaign.failed`; ``retry=True`` tries those again. A campaign that was interrupted,
     killed or short of workers goes on when it is called again, and ends with the same numbers, which are those of the command bit for bit.
     """
+    from ._core import Study as Known
+
+    if not isinstance(study, Known):
+        raise TypeError(f'`study` must be a stickslip.Study, such as Study.from_file("couple.toml") gives, found {study!r}')
+    if processes is not None and (not isinstance(processes, int) or processes < 1):
+        raise ValueError(f"`processes` must be a whole number from 1, found {processes!r}")
+    if not seconds > 0:
+        raise ValueError(f"`seconds` that a batch takes must be more than zero, found {seconds!r}")
+    if Path(out).exists() and not Path(out).is_dir():
+        raise NotADirectoryError(f"`out` must be a folder for the parts of the campaign, and {out} is a file")
     begun = Campaign._begin(study, Path(out))
     if retry and begun.failed:
         begun._forget_failed()
