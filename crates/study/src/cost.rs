@@ -120,6 +120,15 @@ pub(crate) enum Pace {
     Slow,
 }
 
+impl Pace {
+    fn of<T>(self, usual: T, slow: T) -> T {
+        match self {
+            Pace::Usual => usual,
+            Pace::Slow => slow,
+        }
+    }
+}
+
 impl<'a> Costing<'a> {
     pub(crate) fn new(study: &'a Study, surveyed: &'a Surveyed, pace: Pace) -> Self {
         let (case, system) = (&surveyed.case, surveyed.survey.system());
@@ -371,9 +380,9 @@ impl Costing<'_> {
         let case = self.case;
         let size = self.masses + self.joints;
         let patterns = self.joints / EVENT_DRIVEN_SIZE.1;
-        let least = if self.pace == Pace::Usual { EVENT_DRIVEN_USUAL } else { EVENT_DRIVEN.0 };
-        let events = least + EVENT_DRIVEN.1 * patterns * (size / EVENT_DRIVEN_SIZE.0).powi(3);
-        let shooting = if self.pace == Pace::Usual { SHOOTING_USUAL } else { SHOOTING };
+        let events = self.pace.of(EVENT_DRIVEN_USUAL, EVENT_DRIVEN.0)
+            + EVENT_DRIVEN.1 * patterns * (size / EVENT_DRIVEN_SIZE.0).powi(3);
+        let shooting = self.pace.of(SHOOTING_USUAL, SHOOTING);
         let shooting = size * size * if self.has_states { shooting.1 } else { shooting.0 };
         let series = self.series(case.method.options.get("harmonics").copied());
         match case.method.name.as_str() {
@@ -414,8 +423,7 @@ impl Costing<'_> {
             Some(harmonics) => (harmonics / SERIES_HARMONICS).max(1.0),
             None => (SERIES_TOLERANCE / asked).sqrt().max(1.0),
         };
-        let each = if self.pace == Pace::Usual { SERIES_USUAL } else { SERIES };
-        each * (self.masses + self.joints).max(1.0) * factor * length * length
+        self.pace.of(SERIES_USUAL, SERIES) * (self.masses + self.joints).max(1.0) * factor * length * length
     }
 
     /// Time of a period of a transient, s.

@@ -271,6 +271,12 @@ impl CyclicSector {
         CyclicSector { sectors, dofs: kept.len(), rows, kept, mass, damping, stiffness }
     }
 
+    /// What a sector has of these entries with its neighbours held.
+    pub fn alone(&self, entries: &[RingEntry]) -> Result<Matrix, ReductionError> {
+        let own = entries.iter().filter(|entry| entry.2 == 0).map(|&(row, column, _, value)| (row, column, value));
+        Matrix::from_triplets(self.dofs, own).map_err(|_| ReductionError::OutOfRange)
+    }
+
     /// A weighted sum of the component's rows, over those that are left.
     pub fn row(&self, row: &Row) -> RingRow {
         let parts =

@@ -53,15 +53,9 @@ pub(in crate::structure) struct MistunedRing<'a> {
 
 /// A sector with its neighbours held.
 pub(in crate::structure) fn alone(sector: &CyclicSector) -> Result<Factor, ReductionError> {
-    let stiffness = own_stiffness(sector)?;
+    let stiffness = sector.alone(&sector.stiffness)?;
     let factor = Analysis::new(&[&stiffness]).factor(&[(1.0, &stiffness)]);
     factor.map_err(|singular| ReductionError::Singular { omega: 0.0, singular })
-}
-
-fn own_stiffness(sector: &CyclicSector) -> Result<Matrix, ReductionError> {
-    let own = sector.stiffness.iter().filter(|entry| entry.2 == 0);
-    let own = own.map(|&(row, column, _, value)| (row, column, value));
-    Matrix::from_triplets(sector.dofs, own).map_err(|_| ReductionError::OutOfRange)
 }
 
 /// Frequencies (rad/s) up to `up_to` of modes φ of the tuned ring of which the reduced one may lack most: by the energy of what the forces `D φ` of
@@ -75,7 +69,7 @@ pub(in crate::structure) fn lacking_most(
     up_to: f64,
 ) -> Result<Vec<f64>, ReductionError> {
     let (n, r) = (reduced.n, reduced.dofs());
-    let own = own_stiffness(sector)?;
+    let own = sector.alone(&sector.stiffness)?;
     let small = columns::products(n, &reduced.basis, &own.times_columns(&reduced.basis));
     let small = ((&small + small.transpose()) * 0.5).cholesky().ok_or(ReductionError::OutOfRange)?;
     let mut found: Vec<(f64, f64)> = Vec::new();
@@ -125,7 +119,7 @@ impl<'a> MistunedRing<'a> {
         deviations: &'a [f64],
         seen: &[Row],
     ) -> Result<Self, ReductionError> {
-        let stiffness = own_stiffness(sector)?;
+        let stiffness = sector.alone(&sector.stiffness)?;
         let ports: Vec<RingRow> = seen.iter().map(|row| sector.row(row)).collect();
         let size = |row: &RingRow| -> f64 {
             let parts = row.iter().map(|(at, _, weight)| (weight, stiffness.get(*at, *at)));

@@ -17,7 +17,7 @@ use crate::structure::{CyclicSector, Reduction, ReductionKind, RingEntry, turn};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, columns};
+use stickslip_numerics::sparse::{NaturalModes, Wanted, columns};
 
 /// Shares of the largest eigenvalue of the vectors' Gram matrix, below which a combination of them is left out, with the order of the residual
 /// vectors: as they are tried, one after the other.
@@ -265,11 +265,7 @@ impl Waves<'_> {
     /// others; each of unit displacement where most is seen of it.
     fn independent(&self, vectors: &[f64], share: f64) -> Result<Vec<f64>, ReductionError> {
         let n = self.sector.dofs;
-        let own = |entries: &[RingEntry]| {
-            let own = entries.iter().filter(|entry| entry.2 == 0).map(|&(row, column, _, value)| (row, column, value));
-            Matrix::from_triplets(n, own).map_err(|_| ReductionError::OutOfRange)
-        };
-        let (mass, stiffness) = (own(&self.sector.mass)?, own(&self.sector.stiffness)?);
+        let (mass, stiffness) = (self.sector.alone(&self.sector.mass)?, self.sector.alone(&self.sector.stiffness)?);
         let highest = self.met.iter().flat_map(|wave| wave.modes.values.last()).fold(0.0f64, |most, v| most.max(*v));
         let mut energies = columns::products(n, vectors, &stiffness.times_columns(vectors));
         energies += columns::products(n, vectors, &mass.times_columns(vectors)) * highest;
