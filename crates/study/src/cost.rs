@@ -98,6 +98,8 @@ pub struct Costing<'a> {
     pub places: f64,
     /// Joints.
     pub joints: f64,
+    /// Sliders of the joints that have any, one for every other joint.
+    sliders: f64,
     surveyed: &'a Surveyed,
     /// Whether a law is smooth, or made so, and whether one has internal states, which makes the flow stiff.
     smooth: bool,
@@ -146,6 +148,7 @@ impl<'a> Costing<'a> {
             masses: system.dofs() as f64,
             places: system.places().len() as f64,
             joints: system.joints().len() as f64,
+            sliders: laws.iter().map(|law| law.sliders().map_or(1, |all| all.len().max(1)) as f64).sum(),
             surveyed,
             smooth: laws.iter().any(|law| law.pieces().is_none()),
             stepped: laws.iter().any(|law| law.rate().is_none() && !law.is_free()),
@@ -353,6 +356,8 @@ const STEPPED: f64 = 5e-2;
 /// Method `transient`: the periods in which a mode with the least damping loses a digit. Measured at a damping ratio of 7e-4: exact laws
 /// 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses; smooth laws 0.9 s and 8 s for 2 and 4. At 1.6 % a ring took 80 periods.
 const SETTLING_PERIODS: (f64, f64) = (80.0, 50_000.0);
+/// Highest drive frequencies up to which the drive moves a mode.
+const DRIVEN: f64 = 2.0;
 /// Periods after which it ends where nothing settles, which a force without a bound (a gap, a cubic spring) may make of some points; twice, as
 /// a motion that does not settle from its neighbour's is followed from rest again.
 const UNSETTLED_PERIODS: f64 = 2.0 * 4096.0;
@@ -361,8 +366,8 @@ const UNSETTLED_PERIODS: f64 = 2.0 * 4096.0;
 const UNSETTLED: f64 = 0.05;
 /// A period of a transient: integration, times the square of masses and joints; more with states.
 const PERIOD: (f64, f64) = (2.5e-4, 1.3e-3);
-/// A period from event to event, per mass and joint, and times their cube, for the decomposition of each new pattern. Measured: 0.6, 3.5 and
-/// 21 ms for rings of 12, 24 and 48 masses and joints.
+/// A period from event to event, per mass and slider, and times their cube, for the decomposition of each new pattern. Measured: 0.6, 3.5 and
+/// 21 ms for rings of 12, 24 and 48 masses and joints, 4 ms for three masses and a joint of 32 sliders.
 const PERIOD_EVENTS: (f64, f64) = (2e-5, 2.4e-8);
 /// A period in equal steps, times the square of masses and joints. Measured: 0.2 s for two masses and a joint of 32 sliders.
 const PERIOD_STEPPED: f64 = 3e-2;
@@ -391,9 +396,7 @@ impl Costing<'_> {
                 series * self.surveyed.survey.system().cyclic().map_or(1.0, |ring| 2.0 / ring.sectors as f64).min(1.0)
             }
             "transient" => {
-                let modes = &self.surveyed.survey.free().elastic;
-                let damping = modes.iter().map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE);
-                let digit = std::f64::consts::LN_10 / (TAU * damping);
+                let digit = std::f64::consts::LN_10 / (TAU * self.least_damping());
                 let most = case.method.options.get("periods").copied().unwrap_or(SETTLING_PERIODS.1);
                 let restless = if self.unbounded { UNSETTLED * UNSETTLED_PERIODS } else { 0.0 };
                 (digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1) + restless).min(most) * self.period()
@@ -429,15 +432,25 @@ impl Costing<'_> {
     /// Time of a period of a transient, s.
     pub fn period(&self) -> f64 {
         let size = self.masses + self.joints;
+        let exact = self.masses + self.sliders;
         // a width makes sliders integrate that no smooth law replaces
         if self.stepped && (self.smooth || self.case.method.options.contains_key("width")) {
             return PERIOD_STEPPED * size * size;
         }
         match (self.smooth, self.has_states) {
-            (false, _) => PERIOD_EVENTS.0 * size + PERIOD_EVENTS.1 * size.powi(3),
+            (false, _) => PERIOD_EVENTS.0 * exact + PERIOD_EVENTS.1 * exact.powi(3),
             (true, false) => PERIOD.0 * size * size,
             (true, true) => PERIOD.1 * size * size,
         }
+    }
+
+    /// Damping ratio of the mode, with all joints free, whose transient dies last: of all, or usually of those that the drive moves, since friction damps
+    /// the others as long as they are seen.
+    fn least_damping(&self) -> f64 {
+        let modes = &self.surveyed.survey.free().elastic;
+        let highest = self.range().map_or(f64::INFINITY, |(_, highest)| DRIVEN * highest);
+        let driven = modes.iter().filter(|mode| self.pace == Pace::Slow || mode.omega <= highest);
+        driven.map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE)
     }
 
     /// Time to read the motion at so many instants, s.

@@ -356,6 +356,27 @@ fn the_usual_time_is_told_beside_the_longest() {
     assert!(said.contains("minutes on one thread, up to "), "{said}");
 }
 
+/// Transients of 13 points were measured: 0.4 s with the exact law, 26 s with the smooth one. The free contact has nearly no damping of its own, but the drive
+/// does not move it, and friction does not leave it alone: only the longest time counts with it.
+#[test]
+fn transients_usually_die_with_the_modes_that_are_driven() {
+    let arctan = r#"law = { kind = "coulomb-arctan", limit = "Ft", alpha = "25 s/mm" }"#;
+    for (law, measured) in [(r#"law = { kind = "coulomb", limit = "Ft" }"#, 0.4), (arctan, 26.0)] {
+        let text = template(
+            "blade-couple",
+            &[
+                ("points = 241", "points = 13"),
+                (r#"vary = { Ft = ["2 N", "4 N", "6 N", "8 N"] }"#, ""),
+                (r#"law = { kind = "coulomb", limit = "Ft" }"#, law),
+            ],
+        );
+        let summary = summary(&(text + "\n[method]\nkind = \"transient\"\n"));
+        let usual = summary.usual_seconds;
+        assert!((0.5 * measured..10.0 * measured).contains(&usual), "{usual} s, measured {measured} s");
+        assert!(summary.seconds > 50.0 * usual, "{} s", summary.seconds);
+    }
+}
+
 /// A stop 1 kg may hit, with a bare gap, and a figure with references.
 fn stop(law: &str, figure: &str) -> String {
     format!(
