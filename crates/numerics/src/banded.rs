@@ -34,6 +34,11 @@ impl Banded {
         Banded { n, band, rows: vec![0.0; n * (3 * band + 1)], pivots: vec![0; n], ends: vec![0; n] }
     }
 
+    /// Memory of such a matrix of `n` rows, bytes.
+    pub fn bytes(n: usize, band: usize) -> f64 {
+        8.0 * n as f64 * (3 * band + 3) as f64
+    }
+
     /// Sets all entries to zero.
     pub fn clear(&mut self) {
         self.rows.fill(0.0);

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use stickslip::law::{Coulomb, Jenkins, JenkinsArctan, SharedLaw};
+use stickslip::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw, Stribeck};
 use stickslip::method::shooting::Shooting;
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System};
@@ -38,6 +38,40 @@ fn agrees(model: &Model, omega: f64) {
     for (a, b) in found.places.iter().zip(&exact.places) {
         let error = (a.amplitude() - b.amplitude()).abs() / largest;
         assert!(error < 3.0 * estimate + 1e-9, "{a:?} {b:?}, estimate {estimate:.1e}");
+    }
+}
+
+/// Contacts hold, whatever the limit that they do not reach: a body that sticks to the ground beside one that is driven, a spring between them, is a
+/// support of it, so that its amplitude is `F/|k + c - m ω² + i b ω|`; with smooth, plane and falling friction too.
+#[test]
+fn limits_that_nothing_reaches() {
+    let (stiffness, coupling, omega) = (100.0, 40.0, 7.0);
+    let expected = 1.0 / f64::hypot(stiffness + coupling - 2.0 * omega * omega, 0.3 * omega);
+    for exponent in [3, 9, 15, 20, 100] {
+        let limit = 10f64.powi(exponent);
+        let laws: [SharedLaw; 3] = [
+            Arc::new(Coulomb { limit }),
+            Arc::new(Stribeck { limit, static_limit: limit, velocity: 1.0 }),
+            Arc::new(CoulombArctan { limit, alpha: 1e9 }),
+        ];
+        for law in laws {
+            let named = format!("{law:?}");
+            let model = Model {
+                masses: vec![mass("a", 2.0), mass("b", 1.0)],
+                springs: vec![spring("a", GROUND, stiffness, 0.3), spring("a", "b", coupling, 0.0)],
+                joints: vec![joint("b", GROUND, law)],
+                forces: vec![force("a", 1.0, 1)],
+                ..Model::default()
+            };
+            let system = model.assemble().unwrap();
+            for harmonics in [None, Some(1), Some(15)] {
+                let method = HarmonicBalance { harmonics, ..HarmonicBalance::default() };
+                let orbit = method.solver(&system).unwrap().orbit(omega, None);
+                let found =
+                    orbit.unwrap_or_else(|error| panic!("{named}, {harmonics:?}: {error}")).places[0].amplitude();
+                assert!((found / expected - 1.0).abs() < 1e-6, "{named}, {harmonics:?}: {found} instead of {expected}");
+            }
+        }
     }
 }
 

@@ -63,7 +63,8 @@ impl<'a> BranchEquations<'a> {
         let method = HarmonicBalance { harmonics: Some(top), ..method };
         let level =
             |top: usize| Level::new(kept.up_to(top), method.samples_at(top, &ports), &ports, None).with_matrix();
-        super::check_memory(&ports, &rest, (kept.up_to(top).len(), 1), true)?;
+        let harmonics = kept.up_to(top).len();
+        super::check_memory(super::memory(&ports, &rest, harmonics, true), &ports, (harmonics, 1))?;
         let few = 2 * ports.count() * kept.up_to(kept.double(top)).len() <= LARGEST;
         let (finer, level) = (few.then(|| level(kept.double(top))), level(top));
         let motion = Motion::rest(level.linear.len());

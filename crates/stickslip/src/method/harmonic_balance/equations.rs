@@ -51,6 +51,8 @@ pub(super) struct Level {
     pub(super) receptance: Receptance,
     /// ε per port, N s/m; infinite where the motion is imposed.
     pub(super) penalty: Vec<f64>,
+    /// Force that contacts would take to hold what moves without them, N: those of the largest impedance where it moves most.
+    holding: f64,
     /// Motion of the axes without friction, [axis][harmonic].
     pub linear: Vec<Complex64>,
     /// Mean of the imposed motion along the axes, m.
@@ -148,6 +150,7 @@ impl Level {
             alternation,
             receptance: Receptance::Formed(Vec::new()),
             penalty: vec![0.0; ports.len()],
+            holding: 0.0,
             linear: vec![ZERO; nh * axes],
             imposed: vec![0.0; axes],
             series: ports.iter().flat_map(|port| vec![port.series; port.axes]).collect(),
@@ -261,6 +264,16 @@ impl Level {
             } else {
                 self::penalty(receptance, top, omega).max(CLEAR * port.least_penalty)
             };
+        }
+        self.holding = 0.0;
+        for (penalty, port) in self.penalty.iter().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
+            for q in port.range() {
+                let moving = self.linear[q * nh..(q + 1) * nh].iter().zip(&self.alternation.harmonics);
+                let velocity = moving.map(|(c, h)| *h as f64 * omega * c.norm()).fold(0.0, f64::max);
+                if velocity > 0.0 {
+                    self.holding = self.holding.max(penalty * velocity);
+                }
+            }
         }
         Ok(())
     }
@@ -459,12 +472,17 @@ impl Level {
         }
     }
 
-    /// Units of the residual: the motion's length, or the law's scale. Where only laws hold a direction, the mean of the motion is the small
-    /// difference of large ones, and its unit the larger of these.
+    /// Units of the residual: the motion's length, or the law's scale, but no more than the forces that there are: a limit that nothing reaches says
+    /// nothing of them. Where only laws hold a direction, the mean of the motion is the small difference of large ones, and its unit the larger of these.
     fn measure(&mut self, ports: &Ports, motion: &Motion, length: f64) {
         let nh = self.harmonics().len();
+        let forces = ports.iter().filter(|port| port.is_force()).flat_map(Port::range);
+        let largest =
+            forces.flat_map(|q| &motion.force[q * nh..(q + 1) * nh]).map(|f| f.norm_sqr()).fold(0.0, f64::max);
+        let in_play = (self.holding + largest.sqrt()).max(NOTHING);
         for port in ports.iter() {
             let unit = port.unit(length);
+            let unit = if port.is_force() { unit.min(in_play) } else { unit };
             self.units[2 * nh * port.first..2 * nh * (port.first + port.axes)].fill(unit);
             if port.is_force() || self.alternation.harmonics[0] != 0 {
                 continue;

@@ -113,6 +113,8 @@ const RIGID_SHARE: f64 = 1.7;
 /// The same of laws that are steep: until the series resolves their layer they leave half of it, as order 1 does, and where friction falls with
 /// velocity no less. Elsewhere the doubling leaves next to nothing.
 const STEEP_SHARE: f64 = 2.0;
+/// A motion that is less than this share of what it would be without the joints is rest, which their forces and the loads leave in rounding.
+const CANCELS: f64 = 1e-12;
 /// Where friction is rigid or steep, one doubling is not believed to have left less than this share of the distance of the one before: two
 /// motions may be near each other by chance, as 1.3e-3 where the error is 1e-2.
 const CHANCE: f64 = 0.1;
@@ -205,14 +207,8 @@ fn fewer(periods: usize) -> (&'static str, &'static str) {
     if periods > 1 { (PERIOD.key, "fewer periods, ") } else { ("harmonics", "") }
 }
 
-/// Whether what equations with so many harmonics need fits into memory; `formed` if their matrix is needed in any case.
-fn check_memory(
-    ports: &Ports,
-    rest: &Rest,
-    (harmonics, periods): (usize, usize),
-    formed: bool,
-) -> Result<(), MethodError> {
-    let bytes = memory(ports, rest, harmonics, formed);
+/// Whether what equations with so many harmonics need, `bytes`, fits into memory.
+fn check_memory(bytes: f64, ports: &Ports, (harmonics, periods): (usize, usize)) -> Result<(), MethodError> {
     if bytes <= MEMORY {
         return Ok(());
     }
@@ -231,7 +227,6 @@ fn check_memory(
 fn memory(ports: &Ports, rest: &Rest, harmonics: usize, always: bool) -> f64 {
     let (axes, pair) = (ports.count() as f64, 2.0 * harmonics as f64);
     let size = pair * axes;
-    let tangents: f64 = ports.iter().map(|port| (pair * port.axes as f64).powi(2)).sum();
     let structure = match rest.modes_for(ports).filter(|_| !always) {
         Some(structure) => structure.at.len() as f64 + 3.0 * axes * axes,
         None => 4.0 * harmonics as f64 * axes * axes,
@@ -242,7 +237,20 @@ fn memory(ports: &Ports, rest: &Rest, harmonics: usize, always: bool) -> f64 {
         false if size <= coupled::FORMED as f64 => size * size,
         false => 0.0,
     };
-    8.0 * (tangents + structure + formed)
+    tangents(ports, harmonics) + 8.0 * (structure + formed)
+}
+
+/// Memory of a level, bytes; of one in banded form if one harmonic of that is given.
+fn level_memory(banded: Option<&Sparse>, ports: &Ports, rest: &Rest, harmonics: usize) -> f64 {
+    match banded {
+        Some(banded) => tangents(ports, harmonics) + banded.memory(harmonics),
+        None => memory(ports, rest, harmonics, false),
+    }
+}
+
+/// Memory of the derivatives of the ports, bytes.
+fn tangents(ports: &Ports, harmonics: usize) -> f64 {
+    8.0 * ports.iter().map(|port| (2.0 * (harmonics * port.axes) as f64).powi(2)).sum::<f64>()
 }
 
 impl Method for HarmonicBalance {
@@ -371,7 +379,7 @@ struct Compared<'a> {
 }
 
 /// The error of a motion by a finer one: their distance, as the largest of the places and of the inner sliders behind springs, relative to
-/// the largest of these motions, without means, times the share that the finer one may be off itself. What the finer one lacks at
+/// the largest of these motions, without means ([`CANCELS`]), times the share that the finer one may be off itself. What the finer one lacks at
 /// resonances above its own harmonics counts too. The finer one is its level, its motion and, per harmonic, the motions of the places.
 fn estimate(
     seen: &[Axis],
@@ -383,7 +391,12 @@ fn estimate(
 ) -> f64 {
     let above = above(finer, rest, ports, kept, omega, better);
     let fine = Compared { harmonics: finer.harmonics(), places, along: &better.c };
-    let (mut distance, mut size) = (0.0f64, 0.0f64);
+    let unhindered = |place: &Axis| {
+        let moving = fine.harmonics.iter().zip(&finer.free).filter(|(h, _)| **h > 0);
+        moving.map(|(_, free)| place.along_complex(free).norm_sqr()).sum::<f64>()
+    };
+    let largest = seen.iter().map(unhindered).fold(0.0, f64::max);
+    let (mut distance, mut size) = (0.0f64, CANCELS * CANCELS * largest);
     let mut compare = |coarse_at: &dyn Fn(usize) -> Complex64, fine_at: &dyn Fn(usize) -> Complex64, missing: f64| {
         let (mut d, mut s) = (missing, missing);
         for (k, h) in fine.harmonics.iter().enumerate().filter(|(_, h)| **h > 0) {
@@ -445,6 +458,8 @@ struct Balance<'a> {
     /// And those of the whole ring.
     around: Option<Ports>,
     rest: Rest,
+    /// One harmonic in banded form, of which the others need multiples, if that is the system's.
+    banded: Option<Sparse>,
     kept: Kept,
     first: usize,
     judge: Judge,
@@ -465,9 +480,9 @@ impl<'a> Balance<'a> {
         let rest = Rest::new(&system, &ports);
         let first = (FIRST * kept.scale).max(kept.highest);
         let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
-        if Sparse::new(&system, &ports, &[1]).is_none() {
-            check_memory(&ports, &rest, (harmonics.len(), periods), false)?;
-        }
+        let banded = Sparse::new(&system, &ports, &[1]);
+        let bytes = level_memory(banded.as_ref(), &ports, &rest, harmonics.len());
+        check_memory(bytes, &ports, (harmonics.len(), periods))?;
         Ok(Balance {
             method,
             periods,
@@ -475,6 +490,7 @@ impl<'a> Balance<'a> {
             ports,
             around,
             rest,
+            banded,
             kept,
             first,
             judge: Judge::new(&system),
@@ -507,8 +523,8 @@ impl Balance<'_> {
         let harmonics = self.kept.up_to(self.kept.double(top)).len();
         let axes = self.ports.count();
         let products = (harmonics * axes * axes) as f64;
-        2 * axes * harmonics <= LARGEST
-            || (products <= ESTIMATED && memory(&self.ports, &self.rest, harmonics, false) <= MEMORY)
+        let few = 2 * axes * harmonics <= LARGEST || self.banded.is_some() || products <= ESTIMATED;
+        few && level_memory(self.banded.as_ref(), &self.ports, &self.rest, harmonics) <= MEMORY
     }
 
     /// Solves at `top`, from a motion at another number of harmonics or from the first guess.
@@ -620,9 +636,11 @@ impl Balance<'_> {
     fn fixed(&mut self, top: usize, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
         let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
         let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
-        let sparse = self.levels[&top].sparse.is_some();
-        let known = sparse || self.can_compare(top);
-        let truncation = if known { self.compare(top, omega, &motion, &x).ok().map(|(error, ..)| error) } else { None };
+        let truncation = if self.can_compare(top) {
+            self.compare(top, omega, &motion, &x).ok().map(|(error, ..)| error)
+        } else {
+            None
+        };
         self.finish(top, omega, motion, x, truncation)
     }
 
@@ -652,8 +670,7 @@ impl Balance<'_> {
         let mut x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         // nothing is known of the error until two solutions can be compared
         let (mut checked, mut estimate) = (top, 1.0);
-        let sparse = self.levels[&top].sparse.is_some();
-        while top <= MOST * self.kept.scale && (sparse || self.can_compare(top)) {
+        while top <= MOST * self.kept.scale && self.can_compare(top) {
             let (mut error, finer, y) = self.compare(top, omega, &motion, &x).map_err(|l| self.lost(l))?;
             if (self.ports.has_forces() || self.ports.has_steep()) && top > self.first {
                 error = error.max(CHANCE * estimate);

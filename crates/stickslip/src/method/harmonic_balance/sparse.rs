@@ -28,6 +28,8 @@ pub(super) struct Along<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct Sparse {
     n: usize,
+    /// Of places and unknown forces, in their order.
+    band: usize,
     position: Vec<usize>,
     /// Entries of (mass, damping, stiffness) that are not all zero.
     entries: Vec<(usize, usize, [f64; 3])>,
@@ -87,8 +89,10 @@ impl Sparse {
             return None;
         }
         let nh = harmonics.len();
+        let (factor, tangent) = Sparse::sizes(whole, band, nh);
         Some(Sparse {
             n,
+            band,
             position,
             entries,
             forces,
@@ -96,12 +100,23 @@ impl Sparse {
             springs: Vec::new(),
             harmonics: harmonics.iter().map(|h| *h as f64).collect(),
             omega: 0.0,
-            factors: vec![Banded::new(2 * whole, 2 * band + 1); nh],
+            factors: vec![Banded::new(factor.0, factor.1); nh],
             smooth: Banded::new(whole, band),
-            tangent: Banded::new(2 * whole * nh, (band + 1) * 2 * nh - 1),
+            tangent: Banded::new(tangent.0, tangent.1),
             right: vec![0.0; 2 * whole],
             whole: vec![0.0; 2 * whole * nh],
         })
+    }
+
+    /// Memory of the same with so many harmonics, bytes.
+    pub fn memory(&self, harmonics: usize) -> f64 {
+        let (factor, tangent) = Sparse::sizes(self.right.len() / 2, self.band, harmonics);
+        harmonics as f64 * Banded::bytes(factor.0, factor.1) + Banded::bytes(tangent.0, tangent.1)
+    }
+
+    /// Rows and band of the factor of a harmonic, and of the tangent, of so many places and unknown forces with such a band.
+    fn sizes(whole: usize, band: usize, harmonics: usize) -> ((usize, usize), (usize, usize)) {
+        ((2 * whole, 2 * band + 1), (2 * whole * harmonics, (band + 1) * 2 * harmonics - 1))
     }
 
     /// The mean has closed contacts as stiff as this.
@@ -312,4 +327,48 @@ fn dynamic([mass, damping, stiffness]: [f64; 3], rate: f64, omega: f64) -> Compl
     // a direction that nothing holds has a mean position by the spring that the dense form gives it
     let hold = if rate == 0.0 { (HOLD * omega).powi(2) } else { 0.0 };
     Complex64::new(stiffness - rate * rate * mass + hold * mass, rate * damping)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::law::Coulomb;
+    use crate::method::{Method, harmonic_balance::HarmonicBalance};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
+    use std::f64::consts::TAU;
+    use std::sync::Arc;
+
+    /// Blades around a disk whose springs differ by up to 1 %, with rigid friction between each and the next, under forces of an engine order.
+    fn ring(blades: usize, limit: f64) -> System {
+        let name = |i: usize| format!("b{}", i % blades);
+        let mut model = Model::default();
+        for i in 0..blades {
+            let stiffness = 1e5 * (1.0 + 0.01 * (1.7 * (i * i) as f64).sin());
+            model.masses.push(Mass::new(name(i), 0.2));
+            model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness, damping: 0.1 });
+            let phase = TAU * 3.0 * i as f64 / blades as f64;
+            model.forces.push(Force { on: name(i), amplitude: 5.0, phase, harmonic: 1 });
+            let law = Arc::new(Coulomb { limit });
+            model.joints.push(Joint { name: format!("j{i}"), between: [name(i), name(i + 1)], law });
+        }
+        model.assemble().unwrap()
+    }
+
+    /// The forces of an engine order add up to nothing on blades that stick together: their rounding has no series to be followed.
+    #[test]
+    fn a_ring_at_rest_needs_few_harmonics() {
+        let system = ring(24, 1e15);
+        let method = HarmonicBalance { tolerance: Some(1e-6), ..HarmonicBalance::default() };
+        let orbit = method.solver(&system).unwrap().orbit(TAU * 110.1, None).unwrap();
+        assert!(orbit.places.iter().all(|place| place.amplitude() < 1e-15), "{:?}", orbit.places);
+        assert!(orbit.evidence.truncation.unwrap() < 1e-6, "{:?}", orbit.evidence);
+    }
+
+    /// The factor of the band would take 600 GB.
+    #[test]
+    fn bands_that_fill_the_memory_are_refused() {
+        let method = HarmonicBalance { harmonics: Some(10_000), ..HarmonicBalance::default() };
+        let system = ring(24, 10.0);
+        let error = method.solver(&system).err().expect("too many harmonics").to_string();
+        assert!(error.contains("would fill") && error.contains("GB"), "{error}");
+    }
 }
