@@ -17,7 +17,7 @@ use crate::survey::{Surveyed, range};
 use crate::work::Units;
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
-use stickslip::model::{Modes, Onset};
+use stickslip::model::{Modes, Onset, System};
 
 /// What is known of a study before it is run.
 #[derive(Debug, Clone)]
@@ -38,6 +38,9 @@ pub struct ModelSummary {
     pub stuck: Modes,
     /// The joints, in the order of the model.
     pub joints: Vec<JointSummary>,
+    /// Whether there may be several orbits at one frequency, and why; `None` where the study has no drive or no joint, or the structure is too
+    /// large for a quick answer.
+    pub orbits: Option<Orbits>,
     /// The drive frequencies of the study, lowest and highest, rad/s.
     pub range: Option<(f64, f64)>,
     /// What looks like a mistake: sentences that begin with `warning: `.
@@ -49,6 +52,39 @@ pub struct ModelSummary {
     /// What it may take where orbits are hard to find, s; rough, and rather too long than too short.
     pub seconds: f64,
 }
+
+/// How many orbits there are at one frequency.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Orbits {
+    /// One, up to offsets that stuck contacts keep: no two motions under the same drive separate.
+    One,
+    /// Maybe several, for this reason.
+    Several(String),
+}
+
+impl Orbits {
+    fn new(system: &System) -> Option<Orbits> {
+        let separating = system.joints().iter().filter(|joint| !joint.law().is_incrementally_passive());
+        let mut of: Vec<String> =
+            separating.map(|joint| format!("`{}` of {}", joint.law().name(), joint.name())).collect();
+        if of.is_empty() {
+            // of a large structure the answer takes three factors
+            return match system.structure().is_sparse() {
+                true => None,
+                false if system.contracts() => Some(Orbits::One),
+                false => Some(Orbits::Several("the structure gives energy to some motion".to_owned())),
+            };
+        }
+        if let Some(more @ 1..) = of.len().checked_sub(NAMED) {
+            of.truncate(NAMED);
+            of.push(format!("{more} more"));
+        }
+        Some(Orbits::Several(of.join(", ")))
+    }
+}
+
+/// Joints that are named as the reason for several orbits.
+const NAMED: usize = 2;
 
 /// When a joint begins to slip.
 #[derive(Debug, Clone)]
@@ -129,6 +165,7 @@ impl ModelSummary {
             free: first.free().clone(),
             stuck: first.stuck().clone(),
             joints,
+            orbits: range.filter(|_| !first.system().joints().is_empty()).and_then(|_| Orbits::new(first.system())),
             range,
             warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
             size,
@@ -183,6 +220,7 @@ impl ModelSummary {
             "joints_free": modes(&self.free),
             "joints_stuck": modes(&self.stuck),
             "joints": self.joints.iter().map(joint).collect::<Vec<_>>(),
+            "one_orbit_at_a_frequency": self.orbits.as_ref().map(|orbits| *orbits == Orbits::One),
             "rows": self.size.rows,
             "result_bytes": self.size.results,
             "memory_bytes": self.size.memory,

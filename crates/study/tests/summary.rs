@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use stickslip_study::run::{Context, check, run};
-use stickslip_study::summary::ModelSummary;
+use stickslip_study::summary::{ModelSummary, Orbits};
 use stickslip_study::{Study, read_study, templates};
 
 fn study(text: &str) -> Study {
@@ -375,6 +375,19 @@ fn transients_usually_die_with_the_modes_that_are_driven() {
         assert!((0.5 * measured..10.0 * measured).contains(&usual), "{usual} s, measured {measured} s");
         assert!(summary.seconds > 50.0 * usual, "{} s", summary.seconds);
     }
+}
+
+/// Friction at a constant limit has one orbit; a stop, and friction that falls with velocity, may have more, and are named.
+#[test]
+fn several_orbits_are_announced() {
+    let coulomb = r#"law = { kind = "coulomb", limit = "Ft" }"#;
+    assert_eq!(summary(&template("blade-couple", &[])).orbits, Some(Orbits::One));
+    let falling = r#"law = { kind = "stribeck", limit = "Ft", static_limit = "1.5*Ft", velocity = "1 mm/s" }"#;
+    let falling = summary(&template("blade-couple", &[(coulomb, falling)]));
+    assert_eq!(falling.orbits, Some(Orbits::Several("`stribeck` of shroud".to_owned())));
+    assert!(falling.to_string().contains("several may exist at one frequency (`stribeck` of shroud)"), "{falling}");
+    let stop = summary(&stop(r#"kind = "gap", gap = "1 mm", stiffness = "1e5 N/m""#, ""));
+    assert_eq!(stop.orbits, Some(Orbits::Several("`gap` of j".to_owned())));
 }
 
 /// A stop 1 kg may hit, with a bare gap, and a figure with references.

@@ -1,6 +1,6 @@
 //! The summary in words, for a terminal.
 
-use super::{JointSummary, ModelSummary};
+use super::{JointSummary, ModelSummary, Orbits};
 use crate::words::{bytes_text, plural, quantity, significant};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -133,6 +133,15 @@ impl fmt::Display for ModelSummary {
         }
         if let Some(more @ 1..) = lines.checked_sub(LISTED) {
             line("", &format!("and {more} more joint{}", plural(more)))?;
+        }
+        match &self.orbits {
+            Some(Orbits::One) => line("orbits", "one at each frequency, but for offsets that stuck contacts keep")?,
+            Some(Orbits::Several(why)) => {
+                let what =
+                    "each point says whether its own is stable, kind `branch` follows those that are joined to it";
+                line("orbits", &format!("several may exist at one frequency ({why}): {what}"))?;
+            }
+            None => {}
         }
         let Self { size, cases, .. } = self;
         let rows = format!("{} row{}", size.rows, if size.rows == 1 { "" } else { "s" });
