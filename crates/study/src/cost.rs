@@ -327,6 +327,8 @@ const POINT: f64 = 3e-6;
 const EVENT_DRIVEN: (f64, f64) = (2e-4, 3e-3);
 /// The first number where the neighbour's orbit is near. Measured: 19 to 49 µs for the couple.
 const EVENT_DRIVEN_USUAL: f64 = 3e-5;
+/// A decomposition without joints, per cube of the degrees of freedom, s. Measured: 13 s and more a point for 900 of them.
+const EVENT_DRIVEN_ALONE: f64 = 2e-8;
 /// Masses and joints together, and joints, of the second number.
 const EVENT_DRIVEN_SIZE: (f64, f64) = (16.0, 8.0);
 /// The tolerance of harmonic balance for which its time was measured.
@@ -386,6 +388,7 @@ impl Costing<'_> {
         let size = self.masses + self.joints;
         let patterns = self.joints / EVENT_DRIVEN_SIZE.1;
         let events = self.pace.of(EVENT_DRIVEN_USUAL, EVENT_DRIVEN.0)
+            + EVENT_DRIVEN_ALONE * self.masses.powi(3)
             + EVENT_DRIVEN.1 * patterns * (size / EVENT_DRIVEN_SIZE.0).powi(3);
         let shooting = self.pace.of(SHOOTING_USUAL, SHOOTING);
         let shooting = size * size * if self.has_states { shooting.1 } else { shooting.0 };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use stickslip::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw, Stribeck};
 use stickslip::method::shooting::Shooting;
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
-use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System, example};
 use stickslip::orbit::{Accuracy, Orbit};
 
 fn mass(name: &str, mass: f64) -> Mass {
@@ -70,6 +70,27 @@ fn limits_that_nothing_reaches() {
                 let found =
                     orbit.unwrap_or_else(|error| panic!("{named}, {harmonics:?}: {error}")).places[0].amplitude();
                 assert!((found / expected - 1.0).abs() < 1e-6, "{named}, {harmonics:?}: {found} instead of {expected}");
+            }
+        }
+    }
+}
+
+/// A contact that holds does so however steeply its friction would fall: as with friction that does not.
+#[test]
+fn friction_that_falls_holds_too() {
+    let couple = |law: SharedLaw| {
+        let mut model = example::blade_couple();
+        model.joints[0].law = law;
+        model.assemble().unwrap()
+    };
+    let exact = couple(Arc::new(Coulomb { limit: 100.0 }));
+    for velocity in [1e-3, 1e-2, 0.1] {
+        let falling = couple(Arc::new(Stribeck { limit: 100.0, static_limit: 120.0, velocity }));
+        let method = HarmonicBalance { harmonics: Some(7), ..HarmonicBalance::default() };
+        for hertz in [119.5, 120.5, 121.5] {
+            let (found, expected) = (orbit(&method, &falling, TAU * hertz), orbit(&EventDriven, &exact, TAU * hertz));
+            for (a, b) in found.places.iter().zip(&expected.places) {
+                assert!((a.amplitude() / b.amplitude() - 1.0).abs() < 1e-9, "{velocity} m/s, {hertz} Hz: {a:?} {b:?}");
             }
         }
     }

@@ -298,7 +298,7 @@ impl Level {
     /// a step leads to the motion that sticks.
     pub fn begin(&self, system: &System, ports: &Ports, guess: Option<&Guess>, omega: f64) -> Motion {
         let nh = self.harmonics().len();
-        let mut motion = Motion { c: self.linear.clone(), ..Motion::rest(self.linear.len()) };
+        let mut motion = self.unhindered();
         if self.stands() {
             return self.at_rest(1.0);
         }
@@ -496,6 +496,18 @@ impl Level {
                 (self.units[2 * q * nh], self.units[2 * q * nh + 1]) = (large, large);
             }
         }
+    }
+
+    /// The motion without friction.
+    pub fn unhindered(&self) -> Motion {
+        Motion { c: self.linear.clone(), ..Motion::rest(self.linear.len()) }
+    }
+
+    /// Factor on slip limits from which nothing slips, not even what moves as if there were no friction.
+    pub fn sticking(&self, ports: &Ports) -> f64 {
+        let limits = ports.iter().filter(|port| port.is_force()).map(|port| port.scale);
+        let least = limits.filter(|limit| *limit > 0.0).fold(f64::INFINITY, f64::min);
+        Some(4.0 * self.holding / least).filter(|factor| factor.is_finite()).unwrap_or(1.0)
     }
 
     /// Samples of the forces of a port, into the alternation.

@@ -218,16 +218,20 @@ impl Level {
 
     /// From slip limits that hold to those that are given.
     fn lower_limits(&mut self, ports: &Ports, omega: f64, motion: &mut Motion) -> Result<(), Lost> {
-        let mut good = Motion { iterations: motion.iterations, ..Motion::rest(motion.c.len()) };
-        good.c.copy_from_slice(&self.linear);
-        let mut limits = 1.0;
+        let mut good = Motion { iterations: motion.iterations, ..self.unhindered() };
+        let mut limits: f64 = 1.0;
         // where everything sticks the equations are linear
         let mut held = Err(Lost { iterations: good.iterations, residual: f64::INFINITY, resonance: None });
-        for _ in 0..60 {
+        for attempt in 0..60 {
             limits *= 4.0;
-            if self.stands() {
-                good = Motion { iterations: good.iterations, ..self.at_rest(limits) };
+            if attempt == 1 {
+                // steep penalties, as of friction that falls with velocity, take far higher ones
+                limits = limits.max(self.sticking(ports));
             }
+            good = match self.stands() {
+                true => Motion { iterations: good.iterations, ..self.at_rest(limits) },
+                false => Motion { iterations: good.iterations, ..self.unhindered() },
+            };
             let most = if self.stands() { STICKS } else { ITERATIONS };
             held = self.newton(ports, omega, &mut good, Ease { limits, ..GIVEN }, most);
             if held.is_ok() || self.is_exhausted(ports) || good.iterations - motion.iterations > MOST_RAISING {
