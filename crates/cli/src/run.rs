@@ -317,10 +317,11 @@ fn one(
                 format!("; the whole run in {} stays", whole.join("").display())
             };
             let on = if interrupted { "; --resume goes on from there" } else { "" };
-            Ending::Failed(format!(
-                "interrupted; the finished points are in {}{beside}{on}",
-                results.join("").display()
-            ))
+            let what = match assembled.dataset.tables.iter().all(|table| table.rows() == 0) {
+                true => "interrupted before any point was finished; the record is in",
+                false => "interrupted; the finished points are in",
+            };
+            Ending::Failed(format!("{what} {}{beside}{on}", results.join("").display()))
         }
         ending => ending,
     }

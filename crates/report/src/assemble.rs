@@ -3,11 +3,11 @@
 //! Whatever the blocks are and whichever journals they stand in, the files are the same. Memory is that of one block, and of as many rows as the
 //! figure shows.
 
-use crate::file::{File, ReportError, Rows, file_name};
+use crate::file::{File, Output, ReportError, Rows, file_name};
 use crate::folder::{self, Aside};
 use crate::journal::{Journal, JournalError};
 use crate::json::Shape;
-use crate::output::{Outputs, with_record};
+use crate::output::{FIGURES, Outputs, with_record};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -131,7 +131,10 @@ fn written(
     let figure = drawn(study, &tables);
     let dataset = parts.outline.clone().completed(tables, figure, tally, Duration::from_secs_f64(time));
     let mut files = Vec::new();
-    for output in outputs.iter().filter(|output| output.sink.is_none()) {
+    // a run that was stopped before anything was finished has nothing to draw
+    let empty = dataset.record.interrupted && shapes.iter().all(|shape| shape.rows == 0);
+    let makes = |output: &&Output| output.sink.is_none() && !(empty && FIGURES.contains(&output.name));
+    for output in outputs.iter().filter(makes) {
         files.extend((output.make)(&dataset)?);
     }
     names.sort_by_key(|name| {

@@ -16,6 +16,9 @@ pub static TABLE: &[Output] = &[
     crate::html::OUTPUT,
 ];
 
+/// The outputs that are figures.
+pub(crate) const FIGURES: [&str; 3] = [crate::svg::OUTPUT.name, crate::png::OUTPUT.name, crate::html::OUTPUT.name];
+
 /// Which outputs to write.
 #[derive(Debug, Clone)]
 pub struct Outputs(Vec<&'static Output>);

@@ -5,7 +5,7 @@
 
 use crate::file::{File, ReportError, file_name, write_once};
 use crate::folder::{self, RECORD};
-use crate::output::Outputs;
+use crate::output::{FIGURES, Outputs};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Column, Dataset, Record, Table, Values};
@@ -336,9 +336,6 @@ impl Stored {
         same
     }
 }
-
-/// The outputs that are figures.
-const FIGURES: [&str; 3] = [crate::svg::OUTPUT.name, crate::png::OUTPUT.name, crate::html::OUTPUT.name];
 
 #[cfg(test)]
 mod tests {

@@ -196,6 +196,17 @@ fn bare_numbers_as_angles() {
     }
 }
 
+/// Parameters in trigonometric functions have no unit by their place.
+#[test]
+fn bare_parameters_as_angles() {
+    let wedge = |angle: &str| template("under-platform-wedge", &[("a1 = \"30 deg\"", &format!("a1 = {angle}"))]);
+    let said = |angle: &str| summary(&wedge(angle)).warnings.iter().any(|text| text.contains("the bare number"));
+    assert!(said("30") && said("45.5"));
+    assert!(!said("\"30 deg\"") && !said("\"0.5 rad\"") && !said("0.5") && !said("\"pi/6\""));
+    // numbers of blades in sin(pi EO / N)
+    silent(&template("bladed-ring", &[]));
+}
+
 #[test]
 fn a_mode_that_never_slips() {
     let drive = "kind = \"response\"\nfrequency = { from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }";

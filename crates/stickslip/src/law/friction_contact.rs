@@ -28,7 +28,7 @@ pub(super) static INFO: LawInfo = LawInfo {
             "preload",
             Dimension::FORCE,
             Range::Any,
-            "normal load at rest; negative: a gap of -preload/normal",
+            "normal load where the structure does not give way, which takes part of it otherwise; negative: a gap of -preload/normal",
         )
         .or(0.0),
         Parameter::new(

@@ -193,6 +193,23 @@ impl Expression {
         })
     }
 
+    /// The parameters in arguments of `sin`, `cos` and `tan`, by index, but for arguments with pi: these are in radians.
+    pub(crate) fn angles(&self) -> impl Iterator<Item = usize> + '_ {
+        let turns =
+            |operation: &Operation| matches!(operation, Operation::Call { function: "sin" | "cos" | "tan", .. });
+        let within = |span: &Range<usize>| {
+            let span = span.clone();
+            self.steps.iter().filter(move |(_, part)| span.start <= part.start && part.end <= span.end)
+        };
+        let calls = self.steps.iter().filter(move |(operation, _)| turns(operation)).map(|(_, span)| span);
+        let has_pi =
+            move |span: &Range<usize>| within(span).any(|(step, _)| matches!(step, Operation::Push(v) if v.with_pi));
+        calls.filter(move |span| !has_pi(span)).flat_map(within).filter_map(|(operation, _)| match operation {
+            Operation::Parameter(index) => Some(*index),
+            _ => None,
+        })
+    }
+
     /// Whether it is one literal number, with or without a unit.
     pub fn is_literal(&self) -> bool {
         matches!(self.steps.as_slice(), [(Operation::Push(_), _)] | [(Operation::Push(_), _), (Operation::Negate, _)])

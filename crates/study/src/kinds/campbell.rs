@@ -83,9 +83,15 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let values = &costing.case.values;
     let speeds = values.frequencies("speed").map_or(2, crate::values::Frequencies::len) as f64;
     let count = |key: &str, or: u64| values.count(key).unwrap_or(or) as f64;
-    let waves = costing.case.model.ring.map_or(1.0, |ring| ring.sectors as f64 / 2.0 + 1.0);
+    let sectors = costing.case.model.ring.filter(|ring| ring.equal).map(|ring| ring.sectors as f64);
+    let waves = sectors.map_or(1.0, |sectors| sectors / 2.0 + 1.0);
     let lines = 2.0 * waves * count("modes", 3);
-    let crossings = lines * count("engine_orders", 6);
+    // an engine order meets the modes of one nodal diameter
+    let crossings = lines / waves * count("engine_orders", 6);
+    let depends = costing.case.parameters.contains_key(costing.case.values.text("parameter").unwrap_or(PARAMETER));
+    let found = if depends { speeds + REFINED * crossings } else { 1.0 };
+    // both states of every wave; complex ones are twice as large
+    let size = sectors.map_or(costing.masses, |sectors| 2.0 * costing.masses / sectors);
     Cost {
         tables: vec![
             Shape { rows: costing.cases * speeds * lines, numbers: costing.varied + 4.0, words: 1.0 },
@@ -93,7 +99,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: costing.cases * (speeds * lines + crossings),
         unit: speeds * lines * 8.0,
-        work: costing.cases * (speeds + REFINED * crossings) * costing.masses.powi(3) * EIGEN,
+        work: costing.cases * found * 2.0 * waves * size.powi(3) * EIGEN,
     }
 }
 
@@ -153,25 +159,26 @@ fn met(found: &[Natural], orders: usize, sectors: Option<usize>) -> impl Iterato
 }
 
 /// Evaluations that find a crossing between two speeds.
-const REFINED: f64 = 8.0;
+const REFINED: f64 = 4.0;
 /// Most of them.
 const MOST_REFINED: usize = 60;
-/// A crossing is found when it moves by no more than this share of its speed.
-const FOUND: f64 = 1e-12;
+/// A crossing is found when it moves by no more than this share of its speed: a hundred times what is seen of the frequencies' rounding.
+const FOUND: f64 = 1e-11;
 
 /// One case while its speeds are gone through.
 struct Diagram<'a> {
     work: &'a Work<'a>,
     prepared: &'a Prepared,
     most: usize,
-    depends: bool,
+    /// The frequencies, where they do not depend on the speed.
+    same: Option<Result<Vec<Natural>, String>>,
 }
 
 impl Diagram<'_> {
     /// The natural frequencies at a speed, rad/s.
     fn at(&self, speed: f64) -> Result<Vec<Natural>, String> {
-        if !self.depends {
-            return naturals(&self.prepared.case.model, self.most);
+        if let Some(same) = &self.same {
+            return same.clone();
         }
         let name = self.prepared.case.values.text("parameter").unwrap_or(PARAMETER);
         let case =
@@ -179,30 +186,40 @@ impl Diagram<'_> {
         naturals(&case.model, self.most)
     }
 
-    /// Where `order` times the speed is the frequency of `mode`, between two speeds that lie on either side; false position with bisection.
-    fn crossing(&self, order: f64, mode: &Natural, (mut a, mut b): (f64, f64)) -> Result<f64, String> {
-        let gap = |speed: f64| -> Result<f64, String> {
-            let all = self.at(speed)?;
-            let found = all.iter().find(|other| other.is_like(mode));
-            found.map(|found| found.omega - order * speed).ok_or_else(|| "a mode is lost between two speeds".to_owned())
-        };
-        let (mut at_a, mut at_b) = (gap(a)?, gap(b)?);
-        for step in 0..MOST_REFINED {
-            if (b - a).abs() <= FOUND * b.abs() || at_a == 0.0 {
+    /// Where `order` times the speed is the frequency of a mode, between two speeds that lie on either side, each with the mode there.
+    ///
+    /// Squares of frequencies are nearly linear in the square of the speed: softening and stiffening are proportional to it. So false position in these
+    /// is nearly Newton's method; where a step does not halve the interval twice in a row, that is halved.
+    fn crossing(
+        &self,
+        order: f64,
+        (mut a, one): (f64, &Natural),
+        (mut b, other): (f64, &Natural),
+    ) -> Result<f64, String> {
+        let excess = |speed: f64, mode: &Natural| (mode.omega - order * speed) * (mode.omega + order * speed);
+        let (mut at_a, mut at_b) = (excess(a, one), excess(b, other));
+        let (mut last, mut slow) = (f64::NAN, 0);
+        for _ in 0..MOST_REFINED {
+            if at_a == 0.0 {
                 return Ok(a);
             }
-            let middle = 0.5 * (a + b);
-            let secant = a - at_a * (b - a) / (at_b - at_a);
-            // every third step halves, so that a bent curve ends too
-            let next = if step % 3 == 2 || !(secant > a.min(b) && secant < a.max(b)) { middle } else { secant };
-            let there = gap(next)?;
-            if there == 0.0 {
+            let secant = (a * a - at_a * (b * b - a * a) / (at_b - at_a)).sqrt();
+            let inside = secant > a.min(b) && secant < a.max(b);
+            let next = if inside && slow < 2 { secant } else { 0.5 * (a + b) };
+            if (next - last).abs() <= FOUND * next.abs() || (b - a).abs() <= FOUND * b.abs() {
                 return Ok(next);
             }
-            if (next - a).abs().min((next - b).abs()) <= FOUND * next.abs() {
-                return Ok(next);
+            last = next;
+            let all = self.at(next)?;
+            let found = all.iter().find(|mode| mode.is_like(one)).ok_or("a mode is lost between two speeds")?;
+            let there = excess(next, found);
+            let before = (b - a).abs();
+            if (there > 0.0) == (at_a > 0.0) {
+                (a, at_a) = (next, there)
+            } else {
+                (b, at_b) = (next, there)
             }
-            if (there > 0.0) == (at_a > 0.0) { (a, at_a) = (next, there) } else { (b, at_b) = (next, there) }
+            slow = if (b - a).abs() > 0.5 * before && slow < 2 { slow + 1 } else { 0 };
         }
         Ok(0.5 * (a + b))
     }
@@ -212,8 +229,10 @@ fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
     let values = &prepared.case.values;
     let name = values.text("parameter").unwrap_or(PARAMETER);
+    let most = values.count("modes").unwrap_or(3) as usize;
     let depends = prepared.case.parameters.contains_key(name);
-    let diagram = Diagram { work, prepared, most: values.count("modes").unwrap_or(3) as usize, depends };
+    let same = (!depends).then(|| naturals(&prepared.case.model, most));
+    let diagram = Diagram { work, prepared, most, same };
     let mut part = Part::default();
     if !depends {
         let message = format!("There is no parameter `{name}`: the frequencies do not depend on the speed.");
@@ -243,13 +262,12 @@ fn compute(work: &Work<'_>) -> Computed {
             rows.end();
         }
         if let Some((last, all)) = &before {
-            let between = (*last, speed);
             for (order, natural) in met(&found, orders, sectors) {
                 let Some(was) = all.iter().find(|was| was.is_like(natural)) else { continue };
-                if (was.omega - order * last > 0.0) == (natural.omega - order * speed > 0.0) {
-                    continue;
+                if work.context.stopped() || (was.omega - order * last > 0.0) == (natural.omega - order * speed > 0.0) {
+                    continue; // a part during which the run is stopped is computed again
                 }
-                match diagram.crossing(order, natural, between) {
+                match diagram.crossing(order, (*last, was), (speed, natural)) {
                     Ok(at) => {
                         write(prepared, at, &Natural { omega: order * at, ..*natural }, &mut crossings);
                         crossings.integer(ORDER, order as u64);

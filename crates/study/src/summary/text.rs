@@ -57,7 +57,12 @@ impl ModelSummary {
     fn joint(&self, joint: &JointSummary) -> String {
         match joint.pressed {
             Some(0.0) => return "apart at rest: it closes and opens".to_owned(),
-            Some(force) => return format!("pressed with {} at rest: it opens and closes", quantity(force, "N")),
+            Some(force) => {
+                return format!(
+                    "pressed with {} where the structure does not give way: it opens and closes",
+                    quantity(force, "N")
+                );
+            }
             None => {}
         }
         if joint.limit == 0.0 {

@@ -10,6 +10,7 @@ use crate::words::significant;
 use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use stickslip::dimension::Dimension;
+use stickslip::model::Axis;
 
 /// Names that a warning lists; of more it gives the number.
 const NAMED: usize = 6;
@@ -18,9 +19,11 @@ const NAMED: usize = 6;
 pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[Surveyed]) -> Vec<String> {
     let mut warnings = of_kind;
     warnings.extend(loose(cases));
+    warnings.extend(still(&cases[0]));
     warnings.extend(structure(&cases[0]));
     warnings.extend(unused(study));
     warnings.extend(bare_numbers(study));
+    warnings.extend(bare_angles(study));
     warnings.extend(no_references(study, cases));
     warnings.into_iter().map(|text| format!("{WARNING}{text}")).collect()
 }
@@ -47,6 +50,30 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
     };
     cases[0].survey.loose().iter().take(NAMED).map(one).collect()
 }
+
+/// Joints between places that are the same: of the same rows, or both held.
+fn still(case: &Surveyed) -> Option<String> {
+    let moves = |axis: &Axis| {
+        let mut weights: HashMap<usize, (f64, f64)> = HashMap::new();
+        for (row, weight) in axis.rows() {
+            let (sum, size) = weights.entry(*row).or_default();
+            (*sum, *size) = (*sum + weight, *size + weight.abs());
+        }
+        !axis.imposed().is_empty() || weights.values().any(|(sum, size)| sum.abs() > SAME * size)
+    };
+    let joints = case.survey.system().joints().iter();
+    let names: Vec<String> =
+        joints.filter(|joint| !joint.axes().iter().any(moves)).map(|joint| joint.name().to_owned()).collect();
+    let (those, do_not) = if names.len() == 1 {
+        ("the joint", "never moves: its two places are")
+    } else {
+        ("the joints", "never move: their two places are")
+    };
+    (!names.is_empty()).then(|| format!("{those} {} {do_not} the same", listed(&names)))
+}
+
+/// Weights of a row that cancel to this share of them do so but for rounding.
+const SAME: f64 = 1e-12;
 
 /// Frequencies that a structure of the size of a machine has, Hz: outside of these the units are mistaken, which moves them by powers of ten.
 const USUAL: (f64, f64) = (0.1, 2e5);
@@ -185,6 +212,28 @@ fn easily_meant(dimension: Option<Dimension>, si: f64, with_pi: bool) -> Option<
         Dimension::LENGTH if si.abs() >= LONG => Some(("m", "mm", si * 1e3)),
         _ => None,
     }
+}
+
+/// Parameters that are bare numbers, of more than a turn in radians, and stand in `sin`, `cos` or `tan`: they are degrees.
+fn bare_angles(study: &Study) -> Vec<String> {
+    let mut turned: BTreeSet<usize> =
+        study.parameters.iter().flat_map(|parameter| parameter.quantity.expression.angles()).collect();
+    let lists = &study.structure.lists;
+    for list in [&lists.place, &lists.mass, &lists.spring, &lists.joint, &lists.force, &lists.motion] {
+        for table in list {
+            each_quantity(table, &mut |_, quantity, _| turned.extend(quantity.expression.angles()));
+        }
+    }
+    let choice: HashMap<_, _> = study.varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
+    let Ok(values) = evaluate(&study.names, &study.parameters, &study.order, &choice, &[]) else { return Vec::new() };
+    let bare = |index: &usize| values[*index].dimension.is_none() && values[*index].si.abs() > TAU;
+    let sentence = |index: usize| {
+        let (name, number) = (&study.names[index], displayed(values[index].si, None));
+        format!(
+            "the parameter `{name}` is the bare number {number} in `sin`, `cos` or `tan`, where it counts as {number} rad; say the unit: \"{number} deg\""
+        )
+    };
+    turned.into_iter().filter(bare).take(NAMED).map(sentence).collect()
 }
 
 /// Bare numbers whose unit is easily mistaken: angles count as radians, lengths as metres.

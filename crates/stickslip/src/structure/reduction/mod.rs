@@ -197,8 +197,9 @@ pub enum ReductionError {
     SeriesDamping,
     /// No reduction is close enough.
     #[error(
-        "the best of the reductions tried errs by {best:.1e} at {at:.6e} rad/s with {dofs} coordinates, and {tolerance:.1e} was \
-         asked for; ask for less, or for a lower frequency"
+        "the best of the reductions tried errs by {best:.1e} at {:.7} Hz with {dofs} coordinates, and {tolerance:.1e} was \
+         asked for; ask for less, for a lower frequency, or for free modes with residual vectors, which need fewer coordinates",
+        at / std::f64::consts::TAU
     )]
     OutOfReach {
         /// The least relative error.
