@@ -204,9 +204,10 @@ impl Diagram<'_> {
                 return Ok(a);
             }
             let secant = (a * a - at_a * (b * b - a * a) / (at_b - at_a)).sqrt();
-            let inside = secant > a.min(b) && secant < a.max(b);
-            let next = if inside && slow < 2 { secant } else { 0.5 * (a + b) };
-            if (next - last).abs() <= FOUND * next.abs() || (b - a).abs() <= FOUND * b.abs() {
+            let next = if slow < 2 { secant.clamp(a.min(b), a.max(b)) } else { 0.5 * (a + b) };
+            // at an end only rounding is left
+            let near = [a, b, last].into_iter().any(|known| (next - known).abs() <= FOUND * next.abs());
+            if near || (b - a).abs() <= FOUND * b.abs() {
                 return Ok(next);
             }
             last = next;
