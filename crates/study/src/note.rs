@@ -138,8 +138,8 @@ impl Note {
             Note::History(count) => Some(format!(
                 "At {} a joint or a part of one sticks for the whole period, in a motion that is not its own mirror image: where it sticks \
                  depends on how the motion began, and with it the means, and the amplitudes too if a gap or another law knows positions. \
-                 Shown is the motion in which a spring that never slips carries no mean force, as in joints that creep, and with method \
-                 `transient` the one that its run led to.",
+                 Shown is the motion in which a spring that never slips carries no mean force, as in joints that creep, or no more than \
+                 balance needs on bodies that contacts alone hold, and with method `transient` the one that its run led to.",
                 points(*count)
             )),
             Note::StuckElsewhere(count) => Some(format!(

@@ -109,7 +109,6 @@ fn a_stuck_wedge_is_two_springs_at_angles() {
             ("a2", format!("{a2} deg")),
             ("m", "1e-4 g".to_owned()),
             ("kz", "1e7 N/mm".to_owned()),
-            ("kw", "0 N/m".to_owned()),
         ];
         frequencies(("under-platform-wedge", 12, 1), &parameters, 2e-6, |stuck, theta| {
             vec![((k + if stuck { 2.0 * kc * (1.0 - theta.cos()) } else { 0.0 }) / mass).sqrt()]

@@ -100,6 +100,21 @@ fn masses_that_nothing_holds() {
     warns(&template("blade-couple", &ground), &["no spring holds `contact`", "friction alone"]);
 }
 
+/// A block on a contact that presses it away: with the force that presses it back nothing is said.
+#[test]
+fn a_preload_that_nothing_balances() {
+    let block = |press: &str| {
+        format!(
+            "schema = 1\n[[mass]]\nname = \"block\"\nmass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n[[joint]]\nname = \"foot\"\n\
+             between = [\"block\", \"ground\"]\nlaw = {{ kind = \"friction-contact\", tangential = \"1 N/um\", normal = \"2 N/um\", \
+             friction = 0.5, preload = \"10 N\", tangents = 1 }}\n[[force]]\non = \"block.x\"\namplitude = \"1 N\"\n{press}[study]\n\
+             kind = \"orbit\"\nfrequency = \"100 Hz\"\n"
+        )
+    };
+    warns(&block(""), &["the preload of `foot`, 10 N in all, pushes `block.x`, `block.z` away", "harmonic = 0"]);
+    silent(&block("[[force]]\non = \"block.z\"\namplitude = \"8 N\"\nharmonic = 0\n"));
+}
+
 #[test]
 fn parameters_that_nothing_uses() {
     let edits = [("F0 = \"10 N\"", "F0 = \"10 N\"\nspare = \"1 N\"\nother = \"2 * spare\"")];

@@ -5,6 +5,7 @@
 
 mod assembly;
 pub mod auto;
+mod course;
 mod drive;
 pub mod event_driven;
 mod evidence;

@@ -18,7 +18,7 @@ pub use disk::{Around, Disk, LEAST_SECTORS, NEXT, Ring, normal_pattern};
 pub use error::{Element, ModelError};
 pub use place::{Frame, FrameError, Place};
 pub use places::{is_identifier, is_place};
-pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey, WaveModes};
+pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey, Unpressed, WaveModes};
 pub use system::{Axis, Cyclic, Load, MovedPlace, System, SystemBuilder, SystemError, SystemJoint};
 
 use crate::law::SharedLaw;

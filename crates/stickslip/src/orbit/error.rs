@@ -164,6 +164,16 @@ pub enum OrbitError {
         /// Drive frequency, rad/s.
         omega: f64,
     },
+    /// No orbit was found, and a motion that was followed from rest shows what there is instead.
+    #[error("{method} finds no orbit at Ω = {omega:.4} rad/s; followed in time from rest, the motion {course}")]
+    NoOrbit {
+        /// The method.
+        method: &'static str,
+        /// Drive frequency, rad/s.
+        omega: f64,
+        /// What it does.
+        course: Course,
+    },
     /// Nothing bounds the motion of the structure without its joints.
     #[error(
         "{method} finds the structure without its joints in a resonance without damping at Ω = {omega:.4} rad/s: nothing bounds its motion at \
@@ -195,6 +205,87 @@ pub enum OrbitError {
     },
 }
 
+/// What a motion does that is followed in time.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Course {
+    /// It comes to one that repeats with the drive.
+    Settles,
+    /// It comes closer to such a one, and is not there yet.
+    Settling {
+        /// Periods for which it was followed.
+        periods: usize,
+    },
+    /// It comes to one that repeats after several periods of the drive.
+    Repeats {
+        /// How many.
+        periods: usize,
+    },
+    /// A body leaves the place where it was, period by period.
+    MovesOn {
+        /// The place that goes farthest.
+        place: String,
+        /// How far, m.
+        way: f64,
+        /// In how many periods.
+        periods: usize,
+        /// The joint that is apart for the largest share of the last period.
+        joint: String,
+        /// That share; zero if no faces part.
+        share: f64,
+    },
+    /// It neither repeats nor moves on.
+    Wanders {
+        /// Periods for which it was followed.
+        periods: usize,
+        /// The joint that is apart for the largest share of the last of them.
+        joint: String,
+        /// That share; zero if no faces part.
+        share: f64,
+    },
+}
+
+impl std::fmt::Display for Course {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let apart = |joint: &str, share: f64| {
+            if share > 0.0 {
+                format!(", with `{joint}` apart for {:.0} % of the last", 100.0 * share)
+            } else {
+                String::new()
+            }
+        };
+        match self {
+            Course::Settles => {
+                write!(
+                    f,
+                    "settles on one that repeats with the drive, which this series does not reach: take more harmonics, or method `transient`"
+                )
+            }
+            Course::Settling { periods } => write!(
+                f,
+                "settles slowly: after {periods} periods it still changes, less and less; take more harmonics, or method `transient`"
+            ),
+            Course::Repeats { periods } => {
+                write!(
+                    f,
+                    "repeats after {periods} periods of the drive: ask for it with the option `period = {periods}`"
+                )
+            }
+            Course::MovesOn { place, way, periods, joint, share } => write!(
+                f,
+                "moves on, and nothing brings it back: `{place}` by {way:.2e} m in {periods} periods{}; add a spring that holds it, press the \
+                 contacts harder, or damp the motion",
+                apart(joint, *share)
+            ),
+            Course::Wanders { periods, joint, share } => write!(
+                f,
+                "neither repeats nor settles in {periods} periods{}: no orbit attracts it; press the contacts harder or damp the motion, and look at \
+                 it with kind = \"transient\"",
+                apart(joint, *share)
+            ),
+        }
+    }
+}
+
 /// What a motion that does not settle does instead, and what to do about it.
 fn unsettled(repeats: Option<usize>) -> String {
     match repeats {
@@ -217,7 +308,9 @@ impl OrbitError {
             OrbitError::Breakdown { .. } => "breakdown",
             OrbitError::Evidence { .. } => "evidence-fails",
             OrbitError::Truncation { .. } => "tolerance-not-reached",
-            OrbitError::Drift { .. } => "drifts",
+            OrbitError::Drift { .. } | OrbitError::NoOrbit { course: Course::MovesOn { .. }, .. } => "drifts",
+            OrbitError::NoOrbit { course: Course::Settles | Course::Settling { .. }, .. } => "not-converged",
+            OrbitError::NoOrbit { .. } => "not-settled",
             OrbitError::Resonance { .. } => "resonance",
             OrbitError::NotAnOrbit { .. } => "not-an-orbit",
             OrbitError::Frequency { .. } => "bad-frequency",

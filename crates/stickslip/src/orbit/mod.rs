@@ -11,7 +11,7 @@ mod stability;
 pub use crate::law::Contact;
 use crate::law::{MOST_DIRECTIONS, Piece, SharedLaw, Slider};
 use crate::model::System;
-pub use error::{Breakdown, OrbitError};
+pub use error::{Breakdown, Course, OrbitError};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 pub use stability::Stability;

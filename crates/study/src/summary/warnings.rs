@@ -48,7 +48,26 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
             format!("nothing holds {names}: no spring and no joint ties {them} to `ground`")
         }
     };
-    cases[0].survey.loose().iter().take(NAMED).map(one).collect()
+    // what stands on faces that are pressed is no mistake
+    let loose = cases[0].survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
+    loose.take(NAMED).map(one).chain(unpressed(cases)).collect()
+}
+
+/// A preload that no constant force balances, in the first case that has one.
+fn unpressed(cases: &[Surveyed]) -> Option<String> {
+    let (case, found) = cases.iter().find_map(|case| Some((case, case.survey.unpressed()?)))?;
+    let pushed = case.survey.loose().iter().filter(|one| one.contacts.iter().any(|name| found.joints.contains(name)));
+    let bodies: Vec<String> = pushed.flat_map(|one| one.masses.clone()).collect();
+    if bodies.is_empty() {
+        return None;
+    }
+    let (names, joints) = (listed(&bodies), listed(&found.joints));
+    let preload = displayed(found.preload, Some(Dimension::FORCE));
+    Some(format!(
+        "the preload of {joints}, {preload} in all, pushes {names} away: no spring holds {}, and no constant force presses the faces at rest; add a \
+         force with `harmonic = 0` that does",
+        if bodies.len() == 1 { "it" } else { "them" }
+    ))
 }
 
 /// Joints between places that are the same: of the same rows, or both held.

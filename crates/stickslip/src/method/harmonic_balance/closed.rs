@@ -171,6 +171,71 @@ mod tests {
         }
     }
 
+    /// A constant load along the face below the limit is carried by friction: rest is where its spring holds that, and the motion about it is the same,
+    /// `Q/kt + F/|kt - m Ω²| cos Ωt`. The load may reach the limit together with what the motion asks for.
+    #[test]
+    fn friction_carries_a_constant_load() {
+        let (pressed, limit) = (10.0, 5.0);
+        for (load, ratio) in [(3.0f64, 0.6), (-4.2, 0.6), (4.99, 0.01), (2.0, 1.7), (-1.0, 20.0)] {
+            let omega = ratio * (TANGENTIAL / 0.7).sqrt();
+            let amplitude = 0.3 / (TANGENTIAL - 0.7 * omega * omega).abs();
+            // a harmonic load that leaves a hundredth of the limit
+            let share = 0.99f64.min((limit - load.abs()) / (TANGENTIAL * amplitude));
+            let found = orbit(&block([load, pressed], 0.3 * share), 3, omega).unwrap();
+            let (x, z) = (&found.places[0], &found.places[1]);
+            // what keeps a free mean in place holds (1e-5 Ω)² m of it
+            let held = 1e-9 + 2e-10 * ratio * ratio;
+            assert!((x.mean * TANGENTIAL / load - 1.0).abs() < held, "{load}, {ratio}: {}", x.mean * TANGENTIAL);
+            assert!((x.amplitude() / (share * amplitude) - 1.0).abs() < 1e-6, "{load}, {ratio}: {}", x.amplitude());
+            assert!(z.mean.abs() < 1e-9 * 10.0 / NORMAL, "{}", z.mean);
+            assert!(found.joints[0].dissipation.abs() < 1e-9 * limit * amplitude, "{:?}", found.joints);
+        }
+    }
+
+    /// Of two contacts on a body one is loaded while the other is unloaded. Both slip at first, and then carry opposite mean forces with which neither
+    /// slips any more: the body shakes down, and its motion is that of its springs. Where each alone would come to rest their means do not balance.
+    #[test]
+    fn a_body_on_two_contacts_shakes_down() {
+        let (mass, sides, pressed) = (0.7, [1.0, -0.9], 10.0);
+        // along x and z, and a turn
+        let body = structure(DMatrix::identity(3, 3) * mass, DMatrix::zeros(3, 3));
+        let mut builder = System::builder(body);
+        for (i, side) in sides.into_iter().enumerate() {
+            let (tangent, normal) = (Axis::new(vec![(0, 1.0)]), Axis::new(vec![(1, 1.0), (2, side)]));
+            builder = builder.joint(format!("contact{i}"), contact(pressed), vec![tangent, normal]);
+        }
+        let sum = |power: i32| sides.iter().map(|side: &f64| side.powi(power)).sum::<f64>();
+        for (row, power) in [(1, 0), (2, 1)] {
+            builder = builder.force(row, 0, Complex64::new(pressed * sum(power), 0.0));
+        }
+        // what moves the springs in phase by 4.5 N along x, and by 8 N and -7.2 N across the faces
+        let (pull, swing) = (4.5, 8.0);
+        let omega = 0.5 * (TANGENTIAL / mass).sqrt();
+        let [x, turned] = [pull / TANGENTIAL, swing / NORMAL];
+        let inertia = mass * omega * omega;
+        let loads = [(2.0 * TANGENTIAL - inertia) * x, NORMAL * sum(1) * turned, (NORMAL * sum(2) - inertia) * turned];
+        for (row, load) in loads.into_iter().enumerate() {
+            builder = builder.force(row, 1, Complex64::new(load, 0.0));
+        }
+        let found = orbit(&builder.build().unwrap(), 5, omega).unwrap();
+        assert!((found.places[0].amplitude() / x - 1.0).abs() < 1e-6, "{}", found.places[0].amplitude() / x);
+        assert!((found.places[2].amplitude() / turned - 1.0).abs() < 1e-6);
+        let samples = 256;
+        let mut alone = 0.0;
+        for (i, side) in sides.into_iter().enumerate() {
+            let force = |k: usize| found.sample(found.period() * k as f64 / samples as f64).joints[i].force[0];
+            let mean = (0..samples).map(force).sum::<f64>() / samples as f64;
+            // |T + 4.5 c| <= μ (10 + 8 side c) at both ends c = ±1 of the swing
+            let ends = [-1.0, 1.0].map(|c: f64| (FRICTION * (pressed + swing * side * c), pull * c));
+            let low = ends.iter().fold(f64::NEG_INFINITY, |m, (limit, pull)| m.max(-limit - pull));
+            let high = ends.iter().fold(f64::INFINITY, |m, (limit, pull)| m.min(limit - pull));
+            assert!(low <= high && low * high > 0.0, "without a mean it slips: {low} {high}");
+            assert!(mean > low - 1e-6 && mean < high + 1e-6, "{i}: {mean} within {low} and {high}");
+            alone += 0.0f64.clamp(low, high);
+        }
+        assert!(alone.abs() > 0.3, "{alone}");
+    }
+
     /// What presses it away, or drags it more than friction can, is no rest.
     #[test]
     fn loads_that_no_contact_carries_are_refused() {

@@ -38,6 +38,8 @@ const RIPPLE: f64 = 30.0;
 /// The receptance below which motion counts as imposed, relative to that of the excited structure.
 const RIGID: f64 = 1e-14;
 
+/// Where contacts alone hold, the length of a motion counts up to so many times that of its harmonics and of rest.
+const FAR: f64 = 4.0;
 /// Length of a motion that is none, m: its square is a number still.
 const NOTHING: f64 = 1e-150;
 
@@ -100,6 +102,8 @@ pub(super) struct Motion {
     pub c: Vec<Complex64>,
     /// Harmonics of the forces along them, N.
     pub force: Vec<Complex64>,
+    /// Of laws whose springs are relaxed at displacement zero, see [`Alternation::relaxed_at_zero`].
+    pub relaxed_at_zero: bool,
     pub residual: f64,
     pub iterations: usize,
 }
@@ -114,6 +118,7 @@ impl Motion {
         self.c.clone_from(&other.c);
         self.force.clone_from(&other.force);
         (self.residual, self.iterations) = (other.residual, other.iterations);
+        self.relaxed_at_zero = other.relaxed_at_zero;
     }
 }
 
@@ -338,6 +343,7 @@ impl Level {
     ) -> f64 {
         self.assembled += usize::from(slopes != Slopes::None);
         let nh = self.harmonics().len();
+        self.alternation.relaxed_at_zero = motion.relaxed_at_zero;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
             let range = port.first * nh..(port.first + port.axes) * nh;
             let wanted = slopes == Slopes::All || (slopes == Slopes::Cheap && !port.marches());
@@ -472,6 +478,19 @@ impl Level {
         }
     }
 
+    /// Adds this share of these springs to the derivative of the mean: a step then goes as far as they allow.
+    pub(super) fn hold_mean(&mut self, ports: &Ports, share: f64) {
+        let nh = self.alternation.harmonics.len();
+        for (p, port) in ports.iter().enumerate() {
+            let tall = 2 * nh * port.axes;
+            let tangent = &mut self.tangents[block(&self.blocks, p, port, nh)];
+            for (a, k) in self.springs.iter().skip(port.first).take(port.axes).enumerate() {
+                let at = 2 * nh * a;
+                tangent[at * tall + at] += share * k;
+            }
+        }
+    }
+
     /// Units of the residual: the motion's length, or the law's scale, but no more than the forces that there are: a limit that nothing reaches says
     /// nothing of them. Where only laws hold a direction, the mean of the motion is the small difference of large ones, and its unit the larger of these.
     fn measure(&mut self, ports: &Ports, motion: &Motion, length: f64) {
@@ -514,6 +533,7 @@ impl Level {
     pub fn sample(&mut self, ports: &Ports, p: usize, omega: f64, motion: &Motion) {
         let nh = self.harmonics().len();
         let port = &ports[p];
+        self.alternation.relaxed_at_zero = motion.relaxed_at_zero;
         let range = port.first * nh..(port.first + port.axes) * nh;
         self.alternation.sample(port, (omega, self.penalty[p]), (&motion.c[range.clone()], &motion.force[range]));
     }
@@ -725,7 +745,12 @@ impl Level {
             let harmonics = c.iter().enumerate().map(|(i, z)| (z.norm_sqr(), self.alternation.harmonics[i % nh]));
             harmonics.filter(|(_, h)| *h >= from).map(|(square, h)| square * weight(h)).sum::<f64>().sqrt()
         };
-        (norm(&motion.c, 0) + 1e-2 * norm(&self.linear, 1)).max(NOTHING)
+        let mut size = norm(&motion.c, 0);
+        if self.stands() {
+            // a mean that goes far is no yardstick
+            size = size.min(FAR * (norm(&motion.c, 1) + norm(&self.linear, 0)));
+        }
+        (size + 1e-2 * norm(&self.linear, 1)).max(NOTHING)
     }
 }
 

@@ -31,10 +31,11 @@ mod uncoupled;
 use super::guess::Guess;
 use super::{Method, MethodError, MethodInfo, MethodOption, Options, OrbitError, PERIOD, Solver, periods};
 use crate::dimension::Dimension;
+use crate::method::course::course;
 use crate::method::evidence::Judge;
 use crate::method::repeated::Afresh;
 use crate::model::{Axis, System};
-use crate::orbit::Orbit;
+use crate::orbit::{Course, Orbit, Path};
 pub(crate) use arc::ModeArc;
 pub(crate) use branch::BranchEquations;
 use equations::{Level, Motion};
@@ -96,6 +97,8 @@ const FIRST: usize = 7;
 const MOST: usize = 511;
 /// Newton iterations from a neighbouring orbit, which take 2 to 5.
 const NEARBY: usize = 20;
+/// Frequencies without an orbit at which the motion is followed, for seconds each, to say what it does; of a sweep in every one of its blocks.
+const MOST_FOLLOWED: usize = 8;
 /// Orbits whose harmonics are kept as starts for their neighbours: those between which a peak is refined.
 const RECENT: usize = 8;
 /// Unknowns beyond which no error is estimated: the elimination would take seconds.
@@ -466,6 +469,8 @@ struct Balance<'a> {
     levels: BTreeMap<usize, Level>,
     /// The last orbits, the newest first: state at t = 0, highest harmonic and motion.
     recent: VecDeque<(Vec<f64>, usize, Motion)>,
+    /// Frequencies (rad/s) at which the motion was followed and no orbit was found, and what it did.
+    followed: Vec<(f64, Course)>,
 }
 
 impl<'a> Balance<'a> {
@@ -497,6 +502,7 @@ impl<'a> Balance<'a> {
             system,
             levels: BTreeMap::new(),
             recent: VecDeque::new(),
+            followed: Vec::new(),
         })
     }
 }
@@ -556,6 +562,11 @@ impl Balance<'_> {
     fn approached(&mut self, top: usize, omega: f64, guess: Option<&Guess>) -> Option<Motion> {
         let start = guess.filter(|_| self.periods > 1)?.state(self.system.dofs());
         let path = self.judge.approach(&self.system, omega, start)?;
+        self.series_of(&*path, top, omega)
+    }
+
+    /// The harmonics of a motion that was followed over a period.
+    fn series_of(&mut self, path: &dyn Path, top: usize, omega: f64) -> Option<Motion> {
         let level = self.levels.get_mut(&top)?;
         let (nh, n) = (level.harmonics().len(), level.alternation.samples());
         let mut motion = Motion::rest(level.linear.len());
@@ -576,6 +587,9 @@ impl Balance<'_> {
     fn lost(&self, lost: Lost) -> OrbitError {
         if let Some(resonance) = lost.resonance {
             return OrbitError::Resonance { method: NAME, omega: self.drive, resonance };
+        }
+        if lost.away {
+            return OrbitError::Drift { method: NAME, omega: self.drive };
         }
         OrbitError::NotConverged {
             method: NAME,
@@ -613,7 +627,7 @@ impl Balance<'_> {
         let orbit =
             path::orbit(context, level, &motion, x).ok_or(OrbitError::Drift { method: NAME, omega: self.drive })?;
         if !path::balances(&self.system, &orbit) {
-            let lost = Lost { residual: orbit.evidence.energy_gap, resonance: None, iterations: motion.iterations };
+            let lost = Lost::after(motion.iterations, orbit.evidence.energy_gap);
             return Err(self.lost(lost));
         }
         self.recent.truncate(RECENT - 1);
@@ -689,6 +703,38 @@ impl Balance<'_> {
 }
 
 impl Balance<'_> {
+    fn from(&mut self, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
+        match self.method.harmonics {
+            Some(top) => self.fixed(top, omega, warm),
+            None => self.chosen(omega, warm),
+        }
+    }
+
+    /// Where contacts alone hold, and no orbit was found: the motion from rest leads to one, or shows what there is instead. `None` where it is
+    /// not followed.
+    fn by_its_course(&mut self, omega: f64) -> Option<Result<Orbit, OrbitError>> {
+        let top = self.method.harmonics.unwrap_or(self.first);
+        if self.periods > 1 || !self.levels.get(&top)?.stands() {
+            return None;
+        }
+        let no_orbit = |course| Some(Err(OrbitError::NoOrbit { method: NAME, omega: self.drive, course }));
+        if let Some((_, course)) = self.followed.iter().find(|(at, _)| *at == omega) {
+            return no_orbit(course.clone());
+        }
+        if self.followed.len() >= MOST_FOLLOWED {
+            return None;
+        }
+        let (course, path) = course(&self.system, omega)?;
+        if matches!(course, Course::Settles | Course::Settling { .. })
+            && let Some(motion) = self.series_of(&*path, top, omega)
+            && let Ok(orbit) = self.from(omega, Some((top, motion)))
+        {
+            return Some(Ok(orbit));
+        }
+        self.followed.push((omega, course.clone()));
+        Some(Err(OrbitError::NoOrbit { method: NAME, omega: self.drive, course }))
+    }
+
     /// The harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess.
     fn warm(&self, start: Option<&[f64]>) -> Option<(usize, Motion)> {
         let start = start?;
@@ -705,9 +751,11 @@ impl Solver for Balance<'_> {
         self.drive = omega;
         let omega = omega / self.periods as f64;
         let warm = self.warm(start);
-        match self.method.harmonics {
-            Some(top) => self.fixed(top, omega, warm),
-            None => self.chosen(omega, warm),
+        match self.from(omega, warm) {
+            Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
+                self.by_its_course(omega).unwrap_or(Err(error))
+            }
+            found => found,
         }
     }
 

@@ -28,6 +28,16 @@ pub(super) const HALVINGS: usize = 7;
 pub(super) const GROWS: f64 = 100.0;
 /// Share of its length by which a step has to shorten the residual.
 pub(super) const SHORTENS: f64 = 1e-3;
+/// Mean motion of one step where contacts alone hold, relative to the motion.
+const REACH: f64 = 2.0;
+/// Mean beyond which such a motion has left its contacts, relative to the motion: what stands on them goes about as far as it swings.
+const AWAY: f64 = 10.0;
+/// Shares of the stiffness of closed contacts that hold the mean back in a step which goes farther.
+const HELD: [f64; 5] = [1e-3, 1e-2, 0.1, 1.0, 10.0];
+/// What is left of that reach after a step that led away.
+const SHRINK: f64 = 0.25;
+/// Steps that have to be held back, at most, where springs carry no mean.
+const MOST_FLAT: usize = 8;
 /// Shares of the penalty that are tried first if Newton's method fails with the whole.
 const GENTLE: [f64; 3] = [0.04, 0.2, 1.0];
 
@@ -54,12 +64,19 @@ pub(super) struct Lost {
     pub residual: f64,
     /// A resonance without damping, rad/s.
     pub resonance: Option<f64>,
+    /// The mean went away from the contacts that alone hold it.
+    pub away: bool,
 }
 
 impl Lost {
+    /// After so many iterations, with this residual.
+    pub fn after(iterations: usize, residual: f64) -> Self {
+        Lost { iterations, residual, resonance: None, away: false }
+    }
+
     /// By the structure alone.
     pub fn at(resonance: f64) -> Self {
-        Lost { iterations: 0, residual: f64::INFINITY, resonance: Some(resonance) }
+        Lost { resonance: Some(resonance), ..Lost::after(0, f64::INFINITY) }
     }
 }
 
@@ -72,14 +89,13 @@ impl Level {
         let mut least = f64::INFINITY;
         // the residual that is to be halved, and for how long it was not
         let (mut mark, mut waited) = (residual, 0);
+        let (mut reach, mut flat) = (REACH * self.extent(motion), 0);
         for _ in 0..most {
             if self.is_exhausted(ports) || residual <= SOLVED || (waited > PATIENCE && least <= ROUNDED) {
                 break;
             }
             self.follow_slopes(ports, omega, motion, ease);
-            if !self.newton_step(ports, omega, ease, (length, residual)) {
-                break;
-            }
+            let Some(held) = self.bounded_step(ports, omega, ease, (length, residual), reach) else { break };
             motion.iterations += 1;
             self.before.copy(motion);
             let mut fraction = 1.0;
@@ -97,6 +113,12 @@ impl Level {
             }
             if !after.is_finite() || after > GROWS * residual {
                 break;
+            }
+            // beyond the reach forces do not follow the mean, and the way back from too long a step is none either
+            reach *= if after > residual { SHRINK } else { 1.0 };
+            flat += usize::from(held);
+            if flat > MOST_FLAT && !motion.relaxed_at_zero {
+                break; // no friction carries a mean here
             }
             residual = after;
             if residual < least {
@@ -123,8 +145,52 @@ impl Level {
         if residual <= SOLVED || (waited > PATIENCE && residual <= ROUNDED) {
             Ok(())
         } else {
-            Err(Lost { iterations: motion.iterations, residual, resonance: None })
+            Err(Lost { away: self.is_away(motion), ..Lost::after(motion.iterations, residual) })
         }
+    }
+
+    /// The Newton step into `self.step`. Where contacts alone hold, the mean goes no farther at once than `reach`, m: a step that opens all of them, or
+    /// slips in all, knows of nothing that brings it back. Such a step is made again as if springs held the mean where it is. Says whether it was,
+    /// `None` if there is no step.
+    fn bounded_step(&mut self, ports: &Ports, omega: f64, ease: Ease, at: (f64, f64), reach: f64) -> Option<bool> {
+        if !self.newton_step(ports, omega, ease, at) {
+            return None;
+        }
+        let mut held = 0.0;
+        if self.stands() {
+            for share in HELD {
+                if self.mean_step(ports, at.0) <= reach {
+                    break;
+                }
+                self.hold_mean(ports, share - held);
+                held = share;
+                if !self.newton_step(ports, omega, ease, at) {
+                    return None;
+                }
+            }
+        }
+        Some(held > 0.0)
+    }
+
+    /// How far the step leads the mean along any axis, m.
+    fn mean_step(&self, ports: &Ports, length: f64) -> f64 {
+        let nh = self.harmonics().len();
+        let motions = ports.iter().filter(|port| !port.is_force());
+        motions.flat_map(|port| port.range()).map(|q| self.step[2 * q * nh].abs() * length).fold(0.0, f64::max)
+    }
+
+    /// How far motion on these contacts goes, m: that at rest, that without friction, and the harmonics of this one.
+    fn extent(&self, motion: &Motion) -> f64 {
+        let nh = self.harmonics().len();
+        let swing = motion.c.iter().enumerate().filter(|(i, _)| i % nh > 0).map(|(_, c)| c.norm());
+        self.linear.iter().map(|c| c.norm()).chain(swing).fold(0.0, f64::max)
+    }
+
+    /// Whether the mean of a motion that contacts alone hold has left them.
+    fn is_away(&self, motion: &Motion) -> bool {
+        let nh = self.harmonics().len();
+        let mean = motion.c.iter().step_by(nh).fold(0.0, |m: f64, c| m.max(c.norm()));
+        self.stands() && mean > AWAY * self.extent(motion)
     }
 
     /// Whether the search has taken all the work that it may.
@@ -198,7 +264,7 @@ impl Level {
         start.iterations = 0;
         (self.assembled, self.alternation.marched) = (0, 0);
         let mut motion = start.clone();
-        if self.newton(ports, omega, &mut motion, GIVEN, ITERATIONS).is_ok() {
+        if self.newton(ports, omega, &mut motion, GIVEN, ITERATIONS).is_ok() && !self.is_away(&motion) {
             return Ok(motion);
         }
         if ports.has_forces() {
@@ -212,25 +278,41 @@ impl Level {
                 return Ok(motion);
             }
         }
+        if self.stands() {
+            // friction that stuck contacts carry in the mean
+            motion = Motion { iterations: motion.iterations, relaxed_at_zero: true, ..self.at_rest(1.0) };
+            let found = self.newton(ports, omega, &mut motion, GIVEN, ITERATIONS);
+            let away = self.is_away(&motion);
+            if found.is_ok() && !away {
+                return Ok(motion);
+            }
+            return match self.lower_limits(ports, omega, &mut motion) {
+                Ok(()) if !self.is_away(&motion) => Ok(motion),
+                Ok(()) => Err(Lost { away: true, ..Lost::after(motion.iterations, motion.residual) }),
+                Err(lost) => Err(Lost { away: away || lost.away, ..lost }),
+            };
+        }
         self.lower_limits(ports, omega, &mut motion)?;
         Ok(motion)
     }
 
     /// From slip limits that hold to those that are given.
     fn lower_limits(&mut self, ports: &Ports, omega: f64, motion: &mut Motion) -> Result<(), Lost> {
+        let relaxed_at_zero = motion.relaxed_at_zero;
         let mut good = Motion { iterations: motion.iterations, ..self.unhindered() };
         let mut limits: f64 = 1.0;
         // where everything sticks the equations are linear
-        let mut held = Err(Lost { iterations: good.iterations, residual: f64::INFINITY, resonance: None });
+        let mut held = Err(Lost::after(good.iterations, f64::INFINITY));
         for attempt in 0..60 {
             limits *= 4.0;
             if attempt == 1 {
                 // steep penalties, as of friction that falls with velocity, take far higher ones
                 limits = limits.max(self.sticking(ports));
             }
+            let iterations = good.iterations;
             good = match self.stands() {
-                true => Motion { iterations: good.iterations, ..self.at_rest(limits) },
-                false => Motion { iterations: good.iterations, ..self.unhindered() },
+                true => Motion { iterations, relaxed_at_zero, ..self.at_rest(limits) },
+                false => Motion { iterations, ..self.unhindered() },
             };
             let most = if self.stands() { STICKS } else { ITERATIONS };
             held = self.newton(ports, omega, &mut good, Ease { limits, ..GIVEN }, most);

@@ -42,7 +42,9 @@ impl Model {
         let mut gripped = bodies.clone();
         let carry: BTreeSet<usize> = joints.iter().filter(|j| j.hold != Hold::Nothing).map(|j| j.joint).collect();
         let grips = self.joints.iter().zip(self.joint_labels()).enumerate().filter(|(i, _)| carry.contains(i));
-        for (_, (joint, labels)) in grips {
+        let faces: BTreeSet<usize> = joints.iter().filter(|j| j.pressed.is_some()).map(|j| j.joint).collect();
+        let mut touched: Vec<(usize, &str)> = Vec::new();
+        for (number, (joint, labels)) in grips {
             // of nodes, each direction
             let along = |name: &String, label: &String| match label.strip_prefix(joint.name.as_str()) {
                 Some(rest) if !rest.is_empty() && name != GROUND => format!("{name}{rest}"),
@@ -52,6 +54,9 @@ impl Model {
                 let between = [along(&joint.between[0], &label), along(&joint.between[1], &label)];
                 if let Some(e) = ends(&between) {
                     gripped.join(e);
+                    if faces.contains(&number) {
+                        touched.extend([(e.0, joint.name.as_str()), (e.1, joint.name.as_str())]);
+                    }
                 }
             }
         }
@@ -68,7 +73,13 @@ impl Model {
                 None => {
                     let held_by_friction = gripped.of(at) == gripped.of(0);
                     known.insert(body, loose.len());
-                    loose.push(Loose { masses: vec![place.clone()], held_by_friction });
+                    let mut contacts: Vec<String> = Vec::new();
+                    for (_, name) in touched.iter().filter(|(end, _)| bodies.of(*end) == body) {
+                        if contacts.last().is_none_or(|last| last != name) {
+                            contacts.push((*name).to_owned());
+                        }
+                    }
+                    loose.push(Loose { masses: vec![place.clone()], held_by_friction, contacts });
                 }
             }
         }

@@ -9,6 +9,7 @@ mod hold;
 mod linear;
 mod loose;
 mod onset;
+mod rest;
 mod waves;
 
 pub use waves::WaveModes;
@@ -74,6 +75,17 @@ pub struct Loose {
     pub masses: Vec<String>,
     /// Whether joints that are stuck hold it.
     pub held_by_friction: bool,
+    /// The joints with faces that press on it, which hold it while they do.
+    pub contacts: Vec<String>,
+}
+
+/// Contacts that are pressed before anything is loaded, and carry nothing at rest: their preload has pushed away a body that nothing else holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unpressed {
+    /// The joints.
+    pub joints: Vec<String>,
+    /// The sum of their preloads, N.
+    pub preload: f64,
 }
 
 /// What is known of a model before anything is computed.
@@ -84,6 +96,7 @@ pub struct Survey {
     free: Linear,
     stuck: Linear,
     loose: Vec<Loose>,
+    unpressed: Option<Unpressed>,
 }
 
 impl Model {
@@ -106,10 +119,11 @@ impl Model {
         let system = self.assemble()?;
         let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(Stuck::of_joint).collect();
         let loose = self.loose(&system, &joints);
+        let unpressed = if loose.is_empty() { None } else { rest::unpressed(&system, &joints) };
         if system.dofs() > LARGEST {
             let lost = system.dofs();
             let unknown = || Linear { modes: Modes { lost, ..Modes::default() }, shapes: None };
-            return Ok(Survey { free: unknown(), stuck: unknown(), system, joints, loose });
+            return Ok(Survey { free: unknown(), stuck: unknown(), system, joints, loose, unpressed });
         }
         let held: Vec<Link> = joints
             .iter()
@@ -127,7 +141,7 @@ impl Model {
         if self.substructure.is_some() {
             let free = Linear::of_matrices(system.structure().full(), &[], &[]);
             let stuck = Linear::of_matrices(system.structure().full(), &held, &rigid);
-            return Ok(Survey { free, stuck, system, joints, loose });
+            return Ok(Survey { free, stuck, system, joints, loose, unpressed });
         }
         let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
         let ends = |between: &[String; 2]| -> Vec<(usize, f64)> {
@@ -144,7 +158,7 @@ impl Model {
         let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().own_mass(i)).collect();
         let free = Linear::new(&mass, &springs.iter().collect::<Vec<_>>(), &[]);
         let stuck = Linear::new(&mass, &springs.iter().chain(&held).collect::<Vec<_>>(), &rigid);
-        Ok(Survey { system, joints, free, stuck, loose })
+        Ok(Survey { system, joints, free, stuck, loose, unpressed })
     }
 }
 
@@ -177,6 +191,11 @@ impl Survey {
     /// Bodies that no spring holds.
     pub fn loose(&self) -> &[Loose] {
         &self.loose
+    }
+
+    /// Contacts of bodies that no spring holds which carry nothing at rest, though they have a preload: no constant force balances it.
+    pub fn unpressed(&self) -> Option<&Unpressed> {
+        self.unpressed.as_ref()
     }
 
     /// When each joint begins to slip, in the order of the model.

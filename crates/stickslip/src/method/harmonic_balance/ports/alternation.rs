@@ -10,6 +10,9 @@ pub(super) const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// The transform's memory for one number of harmonics and samples.
 #[derive(Debug, Clone)]
 pub(in super::super) struct Alternation {
+    /// Springs behind sliders are relaxed at displacement zero, and not where the mean of the motion is: they then carry mean forces from the first
+    /// movement on, as far as their limits allow.
+    pub relaxed_at_zero: bool,
     /// Steps that laws with a memory were marched, in the present search.
     pub marched: usize,
     pub harmonics: Vec<usize>,
@@ -52,6 +55,7 @@ impl Alternation {
         let three = || std::array::from_fn(|_| vec![0.0; samples]);
         let top = harmonics.last().copied().unwrap_or(0);
         Alternation {
+            relaxed_at_zero: false,
             marched: 0,
             fourier: Fourier::new(samples),
             pairs: harmonics.iter().map(|&h| (h, ZERO)).collect(),
@@ -89,6 +93,11 @@ impl Alternation {
             pair.1 = value * factor(pair.0);
         }
         self.fourier.synthesise(&self.pairs, &mut self.signal);
+    }
+
+    /// Where springs behind sliders are relaxed in a motion of these harmonics along an axis, m.
+    pub(super) fn relaxed(&self, harmonics: &[usize], c: &[Complex64]) -> f64 {
+        if harmonics[0] == 0 && !self.relaxed_at_zero { c[0].re } else { 0.0 }
     }
 
     /// Any harmonics below half of the samples of the forces that were sampled last along an axis.

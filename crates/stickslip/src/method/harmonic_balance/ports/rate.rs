@@ -121,7 +121,7 @@ impl Alternation {
         }
         let displacement = std::mem::take(&mut self.displacement);
         let velocity = std::mem::take(&mut self.velocity);
-        let mean = |a: usize| if self.harmonics[0] == 0 { c[a * nh].re } else { 0.0 };
+        let relaxed = |a: usize| self.relaxed(&self.harmonics, &c[a * nh..(a + 1) * nh]);
         let states = rate.states();
         let mut march = RateMarch {
             rate,
@@ -130,7 +130,8 @@ impl Alternation {
             length: angle / omega,
             at: [&displacement, &velocity],
             stages: &stages,
-            mean: std::array::from_fn(|a| if a < axes { mean(a) } else { 0.0 }),
+            relaxed: std::array::from_fn(|a| if a < axes { relaxed(a) } else { 0.0 }),
+            follows_mean: !self.relaxed_at_zero,
             points: [RatePoint::new(axes, states), RatePoint::new(axes, states)],
             stage: DVector::zeros(2 * states),
             frequency: self.by_frequency.is_some(),
@@ -154,7 +155,9 @@ struct RateMarch<'a> {
     at: [&'a Signals; 2],
     /// The same at the first stage of the step that ends at the sample.
     stages: &'a [Signals; 2],
-    mean: [f64; MOST_DIRECTIONS],
+    /// Where the first movement begins, and whether that is the mean.
+    relaxed: [f64; MOST_DIRECTIONS],
+    follows_mean: bool,
     points: [RatePoint; 2],
     stage: DVector<f64>,
     /// The derivative by ω is wanted.
@@ -275,7 +278,7 @@ impl March for RateMarch<'_> {
         [stage, stage * turn, at, at * turn]
     }
     fn first_waves(&self, h: usize) -> [Complex64; 4] {
-        let mean = if h == 0 { 1.0 } else { 0.0 };
+        let mean = if h == 0 && self.follows_mean { 1.0 } else { 0.0 };
         let rate = (1.0 - mean) * self.omega / (TAU * LEAD);
         [LEFT * mean + (1.0 - LEFT), rate, 1.0, rate].map(|x| Complex64::new(x, 0.0))
     }
@@ -308,8 +311,8 @@ impl March for RateMarch<'_> {
     ) -> bool {
         let duration = TAU * LEAD / self.omega;
         let to: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| if a < self.axes { self.at[0][a][0] } else { 0.0 });
-        let velocity = std::array::from_fn(|a| (to[a] - self.mean[a]) / duration);
-        let third = std::array::from_fn(|a| LEFT * self.mean[a] + (1.0 - LEFT) * to[a]);
+        let velocity = std::array::from_fn(|a| (to[a] - self.relaxed[a]) / duration);
+        let third = std::array::from_fn(|a| LEFT * self.relaxed[a] + (1.0 - LEFT) * to[a]);
         let motions = [third, to].map(|displacement| Relative { displacement, velocity });
         self.advance((duration, motions), before, after, force, rows)
     }

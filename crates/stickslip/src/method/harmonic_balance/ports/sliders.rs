@@ -215,7 +215,8 @@ impl Alternation {
     }
 
     fn slider(&mut self, kt: f64, limit: f64, series: Series) {
-        let mean = if series.harmonics[0] == 0 { series.c[0].re } else { 0.0 };
+        let relaxed = self.relaxed(series.harmonics, series.c);
+        let first = if self.relaxed_at_zero { Anchor::Nothing } else { Anchor::Mean };
         let count = self.extremes.len();
         let hold_at = |hold: f64, from: f64, anchor: Anchor, begin: f64, end: f64| Interval {
             begin,
@@ -226,7 +227,7 @@ impl Alternation {
             slips: false,
         };
         // force and displacement at the anchor
-        let (mut hold, mut from, mut anchor) = (0.0, mean, Anchor::Mean);
+        let (mut hold, mut from, mut anchor) = (0.0, relaxed, first);
         let mut slipped = None;
         for leg in 0..2 * count {
             let Extreme { at, value } = self.extremes[leg % count];

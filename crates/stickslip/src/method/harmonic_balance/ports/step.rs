@@ -30,7 +30,7 @@ impl Alternation {
                 }
             }
         }
-        if !step.holds(&mean, &reach) {
+        if self.relaxed_at_zero || !step.holds(&mean, &reach) {
             return self.step_by_step(step, axes, c, force, tangent);
         }
         self.state.clear();
@@ -69,15 +69,17 @@ impl Alternation {
         tangent: Option<&mut [f64]>,
     ) {
         let nh = self.harmonics.len();
-        let mut mean = [0.0; MOST_DIRECTIONS];
+        let mut relaxed = [0.0; MOST_DIRECTIONS];
         for a in 0..axes {
             let c = &c[a * nh..(a + 1) * nh];
             self.synthesise(c, |_| Complex64::new(1.0, 0.0));
             self.displacement[a].copy_from_slice(&self.signal);
-            mean[a] = if self.harmonics[0] == 0 { c[0].re } else { 0.0 };
+            relaxed[a] = self.relaxed(&self.harmonics, c);
         }
         let displacement = std::mem::take(&mut self.displacement);
-        let mut march = StepMarch { step, axes, at: &displacement, mean, point: StepPoint::new(axes, step.states()) };
+        let follows_mean = !self.relaxed_at_zero;
+        let point = StepPoint::new(axes, step.states());
+        let mut march = StepMarch { step, axes, at: &displacement, relaxed, follows_mean, point };
         self.march(&mut march, force, tangent);
         self.displacement = displacement;
     }
@@ -88,7 +90,9 @@ struct StepMarch<'a> {
     step: &'a dyn Step,
     axes: usize,
     at: &'a [Vec<f64>; MOST_DIRECTIONS],
-    mean: [f64; MOST_DIRECTIONS],
+    /// Where the first movement begins, and whether that is the mean.
+    relaxed: [f64; MOST_DIRECTIONS],
+    follows_mean: bool,
     point: StepPoint,
 }
 
@@ -142,7 +146,7 @@ impl March for StepMarch<'_> {
         [at * Complex64::cis(-angle * h as f64), at, zero, zero]
     }
     fn first_waves(&self, h: usize) -> [Complex64; 4] {
-        [if h == 0 { 1.0 } else { 0.0 }, 1.0, 0.0, 0.0].map(|x| Complex64::new(x, 0.0))
+        [if h == 0 && self.follows_mean { 1.0 } else { 0.0 }, 1.0, 0.0, 0.0].map(|x| Complex64::new(x, 0.0))
     }
     fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
         self.step.around(self.axes, self.at, z, force, rows);
@@ -155,7 +159,7 @@ impl March for StepMarch<'_> {
         force: &mut [f64; MOST_DIRECTIONS],
         rows: Option<&mut [f64]>,
     ) -> bool {
-        let (from, to) = (self.mean, self.read(0));
+        let (from, to) = (self.relaxed, self.read(0));
         self.advance((&from, &to), before, after, force, rows)
     }
 }

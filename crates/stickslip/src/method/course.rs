@@ -1,0 +1,154 @@
+//! What a motion does that is followed in time from rest, where no orbit was found: whether it settles, repeats after several periods, moves on, or
+//! does none of these. An orbit to which it settles can be searched for anew from it.
+
+use super::flow::Flow;
+use super::followed::Kind;
+use super::incremental::flow::IncrementalFlow;
+use crate::law::Contact;
+use crate::model::System;
+use crate::orbit::{Course, Path, Symmetry};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// Systems that are followed: each step multiplies full matrices.
+const LARGEST: usize = 100;
+const JOINTS: usize = 60;
+/// Steps per period: enough for what a motion does, not for its digits.
+const STEPS: usize = 256;
+/// Periods, and how many at the end are looked at.
+const PERIODS: usize = 80;
+const WINDOW: usize = 33;
+/// Periods after which a motion may repeat.
+const REPEATS: usize = 8;
+/// Distance of two returns, relative to the swing, below which they are the same: the rest of a transient, and the error of the steps.
+const SAME: f64 = 2e-3;
+/// What is left of the distance of two returns half a window later, at most, where a motion settles: beats leave more now and then, and twice by chance
+/// in rare cases only.
+const CALMS: f64 = 0.9;
+/// Way in the window, relative to the swing, beyond which a place has moved on.
+const MOVED: f64 = 2.0;
+/// Instants of the last period at which contacts are asked.
+const INSTANTS: usize = 128;
+
+/// The course of the motion from rest, and its last period; `None` where no flow in steps follows the system, or where it breaks down.
+pub(crate) fn course(system: &System, omega: f64) -> Option<(Course, Arc<dyn Path>)> {
+    if system.dofs() > LARGEST || system.joints().len() > JOINTS || Kind::of(system, None) != Kind::Incremental {
+        return None;
+    }
+    let mut flow = IncrementalFlow::new(system, None, "what follows a motion").ok()?;
+    flow.count = STEPS;
+    let (n, period) = (system.dofs(), TAU / omega);
+    flow.set_drive(system, omega);
+    let mut state = vec![0.0; flow.states()];
+    let mut returns = Vec::with_capacity(WINDOW);
+    for count in 1..=PERIODS {
+        flow.keep(count == PERIODS);
+        flow.run(&mut state, period, None).ok()?;
+        if count > PERIODS - WINDOW {
+            returns.push(state[..2 * n].to_vec());
+        }
+    }
+    let path = flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period);
+    let samples: Vec<_> = (0..INSTANTS).map(|i| path.sample(period * i as f64 / INSTANTS as f64)).collect();
+    Some((classified(system, omega, &returns, &samples), path))
+}
+
+fn classified(system: &System, omega: f64, returns: &[Vec<f64>], samples: &[crate::orbit::Sample]) -> Course {
+    let n = system.dofs();
+    // displacements, and velocities over Ω
+    let unit = |i: usize| if i < n { 1.0 } else { omega };
+    let swing = returns.iter().flat_map(|state| &state[n..]).fold(0.0, |m: f64, v| m.max(v.abs() / omega));
+    let swing = samples.iter().flat_map(|now| &now.velocity).fold(swing, |m, v| m.max(v.abs() / omega));
+    let last = returns.len() - 1;
+    let apart_at = |end: usize, p: usize| {
+        let pairs = (0..=REPEATS).map(|k| (&returns[end - k], &returns[end - k - p]));
+        let each = pairs.flat_map(|(a, b)| a.iter().zip(b).enumerate().map(|(i, (a, b))| (a - b).abs() / unit(i)));
+        each.fold(0.0, f64::max)
+    };
+    let apart = |p: usize| apart_at(last, p);
+    if let Some(periods) = (1..=REPEATS).find(|p| apart(*p) <= SAME * swing) {
+        return if periods == 1 { Course::Settles } else { Course::Repeats { periods } };
+    }
+    if apart(1) <= CALMS * apart_at(last / 2, 1) && apart_at(last / 2, 1) <= CALMS * apart_at(REPEATS + 1, 1) {
+        return Course::Settling { periods: PERIODS };
+    }
+    let open = |j: usize| {
+        samples.iter().filter(|now| now.joints[j].contact == Contact::Open).count() as f64 / samples.len() as f64
+    };
+    let widest = (0..system.joints().len()).map(|j| (j, open(j))).fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
+    let joint = system.joints().get(widest.0).map_or_else(String::new, |joint| joint.name().to_owned());
+    let share = widest.1;
+    // both halves of the window lead the same way
+    let moved = |axis: &crate::model::Axis, from: usize, to: usize| {
+        axis.along(&returns[to][..n]) - axis.along(&returns[from][..n])
+    };
+    let farthest = system.seen().iter().zip(system.places()).map(|(axis, place)| {
+        let halves = [moved(axis, 0, last / 2), moved(axis, last / 2, last)];
+        let steady =
+            halves[0] * halves[1] > 0.0 && halves[0].abs().min(halves[1].abs()) > 0.25 * (halves[0] + halves[1]).abs();
+        (if steady { (halves[0] + halves[1]).abs() } else { 0.0 }, place)
+    });
+    let farthest = farthest.fold((0.0, ""), |a, (way, place)| if way > a.0 { (way, place.as_str()) } else { a });
+    if farthest.0 > MOVED * swing {
+        let (way, place) = (farthest.0, farthest.1.to_owned());
+        return Course::MovesOn { place, way, periods: last, joint, share };
+    }
+    Course::Wanders { periods: PERIODS, joint, share }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::FrictionContact;
+    use crate::model::Axis;
+    use crate::structure::Structure;
+    use nalgebra::DMatrix;
+    use num_complex::Complex64;
+
+    const OMEGA: f64 = 200.0;
+
+    /// A mass of a kilogram along (x, z) on a contact of 10 N and friction 0.5, with a harmonic force of 1 N along x and `load` along both.
+    fn block(load: [f64; 2]) -> System {
+        let law = FrictionContact { tangential: 1e5, normal: 2e5, friction: 0.5, preload: 10.0, tangents: 1 };
+        let names = vec!["x".into(), "z".into()];
+        let one = DMatrix::identity(2, 2);
+        let structure = Structure::new(names, one.clone(), one * 60.0, DMatrix::zeros(2, 2)).unwrap();
+        let axes = vec![Axis::new(vec![(0, 1.0)]), Axis::new(vec![(1, 1.0)])];
+        let mut builder = System::builder(structure).joint("foot", Arc::new(law), axes);
+        for (row, load) in load.into_iter().enumerate() {
+            builder = builder.force(row, 0, Complex64::new(load, 0.0));
+        }
+        builder.force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap()
+    }
+
+    /// On its foot it settles; dragged by 2 N more than friction holds it goes at `2 N/(60 kg/s)`, lifted by 3 N at `3 N/(60 kg/s)`, as damping
+    /// alone then balances what is left of the load.
+    #[test]
+    fn a_block_stays_slides_or_leaves() {
+        assert_eq!(course(&block([2.0, 10.0]), OMEGA).unwrap().0, Course::Settles);
+        for (load, along, speed) in [([7.0, 10.0], "x", 2.0 / 60.0), ([0.0, -3.0], "z", 3.0 / 60.0)] {
+            let (course, _) = course(&block(load), OMEGA).unwrap();
+            let Course::MovesOn { ref place, way, periods, share, .. } = course else { panic!("{course}") };
+            assert_eq!(place, along);
+            let expected = speed * periods as f64 * TAU / OMEGA;
+            assert!((way / expected - 1.0).abs() < 1e-3, "{way} {expected}");
+            assert_eq!(share, if along == "z" { 1.0 } else { 0.0 });
+            assert!(course.to_string().contains(&format!("`{along}`")), "{course}");
+        }
+    }
+
+    /// Returns that are the same every third time, and none that are.
+    #[test]
+    fn what_repeats_is_told_from_what_does_not() {
+        let system = block([0.0, 10.0]);
+        let returns = |of: &dyn Fn(usize) -> f64| (0..WINDOW).map(|k| vec![of(k), 0.0, 0.0, OMEGA]).collect::<Vec<_>>();
+        let path = course(&system, OMEGA).unwrap().1;
+        let samples = [path.sample(0.0)];
+        let third = classified(&system, OMEGA, &returns(&|k| (k % 3) as f64), &samples);
+        assert_eq!(third, Course::Repeats { periods: 3 });
+        let slow = classified(&system, OMEGA, &returns(&|k| (-0.02 * k as f64).exp()), &samples);
+        assert_eq!(slow, Course::Settling { periods: PERIODS });
+        let none = classified(&system, OMEGA, &returns(&|k| ((k * k) as f64).sin()), &samples);
+        assert!(matches!(none, Course::Wanders { periods: PERIODS, .. }), "{none}");
+    }
+}

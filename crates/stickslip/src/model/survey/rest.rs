@@ -1,0 +1,55 @@
+//! Contacts at rest: `(K + W k Wᵀ) x = F - W f₀` with the springs `k` of closed contacts that stick, and their forces `f₀` before anything moves.
+
+use super::super::System;
+use super::Unpressed;
+use super::hold::{Hold, Stuck};
+use super::linear::LARGEST;
+use nalgebra::{DMatrix, DVector};
+
+/// Share of the preload below which a contact carries nothing: that of the directions that nothing holds is rounding.
+const NOTHING: f64 = 1e-6;
+/// Stiffness of directions that nothing holds, relative to the stiffest contact: they move, and no force counts on them.
+const SOFT: f64 = 1e-12;
+
+/// Contacts with a preload that carry nothing, if all stay closed on the way to rest; `None` if each carries something, or is beyond [`LARGEST`].
+pub(super) fn unpressed(system: &System, joints: &[Stuck]) -> Option<Unpressed> {
+    let n = system.dofs();
+    let pressed = |joint: &&Stuck| joint.pressed.is_some_and(|force| force > 0.0);
+    if n > LARGEST || !joints.iter().any(|joint| pressed(&joint)) {
+        return None;
+    }
+    let mut load = DVector::zeros(n);
+    for (_, force) in system.excitation(0.0).iter().filter(|(harmonic, _)| *harmonic == 0) {
+        load += force.map(|f| f.re);
+    }
+    let mut stiffness = DMatrix::zeros(n, n);
+    for (row, column, [.., k]) in system.structure().entries() {
+        stiffness[(row, column)] += k;
+    }
+    let springs = |joint: &Stuck| match joint.hold {
+        Hold::Spring { stiffness, .. } => stiffness,
+        _ => 0.0,
+    };
+    let stiffest = joints.iter().map(springs).fold(0.0, f64::max);
+    for joint in joints {
+        let k = springs(joint);
+        for &(a, w) in &joint.at {
+            load[a] -= w * joint.pressed.unwrap_or(0.0);
+            joint.at.iter().for_each(|&(b, v)| stiffness[(a, b)] += k * w * v);
+        }
+    }
+    (0..n).for_each(|i| stiffness[(i, i)] += SOFT * stiffest);
+    let x = stiffness.lu().solve(&load)?;
+    let carried = |joint: &Stuck, preload: f64| {
+        preload + springs(joint) * joint.at.iter().map(|&(row, w)| w * x[row]).sum::<f64>()
+    };
+    let mut found = Unpressed { joints: Vec::new(), preload: 0.0 };
+    for joint in joints.iter().filter(pressed) {
+        let preload = joint.pressed.unwrap_or(0.0);
+        if carried(joint, preload) <= NOTHING * preload {
+            found.joints.push(system.joints()[joint.joint].name().to_owned());
+            found.preload += preload;
+        }
+    }
+    (!found.joints.is_empty()).then_some(found)
+}
