@@ -12,8 +12,8 @@ const TABLES: &str = "structure.toml";
 
 /// Reduces the structure of the first case and writes it into the folder `out`.
 pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
-    let model = match model(file, set) {
-        Ok(model) => model,
+    let (model, stiffened) = match model(file, set) {
+        Ok(read) => read,
         Err(error) => {
             run::show(&error);
             return Ending::WrongInput;
@@ -25,6 +25,12 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
     if model.ring.is_some() {
         let message =
             "a sector of a disk is reduced for all of its waves by every study of it, and has no files of its own";
+        return Ending::Failed(format!("{}: {message}", file.display()));
+    }
+    if stiffened {
+        let message = "rotation stiffens its [structure] (`stiffened`), so that a reduction serves one speed, and files of it would be those of that speed \
+                       alone; leave `stiffened` out to save the structure at rest, or name the stiffness of one speed as `stiffness`. Studies reduce at every \
+                       speed by themselves";
         return Ending::Failed(format!("{}: {message}", file.display()));
     }
     let alone = Model { substructure: Some(substructure.clone()), places: model.places.clone(), ..Model::default() };
@@ -49,8 +55,10 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
     }
 }
 
-fn model(file: &Path, set: &[(String, String)]) -> Result<Model, StudyError> {
-    Ok(stickslip_study::read_file(file, set)?.case(0)?.model)
+/// The model of the first case, and whether its structure depends on a speed.
+fn model(file: &Path, set: &[(String, String)]) -> Result<(Model, bool), StudyError> {
+    let study = stickslip_study::read_file(file, set)?;
+    Ok((study.case(0)?.model, study.is_stiffened()))
 }
 
 fn save(system: &System, what: &str, out: &Path) -> Result<(), String> {

@@ -504,3 +504,30 @@ fn a_run_that_needs_too_much_memory_is_refused_in_advance() {
     assert_eq!(code(&stickslip(folder.path(), &["check", "study.toml", "--memory", "50 GB"])), 0);
     assert_eq!(code(&stickslip(folder.path(), &["check", "study.toml", "--memory", "lots"])), 2);
 }
+
+/// A reduction belongs to one speed: of a structure that rotation stiffens none is saved.
+#[test]
+fn a_structure_that_rotation_stiffens_is_not_saved() {
+    let folder = TempDir::new().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    let matrix = |entry: &str| {
+        format!("%%MatrixMarket matrix coordinate real symmetric\n2 2 3\n1 1 2e5\n2 1 -1e5\n2 2 {entry}\n")
+    };
+    write("k.mtx", &matrix("1e5"));
+    write("k100.mtx", &matrix("1.2e5"));
+    write("m.mtx", "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 1 1\n2 2 1\n");
+    let study = |key: &str| {
+        format!(
+            "schema = 1\n[parameters]\nspeed = \"50 Hz\"\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\nunits = \"m-kg-s\"\n\
+             reduce = {{ modes = 1 }}\n{key}\n[[place]]\nname = \"tip\"\ndof = 2\n[[joint]]\nname = \"rub\"\nbetween = [\"tip\", \"ground\"]\n\
+             law = {{ kind = \"jenkins\", stiffness = \"1e3 N/m\", limit = \"1 N\" }}\n[study]\nkind = \"campbell\"\nspeed = {{ from = \"1 Hz\", to = \"2 Hz\", points = 2 }}\n"
+        )
+    };
+    write("spinning.toml", &study("stiffened = { file = \"k100.mtx\", at = \"100 Hz\", speed = \"speed\" }"));
+    write("resting.toml", &study(""));
+    let refused = stickslip(folder.path(), &["reduce", "spinning.toml", "--out", "few"]);
+    assert!(code(&refused) != 0 && stderr(&refused).contains("serves one speed"), "{}", stderr(&refused));
+    assert!(!folder.path().join("few").exists());
+    let saved = stickslip(folder.path(), &["reduce", "resting.toml", "--out", "few"]);
+    assert!(code(&saved) == 0 && folder.path().join("few/structure.toml").exists(), "{}", stderr(&saved));
+}

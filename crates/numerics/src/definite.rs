@@ -1,8 +1,12 @@
-//! Whether a symmetric matrix is positive semidefinite, and of which rank: Cholesky's factorisation with pivots from the diagonal.
+//! Whether a symmetric matrix is positive semidefinite, and of which rank: Cholesky's factorisation with pivots from the diagonal; of large ones in
+//! blocks first, which suffices for all that are definite.
 //!
 //! Source: Higham, "Accuracy and Stability of Numerical Algorithms" (2002), Sec. 10.3.
 
 use crate::sparse::{Analysis, Matrix};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{LltParams, cholesky_in_place, cholesky_in_place_scratch};
+use faer::{MatMut, Par, Spec};
 use nalgebra::DMatrix;
 
 /// Rounding of a row per entry, relative to its diagonal: sums of springs cancel to this, and so does the elimination.
@@ -21,22 +25,10 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 pub fn semidefinite(matrix: &DMatrix<f64>) -> Option<usize> {
     let n = matrix.nrows();
     let zero = ROUNDING * n as f64;
-    if (0..n).any(|i| !(matrix[(i, i)] >= 0.0 && matrix[(i, i)].is_finite())) {
-        return None;
-    }
-    let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].sqrt()).collect();
-    let mut rest = DMatrix::zeros(n, n);
-    for i in 0..n {
-        for k in 0..n {
-            let value = matrix[(i, k)];
-            if !value.is_finite() || (value != 0.0 && (scale[i] == 0.0 || scale[k] == 0.0)) {
-                return None; // beside a zero on the diagonal everything is zero
-            }
-            rest[(i, k)] = if value == 0.0 { 0.0 } else { value / scale[i] / scale[k] };
-        }
-    }
-    if (0..n).any(|i| (0..i).any(|k| (rest[(i, k)] - rest[(k, i)]).abs() > zero)) {
-        return None;
+    let (mut rest, scale) = scaled(matrix)?;
+    // no pivot of a matrix is below its least eigenvalue
+    if n >= LARGE && positive(&rest, -zero) {
+        return Some(n);
     }
     let mut left: Vec<usize> = (0..n).filter(|&i| scale[i] > 0.0).collect();
     let mut rank = 0;
@@ -60,6 +52,62 @@ pub fn semidefinite(matrix: &DMatrix<f64>) -> Option<usize> {
     }
     // what is left has no pivot above rounding: it is zero, or it has a negative eigenvalue
     left.iter().all(|&i| left.iter().all(|&k| rest[(i, k)].abs() <= zero)).then_some(rank)
+}
+
+/// Whether a symmetric matrix is positive semidefinite, as [`semidefinite`] says; without its rank, large ones are told in blocks all the same.
+///
+/// # Example
+/// ```
+/// use nalgebra::dmatrix;
+/// use stickslip_numerics::definite::is_semidefinite;
+/// assert!(is_semidefinite(&dmatrix![2.0, -2.0; -2.0, 2.0]) && !is_semidefinite(&dmatrix![1.0, 2.0; 2.0, 1.0]));
+/// ```
+pub fn is_semidefinite(matrix: &DMatrix<f64>) -> bool {
+    let n = matrix.nrows();
+    match scaled(matrix) {
+        Some((rows, _)) if n >= LARGE => positive(&rows, ROUNDING * n as f64),
+        Some(_) => semidefinite(matrix).is_some(),
+        None => false,
+    }
+}
+
+/// Size from which factors in blocks are the faster ones, as in [`dense`](crate::dense).
+const LARGE: usize = 96;
+
+/// Rows and columns scaled to ones on the diagonal, and the roots of the diagonal; `None` if the matrix is not symmetric, has an entry that is not
+/// finite, a negative one on its diagonal, or one beside a zero there.
+fn scaled(matrix: &DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<f64>)> {
+    let n = matrix.nrows();
+    let zero = ROUNDING * n as f64;
+    if (0..n).any(|i| !(matrix[(i, i)] >= 0.0 && matrix[(i, i)].is_finite())) {
+        return None;
+    }
+    let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].sqrt()).collect();
+    let mut rest = DMatrix::zeros(n, n);
+    for i in 0..n {
+        for k in 0..n {
+            let value = matrix[(i, k)];
+            if !value.is_finite() || (value != 0.0 && (scale[i] == 0.0 || scale[k] == 0.0)) {
+                return None; // beside a zero on the diagonal everything is zero
+            }
+            rest[(i, k)] = if value == 0.0 { 0.0 } else { value / scale[i] / scale[k] };
+        }
+    }
+    if (0..n).any(|i| (0..i).any(|k| (rest[(i, k)] - rest[(k, i)]).abs() > zero)) {
+        return None;
+    }
+    Some((rest, scale))
+}
+
+/// Whether a symmetric matrix with `shift` more on its diagonal has positive pivots only.
+fn positive(matrix: &DMatrix<f64>, shift: f64) -> bool {
+    let n = matrix.nrows();
+    let mut shifted = matrix.clone();
+    (0..n).for_each(|i| shifted[(i, i)] += shift);
+    let params = Spec::<LltParams, f64>::default();
+    let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(n, Par::Seq, params));
+    let whole = MatMut::from_column_major_slice_mut(shifted.as_mut_slice(), n, n);
+    cholesky_in_place(whole, Default::default(), Par::Seq, MemStack::new(&mut memory), params).is_ok()
 }
 
 /// Whether a sparse symmetric matrix is positive definite, or if not, at least semidefinite; `None` if it is neither, or not symmetric. The
@@ -159,5 +207,20 @@ mod tests {
             prop_assert_eq!(semidefinite(&(&product - DMatrix::identity(6, 6) * shift)), None);
             prop_assert_eq!(semidefinite(&(&product + DMatrix::identity(6, 6) * shift)), Some(6));
         }
+    }
+
+    /// Large matrices have the ranks of small ones, and are told by the same bounds.
+    #[test]
+    fn large_matrices_are_told_as_small_ones() {
+        let n = 3 * LARGE;
+        for (ends, rank) in [([0.7, 0.0], Some(n)), ([0.0, 0.0], Some(n - 1)), ([0.7, -0.7], None)] {
+            let chain = chain(n, 0.3, ends);
+            assert_eq!((semidefinite(&chain), is_semidefinite(&chain)), (rank, rank.is_some()), "{ends:?}");
+        }
+        let mut gap = chain(n, 0.3, [0.7, 0.0]);
+        (0..n).for_each(|i| (gap[(i, 5)], gap[(5, i)]) = (0.0, 0.0));
+        assert_eq!((semidefinite(&gap), is_semidefinite(&gap)), (Some(n - 1), true));
+        gap[(5, 5)] = -1e-9;
+        assert_eq!((semidefinite(&gap), is_semidefinite(&gap)), (None, false));
     }
 }

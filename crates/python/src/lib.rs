@@ -1,6 +1,7 @@
 //! The Python package of Stickslip: the part in Rust, `stickslip._core`. The package around it stands in `python/stickslip`.
 
 mod arrow;
+mod disk;
 mod error;
 mod law;
 mod lend;

@@ -7,7 +7,7 @@ use crate::python_law::Written;
 use crate::result::PyResultSet;
 use crate::rows::{self, Row};
 use crate::watch::{Watch, watched};
-use crate::{error, matrices, quantity};
+use crate::{disk, error, matrices, quantity};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -24,7 +24,7 @@ use stickslip::dimension::Dimension;
 use stickslip::law::BuildError;
 use stickslip::method::{self, Method, Options, OrbitError, Solver};
 use stickslip::model::{
-    Force, Joint, Mass, Model, ModelError, Motion, Spring, Substructure, SubstructureDamping, System,
+    Around, Disk, Force, Joint, Mass, Model, ModelError, Motion, Spring, Substructure, SubstructureDamping, System,
 };
 use stickslip::orbit::Orbit;
 use stickslip::structure::Reduction;
@@ -51,6 +51,8 @@ use stickslip_study::run::{CONVERGED, Context, NOT_REACHED};
 #[derive(Default)]
 pub struct PyModel {
     model: Model,
+    /// Of forces and imposed motions how they go around a disk, where something is said of it.
+    around: [Vec<Option<Around>>; 2],
     /// Laws that Python wrote, to ask them what they raised.
     written: Vec<Arc<Written>>,
     /// The system and what finds its orbits, as asked for last.
@@ -92,13 +94,19 @@ impl PyModel {
         PyModel { model, ..PyModel::default() }
     }
 
-    /// The model is another one from now on.
+    /// The model is another one from now on; what was a ring may have other sectors.
     fn changed(&mut self) {
+        disk::of_any_sectors(&mut self.model);
         *self.ready.get_mut().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
     fn system(&self, py: Python<'_>) -> PyResult<System> {
-        self.model.assemble().map_err(|cause| refused(py, &cause))
+        if self.around.iter().flatten().any(Option::is_some) {
+            let message = "`engine_order`, `nodal_diameter` and `sector` say how a force goes around a disk: this is one sector of it, and \
+                           model.disk(24) is the ring of 24";
+            return Err(error::model(py, message));
+        }
+        self.model.assemble().map_err(|cause| refused(py, &cause, &self.model))
     }
 
     fn asked(&self, py: Python<'_>, name: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Asked> {
@@ -219,8 +227,13 @@ impl PyModel {
     }
 }
 
-fn refused(py: Python<'_>, cause: &ModelError) -> PyErr {
-    error::model(py, cause)
+/// What is wrong with a part of a model, by its name.
+fn said(cause: &ModelError, model: &Model) -> String {
+    format!("{}, `{}`: {}", cause.element.named(model), cause.key, cause.message)
+}
+
+fn refused(py: Python<'_>, cause: &ModelError, model: &Model) -> PyErr {
+    error::model(py, said(cause, model))
 }
 
 /// What is said of a computation in its record.
@@ -330,7 +343,7 @@ impl PyModel {
         };
         let substructure = Some(Substructure { component, damping, reduction, disk: None });
         let made = PyModel::from_model(Model { substructure, places, ..Model::default() });
-        py.detach(|| made.model.assemble()).map_err(|cause| refused(py, &cause))?;
+        py.detach(|| made.model.assemble()).map_err(|cause| refused(py, &cause, &made.model))?;
         Ok(made)
     }
 
@@ -370,35 +383,82 @@ impl PyModel {
     }
 
     /// Adds a force ``amplitude cos(harmonic Ω t + phase)``: N, rad; ``harmonic=0`` makes it constant.
-    #[pyo3(signature = (on, amplitude, *, phase=None, harmonic=1))]
+    ///
+    /// On one sector of a disk it goes around with ``engine_order``, stands with ``nodal_diameter``, or acts on one ``sector`` alone.
+    #[pyo3(signature = (on, amplitude, *, phase=None, harmonic=1, engine_order=None, nodal_diameter=None, sector=None))]
+    #[allow(clippy::too_many_arguments)] // keywords
     fn force(
         &mut self,
+        py: Python<'_>,
         on: String,
         amplitude: &Bound<'_, PyAny>,
         phase: Option<&Bound<'_, PyAny>>,
         harmonic: u32,
+        engine_order: Option<i64>,
+        nodal_diameter: Option<i64>,
+        sector: Option<usize>,
     ) -> PyResult<()> {
+        let around = disk::around(py, engine_order, nodal_diameter, sector)?;
         let amplitude = quantity::si(amplitude, Dimension::FORCE, &format!("force on `{on}`"))?;
         let phase = phase.map_or(Ok(0.0), |phase| quantity::si(phase, Dimension::ANGLE, "phase"))?;
         self.model.forces.push(Force { on, amplitude, phase, harmonic });
+        self.around[0].resize(self.model.forces.len() - 1, None);
+        self.around[0].push(around);
         self.changed();
         Ok(())
     }
 
-    /// Adds an imposed motion ``amplitude cos(harmonic Ω t + phase)`` of a place: m, rad.
-    #[pyo3(signature = (on, amplitude, *, phase=None, harmonic=1))]
+    /// Adds an imposed motion ``amplitude cos(harmonic Ω t + phase)`` of a place: m, rad; around a disk as a force.
+    #[pyo3(signature = (on, amplitude, *, phase=None, harmonic=1, engine_order=None, nodal_diameter=None, sector=None))]
+    #[allow(clippy::too_many_arguments)] // keywords
     fn motion(
         &mut self,
+        py: Python<'_>,
         on: String,
         amplitude: &Bound<'_, PyAny>,
         phase: Option<&Bound<'_, PyAny>>,
         harmonic: u32,
+        engine_order: Option<i64>,
+        nodal_diameter: Option<i64>,
+        sector: Option<usize>,
     ) -> PyResult<()> {
+        let around = disk::around(py, engine_order, nodal_diameter, sector)?;
         let amplitude = quantity::si(amplitude, Dimension::LENGTH, &format!("motion of `{on}`"))?;
         let phase = phase.map_or(Ok(0.0), |phase| quantity::si(phase, Dimension::ANGLE, "phase"))?;
         self.model.motions.push(Motion { on, amplitude, phase, harmonic });
+        self.around[1].resize(self.model.motions.len() - 1, None);
+        self.around[1].push(around);
         self.changed();
         Ok(())
+    }
+
+    /// The disk of so many sectors, each of them this model: ``"next.blade"`` is the blade of the sector after, and the last sector's next is the
+    /// first. Its places are ``blade_0``, ``blade_1`` …, as in a study file with ``[disk]``.
+    ///
+    /// ``mistuning``: what differs from sector to sector, ``{"of": "blade", "deviation": "2 %", "seed": 7}``: ``of`` is a mass, or a spring by its
+    /// two ends, ``deviation`` the standard deviation of normal numbers, or a list with that of every sector. A tuned disk under an excitation
+    /// that travels is solved on one sector; what is changed in the ring afterwards makes it a ring of any sectors.
+    ///
+    /// >>> import stickslip
+    /// >>> sector = stickslip.Model()
+    /// >>> sector.mass("blade", "300 g")
+    /// >>> sector.spring("blade", "ground", stiffness="150 N/mm", damping="0.3 kg/s")
+    /// >>> sector.joint("shroud", "blade", "next.blade", stickslip.law("jenkins", stiffness="10 N/mm", limit="3 N"))
+    /// >>> sector.force("blade", "1 N", engine_order=4)
+    /// >>> ring = sector.disk(24)
+    /// >>> orbit = ring.orbit("115 Hz")
+    /// >>> abs(orbit.amplitude["blade_7"] / orbit.amplitude["blade_0"] - 1) < 1e-9
+    /// True
+    #[pyo3(signature = (sectors, *, mistuning=None))]
+    fn disk(&self, py: Python<'_>, sectors: usize, mistuning: Option<&Bound<'_, PyDict>>) -> PyResult<PyModel> {
+        let all = |which: usize, count: usize| -> Vec<Around> {
+            let said = |i: usize| self.around[which].get(i).copied().flatten();
+            (0..count).map(|i| said(i).unwrap_or(Around::EngineOrder(0))).collect()
+        };
+        let forces = all(0, self.model.forces.len());
+        let disk = Disk { sectors, forces, motions: all(1, self.model.motions.len()) };
+        let model = disk::ring(py, &self.model, &disk, mistuning)?.map_err(|cause| refused(py, &cause, &self.model))?;
+        Ok(PyModel { written: self.written.clone(), ..PyModel::from_model(model) })
     }
 
     /// Gives parameters other values: ``model.set({"shroud.limit": "3 N", "a.mass": 0.2, "a-ground.stiffness": 1e5, "a.force": 5})``.
@@ -469,7 +529,7 @@ impl PyModel {
         out.set_item("joints", self.joints())?;
         out.set_item("method", choice.to_string())?;
         if asked.system.dofs() <= MOST_SURVEYED {
-            let survey = py.detach(|| self.model.survey()).map_err(|cause| refused(py, &cause))?;
+            let survey = py.detach(|| self.model.survey()).map_err(|cause| refused(py, &cause, &self.model))?;
             let hertz =
                 |modes: &stickslip::model::Modes| modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>();
             out.set_item("free_Hz", hertz(survey.free()))?;
@@ -682,7 +742,9 @@ impl PyModel {
             numbers("viscous_damping_ratio", &|point| point.viscous),
         ];
         for (i, place) in system.places().iter().enumerate() {
-            columns.push(numbers(&format!("{}_amplitude_m", place.replace('.', "_")), &|point| point.places[i]));
+            let name = place.replace('.', "_");
+            columns.push(numbers(&format!("{name}_amplitude_m"), &|point| point.places[i].norm()));
+            columns.push(numbers(&format!("{name}_phase_deg"), &|point| point.phases()[i].to_degrees()));
         }
         let table = Table { name: "modes".to_owned(), columns };
         let x = Axis::new("modal amplitude", "m √kg").log();
@@ -757,11 +819,13 @@ impl PyModel {
                 return Ok(None);
             }
             let mut model = self.model.clone();
+            // a parameter of one sector makes it another one
+            disk::of_any_sectors(&mut model);
             let at = |message: String| format!("point {index}: {message}");
             for (name, values) in along {
                 PyModel::put(&mut model, name, values[index]).map_err(|cause| Refusal::Model(at(cause.to_string())))?;
             }
-            let system = model.assemble().map_err(|cause| Refusal::Model(at(cause.to_string())))?;
+            let system = model.assemble().map_err(|cause| Refusal::Model(at(said(&cause, &model))))?;
             let solver = asked.method.solver(&system);
             let mut solver = solver.map_err(|cause| Refusal::Method(at(cause.to_string())))?;
             let outcome = solver.orbit(omegas[index], None);

@@ -272,3 +272,100 @@ def test_instants_and_starts_are_checked():
         model.orbit(121.0, start=np.full(len(orbit.start), np.nan))
     with pytest.raises(stickslip.StickslipError, match="begins with"):
         model.orbit(121.0, start=np.zeros(len(orbit.start) + 3))
+
+
+SECTOR = """schema = 1
+[disk]
+sectors = 6
+{mistuning}
+[[mass]]
+name = "blade"
+mass = "300 g"
+[[spring]]
+between = ["blade", "ground"]
+stiffness = "150 N/mm"
+damping = "0.3 kg/s"
+[[joint]]
+name = "shroud"
+between = ["blade", "next.blade"]
+law = {{ kind = "jenkins", stiffness = "10 N/mm", limit = "3 N" }}
+[[force]]
+on = "blade"
+amplitude = "1 N"
+engine_order = 2
+[study]
+kind = "response"
+frequency = ["112 Hz", "115 Hz", "118 Hz"]
+[method]
+kind = "harmonic-balance"
+harmonics = 3
+"""
+
+
+def sector():
+    model = stickslip.Model()
+    model.mass("blade", "300 g")
+    model.spring("blade", "ground", stiffness="150 N/mm", damping="0.3 kg/s")
+    model.joint("shroud", "blade", "next.blade", stickslip.law("jenkins", stiffness="10 N/mm", limit="3 N"))
+    model.force("blade", "1 N", engine_order=2)
+    return model
+
+
+@pytest.mark.parametrize(
+    ("stated", "given"),
+    [
+        ("", None),
+        (
+            'mistuning = { of = ["blade", "ground"], deviation = "2 %", seed = 7 }',
+            {"of": ("blade", "ground"), "deviation": "2 %", "seed": 7},
+        ),
+        ('mistuning = { of = "blade", deviation = 0.02 }', {"of": "blade", "deviation": 0.02}),
+    ],
+)
+def test_a_disk_by_calls_is_that_of_the_study_file(stated, given):
+    study = stickslip.Study.from_text(SECTOR.format(mistuning=stated))
+    expected = study.run(threads=1)["curve"]
+    ring = sector().disk(6, mistuning=given)
+    found = ring.response([112, 115, 118], method="harmonic-balance", harmonics=3, threads=1)["curve"]
+    for place in ring.places:
+        for column in (f"{place}_amplitude_m", f"{place}_phase_deg"):
+            np.testing.assert_array_equal(found[column], expected[column])
+
+
+def test_a_measured_pattern_and_wrong_disks():
+    ring = sector().disk(3, mistuning={"of": "blade", "deviation": [0.01, "-2 %", 0]})
+    # ω² = k/m of blades that nothing ties together
+    free = np.sort(np.sqrt(150e3 / (0.3 * (1 + np.array([0.01, -0.02, 0])))) / (2 * np.pi))
+    np.testing.assert_allclose(ring.check()["free_Hz"], free, rtol=1e-12)
+    # what differs from sector to sector is no wave on one of them
+    tuned = sector().disk(3)
+    tuned.set({"blade_1.mass": 0.33})
+    one = tuned.orbit(115, method="harmonic-balance", harmonics=1).amplitude
+    assert one["blade_1"] != pytest.approx(one["blade_0"], rel=1e-3)
+    for call, match in [
+        (lambda: sector().orbit(115), "one sector"),
+        (lambda: sector().disk(1), "2 sectors or more"),
+        (lambda: sector().disk(10**9), "the limit is 20000"),
+        (lambda: tuned.disk(3), "a disk already"),
+        (lambda: sector().disk(3, mistuning={"of": "vane", "deviation": 0.1}), "no mass `vane`"),
+        (lambda: sector().disk(3, mistuning={"of": ("blade", "disk"), "deviation": 0.1}), "no spring between"),
+        (lambda: sector().disk(3, mistuning={"of": "blade"}), "needs `deviation`"),
+        (lambda: sector().disk(3, mistuning={"of": "blade", "deviation": [0.1]}), "has 3 sectors"),
+        (lambda: sector().disk(3, mistuning={"of": "blade", "deviation": [0, -1, 0]}), "nothing is left"),
+        (lambda: sector().disk(3, mistuning={"of": "blade", "deviations": 1}), "has no key"),
+        (lambda: sector().force("blade", 1, engine_order=1, sector=2), "different things"),
+    ]:
+        with pytest.raises(stickslip.ModelError, match=match):
+            call()
+
+
+def test_errors_name_the_part():
+    model = stickslip.Model()
+    model.mass("a", 1)
+    model.spring("a", "b", stiffness=1)
+    with pytest.raises(stickslip.ModelError, match="spring between `a` and `b`, `between`"):
+        model.orbit(1)
+    model = stickslip.Model()
+    model.mass("a", -1)
+    with pytest.raises(stickslip.ModelError, match="mass `a`, `mass`"):
+        model.orbit(1)

@@ -18,9 +18,14 @@ pub(crate) fn amplitude_of(place: &str) -> String {
     format!("{place}_amplitude_m")
 }
 
-/// The phase of its first harmonic against the drive, degrees.
+/// The phase of its first harmonic against the drive, degrees; in free vibration against the place that moves most.
 pub(crate) fn phase_of(place: &str) -> String {
     format!("{place}_phase_deg")
+}
+
+/// The displacement of a place in a mode whose modal mass is one, 1/√kg.
+pub(crate) fn shape_of(place: &str) -> String {
+    format!("{place}_shape_per_sqrt_kg")
 }
 
 /// The fraction of the period in which a joint slips.

@@ -93,9 +93,10 @@ impl Column {
     /// assert_eq!(unit("blade1_amplitude_m").as_deref(), Some("m"));
     /// assert_eq!(unit("tip_velocity_m_per_s").as_deref(), Some("m/s"));
     /// assert_eq!((unit("slip_fraction"), unit("residual")), (None, None));
+    /// assert_eq!(unit("blade_shape_per_sqrt_kg"), None); // study files know no roots
     /// ```
     pub fn unit(&self) -> Option<String> {
-        if !matches!(self.values, Values::Number(_)) {
+        if !matches!(self.values, Values::Number(_)) || self.name.contains("_sqrt_") {
             return None;
         }
         let ends = self.name.match_indices('_').map(|(at, _)| &self.name[at + 1..]);

@@ -10,38 +10,20 @@ use crate::statement::{Environment, Stated, StatedTable};
 use crate::values::{Given, Values};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
-use stickslip::model::{Disk, DiskPart, Element, LEAST_SECTORS, Model, normal_pattern};
+use stickslip::model::{Disk, DiskPart, Element, LEAST_SECTORS, Mistuned, Model, normal_pattern, too_far};
 use stickslip::structure::{Axis, Boundary, Component, Faces, FacesError, Node, Reduction};
 
 /// What differs from sector to sector.
-enum Mistuned {
+enum Differs {
     /// A parameter by its index.
     Parameter(usize),
-    Mass(String),
-    Spring([String; 2]),
-    /// The blade of a sector by its matrices.
-    Blade(BladePart),
+    /// A part of the sector.
+    Part(Mistuned),
 }
 
-/// What of a blade deviates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum BladePart {
-    Stiffness,
-    Frequency,
-}
-
-impl BladePart {
-    const NAMES: [(&'static str, BladePart); 2] =
-        [("blade.stiffness", BladePart::Stiffness), ("blade.frequency", BladePart::Frequency)];
-
-    /// Deviation of the stiffness. Every cantilever frequency deviates by the same share.
-    fn of_stiffness(self, deviation: f64) -> f64 {
-        match self {
-            BladePart::Stiffness => deviation,
-            BladePart::Frequency => deviation * (2.0 + deviation),
-        }
-    }
-}
+/// What of a blade by its matrices may deviate.
+const OF_BLADE: [(&str, Mistuned); 2] =
+    [("blade.stiffness", Mistuned::BladeStiffness), ("blade.frequency", Mistuned::BladeFrequency)];
 
 /// Rows of all sectors of a disk that are not reduced, at most: matrices of some GB.
 const MOST_ROWS: usize = 1_000_000;
@@ -241,17 +223,17 @@ fn mistuned(
         return Ok(Vec::new());
     };
     let of = target(disk, table, environment, first).map_err(|problem| vec![problem])?;
-    if let Some(sector) = deviations.iter().position(|deviation| *deviation <= -1.0) {
+    if let Some(message) = too_far(deviations) {
         let key = if disk.pattern.is_some() { "file" } else { "deviation" };
-        let message = format!("sector {sector} deviates by {:.1} %: nothing is left", 100.0 * deviations[sector]);
-        return Err(vec![Problem::new(table.place_of(key, None), key, message)]);
+        let problem = Problem::new(table.place_of(key, None), key, message);
+        return Err(vec![problem.help("deviations are shares: 0.02 is 2 %")]);
     }
     let mut models = Vec::with_capacity(deviations.len());
     for (sector, deviation) in deviations.iter().enumerate() {
-        let factor = 1.0 + deviation;
         models.push(match &of {
-            Mistuned::Parameter(index) => {
-                let changed = environment.values[*index].si * factor;
+            Differs::Part(part) => part.deviated(first, *deviation),
+            Differs::Parameter(index) => {
+                let changed = environment.values[*index].si * (1.0 + deviation);
                 let values = again(&[(*index, changed)]).map_err(|problem| vec![problem])?;
                 let mut problems = Vec::new();
                 let (model, ..) =
@@ -274,31 +256,9 @@ fn mistuned(
                 }
                 model
             }
-            Mistuned::Blade(part) => {
-                let mut model = first.clone();
-                if let Some(disk) = model.substructure.as_mut().and_then(|own| own.disk.as_mut()) {
-                    disk.deviations = vec![part.of_stiffness(*deviation)];
-                }
-                model
-            }
-            Mistuned::Mass(name) => {
-                let mut model = first.clone();
-                model.masses.iter_mut().filter(|mass| mass.name == *name).for_each(|mass| mass.mass *= factor);
-                model
-            }
-            Mistuned::Spring(ends) => {
-                let mut model = first.clone();
-                let springs = model.springs.iter_mut().filter(|spring| joins(&spring.between, ends));
-                springs.for_each(|spring| spring.stiffness *= factor);
-                model
-            }
         });
     }
     Ok(models)
-}
-
-fn joins([a, b]: &[String; 2], [c, d]: &[String; 2]) -> bool {
-    (a, b) == (c, d) || (a, b) == (d, c)
 }
 
 /// What `of` names.
@@ -307,7 +267,7 @@ fn target(
     table: &StatedTable,
     environment: &Environment<'_>,
     sector: &Model,
-) -> Result<Mistuned, Problem> {
+) -> Result<Differs, Problem> {
     let names = match table.entry("of").map(|entry| &entry.value) {
         Some(Stated::Names(names)) => names.iter().map(|(name, _)| name.clone()).collect(),
         _ => Vec::new(),
@@ -315,19 +275,20 @@ fn target(
     let place = table.place_of("of", None);
     match &names[..] {
         [name] => {
-            if let Some((_, part)) = BladePart::NAMES.into_iter().find(|(known, _)| known == name) {
+            if let Some((_, part)) = OF_BLADE.into_iter().find(|(known, _)| known == name) {
                 if disk.table.entry("blade").is_some() {
-                    return Ok(Mistuned::Blade(part));
+                    return Ok(Differs::Part(part));
                 }
                 let message = format!("`{name}` needs to know what of the sector is the blade");
                 let help = "add blade = \"blade_nodes.csv\" to [disk], a file with the column node";
                 return Err(Problem::new(place, "of", message).help(help));
             }
             if let Some(index) = environment.names.iter().position(|known| known == name) {
-                return Ok(Mistuned::Parameter(index));
+                return Ok(Differs::Parameter(index));
             }
-            if sector.masses.iter().any(|mass| mass.name == *name) {
-                return Ok(Mistuned::Mass(name.clone()));
+            let mass = Mistuned::Mass(name.clone());
+            if mass.is_in(sector) {
+                return Ok(Differs::Part(mass));
             }
             let known = environment.names.iter().chain(sector.masses.iter().map(|mass| &mass.name));
             let help = match nearest(name, known.map(String::as_str)) {
@@ -340,9 +301,9 @@ fn target(
             Err(Problem::new(place, "of", format!("there is no parameter or mass `{}`", shown(name))).help(help))
         }
         [a, b] => {
-            let ends = [a.clone(), b.clone()];
-            if sector.springs.iter().any(|spring| joins(&spring.between, &ends)) {
-                return Ok(Mistuned::Spring(ends));
+            let spring = Mistuned::Spring([a.clone(), b.clone()]);
+            if spring.is_in(sector) {
+                return Ok(Differs::Part(spring));
             }
             let message = format!("there is no spring between `{}` and `{}`", shown(a), shown(b));
             Err(Problem::new(place, "of", message).help("write its ends as in the list of springs"))

@@ -205,6 +205,11 @@ pub(crate) fn thinned<T>(all: &[T], most: usize) -> Vec<&T> {
     (0..most).map(|i| &all[i * (all.len() - 1) / (most - 1)]).collect()
 }
 
+/// The parts of a title that there are.
+pub(crate) fn join(parts: impl IntoIterator<Item = String>) -> String {
+    parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
+}
+
 /// The numbers of a column in some rows; NaN where there are none.
 pub(crate) fn numbers(table: &Table, column: &str, rows: Range<usize>) -> Vec<f64> {
     match table.numbers(column) {

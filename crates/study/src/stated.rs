@@ -139,21 +139,13 @@ impl StatedDisk {
 
 /// What is wrong with a model, at the place in the file that states it; `model` has the names that there are.
 pub(crate) fn problem_of(structure: &Structure, error: &ModelError, model: &Model) -> Problem {
-    let (list, index) = match error.element {
-        Element::Mass(i) => ("mass", i),
-        Element::Spring(i) => ("spring", i),
-        Element::Joint(i) => ("joint", i),
-        Element::Force(i) => ("force", i),
-        Element::Motion(i) => ("motion", i),
-        Element::Place(i) => ("place", i),
-        Element::Substructure => ("structure", 0),
-        Element::Whole => ("", 0),
-    };
+    let (list, index) = error.element.entry();
     let whole = Place::default();
     let (place, message) = match &structure.template {
         None => {
             let matrices = structure.matrices.as_ref().filter(|_| list == "structure");
-            let table = matrices.map(|matrices| &matrices.table).or_else(|| structure.lists.get(list).get(index));
+            let table =
+                matrices.map(|matrices| &matrices.table).or_else(|| structure.lists.get(list).get(index.unwrap_or(0)));
             let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
             (place, table.map_or_else(|| error.message.clone(), |table| table.with_turn(&error.message)))
         }

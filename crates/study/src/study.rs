@@ -309,6 +309,11 @@ impl Study {
         matches!(self.study.entry("frequency").map(|entry| &entry.value), Some(Stated::Adaptive { .. }))
     }
 
+    /// Whether rotation stiffens the structure by its matrices (`stiffened`), which then is another one at every speed.
+    pub fn is_stiffened(&self) -> bool {
+        self.structure.matrices.as_ref().is_some_and(|matrices| matrices.stiffened.is_some())
+    }
+
     /// The values of `[figure]`.
     pub(crate) fn figure_values(&self) -> Values {
         // none of its keys takes a quantity

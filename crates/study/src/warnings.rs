@@ -167,9 +167,8 @@ fn sticks(cases: &[Surveyed]) -> Option<String> {
         let number = values.count("mode").unwrap_or(1) as usize - 1;
         let to = values.table("amplitude")?.quantity("to")?;
         // the range is of the place that moves most in the mode of the structure without its joints
-        let unit = one.survey.system().structure().modal_unit(number);
-        let slip = one.survey.slip_amplitude(number)? / unit;
-        if !(unit > 0.0 && slip * STICKS > to) {
+        let slip = one.survey.slip_amplitude(number)? / one.survey.system().modal_unit(number)?;
+        if slip * STICKS <= to {
             return None;
         }
         if slip < needed {

@@ -1,5 +1,7 @@
 //! Bladed disks in study files.
 
+use std::f64::consts::TAU;
+use stickslip::model::Model;
 use stickslip_study::run::{Context, run};
 use stickslip_study::{Case, Study, StudyError, read_study};
 
@@ -136,7 +138,11 @@ fn wrong_disks_are_refused_at_their_place() {
         ("", "mistuning = { of = \"k\" }", "`deviation` or `file` is missing"),
         ("", "mistuning = { of = \"k\", deviation = 0.02, seed = 0.5 }", "whole number"),
         ("", "mistuning = { of = \"k\", deviation = 0.02, file = \"p.csv\" }", "says nothing beside it"),
-        ("", "mistuning = { of = \"k\", deviation = 100, seed = 1 }", "nothing is left"),
+        (
+            "",
+            "mistuning = { of = \"k\", deviation = 100, seed = 1 }",
+            "nothing is left | deviations are shares: 0.02 is 2 %",
+        ),
         ("", "sectors_ = 3", "no key `sectors_`"),
     ] {
         assert!(message(force, disk).contains(words), "{force} {disk}: {}", message(force, disk));
@@ -179,8 +185,8 @@ fn frequencies_by_nodal_diameter() {
     assert_eq!(table.rows(), 8, "one mode of each of 4 diameters, free and stuck");
     for row in 0..8 {
         let kc = if joints[row] == "free" { 1e4 } else { 3e4 };
-        let square = (1e5 + 2.0 * kc * (1.0 - (std::f64::consts::TAU * d[row] as f64 / 6.0).cos())) / 0.2;
-        assert!((f[row] * std::f64::consts::TAU / square.sqrt() - 1.0).abs() < 1e-12);
+        let square = (1e5 + 2.0 * kc * (1.0 - (TAU * d[row] as f64 / 6.0).cos())) / 0.2;
+        assert!((f[row] * TAU / square.sqrt() - 1.0).abs() < 1e-12);
     }
     assert!(!data.figure.panels[0].series.is_empty());
     let mistuned = read("", "mistuning = { of = \"k\", deviation = 0.01 }", "[study]\nkind = \"nodal-diameter\"\n");
@@ -208,7 +214,7 @@ fn campbell_crossings() {
     let (orders, speeds) = (found.integers("engine_order").unwrap(), found.numbers("speed_Hz").unwrap());
     let joints = found.texts("joints").unwrap();
     for order in 1..=5u64 {
-        let speed = (1e5 / ((order * order) as f64 * 0.2 - 0.1)).sqrt() / std::f64::consts::TAU;
+        let speed = (1e5 / ((order * order) as f64 * 0.2 - 0.1)).sqrt() / TAU;
         let rows: Vec<usize> = (0..found.rows()).filter(|r| orders[*r] == order && joints[*r] == "free").collect();
         assert_eq!(rows.len(), usize::from((20.0..200.0).contains(&speed)), "{order} {speed}");
         assert!(rows.iter().all(|row| (speeds[*row] / speed - 1.0).abs() < 1e-9), "{order}");
@@ -298,7 +304,7 @@ fn a_campbell_diagram_of_a_sector_that_rotation_stiffens() {
     let data = run(&study, &Context::unwatched(1)).unwrap();
     assert!(data.failures.is_empty(), "{:?}", data.failures);
     let expected = |diameter: u64, speed: f64, stuck: bool| -> Vec<f64> {
-        let waves = 2.0 * (1.0 - (std::f64::consts::TAU * diameter as f64 / 6.0).cos());
+        let waves = 2.0 * (1.0 - (TAU * diameter as f64 / 6.0).cos());
         let (share, shroud) = ((speed / 100.0).powi(2), if stuck { 2e3 * waves } else { 0.0 });
         let stiffness = nalgebra::Matrix3::new(
             3.5e5 + 2e5 * waves,
@@ -314,7 +320,7 @@ fn a_campbell_diagram_of_a_sector_that_rotation_stiffens() {
         let root = nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::new(2.0f64, 0.3, 0.2).map(|m| 1.0 / m.sqrt()));
         let mut all: Vec<f64> = (root * stiffness * root).symmetric_eigenvalues().iter().map(|v| v.sqrt()).collect();
         all.sort_by(f64::total_cmp);
-        all.into_iter().map(|omega| omega / std::f64::consts::TAU).collect()
+        all.into_iter().map(|omega| omega / TAU).collect()
     };
     let mut rows = 0;
     for table in &data.tables {
@@ -449,6 +455,110 @@ fn coordinates_tell_a_wrong_sector() {
     ] {
         assert!(refused(disk).contains(words), "{disk}: {}", refused(disk));
     }
+}
+
+/// The natural frequencies of a ring without its joints, Hz, and its shapes at all places, with `φᵀMφ = 1`: an eigenvalue solution of its full
+/// matrices, which know no sectors.
+fn dense_modes(model: &Model) -> (Vec<String>, Vec<(f64, Vec<f64>)>) {
+    let system = model.assemble().unwrap();
+    let full = system.structure().full();
+    let inverse = full.mass.clone().cholesky().unwrap().l().try_inverse().unwrap();
+    let eigen = (&inverse * &full.stiffness * inverse.transpose()).symmetric_eigen();
+    let shapes = inverse.transpose() * eigen.eigenvectors;
+    let mode = |i: usize| {
+        (eigen.eigenvalues[i].abs().sqrt() / TAU, system.at_places(shapes.column(i).into_owned().as_slice()))
+    };
+    let mut modes: Vec<(f64, Vec<f64>)> = (0..system.dofs()).map(mode).collect();
+    modes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    (system.places().to_vec(), modes)
+}
+
+/// A sector whose nodes move along x, y, z of their own: of every frequency `Σ φφᵀ` at the places is that of the whole ring.
+#[test]
+fn shapes_of_a_sector_are_those_of_the_ring() {
+    let more = "[[place]]\nname = \"rim\"\ndof = \"2.x\"\n[study]\nkind = \"nodal-diameter\"\nmodes = 3\n";
+    let study = in_space("sectors = 6\naxis = \"z\"\nboundary = \"right.csv\"", more).unwrap();
+    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let table = &data.tables[0];
+    let (names, modes) = dense_modes(&study.case(0).unwrap().model);
+    let (diameters, found) = (table.integers("nodal_diameter").unwrap(), table.numbers("frequency_Hz").unwrap());
+    let joints = table.texts("joints").unwrap();
+    let free: Vec<usize> = (0..table.rows()).filter(|row| joints[*row] == "free").collect();
+    // a shape at all places, and a quarter of a wave further
+    let waves = |row: usize| -> Vec<Vec<f64>> {
+        let at = |name: &String, quarter: f64| {
+            let (node, along) =
+                name.split_once('.').map_or((name.as_str(), String::new()), |(n, a)| (n, format!("_{a}")));
+            let (node, sector) = node.rsplit_once('_').unwrap();
+            let column = |what: &str| table.numbers(&format!("{node}{along}_{what}")).unwrap()[row];
+            let lead = 360.0 * diameters[row] as f64 * sector.parse::<f64>().unwrap() / 6.0;
+            column("shape_per_sqrt_kg") * (column("phase_deg") + lead + quarter).to_radians().cos()
+        };
+        let travels = diameters[row] % 3 != 0;
+        let quarters: &[f64] = if travels { &[0.0, 90.0] } else { &[0.0] };
+        quarters.iter().map(|quarter| names.iter().map(|name| at(name, *quarter)).collect()).collect()
+    };
+    assert_eq!(free.len(), 12);
+    for row in free.iter().copied() {
+        let same = |hertz: f64| (hertz / found[row] - 1.0).abs() < 1e-6;
+        let n = names.len();
+        let mut sum = nalgebra::DMatrix::<f64>::zeros(n, n);
+        let mut add = |shape: &[f64], sign: f64| {
+            let shape = nalgebra::DVector::from_column_slice(shape);
+            sum += &shape * shape.transpose() * sign;
+        };
+        modes.iter().filter(|(hertz, _)| same(*hertz)).for_each(|(_, shape)| add(shape, 1.0));
+        let like = free.iter().filter(|other| same(found[**other]));
+        like.flat_map(|other| waves(*other)).for_each(|shape| add(&shape, -1.0));
+        assert!(sum.amax() < 1e-9, "row {row}: {}", sum.amax());
+    }
+    // the first mode of the nodal diameters 0 to 3
+    let titles: Vec<&str> =
+        data.figure.panels.iter().filter(|panel| panel.picture).map(|panel| panel.title.as_str()).collect();
+    assert_eq!(titles.len(), 4);
+    assert!(titles[1].starts_with("mode 1, 1 nodal diameter, "), "{titles:?}");
+}
+
+/// What the figure of kind `nodal-diameter` shows of the shapes, and what it has not.
+#[test]
+fn the_shapes_that_are_drawn() {
+    let titles = |keys: &str| -> Vec<String> {
+        let study = read("", "", &format!("[study]\nkind = \"nodal-diameter\"\nmodes = 2\n{keys}\n")).unwrap();
+        let panels = run(&study, &Context::unwatched(1)).unwrap().figure.panels;
+        panels.into_iter().filter(|panel| panel.picture).map(|panel| panel.title).collect()
+    };
+    assert_eq!(titles("shapes = false").len(), 0);
+    // ω² = (k + 2 kc (1 - cos θ))/m, θ = 120 degrees, with the joints' springs
+    let stuck = titles("nodal_diameter = 2\njoints = \"stuck\"");
+    let hertz = ((1e5 + 3.0 * 3e4) / 0.2f64).sqrt() / TAU;
+    assert_eq!(stuck, [format!("mode 1, 2 nodal diameters, {hertz:.2} Hz, joints stuck")]);
+    assert_eq!(titles("mode = 1").len(), 4);
+    for (keys, words) in [("nodal_diameter = 4", "has no 4 nodal diameters"), ("mode = 3", "not among the 2 lowest")] {
+        let error = read("", "", &format!("[study]\nkind = \"nodal-diameter\"\nmodes = 2\n{keys}\n")).unwrap_err();
+        assert!(error.message().contains(words), "{keys}: {}", error.message());
+    }
+}
+
+/// At an amplitude at which friction hardly matters a mode of a mistuned ring is that of its full matrices, blade by blade.
+#[test]
+fn a_mode_of_a_mistuned_ring_has_the_shape_of_every_blade() {
+    let kind = "[study]\nkind = \"modes\"\nmode = 3\nharmonics = 1\nsamples = 64\namplitude = { from = \"10 mm\", to = \"10 m\", points = 2 }\n";
+    let study = read("", "mistuning = { of = \"k\", deviation = \"5 %\", seed = 7 }", kind).unwrap();
+    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let (names, modes) = dense_modes(&study.case(0).unwrap().model);
+    let (hertz, shape) = &modes[2];
+    let largest = shape.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap();
+    let table = &data.tables[0];
+    // friction is 1e-5 of the elastic forces, and of what tells the modes apart 1e-3
+    assert!((table.numbers("frequency_Hz").unwrap()[1] / hertz - 1.0).abs() < 1e-5);
+    for (name, x) in names.iter().zip(shape) {
+        let column = |what: &str| table.numbers(&format!("{name}_{what}")).unwrap()[1];
+        let found = column("amplitude_m") * column("phase_deg").to_radians().cos();
+        assert!((found - 10.0 * x / largest).abs() < 1e-2, "{name}: {found} {}", 10.0 * x / largest);
+    }
+    let titles: Vec<&str> =
+        data.figure.panels.iter().filter(|panel| panel.picture).map(|panel| panel.title.as_str()).collect();
+    assert!(titles.len() == 2 && titles[1].starts_with("mode 3 at 10 m, "), "{titles:?}");
 }
 
 /// The peaks of a node of a sector: of all its directions, or of one, in all sectors.

@@ -371,3 +371,38 @@ fn what_is_wrong_is_said() {
         assert!(text.contains("units"), "{unit}: {text}");
     }
 }
+
+/// A free vibration of the blade in few coordinates, its joint next to nothing: amplitudes are those of places, the largest the one that was
+/// asked for, and they are those of a dense eigenvalue solution.
+#[test]
+fn a_mode_is_given_at_places() {
+    let brick = blade();
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "mtx", (1.0, 1.0));
+    let nodes = [tip(&brick, 0, 1), (101 + brick.row([4, 0, 1], 0).unwrap() / 3).to_string()];
+    let places: String = ["tip", "middle"].iter().zip(&nodes).map(|(name, node)| place(name, node)).collect();
+    let text = structure("mtx", "rows.csv", "m-kg-s", &format!("{DAMPED}\nreduce = {{ up_to = \"2 kHz\" }}"))
+        + &places
+        + "[[joint]]\nname = \"rub\"\nbetween = [\"middle.z\", \"ground\"]\nlaw = { kind = \"jenkins\", stiffness = \"1 N/m\", limit = \"1 N\" }\n\
+           [study]\nkind = \"modes\"\nharmonics = 1\nsamples = 64\namplitude = { from = \"1 um\", to = \"1 mm\", points = 2 }\n";
+    let data = results(folder.path(), &text);
+    let (mass, stiffness) = (full(&brick.mass), full(&brick.stiffness));
+    let inverse = mass.cholesky().unwrap().l().try_inverse().unwrap();
+    let eigen = (&inverse * stiffness * inverse.transpose()).symmetric_eigen();
+    let first = eigen.eigenvalues.imin();
+    let shape = inverse.transpose() * eigen.eigenvectors.column(first);
+    let at = |corner: [usize; 3], along: usize| shape[brick.row(corner, along).unwrap()].abs();
+    let largest = at([8, 0, 1], 2);
+    for (row, asked) in [1e-6, 1e-3].into_iter().enumerate() {
+        for (name, corner) in [("tip", [8, 0, 1]), ("middle", [4, 0, 1])] {
+            for (along, direction) in DIRECTIONS.iter().enumerate() {
+                let found = numbers(&data, &format!("{name}_{direction}_amplitude_m"))[row];
+                // the tolerance of the reduction
+                assert!(
+                    (found / asked - at(corner, along) / largest).abs() < 1e-3,
+                    "{row} {name} {direction}: {found}"
+                );
+            }
+        }
+    }
+}

@@ -14,6 +14,7 @@
 use crate::method::MethodError;
 use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState};
 use crate::model::System;
+use num_complex::Complex64;
 
 /// A point of a nonlinear mode.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,8 +28,29 @@ pub struct ModePoint {
     pub damping: f64,
     /// The part of it that the viscous dampers have in this motion; the rest is the joints'.
     pub viscous: f64,
-    /// Amplitude of the first harmonic of every place, m.
-    pub places: Vec<f64>,
+    /// First harmonic of every place, m: the shape, with the phases that friction leaves.
+    pub places: Vec<Complex64>,
+}
+
+/// Places whose amplitudes differ by less than this share move equally: the first of them has the phase zero, whatever rounding says.
+const EQUAL: f64 = 1e-6;
+
+impl ModePoint {
+    /// Phases of the places against the one that moves most, rad.
+    ///
+    /// # Example
+    /// ```
+    /// use num_complex::Complex64;
+    /// use stickslip::curve::modes::ModePoint;
+    /// let places = vec![Complex64::new(0.0, 1.0), Complex64::new(0.0, -2.0)];
+    /// let point = ModePoint { amplitude: 1.0, omega: 1.0, damping: 0.0, viscous: 0.0, places };
+    /// assert_eq!(point.phases().iter().map(|phase| phase.abs()).collect::<Vec<_>>(), [std::f64::consts::PI, 0.0]);
+    /// ```
+    pub fn phases(&self) -> Vec<f64> {
+        let most = self.places.iter().map(|x| x.norm()).fold(0.0, f64::max);
+        let leading = self.places.iter().find(|x| x.norm() >= (1.0 - EQUAL) * most).copied().unwrap_or_default();
+        self.places.iter().map(|x| (x * leading.conj()).arg()).collect()
+    }
 }
 
 /// A nonlinear mode.
@@ -455,7 +477,7 @@ fn point(equations: &ModeEquations<'_>, amplitude: f64, state: &ModeState) -> Mo
         omega: state.omega,
         damping: state.damping,
         viscous: equations.viscous(state),
-        places: equations.amplitudes(state),
+        places: equations.places(state),
     }
 }
 
@@ -465,7 +487,6 @@ mod tests {
     use crate::law::Coulomb;
     use crate::method::{Method, event_driven::EventDriven};
     use crate::model::{Force, example};
-    use num_complex::Complex64;
     use std::f64::consts::PI;
 
     /// What the energy of an exact orbit and the amplitudes of its places may differ by from a mode with 31 harmonics: rigid friction makes

@@ -255,6 +255,20 @@ impl Disk {
     }
 }
 
+/// What is wrong with deviations of sectors, shares of one, of which one is as large as what it changes: nothing would be left, or percents were meant.
+///
+/// # Example
+/// ```
+/// assert_eq!(stickslip::model::too_far(&[0.02, -0.01]), None);
+/// assert!(stickslip::model::too_far(&[2.0, -1.0]).unwrap().contains("sector 1 deviates by -100.0 %: nothing is left"));
+/// ```
+pub fn too_far(deviations: &[f64]) -> Option<String> {
+    let first = |far: fn(f64) -> bool| deviations.iter().position(|deviation| far(*deviation));
+    let said = |sector: usize| format!("sector {sector} deviates by {:.1} %", 100.0 * deviations[sector]);
+    let nothing = first(|deviation| deviation <= -1.0).map(|sector| said(sector) + ": nothing is left");
+    nothing.or_else(|| first(|deviation| deviation >= 1.0).map(said))
+}
+
 /// Deviations of sectors: normal with mean 0 and this standard deviation, decided by the seed, the same bits on every machine. Seeds are samples of
 /// the same distribution, and a longer pattern begins with the shorter one.
 ///
@@ -266,6 +280,68 @@ impl Disk {
 pub fn normal_pattern(sectors: usize, deviation: f64, seed: u64) -> Vec<f64> {
     let stream = Stream::new(seed);
     (0..sectors as u64).map(|sector| deviation * stream.normal(sector)).collect()
+}
+
+/// What of a sector deviates, where no two are alike.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Mistuned {
+    /// The mass of this name.
+    Mass(String),
+    /// The stiffness of the springs between these two places.
+    Spring([String; 2]),
+    /// The stiffness of the blade of a sector by its matrices.
+    BladeStiffness,
+    /// All cantilever frequencies of that blade, each by the same share.
+    BladeFrequency,
+}
+
+impl Mistuned {
+    /// The sector of which this is `1 + deviation` times as large.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip::model::{Mass, Mistuned, Model};
+    /// let sector = Model { masses: vec![Mass::new("blade", 2.0)], ..Model::default() };
+    /// assert_eq!(Mistuned::Mass("blade".to_owned()).deviated(&sector, 0.5).masses[0].mass, 3.0);
+    /// ```
+    #[must_use]
+    pub fn deviated(&self, sector: &Model, deviation: f64) -> Model {
+        let (mut model, factor) = (sector.clone(), 1.0 + deviation);
+        let of_stiffness = match self {
+            Mistuned::Mass(name) => {
+                model.masses.iter_mut().filter(|mass| mass.name == *name).for_each(|mass| mass.mass *= factor);
+                return model;
+            }
+            Mistuned::Spring(ends) => {
+                let springs = model.springs.iter_mut().filter(|spring| joins(&spring.between, ends));
+                springs.for_each(|spring| spring.stiffness *= factor);
+                return model;
+            }
+            Mistuned::BladeStiffness => deviation,
+            // the square of the frequency
+            Mistuned::BladeFrequency => deviation * (2.0 + deviation),
+        };
+        if let Some(disk) = model.substructure.as_mut().and_then(|own| own.disk.as_mut()) {
+            disk.deviations = vec![of_stiffness];
+        }
+        model
+    }
+
+    /// Whether the sector has it.
+    pub fn is_in(&self, sector: &Model) -> bool {
+        match self {
+            Mistuned::Mass(name) => sector.masses.iter().any(|mass| mass.name == *name),
+            Mistuned::Spring(ends) => sector.springs.iter().any(|spring| joins(&spring.between, ends)),
+            Mistuned::BladeStiffness | Mistuned::BladeFrequency => {
+                let disk = sector.substructure.as_ref().and_then(|own| own.disk.as_ref());
+                disk.is_some_and(|disk| !disk.blade.is_empty())
+            }
+        }
+    }
+}
+
+fn joins([a, b]: &[String; 2], [c, d]: &[String; 2]) -> bool {
+    (a, b) == (c, d) || (a, b) == (d, c)
 }
 
 /// Of every element, all alike where nothing is said.

@@ -1,5 +1,6 @@
 //! Why a model is refused.
 
+use super::{Model, Spring};
 use std::fmt;
 
 /// The element of a model that an error is about.
@@ -16,19 +17,52 @@ pub enum Element {
     Whole,
 }
 
+impl Element {
+    /// The list of the model that it stands in, as in study files, and its place in that; `None` where there is but one.
+    pub fn entry(self) -> (&'static str, Option<usize>) {
+        match self {
+            Element::Mass(i) => ("mass", Some(i)),
+            Element::Spring(i) => ("spring", Some(i)),
+            Element::Joint(i) => ("joint", Some(i)),
+            Element::Force(i) => ("force", Some(i)),
+            Element::Motion(i) => ("motion", Some(i)),
+            Element::Place(i) => ("place", Some(i)),
+            Element::Substructure => ("structure", None),
+            Element::Whole => ("model", None),
+        }
+    }
+
+    /// What it is called in a model, for messages: by its name, or by the places that it acts on.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip::model::{Element, example};
+    /// let couple = example::blade_couple();
+    /// assert_eq!(Element::Joint(0).named(&couple), "joint `shroud`");
+    /// assert_eq!(Element::Spring(0).named(&couple), "spring between `blade1` and `ground`");
+    /// ```
+    pub fn named(self, model: &Model) -> String {
+        let name = match self {
+            Element::Mass(i) => model.masses.get(i).map(|mass| format!("mass `{}`", mass.name)),
+            Element::Spring(i) => {
+                model.springs.get(i).map(|Spring { between: [a, b], .. }| format!("spring between `{a}` and `{b}`"))
+            }
+            Element::Joint(i) => model.joints.get(i).map(|joint| format!("joint `{}`", joint.name)),
+            Element::Force(i) => model.forces.get(i).map(|force| format!("force on `{}`", force.on)),
+            Element::Motion(i) => model.motions.get(i).map(|motion| format!("motion of `{}`", motion.on)),
+            Element::Place(i) => model.places.get(i).map(|place| format!("place `{}`", place.name)),
+            Element::Substructure | Element::Whole => None,
+        };
+        name.unwrap_or_else(|| self.to_string())
+    }
+}
+
 impl fmt::Display for Element {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (what, index) = match self {
-            Element::Mass(i) => ("mass", i),
-            Element::Spring(i) => ("spring", i),
-            Element::Joint(i) => ("joint", i),
-            Element::Force(i) => ("force", i),
-            Element::Motion(i) => ("motion", i),
-            Element::Place(i) => ("place", i),
-            Element::Substructure => return write!(f, "structure"),
-            Element::Whole => return write!(f, "model"),
-        };
-        write!(f, "{what} {}", index + 1)
+        match self.entry() {
+            (what, Some(index)) => write!(f, "{what} {}", index + 1),
+            (what, None) => f.write_str(what),
+        }
     }
 }
 

@@ -14,7 +14,7 @@ mod places;
 mod survey;
 mod system;
 
-pub use disk::{Around, Disk, LEAST_SECTORS, NEXT, Ring, normal_pattern};
+pub use disk::{Around, Disk, LEAST_SECTORS, Mistuned, NEXT, Ring, normal_pattern, too_far};
 pub use error::{Element, ModelError};
 pub use place::{Frame, FrameError, Place};
 pub use places::{is_identifier, is_place};

@@ -18,8 +18,7 @@ pub use sector::{Sector, Wave, WaveStiffness};
 
 use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};
-use stickslip_numerics::definite::{semidefinite, sparse_definite};
-use stickslip_numerics::eigen;
+use stickslip_numerics::definite::{is_semidefinite, semidefinite, sparse_definite};
 use stickslip_numerics::sparse::{Analysis, Asymmetry, Matrix, MatrixError};
 
 /// `M x'' + C x' + K x`, over places that are free to move.
@@ -372,20 +371,6 @@ impl Structure {
             }
         })
     }
-
-    /// `√(φᵀMφ)` of mode `index`, scaled to a largest displacement of one: the modal amplitude (m √kg) of a metre at the place that moves
-    /// most. Modes count by rising frequency from 0; zero if there is no such mode.
-    pub fn modal_unit(&self, index: usize) -> f64 {
-        let Matrices { mass, stiffness, .. } = &**self.full();
-        let Some(factor) = mass.clone().cholesky() else { return 0.0 };
-        let n = self.dofs();
-        let Some(inverse) = factor.l().solve_lower_triangular(&DMatrix::identity(n, n)) else { return 0.0 };
-        let Some(eigen) = eigen::symmetric(&inverse * stiffness * inverse.transpose()) else { return 0.0 };
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-        // an M-normalised shape has φᵀMφ = 1
-        order.get(index).map_or(0.0, |&k| 1.0 / (inverse.transpose() * eigen.eigenvectors.column(k)).amax())
-    }
 }
 
 impl PartialEq for Structure {
@@ -449,11 +434,10 @@ impl Matrices {
     fn dissipates(&self) -> bool {
         // a part of the damping that only turns velocities takes no power
         let damping = (&self.damping + self.damping.transpose()) * 0.5;
-        let (Some(rank), Some(_), Some(_)) =
-            (semidefinite(&self.mass), semidefinite(&damping), semidefinite(&self.stiffness))
-        else {
+        if ![&damping, &self.stiffness].into_iter().all(is_semidefinite) {
             return false;
-        };
+        }
+        let Some(rank) = semidefinite(&self.mass) else { return false };
         let n = self.mass.nrows();
         rank == n || {
             // each with its own unit: what one of them holds is held

@@ -15,6 +15,7 @@ pub mod performance;
 pub mod response;
 mod shares;
 mod transient;
+mod wheel;
 
 use crate::extra;
 use crate::study::Study;

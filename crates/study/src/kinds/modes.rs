@@ -1,9 +1,11 @@
 //! Nonlinear modes: frequency and equivalent damping over amplitude.
 
 use super::keys::{HARMONICS, SERIES_SAMPLES, check_samples};
+use super::wheel::{self, Around};
+use crate::columns::{amplitude_of, phase_of};
 use crate::cost::{Cost, Costing, Shape};
-use crate::dataset::{Axis, Figure, Panel, Series, Values as Cells};
-use crate::drawing::{Drawing, largest, numbers};
+use crate::dataset::{Axis, Figure, Panel, Series, Table, Values as Cells};
+use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers};
 use crate::info::Complaint;
 use crate::info::KindInfo;
 use crate::key::{Key, Takes, Within, default, required};
@@ -12,7 +14,7 @@ use crate::note::Note;
 use crate::rows::Rows;
 use crate::values::{Values, hertz};
 use crate::warnings::mode_sticks;
-use crate::words::display_unit;
+use crate::words::{display_unit, significant};
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode};
 use stickslip::dimension::Dimension;
@@ -33,7 +35,7 @@ const AMPLITUDE: &[Key] = &[
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
         name: "modes",
-        summary: "nonlinear modes: frequency and equivalent damping over the amplitude of free vibration",
+        summary: "nonlinear modes: frequency, equivalent damping and shape over the amplitude of free vibration",
         keys: &[
             required(
                 "amplitude",
@@ -70,7 +72,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let harmonics = values.count("harmonics").unwrap_or(HARMONICS) as f64;
     Cost {
         tables: vec![
-            Shape { rows, numbers: costing.varied + 4.0 + costing.places, words: 0.0 },
+            Shape { rows, numbers: costing.varied + 4.0 + 2.0 * costing.places, words: 0.0 },
             Shape { rows: costing.cases, numbers: costing.varied + 5.0, words: 0.0 },
         ],
         drawn: 2.0 * rows,
@@ -98,12 +100,18 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
 
 fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
-    let mode = follow(prepared).map_err(|error| (prepared.case.index, error))?;
-    (work.context.finished)();
     let mut part = Part::default();
-    let (status, reason) = judged(prepared, &mode);
+    let Some(unit) = prepared.system.modal_unit(number(prepared)) else {
+        (work.context.finished)();
+        part.count(|| place_of(prepared), "failed", Some(UNSEEN.to_owned()));
+        part.tables = vec![Rows::default(), Rows::default()];
+        return Ok(part);
+    };
+    let mode = follow(prepared, unit).map_err(|error| (prepared.case.index, error))?;
+    (work.context.finished)();
+    let (status, reason) = judged(unit, &mode);
     part.count(|| place_of(prepared), status, reason);
-    part.notes.extend(remarks(prepared, &mode).into_iter().map(Note::Said));
+    part.notes.extend(remarks(prepared, unit, &mode).into_iter().map(Note::Said));
     let (mut rows, mut summary) = (Rows::default(), Rows::default());
     let (mut stretch, mut before) = (1, f64::INFINITY);
     for point in &mode.points {
@@ -114,8 +122,10 @@ fn compute(work: &Work<'_>) -> Computed {
         rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
         rows.number("frequency_Hz", hertz(point.omega));
         rows.number("damping_ratio", point.damping);
-        for (place, amplitude) in prepared.system.places().iter().zip(&point.places) {
-            rows.number(&format!("{place}_amplitude_m"), *amplitude);
+        let motions = point.places.iter().zip(point.phases());
+        for (place, (x, phase)) in prepared.system.places().iter().zip(motions) {
+            rows.number(&amplitude_of(place), x.norm());
+            rows.number(&phase_of(place), phase.to_degrees());
         }
         rows.integer("stretch", stretch);
         rows.end();
@@ -126,7 +136,7 @@ fn compute(work: &Work<'_>) -> Computed {
     summary.number("large_end_frequency_Hz", end(mode.points.last()));
     let largest = mode.largest.as_ref();
     summary.number("largest_damping_ratio", largest.map_or(f64::NAN, |point| point.damping));
-    summary.number("amplitude_there_m", largest.map_or(f64::NAN, |point| point.amplitude / unit(prepared)));
+    summary.number("amplitude_there_m", largest.map_or(f64::NAN, |point| point.amplitude / unit));
     summary.number("frequency_there_Hz", end(largest));
     summary.end();
     part.tables = vec![rows, summary];
@@ -138,15 +148,14 @@ fn number(prepared: &Prepared) -> usize {
     prepared.case.values.count("mode").unwrap_or(1) as usize - 1
 }
 
-/// Modal amplitude of a unit displacement of the place that moves most, m √kg per m.
-fn unit(prepared: &Prepared) -> f64 {
-    prepared.system.structure().modal_unit(number(prepared))
-}
+/// What is wrong where no modal amplitude belongs to the amplitudes of the study.
+const UNSEEN: &str =
+    "the structure has no such mode, or no place moves in it; ask for another mode, or add a [[place]] where it moves";
 
-fn follow(prepared: &Prepared) -> Result<Mode, MethodError> {
+/// Follows the mode; `unit` is the modal amplitude of a unit displacement of the place that moves most, m √kg per m.
+fn follow(prepared: &Prepared, unit: f64) -> Result<Mode, MethodError> {
     let values = &prepared.case.values;
     let range = values.table("amplitude");
-    let unit = unit(prepared);
     let end = |key: &str| range.and_then(|t| t.quantity(key)).unwrap_or(0.0) * unit;
     mode(
         &prepared.system,
@@ -167,15 +176,15 @@ fn place_of(prepared: &Prepared) -> String {
 }
 
 /// A modal amplitude in words, as the study file gives it: the amplitude of the place that moves most.
-fn amplitude(prepared: &Prepared, modal: f64) -> String {
-    let si = modal / unit(prepared);
+fn amplitude(unit: f64, modal: f64) -> String {
+    let si = modal / unit;
     let (name, factor) = display_unit(si, "m");
     format!("{:.3} {name}", si * factor)
 }
 
 /// The status of a mode, and what is missing or in doubt.
-fn judged(prepared: &Prepared, mode: &Mode) -> (&'static str, Option<String>) {
-    let words = |modal: f64| amplitude(prepared, modal);
+fn judged(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
+    let words = |modal: f64| amplitude(unit, modal);
     if let Some(lost) = mode.lost {
         let from = if lost.at.is_finite() { format!("lost at {}: ", words(lost.at)) } else { String::new() };
         return ("lost", Some(format!("{from}{}", lost.reason)));
@@ -200,7 +209,7 @@ fn judged(prepared: &Prepared, mode: &Mode) -> (&'static str, Option<String>) {
 const SLIPS: f64 = 1e-9;
 
 /// What the reader must know of a mode that was followed.
-fn remarks(prepared: &Prepared, mode: &Mode) -> Vec<String> {
+fn remarks(prepared: &Prepared, unit: f64, mode: &Mode) -> Vec<String> {
     let place = place_of(prepared);
     let mut remarks: Vec<String> = mode
         .turns
@@ -209,8 +218,8 @@ fn remarks(prepared: &Prepared, mode: &Mode) -> Vec<String> {
             format!(
                 "{place}: the curve turns at {} and goes back to {} before it falls for good; between them there are several \
                  motions, and below the first the values jump.",
-                amplitude(prepared, turn.at),
-                amplitude(prepared, turn.up)
+                amplitude(unit, turn.at),
+                amplitude(unit, turn.up)
             )
         })
         .collect();
@@ -221,10 +230,10 @@ fn remarks(prepared: &Prepared, mode: &Mode) -> Vec<String> {
     remarks
 }
 
-/// Of every case the place that moves most at the largest amplitude.
+/// Of every case the place that moves most at the largest amplitude; of a disk the shapes at both ends of the amplitudes as well.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(table), Some(system)) = (drawing.table("modes"), drawing.system()) else { return Figure::default() };
-    let column = |place: &String| format!("{place}_amplitude_m");
+    let column = |place: &String| amplitude_of(place);
     let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, system.places().iter().map(column)), "m");
     let stretches = drawing.stretches(table);
     let parts = match table.columns.iter().find(|column| column.name == "stretch").map(|column| &column.values) {
@@ -259,9 +268,34 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             .collect(),
         ..Panel::default()
     };
-    let panels = vec![
+    let mut panels = vec![
         panel("frequency", "Hz", "frequency_Hz", 1.0),
         panel("equivalent damping ratio", "%", "damping_ratio", 100.0),
     ];
+    if panels.len() + 2 * stretches.len() <= MOST_PANELS {
+        panels.extend(
+            stretches.iter().flat_map(|stretch| wheels(drawing, table, system.places(), (stretch, stretches.len()))),
+        );
+    }
     Figure { panels, ..Figure::default() }
+}
+
+/// The shapes of a disk at the smallest amplitude, where joints stick, and at the largest, of one of so many cases, in colours of their own.
+fn wheels(drawing: &Drawing<'_>, table: &Table, places: &[String], (stretch, cases): (&Stretch, usize)) -> Vec<Panel> {
+    let Ok(case) = drawing.study.case(stretch.case) else { return Vec::new() };
+    let Some(ring) = case.model.ring else { return Vec::new() };
+    let shown: Vec<&String> = places.iter().filter(|name| drawing.shows(name)).collect();
+    let mode = format!("mode {}", case.values.count("mode").unwrap_or(1));
+    let mut ends = vec![stretch.rows.start, stretch.rows.end - 1];
+    ends.dedup();
+    let wheel = |row: usize| {
+        let at = |column: &str| numbers(table, column, row..row + 1)[0];
+        let most = places.iter().map(|name| at(&amplitude_of(name))).fold(0.0, f64::max);
+        let (unit, factor) = display_unit(most, "m");
+        let words = format!("{mode} at {} {unit}", significant(most * factor, 3));
+        let frequency = format!("{} Hz", significant(at("frequency_Hz"), 5));
+        let moves = shown.iter().map(|name| (name.as_str(), at(&amplitude_of(name)), at(&phase_of(name))));
+        wheel::panel(&Around::of_ring(moves)?, ring.sectors, join([stretch.label(), words, frequency]), cases)
+    };
+    ends.into_iter().filter_map(wheel).collect()
 }

@@ -1,15 +1,17 @@
-//! Frequencies of a tuned disk over its nodal diameters, with all joints free and with all of them stuck.
+//! Frequencies of a tuned disk over its nodal diameters, with all joints free and with all of them stuck, and the shapes of its modes.
 
 use super::keys::anything;
-use crate::columns::FREQUENCY;
+use super::wheel::{self, Around, of_sector};
+use crate::columns::{FREQUENCY, phase_of, shape_of};
 use crate::cost::{Cost, Costing, Shape};
-use crate::dataset::{Axis, Figure, Panel, Series, Style};
-use crate::drawing::{Drawing, MOST_PANELS, Stretch, largest, numbers, words};
+use crate::dataset::{Axis, Figure, Panel, Series, Style, Table};
+use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers, words};
 use crate::info::{Complaint, KindInfo};
-use crate::key::{Takes, default};
+use crate::key::{Takes, default, optional};
 use crate::kind::Kind;
 use crate::rows::Rows;
-use crate::values::hertz;
+use crate::values::{Values, hertz};
+use crate::words::significant;
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::dimension::Dimension;
 use stickslip::model::{Model, WaveModes};
@@ -21,13 +23,37 @@ const MODE: &str = "mode";
 const JOINTS: &str = "joints";
 /// Both states of the joints, as in the column of that name.
 pub(super) const STATES: [&str; 2] = ["free", "stuck"];
+/// Wheels that are drawn of a case, at most.
+const WHEELS: usize = 4;
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
         name: "nodal-diameter",
-        summary: "frequencies of a tuned disk over its nodal diameters, all joints free and all joints stuck",
-        keys: &[default("modes", Takes::Count(1, 100), "4", "lowest modes of every nodal diameter", "4")],
-        check: |_, model, _| check_disk(model),
+        summary: "frequencies of a tuned disk over its nodal diameters, all joints free and all joints stuck, and the shapes of its modes",
+        keys: &[
+            default("modes", Takes::Count(1, 100), "4", "lowest modes of every nodal diameter", "4"),
+            default(
+                SHAPES,
+                Takes::Flag,
+                "true",
+                "whether the figure has shapes, on wheels; the table always has them",
+                "false",
+            ),
+            optional(
+                DIAMETER,
+                Takes::Count(0, 100_000),
+                "the nodal diameter whose lowest modes are drawn; absent: the first mode (or `mode`) of the lowest nodal diameters",
+                "3",
+            ),
+            optional(
+                MODE,
+                Takes::Count(1, 100),
+                "the mode that is drawn, by rising frequency in its nodal diameter",
+                "1",
+            ),
+            default(JOINTS, Takes::Choice(states), STATES[0], "the joints of the shapes that are drawn", "\"stuck\""),
+        ],
+        check,
         axes: [Some(Dimension::NONE), Some(Dimension::FREQUENCY)],
         uses_method: false,
         needs: anything,
@@ -41,13 +67,37 @@ pub(super) const KIND: Kind = Kind {
     draw,
 };
 
+const SHAPES: &str = "shapes";
+
+fn states() -> Vec<(&'static str, &'static str)> {
+    vec![(STATES[0], "no joint carries a force"), (STATES[1], "no joint slips")]
+}
+
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
+    check_disk(model)?;
+    let (most, sectors) = (values.count("modes").unwrap_or(4), model.ring.map_or(0, |ring| ring.sectors as u64));
+    if let Some(diameter) = values.count(DIAMETER).filter(|diameter| 2 * diameter > sectors) {
+        let message = format!("a disk of {sectors} sectors has no {diameter} nodal diameters");
+        return Err(Complaint::new(DIAMETER, message, format!("they count from 0 to {}", sectors / 2)));
+    }
+    if let Some(mode) = values.count(MODE).filter(|mode| *mode > most) {
+        let message = format!("mode {mode} is not among the {most} lowest that are computed");
+        return Err(Complaint::new(MODE, message, format!("write modes = {mode}, or a mode from 1 to {most}")));
+    }
+    Ok(())
+}
+
 /// Whether the model is a disk of equal sectors.
 fn check_disk(model: &Model) -> Result<(), Complaint> {
     match model.ring {
         Some(ring) if ring.equal => Ok(()),
         Some(_) => {
             let message = "the sectors differ, and a mistuned disk has no nodal diameters";
-            Err(Complaint::new("kind", message, "leave `mistuning` out of [disk]; its modes are those of a response"))
+            Err(Complaint::new(
+                "kind",
+                message,
+                "leave `mistuning` out of [disk]; kind = \"modes\" has the modes of the whole ring",
+            ))
         }
         None => {
             let message = "the model is no disk, and only disks have nodal diameters";
@@ -61,8 +111,9 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let sectors = costing.case.model.ring.map_or(2.0, |ring| ring.sectors as f64);
     let (waves, each) = (sectors / 2.0 + 1.0, 2.0 * costing.masses / sectors);
     let rows = costing.cases * waves * 2.0 * modes;
+    let shapes = 2.0 * costing.places / sectors;
     Cost {
-        tables: vec![Shape { rows, numbers: costing.varied + 4.0, words: 1.0 }],
+        tables: vec![Shape { rows, numbers: costing.varied + 4.0 + shapes, words: 1.0 }],
         drawn: rows,
         unit: 8.0 * each * each,
         work: costing.cases * waves * each.powi(3) * EIGEN,
@@ -108,9 +159,10 @@ fn place_of(prepared: &Prepared) -> String {
 
 fn write(prepared: &Prepared, waves: &[WaveModes], rows: &mut Rows) {
     let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
+    let places = places(&prepared.case.model);
     for (state, name) in STATES.into_iter().enumerate() {
         for wave in waves {
-            let modes = if state == 0 { &wave.free } else { &wave.stuck };
+            let (modes, shapes) = [(&wave.free, &wave.free_shapes), (&wave.stuck, &wave.stuck_shapes)][state];
             for (mode, found) in modes.elastic.iter().take(most).enumerate() {
                 rows.varied(&prepared.case);
                 rows.text(JOINTS, name);
@@ -118,13 +170,24 @@ fn write(prepared: &Prepared, waves: &[WaveModes], rows: &mut Rows) {
                 rows.integer(MODE, mode as u64 + 1);
                 rows.number(FREQUENCY, hertz(found.omega));
                 rows.number("damping_ratio", found.damping);
+                for (i, (_, place)) in places.iter().enumerate() {
+                    let at = shapes.get(mode).map(|shape| shape[i].to_polar());
+                    rows.number(&shape_of(place), at.map_or(f64::NAN, |(size, _)| size));
+                    rows.number(&phase_of(place), at.map_or(f64::NAN, |(_, phase)| phase.to_degrees()));
+                }
                 rows.end();
             }
         }
     }
 }
 
-/// A panel for every case: a line with marks for every mode, joints free and joints stuck.
+/// The places of the first sector, as they are called in the ring, and in their sector.
+fn places(model: &Model) -> Vec<(String, String)> {
+    let both = |name: String| of_sector(&name).map(|(place, _)| (name, place));
+    model.sector_places().into_iter().filter_map(both).collect()
+}
+
+/// A panel for every case: a line with marks for every mode, joints free and joints stuck; behind it, if there is room, shapes on wheels.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let Some(table) = drawing.table(TABLE) else { return Figure::default() };
     let (y, factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
@@ -135,10 +198,54 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         series: lines(table, stretch, factor),
         ..Panel::default()
     };
-    Figure { panels: drawing.stretches(table).iter().take(MOST_PANELS).map(panel).collect(), ..Figure::default() }
+    let stretches = drawing.stretches(table);
+    let room = stretches.len() * (1 + WHEELS) <= MOST_PANELS;
+    let of_case = |stretch: &Stretch| {
+        let shapes = if room { wheels(drawing, table, stretch) } else { Vec::new() };
+        std::iter::once(panel(stretch)).chain(shapes).collect::<Vec<_>>()
+    };
+    Figure { panels: stretches.iter().take(MOST_PANELS).flat_map(of_case).collect(), ..Figure::default() }
 }
 
-fn lines(table: &crate::dataset::Table, stretch: &Stretch, factor: f64) -> Vec<Series> {
+/// The shapes of a case: the lowest modes of a nodal diameter, one mode of the lowest nodal diameters, or the one that is both.
+fn wheels(drawing: &Drawing<'_>, table: &Table, stretch: &Stretch) -> Vec<Panel> {
+    let Ok(case) = drawing.study.case(stretch.case) else { return Vec::new() };
+    let (Some(ring), values) = (case.model.ring, &case.values) else { return Vec::new() };
+    let (Some(diameters), Some(modes)) = (table.integers(DIAMETER), table.integers(MODE)) else { return Vec::new() };
+    if values.flag(SHAPES) == Some(false) {
+        return Vec::new();
+    }
+    let (diameter, mode) = (values.count(DIAMETER), values.count(MODE));
+    let state = values.text(JOINTS).unwrap_or(STATES[0]);
+    let wanted = |row: &usize| {
+        words(table, JOINTS).get(*row).is_some_and(|joints| joints == state)
+            && diameter.is_none_or(|diameter| diameters[*row] == diameter)
+            && match mode {
+                Some(mode) => modes[*row] == mode,
+                None => diameter.is_some() || modes[*row] == 1,
+            }
+    };
+    let frequencies = numbers(table, FREQUENCY, 0..table.rows());
+    let places: Vec<(String, String)> =
+        places(&case.model).into_iter().filter(|(name, _)| drawing.shows(name)).collect();
+    let wheel = |row: usize| {
+        let (mode, diameter) = (modes[row], diameters[row]);
+        let at = |column: &str| numbers(table, column, row..row + 1)[0];
+        let around = |(_, place): &(String, String)| {
+            let moves = (at(&shape_of(place)), at(&phase_of(place)));
+            Around::of_wave(place.clone(), moves, diameter as usize, ring.sectors)
+        };
+        let many = if diameter == 1 { "" } else { "s" };
+        let frequency = format!("{} Hz", significant(frequencies[row], 5));
+        let joints = if state == STATES[0] { String::new() } else { format!("joints {state}") };
+        let title =
+            [stretch.label(), format!("mode {mode}"), format!("{diameter} nodal diameter{many}"), frequency, joints];
+        wheel::panel(&places.iter().map(around).collect::<Vec<_>>(), ring.sectors, join(title), STATES.len())
+    };
+    stretch.rows.clone().filter(wanted).take(WHEELS).filter_map(wheel).collect()
+}
+
+fn lines(table: &Table, stretch: &Stretch, factor: f64) -> Vec<Series> {
     let (Some(diameters), Some(modes)) = (table.integers(DIAMETER), table.integers(MODE)) else { return Vec::new() };
     let states = words(table, JOINTS);
     let frequencies = numbers(table, FREQUENCY, 0..table.rows());

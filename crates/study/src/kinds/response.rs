@@ -2,7 +2,6 @@
 
 mod amplification;
 mod tables;
-mod wheel;
 
 pub use tables::{Curve, MassCurve, curves};
 
@@ -10,10 +9,11 @@ use super::keys::{FREQUENCY, OUTPUT, anything, check_output};
 use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of, named_places, worst};
 use super::shares;
+use super::wheel::{self, Around, of_sector};
 use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, amplitude_of, phase_of};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Column, Figure, Panel, Series, Sharing, Style, Table, column_name};
-use crate::drawing::{Drawing, Layout, MOST_CURVES, MOST_PANELS, Stretch, largest, numbers, thinned, words};
+use crate::drawing::{Drawing, Layout, MOST_CURVES, MOST_PANELS, Stretch, join, largest, numbers, thinned, words};
 use crate::histogram;
 use crate::info::KindInfo;
 use crate::key::{Key, Takes, default};
@@ -501,11 +501,6 @@ impl Drawn<'_> {
     }
 }
 
-/// The parts of a title that there are.
-fn join(parts: impl IntoIterator<Item = String>) -> String {
-    parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
-}
-
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(curve), Some(system)) = (drawing.table(tables::CURVE), drawing.system()) else {
         return Figure::default();
@@ -561,14 +556,6 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     figure.panels.extend(if amplified.is_empty() { drawn.heights() } else { amplified });
     figure.panels.truncate(MOST_PANELS);
     figure
-}
-
-/// What a place of a ring is called in its sector, and the number of that: `blade` and 3 for `blade_3`, `blade.x` and 3 for `blade_3.x`.
-fn of_sector(name: &str) -> Option<(String, usize)> {
-    let (node, along) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));
-    let (place, sector) = node.rsplit_once('_')?;
-    let place = along.map_or_else(|| place.to_owned(), |along| format!("{place}.{along}"));
-    Some((place, sector.parse().ok()?))
 }
 
 /// The column of a joint's force.
@@ -716,27 +703,22 @@ impl Drawn<'_> {
         let highest = |row: usize| columns.iter().map(|(_, values)| values[row]).fold(f64::NEG_INFINITY, f64::max);
         let row = (0..stretch.rows.len()).max_by(|a, b| highest(*a).total_cmp(&highest(*b)))?;
         // what is one place in a sector has one colour
-        let mut series: Vec<Series> = Vec::new();
-        let mut shape: Vec<wheel::Around> = Vec::new();
-        for (name, values) in &columns {
-            let (place, sector) = of_sector(name)?;
-            let at = series.iter().position(|bars| bars.label == place).unwrap_or_else(|| {
-                shape.push((place.clone(), Vec::new()));
-                series.push(Series::bars(place, Vec::new(), Vec::new(), series.len()));
-                series.len() - 1
-            });
-            series[at].x.push(sector as f64);
-            series[at].y.push(values[row] * self.factor.1);
-            let phase = numbers(self.curve, &phase_of(name), stretch.rows.start + row..stretch.rows.start + row + 1)[0];
-            shape[at].1.push((sector, values[row], phase));
-        }
+        let at = stretch.rows.start + row;
+        let phase = |name: &str| numbers(self.curve, &phase_of(name), at..at + 1)[0];
+        let shape = columns.iter().map(|(name, values)| (*name, values[row], phase(name)));
+        let shape = Around::of_ring(shape)?;
+        let bars = |(colour, around): (usize, &Around)| {
+            let (x, y) = around.of.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
+            Series::bars(&around.place, x, y, colour)
+        };
+        let series: Vec<Series> = shape.iter().enumerate().map(bars).collect();
         if series.iter().all(|bars| bars.x.len() < 2) {
             return None;
         }
         let frequency = shown_hertz(numbers(self.curve, DRIVE, stretch.rows.clone())[row]);
         let title = join([stretch.label(), format!("at {frequency}")]);
         let (x, y) = (Axis::new("sector", "").whole(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
-        let wheel = wheel::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone()]));
+        let wheel = wheel::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone()]), 0);
         Some([Some(Panel { title, x, y, series, ..Panel::default() }), wheel])
     }
 

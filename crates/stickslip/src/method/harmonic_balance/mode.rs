@@ -12,7 +12,7 @@ use super::hold::{CLEAR, stay};
 use super::ports::{Alternation, Port, Ports};
 use super::solve::{HALVINGS, SHORTENS};
 use crate::method::MethodError;
-use crate::model::System;
+use crate::model::{Axis, System};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::dense;
@@ -196,9 +196,11 @@ impl<'a> ModeEquations<'a> {
         lost / (2.0 * state.omega * whole)
     }
 
-    /// Amplitude of the first harmonic of every place, m.
-    pub fn amplitudes(&self, state: &ModeState) -> Vec<f64> {
-        self.first(state).iter().map(|x| x.norm()).collect()
+    /// First harmonic of every place, m.
+    pub fn places(&self, state: &ModeState) -> Vec<Complex64> {
+        let x = self.first(state);
+        let at = |place: &Axis| place.rows().iter().map(|(row, weight)| x[*row] * *weight).sum();
+        self.system.seen().iter().map(at).collect()
     }
 
     /// How real the shape is: `|X₁ᵀ M X₁| / X₁ᴴ M X₁`, one if all places move in phase or against each other. Where two modes of the symmetric
@@ -660,7 +662,7 @@ mod tests {
             state = equations.solve(&state, before, a).unwrap();
             before = a;
         }
-        let first = equations.amplitudes(&state)[0];
+        let first = equations.places(&state)[0].norm();
         (state, first)
     }
 

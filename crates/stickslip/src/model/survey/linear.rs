@@ -145,17 +145,18 @@ impl Reduced {
     }
 }
 
-/// Bodies with mass that neither a spring nor a constraint holds to the ground.
+/// Motions with mass that neither a spring nor a constraint resists.
 fn rigid_motions(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> usize {
     let n = mass.len();
-    let mut groups = Groups::new(n + 1); // place n stands for the ground
     let held = links.iter().filter(|link| link.stiffness > 0.0).map(|link| link.at.as_slice());
-    for at in held.chain(rigid.iter().copied()) {
+    let held: Vec<&[(usize, f64)]> = held.chain(rigid.iter().copied()).collect();
+    let mut groups = Groups::new(n + 1); // place n stands for the ground
+    for at in &held {
         match at {
             [(a, _)] => groups.join((*a, n)),
-            [(a, _), (b, _)] if a != b => groups.join((*a, *b)),
-            // of a wave: neighbours that move alike stretch it
-            _ => at.iter().for_each(|(a, _)| groups.join((*a, n))),
+            [(a, p), (b, q)] if a != b && p + q == 0.0 => groups.join((*a, *b)),
+            // along a direction of a node, or in a wave: what it resists is a matter of all others
+            _ => return unresisted(mass, &held),
         }
     }
     let ground = groups.of(n);
@@ -163,6 +164,13 @@ fn rigid_motions(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> us
     bodies.sort_unstable();
     bodies.dedup();
     bodies.into_iter().filter(|body| *body != ground).count()
+}
+
+/// The same of any directions: as many as these leave free, less those of places without mass alone.
+fn unresisted(mass: &[f64], held: &[&[(usize, f64)]]) -> usize {
+    let (light, heavy): (Vec<usize>, Vec<usize>) = (0..mass.len()).partition(|i| mass[*i] == 0.0);
+    let all = [light.as_slice(), &heavy].concat();
+    Basis::new(mass.len(), &all, held).kept.len() - Basis::new(mass.len(), &light, held).kept.len()
 }
 
 /// Eliminates constraints and places without mass, and solves for the modes of the remaining places.
@@ -349,5 +357,26 @@ mod tests {
         assert_eq!(basis.kept, [0, 2]);
         assert_eq!(basis.rows, [vec![(0, 1.0)], vec![(0, 1.0)], vec![(1, 1.0)]]);
         assert!(basis.along(&at).is_empty());
+    }
+
+    /// A mass that moves in a plane: one inclined spring leaves a motion, two that are not parallel leave none, parallel ones do; a place without
+    /// mass is no motion of its own.
+    #[test]
+    fn inclined_springs_resist_what_they_span() {
+        let link = |at: &[(usize, f64)]| Link { at: at.to_vec(), stiffness: 1.0, damping: 0.0 };
+        let along = |angle: f64| link(&[(0, angle.cos()), (1, angle.sin())]);
+        let motions = |mass: &[f64], links: &[Link]| rigid_motions(mass, &links.iter().collect::<Vec<_>>(), &[]);
+        assert_eq!(motions(&[1.0, 1.0], &[along(0.6)]), 1);
+        assert_eq!(motions(&[1.0, 1.0], &[along(0.6), along(2.0)]), 0);
+        assert_eq!(motions(&[1.0, 1.0], &[along(0.6), along(0.6)]), 1);
+        let chained = [along(0.6), link(&[(1, 1.0), (2, -1.0)])];
+        assert_eq!(motions(&[1.0, 1.0, 0.0], &chained), 1);
+        assert_eq!(motions(&[1.0, 1.0, 1.0], &chained), 1);
+        assert_eq!(motions(&[1.0, 1.0, 0.0], &chained[..1]), 1);
+        assert_eq!(motions(&[1.0, 1.0, 1.0], &chained[..1]), 2);
+        let elastic = Linear::new(&[1.0, 1.0], &[&along(0.6), &along(2.0)], &[]).modes;
+        // two unit springs at an angle of 1.4: 1 ± cos 1.4
+        let squares: Vec<f64> = elastic.elastic.iter().map(|mode| mode.omega * mode.omega).collect();
+        assert!((squares[0] - 1.0 + 1.4f64.cos()).abs() < 1e-12 && (squares[1] - 1.0 - 1.4f64.cos()).abs() < 1e-12);
     }
 }

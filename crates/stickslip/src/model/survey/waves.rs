@@ -6,7 +6,10 @@
 use super::hold::{Hold, Stuck};
 use super::linear::{LARGEST, Linear, Link};
 use super::{LinearMode, Model, ModelError, Modes, System};
+use crate::model::{Mass, Place};
 use crate::structure::{Sector, Structure, turn};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
 use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
 
@@ -19,6 +22,12 @@ pub struct WaveModes {
     pub free: Modes,
     /// With all joints stuck.
     pub stuck: Modes,
+    /// Of every mode of `free` its shape, [mode][place of the sector] in the order of [`Model::sector_places`], 1/√kg: in sector n of N the
+    /// displacement of a wave that stands is the real part of `shape · e^{j 2π diameter n/N}`, and `φᵀMφ = 1` of the whole disk. The place of
+    /// the first sector that moves most is real and positive. Empty where stiffnesses are too far apart for one eigenvalue problem.
+    pub free_shapes: Vec<Vec<Complex64>>,
+    /// The same of `stuck`.
+    pub stuck_shapes: Vec<Vec<Complex64>>,
 }
 
 type Row = Vec<(usize, f64)>;
@@ -50,7 +59,124 @@ impl Turned {
         };
         parts.into_iter().take(copies).map(row).filter(|row| !row.is_empty()).collect()
     }
+
+    /// What both states of the joints have, at the places.
+    fn modes(&self, free: Once, stuck: Once, places: &[Row]) -> WaveModes {
+        let at_places = |shapes: &[DVector<f64>]| shapes.iter().map(|shape| self.seen(shape, places)).collect();
+        WaveModes {
+            diameter: self.diameter,
+            free_shapes: at_places(&free.shapes),
+            stuck_shapes: at_places(&stuck.shapes),
+            free: free.modes,
+            stuck: stuck.modes,
+        }
+    }
+
+    /// Each mode of a wave that travels either way once, and the lowest of them. `weigh` is the product with the mass matrix of `(a, b)`.
+    ///
+    /// A mode `x` of such a wave comes with `jx`, and what is found of both are two directions of their plane, of equal modes of a larger space:
+    /// that is split into complex shapes, orthogonal to each other.
+    fn once(
+        &self,
+        mut modes: Modes,
+        shapes: Option<DMatrix<f64>>,
+        lowest: usize,
+        weigh: &dyn Fn(&DVector<f64>) -> DVector<f64>,
+    ) -> Once {
+        let columns = |shapes: DMatrix<f64>| -> Vec<DVector<f64>> {
+            shapes.column_iter().take(lowest).map(|shape| shape.into_owned()).collect()
+        };
+        if !self.double {
+            modes.elastic.truncate(lowest);
+            return Once { modes, shapes: shapes.map_or_else(Vec::new, columns) };
+        }
+        (modes.rigid, modes.lost) = (modes.rigid / 2, modes.lost / 2);
+        let most = lowest.min(modes.elastic.len() / 2);
+        let split = shapes.and_then(|shapes| self.split(&modes.elastic, &shapes, most, weigh));
+        let (kept, shapes) = split.unwrap_or_else(|| ((0..most).map(|mode| 2 * mode).collect(), Vec::new()));
+        modes.elastic = kept.into_iter().map(|mode| modes.elastic[mode]).collect();
+        Once { modes, shapes }
+    }
+
+    /// `most` complex shapes among twice as many real ones: which these are, and orthogonal `(a, b)`.
+    fn split(
+        &self,
+        elastic: &[LinearMode],
+        shapes: &DMatrix<f64>,
+        most: usize,
+        weigh: &dyn Fn(&DVector<f64>) -> DVector<f64>,
+    ) -> Option<(Vec<usize>, Vec<DVector<f64>>)> {
+        let mut kept: Vec<usize> = Vec::new();
+        // each with M times itself and times `j` of itself
+        let mut found: Vec<[DVector<f64>; 4]> = Vec::new();
+        for (column, mode) in elastic.iter().enumerate() {
+            if kept.len() == most {
+                break;
+            }
+            let mut shape = shapes.column(column).into_owned();
+            let near = |other: &&usize| mode.omega - elastic[**other].omega <= NEAR * mode.omega;
+            let first = kept.len() - kept.iter().rev().take_while(near).count();
+            for [own, weighed, turned, turned_weighed] in &found[first..] {
+                let (along, across) = (weighed.dot(&shape), turned_weighed.dot(&shape));
+                shape.axpy(-along, own, 1.0);
+                shape.axpy(-across, turned, 1.0);
+            }
+            let weighed = weigh(&shape);
+            let left = weighed.dot(&shape);
+            if left >= APART {
+                let (shape, weighed) = (shape / left.sqrt(), weighed / left.sqrt());
+                let turned = self.quarter(&shape);
+                let turned_weighed = self.quarter(&weighed);
+                kept.push(column);
+                found.push([shape, weighed, turned, turned_weighed]);
+            }
+        }
+        (kept.len() == most).then(|| (kept, found.into_iter().map(|[shape, ..]| shape).collect()))
+    }
+
+    /// `j (a + jb)`, a quarter of the period earlier. The mass matrix of the wave does not care when.
+    fn quarter(&self, shape: &DVector<f64>) -> DVector<f64> {
+        let n = self.dofs;
+        DVector::from_fn(2 * n, |i, _| if i < n { -shape[n + i] } else { shape[i - n] })
+    }
+
+    /// A shape with `aᵀMa + bᵀMb = 1` of one sector at the places, as [`WaveModes`] says.
+    fn seen(&self, shape: &DVector<f64>, places: &[Row]) -> Vec<Complex64> {
+        let n = self.dofs;
+        let whole = |i: usize| Complex64::new(shape[i], if self.double { shape[n + i] } else { 0.0 });
+        // half of the sectors' sum of squares is that of a cosine
+        let scale = (if self.double { 2.0 } else { 1.0 } / self.sectors as f64).sqrt();
+        let at = |place: &Row| -> Complex64 {
+            let term = |(row, weight): &(usize, f64)| {
+                whole(row % n) * turn((self.diameter * (row / n)) as i64, self.sectors) * (*weight * scale)
+            };
+            place.iter().map(term).sum()
+        };
+        let mut at: Vec<Complex64> = places.iter().map(at).collect();
+        // of equal ones the first, whatever rounding says
+        let most = at.iter().map(|x| x.norm()).fold(0.0, f64::max);
+        let first = at.iter().find(|x| x.norm() >= (1.0 - EQUAL) * most).copied();
+        if let Some(first) = first.filter(|_| most > 0.0) {
+            at.iter_mut().for_each(|x| *x *= first.conj() / first.norm());
+        }
+        at
+    }
 }
+
+/// The modes of a wave, each once, and their shapes `(a, b)` if they are known.
+struct Once {
+    modes: Modes,
+    shapes: Vec<DVector<f64>>,
+}
+
+/// Share of a frequency within which modes may be of one space. Modes further apart are orthogonal to rounding, whether they are looked at
+/// or not; those of one pair differ by 1e-6 at most where frequencies have their last digits.
+const NEAR: f64 = 1e-3;
+/// Part of a shape's square that is left beside those already found, from which on it is another one: of a pair nothing is left but rounding,
+/// and of up to six equal modes some shape always has more.
+const APART: f64 = 0.25;
+/// Displacements of places that differ by less than this share are equally large.
+const EQUAL: f64 = 1e-6;
 
 impl Model {
     /// The `lowest` modes of a ring of equal sectors by nodal diameter; `None` if the model is none, or if its sectors are too large. Sectors by
@@ -74,13 +200,15 @@ impl Model {
     /// let waves = ring.wave_modes(1).unwrap().unwrap();
     /// assert_eq!(waves.len(), 7);
     /// assert!((waves[3].free.elastic[0].omega - 1.4f64.sqrt()).abs() < 1e-12);
+    /// // cos(2π 3n/12) has the squares 1, 0, 1, 0 …, six in all
+    /// assert!((waves[3].free_shapes[0][0].re - (1.0f64 / 6.0).sqrt()).abs() < 1e-12);
     /// ```
     pub fn wave_modes(&self, lowest: usize) -> Result<Option<Vec<WaveModes>>, ModelError> {
         let Some(ring) = self.ring.filter(|ring| ring.equal) else { return Ok(None) };
         let system = self.assemble()?;
         let (sectors, n) = (ring.sectors, system.dofs() / ring.sectors);
         if self.substructure.is_some() {
-            return Ok(of_matrices(&system, sectors, lowest));
+            return Ok(of_matrices(&system, sectors, lowest, &self.sector_axes(&system)));
         }
         if n == 0 || 2 * n > LARGEST {
             return Ok(None);
@@ -95,6 +223,7 @@ impl Model {
         let joints = &system.joints()[..system.joints().len() / sectors];
         let stuck: Vec<Stuck> = joints.iter().enumerate().flat_map(Stuck::of_joint).collect();
         let own: Vec<f64> = (0..n).map(|i| system.structure().own_mass(i)).collect();
+        let places = self.sector_axes(&system);
         let wave = |diameter: usize| {
             let double = !(2 * diameter).is_multiple_of(sectors);
             let turned = Turned { dofs: n, sectors, diameter, double };
@@ -112,30 +241,34 @@ impl Model {
                     Hold::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
                 }
             }
-            let once = |linear: Linear| once(linear.modes, double, lowest);
+            let weigh = |x: &DVector<f64>| x.component_mul(&DVector::from_column_slice(&mass));
+            let once = |linear: Linear| turned.once(linear.modes, linear.shapes, lowest, &weigh);
             let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
-            WaveModes {
-                diameter,
-                free: once(Linear::new(&mass, &free.iter().collect::<Vec<_>>(), &[])),
-                stuck: once(Linear::new(&mass, &free.iter().chain(&held).collect::<Vec<_>>(), &rigid)),
-            }
+            let free_ones = once(Linear::new(&mass, &free.iter().collect::<Vec<_>>(), &[]));
+            let stuck_ones = once(Linear::new(&mass, &free.iter().chain(&held).collect::<Vec<_>>(), &rigid));
+            turned.modes(free_ones, stuck_ones, &places)
         };
         Ok(Some((0..=sectors / 2).map(wave).collect()))
     }
-}
 
-/// Each mode of a wave that travels either way once, and the lowest of them.
-fn once(mut modes: Modes, double: bool, lowest: usize) -> Modes {
-    if double {
-        modes.elastic = modes.elastic.into_iter().step_by(2).collect();
-        (modes.rigid, modes.lost) = (modes.rigid / 2, modes.lost / 2);
+    /// The places of the first sector of a disk, as they are called in the ring; none of a model that is no disk.
+    pub fn sector_places(&self) -> Vec<String> {
+        let Some(ring) = self.ring else { return Vec::new() };
+        let own = |all: usize| all / ring.sectors.max(1);
+        let places = self.places[..own(self.places.len())].iter().flat_map(Place::places);
+        places.chain(self.masses[..own(self.masses.len())].iter().flat_map(Mass::places)).collect()
     }
-    modes.elastic.truncate(lowest);
-    modes
+
+    /// How these follow from the coordinates of the ring.
+    fn sector_axes(&self, system: &System) -> Vec<Row> {
+        let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
+        let seen = |name: String| index.get(name.as_str()).map_or_else(Vec::new, |i| system.seen()[*i].rows().to_vec());
+        self.sector_places().into_iter().map(seen).collect()
+    }
 }
 
 /// The modes of the waves of equal sectors that are stated by their matrices.
-fn of_matrices(system: &System, sectors: usize, lowest: usize) -> Option<Vec<WaveModes>> {
+fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -> Option<Vec<WaveModes>> {
     let sector = Sector::of(system.structure(), sectors)?;
     let joints = &system.joints()[..system.joints().len() / sectors];
     let stuck: Vec<Stuck> = joints.iter().enumerate().flat_map(Stuck::of_joint).collect();
@@ -153,23 +286,26 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize) -> Option<Vec<Wav
                 Hold::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
             }
         }
-        let modes = |links: &[Link], rigid: &[Row]| -> Option<Modes> {
+        let modes = |links: &[Link], rigid: &[Row]| -> Option<Once> {
             if structure.dofs() <= LARGEST {
                 let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
-                return Some(once(Linear::of_matrices(structure.full(), links, &rigid).modes, double, lowest));
+                let Linear { modes, shapes } = Linear::of_matrices(structure.full(), links, &rigid);
+                return Some(turned.once(modes, shapes, lowest, &|x| &structure.full().mass * x));
             }
             if !rigid.is_empty() {
                 return None;
             }
-            Some(once(of_large(structure, links, if double { 2 * lowest } else { lowest })?, double, lowest))
+            let (mass, modes, shapes) =
+                of_large(structure, links, if double { lowest.saturating_mul(2) } else { lowest })?;
+            Some(turned.once(modes, Some(shapes), lowest, &|x| DVector::from_vec(mass.times(x.as_slice()))))
         };
-        Some(WaveModes { diameter, free: modes(&[], &[])?, stuck: modes(&held, &rigid)? })
+        Some(turned.modes(modes(&[], &[])?, modes(&held, &rigid)?, places))
     };
     (0..=sectors / 2).map(wave).collect()
 }
 
-/// The lowest modes of a large structure, each of a pair among them.
-fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<Modes> {
+/// The mass matrix and the lowest modes of a large structure, each of a pair among them, with their shapes.
+fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(Matrix, Modes, DMatrix<f64>)> {
     let n = structure.dofs();
     let part = |kind: usize, more: Vec<(usize, usize, f64)>| {
         let own = structure.entries().map(|(row, column, values)| (row, column, values[kind]));
@@ -191,7 +327,9 @@ fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<Modes
         let power: f64 = damping.times(shape).iter().zip(shape).map(|(c, x)| c * x).sum();
         LinearMode { omega, damping: power / (2.0 * omega) }
     };
-    Some(Modes { elastic: (free..found.count()).map(mode).collect(), rigid: free, lost: 0 })
+    let shapes = DMatrix::from_fn(n, found.count() - free, |row, k| found.shape(free + k)[row]);
+    let modes = Modes { elastic: (free..found.count()).map(mode).collect(), rigid: free, lost: 0 };
+    Some((mass, modes, shapes))
 }
 
 /// Free motions of a body, twice: a wave either way.
@@ -201,6 +339,8 @@ const FREE_AT_MOST: usize = 12;
 mod tests {
     use crate::law::{Coulomb, Jenkins, SharedLaw};
     use crate::model::{Disk, Joint, Mass, Model, Spring};
+    use crate::structure::turn;
+    use nalgebra::{DMatrix, DVector};
     use std::sync::Arc;
 
     fn sector(law: SharedLaw) -> Model {
@@ -244,6 +384,101 @@ mod tests {
                         assert!((a / b.omega - 1.0).abs() < 1e-9, "{} {sectors} {stuck}: {a} {}", law.name(), b.omega);
                     }
                 }
+            }
+        }
+    }
+
+    /// Of a chain around a ring the shapes are cosines, `√(2/(N m)) cos(2π d n/N)`, and `√(1/(N m))` where the wave does not travel.
+    #[test]
+    fn shapes_of_a_chain_are_cosines() {
+        let between = |other: &str| ["blade".to_owned(), other.to_owned()];
+        let spring = |other: &str, stiffness| Spring { between: between(other), stiffness, damping: 0.0 };
+        let model = Model {
+            masses: vec![Mass::new("blade", 0.3)],
+            springs: vec![spring("ground", 3.0), spring("next.blade", 2.0)],
+            ..Model::default()
+        };
+        let ring = Disk { sectors: 8, ..Disk::default() }.ring(|_| model.clone()).unwrap();
+        assert_eq!(ring.sector_places(), ["blade_0"]);
+        for wave in ring.wave_modes(4).unwrap().unwrap() {
+            let waves = if [0, 4].contains(&wave.diameter) { 1.0 } else { 2.0 };
+            let [shape] = &wave.free_shapes[..] else { panic!("{wave:?}") };
+            assert!((shape[0] - (waves / (8.0 * 0.3f64)).sqrt()).norm() < 1e-12, "{wave:?}");
+        }
+    }
+
+    /// Of every frequency of the ring, the sum of `φφᵀ` over what an eigenvalue solution of the whole ring has there is the same as over the
+    /// waves that stand, `Re(X e^{j 2π d n/N})` and a quarter of a wave further: shapes, phases and `φᵀMφ = 1` in one. Two blades of a sector
+    /// that know nothing of each other make pairs of pairs, which must be told apart.
+    #[test]
+    fn shapes_are_those_of_the_ring() {
+        let between = |a: &str, b: &str| [a.to_owned(), b.to_owned()];
+        let mut twins = sector(Arc::new(Jenkins { stiffness: 2.0, limit: 1.0 }));
+        twins.masses.push(Mass::new("twin", 0.3));
+        twins.masses.remove(0);
+        twins.springs = ["blade", "twin"]
+            .into_iter()
+            .flat_map(|name| {
+                [("ground".to_owned(), 3.0), (format!("next.{name}"), 2.0)].map(|(other, stiffness)| Spring {
+                    between: between(name, &other),
+                    stiffness,
+                    damping: 0.0,
+                })
+            })
+            .collect();
+        twins.joints.clear();
+        for (sector, sectors) in
+            [(sector(Arc::new(Jenkins { stiffness: 2.0, limit: 1.0 })), 9), (twins.clone(), 6), (twins, 7)]
+        {
+            let ring = Disk { sectors, ..Disk::default() }.ring(|_| sector.clone()).unwrap();
+            // stuck, the joint is a spring
+            let mut stuck = ring.clone();
+            stuck.springs.extend(stuck.joints.drain(..).map(|joint| Spring {
+                between: joint.between,
+                stiffness: 2.0,
+                damping: 0.0,
+            }));
+            let waves = ring.wave_modes(usize::MAX).unwrap().unwrap();
+            for (whole, state) in [(&ring, 0), (&stuck, 1)] {
+                let system = whole.assemble().unwrap();
+                let full = system.structure().full();
+                let root = full.mass.map(|m| if m > 0.0 { 1.0 / m.sqrt() } else { 0.0 });
+                let eigen = (&root * &full.stiffness * &root).symmetric_eigen();
+                let n = root.nrows();
+                let mut checked = 0;
+                for wave in &waves {
+                    let (modes, shapes) = [(&wave.free, &wave.free_shapes), (&wave.stuck, &wave.stuck_shapes)][state];
+                    assert_eq!(modes.elastic.len(), shapes.len());
+                    for mode in &modes.elastic {
+                        let same = |omega: f64| (omega / mode.omega - 1.0).abs() < 1e-7;
+                        let mut sum = DMatrix::zeros(n, n);
+                        for (i, square) in eigen.eigenvalues.iter().enumerate().filter(|(_, w)| same(w.abs().sqrt())) {
+                            assert!(*square > 0.0);
+                            let shape = &root * eigen.eigenvectors.column(i);
+                            sum += &shape * shape.transpose();
+                        }
+                        assert!(sum.amax() > 0.0);
+                        for other in &waves {
+                            let (modes, shapes) =
+                                [(&other.free, &other.free_shapes), (&other.stuck, &other.stuck_shapes)][state];
+                            for (_, shape) in modes.elastic.iter().zip(shapes).filter(|(mode, _)| same(mode.omega)) {
+                                for quarter in 0..if 2 * other.diameter % sectors == 0 { 1 } else { 2 } {
+                                    let at = |row: usize| {
+                                        let place = row % shape.len();
+                                        let turned =
+                                            shape[place] * turn((other.diameter * (row / shape.len())) as i64, sectors);
+                                        [turned.re, turned.im][quarter]
+                                    };
+                                    let whole = DVector::from_fn(n, |row, _| at(row));
+                                    sum -= &whole * whole.transpose();
+                                }
+                            }
+                        }
+                        assert!(sum.amax() < 1e-9, "{sectors} {state} {}: {}", wave.diameter, sum.amax());
+                        checked += 1;
+                    }
+                }
+                assert!(checked >= sectors, "{checked}");
             }
         }
     }
