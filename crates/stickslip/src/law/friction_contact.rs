@@ -157,13 +157,13 @@ impl StepLaw for FrictionContact {
                     trial
                 };
             }
-            _ => {
+            [one, two, ..] => {
                 let way = [0, 1].map(|a| (to[a] - from[a]) * closed);
-                let force = plane::step([z[0], z[1]], way, self.tangential, [first, last]);
-                z.copy_from_slice(&force);
+                [*one, *two] = plane::step([*one, *two], way, self.tangential, [first, last]);
             }
+            [] => {}
         }
-        out[..self.tangents].copy_from_slice(z);
+        out.iter_mut().zip(&*z).for_each(|(out, z)| *out = *z);
         out[self.tangents] = after;
         out
     }
@@ -202,7 +202,7 @@ impl StepLaw for FrictionContact {
             }
             _ => plane::step_with_slopes([z[0], z[1]], way, self.tangential, limits),
         };
-        z.copy_from_slice(&force[..t]);
+        z.iter_mut().zip(force).for_each(|(z, force)| *z = force);
         let slip = [if closes { 0.0 } else { self.friction }, self.friction].map(|by| by * self.normal);
         let width = 2 * directions + t;
         for (a, row) in slopes.state.chunks_exact_mut(width).enumerate() {
@@ -219,7 +219,7 @@ impl StepLaw for FrictionContact {
         }
         slopes.force[..t * width].copy_from_slice(slopes.state);
         slopes.force[t * width + directions + t] = self.normal;
-        out[..t].copy_from_slice(z);
+        out.iter_mut().zip(&*z).for_each(|(out, z)| *out = *z);
         out[t] = after;
         Some(out)
     }

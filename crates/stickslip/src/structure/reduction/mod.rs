@@ -36,6 +36,7 @@ pub use series::Series;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
+use stickslip_numerics::dense::{ComplexLu, Lu};
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{Analysis, Matrix, ModesError, NaturalModes, Singular, Wanted, columns};
 
@@ -455,11 +456,24 @@ impl Reduced {
             }
             DMatrix::from_fn(forces.nrows(), forces.ncols(), |i, k| forces[(i, k)] / own[i])
         } else {
-            let stiffness = DMatrix::from_fn(self.dofs(), self.dofs(), at);
-            stiffness.lu().solve(&forces.map(|v| Complex::new(v, 0.0))).ok_or(free)?
+            self.solved(omega, forces).map_err(|row| ReductionError::Singular { omega, singular: Singular { row } })?
         };
         let part = |read: fn(&Complex<f64>) -> f64| product(&self.ports, &moved.map(|z| read(&z)));
         Ok(part(|z| z.re).zip_map(&part(|z| z.im), Complex::new))
+    }
+
+    /// The coordinates under forces on them, by elimination: without damping in real numbers, a fourth of the work.
+    fn solved(&self, omega: f64, mut forces: DMatrix<f64>) -> Result<DMatrix<Complex<f64>>, usize> {
+        let n = self.dofs();
+        let bare = (self.stiffness.iter().zip(self.mass.iter())).map(|(k, m)| k - omega * omega * m);
+        if self.damping.iter().all(|c| *c == 0.0) {
+            Lu::new(bare.collect(), n)?.solve(forces.as_mut_slice());
+            return Ok(forces.map(|v| Complex::new(v, 0.0)));
+        }
+        let damped = bare.zip(self.damping.iter()).map(|(re, c)| Complex::new(re, omega * c));
+        let mut moved = forces.map(|v| Complex::new(v, 0.0));
+        ComplexLu::new(damped.collect(), n)?.solve(moved.as_mut_slice());
+        Ok(moved)
     }
 }
 
