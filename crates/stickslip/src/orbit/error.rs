@@ -156,7 +156,8 @@ pub enum OrbitError {
     /// Nothing holds the structure against the mean of the forces, or only friction does.
     #[error(
         "{method} finds no motion at Ω = {omega:.4} rad/s that stays where it is: nothing but friction holds the structure against \
-         a mean force; add the spring that holds it (where friction is enough, method `event-driven` finds the motion)"
+         a mean force; add the spring that holds it{}",
+        if *method == "event-driven" { "" } else { " (where friction is enough, method `event-driven` finds the motion)" }
     )]
     Drift {
         /// The method.

@@ -24,6 +24,7 @@ use crate::percentiles::percentiles;
 use crate::point::{Summary, place_of};
 use crate::rows::Rows;
 use crate::study::varied_text;
+use crate::survey::Surveyed;
 use crate::values::{Frequencies, hertz};
 use crate::warnings::sampled;
 use crate::words::{display_unit, shown_hertz};
@@ -74,7 +75,7 @@ pub(super) const KIND: Kind = Kind {
         false => Grain::Frequencies,
     },
     cost,
-    warnings: |cases| sampled(cases).into_iter().chain(amplification::none(cases)).collect(),
+    warnings: |cases| sampled(cases).into_iter().chain(amplification::none(cases)).chain(many_peaks(cases)).collect(),
     compute,
     draw,
 };
@@ -109,12 +110,29 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
+/// Says what refining the peaks of thousands of places costs, and how to do without.
+fn many_peaks(cases: &[Surveyed]) -> Option<String> {
+    let one = cases.first()?;
+    let (values, places) = (&one.case.values, one.survey.system().places().len());
+    let sought = values.flag("peaks") != Some(false) && values.names("peak_of").is_none();
+    (sought && places >= MANY_PEAKS).then(|| {
+        format!(
+            "the peaks of {places} places are refined one by one, with {REFINING:.0} orbits or so for each: peak_of = \"all\" in [study] refines \
+             that of the worst, and peaks = false none"
+        )
+    })
+}
+
 /// Amplitudes below this share of the largest are rounding.
 const ROUNDING: f64 = 1e-10;
 /// A mass below this share of the heaviest is drawn dashed, like the paper's contact masses.
 const LIGHT: f64 = 0.5;
 /// Masses that are drawn one by one; of more the largest amplitude is, with the single ones pale behind it.
 const SINGLE: usize = 7;
+/// Masses that are drawn behind the largest of them, those with the highest peaks: the curves of thousands would be one grey area in megabytes.
+const BEHIND: usize = 100;
+/// Places whose peaks are no longer refined one by one without a word: a disk of many blades wants them, the nodes of a contact hardly.
+const MANY_PEAKS: usize = 1000;
 /// Colours that the curves of many masses take: the single ones and the largest of them.
 const MANY: usize = 2;
 /// Two points before a peak that differ from it by less than this share are level with it: more than the rounding of an orbit, and less
@@ -685,14 +703,30 @@ impl Drawn<'_> {
             }
             return panel;
         }
-        for name in &names {
+        let behind = self.highest(stretch, BEHIND);
+        let label = match behind.len() < names.len() {
+            true => format!("the {} highest of {} masses", behind.len(), names.len()),
+            false => format!("each of {} masses", names.len()),
+        };
+        for name in behind {
             let (x, y) = self.line(stretch, name);
-            panel.series.push(Series::line(format!("each of {} masses", names.len()), x, y, 1).pale());
+            panel.series.push(Series::line(label.clone(), x, y, 1).pale());
         }
         let (x, y, worst) = self.envelope(stretch);
         panel.title = join([panel.title, worst]);
         panel.series.push(Series::line(format!("largest of {} masses", names.len()), x, y, 0));
         panel
+    }
+
+    /// So many of the shown masses at most, those with the largest amplitudes, in their own order.
+    fn highest(&self, stretch: &Stretch, most: usize) -> Vec<&str> {
+        let names = self.names();
+        let height = |name: &str| self.amplitudes(name, stretch.rows.clone()).into_iter().fold(0.0, f64::max);
+        let mut by_height: Vec<(usize, f64)> = names.iter().map(|name| height(name)).enumerate().collect();
+        by_height.sort_by(|a, b| b.1.total_cmp(&a.1));
+        by_height.truncate(most);
+        by_height.sort_by_key(|(index, _)| *index);
+        by_height.into_iter().map(|(index, _)| names[index]).collect()
     }
 
     /// Of a disk a bar for every sector, at the frequency where the largest amplitude is, and its shape there.

@@ -185,7 +185,8 @@ pub enum ReductionError {
     },
     /// The ports do not hold the structure.
     #[error(
-        "with all ports held the structure can still move freely ({count} ways), so it has no static answers to them; take free modes instead of Craig-Bampton"
+        "with all ports held the structure still has {count} free motion{}, so it has no static answers to them; take free modes instead of Craig-Bampton",
+        if *count == 1 { "" } else { "s" }
     )]
     NotHeld {
         /// Free motions.
