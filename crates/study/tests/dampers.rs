@@ -120,6 +120,25 @@ fn a_stuck_wedge_is_two_springs_at_angles() {
     }
 }
 
+/// What nothing drives rests, however small the force that does is beside the wedges' load: a billionth of it is answered in proportion.
+#[test]
+fn a_wedge_that_nothing_drives_rests() {
+    let amplitude = |force: &str| {
+        let parameters = [("F0", force.to_owned()), ("a1", "35 deg".to_owned())];
+        let study = study(
+            "under-platform-wedge",
+            &parameters,
+            "[study]\nkind = \"response\"\nfrequency = [\"130 Hz\", \"290 Hz\"]\n[method]\nkind = \"harmonic-balance\"\nharmonics = 3\n",
+        );
+        numbers(&study, "curve", "blade_0_x_amplitude_m").to_vec()
+    };
+    let (rest, little, small) = (amplitude("0 N"), amplitude("1e-8 N"), amplitude("1e-3 N"));
+    for i in 0..2 {
+        assert!(rest[i] < 1e-15, "{} m", rest[i]);
+        near("in proportion", 1e5 * little[i], small[i], 1e-3);
+    }
+}
+
 /// While blades close, the wedge is pushed inwards against friction, while they open it slides outwards: between the blades it holds
 /// `C/2 tan(a ± ρ)` with `μ = tan ρ`, and a cycle loses `h (Δ - h/kc)`, with h the
 /// difference of both and Δ the range of the blades' distance.

@@ -40,6 +40,9 @@ const RIGID: f64 = 1e-14;
 
 /// Where contacts alone hold, the length of a motion counts up to so many times that of its harmonics and of rest.
 const FAR: f64 = 4.0;
+/// Share of the mean displacement that constant loads cause on closed contacts, below which no motion is solved more exactly than this share: the
+/// residual is then at the mean's rounding.
+const STANDING: f64 = 1e-5;
 /// Length of a motion that is none, m: its square is a number still.
 const NOTHING: f64 = 1e-150;
 
@@ -748,7 +751,8 @@ impl Level {
         let mut size = norm(&motion.c, 0);
         if self.stands() {
             // a mean that goes far is no yardstick
-            size = size.min(FAR * (norm(&motion.c, 1) + norm(&self.linear, 0)));
+            let standing = norm(&self.linear, 0);
+            size = size.min(FAR * (norm(&motion.c, 1) + standing)).max(STANDING * standing);
         }
         (size + 1e-2 * norm(&self.linear, 1)).max(NOTHING)
     }

@@ -714,7 +714,8 @@ impl Balance<'_> {
     /// not followed.
     fn by_its_course(&mut self, omega: f64) -> Option<Result<Orbit, OrbitError>> {
         let top = self.method.harmonics.unwrap_or(self.first);
-        if self.periods > 1 || !self.levels.get(&top)?.stands() {
+        let vibrates = self.system.harmonics_of_excitation(|z| z != Complex64::ZERO).iter().any(|h| *h > 0);
+        if self.periods > 1 || !vibrates || !self.levels.get(&top)?.stands() {
             return None;
         }
         let no_orbit = |course| Some(Err(OrbitError::NoOrbit { method: NAME, omega: self.drive, course }));
