@@ -1,12 +1,15 @@
 //! Harmonic balance at the edges of what it can do: what it must find, and what it must refuse.
 
+use nalgebra::DMatrix;
+use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use stickslip::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw, Stribeck};
+use stickslip::law::{Coulomb, Coulomb2d, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw, Stribeck};
 use stickslip::method::shooting::Shooting;
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
-use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System, example};
+use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Motion, Spring, System, example};
 use stickslip::orbit::{Accuracy, Orbit};
+use stickslip::structure::Structure;
 
 fn mass(name: &str, mass: f64) -> Mass {
     Mass::new(name, mass)
@@ -210,6 +213,44 @@ fn multipliers_of_an_inner_slider() {
         for (a, b) in found.multipliers().unwrap().iter().zip(judge.multipliers().unwrap()) {
             // the series is within 1e-3 of the motion
             assert!((a.norm() - b.norm()).abs() < 1e-3, "{phase}: {a} {b}");
+        }
+    }
+}
+
+/// The same rigid friction said otherwise: in parallel contacts that share its limit, and as friction in a plane of which the motion takes one line only.
+/// Nothing decides what each of them carries while they stick, and the motion is that of the one.
+#[test]
+fn friction_that_is_shared_is_that_of_one_contact() {
+    let (limit, omega) = (3.068, 50.137);
+    let along = |weight: f64| Axis::new(vec![(0, weight)]);
+    let one: Vec<(SharedLaw, Vec<Axis>)> = vec![(Arc::new(Coulomb { limit }), vec![along(1.0)])];
+    let parts = [0.23, 0.4, 0.37].map(|share| Arc::new(Coulomb { limit: share * limit }) as SharedLaw);
+    let parallel = parts.into_iter().map(|law| (law, vec![along(1.0)])).collect();
+    let line = vec![(Arc::new(Coulomb2d { limit }) as SharedLaw, vec![along(0.6), along(0.8)])];
+    let same = 0.5f64.sqrt();
+    let twice = vec![(Arc::new(Coulomb2d { limit }) as SharedLaw, vec![along(same), along(same)])];
+    let amplitude = |joints: Vec<(SharedLaw, Vec<Axis>)>, force: f64| {
+        let one = |value: f64| DMatrix::from_element(1, 1, value);
+        let structure = Structure::new(vec!["p".to_owned()], one(0.9), one(20.0), one(1.7e4)).unwrap();
+        let mut builder = System::builder(structure).force(0, 1, Complex64::new(force, 0.0));
+        for (j, (law, axes)) in joints.into_iter().enumerate() {
+            builder = builder.joint(format!("j{j}"), law, axes);
+        }
+        let system = builder.build().unwrap();
+        let method = HarmonicBalance { harmonics: Some(63), ..HarmonicBalance::default() };
+        let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+        assert!(orbit.evidence.residual <= 1e-6, "{}", orbit.evidence.residual);
+        (orbit.places[0].amplitude(), orbit.evidence.truncation.unwrap())
+    };
+    // mostly in stick, and mostly in slip
+    for force in [5.0, 12.0] {
+        let (expected, error) = amplitude(one.clone(), force);
+        for (what, joints) in [("parallel", &parallel), ("line", &line), ("twice", &twice)] {
+            let (found, own) = amplitude(Vec::clone(joints), force);
+            assert!(
+                (found / expected - 1.0).abs() < error + own,
+                "{force} N, {what}: {found} {expected} {error} {own}"
+            );
         }
     }
 }

@@ -10,7 +10,6 @@
 //! Memory: per harmonic two complex matrices over the axes, or in modes two real ones over the axes and one over axes and modes.
 
 use super::ease::{Ease, SOLVED};
-use super::hold::{CLEAR, stay};
 use super::ports::{Port, Ports, block};
 use super::receptance::{Modal, Receptance};
 use num_complex::Complex64;
@@ -121,10 +120,6 @@ impl Linear<'_> {
         &self.tangents[block(self.blocks, p, port, self.harmonics.len())]
     }
 
-    fn penalty(&self, p: usize, port: &Port) -> f64 {
-        self.penalty[p] * self.ease.penalty.max(CLEAR * port.least_penalty / self.penalty[p])
-    }
-
     /// The derivative times a step, both in units.
     fn multiply(
         &self,
@@ -167,7 +162,7 @@ impl Linear<'_> {
                 continue;
             }
             // λ less T of what changes in λ + ε u', u = -R f
-            let penalty = self.penalty(p, port);
+            let penalty = self.penalty[p];
             let changed: Vec<f64> = moved
                 .iter()
                 .enumerate()
@@ -179,7 +174,7 @@ impl Linear<'_> {
                 })
                 .collect();
             for (i, (out, row)) in out.iter_mut().zip(self.tangent(p, port).chunks_exact(wide)).enumerate() {
-                let kept = 1.0 + stay(self.harmonics[i % pair / 2]);
+                let kept = 1.0 + self.ease.stay(self.harmonics[i % pair / 2]);
                 *out = (kept * unit * v[i] - dot(row, &changed)) / units[i];
             }
         }
@@ -258,7 +253,7 @@ impl Linear<'_> {
                 port.range().for_each(|q| matrix[q * size + q] += 1.0);
                 continue;
             }
-            let penalty = self.penalty(p, port);
+            let penalty = self.penalty[p];
             let rate = if penalty.is_finite() { Complex64::new(0.0, penalty * h as f64 * self.omega) } else { ZERO };
             let turn: Vec<Complex64> = (0..port.axes * port.axes)
                 .map(|ab| self.mean(self.tangent(p, port), port.axes, (ab / port.axes, ab % port.axes), k))
@@ -270,7 +265,7 @@ impl Linear<'_> {
                 }
             }
             for (a, q) in port.range().enumerate() {
-                matrix[q * size + q] += 1.0 + stay(h);
+                matrix[q * size + q] += 1.0 + self.ease.stay(h);
                 for (b, column) in port.range().enumerate() {
                     matrix[column * size + q] -= turn[a * port.axes + b];
                 }

@@ -19,7 +19,7 @@
 
 use super::coupled::{Coupled, Linear, by_products};
 use super::ease::{Ease, GIVEN};
-use super::hold::{CLEAR, stay};
+use super::hold::CLEAR;
 use super::ports::{Alternation, Port, Ports, block, blocks};
 use super::receptance::{Modal, Receptance};
 use super::rest::Rest;
@@ -89,6 +89,8 @@ pub(super) struct Level {
     pub(super) units: Vec<f64>,
     pub(super) before: Motion,
     pub(super) best: Motion,
+    /// Forces that those of [`Ease::pull`] are drawn to, [axis][harmonic], N.
+    pub(super) anchor: Vec<Complex64>,
     pub(super) step: Vec<f64>,
     image: Vec<Complex64>,
     /// Of ports with a memory, the states at t = 0 in the motion that was evaluated last.
@@ -177,6 +179,7 @@ impl Level {
             units: vec![1.0; size],
             before: Motion::rest(nh * axes),
             best: Motion::rest(nh * axes),
+            anchor: Vec::new(),
             step: vec![0.0; size],
             image: vec![ZERO; nh * widest],
             states: vec![Vec::new(); ports.len()],
@@ -392,7 +395,7 @@ impl Level {
         }
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.is_force()) {
             let range = port.first * nh..(port.first + port.axes) * nh;
-            let penalty = self.penalty[p] * ease.penalty.max(CLEAR * port.least_penalty / self.penalty[p]);
+            let penalty = self.penalty[p];
             let (c, force) = (&motion.c[range.clone()], &motion.force[range.clone()]);
             let slot = &mut self.tangents[block(&self.blocks, p, port, nh)];
             slot.fill(0.0);
@@ -400,7 +403,10 @@ impl Level {
             let slot = (slopes != Slopes::None).then_some(slot);
             self.alternation.image(port, (omega, penalty, ease.limits), (c, force), image, slot);
             for (at, (force, image)) in range.zip(force.iter().zip(&*image)) {
-                let r = force - image;
+                let mut r = force - image;
+                if ease.pull > 0.0 {
+                    r += (force - self.anchor[at]) * ease.pull;
+                }
                 (self.residual[2 * at], self.residual[2 * at + 1]) = (r.re, r.im);
             }
         }
@@ -620,7 +626,7 @@ impl Level {
                     }
                 }
                 // -r_u = 1, or T ε d/dt
-                let penalty = self.penalty[q] * ease.penalty.max(CLEAR * row.least_penalty / self.penalty[q]);
+                let penalty = self.penalty[q];
                 for i in 0..tall {
                     let start = (row.first * pair + i) * size + column.first * pair;
                     let out = &mut self.jacobian[start..start + wide];
@@ -664,7 +670,7 @@ impl Level {
                 let line = &mut self.jacobian[at * size..(at + 1) * size];
                 line[at] += 1.0;
                 if row.is_force() {
-                    line[at] += stay(self.alternation.harmonics[i % pair / 2]);
+                    line[at] += ease.stay(self.alternation.harmonics[i % pair / 2]);
                     for (j, t) in line[row.first * pair..].iter_mut().zip(&own[i * tall..(i + 1) * tall]) {
                         *j -= t;
                     }

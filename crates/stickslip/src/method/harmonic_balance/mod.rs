@@ -4,7 +4,7 @@
 //! - `rest`: the receptance of the linear rest, in closed form from its modes;
 //! - `closed`: the mean of bodies that nothing but contacts holds;
 //! - `equations`: those along the joints, and their derivative;
-//! - `solve`: Newton's method on them;
+//! - `solve`: Newton's method on them; `proximal`: the way to forces that nothing decides;
 //! - `path`: the orbit's numbers from its harmonics.
 //!
 //! The unknowns are the harmonics of the joints' relative motions, or of their forces where the velocity alone decides them: the cost
@@ -22,6 +22,7 @@ mod hold;
 mod mode;
 mod path;
 mod ports;
+mod proximal;
 mod receptance;
 mod rest;
 mod solve;
@@ -685,7 +686,12 @@ impl Balance<'_> {
         // nothing is known of the error until two solutions can be compared
         let (mut checked, mut estimate) = (top, 1.0);
         while top <= MOST * self.kept.scale && self.can_compare(top) {
-            let (mut error, finer, y) = self.compare(top, omega, &motion, &x).map_err(|l| self.lost(l))?;
+            let (mut error, finer, y) = match self.compare(top, omega, &motion, &x) {
+                Ok(compared) => compared,
+                // what was found has an error that is known
+                Err(_) if top > self.first => break,
+                Err(lost) => return Err(self.lost(lost)),
+            };
             if (self.ports.has_forces() || self.ports.has_steep()) && top > self.first {
                 error = error.max(CHANCE * estimate);
             }

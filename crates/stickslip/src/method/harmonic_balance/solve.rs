@@ -1,4 +1,4 @@
-//! The search for a solution: Newton's method with the exact derivative; where it fails, a smaller penalty, and then slip limits that are
+//! The search for a solution: Newton's method with the exact derivative; where it fails, proximal points, and then slip limits that are
 //! lowered from where everything sticks.
 
 use super::coupled::FORMED;
@@ -38,9 +38,6 @@ const HELD: [f64; 5] = [1e-3, 1e-2, 0.1, 1.0, 10.0];
 const SHRINK: f64 = 0.25;
 /// Steps that have to be held back, at most, where springs carry no mean.
 const MOST_FLAT: usize = 8;
-/// Shares of the penalty that are tried first if Newton's method fails with the whole.
-const GENTLE: [f64; 3] = [0.04, 0.2, 1.0];
-
 /// Multiplications in the eliminations of one search, about five seconds of one core, but for [`FEWEST`] eliminations in any case: a
 /// search that is to end takes a few of them.
 const WORK: f64 = 1e10;
@@ -83,15 +80,25 @@ impl Lost {
 impl Level {
     /// Newton's method: the longest of the halved steps that comes closer, and where none does the whole one, which may lead out of a
     /// set of slipping samples that repeats.
-    fn newton(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, ease: Ease, most: usize) -> Result<(), Lost> {
+    pub(super) fn newton(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        motion: &mut Motion,
+        ease: Ease,
+        most: usize,
+    ) -> Result<(), Lost> {
         let mut length = self.length(motion);
         let mut residual = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
         let mut least = f64::INFINITY;
         // the residual that is to be halved, and for how long it was not
         let (mut mark, mut waited) = (residual, 0);
+        // forces that wander are found by proximal points
+        let hope = if ports.has_forces() { PATIENCE } else { most };
         let (mut reach, mut flat) = (REACH * self.extent(motion), 0);
         for _ in 0..most {
-            if self.is_exhausted(ports) || residual <= SOLVED || (waited > PATIENCE && least <= ROUNDED) {
+            let found = residual <= SOLVED || (waited > PATIENCE && least <= ROUNDED);
+            if found || self.is_exhausted(ports) || (waited > hope && least < f64::INFINITY) {
                 break;
             }
             self.follow_slopes(ports, omega, motion, ease);
@@ -194,7 +201,7 @@ impl Level {
     }
 
     /// Whether the search has taken all the work that it may.
-    fn is_exhausted(&self, ports: &Ports) -> bool {
+    pub(super) fn is_exhausted(&self, ports: &Ports) -> bool {
         let size = self.residual.len() as f64;
         let axes = size / (2 * self.harmonics().len()) as f64;
         let one = match self.sparse {
@@ -213,7 +220,7 @@ impl Level {
         self.step.copy_from_slice(&self.residual);
         match &mut self.sparse {
             Some(sparse) => {
-                let along = Along { penalty: &self.penalty, ease: ease.penalty };
+                let along = Along { penalty: &self.penalty, ease };
                 if !sparse.step(ports, &along, &self.tangents, &mut self.step) {
                     return false;
                 }
@@ -267,15 +274,13 @@ impl Level {
         if self.newton(ports, omega, &mut motion, GIVEN, ITERATIONS).is_ok() && !self.is_away(&motion) {
             return Ok(motion);
         }
+        let mut nearest = f64::INFINITY;
         if ports.has_forces() {
             let iterations = motion.iterations;
             motion = Motion { iterations, ..start };
-            let mut found = Ok(());
-            for penalty in GENTLE {
-                found = self.newton(ports, omega, &mut motion, Ease { penalty, ..GIVEN }, ITERATIONS);
-            }
-            if found.is_ok() {
-                return Ok(motion);
+            match self.by_proximal_points(ports, omega, &mut motion) {
+                Ok(()) => return Ok(motion),
+                Err(lost) => nearest = lost.residual,
             }
         }
         if self.stands() {
@@ -292,7 +297,8 @@ impl Level {
                 Err(lost) => Err(Lost { away: away || lost.away, ..lost }),
             };
         }
-        self.lower_limits(ports, omega, &mut motion)?;
+        let found = self.lower_limits(ports, omega, &mut motion);
+        found.map_err(|lost| Lost { residual: lost.residual.min(nearest), ..lost })?;
         Ok(motion)
     }
 

@@ -5,7 +5,8 @@
 //! themselves, along laws of velocity, border it as if each contact were one more place: `Z y - W δλ = 0` and
 //! `(1 - T) δλ + ε T D Wᵀ y = r`.
 
-use super::hold::{CLEAR, HOLD, stay};
+use super::ease::Ease;
+use super::hold::HOLD;
 use super::ports::Ports;
 use crate::model::System;
 use num_complex::Complex64;
@@ -20,8 +21,8 @@ pub(super) const GUESSED: usize = 40;
 pub(super) struct Along<'a> {
     /// ε per port, N s/m.
     pub penalty: &'a [f64],
-    /// Factor on it.
-    pub ease: f64,
+    /// And what eases the step.
+    pub ease: Ease,
 }
 
 /// The banded form of a system at one drive frequency.
@@ -256,7 +257,7 @@ impl Sparse {
             let tangent = &tangents[super::ports::block(&blocks, p, port, nh)];
             let wide = size * port.axes;
             let r = &residual[port.first * size..port.first * size + wide];
-            let penalty = along.penalty[p] * along.ease.max(CLEAR * port.least_penalty / along.penalty[p]);
+            let penalty = along.penalty[p];
             for (a, row) in tangent.chunks_exact(wide).enumerate() {
                 let own = port.first + a / size;
                 let Some(force) = self.forces[own] else {
@@ -277,7 +278,7 @@ impl Sparse {
                 };
                 let at = self.position[force] * size + a % size;
                 self.whole[at] = r[a];
-                self.tangent.add(at, at, 1.0 + stay(self.harmonics[a % size / 2] as usize));
+                self.tangent.add(at, at, 1.0 + along.ease.stay(self.harmonics[a % size / 2] as usize));
                 for &(i, w) in &self.ends[own] {
                     self.tangent.add(self.position[i] * size + a % size, at, -w);
                 }
