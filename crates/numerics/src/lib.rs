@@ -9,6 +9,7 @@ pub mod dual;
 pub mod eigen;
 pub mod fourier;
 pub mod krylov;
+pub mod leading;
 pub mod lu;
 pub mod maximum;
 pub mod modes;

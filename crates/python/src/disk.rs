@@ -5,9 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use stickslip::dimension::Dimension;
 use stickslip::model::{Around, Disk, Mistuned, Model, ModelError, Ring, normal_pattern, too_far};
-
-/// Masses of a ring, at most: as in study files.
-const MOST_MASSES: usize = 20_000;
+use stickslip_study::schema::MOST_MASSES;
 
 /// How a force or an imposed motion goes around a disk, if something is said of it.
 pub fn around(

@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
-use stickslip::curve::modes::{ModeRequest, mode};
+use stickslip::curve::modes::{ModePoint, ModeRequest, mode};
 use stickslip::curve::sweep::{BLOCK, Watch as Sweep, sweep};
 use stickslip::dimension::Dimension;
 use stickslip::law::BuildError;
@@ -732,7 +732,7 @@ impl PyModel {
         let outcome = py.detach(|| self::mode(&system, request));
         self.raised()?;
         let found = outcome.map_err(|cause| error::method(py, cause))?;
-        let numbers = |name: &str, value: &dyn Fn(&stickslip::curve::modes::ModePoint) -> f64| {
+        let numbers = |name: &str, value: &dyn Fn(&ModePoint) -> f64| {
             Column::numbers(name, found.points.iter().map(value).collect())
         };
         let mut columns = vec![
@@ -741,10 +741,12 @@ impl PyModel {
             numbers("damping_ratio", &|point| point.damping),
             numbers("viscous_damping_ratio", &|point| point.viscous),
         ];
+        let phases: Vec<Vec<f64>> = found.points.iter().map(ModePoint::phases).collect();
         for (i, place) in system.places().iter().enumerate() {
             let name = place.replace('.', "_");
             columns.push(numbers(&format!("{name}_amplitude_m"), &|point| point.places[i].norm()));
-            columns.push(numbers(&format!("{name}_phase_deg"), &|point| point.phases()[i].to_degrees()));
+            let phase = phases.iter().map(|all| all[i].to_degrees()).collect();
+            columns.push(Column::numbers(&format!("{name}_phase_deg"), phase));
         }
         let table = Table { name: "modes".to_owned(), columns };
         let x = Axis::new("modal amplitude", "m √kg").log();

@@ -80,7 +80,7 @@ pub struct Cost {
 }
 
 /// What is known of a study when its cost is asked: counts, and what one orbit takes. The first case stands for all.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Costing<'a> {
     /// The study.
     pub study: &'a Study,
@@ -115,7 +115,7 @@ pub struct Costing<'a> {
 
 /// How hard orbits are to find.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Pace {
+enum Pace {
     /// As they mostly are.
     Usual,
     /// Where many are not found, or only after long searches.
@@ -132,7 +132,8 @@ impl Pace {
 }
 
 impl<'a> Costing<'a> {
-    pub(crate) fn new(study: &'a Study, surveyed: &'a Surveyed, pace: Pace) -> Self {
+    /// Of a study whose orbits are hard to find.
+    pub(crate) fn new(study: &'a Study, surveyed: &'a Surveyed) -> Self {
         let (case, system) = (&surveyed.case, surveyed.survey.system());
         // a width makes exact laws smooth
         let width = case.method.options.get("width");
@@ -155,8 +156,13 @@ impl<'a> Costing<'a> {
             falls: laws.iter().any(|law| law.prox().is_some() && !law.is_incrementally_passive()),
             unbounded: laws.iter().any(|law| law.scale().is_infinite()),
             has_states: laws.iter().any(|law| law.rate().is_some_and(|rate| rate.states() > 0)),
-            pace,
+            pace: Pace::Slow,
         }
+    }
+
+    /// Of the same study, where orbits are as easy to find as they mostly are.
+    pub(crate) fn usual(&self) -> Self {
+        Costing { pace: Pace::Usual, ..self.clone() }
     }
 
     /// Cases times frequencies.
@@ -256,8 +262,8 @@ impl Cost {
 }
 
 impl Costing<'_> {
-    /// Size, and rough time on one thread (s), of a study of this cost whose work is cut into so many units.
-    pub(crate) fn total(&self, cost: &Cost, units: usize) -> (Size, f64) {
+    /// Size of a study of this cost whose work is cut into so many units.
+    pub(crate) fn size(&self, cost: &Cost, units: usize) -> Size {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let tables = cost.cells(NUMBER + WRITTEN, WORD + WRITTEN);
         // units wait for their turn; of the tables as many rows are read back as a figure shows
@@ -267,18 +273,22 @@ impl Costing<'_> {
         let working = units.min(threads) as f64 * cost.unit;
         // a float that is too large for the type becomes its largest value
         let whole = |value: f64| value as u64;
-        let size = Size {
+        Size {
             rows: whole(cost.rows()),
             results: whole(cost.cells(NUMBER, NUMBER)),
             memory: whole(tables.min(waiting + shown) + drawn + working),
             whole: whole(tables + drawn + working),
-        };
+        }
+    }
+
+    /// Rough time of a study of this cost on one thread, s.
+    pub(crate) fn seconds(&self, cost: &Cost) -> f64 {
         let elements = self.masses + self.joints;
         // the modes of large models are not asked for
         let modes = if self.surveyed.survey.is_too_large() { 0.0 } else { elements.powi(3) / PREPARED };
         let preparing = self.cases * (PREPARING * (1.0 + modes) + ASSEMBLING * elements);
         let writing = CELL * cost.cells(1.0, 1.0);
-        (size, OVERHEAD + GENEROUS * (cost.work + preparing + writing + POINT * cost.drawn))
+        OVERHEAD + GENEROUS * (cost.work + preparing + writing + POINT * cost.drawn)
     }
 }
 

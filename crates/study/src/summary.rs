@@ -9,7 +9,7 @@ mod warnings;
 
 pub use structure::StructureSummary;
 
-use crate::cost::{Costing, Pace, Size};
+use crate::cost::{Costing, Size};
 use crate::error::StudyError;
 use crate::kinds;
 use crate::study::Study;
@@ -151,11 +151,8 @@ impl ModelSummary {
         });
         let joints = joints.collect();
         let kind = kinds::of(study);
-        let total = |pace| {
-            let costing = Costing::new(study, &cases[0], pace);
-            costing.total(&(kind.cost)(&costing), Units::of(study, (kind.grain)(study)).len())
-        };
-        let ((size, seconds), (_, usual_seconds)) = (total(Pace::Slow), total(Pace::Usual));
+        let slow = Costing::new(study, &cases[0]);
+        let (usual, cost) = (slow.usual(), (kind.cost)(&slow));
         Ok(ModelSummary {
             case: shown.case.label(),
             cases: study.cases(),
@@ -168,9 +165,9 @@ impl ModelSummary {
             orbits: range.filter(|_| !first.system().joints().is_empty()).and_then(|_| Orbits::new(first.system())),
             range,
             warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
-            size,
-            usual_seconds,
-            seconds,
+            size: slow.size(&cost, Units::of(study, (kind.grain)(study)).len()),
+            usual_seconds: usual.seconds(&(kind.cost)(&usual)),
+            seconds: slow.seconds(&cost),
         })
     }
 

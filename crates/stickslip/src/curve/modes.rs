@@ -15,6 +15,7 @@ use crate::method::MethodError;
 use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState};
 use crate::model::System;
 use num_complex::Complex64;
+use stickslip_numerics::leading::leading;
 
 /// A point of a nonlinear mode.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,11 +33,8 @@ pub struct ModePoint {
     pub places: Vec<Complex64>,
 }
 
-/// Places whose amplitudes differ by less than this share move equally: the first of them has the phase zero, whatever rounding says.
-const EQUAL: f64 = 1e-6;
-
 impl ModePoint {
-    /// Phases of the places against the one that moves most, rad.
+    /// Phases of the places against the one that moves most, rad; of equal ones the first has the phase zero.
     ///
     /// # Example
     /// ```
@@ -47,8 +45,7 @@ impl ModePoint {
     /// assert_eq!(point.phases().iter().map(|phase| phase.abs()).collect::<Vec<_>>(), [std::f64::consts::PI, 0.0]);
     /// ```
     pub fn phases(&self) -> Vec<f64> {
-        let most = self.places.iter().map(|x| x.norm()).fold(0.0, f64::max);
-        let leading = self.places.iter().find(|x| x.norm() >= (1.0 - EQUAL) * most).copied().unwrap_or_default();
+        let leading = leading(self.places.iter().map(|x| x.norm())).map_or(Complex64::default(), |i| self.places[i]);
         self.places.iter().map(|x| (x * leading.conj()).arg()).collect()
     }
 }

@@ -5,8 +5,8 @@ use super::flow::Flow;
 use super::followed::Kind;
 use super::incremental::flow::IncrementalFlow;
 use crate::law::Contact;
-use crate::model::System;
-use crate::orbit::{Course, Path, Symmetry};
+use crate::model::{Axis, System};
+use crate::orbit::{Course, Path, Sample, Symmetry};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -53,12 +53,12 @@ pub(crate) fn course(system: &System, omega: f64) -> Option<(Course, Arc<dyn Pat
     Some((classified(system, omega, &returns, &samples), path))
 }
 
-fn classified(system: &System, omega: f64, returns: &[Vec<f64>], samples: &[crate::orbit::Sample]) -> Course {
+fn classified(system: &System, omega: f64, returns: &[Vec<f64>], samples: &[Sample]) -> Course {
     let n = system.dofs();
     // displacements, and velocities over Ω
     let unit = |i: usize| if i < n { 1.0 } else { omega };
-    let swing = returns.iter().flat_map(|state| &state[n..]).fold(0.0, |m: f64, v| m.max(v.abs() / omega));
-    let swing = samples.iter().flat_map(|now| &now.velocity).fold(swing, |m, v| m.max(v.abs() / omega));
+    let velocities = returns.iter().flat_map(|state| &state[n..]).chain(samples.iter().flat_map(|now| &now.velocity));
+    let swing = velocities.fold(0.0, |m: f64, v| m.max(v.abs() / omega));
     let last = returns.len() - 1;
     let apart_at = |end: usize, p: usize| {
         let pairs = (0..=REPEATS).map(|k| (&returns[end - k], &returns[end - k - p]));
@@ -79,9 +79,7 @@ fn classified(system: &System, omega: f64, returns: &[Vec<f64>], samples: &[crat
     let joint = system.joints().get(widest.0).map_or_else(String::new, |joint| joint.name().to_owned());
     let share = widest.1;
     // both halves of the window lead the same way
-    let moved = |axis: &crate::model::Axis, from: usize, to: usize| {
-        axis.along(&returns[to][..n]) - axis.along(&returns[from][..n])
-    };
+    let moved = |axis: &Axis, from: usize, to: usize| axis.along(&returns[to][..n]) - axis.along(&returns[from][..n]);
     let farthest = system.seen().iter().zip(system.places()).map(|(axis, place)| {
         let halves = [moved(axis, 0, last / 2), moved(axis, last / 2, last)];
         let steady =
@@ -100,7 +98,6 @@ fn classified(system: &System, omega: f64, returns: &[Vec<f64>], samples: &[crat
 mod tests {
     use super::*;
     use crate::law::FrictionContact;
-    use crate::model::Axis;
     use crate::structure::Structure;
     use nalgebra::DMatrix;
     use num_complex::Complex64;

@@ -248,8 +248,8 @@ impl<'a> Shooter<'a> {
         self.freeze(false);
         if let Search::Settle { tolerance, returns } = search {
             let fine = self.set_tolerance(self.tolerance.max(COARSE));
-            let coarsely = Search::Settle { tolerance: tolerance.max(COARSE), returns: returns.min(COARSE_RETURNS) };
-            let near = coarsely.find(self, start, |shooter| shooter.first_state(aim.omega), aim);
+            let coarse = Search::Settle { tolerance: tolerance.max(COARSE), returns: returns.min(COARSE_RETURNS) };
+            let near = coarse.find(self, start, |shooter| shooter.first_state(aim.omega), aim);
             self.set_tolerance(fine);
             let near = match near {
                 Err(error @ OrbitError::Unsettled { .. }) => return Err(error),

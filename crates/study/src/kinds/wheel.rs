@@ -4,6 +4,7 @@
 use crate::dataset::{Axis, Panel, Series};
 use crate::drawing::join;
 use std::f64::consts::TAU;
+use stickslip_numerics::leading::leading;
 
 /// A place of every sector: its name, and sector, amplitude and phase (degrees) of each.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,15 +56,14 @@ const LEAST: usize = 3;
 const CIRCLE: usize = 180;
 /// More places than these cover each other: those that move most are drawn.
 const MOST: usize = 4;
-/// Places whose amplitudes differ by less than this share are farthest out alike; the first of them decides the instant.
-const EQUAL: f64 = 1e-6;
 
 /// The picture of some places of a ring of so many sectors, in colours from `colour` on. Sector 0 is at the top, the next to the right of it.
 pub(super) fn panel(places: &[Around], sectors: usize, title: String, colour: usize) -> Option<Panel> {
     let largest = places.iter().map(Around::largest).fold(0.0, f64::max);
-    let mut all = places.iter().flat_map(|around| &around.of);
-    let (_, _, now) = *all.find(|(_, size, _)| *size >= (1.0 - EQUAL) * largest)?;
-    if largest <= 0.0 || sectors < LEAST || places.iter().all(|around| around.of.len() < LEAST) {
+    let all = places.iter().flat_map(|around| &around.of);
+    // of equal ones the first decides the instant
+    let (_, _, now) = *all.clone().nth(leading(all.map(|(_, size, _)| *size))?)?;
+    if sectors < LEAST || places.iter().all(|around| around.of.len() < LEAST) {
         return None;
     }
     let mut shown: Vec<usize> = (0..places.len()).collect();

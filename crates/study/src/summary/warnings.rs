@@ -22,8 +22,10 @@ pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[Surveyed]) -> Ve
     warnings.extend(still(&cases[0]));
     warnings.extend(structure(&cases[0]));
     warnings.extend(unused(study));
-    warnings.extend(bare_numbers(study));
-    warnings.extend(bare_angles(study));
+    if let Some(environment) = first_values(study) {
+        warnings.extend(bare_numbers(study, &environment));
+        warnings.extend(bare_angles(study, &environment));
+    }
     warnings.extend(no_references(study, cases));
     warnings.into_iter().map(|text| format!("{WARNING}{text}")).collect()
 }
@@ -233,8 +235,15 @@ fn easily_meant(dimension: Option<Dimension>, si: f64, with_pi: bool) -> Option<
     }
 }
 
+/// The parameters of the first case.
+fn first_values(study: &Study) -> Option<Environment<'_>> {
+    let choice: HashMap<_, _> = study.varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
+    let values = evaluate(&study.names, &study.parameters, &study.order, &choice, &[]).ok()?;
+    Some(Environment { names: &study.names, values })
+}
+
 /// Parameters that are bare numbers, of more than a turn in radians, and stand in `sin`, `cos` or `tan`: they are degrees.
-fn bare_angles(study: &Study) -> Vec<String> {
+fn bare_angles(study: &Study, first: &Environment<'_>) -> Vec<String> {
     let mut turned: BTreeSet<usize> =
         study.parameters.iter().flat_map(|parameter| parameter.quantity.expression.angles()).collect();
     let lists = &study.structure.lists;
@@ -243,8 +252,7 @@ fn bare_angles(study: &Study) -> Vec<String> {
             each_quantity(table, &mut |_, quantity, _| turned.extend(quantity.expression.angles()));
         }
     }
-    let choice: HashMap<_, _> = study.varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
-    let Ok(values) = evaluate(&study.names, &study.parameters, &study.order, &choice, &[]) else { return Vec::new() };
+    let values = &first.values;
     let bare = |index: &usize| values[*index].dimension.is_none() && values[*index].si.abs() > TAU;
     let sentence = |index: usize| {
         let (name, number) = (&study.names[index], displayed(values[index].si, None));
@@ -256,16 +264,13 @@ fn bare_angles(study: &Study) -> Vec<String> {
 }
 
 /// Bare numbers whose unit is easily mistaken: angles count as radians, lengths as metres.
-fn bare_numbers(study: &Study) -> Vec<String> {
-    let choice: HashMap<_, _> = study.varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
-    let Ok(values) = evaluate(&study.names, &study.parameters, &study.order, &choice, &[]) else { return Vec::new() };
-    let environment = Environment { names: &study.names, values };
+fn bare_numbers(study: &Study, first: &Environment<'_>) -> Vec<String> {
     let mut found: Vec<(String, String, usize)> = Vec::new();
     let lists = &study.structure.lists;
     for (list, tables) in [("joint", &lists.joint), ("force", &lists.force), ("motion", &lists.motion)] {
         for (index, table) in tables.iter().enumerate() {
             each_quantity(table, &mut |key, quantity, dimension| {
-                let Ok(value) = quantity.value(key, &environment) else { return };
+                let Ok(value) = quantity.value(key, first) else { return };
                 let easily = easily_meant(dimension, value.si, value.with_pi);
                 let Some((unit, other, converted)) = easily.filter(|_| value.dimension.is_none()) else { return };
                 let text = format!("{key} = {}", quantity.text.trim());

@@ -43,6 +43,8 @@ const FAR: f64 = 4.0;
 /// Share of the mean displacement that constant loads cause on closed contacts, below which no motion is solved more exactly than this share: the
 /// residual is then at the mean's rounding.
 const STANDING: f64 = 1e-5;
+/// The share of the springs of closed contacts that a law's derivative has beside a structure that has them.
+const OPEN: f64 = -1.0;
 /// Length of a motion that is none, m: its square is a number still.
 const NOTHING: f64 = 1e-150;
 
@@ -357,7 +359,7 @@ impl Level {
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
             self.alternation.respond(port, (omega, ease.limits), c, force, slot);
             if wanted {
-                self.open(p, port);
+                self.add_springs(p, port, OPEN);
             }
             if port.marches() {
                 self.states[p].clone_from(&self.alternation.state);
@@ -435,7 +437,7 @@ impl Level {
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
             self.alternation.begin.clone_from(&self.states[p]);
             self.alternation.respond(port, (omega, ease.limits), c, force, Some(slot));
-            self.open(p, port);
+            self.add_springs(p, port, OPEN);
         }
     }
 
@@ -476,27 +478,15 @@ impl Level {
         if self.stands() { &self.acting } else { &motion.force }
     }
 
-    /// Takes these springs off the derivative of a port.
-    fn open(&mut self, p: usize, port: &Port) {
+    /// Adds so many times these springs to the derivative of the mean at a port: [`OPEN`] where the structure has them, a share of them where a step
+    /// may go as far as they allow only.
+    pub(super) fn add_springs(&mut self, p: usize, port: &Port, share: f64) {
         let nh = self.alternation.harmonics.len();
         let tall = 2 * nh * port.axes;
         let tangent = &mut self.tangents[block(&self.blocks, p, port, nh)];
         for (a, k) in self.springs.iter().skip(port.first).take(port.axes).enumerate() {
             let at = 2 * nh * a;
-            tangent[at * tall + at] -= k;
-        }
-    }
-
-    /// Adds this share of these springs to the derivative of the mean: a step then goes as far as they allow.
-    pub(super) fn hold_mean(&mut self, ports: &Ports, share: f64) {
-        let nh = self.alternation.harmonics.len();
-        for (p, port) in ports.iter().enumerate() {
-            let tall = 2 * nh * port.axes;
-            let tangent = &mut self.tangents[block(&self.blocks, p, port, nh)];
-            for (a, k) in self.springs.iter().skip(port.first).take(port.axes).enumerate() {
-                let at = 2 * nh * a;
-                tangent[at * tall + at] += share * k;
-            }
+            tangent[at * tall + at] += share * k;
         }
     }
 

@@ -724,7 +724,8 @@ impl Balance<'_> {
         if self.periods > 1 || !vibrates || !self.levels.get(&top)?.stands() {
             return None;
         }
-        let no_orbit = |course| Some(Err(OrbitError::NoOrbit { method: NAME, omega: self.drive, course }));
+        let drive = self.drive;
+        let no_orbit = |course| Some(Err(OrbitError::NoOrbit { method: NAME, omega: drive, course }));
         if let Some((_, course)) = self.followed.iter().find(|(at, _)| *at == omega) {
             return no_orbit(course.clone());
         }
@@ -739,7 +740,7 @@ impl Balance<'_> {
             return Some(Ok(orbit));
         }
         self.followed.push((omega, course.clone()));
-        Some(Err(OrbitError::NoOrbit { method: NAME, omega: self.drive, course }))
+        no_orbit(course)
     }
 
     /// The harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess.

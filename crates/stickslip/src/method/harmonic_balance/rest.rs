@@ -81,8 +81,8 @@ struct Waves {
 }
 
 impl Waves {
-    fn new(system: &System, cyclic: Cyclic) -> Option<Self> {
-        let sector = Sector::of(system.structure(), cyclic.sectors)?;
+    fn new(structure: &Structure, cyclic: Cyclic) -> Option<Self> {
+        let sector = Sector::of(structure, cyclic.sectors)?;
         Some(Waves { cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
     }
 
@@ -226,7 +226,7 @@ impl Rest {
                 rows.into_iter().collect()
             })
             .collect::<Vec<Vec<(usize, f64)>>>();
-        let waves = ports.wave().and_then(|wave| Waves::new(system, wave));
+        let waves = ports.wave().and_then(|wave| Waves::new(system.structure(), wave));
         let factored = is_factored(system.structure());
         let alone = waves.is_none();
         Rest {
@@ -268,10 +268,7 @@ impl Rest {
             .collect();
         let structure = self.structure.with_springs(&around)?;
         let waves = match &self.waves {
-            Some(waves) => {
-                let sector = Sector::of(&structure, sectors)?;
-                Some(Waves { cyclic: waves.cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
-            }
+            Some(waves) => Some(Waves::new(&structure, waves.cyclic)?),
             None => None,
         };
         let rest = Rest {

@@ -169,7 +169,9 @@ impl Level {
                 if self.mean_step(ports, at.0) <= reach {
                     break;
                 }
-                self.hold_mean(ports, share - held);
+                for (p, port) in ports.iter().enumerate() {
+                    self.add_springs(p, port, share - held);
+                }
                 held = share;
                 if !self.newton_step(ports, omega, ease, at) {
                     return None;

@@ -11,6 +11,7 @@ use crate::structure::{Sector, Structure, turn};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
+use stickslip_numerics::leading::leading;
 use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
 
 /// The modes of one nodal diameter.
@@ -153,10 +154,7 @@ impl Turned {
             place.iter().map(term).sum()
         };
         let mut at: Vec<Complex64> = places.iter().map(at).collect();
-        // of equal ones the first, whatever rounding says
-        let most = at.iter().map(|x| x.norm()).fold(0.0, f64::max);
-        let first = at.iter().find(|x| x.norm() >= (1.0 - EQUAL) * most).copied();
-        if let Some(first) = first.filter(|_| most > 0.0) {
+        if let Some(first) = leading(at.iter().map(|x| x.norm())).map(|first| at[first]) {
             at.iter_mut().for_each(|x| *x *= first.conj() / first.norm());
         }
         at
@@ -175,8 +173,6 @@ const NEAR: f64 = 1e-3;
 /// Part of a shape's square that is left beside those already found, from which on it is another one: of a pair nothing is left but rounding,
 /// and of up to six equal modes some shape always has more.
 const APART: f64 = 0.25;
-/// Displacements of places that differ by less than this share are equally large.
-const EQUAL: f64 = 1e-6;
 
 impl Model {
     /// The `lowest` modes of a ring of equal sectors by nodal diameter; `None` if the model is none, or if its sectors are too large. Sectors by
