@@ -10,6 +10,7 @@ use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::Har
 use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Motion, Spring, System, example};
 use stickslip::orbit::{Accuracy, Orbit};
 use stickslip::structure::Structure;
+use stickslip_verification::random_system;
 
 fn mass(name: &str, mass: f64) -> Mass {
     Mass::new(name, mass)
@@ -252,5 +253,17 @@ fn friction_that_is_shared_is_that_of_one_contact() {
                 "{force} N, {what}: {found} {expected} {error} {own}"
             );
         }
+    }
+}
+
+/// A spring that stiffens a thousandfold over the motion, at a frequency where Newton's method finds nothing from the linear motion: rest leads to the
+/// orbit in time, and it is that of shooting.
+#[test]
+fn time_leads_to_orbits_that_newton_misses() {
+    let (system, omega) = random_system(987);
+    let [balance, shooting]: [&dyn Method; 2] = [&HarmonicBalance::default(), &Shooting::default()];
+    let (found, expected) = (orbit(balance, &system, omega), orbit(shooting, &system, omega));
+    for (a, b) in found.places.iter().zip(&expected.places) {
+        assert!((a.amplitude() / b.amplitude() - 1.0).abs() < 1e-5, "{} {}", a.amplitude(), b.amplitude());
     }
 }

@@ -69,10 +69,9 @@ impl Judge {
         self.proven
     }
 
-    /// The motion to which one from `start` comes after a while, over one period; `None` where no flow follows the system, or where all motions come
-    /// to those that repeat with the drive, because none of two separate.
+    /// The motion to which one from `start` comes after a while, over one period; `None` where no flow follows the system.
     pub fn approach(&mut self, system: &System, omega: f64, mut start: Vec<f64>) -> Option<Arc<dyn Path>> {
-        let flow = self.flow.as_mut().filter(|_| !self.proven)?;
+        let flow = self.flow.as_mut()?;
         let period = TAU / omega;
         flow.set_drive(system, omega);
         start.resize(flow.states(), 0.0);

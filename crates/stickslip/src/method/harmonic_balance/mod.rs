@@ -100,10 +100,12 @@ const MOST: usize = 511;
 const NEARBY: usize = 20;
 /// Frequencies without an orbit at which the motion is followed, for seconds each, to say what it does; of a sweep in every one of its blocks.
 const MOST_FOLLOWED: usize = 8;
+/// Degrees of freedom up to which it is followed to find an orbit: steps of integrations multiply full matrices.
+const MOST_DOFS_IN_TIME: usize = 60;
 /// Orbits whose harmonics are kept as starts for their neighbours: those between which a peak is refined.
 const RECENT: usize = 8;
-/// Unknowns beyond which no error is estimated: the elimination would take seconds.
-const LARGEST: usize = 2100;
+/// Unknowns beyond which no error is estimated by elimination: one would take seconds, and a search takes ten and more.
+const LARGEST: usize = 2600;
 /// Memory of the equations, bytes, beyond which nothing is begun: 1000 nodes of three directions with five harmonics need half of it without modes.
 const MEMORY: f64 = 4e9;
 /// Harmonics times axes squared up to which products with all of them take a tenth of a second, so that an error is estimated.
@@ -472,6 +474,8 @@ struct Balance<'a> {
     recent: VecDeque<(Vec<f64>, usize, Motion)>,
     /// Frequencies (rad/s) at which the motion was followed and no orbit was found, and what it did.
     followed: Vec<(f64, Course)>,
+    /// How often it was followed to find one.
+    tried_in_time: usize,
 }
 
 impl<'a> Balance<'a> {
@@ -504,6 +508,7 @@ impl<'a> Balance<'a> {
             levels: BTreeMap::new(),
             recent: VecDeque::new(),
             followed: Vec::new(),
+            tried_in_time: 0,
         })
     }
 }
@@ -530,7 +535,9 @@ impl Balance<'_> {
         let harmonics = self.kept.up_to(self.kept.double(top)).len();
         let axes = self.ports.count();
         let products = (harmonics * axes * axes) as f64;
-        let few = 2 * axes * harmonics <= LARGEST || self.banded.is_some() || products <= ESTIMATED;
+        let size = 2 * axes * harmonics;
+        let multiplied = coupled::by_products(size, axes) && products <= ESTIMATED;
+        let few = size <= LARGEST || self.banded.is_some() || multiplied;
         few && level_memory(self.banded.as_ref(), &self.ports, &self.rest, harmonics) <= MEMORY
     }
 
@@ -561,9 +568,26 @@ impl Balance<'_> {
     /// that repeat after one. So the motion is followed in time for a while, if some flow follows the system; where motions do not separate there is
     /// none to be found.
     fn approached(&mut self, top: usize, omega: f64, guess: Option<&Guess>) -> Option<Motion> {
-        let start = guess.filter(|_| self.periods > 1)?.state(self.system.dofs());
+        let start = guess.filter(|_| self.periods > 1 && !self.judge.proves())?.state(self.system.dofs());
         let path = self.judge.approach(&self.system, omega, start)?;
         self.series_of(&*path, top, omega)
+    }
+
+    /// Where the search has found no orbit: from the motion that rest comes to in time, `None` where it is not followed. Of frequencies at which there is
+    /// more than one orbit it leads to one that attracts.
+    fn by_time(&mut self, omega: f64) -> Option<Orbit> {
+        // twice the harmonics, since with few of them there may be a motion that leads nowhere
+        let top = self.method.harmonics.unwrap_or(self.kept.double(self.first));
+        if self.periods > 1 || self.system.dofs() > MOST_DOFS_IN_TIME || self.tried_in_time >= MOST_FOLLOWED {
+            return None;
+        }
+        self.tried_in_time += 1;
+        self.level(top, omega).ok()?;
+        let path = self.judge.approach(&self.system, omega, vec![0.0; 2 * self.system.dofs()])?;
+        let warm = Some((top, self.series_of(&*path, top, omega)?));
+        let found =
+            if self.method.harmonics.is_some() { self.fixed(top, omega, warm) } else { self.chosen(top, omega, warm) };
+        found.ok()
     }
 
     /// The harmonics of a motion that was followed over a period.
@@ -678,9 +702,9 @@ impl Balance<'_> {
 
     /// As many harmonics as the tolerance needs. The solution that is returned is not the finest that was found, but the one whose error
     /// is known from it.
-    fn chosen(&mut self, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
+    fn chosen(&mut self, mut top: usize, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
         let tolerance = self.method.tolerance.unwrap_or(TOLERANCE);
-        let mut top = self.first;
+        let first = top;
         let mut motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
         let mut x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         // nothing is known of the error until two solutions can be compared
@@ -689,14 +713,14 @@ impl Balance<'_> {
             let (mut error, finer, y) = match self.compare(top, omega, &motion, &x) {
                 Ok(compared) => compared,
                 // what was found has an error that is known
-                Err(_) if top > self.first => break,
+                Err(_) if top > first => break,
                 Err(lost) => return Err(self.lost(lost)),
             };
-            if (self.ports.has_forces() || self.ports.has_steep()) && top > self.first {
+            if (self.ports.has_forces() || self.ports.has_steep()) && top > first {
                 error = error.max(CHANCE * estimate);
             }
             // where friction falls with velocity chance is frequent: the first distance has none before it that would show it
-            let shown = top > self.first || !self.ports.has_falling();
+            let shown = top > first || !self.ports.has_falling();
             if error <= tolerance && shown {
                 return self.finish(top, omega, motion, x, Some(error));
             }
@@ -712,7 +736,7 @@ impl Balance<'_> {
     fn from(&mut self, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
         match self.method.harmonics {
             Some(top) => self.fixed(top, omega, warm),
-            None => self.chosen(omega, warm),
+            None => self.chosen(self.first, omega, warm),
         }
     }
 
@@ -761,7 +785,8 @@ impl Solver for Balance<'_> {
         let warm = self.warm(start);
         match self.from(omega, warm) {
             Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
-                self.by_its_course(omega).unwrap_or(Err(error))
+                let by_time = |balance: &mut Self| balance.by_time(omega).ok_or(error);
+                self.by_its_course(omega).unwrap_or_else(|| by_time(self))
             }
             found => found,
         }
