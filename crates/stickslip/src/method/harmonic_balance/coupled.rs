@@ -10,6 +10,7 @@
 //! Memory: per harmonic two complex matrices over the axes, or in modes two real ones over the axes and one over axes and modes.
 
 use super::ease::{Ease, SOLVED};
+use super::equations::Near;
 use super::ports::{Port, Ports, block};
 use super::receptance::{Modal, Receptance};
 use num_complex::Complex64;
@@ -22,7 +23,7 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Unknowns from which products are faster than elimination: 16 nodes of three directions with six harmonics have 576.
 const MANY: usize = 400;
 /// Directions of joints from which they are: few with many harmonics have steps that are hard to find by products, and a small matrix.
-const DIRECTIONS: usize = 24;
+pub(super) const DIRECTIONS: usize = 24;
 /// Unknowns up to which a matrix is formed all the same where products do not lead to the step: 130 MB, seconds.
 pub(super) const FORMED: usize = 4096;
 /// Whether a level with so many unknowns along so many directions is solved by products.
@@ -36,6 +37,8 @@ const SHARE: f64 = 0.1;
 const COARSEST: f64 = 1e-6;
 /// The same at most by products with modes, which cost more than derivatives do: of 1000 nodes one takes 50 ms, all derivatives 0.3 s.
 const COARSEST_OF_MODES: f64 = 1e-2;
+/// The same at least by derivatives that are sketched, which are off by more.
+const FINEST_OF_SKETCHES: f64 = 1e-4;
 /// Vectors that are kept, and products in all.
 const VECTORS: usize = 80;
 const PRODUCTS: usize = 320;
@@ -74,17 +77,18 @@ pub(super) struct Linear<'a> {
 }
 
 impl Coupled {
-    /// The Newton step from the residual in units, in `step`, into it; `residual` is the size of that. Whether it was found, and the products that it
-    /// took; a step that was not found is the residual still.
+    /// The Newton step from the residual in units, in `step`, into it. Whether it was found, and the products that it took; a step that was not found
+    /// is the residual still.
     pub(super) fn step(
         &mut self,
         linear: &Linear<'_>,
         receptance: &mut Receptance,
         step: &mut [f64],
-        residual: f64,
+        near: Near,
     ) -> (bool, usize) {
         let coarsest = if matches!(receptance, Receptance::Modal(_)) { COARSEST_OF_MODES } else { COARSEST };
-        let wanted = (SHARE * residual).min(coarsest).max(SHARE * SOLVED / residual.max(SOLVED));
+        let (residual, finest) = (near.residual, if near.sketched { FINEST_OF_SKETCHES } else { 0.0 });
+        let wanted = (SHARE * residual).min(coarsest).max(SHARE * SOLVED / residual.max(SOLVED)).max(finest);
         let limits = Limits { tolerance: wanted, vectors: VECTORS, products: PRODUCTS };
         let right = step.to_vec();
         let (mut fresh, mut products) = (false, 0);
@@ -481,14 +485,19 @@ mod tests {
         Eliminated,
         Formed,
         Modal,
+        /// As formed, with a quarter of the samples on the way.
+        Sketched,
     }
 
-    /// The motion, and how many products it took.
-    fn solve(system: &System, omega: f64, harmonics: &[usize], form: Form) -> (Motion, usize) {
+    /// The motion, how many products it took, and how many steps of laws with a memory.
+    fn solve(system: &System, omega: f64, harmonics: &[usize], form: Form) -> (Motion, usize, usize) {
         let ports = Ports::new(system).unwrap();
         let rest = Rest::new(system, &ports);
         let mut level = Level::new(harmonics.to_vec(), 1024, &ports, None);
         level.coupled = (form != Form::Eliminated).then(Coupled::default);
+        if form == Form::Sketched {
+            level.keep_sketch();
+        }
         level.drive(system, &ports, &rest, omega).unwrap();
         if form == Form::Modal {
             let directions: Vec<_> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();
@@ -498,15 +507,16 @@ mod tests {
         }
         let start = level.begin(system, &ports, None, omega);
         let found = level.solve(&ports, omega, start);
-        (found.unwrap_or_else(|lost| panic!("{form:?} at {omega}: {lost:?}")), level.products)
+        let found = found.unwrap_or_else(|lost| panic!("{form:?} at {omega}: {lost:?}"));
+        (found, level.products, level.alternation.marched)
     }
 
     fn agree(system: &System, harmonics: &[usize], forms: &[Form]) {
         for omega in [0.6, 1.7] {
-            let (expected, _) = solve(system, omega, harmonics, Form::Eliminated);
+            let (expected, ..) = solve(system, omega, harmonics, Form::Eliminated);
             let size = expected.c.iter().map(|c| c.norm()).fold(0.0, f64::max);
             for form in forms {
-                let (found, products) = solve(system, omega, harmonics, *form);
+                let (found, products, _) = solve(system, omega, harmonics, *form);
                 assert!(products > 0 && products < 60 * found.iterations, "{products} in {}", found.iterations);
                 for (a, b) in found.c.iter().zip(&expected.c) {
                     assert!((a - b).norm() < 1e-8 * size, "{omega}: {a} {b}");
@@ -527,6 +537,40 @@ mod tests {
         };
         let contacts: Vec<_> = (0..14).map(contact).collect();
         agree(&system(&contacts), &[0, 1, 2, 3], &[Form::Formed, Form::Modal]);
+    }
+
+    /// Fewer samples on the way lead to the motion of all samples, in fewer steps of the laws.
+    #[test]
+    fn sketches_lead_to_the_motion_of_all_samples() {
+        let contact = |i: usize| -> (SharedLaw, usize) {
+            (Arc::new(Jenkins2d { stiffness: 1.5 + 0.5 * noise(i), limit: 0.2 + 0.1 * noise(5 * i) }), 2)
+        };
+        let system = system(&(0..12).map(contact).collect::<Vec<_>>());
+        for omega in [0.6, 1.1, 1.7] {
+            let (expected, _, all) = solve(&system, omega, &[0, 1, 2, 3], Form::Formed);
+            let (found, _, few) = solve(&system, omega, &[0, 1, 2, 3], Form::Sketched);
+            let size = expected.c.iter().map(|c| c.norm()).fold(0.0, f64::max);
+            let apart = found.c.iter().zip(&expected.c).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            assert!(apart < 1e-8 * size, "{omega}: {apart:.1e} of {size:.1e}");
+            assert!(few < all, "{omega}: {few} steps, {all} without");
+        }
+    }
+
+    /// Steps that are shortened again and again take no products, and end no search; products do.
+    #[test]
+    fn products_are_the_work_of_a_search() {
+        let contacts: Vec<(SharedLaw, usize)> =
+            (0..201).map(|_| (Arc::new(Jenkins2d { stiffness: 2.0, limit: 0.3 }) as SharedLaw, 2)).collect();
+        let system = system(&contacts);
+        let ports = Ports::new(&system).unwrap();
+        let mut level = Level::new(vec![1], 64, &ports, None);
+        level.begin_anew();
+        level.assembled = 10_000;
+        assert!(level.coupled.is_some() && !level.is_exhausted(&ports));
+        level.products = 1_000_000;
+        assert!(level.is_exhausted(&ports));
+        level.begin_anew();
+        assert!(!level.is_exhausted(&ports));
     }
 
     /// Unknown forces too, of rigid friction beside elastic.

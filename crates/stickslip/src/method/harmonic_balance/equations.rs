@@ -20,7 +20,7 @@
 use super::coupled::{Coupled, Linear, by_products};
 use super::ease::{Ease, GIVEN};
 use super::hold::CLEAR;
-use super::ports::{Alternation, Port, Ports, block, blocks};
+use super::ports::{Alternation, Beginning, Port, Ports, block, blocks};
 use super::receptance::{Modal, Receptance};
 use super::rest::Rest;
 use super::sparse::Sparse;
@@ -43,6 +43,10 @@ const FAR: f64 = 4.0;
 /// Share of the mean displacement that constant loads cause on closed contacts, below which no motion is solved more exactly than this share: the
 /// residual is then at the mean's rounding.
 const STANDING: f64 = 1e-5;
+/// All samples for one of a sketch, and how many a sketch has at least for the wave of the highest harmonic: as many as sliders need to tell their turning
+/// points apart.
+const FEWER: usize = 4;
+const SKETCHED: usize = 16;
 /// The share of the springs of closed contacts that a law's derivative has beside a structure that has them.
 const OPEN: f64 = -1.0;
 /// Length of a motion that is none, m: its square is a number still.
@@ -95,8 +99,14 @@ pub(super) struct Level {
     pub(super) anchor: Vec<Complex64>,
     pub(super) step: Vec<f64>,
     image: Vec<Complex64>,
-    /// Of ports with a memory, the states at t = 0 in the motion that was evaluated last.
-    states: Vec<Vec<f64>>,
+    /// Of ports with a memory, the states at t = 0 in the motion that was evaluated last, and what is forgotten of them.
+    states: Vec<Beginning>,
+    /// Whether they begin there in the next motion.
+    pub(super) nearby: bool,
+    /// The same period by a quarter of the samples, for derivatives of many contacts: see [`Level::follow_slopes`].
+    pub(super) sketch: Option<Alternation>,
+    /// Whether the present search goes by these.
+    pub(super) sketches: bool,
     /// Motions along the axes under their forces, [axis][harmonic].
     moved: Vec<Complex64>,
     product: Vec<f64>,
@@ -129,6 +139,17 @@ impl Motion {
     }
 }
 
+/// Where a step of Newton's method begins.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Near {
+    /// The yardstick of motions there, m, see [`Level::length`].
+    pub length: f64,
+    /// The size of the residual.
+    pub residual: f64,
+    /// Whether derivatives are by fewer samples, see [`Level::follow_slopes`].
+    pub sketched: bool,
+}
+
 /// Which ports' derivatives an evaluation makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Slopes {
@@ -143,7 +164,17 @@ impl Level {
         let mut level = Level::unassembled(Alternation::new(harmonics, samples), ports, sparse);
         let size = level.residual.len();
         level.coupled = (level.sparse.is_none() && by_products(size, ports.count())).then(Coupled::default);
+        if level.coupled.is_some() && !ports.has_forces() {
+            level.keep_sketch();
+        }
         level
+    }
+
+    /// Keeps fewer samples beside all, if that is enough for a sketch.
+    pub(super) fn keep_sketch(&mut self) {
+        let few = self.alternation.samples() / FEWER;
+        let top = self.harmonics().last().copied().unwrap_or(0);
+        self.sketch = (few >= SKETCHED * (top + 1)).then(|| Alternation::new(self.harmonics().to_vec(), few));
     }
 
     /// The same with a derivative that is a matrix, whatever its size.
@@ -184,7 +215,10 @@ impl Level {
             anchor: Vec::new(),
             step: vec![0.0; size],
             image: vec![ZERO; nh * widest],
-            states: vec![Vec::new(); ports.len()],
+            states: vec![Beginning::default(); ports.len()],
+            nearby: false,
+            sketch: None,
+            sketches: false,
             moved: vec![ZERO; nh * axes],
             product: vec![0.0; (2 * nh * widest).pow(2)],
         }
@@ -192,6 +226,11 @@ impl Level {
 
     pub fn harmonics(&self) -> &[usize] {
         &self.alternation.harmonics
+    }
+
+    /// Whether its steps are sought by products, see [`by_products`].
+    pub fn is_coupled(&self) -> bool {
+        self.coupled.is_some()
     }
 
     /// What is measured of a motion of one sector, over all of them: `ports` are those of the ring, and the motion's are earlier by the lead of
@@ -357,12 +396,15 @@ impl Level {
             let wanted = slopes == Slopes::All || (slopes == Slopes::Cheap && !port.marches());
             let slot = wanted.then_some(&mut self.tangents[block(&self.blocks, p, port, nh)]);
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
+            if port.marches() && self.nearby {
+                self.alternation.begin.clone_from(&self.states[p]);
+            }
             self.alternation.respond(port, (omega, ease.limits), c, force, slot);
             if wanted {
                 self.add_springs(p, port, OPEN);
             }
             if port.marches() {
-                self.states[p].clone_from(&self.alternation.state);
+                self.states[p].state.clone_from(&self.alternation.state);
             }
         }
         let share = self.load(ease);
@@ -428,17 +470,63 @@ impl Level {
         sum.sqrt()
     }
 
-    /// The derivatives that [`Slopes::Cheap`] left out, at the motion that was evaluated last.
-    pub fn follow_slopes(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, ease: Ease) {
+    /// The derivatives that [`Slopes::Cheap`] left out, at the motion that was evaluated last. If they are `sketched` those of return maps are taken by
+    /// fewer samples, where the level has such: a step of Newton's method by them leaves some thousandths of the residual, whose own samples are all
+    /// there. Whether some are so.
+    pub fn follow_slopes(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        motion: &mut Motion,
+        (ease, sketched): (Ease, bool),
+    ) -> bool {
         let nh = self.harmonics().len();
+        let mut any = false;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.marches()) {
             let range = port.first * nh..(port.first + port.axes) * nh;
             let slot = &mut self.tangents[block(&self.blocks, p, port, nh)];
-            let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
-            self.alternation.begin.clone_from(&self.states[p]);
-            self.alternation.respond(port, (omega, ease.limits), c, force, Some(slot));
+            let (c, force) = (&motion.c[range.clone()], &mut motion.force[range.clone()]);
+            let mut alternation = &mut self.alternation;
+            let mut rough = false;
+            if let Some(sketch) = self.sketch.as_mut().filter(|_| sketched && port.steps()) {
+                let image = &mut self.image[..range.len()];
+                sketch.relaxed_at_zero = alternation.relaxed_at_zero;
+                sketch.begin.state.clone_from(&self.states[p].state);
+                sketch.respond(port, (omega, ease.limits), c, image, Some(&mut *slot));
+                rough = image.iter().all(|f| f.is_finite());
+                if rough {
+                    alternation = sketch;
+                }
+            }
+            if !rough {
+                alternation.begin.clone_from(&self.states[p]);
+                alternation.respond(port, (omega, ease.limits), c, force, Some(slot));
+            }
+            // what holds was not sampled
+            any |= rough && !alternation.state.is_empty();
+            self.states[p].forgets.clone_from(&alternation.forgets);
             self.add_springs(p, port, OPEN);
         }
+        any
+    }
+
+    /// Forgets what a search has seen of the laws' memories.
+    pub fn begin_anew(&mut self) {
+        (self.assembled, self.products, self.alternation.marched) = (0, 0, 0);
+        (self.nearby, self.sketches) = (false, self.sketch.is_some());
+        self.states.iter_mut().for_each(|known| *known = Beginning::default());
+    }
+
+    /// Samples of a period, also while those of a sketch stand in for them.
+    pub fn all_samples(&self) -> usize {
+        self.sketch.iter().map(|sketch| sketch.samples()).fold(self.alternation.samples(), usize::max)
+    }
+
+    /// The sketch becomes what is sampled, and back: forces by fewer samples then, and derivatives that are theirs.
+    pub fn exchange_samples(&mut self) {
+        let Some(sketch) = &mut self.sketch else { return };
+        sketch.marched = self.alternation.marched;
+        std::mem::swap(&mut self.alternation, sketch);
     }
 
     /// Whether nothing but contacts holds some body.
@@ -550,26 +638,20 @@ impl Level {
     }
 
     /// The Newton step by products, from `self.step`, the residual in units, into it; `residual` is the size of that. False if it was not found.
-    pub(super) fn coupled_step(
-        &mut self,
-        ports: &Ports,
-        omega: f64,
-        ease: Ease,
-        (length, residual): (f64, f64),
-    ) -> bool {
+    pub(super) fn coupled_step(&mut self, ports: &Ports, omega: f64, ease: Ease, near: Near) -> bool {
         let Some(coupled) = &mut self.coupled else { return false };
         let linear = Linear {
             ports,
             harmonics: &self.alternation.harmonics,
             omega,
             ease,
-            length,
+            length: near.length,
             penalty: &self.penalty,
             tangents: &self.tangents,
             blocks: &self.blocks,
             units: &self.units,
         };
-        let (found, products) = coupled.step(&linear, &mut self.receptance, &mut self.step, residual);
+        let (found, products) = coupled.step(&linear, &mut self.receptance, &mut self.step, near);
         self.products += products;
         found
     }

@@ -476,6 +476,8 @@ struct Balance<'a> {
     followed: Vec<(f64, Course)>,
     /// How often it was followed to find one.
     tried_in_time: usize,
+    /// By the highest harmonic, of many contacts the last solution that was compared with one of twice the harmonics, and that.
+    compared: BTreeMap<usize, [Motion; 2]>,
 }
 
 impl<'a> Balance<'a> {
@@ -509,6 +511,7 @@ impl<'a> Balance<'a> {
             recent: VecDeque::new(),
             followed: Vec::new(),
             tried_in_time: 0,
+            compared: BTreeMap::new(),
         })
     }
 }
@@ -692,12 +695,33 @@ impl Balance<'_> {
         x: &[DVector<Complex64>],
     ) -> Result<(f64, Motion, Vec<DVector<Complex64>>), Lost> {
         let double = self.kept.double(top);
-        let better = self.solve(double, omega, Some((top, motion)))?;
+        let start = self.refined(top, motion);
+        self.level(double, omega)?;
+        let better = self.levels.get_mut(&double).expect("made above").solve(&self.ports, omega, start)?;
+        if self.levels[&double].is_coupled() {
+            self.compared.insert(top, [motion.clone(), better.clone()]);
+        }
         let y = self.places(double, omega, &better)?;
         let finer = self.levels.get_mut(&double).expect("solved");
         let coarse = Compared { harmonics: &self.kept.up_to(top), places: x, along: &motion.c };
         let at = (self.kept, omega);
         Ok((estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &better, &y)), better, y))
+    }
+
+    /// A start with twice the harmonics: a solution, and what these added to the last one that was compared.
+    fn refined(&self, top: usize, motion: &Motion) -> Motion {
+        let harmonics = |top: usize| self.kept.up_to(top);
+        let (few, many) = (harmonics(top), harmonics(self.kept.double(top)));
+        let mut start = equations::transfer(motion, &few, &many);
+        if let Some([coarse, fine]) = self.compared.get(&top) {
+            let coarse = equations::transfer(coarse, &few, &many);
+            let add = |to: &mut [Complex64], coarse: &[Complex64], fine: &[Complex64]| {
+                to.iter_mut().zip(fine.iter().zip(coarse)).for_each(|(to, (fine, coarse))| *to += fine - coarse);
+            };
+            add(&mut start.c, &coarse.c, &fine.c);
+            add(&mut start.force, &coarse.force, &fine.force);
+        }
+        start
     }
 
     /// As many harmonics as the tolerance needs. The solution that is returned is not the finest that was found, but the one whose error

@@ -8,9 +8,10 @@
 //! matrices are those of one sector. Displacements and forces are those of the whole ring all the same.
 
 use super::closed;
+use super::coupled::DIRECTIONS;
 use super::hold::HOLD;
 use super::ports::Ports;
-use super::uncoupled::{Resonant, Uncoupled};
+use super::uncoupled::{Resonant, Uncoupled, by_themselves};
 use crate::model::{Cyclic, System};
 use crate::structure::{DynamicStiffness, Matrices, Sector, Structure, Wave, WaveStiffness, turn};
 use nalgebra::{DMatrix, DVector};
@@ -232,7 +233,7 @@ impl Rest {
         Rest {
             n,
             modal: if factored || !alone { None } else { modal(system, &columns(n, &directions)) },
-            uncoupled: if factored && alone {
+            uncoupled: if alone && (factored || (directions.len() >= DIRECTIONS && is_modal(system.structure()))) {
                 Uncoupled::new(system.structure(), &directions).map(Arc::new)
             } else {
                 None
@@ -536,6 +537,11 @@ impl Rest {
 /// Whether the dynamic stiffness is factored at every frequency.
 fn is_factored(structure: &Structure) -> bool {
     structure.is_sparse() || structure.dofs() > MODES
+}
+
+/// Whether its coordinates are its modes, as those of a reduction are: real ones, whose receptances are made in blocks.
+fn is_modal(structure: &Structure) -> bool {
+    by_themselves(structure).is_some()
 }
 
 /// As in the modal form, what nothing holds has a mean position by a soft spring, 1/s² times its mass.

@@ -42,7 +42,7 @@ impl Uncoupled {
     /// `None` if damping couples the modes, or if there are too many.
     pub fn new(structure: &Structure, directions: &[Vec<(usize, f64)>]) -> Option<Self> {
         let n = structure.dofs();
-        let (own, shapes) = match diagonal(structure) {
+        let (own, shapes) = match by_themselves(structure) {
             Some(own) => (own, None),
             None if structure.is_sparse() || n > MOST => return None,
             None => {
@@ -53,12 +53,11 @@ impl Uncoupled {
         let axes = directions.len();
         let mut at = vec![0.0; axes * n];
         for (q, rows) in directions.iter().enumerate() {
-            for &(i, w) in rows {
-                match &shapes {
-                    None => at[i * axes + q] += w,
-                    Some(shapes) => (0..n).for_each(|m| at[m * axes + q] += w * shapes[(i, m)]),
-                }
-            }
+            rows.iter().for_each(|&(i, w)| at[i * axes + q] += w);
+        }
+        if let Some(shapes) = &shapes {
+            let along = std::mem::replace(&mut at, vec![0.0; axes * n]);
+            multiply_in_blocks(&along, shapes.as_slice(), &mut at, (axes, n, n), false);
         }
         Some(Uncoupled { own, shapes, at, axes })
     }
@@ -135,7 +134,7 @@ impl Uncoupled {
 }
 
 /// The diagonals of a structure that has nothing beside them.
-fn diagonal(structure: &Structure) -> Option<Vec<[f64; 3]>> {
+pub(super) fn by_themselves(structure: &Structure) -> Option<Vec<[f64; 3]>> {
     let mut own = vec![[0.0; 3]; structure.dofs()];
     for (i, k, values) in structure.entries() {
         if i != k {

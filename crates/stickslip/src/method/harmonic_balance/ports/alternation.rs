@@ -32,8 +32,10 @@ pub(in super::super) struct Alternation {
     pub by_frequency: Option<Vec<Complex64>>,
     /// Internal states at t = 0 of the port evaluated last.
     pub state: Vec<f64>,
-    /// States at t = 0 from which the next port with a memory begins, if they are known; used up by it.
-    pub begin: Vec<f64>,
+    /// Where the next port with a memory begins, if that is known; used up by it.
+    pub begin: Beginning,
+    /// `(1 - Π)⁻¹` of the port with a memory that was evaluated last with its derivative, see [`Beginning`].
+    pub forgets: Vec<f64>,
     /// `e^{2πji/N}`.
     pub(super) turns: Vec<Complex64>,
     pub(super) argument: Vec<Complex64>,
@@ -47,6 +49,15 @@ pub(in super::super) struct Alternation {
     pub(super) extremes: Vec<super::events::Extreme>,
     pub(super) grid: super::events::Grid,
     pub(super) march: super::memory::Memory,
+}
+
+/// What is known of the states of a port with a memory in a motion nearby.
+#[derive(Debug, Clone, Default)]
+pub(in super::super) struct Beginning {
+    /// States at t = 0; empty where they are sought from the first movement on.
+    pub state: Vec<f64>,
+    /// `(1 - Π)⁻¹`, row by row, with Π what a period leaves of a change of these; empty where nothing is known, or where something is never forgotten.
+    pub forgets: Vec<f64>,
 }
 
 impl Alternation {
@@ -66,7 +77,8 @@ impl Alternation {
             slips: vec![false; samples],
             by_frequency: None,
             state: Vec::new(),
-            begin: Vec::new(),
+            begin: Beginning::default(),
+            forgets: Vec::new(),
             turns: (0..samples).map(|i| Complex64::cis(i as f64 * TAU / samples as f64)).collect(),
             argument: Vec::new(),
             work: zeros.clone(),

@@ -24,6 +24,8 @@ const PERIODS: usize = 60;
 /// costs as much as three without.
 const FORGETS: usize = 6;
 const SLOW: f64 = 0.03;
+/// Share of the least distance so far that a period is to leave where the derivative of a motion nearby leads; one may miss it.
+const NEARER: f64 = 0.3;
 /// Singular values of `1 - Π` below this belong to states that nothing forgets.
 const NEUTRAL: f64 = 1e-9;
 /// Harmonics up to which those of a derivative are made by a matrix, not by transforms.
@@ -88,13 +90,21 @@ impl Alternation {
         let scale = march.state_scale();
         let known = std::mem::take(&mut self.begin);
         let mut z = DVector::zeros(m);
-        if m > 0 && known.len() == m {
-            z.copy_from_slice(&known);
+        let begun = m > 0 && known.state.len() == m;
+        if begun {
+            z.copy_from_slice(&known.state);
         } else {
             let mut force = [0.0; MOST_DIRECTIONS];
             if !march.first(&vec![0.0; m], z.as_mut_slice(), &mut force, None) {
                 return None;
             }
+        }
+        if m > 0 && !linear && known.forgets.len() == m * m {
+            let inverse = DMatrix::from_row_slice(m, m, &known.forgets);
+            if self.repeat_nearby(march, &mut z, inverse)? {
+                return Some(DMatrix::zeros(m, m));
+            }
+        } else if !begun {
             // what slips forgets its beginning in a few periods: no derivative is needed to see that
             let mut last = f64::INFINITY;
             for _ in 0..FORGETS {
@@ -132,6 +142,42 @@ impl Alternation {
         None
     }
 
+    /// From states that repeat in a motion nearby to those that repeat in this one, by what a period forgets in that motion and by what it is seen to
+    /// forget in this one: without derivatives, which cost as much as three periods. Whether they were found, into `self.state`; if not `z` is nearer
+    /// to them all the same.
+    /// Source: Broyden, "A class of methods for solving nonlinear simultaneous equations" (1965), his good one.
+    fn repeat_nearby(
+        &mut self,
+        march: &mut dyn March,
+        z: &mut DVector<f64>,
+        mut inverse: DMatrix<f64>,
+    ) -> Option<bool> {
+        let scale = march.state_scale();
+        let mut change = self.period(march, z, None)? - &*z;
+        let mut best = change.amax() / scale;
+        let mut waited = 0;
+        while best > REPEATS {
+            let step = &inverse * &change;
+            *z += &step;
+            let after = self.period(march, z, None)? - &*z;
+            let gap = after.amax() / scale;
+            (best, waited) = if gap < NEARER * best { (gap, 0) } else { (best.min(gap), waited + 1) };
+            if waited > 1 || !gap.is_finite() {
+                return Some(false);
+            }
+            // the step that this change of the gap would have asked for
+            let seen = &inverse * (&change - &after);
+            let size = step.dot(&seen);
+            if size != 0.0 {
+                inverse += (&step - &seen) * (step.transpose() * &inverse) / size;
+            }
+            change = after;
+        }
+        self.state.clear();
+        self.state.extend(z.iter());
+        Some(true)
+    }
+
     /// A period from the states `z`.
     fn period(
         &mut self,
@@ -159,26 +205,16 @@ impl Alternation {
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let n = self.samples();
         let (m, d) = (march.states(), march.axes());
-        let (inputs, width) = (march.inputs() * d, width(march));
         let after = self.period(march, z, Some(&mut memory.rows))?;
-        // Π of the steps so far, row by row
-        let mut product: Vec<f64> = (0..m * m).map(|at| if at % (m + 1) == 0 { 1.0 } else { 0.0 }).collect();
-        let mut next = vec![0.0; m * m];
-        memory.by_state.resize(n * d * m, 0.0);
-        for step in 1..=n {
-            let i = step % n;
-            let rows = memory.rows[i * (m + d) * width..(i + 1) * (m + d) * width].chunks_exact(width);
-            let forces = &mut memory.by_state[i * d * m..(i + 1) * d * m];
-            let out = next.chunks_exact_mut(m.max(1)).chain(forces.chunks_exact_mut(m.max(1)));
-            for (row, out) in rows.zip(out) {
-                let row = &row[inputs..inputs + m];
-                for (t, out) in out.iter_mut().enumerate() {
-                    *out = row.iter().zip(product[t..].iter().step_by(m)).map(|(x, p)| x * p).sum();
-                }
-            }
-            std::mem::swap(&mut product, &mut next);
-        }
-        Some((after, DMatrix::from_row_slice(m, m, &product)))
+        let chain = Chain {
+            rows: &memory.rows,
+            width: width(march),
+            before: march.inputs() * d,
+            states: m,
+            axes: d,
+            samples: n,
+        };
+        Some((after, chain.product(None)))
     }
 
     /// Adds the derivative of the forces. False if the first movement has none.
@@ -192,9 +228,23 @@ impl Alternation {
         let (n, nh) = (self.samples(), self.harmonics.len());
         let (m, d) = (march.states(), march.axes());
         let size = 2 * nh * d;
+        let chain = Chain {
+            rows: &memory.rows,
+            width: width(march),
+            before: march.inputs() * d,
+            states: m,
+            axes: d,
+            samples: n,
+        };
+        memory.by_state.resize(n * d * m, 0.0);
+        chain.product(Some(&mut memory.by_state));
         let open = DMatrix::identity(m, m) - product;
         let neutral = m > 0 && open.clone().singular_values().min() <= NEUTRAL;
         let inverse = pseudo_inverse(open);
+        self.forgets.clear();
+        if !neutral {
+            self.forgets.extend(inverse.transpose().iter());
+        }
         // where something is never forgotten, its derivative is that of the first period
         let beginning = if neutral {
             let mut first = std::mem::take(&mut memory.first);
@@ -370,6 +420,65 @@ impl Alternation {
         let run = self.period(march, &z, Some(&mut rows));
         self.force = forces;
         run.map(|_| rows)
+    }
+}
+
+/// The derivatives of all steps of a period: [sample][state, then force], each by inputs, then by the states before, from `before` on.
+struct Chain<'a> {
+    rows: &'a [f64],
+    width: usize,
+    before: usize,
+    states: usize,
+    axes: usize,
+    samples: usize,
+}
+
+impl Chain<'_> {
+    /// Π, the states after a period by those before it; the forces by these into `forces`, [sample][axis][state].
+    fn product(&self, forces: Option<&mut [f64]>) -> DMatrix<f64> {
+        match self.states {
+            0 => DMatrix::zeros(0, 0),
+            1 => self.multiplied::<1>(forces),
+            2 => self.multiplied::<2>(forces),
+            _ => self.of_any(forces),
+        }
+    }
+
+    /// With so many states: most laws have one or two.
+    fn multiplied<const M: usize>(&self, mut forces: Option<&mut [f64]>) -> DMatrix<f64> {
+        let mut product: [[f64; M]; M] = std::array::from_fn(|s| std::array::from_fn(|t| f64::from(u8::from(s == t))));
+        for step in 1..=self.samples {
+            let i = step % self.samples;
+            let rows = &self.rows[i * (M + self.axes) * self.width..][..(M + self.axes) * self.width];
+            let (states, own) = rows.split_at(M * self.width);
+            let times = |row: &[f64]| -> [f64; M] {
+                let row = &row[self.before..self.before + M];
+                std::array::from_fn(|t| row.iter().zip(&product).map(|(x, p)| x * p[t]).sum())
+            };
+            if let Some(forces) = forces.as_deref_mut() {
+                let out = forces[i * self.axes * M..][..self.axes * M].chunks_exact_mut(M);
+                own.chunks_exact(self.width).zip(out).for_each(|(row, out)| out.copy_from_slice(&times(row)));
+            }
+            product = std::array::from_fn(|s| times(&states[s * self.width..]));
+        }
+        DMatrix::from_fn(M, M, |s, t| product[s][t])
+    }
+
+    fn of_any(&self, mut forces: Option<&mut [f64]>) -> DMatrix<f64> {
+        let m = self.states;
+        let mut product = DMatrix::identity(m, m);
+        for step in 1..=self.samples {
+            let i = step % self.samples;
+            let size = (m + self.axes) * self.width;
+            let rows = DMatrix::from_row_slice(m + self.axes, self.width, &self.rows[i * size..(i + 1) * size]);
+            let next = rows.columns(self.before, m) * &product;
+            if let Some(forces) = forces.as_deref_mut() {
+                let out = &mut forces[i * self.axes * m..][..self.axes * m];
+                out.iter_mut().enumerate().for_each(|(at, out)| *out = next[(m + at / m, at % m)]);
+            }
+            product = next.rows(0, m).into_owned();
+        }
+        product
     }
 }
 

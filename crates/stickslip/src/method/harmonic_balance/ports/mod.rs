@@ -18,7 +18,7 @@ mod step;
 #[cfg(test)]
 mod tests;
 
-pub(super) use alternation::Alternation;
+pub(super) use alternation::{Alternation, Beginning};
 use prox::Rigid;
 use sliders::Part;
 
@@ -75,6 +75,11 @@ impl Port {
     pub fn marches(&self) -> bool {
         matches!(self.kernel, Kernel::Step(_))
             || matches!(&self.kernel, Kernel::Rate(law) if law.rate().is_some_and(|rate| rate.states() > 0))
+    }
+
+    /// Whether it is followed by its return map.
+    pub fn steps(&self) -> bool {
+        matches!(self.kernel, Kernel::Step(_))
     }
 
     /// Whether it holds rigidly, so that accelerations jump.

@@ -3,7 +3,7 @@
 //! A straight step is exact for elastic-plastic laws along one direction; between samples the motion is curved, and what that
 //! leaves out is `(2π h/N)²/8` of the motion at harmonic h, some 5e-6 at 1024 samples.
 
-use super::alternation::{Alternation, add_entries};
+use super::alternation::{Alternation, Beginning, add_entries};
 use super::march::March;
 use crate::law::{MOST_DIRECTIONS, Step, StepPoint};
 use num_complex::Complex64;
@@ -34,7 +34,8 @@ impl Alternation {
             return self.step_by_step(step, axes, c, force, tangent);
         }
         self.state.clear();
-        self.begin.clear();
+        self.forgets.clear();
+        self.begin = Beginning::default();
         let mut point = StepPoint::new(axes, step.states());
         step.linearise(axes, &mean, &mean, &vec![0.0; step.states()], &mut point);
         let mut tangent = tangent;
@@ -199,6 +200,39 @@ mod tests {
                 alternation.step(law, axes, &far, force, None);
                 assert!(alternation.marched > 0, "{law:?} slips");
             }
+        }
+    }
+
+    /// From what was seen of a motion nearby the states are found that are found from rest, in fewer periods.
+    #[test]
+    fn states_follow_from_those_of_a_motion_nearby() {
+        let contact = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.5, preload: 1.0, tangents: 2 };
+        let harmonics = vec![0, 1, 2, 3];
+        let nh = harmonics.len();
+        let at = |change: f64| -> Vec<Complex64> {
+            let own = |i: usize| Complex64::new(0.2 / (1.0 + i as f64), if i.is_multiple_of(nh) { 0.0 } else { -0.1 });
+            (0..3 * nh).map(|i| own(i) * (1.0 + change * (i as f64).sin())).collect()
+        };
+        let none = vec![Complex64::new(0.0, 0.0); 3 * nh];
+        let mut alternation = Alternation::new(harmonics, 512);
+        let mut slopes = vec![0.0; (6 * nh).pow(2)];
+        alternation.step(&contact, 3, &at(0.0), &mut none.clone(), Some(&mut slopes));
+        let known = Beginning { state: alternation.state.clone(), forgets: alternation.forgets.clone() };
+        assert!(known.forgets.len() == 4, "a contact that slips forgets");
+        for change in [1e-6, 1e-2, 0.3] {
+            let mut run = |begin: Beginning| {
+                let mut force = none.clone();
+                (alternation.begin, alternation.marched) = (begin, 0);
+                alternation.step(&contact, 3, &at(change), &mut force, None);
+                (force, alternation.marched)
+            };
+            let (from_rest, many) = run(Beginning::default());
+            let (nearby, few) = run(known.clone());
+            assert!(
+                from_rest.iter().zip(&nearby).all(|(a, b)| (a - b).norm() < 1e-11),
+                "{change}: {from_rest:?} {nearby:?}"
+            );
+            assert!(few < many || change > 0.1, "{change}: {few} steps, {many} from rest");
         }
     }
 }
