@@ -1,81 +1,158 @@
 //! `stickslip reduce`: the structure of a study in few coordinates, as files that a study can read instead of the whole.
 
 use crate::{Ending, print, run};
+use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use stickslip::model::{Axis, Model, System};
+use stickslip::model::{Axis, Model, Place, Substructure, SubstructureDamping, System};
+use stickslip::structure::reduction::Row;
+use stickslip::structure::{Reduction, ReductionKind};
 use stickslip_formats::{Matrix, Symmetry};
-use stickslip_study::StudyError;
+use stickslip_numerics::sparse;
+use stickslip_study::Exports;
 
 /// Name of the file with `[structure]` and `[[place]]`.
 const TABLES: &str = "structure.toml";
 
 /// Reduces the structure of the first case and writes it into the folder `out`.
 pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
-    let (model, stiffened) = match model(file, set) {
+    let read = stickslip_study::read_file(file, set).and_then(|study| Ok((study.case(0)?.model, study.stiffened())));
+    let (model, exports) = match read {
         Ok(read) => read,
         Err(error) => {
             run::show(&error);
             return Ending::WrongInput;
         }
     };
+    let failed = |message: &str| Ending::Failed(format!("{}: {message}", file.display()));
     let Some(substructure) = &model.substructure else {
-        return Ending::Failed(format!("{}: there is no [structure] that could be reduced", file.display()));
+        return failed("there is no [structure] that could be reduced");
     };
     if model.ring.is_some() {
-        let message =
-            "a sector of a disk is reduced for all of its waves by every study of it, and has no files of its own";
-        return Ending::Failed(format!("{}: {message}", file.display()));
+        return failed(
+            "a sector of a disk is reduced for all of its waves by every study of it, and has no files of its own",
+        );
     }
-    if stiffened {
-        let message = "rotation stiffens its [structure] (`stiffened`), so that a reduction serves one speed, and files of it would be those of that speed \
-                       alone; leave `stiffened` out to save the structure at rest, or name the stiffness of one speed as `stiffness`. Studies reduce at every \
-                       speed by themselves";
-        return Ending::Failed(format!("{}: {message}", file.display()));
+    if substructure.reduction == Reduction::None {
+        return failed(
+            "its [structure] says reduce = false: nothing is to be saved; say how far the reduction is to reach",
+        );
     }
-    let alone = Model { substructure: Some(substructure.clone()), places: model.places.clone(), ..Model::default() };
-    let system = match alone.assemble() {
-        Ok(system) => system,
-        Err(error) => return Ending::Failed(error.to_string()),
+    let few = match exports {
+        Some(exports) => over_speeds(substructure, &model.places, &exports),
+        None => at_rest(substructure, &model.places),
     };
-    let Some(reduced) = system.reduced() else {
-        let message =
-            "its [structure] says reduce = false: nothing is to be saved; say how far the reduction is to reach";
-        return Ending::Failed(format!("{}: {message}", file.display()));
-    };
-    match save(&system, &format!("{reduced}"), out) {
-        Ok(()) => print(&format!(
-            "{}: {} rows, {reduced}\n  written to {}; put {} in the place of [structure] and [[place]]\n",
+    match few.and_then(|few| save(&few, out).map(|()| few)) {
+        Ok(few) => print(&format!(
+            "{}: {} rows, {}\n  written to {}; put {} in the place of [structure] and [[place]]\n",
             file.display(),
             substructure.component.dofs(),
+            few.what,
             out.display(),
             out.join(TABLES).display(),
         )),
-        Err(message) => Ending::Failed(message),
+        Err(message) => failed(&message),
     }
 }
 
-/// The model of the first case, and whether its structure depends on a speed.
-fn model(file: &Path, set: &[(String, String)]) -> Result<(Model, bool), StudyError> {
-    let study = stickslip_study::read_file(file, set)?;
-    Ok((study.case(0)?.model, study.is_stiffened()))
+/// What is saved.
+struct Few {
+    system: System,
+    /// How it was made, and its error.
+    what: String,
+    /// More keys of `[structure]`.
+    keys: Vec<String>,
+    /// The stiffness at a speed.
+    there: Option<sparse::Matrix>,
 }
 
-fn save(system: &System, what: &str, out: &Path) -> Result<(), String> {
+/// Row, column, value.
+type Entries = Vec<(usize, usize, f64)>;
+
+fn at_rest(substructure: &Substructure, places: &[Place]) -> Result<Few, String> {
+    let alone = Model { substructure: Some(substructure.clone()), places: places.to_vec(), ..Model::default() };
+    let system = alone.assemble().map_err(|error| error.to_string())?;
+    let what = system.reduced().map(ToString::to_string).unwrap_or_default();
+    Ok(Few { system, what, keys: vec!["reduce = false".to_owned()], there: None })
+}
+
+/// In coordinates that serve all speeds up to that of the second export.
+fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports) -> Result<Few, String> {
+    let seen: Vec<Row> =
+        places.iter().filter(|place| place.of.is_none()).flat_map(|place| place.rows.clone()).collect();
+    let few = exports.rest.reduced_between(&exports.there, &seen, &substructure.reduction);
+    let few = few.map_err(|error| error.to_string())?;
+    let mut seen = few.seen.into_iter();
+    let mut places: Vec<Place> = places.to_vec();
+    let rows = places.iter_mut().filter(|place| place.of.is_none()).flat_map(|place| &mut place.rows);
+    rows.zip(&mut seen).for_each(|(row, seen)| *row = seen);
+    let n = few.component.dofs();
+    let (component, damping) = (few.component, SubstructureDamping::Own);
+    let whole = Substructure { component, damping, reduction: Reduction::None, disk: None };
+    let model = Model { substructure: Some(whole), places, ..Model::default() };
+    let system = model.assemble().map_err(|error| error.to_string())?;
+    let what = format!(
+        "{n} coordinates ({}), error {:.1e} up to {:.6} Hz, at all speeds up to {:.6} rpm",
+        few.kind,
+        few.error,
+        few.up_to / TAU,
+        60.0 * exports.at / TAU
+    );
+    let speed = format!(
+        "stiffened = {{ file = \"stiffened.mtx\", at = \"{:e} rad/s\", speed = {:?} }}   # an expression over the parameters of the study",
+        exports.at, exports.speed
+    );
+    let keys = [vec![speed], damping_keys(substructure)].concat();
+    Ok(Few { system, what, keys, there: Some(few.there) })
+}
+
+/// Damping that follows the stiffness at every speed; of modes that of those that a reduction at that speed has.
+fn damping_keys(substructure: &Substructure) -> Vec<String> {
+    let reduce = match substructure.reduction {
+        Reduction::UpTo { up_to, tolerance, kind } => {
+            format!("reduce = {{ up_to = \"{:e} rad/s\", tolerance = {tolerance:e}{} }}", up_to, named(kind))
+        }
+        Reduction::Modes { modes, kind } => format!("reduce = {{ modes = {modes}{} }}", named(Some(kind))),
+        Reduction::None => "reduce = false".to_owned(),
+    };
+    match substructure.damping {
+        SubstructureDamping::Own => vec!["reduce = false".to_owned()],
+        SubstructureDamping::Rayleigh { mass, stiffness } => vec![
+            "reduce = false".to_owned(),
+            format!("rayleigh = {{ mass = \"{mass:e} /s\", stiffness = \"{stiffness:e} s\" }}"),
+        ],
+        SubstructureDamping::Ratio(ratio) => vec![reduce, format!("modal_damping = {ratio:e}")],
+    }
+}
+
+fn named(kind: Option<ReductionKind>) -> &'static str {
+    match kind {
+        None => "",
+        Some(ReductionKind::Rubin) => ", kind = \"rubin\"",
+        Some(ReductionKind::CraigBampton) => ", kind = \"craig-bampton\"",
+    }
+}
+
+fn save(few: &Few, out: &Path) -> Result<(), String> {
     std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
-    let (n, structure) = (system.dofs(), system.structure());
-    let mut files = vec![("stiffness", structure.stiffness()), ("mass", structure.mass())];
-    if structure.largest()[1] > 0.0 {
-        files.push(("damping", structure.damping()));
+    let (system, n, structure) = (&few.system, few.system.dofs(), few.system.structure());
+    let mut files: Vec<(&str, Entries)> = Vec::new();
+    for (number, key) in ["mass", "damping", "stiffness"].into_iter().enumerate() {
+        if key != "damping" || structure.largest()[number] > 0.0 {
+            files.push((key, structure.entries().map(|(i, k, values)| (i, k, values[number])).collect()));
+        }
     }
-    let mut text = format!("# {what}\n[structure]\nunits = \"m-kg-s\"\nreduce = false\n");
-    for (key, matrix) in files {
+    files.extend(few.there.iter().map(|there| ("stiffened", there.entries().collect())));
+    let mut text = format!("# {}\n[structure]\nunits = \"m-kg-s\"\n{}\n", few.what, few.keys.join("\n"));
+    for (key, entries) in files {
         let path: PathBuf = out.join(format!("{key}.mtx"));
-        let entries = (0..n).flat_map(|k| (0..n).map(move |i| (i, k))).map(|at| (at.0, at.1, matrix[at]));
         let made =
             Matrix::new(n, n, Symmetry::General, entries).and_then(|matrix| stickslip_formats::write(&path, &matrix));
         made.map_err(|error| error.to_string())?;
-        let _ = writeln!(text, "{key} = \"{key}.mtx\"");
+        // its key has a speed beside the file
+        if key != "stiffened" {
+            let _ = writeln!(text, "{key} = \"{key}.mtx\"");
+        }
     }
     let mut nodes: Vec<(&str, Vec<(&str, &Axis)>)> = Vec::new();
     for (place, axis) in system.places().iter().zip(system.seen()) {

@@ -6,6 +6,7 @@ use faer::linalg::lu::partial_pivoting::solve::{
     solve_in_place, solve_in_place_scratch, solve_transpose_in_place, solve_transpose_in_place_scratch,
 };
 use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::perm::PermRef;
 use faer::traits::ComplexField;
 use faer::{Accum, MatMut, MatRef, Par, Spec};
@@ -181,6 +182,27 @@ pub fn multiply_in_blocks(
     };
     let c = MatMut::from_column_major_slice_mut(&mut c[..rows * columns], rows, columns);
     matmul(c, Accum::Replace, a, b, 1.0, Par::Seq);
+}
+
+/// Solves `L X = B`, or `Lᵀ X = B` if `transposed`, with the lower triangle L of a column-major matrix `n × n`, in place for columns of length n one after the
+/// other, in blocks that stay in the cache.
+///
+/// # Example
+/// ```
+/// let (lower, mut right) = ([2.0, 1.0, 0.0, 4.0], [2.0, 9.0]);
+/// stickslip_numerics::dense::solve_lower_in_blocks(&lower, 2, &mut right, false);
+/// assert_eq!(right, [1.0, 2.0]);
+/// stickslip_numerics::dense::solve_lower_in_blocks(&lower, 2, &mut right, true);
+/// assert_eq!(right, [0.25, 0.5]);
+/// ```
+pub fn solve_lower_in_blocks(lower: &[f64], n: usize, right: &mut [f64], transposed: bool) {
+    let columns = right.len() / n.max(1);
+    let lower = MatRef::from_column_major_slice(&lower[..n * n], n, n);
+    let right = MatMut::from_column_major_slice_mut(&mut right[..n * columns], n, columns);
+    match transposed {
+        false => solve_lower_triangular_in_place(lower, right, Par::Seq),
+        true => solve_upper_triangular_in_place(lower.transpose(), right, Par::Seq),
+    }
 }
 
 /// Numbers that [`Lu`] takes: real and complex ones.

@@ -56,5 +56,6 @@ pub mod work;
 
 pub use error::StudyError;
 pub use read::{TemplateParameter, read_bytes, read_document, read_file, read_stored, read_study};
+pub use stiffened::Exports;
 pub use study::{Case, MethodChoice, Study, VariedValue};
 pub use values::{Frequencies, Values, hertz};

@@ -10,6 +10,19 @@ use stickslip_numerics::sparse::{Matrix, MatrixError};
 /// Components at so many speeds are kept: reductions belong to a component, and cases at one speed share it.
 const KEPT: usize = 16;
 
+/// Both exports of a study's structure.
+#[derive(Debug, Clone)]
+pub struct Exports {
+    /// At rest.
+    pub rest: Component,
+    /// The stiffness at a speed, N/m.
+    pub there: Matrix,
+    /// That speed, rad/s.
+    pub at: f64,
+    /// The speed of the study, as its file states it.
+    pub speed: String,
+}
+
 /// What the second export has more.
 #[derive(Debug, Clone)]
 pub(crate) struct Stiffened {

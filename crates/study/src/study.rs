@@ -13,6 +13,7 @@ use crate::sample::{Drawn, Sample};
 use crate::sector::{none_around, sector_of};
 use crate::stated::{Matrices, Structure, problem_of};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
+use crate::stiffened::Exports;
 use crate::substructure;
 use crate::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
 use serde_json::{Value as Json, json};
@@ -309,9 +310,17 @@ impl Study {
         matches!(self.study.entry("frequency").map(|entry| &entry.value), Some(Stated::Adaptive { .. }))
     }
 
-    /// Whether rotation stiffens the structure by its matrices (`stiffened`), which then is another one at every speed.
-    pub fn is_stiffened(&self) -> bool {
-        self.structure.matrices.as_ref().is_some_and(|matrices| matrices.stiffened.is_some())
+    /// Both exports of a structure by its matrices that rotation stiffens (`stiffened`), at the values of the first case.
+    pub fn stiffened(&self) -> Option<Exports> {
+        let Matrices { table, component, stiffened, .. } = self.structure.matrices.as_ref()?;
+        let Stated::Table(spin) = &table.entry("stiffened")?.value else { return None };
+        let Stated::Quantity { quantity: speed, .. } = &spin.entry("speed")?.value else { return None };
+        let values = evaluate(&self.names, &self.parameters, &self.order, &self.choice(0), &[]).ok()?;
+        let environment = Environment { names: &self.names, values };
+        let at = spin.values(&environment, &mut Vec::new()).quantity("at")?;
+        let rest = component.clone()?;
+        let there = stiffened.as_ref()?.at(&rest, 1.0).ok()?.matrices().2.clone();
+        Some(Exports { rest, there, at, speed: speed.text.clone() })
     }
 
     /// The values of `[figure]`.

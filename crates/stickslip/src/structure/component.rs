@@ -3,10 +3,11 @@
 
 use super::cyclic::{Blade, BladeError, Boundary, CyclicSector};
 use super::reduction::{
-    Damping, Deviation, Free, MistunedRing, Reduce, Reduced, ReducedSector, ReductionError, Reference, Row, STEPS,
-    Whole, alone, lacking_most,
+    Damping, Deviation, Free, MistunedRing, Mixed, NominalRing, Reduce, Reduced, ReducedSector, ReductionError,
+    Reference, RingModes, Row, STEPS, Whole, alone, lacking_most,
 };
 use super::{StructureError, symmetric};
+use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -65,7 +66,7 @@ pub(crate) struct SectorBlade {
     /// In the coordinates of a reduction with that many steps of its vectors.
     reductions: Known<(Asked, usize), Relieved>,
     /// By the deviations of all blades.
-    mistuned: Known<Pattern, MistunedSector>,
+    mistuned: Known<Pattern, Arc<ReducedComponent>>,
 }
 
 type KeptBlade = Result<Arc<SectorBlade>, BladeError>;
@@ -73,20 +74,13 @@ type KeptBlade = Result<Arc<SectorBlade>, BladeError>;
 type Pattern = (Asked, Vec<f64>);
 type Relieved = Result<Arc<InFew>, ReductionError>;
 
-/// A sector in few coordinates, and what a share of one of its blade's stiffness adds over them.
+/// A sector in few coordinates, and the ring in the modes of its waves.
 #[derive(Debug)]
 struct InFew {
     component: Arc<ReducedComponent>,
-    of_blade: Vec<(usize, usize, f64)>,
+    ring: NominalRing,
     /// Frequencies of modes that lack most when the blades differ, rad/s.
     suspect: Vec<f64>,
-}
-
-/// A sector for a ring whose blades differ.
-#[derive(Debug, Clone)]
-pub(crate) struct MistunedSector {
-    pub component: Arc<ReducedComponent>,
-    few: Arc<InFew>,
 }
 
 /// What was asked, and the answers.
@@ -149,6 +143,23 @@ pub struct ReducedComponent {
     up_to: f64,
 }
 
+/// A component in few coordinates that also serve another stiffness, see [`Component::reduced_between`].
+#[derive(Debug, Clone)]
+pub struct BetweenComponent {
+    /// With its own stiffness.
+    pub component: Component,
+    /// The other stiffness over the same coordinates, N/m.
+    pub there: Matrix,
+    /// What is seen, over the coordinates.
+    pub seen: Vec<Row>,
+    /// How it was made, in words.
+    pub kind: String,
+    /// The largest relative error of what is seen, at both ends and between.
+    pub error: f64,
+    /// The error holds up to there, rad/s.
+    pub up_to: f64,
+}
+
 /// Small matrices.
 #[derive(Debug, Clone)]
 pub(crate) enum Form {
@@ -156,10 +167,13 @@ pub(crate) enum Form {
     Alone(Arc<Reduced>),
     /// Of one sector of a ring.
     Sector(Arc<ReducedSector>),
+    /// Of a ring whose blades differ.
+    Ring(Arc<RingModes>),
 }
 
-/// Patterns of blades whose error is remembered: a case is assembled several times in a row, and a campaign has a million.
-const PATTERNS: usize = 64;
+/// Patterns of blades whose modes are remembered: a case is assembled several times in a row, and a campaign has a million. Those of 240 blades with five
+/// places each are 20 MB.
+const PATTERNS: usize = 16;
 
 /// A mode that is kept, in multiples of the frequency up to which it serves: the last ones only complete those below.
 const BEYOND: f64 = 1.5;
@@ -246,6 +260,56 @@ impl Component {
         })
     }
 
+    /// The component in few coordinates that serve it with another stiffness as well, such as that at a speed of rotation, and all between,
+    /// `K + s (K₁ - K)` with s from 0 to 1; seen at these weighted sums of its rows.
+    ///
+    /// # Errors
+    /// [`ReductionError`]: sizes that differ, no place, modes that cannot be had, or no reduction that is close enough.
+    ///
+    /// # Example
+    /// A mass on a rod of springs, which pull tightens.
+    /// ```
+    /// use stickslip::structure::{Component, Reduction, ReductionKind};
+    /// use stickslip_numerics::sparse::Matrix;
+    /// let rod = |k: f64| Matrix::from_triplets(3, [(0, 0, 2.0 * k), (0, 1, -k), (1, 0, -k), (1, 1, 2.0 * k), (1, 2, -k), (2, 1, -k), (2, 2, k)]);
+    /// let mass = Matrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0)))?;
+    /// let rest = Component::new(vec![String::new(); 3], mass, None, rod(1e4)?)?;
+    /// let how = Reduction::Modes { modes: 1, kind: ReductionKind::Rubin };
+    /// let few = rest.reduced_between(&rod(1.5e4)?, &[vec![(2, 1.0)]], &how)?;
+    /// assert_eq!(few.component.dofs(), few.there.n());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn reduced_between(
+        &self,
+        there: &Matrix,
+        seen: &[Row],
+        how: &Reduction,
+    ) -> Result<BetweenComponent, ReductionError> {
+        let tolerance = match *how {
+            Reduction::UpTo { tolerance, .. } => tolerance,
+            _ => f64::INFINITY,
+        };
+        let reduce = |whole: &Whole| in_few(whole, how).map(|(reduced, _, _, up_to)| (reduced, up_to));
+        let few = self.0.whole.seen_at(seen.to_vec())?.between(there, reduce, tolerance)?;
+        let sparse = |dense: &DMatrix<f64>| {
+            let all = (0..dense.ncols()).flat_map(|k| (0..dense.nrows()).map(move |i| (i, k)));
+            let entries = all.map(|at| (at.0, at.1, dense[at])).filter(|entry| entry.2 != 0.0);
+            Matrix::from_triplets(dense.nrows(), entries).map_err(|_| ReductionError::OutOfRange)
+        };
+        let Reduced { mass, damping, stiffness, ports, kind, .. } = few.rest;
+        let damping = if self.matrices().1.is_some() { Some(sparse(&damping)?) } else { None };
+        let component = Component::new(vec![String::new(); mass.nrows()], sparse(&mass)?, damping, sparse(&stiffness)?);
+        let seen = ports.row_iter().map(|row| row.iter().copied().enumerate().filter(|part| part.1 != 0.0).collect());
+        Ok(BetweenComponent {
+            component: component.map_err(|_| ReductionError::OutOfRange)?,
+            there: sparse(&few.there.stiffness)?,
+            seen: seen.collect(),
+            kind,
+            error: few.deviation.error,
+            up_to: few.up_to,
+        })
+    }
+
     /// The component as one of `sectors` sectors of a ring.
     pub(crate) fn sector(&self, boundary: &Boundary, sectors: usize) -> Arc<KeptSector> {
         let mut known = self.0.sectors.lock().unwrap_or_else(PoisonError::into_inner);
@@ -298,15 +362,9 @@ impl KeptSector {
         })
     }
 
-    /// The sector in few coordinates for a ring whose blades deviate by these shares of their stiffness: with as many vectors of the blade as the
+    /// The ring whose blades deviate by these shares of their stiffness in its own modes: with as many vectors of the blade as the
     /// error of that ring asks for, or with those that come nearest.
-    pub fn mistuned(
-        &self,
-        blade: &SectorBlade,
-        deviations: &[f64],
-        seen: &[Row],
-        how: &Reduction,
-    ) -> Result<MistunedSector, ReductionError> {
+    pub fn mistuned(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
         let asked = ((seen.to_vec(), *how), deviations.to_vec());
         let known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, answer)) = known.iter().find(|(key, _)| *key == asked) {
@@ -323,41 +381,31 @@ impl KeptSector {
         Ok(answer)
     }
 
-    fn nearest(
-        &self,
-        blade: &SectorBlade,
-        deviations: &[f64],
-        seen: &[Row],
-        how: &Reduction,
-    ) -> Result<MistunedSector, ReductionError> {
-        let ring = MistunedRing::new(&self.sector, (&blade.blade, blade.alone(&self.sector)?), deviations, seen)?;
+    fn nearest(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
+        let whole = MistunedRing::new(&self.sector, (&blade.blade, blade.alone(&self.sector)?), deviations, seen)?;
+        // without vectors of the blade only as many modes as are stated
         let (steps, enough) = match *how {
-            Reduction::UpTo { tolerance, .. } => (STEPS.len(), tolerance),
-            _ => (1, f64::INFINITY),
+            Reduction::UpTo { tolerance, .. } => (1..STEPS.len(), tolerance),
+            _ => (0..1, f64::INFINITY),
         };
-        let mut best: Option<MistunedSector> = None;
-        for step in 0..steps {
+        let mut last: Option<(Arc<InFew>, Mixed)> = None;
+        for step in steps {
             // what has served is kept where more of it fails
-            let few = match (self.few(blade, seen, how, step), &best) {
+            let few = match (self.few(blade, seen, how, step), &last) {
                 (Ok(few), _) => few,
-                (Err(_), Some(_)) => continue,
+                (Err(_), Some(_)) => break,
                 (Err(error), None) => return Err(error),
             };
-            let own = &few.component;
-            let Form::Sector(sector) = &own.form else { return Err(ReductionError::NoPorts) };
-            let most = if step + 1 < steps { enough } else { f64::INFINITY };
-            let found = ring.deviation(sector, &few.of_blade, &few.suspect, own.up_to, most)?;
-            let deviation = if found.error > own.deviation.error { found } else { own.deviation };
-            let nearer = best.as_ref().is_none_or(|best| deviation.error < best.component.deviation.error);
-            if nearer {
-                let component = Arc::new(ReducedComponent { deviation, ..ReducedComponent::clone(own) });
-                best = Some(MistunedSector { component, few });
+            let mixed = few.ring.mixed(deviations)?;
+            let found = whole.deviation(&few.ring, &mixed, &few.suspect, enough);
+            if found.error.max(few.component.deviation.error) <= enough {
+                return Ok(few.of(mixed, found));
             }
-            if deviation.error <= enough {
-                break;
-            }
+            last = Some((few, mixed));
         }
-        best.ok_or(ReductionError::NoPorts)
+        let (few, mixed) = last.ok_or(ReductionError::NoPorts)?;
+        let found = whole.deviation(&few.ring, &mixed, &few.suspect, f64::INFINITY);
+        Ok(few.of(mixed, found))
     }
 
     /// With the vectors of the blade from that step on.
@@ -371,8 +419,19 @@ impl KeptSector {
             let of_blade = blade.blade.along(sector.n, &sector.basis);
             let alone = blade.alone(&self.sector)?;
             let suspect = lacking_most(&self.sector, &blade.blade, alone, sector, component.up_to)?;
-            Ok(Arc::new(InFew { component, of_blade, suspect }))
+            let ring = NominalRing::new(sector, &of_blade, self.sector.sectors, component.up_to)?;
+            Ok(Arc::new(InFew { component, ring, suspect }))
         })
+    }
+}
+
+impl InFew {
+    /// With these modes of the ring, which deviate so.
+    fn of(&self, mixed: Mixed, found: Deviation) -> Arc<ReducedComponent> {
+        let own = &self.component;
+        let deviation = if found.error > own.deviation.error { found } else { own.deviation };
+        let form = Form::Ring(Arc::new(self.ring.modes(mixed)));
+        Arc::new(ReducedComponent { form, deviation, ..ReducedComponent::clone(own) })
     }
 }
 
@@ -384,13 +443,6 @@ impl SectorBlade {
     /// What a share of one of its stiffness adds, over all rows that are left.
     pub fn entries(&self) -> &[(usize, usize, f64)] {
         self.entries.get_or_init(|| self.blade.entries())
-    }
-}
-
-impl MistunedSector {
-    /// What a share of one of the blade's stiffness adds, over the coordinates.
-    pub fn of_blade(&self) -> &[(usize, usize, f64)] {
-        &self.few.of_blade
     }
 }
 
@@ -414,7 +466,14 @@ fn natural(modes: &NaturalModes) -> Vec<f64> {
 }
 
 fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionError> {
-    let (reduced, deviation, modes, up_to) = match *how {
+    let (reduced, deviation, modes, up_to) = in_few(whole, how)?;
+    let (frequencies, free) = (natural(&modes), modes.free());
+    Ok(ReducedComponent { form: Form::Alone(Arc::new(reduced.in_metres())), deviation, frequencies, free, up_to })
+}
+
+/// With its error, the modes that it took, and the frequency that it serves up to.
+fn in_few(whole: &Whole, how: &Reduction) -> Result<(Reduced, Deviation, NaturalModes, f64), ReductionError> {
+    Ok(match *how {
         Reduction::None => return Err(ReductionError::NoPorts),
         Reduction::UpTo { up_to, tolerance, kind } => {
             let chosen = Reduce { up_to, tolerance, kind }.of(whole)?;
@@ -430,17 +489,16 @@ fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionE
             let deviation = Reference::new(whole, &modes, up_to)?.deviation(&reduced);
             (reduced, deviation, modes, up_to)
         }
-    };
-    let (frequencies, free) = (natural(&modes), modes.free());
-    Ok(ReducedComponent { form: Form::Alone(Arc::new(reduced.in_metres())), deviation, frequencies, free, up_to })
+    })
 }
 
 impl ReducedComponent {
-    /// Coordinates; of a sector of a ring those of one sector.
+    /// Coordinates; of a sector of a ring those of one sector, unless its blades differ.
     pub fn dofs(&self) -> usize {
         match &self.form {
             Form::Alone(reduced) => reduced.dofs(),
             Form::Sector(sector) => sector.dofs(),
+            Form::Ring(modes) => modes.own.len(),
         }
     }
 
@@ -449,6 +507,7 @@ impl ReducedComponent {
         match &self.form {
             Form::Alone(reduced) => &reduced.kind,
             Form::Sector(sector) => &sector.kind,
+            Form::Ring(modes) => &modes.kind,
         }
     }
 

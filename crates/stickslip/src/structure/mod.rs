@@ -7,7 +7,7 @@ mod faces;
 pub mod reduction;
 mod sector;
 
-pub use component::{Component, ReducedComponent, Reduction, ReductionKind};
+pub use component::{BetweenComponent, Component, ReducedComponent, Reduction, ReductionKind};
 pub(crate) use component::{Form as ReducedForm, KeptSector, SectorBlade};
 pub use cyclic::{Axis, BladeError, Boundary, BoundaryError};
 pub(crate) use cyclic::{CyclicSector, RingEntry, RingRow};

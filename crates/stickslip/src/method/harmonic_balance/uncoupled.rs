@@ -8,7 +8,7 @@ use super::hold::HOLD;
 use crate::structure::{Matrices, Structure};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use stickslip_numerics::dense::multiply_in_blocks;
+use stickslip_numerics::dense::{multiply_in_blocks, solve_lower_in_blocks};
 use stickslip_numerics::eigen;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -158,10 +158,13 @@ fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
     let unit = held.diagonal().map(|v| 1.0 / v.sqrt());
     let scaled = |matrix: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, k| unit[i] * matrix[(i, k)] * unit[k]);
     let lower = scaled(&held).cholesky()?.unpack();
-    let half = lower.solve_lower_triangular(&scaled(mass))?;
-    let whole = lower.solve_lower_triangular(&half.transpose())?;
+    let solve = |mut right: DMatrix<f64>, transposed: bool| {
+        solve_lower_in_blocks(lower.as_slice(), n, right.as_mut_slice(), transposed);
+        right
+    };
+    let whole = solve(solve(scaled(mass), false).transpose(), false);
     let (values, vectors) = eigen::symmetric_in_blocks(&whole)?;
-    let mut shapes = lower.tr_solve_lower_triangular(&vectors)?;
+    let mut shapes = solve(vectors, true);
     for mut column in shapes.column_iter_mut() {
         column.component_mul_assign(&unit);
     }

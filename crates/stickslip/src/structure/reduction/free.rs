@@ -183,7 +183,7 @@ fn join(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Combinations of columns that `stiffness` makes orthonormal, without those that depend on the others.
-fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub(super) fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let energies = columns::products(vectors.nrows(), vectors.as_slice(), product(stiffness, vectors).as_slice());
     let energies = symmetric(energies);
     let size = |i: usize| energies[(i, i)].max(0.0).sqrt();

@@ -10,17 +10,20 @@
 //!
 //! and harmonic balance, which wants receptances only, may take modes and a series of residuals (`series`). Every reduction can be held against the
 //! whole structure (`evidence`; `mistuned` for a ring whose blades differ), and [`Reduce`] takes as many modes as a given error asks for. A sector of a ring is reduced for all its waves at once
-//! (`ring`).
+//! (`ring`); where its blades differ, the ring is brought into the modes that it has (`nominal`). One basis may serve two
+//! stiffnesses and all between (`between`).
 //!
 //! Damping is a part of the whole structure and is reduced like the other matrices; [`Damping`] says what a modal damping ratio means
 //! beyond the modes that
 //! are kept.
 
+mod between;
 mod choice;
 mod craig_bampton;
 mod evidence;
 mod free;
 mod mistuned;
+mod nominal;
 mod residual;
 mod ring;
 mod series;
@@ -29,6 +32,8 @@ pub use choice::{Chosen, Reduce};
 pub use evidence::{Deviation, Reference};
 pub use free::Free;
 pub(in crate::structure) use mistuned::{MistunedRing, alone, lacking_most};
+pub(crate) use nominal::RingModes;
+pub(in crate::structure) use nominal::{Mixed, NominalRing};
 pub(crate) use ring::ReducedSector;
 pub(in crate::structure) use ring::STEPS;
 pub use series::Series;
@@ -418,6 +423,11 @@ impl Reduced {
     /// If a row lies outside of the whole structure.
     pub fn rows(&self, rows: &[Row]) -> DMatrix<f64> {
         product(&seen(rows, self.n, &self.basis), &self.weights)
+    }
+
+    /// All displacements of the whole structure, n × r.
+    fn columns(&self) -> DMatrix<f64> {
+        DMatrix::from_vec(self.n, self.dofs(), columns::combination(self.n, &self.basis, &self.weights))
     }
 
     /// All displacements of the whole structure that belong to coordinates `q`.
