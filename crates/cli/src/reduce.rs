@@ -112,7 +112,8 @@ fn damping_keys(substructure: &Substructure) -> Vec<String> {
         Reduction::UpTo { up_to, tolerance, kind } => {
             format!("reduce = {{ up_to = \"{:e} rad/s\", tolerance = {tolerance:e}{} }}", up_to, named(kind))
         }
-        Reduction::Modes { modes, kind } => format!("reduce = {{ modes = {modes}{} }}", named(Some(kind))),
+        // what its error is measured up to is the study's
+        Reduction::Modes { modes, kind, .. } => format!("reduce = {{ modes = {modes}{} }}", named(Some(kind))),
         Reduction::None => "reduce = false".to_owned(),
     };
     match substructure.damping {

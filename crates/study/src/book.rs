@@ -26,23 +26,29 @@ pub fn markdown() -> String {
         }
         book.push('\n');
     };
+    // tables in tables come after the one that has them
+    let inner = |book: &mut String, of: &str, keys: &[Key]| {
+        for key in keys.iter().filter(|key| key.is_taken()) {
+            if let Takes::Table(keys) | Takes::TableOrNone(keys) = key.takes {
+                rows(book, &format!("`{}` of {of}", key.name), key.doc, keys);
+            }
+        }
+    };
     rows(&mut book, "Top of the file", "", FILE);
     for key in FILE {
-        match key.takes {
-            Takes::List(keys) => rows(&mut book, &format!("`[[{}]]`", key.name), key.doc, keys),
-            Takes::Table(keys) => rows(&mut book, &format!("`[{}]`", key.name), key.doc, keys),
-            Takes::Sample => rows(&mut book, &format!("`[{}]`", key.name), key.doc, SAMPLE),
-            _ => {}
-        }
+        let (heading, keys) = match key.takes {
+            Takes::List(keys) => (format!("`[[{}]]`", key.name), keys),
+            Takes::Table(keys) => (format!("`[{}]`", key.name), keys),
+            Takes::Sample => (format!("`[{}]`", key.name), SAMPLE),
+            _ => continue,
+        };
+        rows(&mut book, &heading, key.doc, keys);
+        inner(&mut book, &heading, keys);
     }
     rows(&mut book, "`[study]`", "The keys of every kind; each kind adds its own.", STUDY);
     for Kind { info: kind, .. } in kinds::TABLE {
         rows(&mut book, &format!("`[study]` with `kind = \"{}\"`", kind.name), kind.summary, kind.keys);
-        for key in kind.keys {
-            if let Takes::Table(keys) = key.takes {
-                rows(&mut book, &format!("`{}` of `{}`", key.name, kind.name), key.doc, keys);
-            }
-        }
+        inner(&mut book, &format!("`{}`", kind.name), kind.keys);
     }
     let named = |book: &mut String, name: &str, summary: &str, keys: &[(&str, String, &str)]| {
         book.push_str(&format!("- `{name}`: {summary}\n"));

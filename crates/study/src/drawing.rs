@@ -61,8 +61,9 @@ impl<'a> Drawing<'a> {
         self.options().names("only").is_none_or(|names| names.iter().any(is))
     }
 
-    /// How curves of so many masses and cases are laid out; draws are shown by their percentiles, for every mass.
-    pub(crate) fn layout(&self, masses: usize, cases: usize) -> Layout {
+    /// How curves of so many masses and cases are laid out, where each case has so many panels; draws are shown by their percentiles, for every
+    /// mass.
+    pub(crate) fn layout(&self, masses: usize, cases: usize, panels: usize) -> Layout {
         if self.study.draws().is_some() {
             return Layout::Masses;
         }
@@ -74,6 +75,7 @@ impl<'a> Drawing<'a> {
         match self.options().flag("overlay") {
             Some(true) => Layout::Masses,
             Some(false) => Layout::Cases,
+            None if cases > 1 && cases * panels > MOST_PANELS => Layout::Masses,
             None if masses > 1 && cases <= MOST_CASES => Layout::Cases,
             None => Layout::Masses,
         }

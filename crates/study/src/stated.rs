@@ -8,7 +8,7 @@ use crate::statement::{Stated, StatedTable};
 use crate::stiffened::Stiffened;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Element, Model, ModelError};
-use stickslip::structure::{Component, Node, Reduction};
+use stickslip::structure::{Component, Node, Reduction, ReductionKind};
 use stickslip_numerics::sparse::Matrix;
 
 /// How the model is stated: in lists, of this file or of a template's.
@@ -147,7 +147,8 @@ pub(crate) fn problem_of(structure: &Structure, error: &ModelError, model: &Mode
             let table =
                 matrices.map(|matrices| &matrices.table).or_else(|| structure.lists.get(list).get(index.unwrap_or(0)));
             let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
-            (place, table.map_or_else(|| error.message.clone(), |table| table.with_turn(&error.message)))
+            let message = if error.key == "reduce" && has_no_end(model) { NO_END } else { &error.message };
+            (place, table.map_or_else(|| message.to_owned(), |table| table.with_turn(message)))
         }
         Some(template) => {
             let place = template.table.place_of(if error.key == "law" { "law" } else { "template" }, None);
@@ -178,12 +179,25 @@ pub(crate) fn problem_of(structure: &Structure, error: &ModelError, model: &Mode
 /// Lowest frequencies that are shown where a structure cannot be reduced.
 const LOWEST: usize = 3;
 
+/// Why a structure is not reduced of which nobody knows how far.
+const NO_END: &str = "the structure is to be brought into few coordinates, and this study has no drive frequency that tells up to which frequency \
+                      these must be good";
+
+/// Whether nothing tells up to which frequency a reduction must be good.
+fn has_no_end(model: &Model) -> bool {
+    let reduction = model.substructure.as_ref().map(|substructure| substructure.reduction);
+    matches!(reduction, Some(Reduction::UpTo { up_to, .. }) if up_to <= 0.0)
+}
+
 /// What to do where a structure cannot be reduced: units that were mistaken move its frequencies by powers of ten.
 fn advice_on_reduction(model: &Model) -> Option<String> {
     let substructure = model.substructure.as_ref()?;
-    if matches!(substructure.reduction, Reduction::UpTo { up_to, .. } if up_to <= 0.0) {
+    if has_no_end(model) {
+        return Some("add to [structure] reduce = { up_to = \"5 kHz\" }, the highest frequency of interest".to_owned());
+    }
+    if matches!(substructure.reduction, Reduction::UpTo { kind: Some(ReductionKind::CraigBampton), .. }) {
         return Some(
-            "this study has no drive frequency that would tell: add reduce = { up_to = \"5 kHz\" }".to_owned(),
+            "leave `kind` out: free modes with residual vectors need fewer coordinates for the same error".to_owned(),
         );
     }
     let component = &substructure.component;

@@ -73,25 +73,27 @@ fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'stati
             "leave out one: `up_to` takes as many modes as the error asks for",
         )),
         (None, Some(modes)) => {
-            Ok(Reduction::Modes { modes: modes as usize, kind: kind.unwrap_or(ReductionKind::Rubin) })
+            Ok(Reduction::Modes { modes: modes as usize, kind: kind.unwrap_or(ReductionKind::Rubin), up_to: 0.0 })
         }
         (up_to, None) => Ok(Reduction::UpTo { up_to: up_to.unwrap_or(0.0), tolerance, kind }),
     }
 }
 
-/// Decides how far the reduction reaches, where the file does not: from the frequencies of the study.
+/// Decides how far the reduction reaches, where the file does not: from the frequencies of the study. The error of so many modes is that up to the
+/// highest frequency that excites: beyond, where the last of them are, no reduction is good.
 pub(crate) fn settle(model: &mut Model, values: &Values) {
-    let Some(Substructure { reduction: Reduction::UpTo { up_to, .. }, .. }) = &mut model.substructure else { return };
-    if *up_to > 0.0 {
-        return;
-    }
-    let run_up = values.table("run_up");
-    let ends = run_up.into_iter().flat_map(|table| ["from", "to"].map(|key| table.quantity(key).unwrap_or(0.0)));
-    let drive = values.frequencies("frequency").into_iter().filter_map(|frequencies| frequencies.highest());
     let harmonic =
         model.forces.iter().map(|force| force.harmonic).chain(model.motions.iter().map(|motion| motion.harmonic));
     let most = f64::from(harmonic.max().unwrap_or(1).max(1));
-    *up_to = HARMONICS * most * ends.chain(drive).fold(0.0, f64::max);
+    let run_up = values.table("run_up");
+    let ends = run_up.into_iter().flat_map(|table| ["from", "to"].map(|key| table.quantity(key).unwrap_or(0.0)));
+    let drive = values.frequencies("frequency").into_iter().filter_map(|frequencies| frequencies.highest());
+    let excited = most * ends.chain(drive).fold(0.0, f64::max);
+    match model.substructure.as_mut().map(|substructure| &mut substructure.reduction) {
+        Some(Reduction::UpTo { up_to, .. }) if *up_to <= 0.0 => *up_to = HARMONICS * excited,
+        Some(Reduction::Modes { up_to, .. }) => *up_to = excited,
+        _ => {}
+    }
 }
 
 /// A `[[place]]`.

@@ -95,9 +95,11 @@ pub struct JointSummary {
     pub limit: f64,
     /// Relative displacement at which it gives way, m; `None` if it holds rigidly until then.
     pub displacement: Option<f64>,
-    /// Of the direction along which faces press on each other: the force with which they do at rest, N, zero if they are
-    /// apart. `None` along those that slip.
+    /// Of the direction along which faces press on each other: the force with which they do where nothing gives way, N, zero if
+    /// they are apart. `None` along those that slip.
     pub pressed: Option<f64>,
+    /// What is left of it at rest, after the structure has given way, N; `None` where nobody knows.
+    pub at_rest: Option<f64>,
     /// What the excitation does to it while all joints stick; `None` where the study has no drive or the model is too
     /// large for a quick answer.
     pub onset: Option<Onset>,
@@ -147,6 +149,7 @@ impl ModelSummary {
             limit: slip.limit,
             displacement: slip.displacement,
             pressed: slip.pressed,
+            at_rest: slip.at_rest,
             onset: onsets.as_ref().map(|onsets| onsets[index].clone()),
         });
         let joints = joints.collect();
@@ -203,6 +206,7 @@ impl ModelSummary {
                 "name": joint.name,
                 "limit_N": Some(joint.limit).filter(|limit| limit.is_finite()),
                 "pressed_N": joint.pressed,
+                "pressed_at_rest_N": joint.at_rest,
                 "slip_displacement_m": joint.displacement.filter(|displacement| displacement.is_finite()),
                 "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / onset.largest).filter(|x| x.is_finite()),
                 "most_loaded_at_Hz": joint.onset.as_ref().map(|onset| onset.at / TAU),

@@ -203,7 +203,7 @@ fn contacts_are_drawn_as_a_map_or_as_areas() {
     let limits = "vary = { Ft = { from = \"1 N\", to = \"9 N\", points = 8 } }";
     let found = dataset(&text(8, "").replace("vary = { Ft = [\"4 N\"] }", limits));
     let panel = found.figure.panels.last().unwrap();
-    assert_eq!((panel.title.as_str(), panel.series.len()), ("mean of 8 joints", 8));
+    assert_eq!((panel.title.as_str(), panel.series.len()), ("mean of 8 joints, slips", 8));
     let slip = |joint: usize| numbers(&found, "curve", &format!("damper_{joint}_slip_fraction"))[10];
     let mean = (0..8).map(slip).sum::<f64>() / 8.0;
     assert!((panel.series[1].y[3] - 100.0 * mean).abs() < 1e-9, "{} {mean}", panel.series[1].y[3]);
@@ -318,6 +318,7 @@ frequency = { from = "1 Hz", to = "2 Hz", points = 41 }
     let highest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     let largest = pale.iter().map(|series| highest(&series.y)).fold(0.0, f64::max);
     assert_eq!(highest(&normal[0].y), largest);
+    assert!(series.iter().all(|series| series.label.ends_with("of 9 places")), "{:?}", series[0].label);
     // the softest of equally damped ones moves most at its resonance: F/(c ω)
     assert!(found.figure.panels[0].title.contains("worst is b1"), "{}", found.figure.panels[0].title);
 }
@@ -507,4 +508,102 @@ fn a_unit_without_its_peaks_is_not_whole() {
         let cut = checked.block(0..1, &context).unwrap();
         assert!(!cut.tally.is_whole(), "stopped after {last} of {points} points");
     }
+}
+
+/// Three places on two faces in as many cases, with the shares of stick and slip.
+fn on_faces(limits: &str) -> Dataset {
+    dataset(&format!(
+        r#"
+schema = 1
+[parameters]
+Ft = "1 N"
+[[mass]]
+repeat = {{ i = 3 }}
+name = "m{{i}}"
+mass = "1 kg"
+[[spring]]
+repeat = {{ i = 3 }}
+between = ["m{{i}}", "ground"]
+stiffness = "100 N/m"
+damping = "0.5 N s/m"
+[[joint]]
+repeat = {{ i = 2 }}
+name = "face{{i}}"
+between = ["m{{i}}", "ground"]
+law = {{ kind = "jenkins", stiffness = "50 N/m", limit = "Ft" }}
+[[force]]
+repeat = {{ i = 3 }}
+on = "m{{i}}"
+amplitude = "2 N"
+[study]
+kind = "response"
+frequency = {{ from = "1 Hz", to = "2.5 Hz", points = 5 }}
+output = ["contact", "joint_force"]
+vary = {{ Ft = [{limits}] }}
+"#
+    ))
+}
+
+/// No case is left out of a figure without a word: where each cannot have its own panels, each has a curve in all.
+#[test]
+fn contacts_of_all_cases_are_drawn() {
+    let found = on_faces("\"0.2 N\", \"0.5 N\", \"1 N\", \"1.5 N\", \"2 N\"");
+    let slip = found.figure.panels.iter().find(|panel| panel.title == "face1 slips").unwrap();
+    let labels: Vec<&str> = slip.series.iter().map(|series| series.label.as_str()).collect();
+    assert_eq!(labels, ["Ft = 0.2 N", "Ft = 0.5 N", "Ft = 1 N", "Ft = 1.5 N", "Ft = 2 N"]);
+    assert_eq!(found.figure.panels.len(), 3 + 2 + 2);
+}
+
+/// Places, forces and states have colours of their own in the one legend of a figure.
+#[test]
+fn no_two_names_have_one_colour() {
+    let found = on_faces("\"0.5 N\", \"1 N\"");
+    let named = found.figure.panels.iter().flat_map(|panel| &panel.series).filter(|series| !series.label.is_empty());
+    let mut colours: std::collections::BTreeMap<usize, &str> = std::collections::BTreeMap::new();
+    for series in named.filter(|series| series.label != "peak" && series.emphasis != Emphasis::Reference) {
+        let first = *colours.entry(series.colour).or_insert(&series.label);
+        assert_eq!(first, series.label, "colour {}", series.colour);
+    }
+    assert_eq!(colours.values().copied().collect::<Vec<_>>(), ["m1", "m2", "m3", "face1", "face2", "sticks", "slips"]);
+}
+
+/// Of places that move equally the first has the peak, whatever rounding says; one that is higher between the points is the worst of the title.
+#[test]
+fn equal_places_have_one_name() {
+    let study = |stiffness: &str| {
+        dataset(&format!(
+            r#"
+schema = 1
+[[mass]]
+repeat = {{ i = 8 }}
+name = "b{{i}}"
+mass = "1 kg"
+[[spring]]
+repeat = {{ i = 8 }}
+between = ["b{{i}}", "ground"]
+stiffness = "{stiffness}"
+damping = "1 N s/m"
+[[force]]
+repeat = {{ i = 8 }}
+on = "b{{i}}"
+amplitude = "1 N"
+[study]
+kind = "response"
+peak_of = "all"
+frequency = {{ from = "1 Hz", to = "2 Hz", points = 21 }}
+"#
+        ))
+    };
+    let worst = |found: &Dataset| {
+        let table = table(found, "peaks");
+        let inner = table.flags("at_range_end").unwrap().iter().position(|end| *end == Some(false)).unwrap();
+        table.texts("mass").unwrap()[inner].clone()
+    };
+    // equal but for 1e-9 of the stiffness: which is higher nobody can tell
+    let equal = study("100 N/m * (1 + 1e-9*i*(9 - i))");
+    assert_eq!(worst(&equal), "b1");
+    assert!(equal.figure.panels[0].title.contains("all are alike"), "{}", equal.figure.panels[0].title);
+    let softer = study("100 N/m * (1 - 0.02*i)");
+    assert_eq!(worst(&softer), "b8");
+    assert!(softer.figure.panels[0].title.contains("worst is b8"), "{}", softer.figure.panels[0].title);
 }

@@ -171,6 +171,48 @@ fn reductions_are_as_good_as_they_say() {
     }
 }
 
+/// The error of so many modes is that over the frequencies of the study: with the drive lower it is smaller, and it says up to where. Craig-Bampton
+/// takes as many modes as an error asks for, on solids more than three times the highest frequency.
+#[test]
+fn errors_are_those_of_the_studys_frequencies() {
+    let brick = blade();
+    let (node, folder) = (tip(&brick, 0, 1), tempfile::tempdir().unwrap());
+    write_pair(folder.path(), &brick, "npz", (1.0, 1.0));
+    let told = |reduce: &str, to: &str| {
+        let study = format!(
+            "[[force]]\non = \"tip.z\"\namplitude = \"1 N\"\n[study]\nkind = \"response\"\nfrequency = [\"100 Hz\", \"{to}\"]\n"
+        );
+        let text =
+            structure("npz", "rows.csv", "m-kg-s", &format!("{DAMPED}\n{reduce}")) + &place("tip", &node) + &study;
+        let file = folder.path().join("study.toml");
+        std::fs::write(&file, text).unwrap();
+        let summary = check(&read_file(&file, &[]).unwrap()).unwrap().summary().clone();
+        let reduced = summary.structure.unwrap().reduced.unwrap();
+        (reduced.error, reduced.up_to / TAU)
+    };
+    let few = "reduce = { modes = 4, kind = \"craig-bampton\" }";
+    let (near, far) = (told(few, "400 Hz"), told(few, "3 kHz"));
+    assert!((near.1 - 400.0).abs() < 1e-9 && (far.1 - 3000.0).abs() < 1e-9, "{near:?} {far:?}");
+    assert!(near.0 < 0.01 && far.0 > near.0, "{near:?} {far:?}");
+    let close = told("reduce = { up_to = \"5 kHz\", kind = \"craig-bampton\", tolerance = 3e-3 }", "400 Hz");
+    assert!(close.0 <= 3e-3, "{close:?}");
+}
+
+/// Where no drive tells how far a reduction must reach, the message asks for it.
+#[test]
+fn modes_of_a_structure_need_an_end() {
+    let brick = blade();
+    let (node, folder) = (tip(&brick, 0, 1), tempfile::tempdir().unwrap());
+    write_pair(folder.path(), &brick, "npz", (1.0, 1.0));
+    let text = structure("npz", "rows.csv", "m-kg-s", DAMPED)
+        + &place("tip", &node)
+        + "[study]\nkind = \"modes\"\namplitude = { from = \"1 um\", to = \"1 mm\" }\n";
+    let file = folder.path().join("study.toml");
+    std::fs::write(&file, text).unwrap();
+    let said = read_file(&file, &[]).unwrap_err().to_string();
+    assert!(said.contains("no drive frequency that tells up to which"), "{said}");
+}
+
 /// Drawn parameters in a study of matrices alone: every draw is the response with its values, all on one reduction.
 #[test]
 fn parameters_of_a_structure_are_drawn() {

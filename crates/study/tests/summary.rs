@@ -478,3 +478,90 @@ fn a_long_run_says_so_at_its_start() {
     let said = points("points = 1000000").unwrap();
     assert!(said.contains("hours on one thread, up to") && said.contains("days") && said.contains("Ctrl-C"), "{said}");
 }
+
+/// A mass of 2 kg on 100 N/mm, pressed by `preload` on a face of 300 N/mm, under a constant force.
+fn pressed(preload: &str, constant: &str) -> String {
+    format!(
+        r#"
+schema = 1
+[[mass]]
+name = "foot"
+mass = "2 kg"
+directions = ["x", "z"]
+[[spring]]
+between = ["foot.x", "ground"]
+stiffness = "50 N/mm"
+[[spring]]
+between = ["foot.z", "ground"]
+stiffness = "100 N/mm"
+[[joint]]
+name = "face"
+between = ["foot", "ground"]
+law = {{ kind = "friction-contact", tangential = "200 N/mm", normal = "300 N/mm", friction = 0.3, preload = "{preload}" }}
+[[force]]
+on = "foot.z"
+amplitude = "{constant}"
+harmonic = 0
+[[force]]
+on = "foot.x"
+amplitude = "1 N"
+[study]
+kind = "response"
+frequency = ["20 Hz", "21 Hz"]
+output = "joint_mean"
+"#
+    )
+}
+
+/// The spring of the structure takes `k/(k + kn)` of the preload off the face, and the constant force is shared in the same way; the mean of a
+/// small vibration is the same.
+#[test]
+fn what_the_structure_takes_of_a_preload() {
+    for (preload, constant, left) in [(40.0, 0.0, 10.0), (40.0, 40.0, 40.0), (40.0, 80.0, 70.0), (40.0, -40.0, -20.0)] {
+        let text = pressed(&format!("{preload} N"), &format!("{constant} N"));
+        let found = summary(&text);
+        let normal = found.joints.iter().find(|joint| joint.name == "face.n" || joint.name == "face.z").unwrap();
+        assert!((normal.at_rest.unwrap() - left).abs() < 1e-9 * preload, "{:?} {left}", normal.at_rest);
+        let said = found.to_string();
+        let words = match left {
+            10.0 => "pressed with 10 N at rest, as the structure takes 30 N of its preload of 40 N",
+            40.0 => "pressed with 40 N at rest: it opens",
+            70.0 => "pressed with 70 N at rest, by its preload of 40 N and 30 N of the constant forces",
+            _ => "apart at rest, as the structure gives way to its preload of 40 N",
+        };
+        assert!(said.contains(words), "{words}: {said}");
+        if left > 0.0 {
+            let data = run(&study(&text), &Context::unwatched(1)).unwrap();
+            let column =
+                data.tables[0].columns.iter().find(|c| c.name.starts_with("face_") && c.name.contains("z_force_mean"));
+            let column = column.unwrap_or_else(|| panic!("{:?}", data.tables[0].columns.iter().map(|c| &c.name)));
+            let mean = column.as_numbers().unwrap()[0];
+            assert!((mean.abs() / left - 1.0).abs() < 1e-3, "{mean} {left}");
+        }
+    }
+}
+
+/// Faces that are apart at rest count as closed in the modes with all joints stuck, as they do in the reference curve of a figure.
+#[test]
+fn stuck_is_closed() {
+    let hertz = |k: f64| (k / 2.0).sqrt() / std::f64::consts::TAU;
+    for preload in ["0 N", "40 N"] {
+        let found = summary(&pressed(preload, "0 N"));
+        let stuck: Vec<f64> = found.stuck.elastic.iter().map(|mode| mode.omega / std::f64::consts::TAU).collect();
+        let expected = [hertz(250e3), hertz(400e3)];
+        assert!(stuck.iter().zip(expected).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{stuck:?} {expected:?}");
+    }
+    let gap = "law = { kind = \"gap\", gap = \"1 mm\", stiffness = \"400 N/m\" }";
+    let found = summary(&template("blade-couple", &[("law = { kind = \"coulomb\", limit = \"Ft\" }", gap)]));
+    assert_eq!(found.stuck.elastic.len(), found.free.elastic.len());
+    assert!(found.stuck.elastic[0].omega > found.free.elastic[0].omega, "{found}");
+}
+
+/// A wedge that nothing presses lies between its faces: one warning for all, which says what is missing.
+#[test]
+fn wedges_that_nothing_presses() {
+    let edit = ("speed = \"2600 rpm\"", "speed = \"0 rpm\"");
+    let alone = ("vary = { speed = [\"2000 rpm\", \"2600 rpm\", \"4000 rpm\", \"8000 rpm\"] }\n", "");
+    let words = ["nothing holds `wedge_0.x`", "`face1_0`, `face2_0`", "and 18 more touch them", "no preload presses"];
+    warns(&template("under-platform-wedge", &[edit, alone]), &words);
+}

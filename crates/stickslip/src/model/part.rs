@@ -265,7 +265,7 @@ fn failed(error: ReductionError) -> ModelError {
 fn damping_law(substructure: &Substructure, component: &ReducedComponent) -> Option<Damping> {
     match substructure.damping {
         SubstructureDamping::Own => None,
-        SubstructureDamping::Ratio(ratio) => Some(Damping::Ratio { ratio, up_to: component.up_to() }),
+        SubstructureDamping::Ratio(ratio) => Some(Damping::Ratio { ratio, up_to: component.serves() }),
         SubstructureDamping::Rayleigh { mass, stiffness } => Some(Damping::Rayleigh { mass, stiffness }),
     }
 }
@@ -359,7 +359,7 @@ mod tests {
     /// As many modes as a sector has rows leave nothing out; a damping ratio is that of every mode of the ring.
     #[test]
     fn all_coordinates_are_the_whole_ring() {
-        let how = Reduction::Modes { modes: 3, kind: crate::structure::ReductionKind::Rubin };
+        let how = Reduction::Modes { modes: 3, kind: crate::structure::ReductionKind::Rubin, up_to: 0.0 };
         let damped = |d| by_matrices(d, how, SubstructureDamping::Ratio(0.01));
         for deviations in [&[][..], &[1e-12; 5], &DEVIATIONS] {
             let few = ring(damped, Around::Sector(1), deviations);

@@ -108,6 +108,9 @@ pub enum Reduction {
         modes: usize,
         /// Of which kind.
         kind: ReductionKind,
+        /// The largest frequency of interest, rad/s, up to which the error is measured; zero: as far as so many modes serve, which is up to the
+        /// last of them over 1.5.
+        up_to: f64,
     },
 }
 
@@ -141,6 +144,8 @@ pub struct ReducedComponent {
     free: usize,
     /// The error holds up to there, rad/s.
     up_to: f64,
+    /// Its modes serve up to there, rad/s.
+    serves: f64,
 }
 
 /// A component in few coordinates that also serve another stiffness, see [`Component::reduced_between`].
@@ -289,7 +294,7 @@ impl Component {
             Reduction::UpTo { tolerance, .. } => tolerance,
             _ => f64::INFINITY,
         };
-        let reduce = |whole: &Whole| in_few(whole, how).map(|(reduced, _, _, up_to)| (reduced, up_to));
+        let reduce = |whole: &Whole| in_few(whole, how).map(|few| (few.reduced, few.up_to));
         let few = self.0.whole.seen_at(seen.to_vec())?.between(there, reduce, tolerance)?;
         let sparse = |dense: &DMatrix<f64>| {
             let all = (0..dense.ncols()).flat_map(|k| (0..dense.nrows()).map(move |i| (i, k)));
@@ -344,7 +349,14 @@ impl KeptSector {
         let chosen = self.sector.reduced(seen, how, blade)?;
         let (deviation, frequencies) = (chosen.deviation, chosen.frequencies);
         let form = Form::Sector(Arc::new(chosen.reduced));
-        Ok(Arc::new(ReducedComponent { form, deviation, frequencies, free: chosen.free, up_to: chosen.up_to }))
+        Ok(Arc::new(ReducedComponent {
+            form,
+            deviation,
+            frequencies,
+            free: chosen.free,
+            up_to: chosen.up_to,
+            serves: chosen.serves,
+        }))
     }
 
     /// The blade that the rows `blade` of the component are.
@@ -466,28 +478,42 @@ fn natural(modes: &NaturalModes) -> Vec<f64> {
 }
 
 fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionError> {
-    let (reduced, deviation, modes, up_to) = in_few(whole, how)?;
+    let Fewer { reduced, deviation, modes, up_to, serves } = in_few(whole, how)?;
     let (frequencies, free) = (natural(&modes), modes.free());
-    Ok(ReducedComponent { form: Form::Alone(Arc::new(reduced.in_metres())), deviation, frequencies, free, up_to })
+    let form = Form::Alone(Arc::new(reduced.in_metres()));
+    Ok(ReducedComponent { form, deviation, frequencies, free, up_to, serves })
 }
 
-/// With its error, the modes that it took, and the frequency that it serves up to.
-fn in_few(whole: &Whole, how: &Reduction) -> Result<(Reduced, Deviation, NaturalModes, f64), ReductionError> {
+/// A whole in few coordinates.
+struct Fewer {
+    reduced: Reduced,
+    deviation: Deviation,
+    /// That it took.
+    modes: NaturalModes,
+    /// The error holds up to there, rad/s.
+    up_to: f64,
+    /// Its modes serve up to there, rad/s.
+    serves: f64,
+}
+
+fn in_few(whole: &Whole, how: &Reduction) -> Result<Fewer, ReductionError> {
     Ok(match *how {
         Reduction::None => return Err(ReductionError::NoPorts),
         Reduction::UpTo { up_to, tolerance, kind } => {
             let chosen = Reduce { up_to, tolerance, kind }.of(whole)?;
-            (chosen.reduced, chosen.deviation, chosen.modes, up_to)
+            let (reduced, deviation, modes) = (chosen.reduced, chosen.deviation, chosen.modes);
+            Fewer { reduced, deviation, modes, up_to, serves: up_to }
         }
-        Reduction::Modes { modes: count, kind } => {
+        Reduction::Modes { modes: count, kind, up_to } => {
             let modes = whole.lowest_modes(count)?;
-            let up_to = natural(&modes).last().map_or(0.0, |last| last / BEYOND);
+            let serves = natural(&modes).last().map_or(0.0, |last| last / BEYOND);
+            let up_to = if up_to > 0.0 { up_to } else { serves };
             let reduced = match kind {
                 ReductionKind::Rubin => Free::new(whole, &modes, 0.0, 1)?.reduced(modes.count(), 1)?,
                 ReductionKind::CraigBampton => whole.held(Wanted::Lowest(count))?,
             };
             let deviation = Reference::new(whole, &modes, up_to)?.deviation(&reduced);
-            (reduced, deviation, modes, up_to)
+            Fewer { reduced, deviation, modes, up_to, serves }
         }
     })
 }
@@ -524,6 +550,11 @@ impl ReducedComponent {
     /// The error holds up to there, rad/s.
     pub fn up_to(&self) -> f64 {
         self.up_to
+    }
+
+    /// Its modes serve up to there, rad/s: a damping ratio is that of each of them.
+    pub fn serves(&self) -> f64 {
+        self.serves
     }
 
     /// Frequencies of the whole component, rad/s, rising, as many as it took.

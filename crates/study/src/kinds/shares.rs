@@ -13,19 +13,40 @@ const NOTHING: f64 = 1e-9;
 /// What a share is given in.
 const PERCENT: f64 = 100.0;
 
-/// What faces do: how a panel calls it, and its colour in the palette.
-const STATES: [(&str, usize); 4] = [("sticks", 0), ("slips", 1), ("touches", 2), ("is apart", 6)];
+/// What faces do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum State {
+    Stick,
+    Slip,
+    /// A stop, of which nobody knows whether it slides.
+    Touch,
+    Open,
+}
+
+impl State {
+    const ALL: [State; 4] = [State::Stick, State::Slip, State::Touch, State::Open];
+
+    /// How a panel calls it.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            State::Stick => "sticks",
+            State::Slip => "slips",
+            State::Touch => "touches",
+            State::Open => "is apart",
+        }
+    }
+}
 
 /// Whether a table has the shares of a joint.
 pub(super) fn has(table: &Table, joint: &str) -> bool {
     table.numbers(&columns::sticks(joint)).is_some_and(|shares| shares.iter().any(|share| share.is_finite()))
 }
 
-/// Shares in percent of the period, in the order of [`STATES`], row by row.
+/// Shares in percent of the period, in the order of [`State::ALL`], row by row.
 fn of_joint(table: &Table, joint: &str, rows: &Range<usize>) -> [Vec<f64>; 4] {
     let [stick, slip, open] = [columns::sticks(joint), columns::slips(joint), columns::open(joint)]
         .map(|column| numbers(table, &column, rows.clone()));
-    // what is left is a stop, of which nobody knows whether it slides
+    // what is left is a stop
     let touch = (0..stick.len()).map(|i| 1.0 - stick[i] - slip[i] - open[i]);
     let touch = touch.map(|share| if share.abs() < NOTHING { 0.0 } else { share }).collect();
     [stick, slip, touch, open].map(|shares: Vec<f64>| shares.into_iter().map(|share| share * PERCENT).collect())
@@ -36,11 +57,30 @@ pub(super) fn axis(quantity: &str) -> Axis {
     Axis::new(quantity, "%").between(0.0, PERCENT)
 }
 
-/// The share of the period in which a joint slips, or of several their mean, in percent.
-pub(super) fn slipping(table: &Table, joints: &[String], rows: &Range<usize>) -> Vec<f64> {
-    let all: Vec<Vec<f64>> = joints.iter().map(|joint| numbers(table, &columns::slips(joint), rows.clone())).collect();
-    let mean = |i: usize| all.iter().map(|shares| shares[i]).sum::<f64>() / all.len() as f64;
-    rows.clone().enumerate().map(|(i, _)| PERCENT * mean(i)).collect()
+/// The share of the period in which a joint is in a state, or of several their mean, in percent.
+pub(super) fn mean(table: &Table, joints: &[String], rows: &Range<usize>, state: State) -> Vec<f64> {
+    let all: Vec<Vec<f64>> = joints.iter().map(|joint| of_joint(table, joint, rows)[state as usize].clone()).collect();
+    (0..rows.len()).map(|i| all.iter().map(|shares| shares[i]).sum::<f64>() / all.len() as f64).collect()
+}
+
+/// Whether one of the joints is ever in a state.
+pub(super) fn occurs_in(table: &Table, joints: &[String], state: State) -> bool {
+    joints.iter().any(|joint| occurs(&of_joint(table, joint, &(0..table.rows()))[state as usize]))
+}
+
+/// The states whose maps are drawn: what sticks is what the others leave.
+fn mapped(table: &Table, joints: &[String]) -> Vec<State> {
+    let drawn = |state: &State| match state {
+        State::Stick => false,
+        State::Slip => true,
+        State::Touch | State::Open => occurs_in(table, joints, *state),
+    };
+    State::ALL.into_iter().filter(drawn).collect()
+}
+
+/// How many panels [`panels`] makes.
+pub(super) fn count(table: &Table, joints: &[String]) -> usize {
+    if joints.len() <= FEW { joints.len() } else { mapped(table, joints).len() }
 }
 
 /// The joints of panels that show one quantity of each: each for itself, or all together.
@@ -51,55 +91,55 @@ pub(super) fn groups(joints: &[String]) -> Vec<(String, Vec<String>)> {
     }
 }
 
-/// The panels of some rows over `x`, whose axis is `over`.
+/// The panels of some rows over `x`, whose axis is `over`, with a title and in colours from `first` on: those of few joints all have the same.
 pub(super) fn panels(
     table: &Table,
     joints: &[String],
     rows: &Range<usize>,
     (x, over): (&[f64], &Axis),
-    title: &str,
+    (title, first): (&str, usize),
 ) -> Vec<Panel> {
     let all: Vec<[Vec<f64>; 4]> = joints.iter().map(|joint| of_joint(table, joint, rows)).collect();
     let titled = |words: &str| if title.is_empty() { words.to_owned() } else { format!("{words}, {title}") };
     if joints.len() <= FEW {
+        let occurring: Vec<State> = State::ALL.into_iter().filter(|state| occurs_in(table, joints, *state)).collect();
         let of_joint = |(joint, shares): (&String, &[Vec<f64>; 4])| Panel {
             title: titled(joint),
             x: over.clone(),
             y: axis("share of the period"),
-            series: areas(shares, x),
+            series: areas(shares, x, &occurring, first),
             ..Panel::default()
         };
         return joints.iter().zip(&all).map(of_joint).collect();
     }
     let names = Axis { names: joints.to_vec(), ..Axis::new("joint", "").between(-0.5, joints.len() as f64 - 0.5) };
-    let map = |state: usize| Panel {
-        title: titled(&format!("share of the period in which a joint {}", STATES[state].0)),
+    let map = |state: State| Panel {
+        title: titled(&format!("share of the period in which a joint {}", state.words())),
         x: over.clone(),
         y: names.clone(),
         series: all
             .iter()
             .enumerate()
-            .map(|(j, shares)| Series::stripe(x.to_vec(), j as f64, shares[state].clone()))
+            .map(|(j, shares)| Series::stripe(x.to_vec(), j as f64, shares[state as usize].clone()))
             .collect(),
         ..Panel::default()
     };
-    // what sticks is what the others leave
-    let shown = (1..STATES.len()).filter(|state| *state == 1 || all.iter().any(|shares| occurs(&shares[*state])));
-    shown.map(map).collect()
+    mapped(table, joints).into_iter().map(map).collect()
 }
 
 fn occurs(shares: &[f64]) -> bool {
     shares.iter().any(|share| *share > 0.0)
 }
 
-/// The shares of one joint on each other.
-fn areas(shares: &[Vec<f64>; 4], x: &[f64]) -> Vec<Series> {
+/// The shares of one joint on each other, in the colours of the states that occur in any.
+fn areas(shares: &[Vec<f64>; 4], x: &[f64], occurring: &[State], first: usize) -> Vec<Series> {
     let mut below = vec![0.0; x.len()];
     let mut areas = Vec::new();
-    for ((what, colour), shares) in STATES.into_iter().zip(shares) {
+    for (colour, state) in (first..).zip(occurring) {
+        let shares = &shares[*state as usize];
         if occurs(shares) {
             let above: Vec<f64> = below.iter().zip(shares).map(|(below, share)| below + share).collect();
-            areas.push(Series::band(what, x.to_vec(), below, above.clone(), colour));
+            areas.push(Series::band(state.words(), x.to_vec(), below, above.clone(), colour));
             areas.push(Series { style: Style::Solid, ..Series::line("", x.to_vec(), above.clone(), colour) });
             below = above;
         }

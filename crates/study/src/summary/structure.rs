@@ -33,8 +33,8 @@ pub struct ReducedSummary {
     pub error: f64,
     /// Up to there, rad/s.
     pub up_to: f64,
-    /// Free motions of the whole.
-    pub free: usize,
+    /// Free motions of the whole; of a sector `None`, as those of the disk are no multiple of its own.
+    pub free: Option<usize>,
     /// Its lowest elastic frequencies, rad/s.
     pub frequencies: Vec<f64>,
 }
@@ -48,7 +48,7 @@ impl StructureSummary {
             kind: reduced.kind().to_owned(),
             error: reduced.error(),
             up_to: reduced.up_to(),
-            free: reduced.free(),
+            free: Some(reduced.free()).filter(|_| one.case.model.ring.is_none()),
             frequencies: reduced.frequencies().iter().skip(reduced.free()).take(LISTED).copied().collect(),
         });
         Some(StructureSummary {
@@ -79,8 +79,8 @@ impl StructureSummary {
             own.push("none".to_owned());
         }
         let free = match reduced.free {
-            0 => String::new(),
-            free => format!(", {free} free motion{}", plural(free)),
+            None | Some(0) => String::new(),
+            Some(free) => format!(", {free} free motion{}", plural(free)),
         };
         lines.push(("frequencies", format!("{} Hz{free}", own.join(", "))));
         let error = significant(100.0 * reduced.error, 2);

@@ -2,7 +2,7 @@
 
 use super::{JointSummary, ModelSummary, Orbits};
 use crate::words::{bytes_text, plural, quantity, significant};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::fmt;
 use stickslip::model::{LinearMode, Modes};
@@ -57,12 +57,7 @@ impl ModelSummary {
     fn joint(&self, joint: &JointSummary) -> String {
         match joint.pressed {
             Some(0.0) => return "apart at rest: it closes and opens".to_owned(),
-            Some(force) => {
-                return format!(
-                    "pressed with {} where the structure does not give way: it opens and closes",
-                    quantity(force, "N")
-                );
-            }
+            Some(preload) => return pressed(preload, joint.at_rest),
             None => {}
         }
         if joint.limit == 0.0 {
@@ -107,10 +102,52 @@ impl ModelSummary {
     }
 }
 
+/// The joint that a direction belongs to.
+fn whole(name: &str) -> &str {
+    name.split('.').next().unwrap_or(name)
+}
+
+/// A load to the digits that tell two apart: joints that symmetry makes alike keep their order, whatever rounding says.
+fn equalised(load: f64) -> f64 {
+    format!("{load:.4e}").parse().unwrap_or(load)
+}
+
+/// Share of a preload that the structure takes, below which it is none.
+const GIVEN_WAY: f64 = 1e-3;
+
+/// What a preload leaves at rest.
+fn pressed(preload: f64, at_rest: Option<f64>) -> String {
+    let newtons = |force: f64| quantity(force, "N");
+    match at_rest {
+        None => {
+            format!("pressed with {} where the structure does not give way: it opens and closes", newtons(preload))
+        }
+        Some(force) if (force - preload).abs() <= GIVEN_WAY * preload => {
+            format!("pressed with {} at rest: it opens and closes", newtons(force))
+        }
+        Some(force) if force > preload => format!(
+            "pressed with {} at rest, by its preload of {} and {} of the constant forces: it opens and closes",
+            newtons(force),
+            newtons(preload),
+            newtons(force - preload)
+        ),
+        Some(force) if force > 0.0 => format!(
+            "pressed with {} at rest, as the structure takes {} of its preload of {}: it opens and closes",
+            newtons(force),
+            newtons(preload - force),
+            newtons(preload)
+        ),
+        Some(_) => format!(
+            "apart at rest, as the structure gives way to its preload of {}: it closes and opens",
+            newtons(preload)
+        ),
+    }
+}
+
 impl fmt::Display for ModelSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // of nodes each direction has a line of its own
-        let names: BTreeSet<&str> = self.joints.iter().filter_map(|joint| joint.name.split('.').next()).collect();
+        let names: BTreeSet<&str> = self.joints.iter().map(|joint| whole(&joint.name)).collect();
         let joints = names.len();
         let dofs =
             if self.dofs == 1 { "1 degree of freedom".to_owned() } else { format!("{} degrees of freedom", self.dofs) };
@@ -126,12 +163,17 @@ impl fmt::Display for ModelSummary {
                 line("joints stuck", &self.modes(&self.stuck))?;
             }
         }
-        // those that the excitation loads most come first where there are many
+        // those that the excitation loads most come first where there are many, each with all its directions
         let mut order: Vec<&JointSummary> = self.joints.iter().collect();
         let lines = self.joints.len();
         if lines > LISTED {
-            let load = |joint: &JointSummary| joint.onset.as_ref().map_or(0.0, |onset| onset.largest);
-            order.sort_by(|a, b| load(b).total_cmp(&load(a)));
+            let mut loads: BTreeMap<&str, f64> = BTreeMap::new();
+            for joint in &self.joints {
+                let load = joint.onset.as_ref().map_or(0.0, |onset| onset.largest);
+                let most = loads.entry(whole(&joint.name)).or_default();
+                *most = most.max(equalised(load));
+            }
+            order.sort_by(|a, b| loads[whole(&b.name)].total_cmp(&loads[whole(&a.name)]));
         }
         for joint in order.iter().take(LISTED) {
             line(&joint.name, &self.joint(joint))?;

@@ -10,7 +10,7 @@ use crate::words::significant;
 use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use stickslip::dimension::Dimension;
-use stickslip::model::Axis;
+use stickslip::model::{Axis, Loose};
 
 /// Names that a warning lists; of more it gives the number.
 const NAMED: usize = 6;
@@ -40,8 +40,10 @@ fn listed(names: &[String]) -> String {
 }
 
 fn loose(cases: &[Surveyed]) -> Vec<String> {
-    let one = |one: &stickslip::model::Loose| {
-        let (names, them) = (listed(&one.masses), if one.masses.len() == 1 { "it" } else { "them" });
+    let them = |count: usize| if count == 1 { "it" } else { "them" };
+    let one = |one: &Loose| {
+        let names = listed(&one.masses);
+        let them = them(one.masses.len());
         if one.held_by_friction {
             format!(
                 "no spring holds {names}: friction alone keeps {them} in place, and once all joints slip nothing does"
@@ -50,13 +52,29 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
             format!("nothing holds {names}: no spring and no joint ties {them} to `ground`")
         }
     };
-    // what stands on faces that are pressed is no mistake
-    let loose = cases[0].survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
-    loose.take(NAMED).map(one).chain(unpressed(cases)).collect()
+    // what stands on faces that are pressed is no mistake, and what lies between faces that nothing presses has a reason of its own
+    let survey = &cases[0].survey;
+    let between = |loose: &&Loose| !loose.held_by_friction && !loose.faces.is_empty();
+    let unpressed: Vec<&Loose> = survey.loose().iter().filter(between).collect();
+    let open = unpressed.first().map(|_| {
+        let bodies: Vec<String> = unpressed.iter().flat_map(|one| one.masses.clone()).collect();
+        let mut joints: Vec<String> = unpressed.iter().flat_map(|one| one.faces.clone()).collect();
+        joints.dedup();
+        format!(
+            "nothing holds {} at rest: only the faces of {} touch {}, and no preload presses these; give them a preload, or hold {} by a spring",
+            listed(&bodies),
+            listed(&joints),
+            them(bodies.len()),
+            them(bodies.len())
+        )
+    });
+    let others = survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
+    let others = others.filter(|one| !between(one));
+    others.take(NAMED).map(one).chain(open).chain(preloaded(cases)).collect()
 }
 
 /// A preload that no constant force balances, in the first case that has one.
-fn unpressed(cases: &[Surveyed]) -> Option<String> {
+fn preloaded(cases: &[Surveyed]) -> Option<String> {
     let (case, found) = cases.iter().find_map(|case| Some((case, case.survey.unpressed()?)))?;
     let pushed = case.survey.loose().iter().filter(|one| one.contacts.iter().any(|name| found.joints.contains(name)));
     let bodies: Vec<String> = pushed.flat_map(|one| one.masses.clone()).collect();
@@ -122,8 +140,8 @@ fn structure(case: &Surveyed) -> Vec<String> {
     }
     if reduced.error() > REDUCTION_ERROR {
         found.push(format!(
-            "the reduced structure errs by {} at {}; take more modes, or `reduce = {{ up_to = … }}`, which takes as many as are needed",
-            displayed(reduced.error(), None),
+            "the reduced structure errs by {} % at {}; take more modes, or `reduce = {{ up_to = … }}`, which takes as many as are needed",
+            significant(100.0 * reduced.error(), 3),
             hertz(reduced.worst_at())
         ));
     }

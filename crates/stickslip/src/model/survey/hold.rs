@@ -13,6 +13,8 @@ pub(super) struct Stuck {
     /// `W`, by its entries.
     pub(super) at: Vec<(usize, f64)>,
     pub(super) hold: Hold,
+    /// The spring of faces that are apart at rest, once they are closed and stick, N/m; zero of all others.
+    pub(super) closed: f64,
     /// The force that presses the faces at rest, N, of a normal direction.
     pub(super) pressed: Option<f64>,
 }
@@ -27,7 +29,11 @@ impl Stuck {
                 true => (Hold::pressed(law, axis), Some(force_at_rest(law, axis))),
                 false => (Hold::of(law, axis), None),
             };
-            Stuck { joint: index, axis, name, at: along.rows().to_vec(), hold, pressed }
+            let closed = match hold {
+                Hold::Nothing => law.closed().and_then(|along| along.get(axis).copied()).unwrap_or(0.0),
+                Hold::Spring { .. } | Hold::Rigid { .. } => 0.0,
+            };
+            Stuck { joint: index, axis, name, at: along.rows().to_vec(), hold, closed, pressed }
         })
         .collect()
     }

@@ -43,7 +43,7 @@ const ITERATIONS: usize = 100;
 
 impl Linear {
     /// The modes of a structure with springs at joints, and constraints `Σ w x = 0`.
-    pub(super) fn of_matrices(full: &Matrices, links: &[Link], rigid: &[&[(usize, f64)]]) -> Linear {
+    pub(super) fn of_matrices(full: &Matrices, links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
         let n = full.mass.nrows();
         let order: Vec<usize> = (0..n).collect();
         let basis = Basis::new(n, &order, rigid);

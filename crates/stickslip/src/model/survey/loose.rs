@@ -41,10 +41,10 @@ impl Model {
         self.springs.iter().filter(|s| s.stiffness > 0.0).filter_map(|s| ends(&s.between)).for_each(|e| bodies.join(e));
         let mut gripped = bodies.clone();
         let carry: BTreeSet<usize> = joints.iter().filter(|j| j.hold != Hold::Nothing).map(|j| j.joint).collect();
-        let grips = self.joints.iter().zip(self.joint_labels()).enumerate().filter(|(i, _)| carry.contains(i));
         let faces: BTreeSet<usize> = joints.iter().filter(|j| j.pressed.is_some()).map(|j| j.joint).collect();
-        let mut touched: Vec<(usize, &str)> = Vec::new();
-        for (number, (joint, labels)) in grips {
+        // by which joints with faces bodies are touched, pressed on each other or not
+        let (mut touched, mut beside) = (Vec::<(usize, &str)>::new(), Vec::<(usize, &str)>::new());
+        for (number, (joint, labels)) in self.joints.iter().zip(self.joint_labels()).enumerate() {
             // of nodes, each direction
             let along = |name: &String, label: &String| match label.strip_prefix(joint.name.as_str()) {
                 Some(rest) if !rest.is_empty() && name != GROUND => format!("{name}{rest}"),
@@ -52,11 +52,14 @@ impl Model {
             };
             for label in labels {
                 let between = [along(&joint.between[0], &label), along(&joint.between[1], &label)];
-                if let Some(e) = ends(&between) {
+                let Some(e) = ends(&between) else { continue };
+                let carries = carry.contains(&number);
+                if carries {
                     gripped.join(e);
-                    if faces.contains(&number) {
-                        touched.extend([(e.0, joint.name.as_str()), (e.1, joint.name.as_str())]);
-                    }
+                }
+                if faces.contains(&number) {
+                    let found = if carries { &mut touched } else { &mut beside };
+                    found.extend([(e.0, joint.name.as_str()), (e.1, joint.name.as_str())]);
                 }
             }
         }
@@ -73,13 +76,17 @@ impl Model {
                 None => {
                     let held_by_friction = gripped.of(at) == gripped.of(0);
                     known.insert(body, loose.len());
-                    let mut contacts: Vec<String> = Vec::new();
-                    for (_, name) in touched.iter().filter(|(end, _)| bodies.of(*end) == body) {
-                        if contacts.last().is_none_or(|last| last != name) {
-                            contacts.push((*name).to_owned());
+                    let of_body = |found: &[(usize, &str)]| {
+                        let mut names: Vec<String> = Vec::new();
+                        for (_, name) in found.iter().filter(|(end, _)| bodies.of(*end) == body) {
+                            if names.last().is_none_or(|last| last != name) {
+                                names.push((*name).to_owned());
+                            }
                         }
-                    }
-                    loose.push(Loose { masses: vec![place.clone()], held_by_friction, contacts });
+                        names
+                    };
+                    let (contacts, faces) = (of_body(&touched), of_body(&beside));
+                    loose.push(Loose { masses: vec![place.clone()], held_by_friction, contacts, faces });
                 }
             }
         }

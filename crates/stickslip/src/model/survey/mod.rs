@@ -51,8 +51,11 @@ pub struct FirstSlip {
     /// limit.
     pub displacement: Option<f64>,
     /// Of the direction along which faces press on each other, which opens and closes and never slips: the force with
-    /// which they do at rest, N, zero if they are apart. `None` along the others.
+    /// which they do where nothing gives way, N, zero if they are apart. `None` along the others.
     pub pressed: Option<f64>,
+    /// What is left of it at rest, under the constant forces, after the structure has given way, N: not positive where it takes all. `None` where
+    /// nobody knows: without a preload, beside rigid friction, or in models too large for a quick answer.
+    pub at_rest: Option<f64>,
 }
 
 /// How much of its limit a stuck joint needs under the model's excitation, over a range of drive frequencies.
@@ -77,6 +80,8 @@ pub struct Loose {
     pub held_by_friction: bool,
     /// The joints with faces that press on it, which hold it while they do.
     pub contacts: Vec<String>,
+    /// The joints with faces that nothing presses, which may touch it.
+    pub faces: Vec<String>,
 }
 
 /// Contacts that are pressed before anything is loaded, and carry nothing at rest: their preload has pushed away a body that nothing else holds.
@@ -95,6 +100,10 @@ pub struct Survey {
     joints: Vec<Stuck>,
     free: Linear,
     stuck: Linear,
+    /// The same with the faces closed that are apart at rest, if there are any.
+    closed: Option<Linear>,
+    /// What contacts carry at rest where no friction is rigid, N, see [`FirstSlip::at_rest`].
+    at_rest: Vec<Option<f64>>,
     loose: Vec<Loose>,
     unpressed: Option<Unpressed>,
 }
@@ -119,12 +128,19 @@ impl Model {
         let system = self.assemble()?;
         let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(Stuck::of_joint).collect();
         let loose = self.loose(&system, &joints);
-        let unpressed = if loose.is_empty() { None } else { rest::unpressed(&system, &joints) };
+        let at_rest = rest::carried(&system, &joints);
+        let unpressed = if loose.is_empty() { None } else { rest::unpressed(&system, &joints, &at_rest) };
         if system.dofs() > LARGEST {
             let lost = system.dofs();
             let unknown = || Linear { modes: Modes { lost, ..Modes::default() }, shapes: None };
-            return Ok(Survey { free: unknown(), stuck: unknown(), system, joints, loose, unpressed });
+            let (free, stuck) = (unknown(), unknown());
+            return Ok(Survey { free, stuck, closed: None, at_rest, system, joints, loose, unpressed });
         }
+        let faces: Vec<Link> = joints
+            .iter()
+            .filter(|joint| joint.closed > 0.0 && !joint.at.is_empty())
+            .map(|joint| Link { at: joint.at.clone(), stiffness: joint.closed, damping: 0.0 })
+            .collect();
         let held: Vec<Link> = joints
             .iter()
             .filter_map(|joint| match joint.hold {
@@ -140,8 +156,9 @@ impl Model {
             .collect();
         if self.substructure.is_some() {
             let free = Linear::of_matrices(system.structure().full(), &[], &[]);
-            let stuck = Linear::of_matrices(system.structure().full(), &held, &rigid);
-            return Ok(Survey { free, stuck, system, joints, loose, unpressed });
+            let stuck = |held: &[&Link]| Linear::of_matrices(system.structure().full(), held, &rigid);
+            let (stuck, closed) = with_faces(&held, &faces, &stuck);
+            return Ok(Survey { free, stuck, closed, at_rest, system, joints, loose, unpressed });
         }
         let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
         let ends = |between: &[String; 2]| -> Vec<(usize, f64)> {
@@ -157,9 +174,20 @@ impl Model {
             .collect();
         let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().own_mass(i)).collect();
         let free = Linear::new(&mass, &springs.iter().collect::<Vec<_>>(), &[]);
-        let stuck = Linear::new(&mass, &springs.iter().chain(&held).collect::<Vec<_>>(), &rigid);
-        Ok(Survey { system, joints, free, stuck, loose, unpressed })
+        let stuck = |held: &[&Link]| {
+            let all: Vec<&Link> = springs.iter().chain(held.iter().copied()).collect();
+            Linear::new(&mass, &all, &rigid)
+        };
+        let (stuck, closed) = with_faces(&held, &faces, &stuck);
+        Ok(Survey { system, joints, free, stuck, closed, at_rest, loose, unpressed })
     }
+}
+
+/// The structure as its joints hold it at rest, and with the faces closed that are apart, if there are any.
+fn with_faces(held: &[Link], faces: &[Link], linear: &dyn Fn(&[&Link]) -> Linear) -> (Linear, Option<Linear>) {
+    let at_rest: Vec<&Link> = held.iter().collect();
+    let closed: Vec<&Link> = held.iter().chain(faces).collect();
+    (linear(&at_rest), (!faces.is_empty()).then(|| linear(&closed)))
 }
 
 impl Survey {
@@ -183,9 +211,9 @@ impl Survey {
         &self.free.modes
     }
 
-    /// Modes with all joints stuck.
+    /// Modes with all joints stuck: none slips, and faces stay closed, those too that are apart at rest.
     pub fn stuck(&self) -> &Modes {
-        &self.stuck.modes
+        &self.closed.as_ref().unwrap_or(&self.stuck).modes
     }
 
     /// Bodies that no spring holds.
@@ -200,14 +228,21 @@ impl Survey {
 
     /// When each joint begins to slip, in the order of the model.
     pub fn first_slip(&self) -> Vec<FirstSlip> {
-        let one = |joint: &Stuck| {
+        let rigid = self.joints.iter().any(|joint| matches!(joint.hold, Hold::Rigid { .. }));
+        let one = |(joint, carried): (&Stuck, &Option<f64>)| {
             let (limit, displacement) = match joint.hold {
                 Hold::Nothing => (0.0, None),
                 Hold::Spring { limit, displacement, .. } => (limit, Some(displacement)),
                 Hold::Rigid { limit } => (limit, None),
             };
-            FirstSlip { joint: joint.name.clone(), limit, displacement, pressed: joint.pressed }
+            FirstSlip {
+                joint: joint.name.clone(),
+                limit,
+                displacement,
+                pressed: joint.pressed,
+                at_rest: carried.filter(|_| !rigid),
+            }
         };
-        self.joints.iter().map(one).collect()
+        self.joints.iter().zip(&self.at_rest).map(one).collect()
     }
 }

@@ -11,12 +11,13 @@ const NOTHING: f64 = 1e-6;
 /// Stiffness of directions that nothing holds, relative to the stiffest contact: they move, and no force counts on them.
 const SOFT: f64 = 1e-12;
 
-/// Contacts with a preload that carry nothing, if all stay closed on the way to rest; `None` if each carries something, or is beyond [`LARGEST`].
-pub(super) fn unpressed(system: &System, joints: &[Stuck]) -> Option<Unpressed> {
+/// What each contact with a preload carries at rest, N, if all stay closed and stick on the way to rest: negative where they do not; `None` of the
+/// others, and of all where none has a preload, or beyond [`LARGEST`]. Rigid friction is left out, whose share nothing tells.
+pub(super) fn carried(system: &System, joints: &[Stuck]) -> Vec<Option<f64>> {
     let n = system.dofs();
-    let pressed = |joint: &&Stuck| joint.pressed.is_some_and(|force| force > 0.0);
-    if n > LARGEST || !joints.iter().any(|joint| pressed(&joint)) {
-        return None;
+    let unknown = || vec![None; joints.len()];
+    if n > LARGEST || !joints.iter().any(|joint| joint.pressed.is_some_and(|force| force > 0.0)) {
+        return unknown();
     }
     let mut load = DVector::zeros(n);
     for (_, force) in system.excitation(0.0).iter().filter(|(harmonic, _)| *harmonic == 0) {
@@ -39,17 +40,21 @@ pub(super) fn unpressed(system: &System, joints: &[Stuck]) -> Option<Unpressed> 
         }
     }
     (0..n).for_each(|i| stiffness[(i, i)] += SOFT * stiffest);
-    let x = stiffness.lu().solve(&load)?;
-    let carried = |joint: &Stuck, preload: f64| {
-        preload + springs(joint) * joint.at.iter().map(|&(row, w)| w * x[row]).sum::<f64>()
+    let Some(x) = stiffness.lu().solve(&load) else { return unknown() };
+    let carried = |joint: &Stuck| {
+        let preload = joint.pressed.filter(|force| *force > 0.0)?;
+        let force = preload + springs(joint) * joint.at.iter().map(|&(row, w)| w * x[row]).sum::<f64>();
+        Some(if force.abs() <= NOTHING * preload { 0.0 } else { force })
     };
+    joints.iter().map(carried).collect()
+}
+
+/// Contacts with a preload that carry nothing; `None` if each carries something.
+pub(super) fn unpressed(system: &System, joints: &[Stuck], carried: &[Option<f64>]) -> Option<Unpressed> {
     let mut found = Unpressed { joints: Vec::new(), preload: 0.0 };
-    for joint in joints.iter().filter(pressed) {
-        let preload = joint.pressed.unwrap_or(0.0);
-        if carried(joint, preload) <= NOTHING * preload {
-            found.joints.push(system.joints()[joint.joint].name().to_owned());
-            found.preload += preload;
-        }
+    for (joint, _) in joints.iter().zip(carried).filter(|(_, carried)| carried.is_some_and(|force| force <= 0.0)) {
+        found.joints.push(system.joints()[joint.joint].name().to_owned());
+        found.preload += joint.pressed.unwrap_or(0.0);
     }
     (!found.joints.is_empty()).then_some(found)
 }

@@ -232,6 +232,7 @@ impl Model {
             let (mut held, mut rigid) = (Vec::new(), Vec::new());
             for joint in &stuck {
                 match joint.hold {
+                    Hold::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed, 0.0)),
                     Hold::Nothing => {}
                     Hold::Spring { stiffness, .. } => held.extend(link(&joint.at, stiffness, 0.0)),
                     Hold::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
@@ -272,20 +273,23 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
         let wave = sector.wave(diameter).ok()?;
         let (structure, double) = (wave.structure(), wave.is_double());
         let turned = Turned { dofs: sector.dofs(), sectors, diameter, double };
+        let link = |at: &[(usize, f64)], stiffness: f64| -> Vec<Link> {
+            turned.rows(at).into_iter().map(|at| Link { at, stiffness, damping: 0.0 }).collect()
+        };
         let (mut held, mut rigid) = (Vec::new(), Vec::new());
         for joint in &stuck {
             match joint.hold {
+                Hold::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed)),
                 Hold::Nothing => {}
-                Hold::Spring { stiffness, .. } => {
-                    held.extend(turned.rows(&joint.at).into_iter().map(|at| Link { at, stiffness, damping: 0.0 }));
-                }
+                Hold::Spring { stiffness, .. } => held.extend(link(&joint.at, stiffness)),
                 Hold::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
             }
         }
         let modes = |links: &[Link], rigid: &[Row]| -> Option<Once> {
             if structure.dofs() <= LARGEST {
                 let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
-                let Linear { modes, shapes } = Linear::of_matrices(structure.full(), links, &rigid);
+                let Linear { modes, shapes } =
+                    Linear::of_matrices(structure.full(), &links.iter().collect::<Vec<_>>(), &rigid);
                 return Some(turned.once(modes, shapes, lowest, &|x| &structure.full().mass * x));
             }
             if !rigid.is_empty() {

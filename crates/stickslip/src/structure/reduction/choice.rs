@@ -2,10 +2,13 @@
 
 use super::{Deviation, Free, Reduced, ReductionError, Reference, Whole};
 use crate::structure::ReductionKind;
-use stickslip_numerics::sparse::NaturalModes;
+use stickslip_numerics::sparse::{ModesError, NaturalModes};
 
 /// Modes are computed up to these multiples of the frequency of interest, one after the other until a reduction is close enough.
 const EXTENTS: [f64; 2] = [1.5, 3.0];
+/// Multiples beyond these for Craig-Bampton where it is asked for: the error of modes with the places held falls with the square of the frequency
+/// alone. Measured on bricks of 30 rows: 10 % at 3, exact with all modes.
+const FURTHER: [f64; 4] = [6.0, 12.0, 24.0, 48.0];
 /// Of these, up to these shares are tried.
 const SHARES: [f64; 4] = [0.67, 0.8, 0.9, 1.0];
 /// Ports beyond which all modes are taken at once: beside hundreds of residual vectors some modes fewer are no gain.
@@ -77,7 +80,7 @@ impl Reduce {
             }
         }
         let mut best: Option<(Deviation, usize)> = None;
-        let mut reference = None;
+        let (mut reference, mut last) = (None, None);
         for extent in EXTENTS {
             let modes = whole.modes(extent * self.up_to)?;
             let reference = match &mut reference {
@@ -117,6 +120,24 @@ impl Reduce {
                 // ports that do not hold the structure leave the free modes
                 Err(ReductionError::NotHeld { .. }) if self.kind.is_none() => {}
                 Err(other) => return Err(other),
+            }
+            last = Some(modes);
+        }
+        if let (Some(ReductionKind::CraigBampton), Some(reference), Some(modes)) = (self.kind, reference, last) {
+            for extent in FURTHER {
+                let reduced = match whole.craig_bampton(extent * self.up_to) {
+                    Ok(reduced) => reduced,
+                    // more than are ever taken
+                    Err(ReductionError::Modes(ModesError::TooMany { .. })) => break,
+                    Err(other) => return Err(other),
+                };
+                let deviation = reference.deviation(&reduced);
+                if deviation.error <= self.tolerance {
+                    return Ok(Chosen { reduced, deviation, modes });
+                }
+                if best.is_none_or(|(least, _)| deviation.error < least.error) {
+                    best = Some((deviation, reduced.dofs()));
+                }
             }
         }
         let (least, dofs) = best.unwrap_or((Deviation { error: f64::INFINITY, omega: self.up_to }, 0));

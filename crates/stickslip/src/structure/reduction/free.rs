@@ -113,7 +113,16 @@ impl<'a> Free<'a> {
         let own = self.damping.as_ref().map(|c| product(&small.transpose(), &product(c, &small)));
         let damping = damping(&self.whole.damping, &mass, &stiffness, own)?;
         let n = self.whole.dofs();
-        let kind = format!("{modes} free modes, {} residual vectors of {order} orders", small.ncols() - modes);
+        let (residual, plural) = (small.ncols() - modes, |count: usize| if count == 1 { "" } else { "s" });
+        let kind = match residual {
+            0 => format!("{modes} free mode{}", plural(modes)),
+            _ => format!(
+                "{modes} free mode{}, {residual} residual vector{} of {order} order{}",
+                plural(modes),
+                plural(residual),
+                plural(order)
+            ),
+        };
         let ports = product(&self.ports, &small);
         Ok(Reduced { kind, mass, damping, stiffness, ports, basis: self.basis.clone(), weights: small, n })
     }

@@ -62,7 +62,10 @@ pub(in crate::structure) struct ChosenSector {
     pub frequencies: Vec<f64>,
     /// Free motions among them.
     pub free: usize,
+    /// The deviation is known up to there, rad/s.
     pub up_to: f64,
+    /// The modes serve up to there, rad/s.
+    pub serves: f64,
 }
 
 /// A wave that was computed.
@@ -103,7 +106,7 @@ impl CyclicSector {
                 waves.blade = blade.map(|(blade, _)| (blade, up_to));
                 waves.up_to(up_to, tolerance, kind, blade.map_or(0, |(_, step)| STEPS[step]))
             }
-            Reduction::Modes { modes, kind } => waves.with_modes(modes, kind),
+            Reduction::Modes { modes, kind, up_to } => waves.with_modes(modes, kind, up_to),
         }
     }
 
@@ -170,7 +173,7 @@ impl Waves<'_> {
                     best = Some((all, reduced.dofs()));
                 }
                 if all.error <= tolerance {
-                    return Ok(self.chosen(reduced, all, up_to));
+                    return Ok(self.chosen(reduced, all, (up_to, up_to)));
                 }
                 // where the waves that were taken are close, it is others that are missing
                 if own.error > tolerance || taken == between {
@@ -184,30 +187,31 @@ impl Waves<'_> {
     }
 
     /// With so many modes of every wave.
-    fn with_modes(&mut self, count: usize, kind: ReductionKind) -> Result<ChosenSector, ReductionError> {
+    fn with_modes(&mut self, count: usize, kind: ReductionKind, up_to: f64) -> Result<ChosenSector, ReductionError> {
         let level = 1;
         let (taken, between) = (self.sector.diameters(level), self.sector.diameters(level + 1));
-        let mut up_to = f64::INFINITY;
+        let mut serves = f64::INFINITY;
         let mut wholes = Vec::new();
         for &diameter in &between {
             let whole = self.sector.wave(diameter, self.seen)?;
             let copies = if is_real(diameter, self.sector.sectors) { 1 } else { 2 };
             let modes = whole.lowest_modes(copies * count)?;
             let last = modes.values.last().map_or(0.0, |value| value.max(0.0).sqrt());
-            up_to = last.min(up_to);
+            serves = last.min(serves);
             wholes.push((diameter, whole, modes));
         }
-        up_to /= BEYOND;
+        serves /= BEYOND;
+        let up_to = if up_to > 0.0 { up_to } else { serves };
         for (diameter, whole, modes) in wholes {
             let reference = Reference::few(&whole, &modes, up_to, SAMPLES)?;
             self.met.push(Computed { diameter, whole, modes, extent: BEYOND, reference });
         }
         let reduced = self.basis(&taken, (BEYOND, SIZES[0]), kind)?;
         let deviation = self.deviation(&reduced, &between, up_to)?;
-        Ok(self.chosen(reduced, deviation, up_to))
+        Ok(self.chosen(reduced, deviation, (up_to, serves)))
     }
 
-    fn chosen(&self, reduced: ReducedSector, deviation: Deviation, up_to: f64) -> ChosenSector {
+    fn chosen(&self, reduced: ReducedSector, deviation: Deviation, (up_to, serves): (f64, f64)) -> ChosenSector {
         let (mut frequencies, mut free) = (Vec::new(), 0);
         for wave in &self.met {
             let step = if is_real(wave.diameter, self.sector.sectors) { 1 } else { 2 };
@@ -215,7 +219,7 @@ impl Waves<'_> {
             free += wave.modes.free() / step;
         }
         frequencies.sort_by(f64::total_cmp);
-        ChosenSector { reduced, deviation, frequencies, free, up_to }
+        ChosenSector { reduced, deviation, frequencies, free, up_to, serves }
     }
 
     /// One basis of the waves of these diameters.

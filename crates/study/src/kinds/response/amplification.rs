@@ -1,7 +1,8 @@
 //! Amplification: the largest amplitude of a mistuned disk over that of the same disk tuned, each at its own peak.
 
 use super::super::peak_of::{named_places, worst};
-use super::{Found, tables};
+use super::peaks::Found;
+use super::tables;
 use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
 use crate::dataset::{Axis, Panel};
 use crate::drawing::{Drawing, Stretch, numbers};

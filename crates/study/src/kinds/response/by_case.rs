@@ -1,0 +1,134 @@
+//! Panels of a response case by case: the curves of places, sectors of a disk, forces and shares of joints.
+
+use super::super::shares;
+use super::super::wheel::{self, Around};
+use super::drawn::Drawn;
+use crate::columns::{FREQUENCY as DRIVE, phase_of};
+use crate::dataset::{Axis, Panel, Series, Style};
+use crate::drawing::{MOST_PANELS, Stretch, join, numbers};
+use crate::words::significant;
+
+/// A mass below this share of the heaviest is drawn dashed, like the paper's contact masses.
+const LIGHT: f64 = 0.5;
+/// Masses that are drawn behind the largest of them, those with the highest peaks: the curves of thousands would be one grey area in megabytes.
+const BEHIND: usize = 100;
+
+impl Drawn<'_> {
+    /// The panels of each case: the curves of every place, of a disk its sectors, the forces and the shares of joints. Where not all cases have
+    /// room, the first ones have, and it is said.
+    pub(super) fn by_case(&self, stretches: &[Stretch]) -> Vec<Panel> {
+        let each = self.panels_of_a_case().max(1);
+        let room = (MOST_PANELS / each).clamp(1, stretches.len().max(1));
+        let wheels = room * (each + 1) <= MOST_PANELS;
+        let [of_sectors, of_forces, of_shares] = self.colours();
+        let mut panels = Vec::new();
+        for stretch in stretches.iter().take(room) {
+            if !self.shown.is_empty() {
+                panels.push(self.masses_of(stretch));
+            }
+            if let Some([bars, wheel]) = self.sectors_of(stretch, of_sectors) {
+                panels.extend(bars.into_iter().chain(wheel.filter(|_| wheels)));
+            }
+            if !self.joints.is_empty() {
+                let mut panel = self.force_panel(stretch.label());
+                for (i, (name, joints)) in self.pulling().into_iter().enumerate() {
+                    let (x, y) = self.force_line(stretch, &joints);
+                    panel.series.push(Series::line(name, x, y, of_forces + i));
+                }
+                panels.push(panel);
+            }
+            let x: Vec<f64> =
+                numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
+            let over = (&x[..], &self.axes.0);
+            let label = stretch.label();
+            panels.extend(shares::panels(self.curve, &self.faces, &stretch.rows, over, (&label, of_shares)));
+        }
+        if let Some(first) = panels.first_mut().filter(|_| room < stretches.len()) {
+            let some = format!("the first {room} of {} cases", stretches.len());
+            first.title = join([std::mem::take(&mut first.title), some]);
+        }
+        panels
+    }
+
+    /// Panels that each case has, the shape of a disk not counted, which is left out where there is no room.
+    pub(super) fn panels_of_a_case(&self) -> usize {
+        let shares = if self.faces.is_empty() { 0 } else { shares::count(self.curve, &self.faces) };
+        usize::from(!self.shown.is_empty()) + usize::from(self.ring()) + usize::from(!self.joints.is_empty()) + shares
+    }
+
+    /// The masses of one case: each, or the largest of them before all others.
+    fn masses_of(&self, stretch: &Stretch) -> Panel {
+        let (mut panel, names) = (self.panel(stretch.label()), self.names());
+        panel.series.extend(self.references(&names));
+        if self.single() {
+            // of a place that is no mass nobody knows how heavy it is
+            let mass = |place: usize| match self.system.seen()[place].rows() {
+                [(row, _)] => self.system.structure().own_mass(*row),
+                _ => f64::INFINITY,
+            };
+            let places = 0..self.system.places().len();
+            let heaviest = places.map(mass).filter(|mass| mass.is_finite()).fold(0.0, f64::max);
+            for (name, place) in &self.shown {
+                let (x, y) = self.line(stretch, name);
+                let light = mass(*place) < LIGHT * heaviest;
+                let style = if light { Style::Dashed } else { Style::Solid };
+                panel.series.push(Series { style, ..Series::line(name, x, y, self.colour_of(name, *place)) });
+            }
+            for (name, place) in &self.shown {
+                panel.series.extend(self.marks(stretch, name, self.colour_of(name, *place)));
+            }
+            return panel;
+        }
+        let behind = self.highest(stretch, BEHIND);
+        let label = match behind.len() < names.len() {
+            true => format!("the {} highest of {} places", behind.len(), names.len()),
+            false => format!("each of {} places", names.len()),
+        };
+        for name in behind {
+            let (x, y) = self.line(stretch, name);
+            panel.series.push(Series::line(label.clone(), x, y, 1).pale());
+        }
+        let (x, y, worst) = self.envelope(stretch);
+        panel.title = join([panel.title, worst]);
+        panel.series.push(Series::line(format!("largest of {} places", names.len()), x, y, 0));
+        panel
+    }
+
+    /// So many of the shown masses at most, those with the largest amplitudes, in their own order.
+    fn highest(&self, stretch: &Stretch, most: usize) -> Vec<&str> {
+        let names = self.names();
+        let height = |name: &str| self.amplitudes(name, stretch.rows.clone()).into_iter().fold(0.0, f64::max);
+        let mut by_height: Vec<(usize, f64)> = names.iter().map(|name| height(name)).enumerate().collect();
+        by_height.sort_by(|a, b| b.1.total_cmp(&a.1));
+        by_height.truncate(most);
+        by_height.sort_by_key(|(index, _)| *index);
+        by_height.into_iter().map(|(index, _)| names[index]).collect()
+    }
+
+    /// Of a disk a bar for every sector, at the frequency where the largest amplitude is, and its shape there, in colours from `first` on.
+    fn sectors_of(&self, stretch: &Stretch, first: usize) -> Option<[Option<Panel>; 2]> {
+        let ring = self.drawing.study.case(0).ok()?.model.ring?;
+        let columns: Vec<(&str, Vec<f64>)> =
+            self.shown.iter().map(|(name, _)| (name.as_str(), self.amplitudes(name, stretch.rows.clone()))).collect();
+        let highest = |row: usize| columns.iter().map(|(_, values)| values[row]).fold(f64::NEG_INFINITY, f64::max);
+        let row = (0..stretch.rows.len()).max_by(|a, b| highest(*a).total_cmp(&highest(*b)))?;
+        // what is one place in a sector has one colour
+        let at = stretch.rows.start + row;
+        let phase = |name: &str| numbers(self.curve, &phase_of(name), at..at + 1)[0];
+        let shape = columns.iter().map(|(name, values)| (*name, values[row], phase(name)));
+        let shape = Around::of_ring(shape)?;
+        let bars = |(colour, around): (usize, &Around)| {
+            let (x, y) = around.of.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
+            Series::bars(&around.place, x, y, first + colour)
+        };
+        let series: Vec<Series> = shape.iter().enumerate().map(bars).collect();
+        if series.iter().all(|bars| bars.x.len() < 2) {
+            return None;
+        }
+        let frequency = format!("{} Hz", significant(numbers(self.curve, DRIVE, stretch.rows.clone())[row], 6));
+        let title = join([stretch.label(), format!("at {frequency}")]);
+        let (x, y) = (Axis::new("sector", "").whole(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
+        let wheel = wheel::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone()]), first);
+        Some([Some(Panel { title, x, y, series, ..Panel::default() }), wheel])
+    }
+}

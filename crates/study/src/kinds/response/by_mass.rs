@@ -1,0 +1,170 @@
+//! Panels of a response place by place and joint by joint, with a curve for every case, or with percentiles of many draws.
+
+use super::super::shares::{self, State};
+use super::drawn::{Drawn, SINGLE};
+use crate::columns::{FREQUENCY as DRIVE, amplitude_of};
+use crate::dataset::{Panel, Series};
+use crate::drawing::{MOST_CURVES, MOST_PANELS, Stretch, join, numbers, thinned};
+use crate::percentiles::percentiles;
+use crate::study::varied_text;
+
+/// x and y of one draw.
+type CurveOf<'a> = &'a dyn Fn(&Stretch) -> (Vec<f64>, Vec<f64>);
+
+impl Drawn<'_> {
+    /// A panel for every mass (or for the largest of them), with a curve for every case, and then for every joint the same. The last varied
+    /// parameter tells the curves of one panel apart, the others the panels.
+    pub(super) fn by_mass(&self, stretches: &[Stretch]) -> Vec<Panel> {
+        if self.drawing.study.draws().is_some() {
+            return self.by_percentiles(stretches);
+        }
+        let outer = |stretch: &Stretch| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
+        let groups: Vec<(&[Stretch], String)> =
+            stretches.chunk_by(|a, b| outer(a) == outer(b)).map(|group| (group, outer(&group[0]))).collect();
+        let masses: Vec<Option<&str>> =
+            if self.single() { self.names().into_iter().map(Some).collect() } else { vec![None] };
+        let of_masses = groups.iter().flat_map(|(group, outer)| {
+            masses.iter().map(|mass| self.cases_of_mass(*mass, group, outer, masses.len())).collect::<Vec<_>>()
+        });
+        let [_, of_forces, of_shares] = self.colours();
+        let of_joints = groups.iter().flat_map(|(group, outer)| {
+            let joints = self.pulling().into_iter().zip(of_forces..);
+            joints.map(move |(joint, alone)| self.cases_of_joint(&joint, group, outer, alone))
+        });
+        let of_faces = groups.iter().flat_map(|(group, outer)| {
+            let groups = shares::groups(&self.faces).into_iter().zip(of_shares..);
+            groups.flat_map(move |(joints, alone)| self.shares_in_cases(&joints, group, outer, alone))
+        });
+        of_masses.chain(of_joints).chain(of_faces).take(MOST_PANELS).collect()
+    }
+
+    /// Of many draws a panel for every mass (or for the largest of them) and for every joint, with their percentiles for each combination of
+    /// `vary`.
+    fn by_percentiles(&self, stretches: &[Stretch]) -> Vec<Panel> {
+        let groups = self.drawing.by_listed(stretches);
+        let draws = self.drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
+        let some = (groups.len() > SINGLE).then(|| format!("the first {SINGLE} of {} cases", groups.len()));
+        let panel = |mut panel: Panel, name: &str, curve: CurveOf<'_>| {
+            panel.title = join([name.to_owned(), draws.clone()].into_iter().chain(some.clone()));
+            for (colour, (words, group)) in groups.iter().take(SINGLE).enumerate() {
+                let curves: Vec<_> = group.iter().map(|stretch| curve(stretch)).collect();
+                panel.series.extend(percentiles(&curves, words, colour));
+            }
+            panel
+        };
+        let of = |stretch: &Stretch, column: &str| {
+            let of = |column: &str, factor: f64| -> Vec<f64> {
+                numbers(self.curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
+            };
+            (of(DRIVE, self.factor.0), of(column, self.factor.1))
+        };
+        let mut panels = Vec::new();
+        if self.single() {
+            for (name, _) in &self.shown {
+                panels.push(panel(self.panel(String::new()), name, &|stretch| of(stretch, &amplitude_of(name))));
+            }
+        } else {
+            let name = format!("largest of {} places", self.shown.len());
+            panels.push(panel(self.panel(String::new()), &name, &|stretch| {
+                let (x, y, _) = self.envelope(stretch);
+                (x, y)
+            }));
+        }
+        for (name, joints) in self.pulling() {
+            panels.push(panel(self.force_panel(String::new()), &name, &|stretch| self.force_line(stretch, &joints)));
+        }
+        for named in shares::groups(&self.faces) {
+            let of_case = |stretch: &Stretch| self.share_line(stretch, &named.1, State::Slip);
+            let shares = self.share_panel(&named, State::Slip, String::new());
+            let title = shares.title.clone();
+            panels.push(panel(shares, &title, &of_case));
+        }
+        panels.truncate(MOST_PANELS);
+        panels
+    }
+
+    /// The cases of a group, for one mass of so many panels, or for the largest amplitude of all.
+    fn cases_of_mass(&self, mass: Option<&str>, group: &[Stretch], outer: &str, panels: usize) -> Panel {
+        let named = mass.filter(|_| panels > 1).map(str::to_owned);
+        let thinned_out = match group.len() > MOST_CURVES {
+            true => Some(format!("{MOST_CURVES} of {} cases", group.len())),
+            false => self.left_out.clone(),
+        };
+        let mut panel = self.panel(join(named.into_iter().chain([outer.to_owned()]).chain(thinned_out)));
+        if mass.is_none() {
+            panel.y.quantity = format!("largest amplitude of {} places", self.shown.len());
+        } else if panels == 1 && self.system.places().len() > 1 {
+            panel.y.quantity = format!("amplitude of {}", self.shown[0].0);
+        }
+        panel.series.extend(self.references(&mass.map_or_else(|| self.names(), |mass| vec![mass])));
+        for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
+            let (x, y) = match mass {
+                Some(name) => self.line(stretch, name),
+                None => {
+                    let (x, y, _) = self.envelope(stretch);
+                    (x, y)
+                }
+            };
+            let line = of_case(stretch, mass.unwrap_or("largest"), x, y, colour);
+            let value = line.value;
+            panel.series.push(line);
+            if let (Some(name), true) = (mass, group.len() <= SINGLE) {
+                panel.series.extend(self.marks(stretch, name, colour).map(|marks| Series { value, ..marks }));
+            }
+        }
+        panel
+    }
+
+    /// The cases of a group, for the force of one joint, or the largest of several; one case has the colour `alone`.
+    fn cases_of_joint(
+        &self,
+        (joint, all): &(String, Vec<String>),
+        group: &[Stretch],
+        outer: &str,
+        alone: usize,
+    ) -> Panel {
+        let named = Some(joint.clone()).filter(|_| self.joints.len() > 1 || self.system.joints().len() > 1);
+        let mut panel = self.force_panel(join(named.into_iter().chain([outer.to_owned()])));
+        for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
+            let (x, y) = self.force_line(stretch, all);
+            let colour = if stretch.varied.is_empty() { alone } else { colour };
+            panel.series.push(of_case(stretch, joint, x, y, colour));
+        }
+        panel
+    }
+
+    /// The cases of a group, for the slip of a joint, or of all, and where it leaves its face for that; one case has the colour `alone`.
+    fn shares_in_cases(
+        &self,
+        named: &(String, Vec<String>),
+        group: &[Stretch],
+        outer: &str,
+        alone: usize,
+    ) -> Vec<Panel> {
+        let (name, joints) = named;
+        let panel = |state: State| {
+            let mut panel = self.share_panel(named, state, outer.to_owned());
+            for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
+                let (x, y) = self.share_line(stretch, joints, state);
+                let colour = if stretch.varied.is_empty() { alone } else { colour };
+                panel.series.push(of_case(stretch, name, x, y, colour));
+            }
+            panel
+        };
+        let occurs = |state: State| shares::occurs_in(self.curve, joints, state);
+        // of a stop nobody knows whether it slides
+        let states: &[State] = match (occurs(State::Slip), occurs(State::Open)) {
+            (_, false) => &[State::Slip],
+            (true, true) => &[State::Slip, State::Open],
+            (false, true) => &[State::Open],
+        };
+        states.iter().map(|state| panel(*state)).collect()
+    }
+}
+
+/// The curve of a case among others, called by its last varied parameter, or `alone` where nothing is varied.
+fn of_case(stretch: &Stretch, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
+    let last = stretch.varied.last();
+    let label = last.map_or_else(|| alone.to_owned(), |varied| varied.text.clone());
+    Series { value: last.map(|varied| varied.on_axis().0), ..Series::line(label, x, y, colour) }
+}

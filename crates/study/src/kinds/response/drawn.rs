@@ -1,0 +1,215 @@
+//! What the figure of a response draws: curves of places and joints, read off its tables.
+
+use super::super::shares::{self, State};
+use super::super::wheel::of_sector;
+use super::tables;
+use crate::columns::{FREQUENCY as DRIVE, amplitude_of};
+use crate::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
+use crate::drawing::{Drawing, Stretch, join, numbers};
+use std::collections::{BTreeSet, HashMap};
+use std::ops::Range;
+use stickslip::model::System;
+use stickslip_numerics::leading::{EQUAL, leading};
+
+/// Masses that are drawn one by one; of more the largest amplitude is, with the single ones pale behind it.
+pub(super) const SINGLE: usize = 7;
+
+/// Colours that the curves of many masses take: the single ones and the largest of them.
+const MANY: usize = 2;
+
+/// What is drawn.
+pub(super) struct Drawn<'a> {
+    pub(super) drawing: &'a Drawing<'a>,
+    pub(super) curve: &'a Table,
+    /// Its columns by name.
+    pub(super) index: HashMap<&'a str, &'a Column>,
+    /// Names of the masses that are shown, and their numbers.
+    pub(super) shown: Vec<(String, usize)>,
+    /// Case, and mass, frequency (Hz), amplitude (m) of the peaks inside the range.
+    pub(super) peaks: Vec<(usize, (String, f64, f64))>,
+    /// Names of the joints whose forces are shown.
+    pub(super) joints: Vec<String>,
+    /// Names of the joints whose shares of stick and slip are shown.
+    pub(super) faces: Vec<String>,
+    /// The first case's; the others differ in numbers only.
+    pub(super) system: &'a System,
+    pub(super) axes: (Axis, Axis),
+    pub(super) force_axis: Axis,
+    /// From the values of tables to those on the axes.
+    pub(super) factor: (f64, f64),
+    pub(super) force_factor: f64,
+    /// How many of the cases are shown, if not all.
+    pub(super) left_out: Option<String>,
+}
+
+impl Drawn<'_> {
+    /// Amplitudes of one mass in some rows; NaN where there are none.
+    pub(super) fn amplitudes(&self, name: &str, rows: Range<usize>) -> Vec<f64> {
+        let column = self.index.get(&*column_name(&amplitude_of(name))).and_then(|column| column.as_numbers());
+        column.map_or_else(|| vec![f64::NAN; rows.len()], |values| values[rows.clone()].to_vec())
+    }
+
+    /// The curve of one mass in one case, with its peaks among its points.
+    pub(super) fn line(&self, stretch: &Stretch, name: &str) -> (Vec<f64>, Vec<f64>) {
+        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
+        let y = self.amplitudes(name, stretch.rows.clone());
+        self.with_peaks(stretch, x.into_iter().zip(y).collect(), &|mass, _| mass == name)
+    }
+
+    /// The largest amplitude over the shown masses, and which mass has the largest of all in words.
+    pub(super) fn envelope(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>, String) {
+        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
+        let all: Vec<Vec<f64>> =
+            self.shown.iter().map(|(name, _)| self.amplitudes(name, stretch.rows.clone())).collect();
+        let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mut heights: Vec<f64> = all.iter().map(|values| highest(values)).collect();
+        let alike = leading(heights.iter().copied())
+            .is_none_or(|worst| heights.iter().all(|height| *height >= (1.0 - EQUAL) * heights[worst]));
+        // between the points of the curve another one may be higher
+        for (mass, _, height) in self.peaks.iter().filter(|peak| peak.0 == stretch.case).map(|peak| &peak.1) {
+            if let Some(i) = self.shown.iter().position(|(name, _)| name == mass) {
+                heights[i] = heights[i].max(*height);
+            }
+        }
+        let worst = leading(heights.into_iter()).filter(|_| !alike);
+        let y: Vec<f64> = (0..x.len()).map(|i| all.iter().map(|values| values[i]).fold(f64::NAN, f64::max)).collect();
+        let below = |omega: f64| {
+            let at = x.partition_point(|x| *x < omega).clamp(1, x.len().max(2) - 1);
+            let share = (omega - x[at - 1]) / (x[at] - x[at - 1]);
+            y[at - 1] + share * (y[at] - y[at - 1])
+        };
+        let points: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).collect();
+        // a peak of one mass below another one is none of the envelope
+        let (x, y) = self.with_peaks(stretch, points, &|_, peak| x.len() > 1 && peak.1 > below(peak.0));
+        (x, y, worst.map_or_else(|| "all are alike".to_owned(), |worst| format!("worst is {}", self.shown[worst].0)))
+    }
+
+    fn with_peaks(
+        &self,
+        stretch: &Stretch,
+        mut points: Vec<(f64, f64)>,
+        counts: &dyn Fn(&str, (f64, f64)) -> bool,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let of_case = self.peaks.iter().filter(|peak| peak.0 == stretch.case).map(|peak| &peak.1);
+        points.extend(of_case.filter(|(mass, x, y)| counts(mass, (*x, *y))).map(|(_, x, y)| (*x, *y)));
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        points.into_iter().map(|(x, y)| (x * self.factor.0, y * self.factor.1)).unzip()
+    }
+
+    /// Marks at the peaks of one mass.
+    pub(super) fn marks(&self, stretch: &Stretch, name: &str, colour: usize) -> impl Iterator<Item = Series> {
+        let of_case = self.peaks.iter().filter(move |peak| peak.0 == stretch.case).map(|peak| &peak.1);
+        of_case
+            .filter(move |(mass, _, _)| mass == name)
+            .map(move |(_, x, y)| Series::marks("peak", vec![x * self.factor.0], vec![y * self.factor.1], colour))
+    }
+
+    /// Grey curves of the linear structures: of one mass, or the largest over the shown ones.
+    pub(super) fn references(&self, names: &[&str]) -> Vec<Series> {
+        let Some(table) = self.drawing.table(tables::REFERENCES) else { return Vec::new() };
+        let x: Vec<f64> = numbers(table, DRIVE, 0..table.rows()).iter().map(|x| x * self.factor.0).collect();
+        [("free", Style::Solid), ("stuck", Style::Dotted)]
+            .into_iter()
+            .map(|(what, style)| {
+                let all: Vec<Vec<f64>> = names
+                    .iter()
+                    .map(|name| numbers(table, &amplitude_of(&format!("{name}_{what}")), 0..table.rows()))
+                    .collect();
+                let y = (0..x.len()).map(|i| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max) * self.factor.1);
+                let y: Vec<f64> = y.collect();
+                let of = if names.len() > 1 { ", largest" } else { "" };
+                let line = Series::line(format!("all joints {what}{of}"), x.clone(), y, 0);
+                Series { style, ..line.reference() }
+            })
+            // why one is absent stands in the notes
+            .filter(|line| line.y.iter().any(|y| y.is_finite()))
+            .collect()
+    }
+
+    pub(super) fn panel(&self, title: String) -> Panel {
+        Panel { title, x: self.axes.0.clone(), y: self.axes.1.clone(), ..Panel::default() }
+    }
+
+    pub(super) fn force_panel(&self, title: String) -> Panel {
+        Panel { y: self.force_axis.clone(), ..self.panel(title) }
+    }
+
+    /// A panel of the share in which a joint, or the mean of several, is in one state.
+    pub(super) fn share_panel(&self, (name, joints): &(String, Vec<String>), state: State, more: String) -> Panel {
+        let words = state.words();
+        let title = if joints.len() == 1 { format!("{name} {words}") } else { format!("{name}, {words}") };
+        Panel { y: shares::axis("share of the period"), ..self.panel(join([title, more])) }
+    }
+
+    /// The share in which joints are in one state, slip for example.
+    pub(super) fn share_line(&self, stretch: &Stretch, joints: &[String], state: State) -> (Vec<f64>, Vec<f64>) {
+        let x = numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
+        (x, shares::mean(self.curve, joints, &stretch.rows, state))
+    }
+
+    /// The force of a joint, or the largest of several.
+    pub(super) fn force_line(&self, stretch: &Stretch, joints: &[String]) -> (Vec<f64>, Vec<f64>) {
+        let of = |column: &str, factor: f64| -> Vec<f64> {
+            numbers(self.curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
+        };
+        let all: Vec<Vec<f64>> = joints.iter().map(|joint| of(&force(joint), self.force_factor)).collect();
+        let largest = |i: usize| all.iter().map(|forces| forces[i]).fold(f64::NAN, f64::max);
+        (of(DRIVE, self.factor.0), (0..stretch.rows.len()).map(largest).collect())
+    }
+
+    /// The joints whose forces are drawn as one line, with its name: each for itself, of many those that are one joint in a sector.
+    pub(super) fn pulling(&self) -> Vec<(String, Vec<String>)> {
+        if self.joints.len() <= SINGLE {
+            return self.joints.iter().map(|joint| (joint.clone(), vec![joint.clone()])).collect();
+        }
+        let mut groups: Vec<(String, Vec<String>)> = Vec::new();
+        for joint in &self.joints {
+            let place = of_sector(joint).map_or_else(|| "joint".to_owned(), |(place, _)| place);
+            match groups.iter_mut().find(|(name, _)| *name == place) {
+                Some((_, group)) => group.push(joint.clone()),
+                None => groups.push((place, vec![joint.clone()])),
+            }
+        }
+        let named = |(place, group): (String, Vec<String>)| (format!("{place}, largest of {}", group.len()), group);
+        groups.into_iter().map(named).collect()
+    }
+
+    /// The colour of a place that is drawn by itself: in all figures the same, as long as there are colours for all places of the model.
+    pub(super) fn colour_of(&self, name: &str, place: usize) -> usize {
+        if self.system.places().len() <= SINGLE {
+            return place;
+        }
+        self.shown.iter().position(|(shown, _)| shown == name).unwrap_or(place)
+    }
+
+    /// The first colours of what is drawn in turn, so that no two names have one: of places in a sector, of joints' forces, of joints' shares.
+    pub(super) fn colours(&self) -> [usize; 3] {
+        let places = match self.single() {
+            true => self.shown.len().max(self.system.places().len().min(SINGLE)),
+            false => MANY,
+        };
+        let in_sector: BTreeSet<String> =
+            self.shown.iter().filter_map(|(name, _)| Some(of_sector(name)?.0)).filter(|_| self.ring()).collect();
+        let joints = places + in_sector.len();
+        [places, joints, joints + if self.joints.is_empty() { 0 } else { self.pulling().len() }]
+    }
+
+    /// Whether the sectors of a disk are drawn side by side.
+    pub(super) fn ring(&self) -> bool {
+        self.drawing.study.case(0).is_ok_and(|case| case.model.ring.is_some())
+    }
+
+    /// Whether the masses are drawn one by one.
+    pub(super) fn single(&self) -> bool {
+        self.shown.len() <= SINGLE
+    }
+
+    pub(super) fn names(&self) -> Vec<&str> {
+        self.shown.iter().map(|(name, _)| name.as_str()).collect()
+    }
+}
+
+/// The column of a joint's force.
+pub(super) fn force(joint: &str) -> String {
+    format!("{joint}_force_amplitude_N")
+}

@@ -1,0 +1,105 @@
+//! The figure of a response.
+
+use super::super::shares;
+use super::drawn::{Drawn, force};
+use super::{amplification, tables};
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, amplitude_of};
+use crate::dataset::{Axis, Figure, Panel, Sharing};
+use crate::drawing::{Drawing, Layout, MOST_PANELS, Stretch, join, largest, numbers, words};
+use crate::histogram;
+use crate::words::display_unit;
+
+pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
+    let (Some(curve), Some(system)) = (drawing.table(tables::CURVE), drawing.system()) else {
+        return Figure::default();
+    };
+    let places = system.places().iter().cloned().zip(0..);
+    let shown: Vec<(String, usize)> = places.filter(|(name, _)| drawing.shows(name)).collect();
+    // with `output = "joint_force"` only
+    let names = system.joints().iter().flat_map(|joint| joint.labels());
+    let joints: Vec<String> =
+        names.filter(|name| drawing.shows(name) && curve.numbers(&force(name)).is_some()).collect();
+    // with `output = "contact"` only
+    let names = system.joints().iter().map(|joint| joint.name().to_owned());
+    let faces: Vec<String> = names.filter(|name| drawing.shows(name) && shares::has(curve, name)).collect();
+    if shown.is_empty() && joints.is_empty() && faces.is_empty() {
+        return Figure::default();
+    }
+    let columns = || shown.iter().map(|(name, _)| amplitude_of(name));
+    let (x, x_factor) = drawing.axis(0, "frequency", largest(curve, [DRIVE.to_owned()]), "Hz");
+    let (y, y_factor) = drawing.axis(1, "amplitude", largest(curve, columns()), "m");
+    let (unit, force_factor) = display_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
+    let stretches = drawing.stretches(curve);
+    let drawn = Drawn {
+        drawing,
+        curve,
+        index: curve.index(),
+        peaks: peaks_by_case(drawing),
+        factor: (x_factor, y_factor),
+        force_factor,
+        axes: (x, y),
+        // a force between nothing and its limit needs no decades
+        force_axis: Axis::new("joint force", unit),
+        system: &system,
+        shown,
+        joints,
+        faces,
+        left_out: drawing.left_out(stretches.len()),
+    };
+    let mut figure = match drawing.layout(drawn.shown.len(), stretches.len(), drawn.panels_of_a_case()) {
+        Layout::Cases => {
+            // colours are those of maps: the curves of one panel have names
+            let varied = (!drawn.faces.is_empty()).then(|| shares::axis("share of the period"));
+            Figure { panels: drawn.by_case(&stretches), varied, ..Figure::default() }
+        }
+        Layout::Masses => Figure {
+            panels: drawn.by_mass(&stretches),
+            sharing: Sharing::Always,
+            varied: drawing.varied_axis(&stretches, drawing.study.varied().len().saturating_sub(1)),
+            ..Figure::default()
+        },
+    };
+    let amplified = amplification::panels(drawing);
+    figure.panels.extend(if amplified.is_empty() { heights(&drawn) } else { amplified });
+    figure.panels.truncate(MOST_PANELS);
+    figure
+}
+
+/// Of many draws how high their largest peak is.
+fn heights(drawn: &Drawn<'_>) -> Vec<Panel> {
+    let (Some(table), Some(_)) = (drawn.drawing.table(tables::PEAKS), drawn.drawing.study.draws()) else {
+        return Vec::new();
+    };
+    let stretches = drawn.drawing.stretches(table);
+    let x = Axis { quantity: "largest peak".to_owned(), ..Axis::new("", &drawn.axes.1.unit) };
+    let of_group = |(words, group): (String, Vec<&Stretch>)| {
+        let highest = |stretch: &&Stretch| {
+            let heights = numbers(table, AMPLITUDE, stretch.rows.clone());
+            heights.into_iter().fold(f64::NAN, f64::max) * drawn.factor.1
+        };
+        let heights: Vec<f64> = group.iter().map(highest).collect();
+        histogram::panel(&heights, &x, &join([words, "largest peak".to_owned()]), "draws")
+    };
+    drawn.drawing.by_listed(&stretches).into_iter().filter_map(of_group).collect()
+}
+
+/// The peaks inside the range: case, and mass, frequency (Hz), amplitude (m).
+fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<(usize, (String, f64, f64))> {
+    let Some(table) = drawing.table(tables::PEAKS) else { return Vec::new() };
+    let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
+    let masses = words(table, tables::MASS);
+    // a table from elsewhere may lack columns
+    if masses.len() != table.rows() {
+        return Vec::new();
+    }
+    let mut peaks = Vec::new();
+    for stretch in drawing.stretches(table) {
+        let (x, y) = (numbers(table, DRIVE, stretch.rows.clone()), numbers(table, AMPLITUDE, stretch.rows.clone()));
+        for (i, row) in stretch.rows.clone().enumerate() {
+            if at_end.get(row) == Some(&Some(false)) {
+                peaks.push((stretch.case, (masses[row].clone(), x[i], y[i])));
+            }
+        }
+    }
+    peaks
+}

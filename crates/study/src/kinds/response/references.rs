@@ -1,0 +1,56 @@
+//! The linear references of a response: the same structure with all joints free, and with all joints stuck.
+
+use crate::columns::{FREQUENCY as DRIVE, amplitude_of};
+use crate::linear::Reference;
+use crate::note::WARNING;
+use crate::rows::Rows;
+use crate::values::hertz;
+use crate::work::{Prepared, Work};
+use stickslip::method::{self, MethodError, Options, Solver};
+use stickslip::model::System;
+use stickslip::orbit::Orbit;
+
+/// Points of the linear references between two points of the curve: their peaks are sharper than that of any damped curve.
+pub(super) const REFERENCE_POINTS: usize = 4;
+
+/// A solver of a linear reference: its joints have other laws than those for which the method was chosen, so that any may do.
+fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    prepared.method.solver(system).or_else(|error| {
+        let others = error.ways().into_iter().flat_map(|ways| &ways.methods).filter_map(|name| method::find(name));
+        let mut takes = others.filter_map(|row| (row.build)(&Options::new()).ok()?.solver(system).ok());
+        takes.next().ok_or(error)
+    })
+}
+
+/// The responses of the same structure with all joints free and with all joints stuck, and why one of them is absent.
+pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>) {
+    let prepared = work.case();
+    let between = omegas.windows(2).flat_map(|pair| {
+        (0..REFERENCE_POINTS).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / REFERENCE_POINTS as f64)
+    });
+    let omegas: Vec<f64> = between.chain(omegas.last().copied()).collect();
+    let mut absent = Vec::new();
+    let mut follow = |reference: Reference| -> Option<Vec<Option<Orbit>>> {
+        // what the laws have no reference for was said when the study was checked
+        let model = reference.model(&prepared.case.model).ok()?;
+        let found = model.assemble().map_err(|error| error.to_string()).and_then(|system| {
+            let mut solver = solver(prepared, &system).map_err(|error| error.to_string())?;
+            Ok(omegas.iter().map(|omega| solver.orbit(*omega, None).ok()).collect())
+        });
+        found.map_err(|why| absent.push(format!("{WARNING}{}", reference.missing(&why)))).ok()
+    };
+    let curves = Reference::ALL.map(|reference| (reference.name(), follow(reference)));
+    let mut rows = Rows::default();
+    for (i, omega) in omegas.iter().enumerate() {
+        rows.number(DRIVE, hertz(*omega));
+        for (what, curve) in &curves {
+            for (place, name) in prepared.system.places().iter().enumerate() {
+                let orbit = curve.as_ref().and_then(|curve| curve[i].as_ref());
+                let amplitude = orbit.map_or(f64::NAN, |orbit| orbit.places[place].amplitude());
+                rows.number(&amplitude_of(&format!("{name}_{what}")), amplitude);
+            }
+        }
+        rows.end();
+    }
+    (rows, absent)
+}
