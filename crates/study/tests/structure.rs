@@ -194,8 +194,8 @@ fn errors_are_those_of_the_studys_frequencies() {
     let (near, far) = (told(few, "400 Hz"), told(few, "3 kHz"));
     assert!((near.1 - 400.0).abs() < 1e-9 && (far.1 - 3000.0).abs() < 1e-9, "{near:?} {far:?}");
     assert!(near.0 < 0.01 && far.0 > near.0, "{near:?} {far:?}");
-    let close = told("reduce = { up_to = \"5 kHz\", kind = \"craig-bampton\", tolerance = 3e-3 }", "400 Hz");
-    assert!(close.0 <= 3e-3, "{close:?}");
+    let close = told("reduce = { up_to = \"5 kHz\", kind = \"craig-bampton\", tolerance = 1e-5 }", "400 Hz");
+    assert!(close.0 <= 1e-5, "{close:?}");
 }
 
 /// Where no drive tells how far a reduction must reach, the message asks for it.
