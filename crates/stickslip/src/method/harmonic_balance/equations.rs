@@ -55,7 +55,7 @@ const NOTHING: f64 = 1e-150;
 /// All that belongs to one number of harmonics.
 #[derive(Debug, Clone)]
 pub(super) struct Level {
-    /// How often the derivative was assembled in the present search.
+    /// How often the derivative was assembled in the present search, where it is a matrix.
     pub assembled: usize,
     pub alternation: Alternation,
     /// Of the axes; empty in the banded form.

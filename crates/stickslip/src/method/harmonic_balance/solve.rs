@@ -1,5 +1,5 @@
-//! The search for a solution: Newton's method with the exact derivative; where it fails, proximal points, and then slip limits that are
-//! lowered from where everything sticks.
+//! The search for a solution: Newton's method with the exact derivative, of many contacts by fewer samples first; where it fails, proximal points, and
+//! then slip limits that are lowered from where everything sticks.
 
 use super::coupled::FORMED;
 use super::ease::{Ease, GIVEN, SOLVED};
