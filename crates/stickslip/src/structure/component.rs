@@ -3,8 +3,8 @@
 
 use super::cyclic::{Blade, BladeError, Boundary, CyclicSector};
 use super::reduction::{
-    Damping, Deviation, Free, MistunedRing, Mixed, NominalRing, Reduce, Reduced, ReducedSector, ReductionError,
-    Reference, RingModes, Row, STEPS, Whole, alone, lacking_most,
+    Damping, Deviation, Free, MistunedRing, Reduce, Reduced, ReducedSector, ReductionError, Reference, Row, STEPS,
+    Whole, alone, lacking_most,
 };
 use super::{StructureError, symmetric};
 use nalgebra::DMatrix;
@@ -66,7 +66,7 @@ pub(crate) struct SectorBlade {
     /// In the coordinates of a reduction with that many steps of its vectors.
     reductions: Known<(Asked, usize), Relieved>,
     /// By the deviations of all blades.
-    mistuned: Known<Pattern, Arc<ReducedComponent>>,
+    mistuned: Known<Pattern, MistunedSector>,
 }
 
 type KeptBlade = Result<Arc<SectorBlade>, BladeError>;
@@ -74,13 +74,20 @@ type KeptBlade = Result<Arc<SectorBlade>, BladeError>;
 type Pattern = (Asked, Vec<f64>);
 type Relieved = Result<Arc<InFew>, ReductionError>;
 
-/// A sector in few coordinates, and the ring in the modes of its waves.
+/// A sector in few coordinates, and what a share of one of its blade's stiffness adds over them.
 #[derive(Debug)]
 struct InFew {
     component: Arc<ReducedComponent>,
-    ring: NominalRing,
+    of_blade: Vec<(usize, usize, f64)>,
     /// Frequencies of modes that lack most when the blades differ, rad/s.
     suspect: Vec<f64>,
+}
+
+/// A sector for a ring whose blades differ.
+#[derive(Debug, Clone)]
+pub(crate) struct MistunedSector {
+    pub component: Arc<ReducedComponent>,
+    few: Arc<InFew>,
 }
 
 /// What was asked, and the answers.
@@ -172,13 +179,10 @@ pub(crate) enum Form {
     Alone(Arc<Reduced>),
     /// Of one sector of a ring.
     Sector(Arc<ReducedSector>),
-    /// Of a ring whose blades differ.
-    Ring(Arc<RingModes>),
 }
 
-/// Patterns of blades whose modes are remembered: a case is assembled several times in a row, and a campaign has a million. Those of 240 blades with five
-/// places each are 20 MB.
-const PATTERNS: usize = 16;
+/// Patterns of blades whose error is remembered: a case is assembled several times in a row, and a campaign has a million.
+const PATTERNS: usize = 64;
 
 /// A mode that is kept, in multiples of the frequency up to which it serves: the last ones only complete those below.
 const BEYOND: f64 = 1.5;
@@ -374,9 +378,15 @@ impl KeptSector {
         })
     }
 
-    /// The ring whose blades deviate by these shares of their stiffness in its own modes: with as many vectors of the blade as the
+    /// The sector in few coordinates for a ring whose blades deviate by these shares of their stiffness: with as many vectors of the blade as the
     /// error of that ring asks for, or with those that come nearest.
-    pub fn mistuned(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
+    pub fn mistuned(
+        &self,
+        blade: &SectorBlade,
+        deviations: &[f64],
+        seen: &[Row],
+        how: &Reduction,
+    ) -> Result<MistunedSector, ReductionError> {
         let asked = ((seen.to_vec(), *how), deviations.to_vec());
         let known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, answer)) = known.iter().find(|(key, _)| *key == asked) {
@@ -393,31 +403,41 @@ impl KeptSector {
         Ok(answer)
     }
 
-    fn nearest(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
-        let whole = MistunedRing::new(&self.sector, (&blade.blade, blade.alone(&self.sector)?), deviations, seen)?;
-        // without vectors of the blade only as many modes as are stated
+    fn nearest(
+        &self,
+        blade: &SectorBlade,
+        deviations: &[f64],
+        seen: &[Row],
+        how: &Reduction,
+    ) -> Result<MistunedSector, ReductionError> {
+        let ring = MistunedRing::new(&self.sector, (&blade.blade, blade.alone(&self.sector)?), deviations, seen)?;
         let (steps, enough) = match *how {
-            Reduction::UpTo { tolerance, .. } => (1..STEPS.len(), tolerance),
-            _ => (0..1, f64::INFINITY),
+            Reduction::UpTo { tolerance, .. } => (STEPS.len(), tolerance),
+            _ => (1, f64::INFINITY),
         };
-        let mut last: Option<(Arc<InFew>, Mixed)> = None;
-        for step in steps {
+        let mut best: Option<MistunedSector> = None;
+        for step in 0..steps {
             // what has served is kept where more of it fails
-            let few = match (self.few(blade, seen, how, step), &last) {
+            let few = match (self.few(blade, seen, how, step), &best) {
                 (Ok(few), _) => few,
-                (Err(_), Some(_)) => break,
+                (Err(_), Some(_)) => continue,
                 (Err(error), None) => return Err(error),
             };
-            let mixed = few.ring.mixed(deviations)?;
-            let found = whole.deviation(&few.ring, &mixed, &few.suspect, enough);
-            if found.error.max(few.component.deviation.error) <= enough {
-                return Ok(few.of(mixed, found));
+            let own = &few.component;
+            let Form::Sector(sector) = &own.form else { return Err(ReductionError::NoPorts) };
+            let most = if step + 1 < steps { enough } else { f64::INFINITY };
+            let found = ring.deviation(sector, &few.of_blade, &few.suspect, own.up_to, most)?;
+            let deviation = if found.error > own.deviation.error { found } else { own.deviation };
+            let nearer = best.as_ref().is_none_or(|best| deviation.error < best.component.deviation.error);
+            if nearer {
+                let component = Arc::new(ReducedComponent { deviation, ..ReducedComponent::clone(own) });
+                best = Some(MistunedSector { component, few });
             }
-            last = Some((few, mixed));
+            if deviation.error <= enough {
+                break;
+            }
         }
-        let (few, mixed) = last.ok_or(ReductionError::NoPorts)?;
-        let found = whole.deviation(&few.ring, &mixed, &few.suspect, f64::INFINITY);
-        Ok(few.of(mixed, found))
+        best.ok_or(ReductionError::NoPorts)
     }
 
     /// With the vectors of the blade from that step on.
@@ -431,19 +451,8 @@ impl KeptSector {
             let of_blade = blade.blade.along(sector.n, &sector.basis);
             let alone = blade.alone(&self.sector)?;
             let suspect = lacking_most(&self.sector, &blade.blade, alone, sector, component.up_to)?;
-            let ring = NominalRing::new(sector, &of_blade, self.sector.sectors, component.up_to)?;
-            Ok(Arc::new(InFew { component, ring, suspect }))
+            Ok(Arc::new(InFew { component, of_blade, suspect }))
         })
-    }
-}
-
-impl InFew {
-    /// With these modes of the ring, which deviate so.
-    fn of(&self, mixed: Mixed, found: Deviation) -> Arc<ReducedComponent> {
-        let own = &self.component;
-        let deviation = if found.error > own.deviation.error { found } else { own.deviation };
-        let form = Form::Ring(Arc::new(self.ring.modes(mixed)));
-        Arc::new(ReducedComponent { form, deviation, ..ReducedComponent::clone(own) })
     }
 }
 
@@ -455,6 +464,13 @@ impl SectorBlade {
     /// What a share of one of its stiffness adds, over all rows that are left.
     pub fn entries(&self) -> &[(usize, usize, f64)] {
         self.entries.get_or_init(|| self.blade.entries())
+    }
+}
+
+impl MistunedSector {
+    /// What a share of one of the blade's stiffness adds, over the coordinates.
+    pub fn of_blade(&self) -> &[(usize, usize, f64)] {
+        &self.few.of_blade
     }
 }
 
@@ -519,12 +535,11 @@ fn in_few(whole: &Whole, how: &Reduction) -> Result<Fewer, ReductionError> {
 }
 
 impl ReducedComponent {
-    /// Coordinates; of a sector of a ring those of one sector, unless its blades differ.
+    /// Coordinates; of a sector of a ring those of one sector.
     pub fn dofs(&self) -> usize {
         match &self.form {
             Form::Alone(reduced) => reduced.dofs(),
             Form::Sector(sector) => sector.dofs(),
-            Form::Ring(modes) => modes.own.len(),
         }
     }
 
@@ -533,7 +548,6 @@ impl ReducedComponent {
         match &self.form {
             Form::Alone(reduced) => &reduced.kind,
             Form::Sector(sector) => &sector.kind,
-            Form::Ring(modes) => &modes.kind,
         }
     }
 

@@ -7,28 +7,32 @@
 //!
 //! A factor of loss `η` stands for damping, of which a reduction adds no error of its own: at a resonance the error is the shift of its frequency
 //! by the half width. The loads have random signs, so that all modes answer. Frequencies are resonances of the reduced ring near those modes of the
-//! tuned one that lack most of what their blades' forces move, where the softest and the stiffest blade put them.
+//! tuned one that lack most of what their blades' forces move, found by Rayleigh quotients from where the softest and the stiffest blade put them.
 //!
 //! Source: Nicolaides (1987), "Deflation of conjugate gradients with applications to boundary value problems", SIAM J. Numer. Anal. 24, 355-365.
 
 use super::evidence::sign;
-use super::nominal::Mixed;
 use super::ring::HALF_WIDTH;
-use super::{Deviation, NominalRing, ReducedSector, ReductionError, Row, natural};
-use crate::structure::RingRow;
+use super::{Deviation, ReducedSector, ReductionError, Row, natural};
 use crate::structure::cyclic::{Blade, CyclicSector};
+use crate::structure::{RingEntry, RingRow};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
-use stickslip_numerics::sparse::{Analysis, Factor, columns};
+use stickslip_numerics::sparse::{Analysis, ComplexFactor, Factor, Matrix, columns};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+const ONE: Complex64 = Complex64::new(1.0, 0.0);
 
 /// Modes of the tuned ring near which both are compared, at most.
 const MODES: usize = 5;
+/// Nodal diameters whose modes are looked at: those of this level.
+const LEVEL: usize = 1;
 /// Frequencies below this share of the range are those of free motions, which no blade's stiffness moves.
-pub(super) const FREE: f64 = 1e-4;
+const FREE: f64 = 1e-4;
 /// Frequencies closer than this share are of one family of blades.
 const SAME_FAMILY: f64 = 0.01;
+/// Steps by which the Rayleigh quotient of an answer finds a resonance: it converges with the third power.
+const TOWARDS: usize = 2;
 /// Vectors beside the reduced ring, at most.
 const VECTORS: usize = 12;
 /// Share of the error by which one more vector changes it, from which on it is known.
@@ -69,7 +73,7 @@ pub(in crate::structure) fn lacking_most(
     let small = columns::products(n, &reduced.basis, &own.times_columns(&reduced.basis));
     let small = ((&small + small.transpose()) * 0.5).cholesky().ok_or(ReductionError::OutOfRange)?;
     let mut found: Vec<(f64, f64)> = Vec::new();
-    for diameter in sector.main_diameters() {
+    for diameter in sector.diameters(LEVEL) {
         let wave = reduced.wave(diameter, sector.sectors)?;
         let (values, shapes) = natural(&wave.mass, &wave.stiffness).ok_or(ReductionError::OutOfRange)?;
         let inside =
@@ -101,8 +105,11 @@ pub(in crate::structure) fn lacking_most(
 
 /// The reduced ring, its blades differing.
 struct Small<'a> {
-    ring: &'a NominalRing,
-    mixed: &'a Mixed,
+    sector: &'a ReducedSector,
+    sectors: usize,
+    mass: Matrix,
+    stiffness: Matrix,
+    analysis: Analysis,
 }
 
 impl<'a> MistunedRing<'a> {
@@ -122,25 +129,22 @@ impl<'a> MistunedRing<'a> {
         Ok(MistunedRing { sector, blade, deviations, ports, scales, alone })
     }
 
-    /// The largest error of the reduced ring in these modes, at those resonances that are nearest to where the softest and the stiffest blade
-    /// put these frequencies of the tuned one. Beyond `enough` no further one is looked at.
-    pub fn deviation(&self, ring: &NominalRing, mixed: &Mixed, near: &[f64], enough: f64) -> Deviation {
-        let (small, up_to) = (Small { ring, mixed }, ring.up_to);
+    /// The largest error of the reduced ring at resonances up to `up_to` (rad/s) near these frequencies of the tuned one. Beyond `enough` no further one
+    /// is looked at.
+    pub fn deviation(
+        &self,
+        reduced: &ReducedSector,
+        of_blade: &[(usize, usize, f64)],
+        near: &[f64],
+        up_to: f64,
+        enough: f64,
+    ) -> Result<Deviation, ReductionError> {
+        let small = self.small(reduced, of_blade)?;
         let of = |pick: fn(f64, f64) -> f64| self.deviations.iter().copied().fold(0.0, pick);
         let ends = [of(f64::max), of(f64::min)].map(|deviation| (1.0 + deviation).sqrt());
-        let own = mixed.own.iter().filter(|own| own[0] > 0.0).map(|[mass, stiffness]| (stiffness / mass).sqrt());
-        let resonances: Vec<f64> = own.filter(|omega| *omega > FREE * up_to && *omega <= up_to).collect();
-        let nearest = |omega: f64| {
-            resonances.iter().copied().min_by(|a, b| (a - omega).abs().total_cmp(&(b - omega).abs())).unwrap_or(up_to)
-        };
-        let mut met: Vec<f64> = Vec::new();
         let mut worst = Deviation { error: 0.0, omega: up_to };
-        for omega in near.iter().flat_map(|omega| ends.map(|end| nearest(omega * end))) {
-            if met.contains(&omega) {
-                continue;
-            }
-            met.push(omega);
-            let one = self.at(&small, omega);
+        for omega in near.iter().flat_map(|omega| ends.map(|end| omega * end)) {
+            let one = self.at_resonance(&small, omega, up_to)?;
             if one.error > worst.error {
                 worst = one;
             }
@@ -148,18 +152,63 @@ impl<'a> MistunedRing<'a> {
                 break;
             }
         }
-        worst
+        Ok(worst)
     }
 
-    fn at(&self, small: &Small, omega: f64) -> Deviation {
+    fn small<'b>(
+        &self,
+        reduced: &'b ReducedSector,
+        of_blade: &[(usize, usize, f64)],
+    ) -> Result<Small<'b>, ReductionError> {
+        let (r, sectors) = (reduced.dofs(), self.sector.sectors);
+        let ring = |entries: &[RingEntry], more: &[(usize, usize, f64)]| {
+            let around = (0..sectors).flat_map(|s| {
+                entries
+                    .iter()
+                    .map(move |&(row, column, shift, value)| (s * r + row, next(s, shift, sectors) * r + column, value))
+            });
+            let blades = (0..sectors).flat_map(|s| {
+                let deviation = self.deviations[s];
+                more.iter().map(move |&(row, column, value)| (s * r + row, s * r + column, deviation * value))
+            });
+            Matrix::from_triplets(sectors * r, around.chain(blades)).map_err(|_| ReductionError::OutOfRange)
+        };
+        let (mass, stiffness) = (ring(&reduced.mass, &[])?, ring(&reduced.stiffness, of_blade)?);
+        let analysis = Analysis::new(&[&stiffness, &mass]);
+        Ok(Small { sector: reduced, sectors, mass, stiffness, analysis })
+    }
+
+    /// At the resonance of the reduced ring that an answer near `omega` leads to.
+    fn at_resonance(&self, small: &Small, omega: f64, up_to: f64) -> Result<Deviation, ReductionError> {
         let load = self.load();
-        let first = small.answers(omega, &load);
-        let error = self.lacking(small, omega, &load, &first);
-        Deviation { error: if error.is_nan() { f64::INFINITY } else { error }, omega }
+        let seen = small.along(&load);
+        let mut omega = omega;
+        for _ in 0..TOWARDS {
+            let mut answer = seen.clone();
+            small.factor(omega)?.solve(&mut answer);
+            let found = small.quotient(&answer).max(0.0).sqrt();
+            // an answer of many modes may lead out of the range
+            if found > 0.0 && found <= up_to {
+                omega = found;
+            }
+        }
+        let factor = small.factor(omega)?;
+        let mut coordinates = seen;
+        factor.solve(&mut coordinates);
+        let first = small.expanded(&coordinates);
+        let error = self.lacking(small, &factor, omega, &load, &first);
+        Ok(Deviation { error: if error.is_nan() { f64::INFINITY } else { error }, omega })
     }
 
     /// The relative change at the ports by what the whole ring adds to an answer of the reduced one.
-    fn lacking(&self, small: &Small, omega: f64, load: &[Complex64], first: &[Complex64]) -> f64 {
+    fn lacking(
+        &self,
+        small: &Small,
+        factor: &ComplexFactor,
+        omega: f64,
+        load: &[Complex64],
+        first: &[Complex64],
+    ) -> f64 {
         let residual = minus(load, &self.times(omega, first));
         let seen = self.seen(first);
         let size = norm(&seen);
@@ -169,7 +218,9 @@ impl<'a> MistunedRing<'a> {
         for _ in 0..VECTORS {
             let mut vector = self.alone(&left);
             let mut force = self.times(omega, &vector);
-            let answered = small.answers(omega, &force);
+            let mut answered = small.along(&force);
+            factor.solve(&mut answered);
+            let answered = small.expanded(&answered);
             vector = minus(&vector, &answered);
             force = minus(&force, &self.times(omega, &answered));
             let length = norm(&vector);
@@ -265,15 +316,31 @@ impl<'a> MistunedRing<'a> {
 const NOTHING: f64 = 1e-10;
 
 impl Small<'_> {
-    /// Displacements of all rows of all sectors under forces on them.
-    fn answers(&self, omega: f64, forces: &[Complex64]) -> Vec<Complex64> {
-        let NominalRing { sector, sectors, .. } = self.ring;
-        let (n, r) = (sector.n, sector.dofs());
-        let [re, im] = parts(forces).map(|part| columns::products(n, &sector.basis, &part));
-        let along: Vec<Complex64> = re.iter().zip(im.iter()).map(|(re, im)| Complex64::new(*re, *im)).collect();
-        let moved = self.ring.answers(self.mixed, (lossy(), omega), &along);
-        let [re, im] =
-            parts(&moved).map(|part| columns::combination(n, &sector.basis, &DMatrix::from_vec(r, *sectors, part)));
+    fn factor(&self, omega: f64) -> Result<ComplexFactor, ReductionError> {
+        let sum = [(lossy(), &self.stiffness), (-omega * omega * ONE, &self.mass)];
+        self.analysis.factor_complex(&sum).map_err(|singular| ReductionError::Singular { omega, singular })
+    }
+
+    /// `ω²` of the Rayleigh quotient.
+    fn quotient(&self, x: &[Complex64]) -> f64 {
+        let energy = |matrix: &Matrix| -> f64 {
+            matrix.times_complex(x).iter().zip(x).map(|(force, x)| (x.conj() * force).re).sum()
+        };
+        energy(&self.stiffness) / energy(&self.mass)
+    }
+
+    /// `Vᵀ f`.
+    fn along(&self, forces: &[Complex64]) -> Vec<Complex64> {
+        let n = self.sector.n;
+        let [re, im] = parts(forces).map(|part| columns::products(n, &self.sector.basis, &part));
+        re.iter().zip(im.iter()).map(|(re, im)| Complex64::new(*re, *im)).collect()
+    }
+
+    /// `V p`.
+    fn expanded(&self, coordinates: &[Complex64]) -> Vec<Complex64> {
+        let (n, r) = (self.sector.n, self.sector.dofs());
+        let [re, im] = parts(coordinates)
+            .map(|part| columns::combination(n, &self.sector.basis, &DMatrix::from_vec(r, self.sectors, part)));
         re.iter().zip(&im).map(|(re, im)| Complex64::new(*re, *im)).collect()
     }
 }

@@ -46,11 +46,6 @@ pub(crate) struct ReducedSector {
     /// Ports over coordinates: port, coordinate, shift, weight.
     pub ports: Vec<RingEntry>,
     pub port_count: usize,
-    /// The modes of its waves that it has go up to this multiple of the frequency of interest; with the order of the residual vectors, and the share
-    /// below which combinations of them were left out.
-    pub extent: f64,
-    pub order: usize,
-    pub share: f64,
 }
 
 /// What came of a reduction.
@@ -110,13 +105,8 @@ impl CyclicSector {
         }
     }
 
-    /// Nodal diameters whose modes stand for those of all, where blades differ.
-    pub(in crate::structure) fn main_diameters(&self) -> Vec<usize> {
-        self.diameters(1)
-    }
-
     /// Nodal diameters that are computed at a level: all from the last one on.
-    fn diameters(&self, level: usize) -> Vec<usize> {
+    pub(super) fn diameters(&self, level: usize) -> Vec<usize> {
         let (half, parts) = (self.sectors / 2, 2usize << level);
         let mut all: Vec<usize> = (0..=parts).map(|part| (part * half + parts / 2) / parts).collect();
         all.dedup();
@@ -166,7 +156,7 @@ impl Waves<'_> {
                 let taken = self.sector.diameters(level);
                 let between = self.sector.diameters(level + 1);
                 self.meet(&between, up_to, extent)?;
-                let reduced = self.basis(&taken, (extent, size), kind)?;
+                let reduced = self.basis(&taken, size, kind)?;
                 let at = |diameters: &[usize]| self.deviation(&reduced, diameters, up_to);
                 let (own, all) = (at(&taken)?, at(&between)?);
                 if best.is_none_or(|(least, _)| all.error < least.error) {
@@ -206,7 +196,7 @@ impl Waves<'_> {
             let reference = Reference::few(&whole, &modes, up_to, SAMPLES)?;
             self.met.push(Computed { diameter, whole, modes, extent: BEYOND, reference });
         }
-        let reduced = self.basis(&taken, (BEYOND, SIZES[0]), kind)?;
+        let reduced = self.basis(&taken, SIZES[0], kind)?;
         let deviation = self.deviation(&reduced, &between, up_to)?;
         Ok(self.chosen(reduced, deviation, (up_to, serves)))
     }
@@ -226,9 +216,10 @@ impl Waves<'_> {
     fn basis(
         &self,
         diameters: &[usize],
-        (extent, (order, share)): (f64, (usize, f64)),
+        (order, share): (usize, f64),
         kind: ReductionKind,
     ) -> Result<ReducedSector, ReductionError> {
+        let n = self.sector.dofs;
         let mut vectors: Vec<f64> = Vec::new();
         let taken = || self.met.iter().filter(|wave| diameters.contains(&wave.diameter));
         for wave in taken() {
@@ -255,7 +246,7 @@ impl Waves<'_> {
         let differing = if self.blade.is_some() { ", and of its blade" } else { "" };
         let modes = modes.div_ceil(2).max(1);
         let kind = format!("a sector, {name} of {count} nodal diameters with up to {modes} modes{differing}");
-        Ok(self.projected(kind, basis, (extent, order, share)))
+        Ok(self.projected(kind, basis, n))
     }
 
     /// What a wave answers to the forces of a blade that deviates, in its modes up to a frequency: residual vectors, both parts of the wave.
@@ -310,8 +301,8 @@ impl Waves<'_> {
         Ok(basis)
     }
 
-    fn projected(&self, kind: String, basis: Vec<f64>, (extent, order, share): (f64, usize, f64)) -> ReducedSector {
-        let (sector, n) = (self.sector, self.sector.dofs);
+    fn projected(&self, kind: String, basis: Vec<f64>, n: usize) -> ReducedSector {
+        let sector = self.sector;
         let project = |entries: &Vec<RingEntry>| projected(entries, n, &basis);
         let symmetric = |entries: &Vec<RingEntry>| symmetrised(project(entries), |shift| -shift);
         let mut ports = Vec::new();
@@ -335,9 +326,6 @@ impl Waves<'_> {
             ports,
             port_count: self.seen.len(),
             basis,
-            extent,
-            order,
-            share,
         }
     }
 
