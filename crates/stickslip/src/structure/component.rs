@@ -283,7 +283,7 @@ impl Component {
     /// let rod = |k: f64| Matrix::from_triplets(3, [(0, 0, 2.0 * k), (0, 1, -k), (1, 0, -k), (1, 1, 2.0 * k), (1, 2, -k), (2, 1, -k), (2, 2, k)]);
     /// let mass = Matrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0)))?;
     /// let rest = Component::new(vec![String::new(); 3], mass, None, rod(1e4)?)?;
-    /// let how = Reduction::Modes { modes: 1, kind: ReductionKind::Rubin };
+    /// let how = Reduction::Modes { modes: 1, kind: ReductionKind::Rubin, up_to: 0.0 };
     /// let few = rest.reduced_between(&rod(1.5e4)?, &[vec![(2, 1.0)]], &how)?;
     /// assert_eq!(few.component.dofs(), few.there.n());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -437,7 +437,16 @@ impl KeptSector {
                 break;
             }
         }
-        best.ok_or(ReductionError::NoPorts)
+        let MistunedSector { component, few } = best.ok_or(ReductionError::NoPorts)?;
+        let Form::Sector(sector) = &component.form else { return Err(ReductionError::NoPorts) };
+        if component.deviation.error <= enough {
+            return Ok(MistunedSector { component, few });
+        }
+        // that of a step which was not enough is the first beyond, and not the largest
+        let found = ring.deviation(sector, &few.of_blade, &few.suspect, component.up_to, f64::INFINITY)?;
+        let deviation = if found.error > component.deviation.error { found } else { component.deviation };
+        let component = Arc::new(ReducedComponent { deviation, ..ReducedComponent::clone(&component) });
+        Ok(MistunedSector { component, few })
     }
 
     /// With the vectors of the blade from that step on.
