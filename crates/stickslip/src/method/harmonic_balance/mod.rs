@@ -669,7 +669,12 @@ impl Balance<'_> {
         self.level(top, omega).map(|_| ()).map_err(|l| self.lost(l))?;
         let mut motion = Motion { iterations: 0, ..near.clone() };
         let level = self.levels.get_mut(&top).expect("made above");
-        level.polish(&self.ports, omega, &mut motion, NEARBY).map_err(|l| self.lost(l))?;
+        let mut found = level.polish(&self.ports, omega, &mut motion, NEARBY);
+        if found.is_err() && self.ports.has_forces() {
+            motion = Motion { iterations: motion.iterations, ..near.clone() };
+            found = level.by_proximal_points(&self.ports, omega, &mut motion);
+        }
+        found.map_err(|l| self.lost(l))?;
         let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         self.finish(top, omega, motion, x, None)
     }

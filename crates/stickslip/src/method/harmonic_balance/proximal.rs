@@ -13,6 +13,8 @@ use super::solve::Lost;
 
 /// Share of their distance from the point before by which forces are drawn to it, at first.
 const PULL: f64 = 1.0;
+/// The same at most: beyond it a point hardly moves.
+const MOST_PULL: f64 = 1e4;
 /// What is left of that share at the next point after one that was found quickly: usually, and where points were hard to find before.
 const LESS: [f64; 2] = [0.1, 0.3];
 /// Where half and more of it is left, the next try draws as at the point before, and then more.
@@ -59,7 +61,7 @@ impl Level {
                     _ => pull /= LESS[0],
                 }
             }
-            if self.is_exhausted(ports) || (found.is_err() && good.residual <= ENOUGH) {
+            if pull > MOST_PULL || self.is_exhausted(ports) || (found.is_err() && good.residual <= ENOUGH) {
                 break;
             }
         }
