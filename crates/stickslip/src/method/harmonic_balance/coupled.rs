@@ -10,8 +10,7 @@
 //! Memory: per harmonic two complex matrices over the axes, or in modes two real ones over the axes and one over axes and modes.
 
 use super::ease::{Ease, SOLVED};
-use super::equations::Near;
-use super::ports::{Port, Ports, block};
+use super::ports::{MANY_DIRECTIONS, Port, Ports, block};
 use super::receptance::{Modal, Receptance};
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -22,13 +21,11 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Unknowns from which products are faster than elimination: 16 nodes of three directions with six harmonics have 576.
 const MANY: usize = 400;
-/// Directions of joints from which they are: few with many harmonics have steps that are hard to find by products, and a small matrix.
-pub(super) const DIRECTIONS: usize = 24;
 /// Unknowns up to which a matrix is formed all the same where products do not lead to the step: 130 MB, seconds.
 pub(super) const FORMED: usize = 4096;
 /// Whether a level with so many unknowns along so many directions is solved by products.
 pub(super) fn by_products(size: usize, directions: usize) -> bool {
-    size > FORMED || (size >= MANY && directions >= DIRECTIONS)
+    size > FORMED || (size >= MANY && directions >= MANY_DIRECTIONS)
 }
 
 /// Share of Newton's residual to which its equations are solved, and at most: derivatives of laws cost as much as tens of products, so that fewer steps
@@ -74,6 +71,17 @@ pub(super) struct Linear<'a> {
     pub tangents: &'a [f64],
     pub blocks: &'a [usize],
     pub units: &'a [f64],
+}
+
+/// Where a step of Newton's method begins.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Near {
+    /// The yardstick of motions there, m, see `Level::length`.
+    pub length: f64,
+    /// The size of the residual.
+    pub residual: f64,
+    /// Whether derivatives are by fewer samples, see `Level::follow_slopes`.
+    pub sketched: bool,
 }
 
 impl Coupled {

@@ -17,7 +17,7 @@
 //!
 //! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian frequency-time method".
 
-use super::coupled::{Coupled, Linear, by_products};
+use super::coupled::{Coupled, Linear, Near, by_products};
 use super::ease::{Ease, GIVEN};
 use super::hold::CLEAR;
 use super::ports::{Alternation, Beginning, Port, Ports, block, blocks};
@@ -137,17 +137,6 @@ impl Motion {
         (self.residual, self.iterations) = (other.residual, other.iterations);
         self.relaxed_at_zero = other.relaxed_at_zero;
     }
-}
-
-/// Where a step of Newton's method begins.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Near {
-    /// The yardstick of motions there, m, see [`Level::length`].
-    pub length: f64,
-    /// The size of the residual.
-    pub residual: f64,
-    /// Whether derivatives are by fewer samples, see [`Level::follow_slopes`].
-    pub sketched: bool,
 }
 
 /// Which ports' derivatives an evaluation makes.

@@ -8,9 +8,8 @@
 //! matrices are those of one sector. Displacements and forces are those of the whole ring all the same.
 
 use super::closed;
-use super::coupled::DIRECTIONS;
 use super::hold::HOLD;
-use super::ports::Ports;
+use super::ports::{MANY_DIRECTIONS, Ports};
 use super::uncoupled::{Resonant, Uncoupled, by_themselves};
 use crate::model::{Cyclic, System};
 use crate::structure::{DynamicStiffness, Matrices, Sector, Structure, Wave, WaveStiffness, turn};
@@ -233,7 +232,7 @@ impl Rest {
         Rest {
             n,
             modal: if factored || !alone { None } else { modal(system, &columns(n, &directions)) },
-            uncoupled: if alone && (factored || (directions.len() >= DIRECTIONS && is_modal(system.structure()))) {
+            uncoupled: if alone && (factored || (directions.len() >= MANY_DIRECTIONS && is_modal(system.structure()))) {
                 Uncoupled::new(system.structure(), &directions).map(Arc::new)
             } else {
                 None

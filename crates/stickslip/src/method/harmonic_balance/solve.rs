@@ -1,9 +1,9 @@
 //! The search for a solution: Newton's method with the exact derivative, of many contacts by fewer samples first; where it fails, proximal points, and
 //! then slip limits that are lowered from where everything sticks.
 
-use super::coupled::FORMED;
+use super::coupled::{FORMED, Near};
 use super::ease::{Ease, GIVEN, SOLVED};
-use super::equations::{Level, Motion, Near, Slopes};
+use super::equations::{Level, Motion, Slopes};
 use super::ports::Ports;
 use super::sparse::Along;
 use num_complex::Complex64;

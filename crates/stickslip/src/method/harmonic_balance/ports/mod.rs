@@ -27,6 +27,10 @@ use crate::method::MethodError;
 use crate::model::{Axis, Cyclic, System};
 use num_complex::Complex64;
 
+/// Directions of joints from which what the structure couples among them is multiplied with and not eliminated: few with many harmonics have steps that are
+/// hard to find by products, and a small matrix.
+pub(super) const MANY_DIRECTIONS: usize = 24;
+
 /// What acts at a port.
 #[derive(Debug, Clone)]
 enum Kernel {
