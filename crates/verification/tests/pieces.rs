@@ -5,12 +5,12 @@
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
-use stickslip::law::{Contact, Gap, Jenkins, Law, LawInfo, Parameter, Piece, SharedLaw, Stribeck};
+use stickslip::law::{Contact, Coulomb, Gap, Jenkins, Law, LawInfo, Parameter, Piece, SharedLaw, Stribeck};
 use stickslip::method::event_driven::{EventDriven, Subharmonic};
 use stickslip::method::transient::{Excitation, Transient};
 use stickslip::method::{Method, auto::Auto, shooting::Shooting};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
-use stickslip::orbit::Orbit;
+use stickslip::orbit::{Orbit, Sample};
 use stickslip_verification::{close, exact, near, number, table};
 
 /// A mass of 1 kg on a spring (N/m) and a damper (kg/s) with these joints to the ground.
@@ -40,7 +40,7 @@ fn free(model: &Model, start: f64, step: f64, duration: f64) -> Vec<f64> {
         width: None,
     };
     let mut all = Vec::new();
-    let mut keep = |_: f64, _: f64, state: &stickslip::orbit::Sample| {
+    let mut keep = |_: f64, _: f64, state: &Sample| {
         all.push(state.displacement[0]);
         true
     };
@@ -229,7 +229,7 @@ fn pieces_of_one_law_are_joints_side_by_side() {
     let apart: [SharedLaw; 3] = [
         Arc::new(Jenkins { stiffness: 2.0, limit: 0.3 }),
         Arc::new(Gap { gap: 0.4, stiffness: 3.0 }),
-        Arc::new(stickslip::law::Coulomb { limit: 0.1 }),
+        Arc::new(Coulomb { limit: 0.1 }),
     ];
     for omega in [0.5, 1.1, 2.0] {
         let solve = |laws: &[SharedLaw]| {
@@ -297,13 +297,149 @@ fn static_friction_agrees_with_scipy() {
     }
 }
 
+/// A mass, driven by a force, that rubs on another mass or on a place that is moved: joints with these limits (N, in slip and at rest), every
+/// third the other way round.
+fn rubbing(limits: &[(f64, f64)], moved: bool) -> Model {
+    let spring = |place: &str, stiffness: f64, damping: f64| {
+        let between = [place.into(), GROUND.into()];
+        Spring { between, stiffness, damping }
+    };
+    let joint = |(i, &(limit, static_limit)): (usize, &(f64, f64))| {
+        let law: SharedLaw = if static_limit > limit {
+            Arc::new(Stribeck { limit, static_limit, velocity: 0.0 })
+        } else {
+            Arc::new(Coulomb { limit })
+        };
+        let between = if i % 3 == 2 { ["b", "a"] } else { ["a", "b"] }.map(str::to_owned);
+        Joint { name: format!("j{i}"), between, law }
+    };
+    let mut model = Model {
+        masses: vec![Mass::new("a", 1.0)],
+        springs: vec![spring("a", 10e3, 3.0)],
+        joints: limits.iter().enumerate().map(joint).collect(),
+        forces: vec![Force { phase: 0.9, ..force("a", 20.0, 1) }],
+        ..Model::default()
+    };
+    if moved {
+        model.motions = vec![Motion { on: "b".into(), amplitude: 0.3e-3, phase: 0.2, harmonic: 1 }];
+    } else {
+        model.masses.push(Mass::new("b", 0.5));
+        model.springs.push(spring("b", 8e3, 2.0));
+    }
+    model
+}
+
+/// What one contact with the sums of the limits carries, each of several side by side carries by its limits: in stick by the static ones, in slip
+/// its own. Its sign is that of its direction.
+fn shares(what: &str, many: &Sample, one: &Sample, limits: &[(f64, f64)]) {
+    let (whole, held) = (&one.joints[0], limits.iter().map(|limit| limit.1).sum::<f64>());
+    for (i, (joint, &(limit, static_limit))) in many.joints.iter().zip(limits).enumerate() {
+        let (contact, sign) = match whole.contact {
+            contact if i % 3 == 2 => (contact.mirrored(), -1.0),
+            contact => (contact, 1.0),
+        };
+        assert_eq!(joint.contact, contact, "{what}: joint {i}");
+        let force = match joint.contact {
+            Contact::SlipForward => limit,
+            Contact::SlipBackward => -limit,
+            _ => sign * whole.force[0] * static_limit / held,
+        };
+        // forces in stick carry the accelerations of stiff springs
+        near(&format!("{what}: force {i}"), joint.force[0], force, 1e-8 * static_limit);
+        near(&format!("{what}: displacement {i}"), joint.displacement[0], sign * whole.displacement[0], 1e-12);
+    }
+    for (many, one) in many.moved.iter().zip(&one.moved) {
+        near(&format!("{what}: reaction"), many.1, one.1, 1e-8 * held);
+    }
+}
+
+/// Rigid contacts between the same places have one relative motion: they slip and stick together, as one contact with the sums of their limits
+/// does, however many they are and whatever their laws.
+#[test]
+fn rigid_contacts_side_by_side_are_one() {
+    type Limits = fn(usize) -> (f64, f64);
+    let kinds: [(&str, Limits); 4] = [
+        ("coulomb", |_| (0.9, 0.9)),
+        ("stribeck", |_| (0.7, 0.91)),
+        ("mixed", |i| if i % 2 == 0 { (0.7, 1.3) } else { (0.7, 0.7) }),
+        ("unequal", |i| (0.3 + 0.1 * i as f64, 0.4 + 0.13 * (i % 4) as f64 + 0.1 * i as f64)),
+    ];
+    for (kind, limits) in kinds {
+        for count in 2..=12usize {
+            // together they let go, however many they are
+            let scale = 5.0 / count as f64;
+            let limits: Vec<_> = (0..count).map(limits).map(|(slip, rest)| (scale * slip, scale * rest)).collect();
+            let sums = limits.iter().fold((0.0, 0.0), |sum, limit| (sum.0 + limit.0, sum.1 + limit.1));
+            for moved in [false, true] {
+                let what = format!("{count} {kind}, moved: {moved}");
+                let system = |limits: &[(f64, f64)]| rubbing(limits, moved).assemble().unwrap();
+                let (side_by_side, whole) = (system(&limits), system(&[sums]));
+                let omega = TAU * 6.0;
+                let (many, one) = (exact(&side_by_side, omega), exact(&whole, omega));
+                assert!(one.joints[0].slip_fraction > 0.0, "{what}");
+                for (many, one) in many.places.iter().zip(&one.places) {
+                    close(&format!("{what}: amplitude"), many.amplitude(), one.amplitude(), 1e-9);
+                }
+                let loss = many.joints.iter().map(|joint| joint.dissipation).sum::<f64>();
+                near(&format!("{what}: loss"), loss, one.joints[0].dissipation, 1e-9 * one.energy.work_in.abs());
+                for (joint, (limit, _)) in many.joints.iter().zip(&limits) {
+                    let part = one.joints[0].dissipation * limit / sums.0;
+                    near(&format!("{what}: loss of a joint"), joint.dissipation, part, 1e-9 * one.energy.work_in.abs());
+                    close(&format!("{what}: slip"), joint.slip_fraction, one.joints[0].slip_fraction, 1e-9);
+                    assert_eq!(joint.switches, one.joints[0].switches, "{what}");
+                }
+                for step in 0..16 {
+                    // between the switches
+                    let time = (f64::from(step) + 0.3711) / 16.0 * TAU / omega;
+                    shares(&what, &many.sample(time), &one.sample(time), &limits);
+                }
+                assert_eq!(many.evidence.switches, count * one.evidence.switches, "{what}");
+            }
+        }
+    }
+}
+
+/// The same for motions that begin at rest, until they repeat.
+#[test]
+fn rigid_contacts_side_by_side_start_as_one() {
+    for count in [5, 7, 11] {
+        for limits in [vec![(0.9, 0.9); count], vec![(0.7, 0.91); count]] {
+            let sums = limits.iter().fold((0.0, 0.0), |sum, limit| (sum.0 + limit.0, sum.1 + limit.1));
+            let samples = |limits: &[(f64, f64)]| {
+                let motion = Transient {
+                    displacement: vec![0.0; 2],
+                    velocity: vec![0.0; 2],
+                    excitation: Excitation::Steady(TAU * 6.0),
+                    duration: 2.0,
+                    step: 0.01371,
+                    width: None,
+                };
+                let mut samples = Vec::new();
+                let mut keep = |_: f64, _: f64, sample: &Sample| {
+                    samples.push(sample.clone());
+                    true
+                };
+                motion.run(&rubbing(limits, false).assemble().unwrap(), &mut keep).unwrap();
+                samples
+            };
+            let (many, one) = (samples(&limits), samples(&[sums]));
+            assert!(many.len() > 100 && one.iter().any(|sample| sample.joints[0].contact.slips()));
+            for (step, (many, one)) in many.iter().zip(&one).enumerate() {
+                let what = format!("{count} of {:?}, sample {step}", limits[0]);
+                near(&what, many.displacement[0], one.displacement[0], 1e-12);
+                shares(&what, many, one, &limits);
+            }
+        }
+    }
+}
+
 /// An overdamped mass creeps towards the place where it would stop, for ever, and is there to all digits after a while: neither that nor a
 /// stop that is approached so is chatter. A mass that slides with `limit` ends where its spring holds that and the constant force.
 #[test]
 fn creeping_to_a_stop_is_no_chatter() {
     let limit = 0.1;
     let laws: [(SharedLaw, f64, f64); 3] = [
-        (Arc::new(stickslip::law::Coulomb { limit }), limit, 1.0),
+        (Arc::new(Coulomb { limit }), limit, 1.0),
         (Arc::new(Jenkins { stiffness: 2.0, limit }), limit, 1.0),
         (Arc::new(Gap { gap: 0.0, stiffness: 2.0 }), 0.0, 3.0),
     ];
@@ -339,7 +475,7 @@ fn creeping_orbits_are_found() {
     for (constant, omega, amplitude) in
         [(0.0, 1e-3, 1.0), (0.0, 1e-3, 10.0), (0.3, 1e-3, 0.3), (0.3, 1e-3, 10.0), (0.3, 0.01, 1.0)]
     {
-        let mut model = oscillator(1.0, 300.0, &[Arc::new(stickslip::law::Coulomb { limit: 0.1 })]);
+        let mut model = oscillator(1.0, 300.0, &[Arc::new(Coulomb { limit: 0.1 })]);
         model.forces = vec![force("m", amplitude, 1), force("m", constant, 0)];
         let system = model.assemble().unwrap();
         let orbit = exact(&system, omega);
@@ -353,10 +489,7 @@ fn creeping_orbits_are_found() {
 /// A body that nothing but friction holds against a mean force wanders off as soon as it slips: the reason is said. While it does not slip, it stays.
 #[test]
 fn free_bodies_under_a_mean_force_drift() {
-    for law in [
-        Arc::new(stickslip::law::Coulomb { limit: 0.1 }) as SharedLaw,
-        Arc::new(Jenkins { stiffness: 2.0, limit: 0.1 }),
-    ] {
+    for law in [Arc::new(Coulomb { limit: 0.1 }) as SharedLaw, Arc::new(Jenkins { stiffness: 2.0, limit: 0.1 })] {
         for damping in [0.0, 0.1, 3.0] {
             for (constant, amplitude) in [(0.03, 1.0), (0.09, 0.3), (0.1, 0.3), (0.3, 0.05), (0.3, 1.0)] {
                 let mut model = oscillator(0.0, damping, std::slice::from_ref(&law));

@@ -1,8 +1,12 @@
 //! The system as the event-driven method sees it: masses, springs, ideal parts of joints, one drive frequency.
+//!
+//! Rigid sliders along one line have one relative motion, and begin to slip and come to rest together. They are one part with the sums of their
+//! limits, so that rounding cannot decide otherwise for one of them than for the next, and no problem is posed whose solution is not unique.
+//! What each carries of the part's force is its [`Share`].
 
 use crate::law::{Contact, Law, Piece};
 use crate::method::MethodError;
-use crate::model::System;
+use crate::model::{Axis, System};
 use crate::structure::Matrices;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Deref;
@@ -11,6 +15,10 @@ use std::sync::Arc;
 /// A relative velocity below this fraction of the largest one is rest. Switch instants are found to 1e-15 of the velocity scale;
 /// joints that switch together by symmetry differ by the rounding of the whole orbit, about 1e-12.
 pub(crate) const REST: f64 = 1e-10;
+
+/// Directions and imposed motions are parallel within this fraction of their largest entry: what the few roundings by which a direction is made
+/// leave. Directions farther apart are different ones.
+const PARALLEL: f64 = 64.0 * f64::EPSILON;
 
 /// What a part of a joint does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,10 +31,10 @@ pub(crate) enum Kind {
     Stop { stiffness: f64, gap: f64 },
 }
 
-/// One ideal part of a joint.
+/// One ideal part of a joint, or several rigid sliders along one line.
 #[derive(Debug, Clone)]
 pub(crate) struct Part {
-    /// The joint it belongs to.
+    /// The joint it belongs to; of several, the first.
     pub joint: usize,
     /// Direction, length n.
     pub direction: DVector<f64>,
@@ -92,6 +100,138 @@ impl Part {
     }
 }
 
+/// What a joint has of a part: the whole, or its share of several rigid sliders along one line.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Share {
+    pub joint: usize,
+    pub part: usize,
+    /// Force of the joint per force of the part while it slips and while it rests, by the limits of each. Negative in joints that point the other
+    /// way.
+    slipping: f64,
+    resting: f64,
+}
+
+impl Share {
+    fn whole(joint: usize, part: usize) -> Self {
+        Share { joint, part, slipping: 1.0, resting: 1.0 }
+    }
+
+    /// Force of the joint per force of the part in this contact.
+    pub fn of(&self, contact: Contact) -> f64 {
+        if contact.slips() { self.slipping } else { self.resting }
+    }
+
+    /// The joint's contact, from its part's.
+    pub fn contact(&self, contact: Contact) -> Contact {
+        if self.resting < 0.0 { contact.mirrored() } else { contact }
+    }
+}
+
+/// A rigid slider of a joint, before those along one line are one part.
+struct Slider<'a> {
+    joint: usize,
+    axis: &'a Axis,
+    direction: DVector<f64>,
+    limit: f64,
+    static_limit: f64,
+}
+
+impl Slider<'_> {
+    /// The factor by which this one's relative motion is that of `other` at all times, if there is one.
+    fn along(&self, other: &Slider) -> Option<f64> {
+        let lead = (0..other.direction.len()).max_by(|&a, &b| {
+            let size = |i: usize| other.direction[i].abs();
+            size(a).total_cmp(&size(b))
+        })?;
+        let factor = self.direction[lead] / other.direction[lead];
+        if !factor.is_finite() || factor == 0.0 {
+            return None; // across, or nothing but imposed motion moves one of them
+        }
+        let near = PARALLEL * self.direction.amax();
+        if self.direction.iter().zip(&other.direction).any(|(own, w)| (own - factor * w).abs() > near) {
+            return None;
+        }
+        // a constant offset changes nothing for friction
+        let moving = |axis: &Axis| axis.imposed().iter().map(|(h, _)| *h).filter(|h| *h > 0).collect::<Vec<u32>>();
+        let (own, its) = (moving(self.axis), moving(other.axis));
+        let near = PARALLEL * own.iter().map(|&h| self.axis.imposed_at(h).norm()).fold(0.0, f64::max);
+        let apart = |&h: &u32| (self.axis.imposed_at(h) - other.axis.imposed_at(h) * factor).norm() > near;
+        (!own.iter().chain(&its).any(apart)).then_some(factor)
+    }
+}
+
+/// Rigid sliders along one line: the first, which is the part, and all of them.
+struct Line<'a> {
+    part: usize,
+    first: Slider<'a>,
+    members: Vec<Member>,
+}
+
+/// A rigid slider on a line.
+struct Member {
+    /// Which of the shares is its.
+    share: usize,
+    /// Its relative motion per that of the first.
+    factor: f64,
+    /// Limit and static limit, N.
+    limits: (f64, f64),
+}
+
+impl Line<'_> {
+    /// Limit and static limit of all together, along the first, N.
+    fn limits(&self) -> (f64, f64) {
+        let add = |sum: (f64, f64), Member { factor, limits, .. }: &Member| {
+            (sum.0 + factor.abs() * limits.0, sum.1 + factor.abs() * limits.1)
+        };
+        self.members.iter().fold((0.0, 0.0), add)
+    }
+}
+
+/// Parts and shares as they are gathered, joint after joint.
+#[derive(Default)]
+struct Gathered<'a> {
+    parts: Vec<Part>,
+    shares: Vec<Share>,
+    lines: Vec<Line<'a>>,
+}
+
+impl<'a> Gathered<'a> {
+    fn push(&mut self, part: Part) {
+        self.shares.push(Share::whole(part.joint, self.parts.len()));
+        self.parts.push(part);
+    }
+
+    fn push_rigid(&mut self, slider: Slider<'a>) {
+        let (share, limits) = (self.shares.len(), (slider.limit, slider.static_limit));
+        let found = self.lines.iter().enumerate().find_map(|(i, line)| Some((i, slider.along(&line.first)?)));
+        let (line, factor) = found.unwrap_or((self.lines.len(), 1.0));
+        if let Some(line) = self.lines.get(line) {
+            self.shares.push(Share::whole(slider.joint, line.part));
+        } else {
+            let kind = Kind::Rigid { limit: limits.0, static_limit: limits.1 };
+            let part = self.parts.len();
+            self.push(Part { joint: slider.joint, direction: slider.direction.clone(), kind });
+            self.lines.push(Line { part, first: slider, members: Vec::new() });
+        }
+        self.lines[line].members.push(Member { share, factor, limits });
+    }
+
+    /// Gives the parts of several the sums of their limits, and each joint its share.
+    fn finish(mut self) -> (Arc<[Part]>, Arc<[Share]>) {
+        for line in self.lines.iter().filter(|line| line.members.len() > 1) {
+            let (limit, static_limit) = line.limits();
+            self.parts[line.part].kind = Kind::Rigid { limit, static_limit };
+            for Member { share, factor, limits } in &line.members {
+                let share = &mut self.shares[*share];
+                // without any force in slip there is nothing to share
+                share.slipping = if limit > 0.0 { factor.signum() * limits.0 / limit } else { 0.0 };
+                share.resting = factor.signum() * limits.1 / static_limit;
+            }
+        }
+        (self.parts.into(), self.shares.into())
+    }
+}
+
 /// Why the method cannot take a law: what it misses.
 fn refusal(law: &dyn Law) -> Option<&'static str> {
     let Some(pieces) = law.pieces() else { return Some("it is not made of ideal sliders, springs and stops") };
@@ -117,8 +257,10 @@ pub(crate) struct Mechanics {
     /// Of the structure, shared with it.
     matrices: Arc<Matrices>,
     pub inverse_mass: DMatrix<f64>,
-    /// Sliders and stops of all joints, those that carry nothing left out.
+    /// Sliders and stops of all joints, those that carry nothing left out, rigid ones along one line as one.
     pub parts: Arc<[Part]>,
+    /// What the joints have of them, joint after joint.
+    pub shares: Arc<[Share]>,
     /// Names of the joints, for errors.
     pub names: Arc<[String]>,
     /// Number of sliders behind springs.
@@ -146,7 +288,7 @@ impl Mechanics {
         if let Some(i) = (0..n).find(|&i| system.structure().own_mass(i) <= 0.0) {
             return Err(MethodError::needs_mass(super::NAME, system, i));
         }
-        let mut parts = Vec::new();
+        let mut gathered = Gathered::default();
         let mut elastic = 0;
         for (j, joint) in system.joints().iter().enumerate() {
             if let Some(misses) = refusal(joint.law().as_ref()) {
@@ -154,11 +296,16 @@ impl Mechanics {
             }
             let axis = &joint.axes()[0];
             for piece in joint.law().pieces().unwrap_or_default() {
+                let direction = axis.dense(n);
                 let kind = match piece {
                     Piece::Slider(slider) if slider.static_limit == 0.0 => continue,
                     Piece::Stop { stiffness: 0.0, .. } => continue,
                     Piece::Slider(slider) => match slider.stiffness {
-                        None => Kind::Rigid { limit: slider.limit, static_limit: slider.static_limit },
+                        None => {
+                            let (limit, static_limit) = (slider.limit, slider.static_limit);
+                            gathered.push_rigid(Slider { joint: j, axis, direction, limit, static_limit });
+                            continue;
+                        }
                         Some(stiffness) => {
                             elastic += 1;
                             Kind::Elastic { stiffness, limit: slider.limit, state: elastic - 1 }
@@ -167,9 +314,10 @@ impl Mechanics {
                     // a stop knows where it is: imposed motion counts with its mean
                     Piece::Stop { gap, stiffness } => Kind::Stop { stiffness, gap: gap - axis.imposed_at(0).re },
                 };
-                parts.push(Part { joint: j, direction: axis.dense(n), kind });
+                gathered.push(Part { joint: j, direction, kind });
             }
         }
+        let (parts, shares) = gathered.finish();
         let positive = system.structure().mass().clone().cholesky().is_some();
         let inverse_mass = system
             .structure()
@@ -186,7 +334,8 @@ impl Mechanics {
             fastest,
             matrices: system.structure().full().clone(),
             inverse_mass,
-            parts: parts.into(),
+            parts,
+            shares,
             names: system.joints().iter().map(|joint| joint.name().to_owned()).collect(),
             elastic,
         })
@@ -200,7 +349,7 @@ impl Mechanics {
         REST * (velocity_scale / rate).max(gap.abs())
     }
 
-    /// The joint of every part.
+    /// The joint of every part; of several along one line, the first.
     pub fn owners(&self) -> Vec<usize> {
         self.parts.iter().map(|part| part.joint).collect()
     }

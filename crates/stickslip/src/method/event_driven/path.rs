@@ -2,7 +2,7 @@
 
 use super::NAME;
 use super::flow::{Flow, Segment};
-use super::mechanics::Part;
+use super::mechanics::{Part, Share};
 use crate::law::Contact;
 use crate::method::Breakdown;
 use crate::method::periodic::Closed;
@@ -27,6 +27,8 @@ pub(crate) struct ExactPath {
     pieces: Vec<Piece>,
     /// Ideal parts of the joints.
     parts: Arc<[Part]>,
+    /// What the joints have of them.
+    shares: Arc<[Share]>,
     symmetry: Symmetry,
     period: f64,
     rates: Vec<f64>,
@@ -94,20 +96,21 @@ impl ExactPath {
             })
             .collect();
         let (rates, omega) = (flow.drive.rates.clone(), flow.drive.omega);
-        ExactPath { system, pieces, parts: flow.mechanics.parts.clone(), symmetry, period, rates, omega }
+        let (parts, shares) = (flow.mechanics.parts.clone(), flow.mechanics.shares.clone());
+        ExactPath { system, pieces, parts, shares, symmetry, period, rates, omega }
     }
 
-    /// The parts of a joint.
-    fn of_joint(&self, joint: usize) -> impl Iterator<Item = usize> {
-        self.parts.iter().enumerate().filter(move |(_, part)| part.joint == joint).map(|(s, _)| s)
+    /// What a joint has of the parts.
+    fn of_joint(&self, joint: usize) -> impl Iterator<Item = &Share> {
+        self.shares.iter().filter(move |share| share.joint == joint)
     }
 
     /// What the faces of a joint do in a segment: they slip if a slider of it does, rest if one does, touch if a stop does, and else are open.
     /// `None` of a joint that holds nothing.
     fn contact_of(&self, joint: usize, segment: &Segment) -> Option<Contact> {
-        let of_part = |s: usize| match segment.contacts[s] {
-            Contact::Stick if !self.parts[s].is_slider() => Contact::Touch,
-            contact => contact,
+        let of_part = |share: &Share| match segment.contacts[share.part] {
+            Contact::Stick if !self.parts[share.part].is_slider() => Contact::Touch,
+            contact => share.contact(contact),
         };
         let of_parts = || self.of_joint(joint).map(of_part);
         of_parts().find(|contact| contact.slips()).or_else(|| of_parts().min())
@@ -189,8 +192,9 @@ impl ExactPath {
             add(&mut force, &piece.segment.displacement[i * nb..(i + 1) * nb], place.stiffness.0[i]);
             add(&mut force, &piece.velocity[i * nb..(i + 1) * nb], place.damping.0[i]);
         }
-        for (s, part) in self.parts.iter().enumerate() {
-            add(&mut force, &piece.segment.force[s * nb..(s + 1) * nb], place.joints[part.joint]);
+        for share in self.shares.iter() {
+            let of_part = &piece.segment.force[share.part * nb..(share.part + 1) * nb];
+            add(&mut force, of_part, place.joints[share.joint] * share.of(piece.segment.contacts[share.part]));
         }
         force
     }
@@ -298,9 +302,10 @@ impl Signals for Measuring<'_> {
     fn force(&self, axis: usize) -> Vec<Complex64> {
         self.made(|piece, out| {
             let nb = out.len();
-            for part in self.path.of_joint(axis) {
-                let force = &piece.segment.force[part * nb..(part + 1) * nb];
-                out.iter_mut().zip(force).for_each(|(sum, f)| *sum += f);
+            for share in self.path.of_joint(axis) {
+                let force = &piece.segment.force[share.part * nb..(share.part + 1) * nb];
+                let factor = share.of(piece.segment.contacts[share.part]);
+                out.iter_mut().zip(force).for_each(|(sum, f)| *sum += f * factor);
             }
         })
     }
@@ -343,8 +348,9 @@ impl Signals for Measuring<'_> {
         for (piece, range) in self.pieces() {
             let u = &u[range];
             let travel = real_dot(u, &piece.at_end) - piece.basis().beginning(u);
-            for part in self.path.of_joint(axis) {
-                sum += piece.segment.contacts[part].sign() * self.path.parts[part].limit() * travel;
+            for share in self.path.of_joint(axis) {
+                let contact = piece.segment.contacts[share.part];
+                sum += contact.sign() * self.path.parts[share.part].limit() * share.of(contact) * travel;
             }
         }
         sum
@@ -357,13 +363,13 @@ impl Signals for Measuring<'_> {
         }
         let contact = |piece: &Piece| path.contact_of(joint, &piece.segment).unwrap_or(Contact::Open);
         let shares = Shares::of(path.pieces.iter().map(|piece| (contact(piece), piece.segment.length)));
-        let slips = |segment: &Segment| path.of_joint(joint).any(|s| segment.contacts[s].slips());
+        let slips = |segment: &Segment| path.of_joint(joint).any(|share| segment.contacts[share.part].slips());
         let pairs = path.pieces.windows(2).map(|pair| (&pair[0].segment.contacts, &pair[1].segment.contacts));
-        let mut switches: usize =
-            pairs.map(|(before, after)| path.of_joint(joint).filter(|&s| before[s] != after[s]).count()).sum();
+        let parts = || path.of_joint(joint).map(|share| share.part);
+        let mut switches: usize = pairs.map(|(before, after)| parts().filter(|&s| before[s] != after[s]).count()).sum();
         if let (Some(first), Some(last)) = (path.pieces.first(), path.pieces.last()) {
             let (first, last) = (&first.segment.contacts, &last.segment.contacts);
-            switches += path.of_joint(joint).filter(|&s| path.next_of(last[s]) != first[s]).count();
+            switches += parts().filter(|&s| path.next_of(last[s]) != first[s]).count();
         }
         let rests = !path.pieces.iter().any(|piece| slips(&piece.segment));
         Faces { shares, switches, rests }
@@ -494,7 +500,8 @@ impl Path for ExactPath {
                     Some(contact) => contact,
                 };
                 let joint_displacement = along(&displacement) + sign * real_dot(&imposed, &values);
-                let force = self.of_joint(j).map(|s| row(&piece.segment.force, s)).sum();
+                let of_share = |s: &Share| s.of(piece.segment.contacts[s.part]) * row(&piece.segment.force, s.part);
+                let force = self.of_joint(j).map(of_share).sum();
                 JointSample::along(joint_displacement, joint_velocity, force, contact)
             })
             .collect();
