@@ -24,6 +24,8 @@ pub(crate) struct Assembly {
     pub joints: Vec<PlacedLaw>,
     /// Internal states of all laws.
     pub internal: usize,
+    /// Names of places, and where they are in the coordinates.
+    seen: Vec<(String, Axis)>,
 }
 
 /// A law with its place among axes and states.
@@ -95,12 +97,20 @@ impl Assembly {
             directions: DMatrix::from_fn(n, first_axis, |row, axis| axes[axis][row]),
             joints,
             internal,
+            seen: system.places().iter().cloned().zip(system.seen().iter().cloned()).collect(),
         })
     }
 
     /// Length of the state `(x, v, internal states)`.
     pub fn states(&self) -> usize {
         2 * self.n + self.internal
+    }
+
+    /// The place that is farthest from its origin.
+    pub fn farthest(&self, state: &[f64]) -> Option<String> {
+        let far = |axis: &Axis| axis.along(&state[..self.n]).abs();
+        let farthest = self.seen.iter().max_by(|(_, a), (_, b)| far(a).total_cmp(&far(b)));
+        farthest.map(|(place, _)| place.clone())
     }
 
     /// Relative displacement and velocity along an axis.

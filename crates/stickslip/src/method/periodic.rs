@@ -140,7 +140,7 @@ fn settle(
         map.returned(&mut state, None).map_err(broke)?;
         state.iter_mut().for_each(|z| *z *= aim.sign);
         if state.iter().any(|z| !z.is_finite()) {
-            return Err(broke(Breakdown::Unbounded { time: f64::INFINITY }));
+            return Err(broke(Breakdown::Unbounded { time: f64::INFINITY, place: None }));
         }
         let change: Vec<f64> = state.iter().zip(&before).map(|(a, b)| a - b).collect();
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
@@ -258,7 +258,7 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
             map.returned(&mut state, None).map_err(broke)?;
             state.iter_mut().for_each(|z| *z *= aim.sign);
             if state.iter().any(|z| !z.is_finite()) {
-                return Err(broke(Breakdown::Unbounded { time: f64::INFINITY }));
+                return Err(broke(Breakdown::Unbounded { time: f64::INFINITY, place: None }));
             }
         }
         returns = returns * 3 / 2;
@@ -327,7 +327,7 @@ fn evaluate(
     let mut end = state.to_vec();
     map.returned(&mut end, Some(derivative))?;
     if end.iter().any(|z| !z.is_finite()) {
-        return Err(Breakdown::Unbounded { time: 0.0 });
+        return Err(Breakdown::Unbounded { time: f64::INFINITY, place: None });
     }
     Ok(DVector::from_iterator(state.len(), state.iter().zip(&end).map(|(z, e)| z - aim.sign * e)))
 }

@@ -6,7 +6,7 @@
 use super::flow::Flow;
 use super::{Breakdown, MethodError, followed};
 use crate::model::System;
-use crate::orbit::{Sample, Symmetry};
+use crate::orbit::{Path, Sample, Symmetry};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -58,14 +58,31 @@ pub enum TransientError {
     /// The laws do not fit together.
     #[error(transparent)]
     Method(#[from] MethodError),
-    /// The motion broke down; the samples until then are good.
-    #[error("{cause}; the samples until t = {time:.6e} s are good")]
+    /// The motion broke down; the samples before were handed on, and are good.
+    #[error("{cause}; {}", good(*.last))]
     Breakdown {
-        /// End of the good samples, s.
-        time: f64,
-        /// Why.
+        /// Time of the last good sample, s; none where the motion breaks down before the first.
+        last: Option<f64>,
+        /// Why, and when.
         cause: Breakdown,
     },
+}
+
+fn good(last: Option<f64>) -> String {
+    last.map_or("no sample before is good".to_owned(), |last| format!("the samples until t = {last:.6e} s are good"))
+}
+
+/// Times that a stretch in which the motion broke down is followed anew, each time up to where it broke down, or half as far where the reason
+/// names no time: enough to find one of [`STRETCH`] samples.
+const SHORTENED: usize = 6;
+
+/// Motion over a stretch of time that begins at `begin` (s).
+struct Stretch {
+    begin: f64,
+    length: f64,
+    /// Index of the last sample in it, if there is one.
+    last: Option<usize>,
+    path: Arc<dyn Path>,
 }
 
 impl Transient {
@@ -113,19 +130,66 @@ impl Transient {
             // of a cycle that outlasts the motion only what is asked for
             let length = if length > self.duration { self.duration + self.step } else { length };
             flow.set_drive(system, omega);
-            flow.follow(&mut state, length).map_err(|cause| TransientError::Breakdown { time: begin, cause })?;
-            let path = flow.path(&shared, Symmetry::FullPeriod, length);
+            let start = state.clone();
+            let followed = flow.follow(&mut state, length);
             let end = begin + length;
-            while next <= samples && next as f64 * self.step < end {
-                let time = next as f64 * self.step;
-                if !sample(time, omega, &path.sample((time - begin).clamp(0.0, length))) {
-                    return Ok(());
+            let inside = (next..=samples).take_while(|i| (*i as f64 * self.step) < end);
+            let whole = inside.last();
+            let stretch = match &followed {
+                Ok(()) => {
+                    let path = flow.path(&shared, Symmetry::FullPeriod, length);
+                    Some(Stretch { begin, length, last: whole, path })
                 }
-                next += 1;
+                Err(cause) => whole.and_then(|last| self.before(&shared, &start, (begin, next, last), cause)),
+            };
+            if let Some(stretch) = stretch {
+                while stretch.last.is_some_and(|last| next <= last) {
+                    let time = next as f64 * self.step;
+                    let since = (time - stretch.begin).clamp(0.0, stretch.length);
+                    if !sample(time, omega, &stretch.path.sample(since)) {
+                        return Ok(());
+                    }
+                    next += 1;
+                }
             }
+            followed.map_err(|cause| TransientError::Breakdown {
+                last: next.checked_sub(1).map(|last| last as f64 * self.step),
+                cause: cause.later(begin),
+            })?;
             begin = end;
         }
         Ok(())
+    }
+
+    /// What there is of a stretch before the motion breaks down in it, up to a sample: it begins at `begin` from the state `start`, and has the
+    /// samples `first` to `last`. `None` where there is no motion at all before, or no sample.
+    fn before(
+        &self,
+        system: &Arc<System>,
+        start: &[f64],
+        (begin, first, mut last): (f64, usize, usize),
+        cause: &Breakdown,
+    ) -> Option<Stretch> {
+        let since = |sample: usize| sample as f64 * self.step - begin;
+        let mut cause = cause.clone();
+        for _ in 0..SHORTENED {
+            let reached = cause.time().unwrap_or(0.5 * since(last + 1));
+            last = (first..=last).take_while(|sample| since(*sample) < reached).last()?;
+            // a sample at the very beginning needs some motion behind it
+            let length = if since(last) > 0.0 { since(last) } else { 0.5 * reached };
+            // one that knows nothing of the attempt that broke down
+            let mut flow = Transient::flow(system, self.width).ok()?;
+            flow.keep(true);
+            flow.set_drive(system, self.frequency(begin));
+            match flow.follow(&mut start.to_vec(), length) {
+                Ok(()) => {
+                    let path = flow.path(system, Symmetry::FullPeriod, length);
+                    return Some(Stretch { begin, length, last: Some(last), path });
+                }
+                Err(again) => cause = again,
+            }
+        }
+        None
     }
 
     /// Whether such motions of a system can be followed, with laws smoothed over `width` (m/s) if it is given.
@@ -169,8 +233,8 @@ impl Transient {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{FrictionContact, SharedLaw};
-    use crate::model::{Axis, Force, GROUND, Mass, Model, Spring};
+    use crate::law::{Coulomb, Cubic, FrictionContact, SharedLaw};
+    use crate::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring};
     use crate::structure::Structure;
     use nalgebra::dmatrix;
 
@@ -207,6 +271,97 @@ mod tests {
             true
         });
         assert!(run.is_ok() && worst < 1e-4, "{run:?} {worst}");
+    }
+
+    /// `x'' + x - 2 x³ = 0` from rest at 1 is `1/cos t`, which is infinite at π/2: in the second stretch, as 100 samples fit before.
+    #[test]
+    fn a_motion_that_escapes_is_followed_until_it_does() {
+        let between = || ["m".to_owned(), GROUND.to_owned()];
+        let model = Model {
+            masses: vec![Mass::new("m", 1.0)],
+            springs: vec![Spring { between: between(), stiffness: 1.0, damping: 0.0 }],
+            joints: vec![Joint { name: "j".into(), between: between(), law: Arc::new(Cubic { stiffness: -2.0 }) }],
+            ..Model::default()
+        };
+        let end = 0.25 * TAU;
+        let motion = Transient {
+            displacement: vec![1.0],
+            velocity: vec![0.0],
+            excitation: Excitation::Free,
+            duration: 3.0 * end,
+            step: end / 100.5,
+            width: None,
+        };
+        let mut count = 0;
+        let run = motion.run(&model.assemble().unwrap(), &mut |time, _, sample| {
+            let expected = 1.0 / time.cos();
+            // what is left until infinity loses as many digits as the motion gained
+            let error = (sample.displacement[0] / expected - 1.0).abs();
+            assert!(error < 1e-6, "{time}: {error:e}");
+            count += 1;
+            true
+        });
+        let Err(TransientError::Breakdown { last: Some(last), cause: Breakdown::Unbounded { time, place } }) = run
+        else {
+            panic!("{run:?}")
+        };
+        assert_eq!((count, place.as_deref()), (101, Some("m")));
+        assert!((last - 100.0 * motion.step).abs() < 1e-12, "{last}");
+        // it is named once it is 1e5 times as fast as where the stretch began, at 64 samples: the velocity is 1/(π/2 - t)²
+        let began = 64.0 * motion.step;
+        let left = (began.cos().powi(2) / began.sin() / 1e5).sqrt();
+        assert!((0.0..left).contains(&(end - time)), "{time}");
+    }
+
+    /// Three rigid joints in a triangle share what they carry in no unique way as soon as all stick: what was computed before is the motion of a
+    /// shorter run, and the time is that of the motion.
+    #[test]
+    fn what_comes_before_a_breakdown_is_handed_on() {
+        let between = [["a", GROUND], ["b", GROUND], ["a", "b"]].map(|pair| pair.map(str::to_owned));
+        let law: SharedLaw = Arc::new(Coulomb { limit: 5.0 });
+        let springs = between.iter().zip([2e4, 3e4]);
+        let force = |on: &str, amplitude| Force { on: on.into(), amplitude, phase: 0.0, harmonic: 1 };
+        let model = Model {
+            masses: vec![Mass::new("a", 1.0), Mass::new("b", 0.7)],
+            springs: springs
+                .map(|(between, stiffness)| Spring { between: between.clone(), stiffness, damping: 3.0 })
+                .collect(),
+            joints: between
+                .iter()
+                .map(|between| Joint { name: between.concat(), between: between.clone(), law: law.clone() })
+                .collect(),
+            forces: vec![force("a", 20.0), Force { phase: 0.7, ..force("b", 12.0) }],
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let omega = TAU * 5.0;
+        let motion = Transient {
+            displacement: vec![0.0; 2],
+            velocity: vec![0.0; 2],
+            excitation: Excitation::Steady(omega),
+            duration: 1.0,
+            step: TAU / omega / 64.0,
+            width: None,
+        };
+        let samples = |motion: &Transient| {
+            let mut samples = Vec::new();
+            let run = motion.run(&system, &mut |time, _, sample| {
+                samples.push((time, sample.displacement.clone()));
+                true
+            });
+            (run, samples)
+        };
+        let (run, found) = samples(&motion);
+        let Err(TransientError::Breakdown { last: Some(last), cause: Breakdown::Redundant { time, .. } }) = run else {
+            panic!("{run:?}")
+        };
+        assert!(last < time && time <= last + motion.step, "{last} {time}");
+        assert_eq!(found.last().unwrap().0, last);
+        let (run, short) = samples(&Transient { duration: last - 0.5 * motion.step, ..motion.clone() });
+        assert!(run.is_ok() && short.len() + 1 == found.len(), "{run:?}");
+        for ((time, a), (_, b)) in short.iter().zip(&found) {
+            a.iter().zip(b).for_each(|(a, b)| assert!((a - b).abs() < 1e-15, "{time}: {a} {b}"));
+        }
     }
 
     /// A linear oscillator run up through its resonance, against the classical Runge-Kutta method with the phase of a frequency that

@@ -73,12 +73,47 @@ pub enum Breakdown {
         /// When, s.
         time: f64,
     },
-    /// A number is no longer finite.
-    #[error("the motion grows beyond all bounds by t = {time:.6e} s")]
+    /// The motion escapes to infinity, or a number is no longer finite.
+    #[error("the motion{} grows without bound{}", .place.as_ref().map_or_else(String::new, |place| format!(" of `{place}`")), by(*.time))]
     Unbounded {
-        /// When, s.
+        /// When, s; not finite where that is not known.
         time: f64,
+        /// The place that is farthest then, where that is known.
+        place: Option<String>,
     },
+}
+
+fn by(time: f64) -> String {
+    if time.is_finite() { format!(" by t = {time:.6e} s") } else { String::new() }
+}
+
+impl Breakdown {
+    /// When, s, if that is known.
+    pub fn time(&self) -> Option<f64> {
+        self.clone().instant().map(|time| *time).filter(|time| time.is_finite())
+    }
+
+    /// The same of a motion that began later by `begin` (s).
+    pub(crate) fn later(mut self, begin: f64) -> Self {
+        if let Some(time) = self.instant() {
+            *time += begin;
+        }
+        self
+    }
+
+    fn instant(&mut self) -> Option<&mut f64> {
+        match self {
+            Breakdown::Chatter { time, .. }
+            | Breakdown::Redundant { time, .. }
+            | Breakdown::Undecidable { time }
+            | Breakdown::Defective { time, .. }
+            | Breakdown::TooFast { time }
+            | Breakdown::Stalled { time, .. }
+            | Breakdown::OutOfRange { time }
+            | Breakdown::Unbounded { time, .. } => Some(time),
+            Breakdown::Unresolved { .. } => None,
+        }
+    }
 }
 
 /// No orbit was found.

@@ -237,7 +237,7 @@ fn compute(work: &Work<'_>) -> Computed {
             step,
             width: case.method.options.get(WIDTH).copied(),
         };
-        let mut stopped = false;
+        let (mut sampled, mut stopped) = (false, false);
         // of every mass the largest displacement, and when
         let mut largest = vec![(0.0f64, 0.0); prepared.system.places().len()];
         let mut decays = vec![Decay::default(); prepared.system.places().len()];
@@ -250,6 +250,7 @@ fn compute(work: &Work<'_>) -> Computed {
             rows.number("frequency_Hz", hertz(omega));
             write_sample(prepared, sample, &mut rows);
             rows.end();
+            sampled = true;
             for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.seen()).enumerate() {
                 let x = along.along(&sample.displacement);
                 decay.add(time, x, along.along(&sample.velocity));
@@ -260,7 +261,8 @@ fn compute(work: &Work<'_>) -> Computed {
             stopped = work.context.stopped();
             !stopped
         });
-        for (place, (displacement, time)) in prepared.system.places().iter().zip(largest) {
+        // a motion without a sample has no largest displacement
+        for (place, (displacement, time)) in prepared.system.places().iter().zip(largest).filter(|_| sampled) {
             extremes.varied(case);
             if work.several_frequencies() {
                 extremes.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));

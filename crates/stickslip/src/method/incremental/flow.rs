@@ -174,7 +174,7 @@ impl Flow for IncrementalFlow {
                 return Err(Breakdown::Stalled { time, step: h });
             }
             if state.iter().any(|z| !z.is_finite()) {
-                return Err(Breakdown::Unbounded { time });
+                return Err(Breakdown::Unbounded { time, place: self.assembly.farthest(state) });
             }
             if let Some(sensitivity) = sensitivity.as_deref_mut() {
                 self.step.carry(&self.assembly, &eliminated, sensitivity);

@@ -25,6 +25,9 @@ const FIRST_LEVEL: usize = 12;
 /// Steps of one run, tried ones too, beyond which it stalls. The returns of the verification tests take 300 on average, at most 6900; these
 /// take a second for one mass.
 const STEP_LIMIT: usize = 200_000;
+/// A motion in which no step is short enough escapes to infinity if it is so many times as fast as the scale that the stretch began with: errors
+/// are measured by that scale, and drown in rounding at 1e7 times. Contacts too stiff to be followed stall at a few.
+const ESCAPED: f64 = 1e5;
 /// The new step aims at this share of the tolerance.
 const SAFETY: f64 = 0.8;
 /// Order of the error estimate plus one.
@@ -278,20 +281,36 @@ impl SmoothFlow {
         }
     }
 
-    /// Whether the next attempt may be made; chooses the level where the mesh is given.
-    fn attempt(&mut self, frozen: bool, time: f64, tick: f64) -> Result<f64, Breakdown> {
+    /// Length of a step of the level, s.
+    fn length(&self, tick: f64) -> f64 {
+        (1u64 << (LEVELS - self.level)) as f64 * tick
+    }
+
+    /// Why no step is short enough any more: the motion is on its way to infinity, which it reaches in finite time where a force grows faster than
+    /// the distance, or the equations are too stiff. `speed` is the scale of velocities at the start, m/s.
+    fn stalled(&self, state: &[f64], (time, step): (f64, f64), speed: f64) -> Breakdown {
+        let n = self.assembly.n;
+        let fastest = state[n..2 * n].iter().fold(0.0f64, |fast, v| fast.max(v.abs()));
+        if fastest > ESCAPED * speed {
+            return Breakdown::Unbounded { time, place: self.assembly.farthest(state) };
+        }
+        Breakdown::Stalled { time, step }
+    }
+
+    /// The length of the next attempt (s), if it may be made; chooses the level where the mesh is given.
+    fn attempt(&mut self, frozen: bool, tick: f64) -> Option<f64> {
         if frozen {
             // the mesh covers the stretch exactly
             self.level = self.mesh[self.accepted];
         }
-        let h = (1u64 << (LEVELS - self.level)) as f64 * tick;
+        let h = self.length(tick);
         if self.accepted + self.rejected >= STEP_LIMIT {
-            return Err(Breakdown::Stalled { time, step: h });
+            return None;
         }
         if self.eliminated[self.level].is_none() {
             self.eliminated[self.level] = Some(Eliminated::new(&self.assembly, h));
         }
-        Ok(h)
+        Some(h)
     }
 
     /// Shortens the step after a failed one.
@@ -394,7 +413,8 @@ impl Flow for SmoothFlow {
         let mut length = None;
         while position < total {
             let time = position as f64 * tick;
-            let h = self.attempt(frozen, time, tick)?;
+            let h =
+                self.attempt(frozen, tick).ok_or_else(|| self.stalled(state, (time, self.length(tick)), scale.1))?;
             let ticks = 1u64 << (LEVELS - self.level);
             self.set_loads(time, h);
             self.predict(state, h, length, time);
@@ -410,7 +430,7 @@ impl Flow for SmoothFlow {
             };
             if !error.is_finite() || error > 1.0 {
                 if !self.shorten(frozen, error) {
-                    return Err(Breakdown::Stalled { time, step: h });
+                    return Err(self.stalled(state, (time, h), scale.1));
                 }
                 continue;
             }
@@ -419,7 +439,7 @@ impl Flow for SmoothFlow {
             };
             self.step.end(&self.assembly, eliminated, &self.loads, &mut self.next);
             if self.next.iter().any(|z| !z.is_finite()) {
-                return Err(Breakdown::Unbounded { time });
+                return Err(Breakdown::Unbounded { time, place: self.assembly.farthest(&self.next) });
             }
             if let Some(sensitivity) = sensitivity.as_deref() {
                 self.step.carry(&self.assembly, eliminated, &mut self.derivative, sensitivity.ncols());
