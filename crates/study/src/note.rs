@@ -16,6 +16,8 @@ pub enum Note {
     Said(String),
     /// Points whose series is too short, and the largest estimated error.
     Truncated(usize, f64),
+    /// The same on a branch, whose harmonics are given, and which has no other method.
+    TruncatedOnBranch(usize, f64),
     /// Points whose series was not compared with a longer one.
     Unchecked(usize),
     /// Points whose orbit is unstable, and those of them whose motion repeats after fewer periods than were asked for.
@@ -48,6 +50,14 @@ impl Note {
         };
         let history = (!orbit.evidence.history.is_empty()).then_some(Note::History(1));
         unstable.into_iter().chain(accuracy).chain(history).collect()
+    }
+
+    /// The same where the orbit is one of a branch.
+    pub(crate) fn on_branch(self) -> Note {
+        match self {
+            Note::Truncated(points, largest) => Note::TruncatedOnBranch(points, largest),
+            other => other,
+        }
     }
 
     /// Adds it to `notes`, to one of its sort if there is one. However notes are joined first with their neighbours, the whole is the same.
@@ -83,7 +93,8 @@ impl Note {
     fn joined(self, notes: &mut Vec<Note>) {
         for known in notes.iter_mut() {
             match (known, &self) {
-                (Note::Truncated(points, largest), Note::Truncated(more, other)) => {
+                (Note::Truncated(points, largest), Note::Truncated(more, other))
+                | (Note::TruncatedOnBranch(points, largest), Note::TruncatedOnBranch(more, other)) => {
                     *points += more;
                     *largest = largest.max(*other);
                     return;
@@ -114,6 +125,11 @@ impl Note {
                 "At {} the series is too short: its estimated error is beyond the `tolerance` of the method, and up to {largest:.1e}. \
                  Leave `harmonics` out or raise it, raise `tolerance` if that is good enough, or use `event-driven` where the laws \
                  are exact.",
+                points(*count)
+            )),
+            Note::TruncatedOnBranch(count, largest) => Some(format!(
+                "At {} of the branch the series is too short: its estimated error is beyond `tolerance`, and up to {largest:.1e}. Raise \
+                 `harmonics` in [study], or `tolerance` if that is good enough; kind = \"response\" gives points by other methods to compare with.",
                 points(*count)
             )),
             Note::Unchecked(count) => Some(format!(
@@ -192,6 +208,23 @@ mod tests {
             texts[3]
         );
         assert_eq!(texts[4], "It is so.");
+    }
+
+    /// A branch takes no other method: its note names its own keys alone.
+    #[test]
+    fn what_helps_a_branch_is_said_of_a_branch() {
+        let mut notes = Vec::new();
+        for note in [Note::Truncated(1, 1e-2), Note::Truncated(2, 3e-2), Note::History(1)] {
+            note.on_branch().join(&mut notes);
+        }
+        let texts: Vec<String> = notes.iter().filter_map(Note::text).collect();
+        assert_eq!(texts.len(), 2, "{texts:?}");
+        assert!(texts[0].starts_with("At 3 points of the branch") && texts[0].contains("3.0e-2"), "{}", texts[0]);
+        assert!(
+            texts[0].contains("Raise `harmonics` in [study]") && !texts[0].contains("event-driven"),
+            "{}",
+            texts[0]
+        );
     }
 
     #[test]

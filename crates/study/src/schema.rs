@@ -93,7 +93,7 @@ pub const FIGURE: &[Key] = &[
         "references",
         Takes::Flag,
         "false",
-        "adds the linear responses with all joints free and all joints stuck, of the first case, to a response",
+        "adds the linear responses with all joints free and all joints stuck, of the first case, to a response; none behind percentiles of draws",
         "true",
     ),
     optional("x", Takes::Choice(scale_names), "scale of the horizontal axis", "\"log\""),

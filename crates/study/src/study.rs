@@ -404,8 +404,13 @@ impl Study {
         study
     }
 
-    /// Whether `[figure]` asks for reference curves, which a run computes.
+    /// Whether `[figure]` asks for reference curves, which a run computes. Behind percentiles of many draws there is none: each draw has its own.
     pub fn wants_references(&self) -> bool {
+        self.draws().is_none() && self.asks_for_references()
+    }
+
+    /// Whether `[figure]` asks for them, drawn or not.
+    pub(crate) fn asks_for_references(&self) -> bool {
         self.figure_values().flag("references") == Some(true)
     }
 

@@ -288,3 +288,63 @@ fn the_worst_evidence_is_the_largest() {
     dataset.tables.clear();
     assert_eq!(worst_evidence(&dataset).residual, None);
 }
+
+/// Rigid joints in a triangle, which stop to be told apart before the first period is over: the rows until then are there, and their summary is of them.
+#[test]
+fn a_transient_that_breaks_down_keeps_what_it_has() {
+    let text = r#"
+schema = 1
+[[mass]]
+name = "a"
+mass = "1 kg"
+[[mass]]
+name = "b"
+mass = "0.7 kg"
+[[spring]]
+between = ["a", "ground"]
+stiffness = "20 N/mm"
+damping = "3 kg/s"
+[[spring]]
+between = ["b", "ground"]
+stiffness = "30 N/mm"
+damping = "3 kg/s"
+[[joint]]
+name = "on_a"
+between = ["a", "ground"]
+law = { kind = "coulomb", limit = "5 N" }
+[[joint]]
+name = "on_b"
+between = ["b", "ground"]
+law = { kind = "coulomb", limit = "5 N" }
+[[joint]]
+name = "across"
+between = ["a", "b"]
+law = { kind = "coulomb", limit = "5 N" }
+[[force]]
+on = "a"
+amplitude = "20 N"
+[[force]]
+on = "b"
+amplitude = "12 N"
+phase = "40 deg"
+[study]
+kind = "transient"
+frequency = "5 Hz"
+cycles = 20
+"#;
+    let (_, found) = of(text);
+    assert_eq!(found.record.points.get("breakdown"), Some(&1), "{:?}", found.record.points);
+    let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap();
+    let (motion, summary) = (table("motion"), table("motion_summary"));
+    let times = motion.numbers("time_s").unwrap();
+    assert!(times.len() > 10, "{times:?}");
+    for (row, mass) in ["a", "b"].iter().enumerate() {
+        let column = motion.numbers(&format!("{mass}_displacement_m")).unwrap();
+        let largest = column.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        assert_eq!(summary.numbers("largest_displacement_m").unwrap()[row], largest);
+        assert!(largest > 0.0);
+    }
+    // smoothed, as its message says, it goes to the end
+    let (_, smoothed) = of(&format!("{text}\n[method]\nkind = \"shooting\"\nwidth = \"0.1 mm/s\"\n"));
+    assert_eq!(smoothed.record.points.get("converged"), Some(&1), "{:?}", smoothed.record.points);
+}

@@ -468,6 +468,20 @@ fn references_that_no_law_has_are_missed_before_the_run() {
     silent(&stop("kind = \"gap\", gap = \"1 mm\", stiffness = \"1 N/mm\"", references));
 }
 
+/// Percentiles of draws have no linear curve behind them, which is said, and none is computed.
+#[test]
+fn references_of_draws_are_missed_before_the_run() {
+    let sample =
+        "[figure]\nreferences = true\n[sample]\ncount = 4\nof = { c = { uniform = [\"1 kg/s\", \"2 kg/s\"] } }\n";
+    let law = "kind = \"gap\", gap = \"1 mm\", stiffness = \"1 N/mm\"";
+    let text = stop(law, sample).replace("schema = 1", "schema = 1\n[parameters]\nc = \"1 kg/s\"");
+    let text = text.replace("damping = \"5 N s/m\"", "damping = \"c\"");
+    warns(&text, &["`references` draws no curve", "[sample]"]);
+    let found = run(&study(&text), &Context::unwatched(1)).unwrap();
+    assert!(found.tables.iter().all(|table| table.name != "references"));
+    assert_eq!(found.notes.iter().filter(|note| note.contains("`references` draws no curve")).count(), 1);
+}
+
 #[test]
 fn a_long_run_says_so_at_its_start() {
     let points = |count: &str| {

@@ -11,6 +11,7 @@ use crate::info::KindInfo;
 use crate::key::ENDS;
 use crate::key::{Takes, Within, default, required};
 use crate::kind::Kind;
+use crate::note::Note;
 use crate::point::Summary;
 use crate::rows::Rows;
 use crate::study::{Study, VariedValue, varied_text};
@@ -172,7 +173,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let (mut rows, mut peaks, mut turns) = (Rows::default(), Rows::default(), Rows::default());
     for point in &branch.points {
         let stable = point.orbit.is_stable();
-        orbits::count(&mut part, &prepared.case, &point.orbit, stable);
+        orbits::count(&mut part, &prepared.case, &point.orbit, (stable, Note::on_branch));
         begin(&mut rows, point.value);
         Summary::of(prepared, &point.orbit, stable).write(prepared, &mut rows);
         rows.end();

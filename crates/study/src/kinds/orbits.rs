@@ -40,7 +40,7 @@ pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Judged>, (us
         match point {
             Some(Ok(orbit)) => {
                 let stable = orbit.is_stable();
-                count(part, case, &orbit, stable);
+                count(part, case, &orbit, (stable, |note| note));
                 orbits.push((orbit, stable));
             }
             other => count_missing(part, case, omega, other.as_ref()),
@@ -49,10 +49,10 @@ pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Judged>, (us
     Ok(orbits)
 }
 
-/// Counts an orbit and notes what its stability and its accuracy ask for.
-pub(super) fn count(part: &mut Part, case: &Case, orbit: &Orbit, stable: Option<bool>) {
+/// Counts an orbit and notes what its stability and its accuracy ask for, in the words of the kind.
+pub(super) fn count(part: &mut Part, case: &Case, orbit: &Orbit, (stable, words): (Option<bool>, fn(Note) -> Note)) {
     part.count(|| place_of(case, orbit.omega), orbit.evidence.accuracy.status(), None);
-    Note::of_orbit(orbit, stable).into_iter().for_each(|note| note.join(&mut part.notes));
+    Note::of_orbit(orbit, stable).into_iter().map(words).for_each(|note| note.join(&mut part.notes));
 }
 
 /// Counts a point that has no orbit.

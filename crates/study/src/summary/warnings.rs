@@ -234,8 +234,13 @@ fn each_quantity(table: &StatedTable, each: &mut dyn FnMut(&'static str, &Quanti
 
 /// That a reference curve which the figure asks for does not exist; the first case stands for all.
 fn no_references(study: &Study, cases: &[Surveyed]) -> Vec<String> {
-    if !study.wants_references() {
+    if !study.asks_for_references() {
         return Vec::new();
+    }
+    if study.draws().is_some() {
+        let why = "`references` draws no curve where [sample] draws parameters: every draw has linear responses of its own; leave it out, or run the \
+                   study without [sample]";
+        return vec![why.to_owned()];
     }
     Reference::ALL.into_iter().filter_map(|reference| reference.model(&cases[0].case.model).err()).collect()
 }
