@@ -16,7 +16,8 @@ pub enum Breakdown {
     /// Rigid joints that form a loop stick together, and how they share the load is not unique.
     #[error(
         "joint `{joint}` and others stick in a loop of rigid contacts whose forces are not unique at t = {time:.6e} s; \
-         give one of them a stiffness (law `jenkins`)"
+         give one of them a stiffness (law `jenkins`), or smooth them: method = {{ kind = \"shooting\", width = \"0.1 mm/s\" }}, the velocity over which \
+         friction changes its sign; or use `harmonic-balance` with a `tolerance` that the series of rigid friction reaches, 0.02"
     )]
     Redundant {
         /// When, s.
