@@ -588,9 +588,7 @@ impl Balance<'_> {
         self.level(top, omega).ok()?;
         let path = self.judge.approach(&self.system, omega, vec![0.0; 2 * self.system.dofs()])?;
         let warm = Some((top, self.series_of(&*path, top, omega)?));
-        let found =
-            if self.method.harmonics.is_some() { self.fixed(top, omega, warm) } else { self.chosen(top, omega, warm) };
-        found.ok()
+        self.from(top, omega, warm).ok()
     }
 
     /// The harmonics of a motion that was followed over a period.
@@ -762,10 +760,11 @@ impl Balance<'_> {
 }
 
 impl Balance<'_> {
-    fn from(&mut self, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
+    /// The user's number of harmonics, or as many as are needed, from `first` on.
+    fn from(&mut self, first: usize, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
         match self.method.harmonics {
             Some(top) => self.fixed(top, omega, warm),
-            None => self.chosen(self.first, omega, warm),
+            None => self.chosen(first, omega, warm),
         }
     }
 
@@ -788,7 +787,7 @@ impl Balance<'_> {
         let (course, path) = course(&self.system, omega)?;
         if matches!(course, Course::Settles | Course::Settling { .. })
             && let Some(motion) = self.series_of(&*path, top, omega)
-            && let Ok(orbit) = self.from(omega, Some((top, motion)))
+            && let Ok(orbit) = self.from(top, omega, Some((top, motion)))
         {
             return Some(Ok(orbit));
         }
@@ -812,7 +811,7 @@ impl Solver for Balance<'_> {
         self.drive = omega;
         let omega = omega / self.periods as f64;
         let warm = self.warm(start);
-        match self.from(omega, warm) {
+        match self.from(self.first, omega, warm) {
             Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
                 let by_time = |balance: &mut Self| balance.by_time(omega).ok_or(error);
                 self.by_its_course(omega).unwrap_or_else(|| by_time(self))

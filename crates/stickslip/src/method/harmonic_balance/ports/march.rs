@@ -203,18 +203,8 @@ impl Alternation {
         z: &DVector<f64>,
         memory: &mut Memory,
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let n = self.samples();
-        let (m, d) = (march.states(), march.axes());
         let after = self.period(march, z, Some(&mut memory.rows))?;
-        let chain = Chain {
-            rows: &memory.rows,
-            width: width(march),
-            before: march.inputs() * d,
-            states: m,
-            axes: d,
-            samples: n,
-        };
-        Some((after, chain.product(None)))
+        Some((after, Chain::of(march, &memory.rows, self.samples()).product(None)))
     }
 
     /// Adds the derivative of the forces. False if the first movement has none.
@@ -228,16 +218,8 @@ impl Alternation {
         let (n, nh) = (self.samples(), self.harmonics.len());
         let (m, d) = (march.states(), march.axes());
         let size = 2 * nh * d;
-        let chain = Chain {
-            rows: &memory.rows,
-            width: width(march),
-            before: march.inputs() * d,
-            states: m,
-            axes: d,
-            samples: n,
-        };
         memory.by_state.resize(n * d * m, 0.0);
-        chain.product(Some(&mut memory.by_state));
+        Chain::of(march, &memory.rows, n).product(Some(&mut memory.by_state));
         let open = DMatrix::identity(m, m) - product;
         let neutral = m > 0 && open.clone().singular_values().min() <= NEUTRAL;
         let inverse = pseudo_inverse(open);
@@ -433,7 +415,12 @@ struct Chain<'a> {
     samples: usize,
 }
 
-impl Chain<'_> {
+impl<'a> Chain<'a> {
+    fn of(march: &dyn March, rows: &'a [f64], samples: usize) -> Self {
+        let (states, axes) = (march.states(), march.axes());
+        Chain { rows, width: width(march), before: march.inputs() * axes, states, axes, samples }
+    }
+
     /// Π, the states after a period by those before it; the forces by these into `forces`, [sample][axis][state].
     fn product(&self, forces: Option<&mut [f64]>) -> DMatrix<f64> {
         match self.states {
