@@ -423,7 +423,13 @@ impl Journal {
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), JournalError> {
-        self.file.write_all(bytes).map_err(|cause| self.failed(cause))?;
+        if let Err(cause) = self.file.write_all(bytes) {
+            // the blocks before this one are whole, and a run that goes on finds them
+            if self.file.sync_data().is_ok() {
+                self.kept = self.units.end;
+            }
+            return Err(self.failed(cause));
+        }
         self.end += bytes.len() as u64;
         Ok(())
     }
