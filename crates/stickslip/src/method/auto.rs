@@ -32,7 +32,7 @@ const PIECES: usize = 100;
 
 /// Degrees of freedom up to which the motion is followed in time. Measured on chains with two `jenkins` joints, seconds a point: event-driven
 /// 0.014, 0.1, 0.5, 2.3 with 30, 60, 100, 150 of them; harmonic balance 0.004 to 0.009.
-const DOFS: usize = 60;
+pub(super) const DOFS: usize = 60;
 
 /// The choice by the laws of a system's joints and their number.
 ///

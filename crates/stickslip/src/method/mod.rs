@@ -31,6 +31,7 @@ use crate::orbit::Orbit;
 pub use crate::orbit::{Breakdown, OrbitError};
 use crate::structure::MOST_IN_FULL;
 use std::collections::BTreeMap;
+use ways::Advised;
 pub use ways::Ways;
 
 /// Turns systems into orbits.
@@ -50,12 +51,13 @@ pub trait Method: Send + Sync + std::fmt::Debug {
     /// # Errors
     /// The system is none that this method can take: [`MethodError`] names the joint or place, and what the method misses.
     fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError>;
-    /// The same for who is to be told what to use instead.
+    /// The same for who is to be told what to use instead, also where no orbit is found.
     ///
     /// # Errors
     /// As [`Method::prepare`], with the methods that take the system.
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        self.prepare(system).map_err(|error| error.with_ways(system))
+        let solver = self.prepare(system).map_err(|error| error.with_ways(system))?;
+        Ok(Box::new(Advised { solver, system }))
     }
 }
 

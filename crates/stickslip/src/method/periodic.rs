@@ -160,7 +160,14 @@ fn settle(
             if residual > tolerance && (repeats.is_some() || hopeless == HOPELESS) {
                 let (method, omega) = (aim.method, aim.omega);
                 let repeats = repeats.map(|back| back + 1);
-                return Err(OrbitError::Unsettled { method, omega, returns: count, change: residual, repeats });
+                return Err(OrbitError::Unsettled {
+                    method,
+                    omega,
+                    returns: count,
+                    change: residual,
+                    repeats,
+                    instead: String::new(),
+                });
             }
         }
         let Some(window) = window(count) else { continue };

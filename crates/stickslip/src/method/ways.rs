@@ -1,7 +1,8 @@
 //! What to use instead of a method that cannot take a system: every method of the table is asked.
 
-use super::{MethodInfo, Options, TABLE, WIDTH};
+use super::{MethodInfo, Options, Solver, TABLE, WIDTH, auto, event_driven, harmonic_balance, settling};
 use crate::model::System;
+use crate::orbit::{Orbit, OrbitError};
 use std::fmt;
 
 /// The methods that take a system, those that pick another one left out.
@@ -37,13 +38,15 @@ const ANY_WIDTH: f64 = 1e-3;
 impl Ways {
     /// Asks every method.
     pub fn of(system: &System) -> Ways {
+        // what picks another method asks here itself
+        Ways::among(system, |name| name != auto::INFO.name)
+    }
+
+    /// Asks the methods whose names `asked` accepts.
+    fn among(system: &System, asked: impl Fn(&str) -> bool) -> Ways {
         let mut ways = Ways::default();
-        for row in TABLE {
+        for row in TABLE.iter().filter(|row| asked(row.name)) {
             let plain = Options::new();
-            // what picks another method asks here itself
-            if row.name == super::auto::INFO.name {
-                continue;
-            }
             let smoothed = Options::from([(WIDTH.to_owned(), ANY_WIDTH)]);
             let smooths = row.options.iter().any(|option| option.key == WIDTH);
             // what a method misses in smoothed laws is what is really in its way
@@ -78,6 +81,44 @@ impl Ways {
     }
 }
 
+/// A solver whose errors name the methods that may find what it did not: only such as take the system.
+pub(super) struct Advised<'a> {
+    pub solver: Box<dyn Solver + Send + 'a>,
+    pub system: &'a System,
+}
+
+impl Solver for Advised<'_> {
+    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.solver.orbit(omega, start).map_err(|error| advised(error, self.system))
+    }
+    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.solver.between(omega, start).map_err(|error| advised(error, self.system))
+    }
+}
+
+/// An error with what to use instead. Systems of more than [`auto::DOFS`] have no other method that is fast enough to be named.
+fn advised(mut error: OrbitError, system: &System) -> OrbitError {
+    if system.dofs() > auto::DOFS {
+        return error;
+    }
+    let words = |asked: &dyn Fn(&str) -> bool| {
+        let ways = Ways::among(system, |name| name != auto::INFO.name && asked(name));
+        if ways.any() { format!(", or {ways}") } else { String::new() }
+    };
+    match &mut error {
+        // a motion in time has no harmonics; waiting is the last resort
+        OrbitError::Truncation { instead, .. } => {
+            *instead = words(&|name| ![harmonic_balance::NAME, settling::INFO.name].contains(&name));
+        }
+        OrbitError::Unsettled { method, instead, repeats: None, .. } => *instead = words(&|name| name != *method),
+        OrbitError::Drift { method, instead, .. } if *method != event_driven::INFO.name => {
+            *instead = words(&|name| name == event_driven::INFO.name);
+        }
+        _ => {}
+    }
+    error
+}
+
 /// Why a method refuses a system, if it does.
 fn refusal(row: &MethodInfo, options: &Options, system: &System) -> Option<String> {
     let prepared = (row.build)(options).and_then(|method| method.prepare(system).map(drop));
@@ -104,6 +145,33 @@ impl fmt::Display for Ways {
             (methods, []) => write!(f, "use method {}", one_of(methods)),
             ([], smoothing) => write!(f, "use method {} {width}", one_of(smoothing)),
             (methods, smoothing) => write!(f, "use method {}, or {} {width}", one_of(methods), one_of(smoothing)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Coulomb, CoulombArctan, SharedLaw};
+    use crate::method::{Method, harmonic_balance::HarmonicBalance};
+    use std::sync::Arc;
+
+    /// A tolerance that no series of this length reaches: what is named takes the law, and what does not take it is not named.
+    #[test]
+    fn errors_name_methods_that_take_the_system() {
+        let exact: SharedLaw = Arc::new(Coulomb { limit: 4.0 });
+        for (law, named, unnamed) in [
+            (exact, "`event-driven`, or `shooting` with a `width`", "`transient`"),
+            (Arc::new(CoulombArctan { limit: 4.0, alpha: 1e4 }), "`shooting`", "event-driven"),
+        ] {
+            let mut model = crate::model::example::blade_couple();
+            model.joints[0].law = law;
+            let system = model.assemble().unwrap();
+            let method = HarmonicBalance { tolerance: Some(1e-11), ..HarmonicBalance::default() };
+            let error = method.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.0, None).unwrap_err();
+            let said = error.to_string();
+            assert!(matches!(error, OrbitError::Truncation { .. }), "{said}");
+            assert!(said.contains(named) && !said.contains(unnamed), "{said}");
         }
     }
 }

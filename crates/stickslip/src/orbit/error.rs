@@ -138,7 +138,7 @@ pub enum OrbitError {
     /// The motion does not settle.
     #[error(
         "{method} at Ω = {omega:.4} rad/s: after {returns} returns the motion still changes by {change:.1e} from one to the next{}",
-        unsettled(*.repeats)
+        unsettled(*.repeats, .instead)
     )]
     Unsettled {
         /// The method.
@@ -151,6 +151,8 @@ pub enum OrbitError {
         change: f64,
         /// Returns after which it repeats, if it does after a few.
         repeats: Option<usize>,
+        /// What finds orbits without waiting, as words behind a comma; empty where nobody has asked or nothing does.
+        instead: String,
     },
     /// The motion broke down.
     #[error("{method} broke down at Ω = {omega:.4} rad/s: {cause}")]
@@ -175,7 +177,7 @@ pub enum OrbitError {
     /// The series that the method may take is too short for the tolerance.
     #[error(
         "{method} reaches an estimated error of {estimate:.1e} at Ω = {omega:.4} rad/s with {harmonics} harmonics, not {tolerance:.1e}; \
-         raise `tolerance`, or use method `event-driven` (exact laws) or `shooting` (smooth laws, and others with a `width`)"
+         raise `tolerance`{instead}"
     )]
     Truncation {
         /// The method.
@@ -188,18 +190,22 @@ pub enum OrbitError {
         estimate: f64,
         /// The error that was allowed.
         tolerance: f64,
+        /// What finds it instead, as words behind a comma; empty where nobody has asked or nothing does.
+        instead: String,
     },
     /// Nothing holds the structure against the mean of the forces, or only friction does.
     #[error(
         "{method} finds no motion at Ω = {omega:.4} rad/s that stays where it is: nothing but friction holds the structure against \
          a mean force; add the spring that holds it{}",
-        if *method == "event-driven" { "" } else { " (where friction is enough, method `event-driven` finds the motion)" }
+        if .instead.is_empty() { String::new() } else { format!("{instead}, which finds the motion where friction is enough") }
     )]
     Drift {
         /// The method.
         method: &'static str,
         /// Drive frequency, rad/s.
         omega: f64,
+        /// What follows such a motion, as words behind a comma; empty where nobody has asked or nothing does.
+        instead: String,
     },
     /// No orbit was found, and a motion that was followed from rest shows what there is instead.
     #[error("{method} finds no orbit at Ω = {omega:.4} rad/s; followed in time from rest, the motion {course}")]
@@ -324,15 +330,19 @@ impl std::fmt::Display for Course {
 }
 
 /// What a motion that does not settle does instead, and what to do about it.
-fn unsettled(repeats: Option<usize>) -> String {
+fn unsettled(repeats: Option<usize>, instead: &str) -> String {
     match repeats {
         // what does not change is settled: the first that can be is the second
         Some(repeats) => {
-            format!("; it repeats after {repeats} of them: ask for it with {repeats} times the `period` (1 when absent)")
+            format!(
+                "; it repeats after {repeats} of them: ask for it with {repeats} times the `period` (1 when absent)"
+            )
         }
-        None => "; by its decay it does not settle within `periods`: no orbit attracts it, or next to nothing damps it; `shooting` and \
-                 `event-driven` find orbits without waiting, and kind = \"transient\" shows the motion"
-            .to_owned(),
+        None => format!(
+            "; by its decay it does not settle within `periods`: no orbit attracts it, or next to nothing damps it; look at it with \
+             kind = \"transient\"{instead}{}",
+            if instead.is_empty() { "" } else { ", which does not wait" }
+        ),
     }
 }
 

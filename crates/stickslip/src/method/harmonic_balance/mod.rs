@@ -615,7 +615,7 @@ impl Balance<'_> {
             return OrbitError::Resonance { method: NAME, omega: self.drive, resonance };
         }
         if lost.away {
-            return OrbitError::Drift { method: NAME, omega: self.drive };
+            return OrbitError::Drift { method: NAME, omega: self.drive, instead: String::new() };
         }
         OrbitError::NotConverged {
             method: NAME,
@@ -650,8 +650,11 @@ impl Balance<'_> {
             judge: Some(&mut self.judge),
         };
         let level = self.levels.get_mut(&top).expect("solved");
-        let orbit =
-            path::orbit(context, level, &motion, x).ok_or(OrbitError::Drift { method: NAME, omega: self.drive })?;
+        let orbit = path::orbit(context, level, &motion, x).ok_or(OrbitError::Drift {
+            method: NAME,
+            omega: self.drive,
+            instead: String::new(),
+        })?;
         if !path::balances(&self.system, &orbit) {
             let lost = Lost::after(motion.iterations, orbit.evidence.energy_gap);
             return Err(self.lost(lost));
@@ -755,7 +758,14 @@ impl Balance<'_> {
             (top, motion, x) = (self.kept.double(top), finer, y);
         }
         let harmonics = checked / self.periods;
-        Err(OrbitError::Truncation { method: NAME, omega: self.drive, harmonics, estimate, tolerance })
+        Err(OrbitError::Truncation {
+            method: NAME,
+            omega: self.drive,
+            harmonics,
+            estimate,
+            tolerance,
+            instead: String::new(),
+        })
     }
 }
 
