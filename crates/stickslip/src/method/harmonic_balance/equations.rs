@@ -13,12 +13,15 @@
 //! Where nothing but contacts holds a body, the mean has the springs of closed contacts in `R`, and their force is taken off `f`: see `closed`.
 //!
 //! `ε` is no free parameter: it is the impedance of the structure at the contact at the highest harmonic, the resolution of the series
-//! ([`RIPPLE`]). Another ε changes the solution no more than the missing harmonics do.
+//! (see [`penalty`]). Another ε changes the solution no more than the missing harmonics do.
 //!
 //! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian frequency-time method".
 
+mod unknowns;
+mod yardsticks;
+
 use super::coupled::{Coupled, Linear, Near, by_products};
-use super::ease::{Ease, GIVEN};
+use super::ease::Ease;
 use super::hold::CLEAR;
 use super::ports::{Alternation, Beginning, Port, Ports, block, blocks};
 use super::receptance::{Modal, Receptance};
@@ -28,30 +31,20 @@ use crate::method::guess::Guess;
 use crate::model::{Cyclic, System};
 use nalgebra::DVector;
 use num_complex::Complex64;
+pub(super) use yardsticks::penalty;
+use yardsticks::weight;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// The penalty ε is the contact's impedance at the highest harmonic times `1 + RIPPLE / highest`. Above that harmonic a series cannot
-/// follow the force: with a larger ε it chatters in stick, with a smaller one a passage through zero is blurred. The second term
-/// makes the passage sharp where the harmonics are few and do not chatter, so that one harmonic is the describing function.
-const RIPPLE: f64 = 30.0;
 /// The receptance below which motion counts as imposed, relative to that of the excited structure.
 const RIGID: f64 = 1e-14;
 
-/// Where contacts alone hold, the length of a motion counts up to so many times that of its harmonics and of rest.
-const FAR: f64 = 4.0;
-/// Share of the mean displacement that constant loads cause on closed contacts, below which no motion is solved more exactly than this share: the
-/// residual is then at the mean's rounding.
-const STANDING: f64 = 1e-5;
 /// All samples for one of a sketch, and how many a sketch has at least for the wave of the highest harmonic: as many as sliders need to tell their turning
 /// points apart.
 const FEWER: usize = 4;
 const SKETCHED: usize = 16;
 /// The share of the springs of closed contacts that a law's derivative has beside a structure that has them.
 const OPEN: f64 = -1.0;
-/// Length of a motion that is none, m: its square is a number still.
-const NOTHING: f64 = 1e-150;
-
 /// All that belongs to one number of harmonics.
 #[derive(Debug, Clone)]
 pub(super) struct Level {
@@ -567,42 +560,9 @@ impl Level {
         }
     }
 
-    /// Units of the residual: the motion's length, or the law's scale, but no more than the forces that there are: a limit that nothing reaches says
-    /// nothing of them. Where only laws hold a direction, the mean of the motion is the small difference of large ones, and its unit the larger of these.
-    fn measure(&mut self, ports: &Ports, motion: &Motion, length: f64) {
-        let nh = self.harmonics().len();
-        let forces = ports.iter().filter(|port| port.is_force()).flat_map(Port::range);
-        let largest =
-            forces.flat_map(|q| &motion.force[q * nh..(q + 1) * nh]).map(|f| f.norm_sqr()).fold(0.0, f64::max);
-        let in_play = (self.holding + largest.sqrt()).max(NOTHING);
-        for port in ports.iter() {
-            let unit = port.unit(length);
-            let unit = if port.is_force() { unit.min(in_play) } else { unit };
-            self.units[2 * nh * port.first..2 * nh * (port.first + port.axes)].fill(unit);
-            if port.is_force() || self.alternation.harmonics[0] != 0 {
-                continue;
-            }
-            for q in port.range() {
-                let moved = match self.sparse {
-                    Some(_) => 0.0,
-                    None => self.receptance.mean(q) * motion.force[q * nh].norm(),
-                };
-                let large = unit + self.linear[q * nh].norm().min(moved);
-                (self.units[2 * q * nh], self.units[2 * q * nh + 1]) = (large, large);
-            }
-        }
-    }
-
     /// The motion without friction.
     pub fn unhindered(&self) -> Motion {
         Motion { c: self.linear.clone(), ..Motion::rest(self.linear.len()) }
-    }
-
-    /// Factor on slip limits from which nothing slips, not even what moves as if there were no friction.
-    pub fn sticking(&self, ports: &Ports) -> f64 {
-        let limits = ports.iter().filter(|port| port.is_force()).map(|port| port.scale);
-        let least = limits.filter(|limit| *limit > 0.0).fold(f64::INFINITY, f64::min);
-        Some(4.0 * self.holding / least).filter(|factor| factor.is_finite()).unwrap_or(1.0)
     }
 
     /// Samples of the forces of a port, into the alternation.
@@ -749,91 +709,11 @@ impl Level {
         true
     }
 
-    /// Residual of the equations at `unknowns` (per axis a motion or a force, relative to [`unit`]) into `residual`, in the same
-    /// units; the derivative into `jacobian`, row-major. Only in the dense form.
-    pub fn residual_at(
-        &mut self,
-        ports: &Ports,
-        omega: f64,
-        (unknowns, length): (&[f64], f64),
-        motion: &mut Motion,
-        residual: &mut [f64],
-        jacobian: Option<&mut [f64]>,
-    ) {
-        self.unpack(ports, (unknowns, length), motion);
-        let slopes = if jacobian.is_some() { Slopes::All } else { Slopes::None };
-        self.evaluate(ports, omega, motion, GIVEN, length, slopes);
-        for ((out, r), unit) in residual.iter_mut().zip(&self.residual).zip(&self.units) {
-            *out = r / unit;
-        }
-        if let Some(jacobian) = jacobian {
-            if self.assemble(ports, omega, GIVEN, length) {
-                jacobian.copy_from_slice(&self.jacobian);
-            } else {
-                jacobian.fill(f64::NAN);
-            }
-        }
-    }
-
     /// Mean of the joint's motion by the degrees of freedom alone, along an axis, m.
     pub fn mean(&self, q: usize, motion: &Motion) -> f64 {
         let at = q * self.harmonics().len();
         motion.c[at].re + self.series[q] * motion.force[at].re - self.imposed[q]
     }
-
-    /// The unknowns of a motion, see [`Level::residual_at`].
-    pub fn pack(&self, ports: &Ports, motion: &Motion, length: f64) -> Vec<f64> {
-        let nh = self.harmonics().len();
-        let mut out = Vec::with_capacity(2 * motion.c.len());
-        for port in ports.iter() {
-            let values = if port.is_force() { &motion.force } else { &motion.c };
-            for value in &values[port.first * nh..(port.first + port.axes) * nh] {
-                let value = value / port.unit(length);
-                out.extend([value.re, value.im]);
-            }
-        }
-        out
-    }
-
-    /// The other way round.
-    pub fn unpack(&self, ports: &Ports, (unknowns, length): (&[f64], f64), motion: &mut Motion) {
-        let nh = self.harmonics().len();
-        for port in ports.iter() {
-            let values = if port.is_force() { &mut motion.force } else { &mut motion.c };
-            let range = port.first * nh..(port.first + port.axes) * nh;
-            for (value, pair) in values[range.clone()].iter_mut().zip(unknowns[2 * range.start..].chunks_exact(2)) {
-                *value = Complex64::new(pair[0], pair[1]) * port.unit(length);
-            }
-        }
-    }
-
-    /// The yardstick of motions: their size, or a hundredth of that without friction, as velocities relative to the drive frequency.
-    pub fn length(&self, motion: &Motion) -> f64 {
-        let nh = self.alternation.harmonics.len();
-        // the mean without friction is far away where only laws hold a direction
-        let norm = |c: &[Complex64], from: usize| {
-            let harmonics = c.iter().enumerate().map(|(i, z)| (z.norm_sqr(), self.alternation.harmonics[i % nh]));
-            harmonics.filter(|(_, h)| *h >= from).map(|(square, h)| square * weight(h)).sum::<f64>().sqrt()
-        };
-        let mut size = norm(&motion.c, 0);
-        if self.stands() {
-            // a mean that goes far is no yardstick
-            let standing = norm(&self.linear, 0);
-            size = size.min(FAR * (norm(&motion.c, 1) + standing)).max(STANDING * standing);
-        }
-        (size + 1e-2 * norm(&self.linear, 1)).max(NOTHING)
-    }
-}
-
-/// The penalty ε (N s/m) of a contact with the receptance (m/N) of the highest harmonic `top`, see [`RIPPLE`].
-pub(super) fn penalty(receptance: f64, top: usize, omega: f64) -> f64 {
-    let impedance = 1.0 / (receptance * top as f64 * omega);
-    impedance * (1.0 + RIPPLE / top as f64)
-}
-
-/// Weight of a harmonic in norms: that of its velocity.
-fn weight(h: usize) -> f64 {
-    ((h * h) as f64).max(1.0)
 }
 
 /// `motion` with other harmonics: those that are new are zero.
