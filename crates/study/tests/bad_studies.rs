@@ -186,6 +186,27 @@ fn a_velocity_is_no_motion() {
     );
 }
 
+/// A key in the wrong table: the message says which table has it.
+#[test]
+fn a_key_in_another_table() {
+    check(
+        "[[force]]",
+        "[frequency]\nfrom = \"1 Hz\"\n[[force]]",
+        (40, 2),
+        "frequency",
+        &["a key of [study]; the keys of the file are"],
+    );
+    check(
+        "on = \"blade1\"\n",
+        "on = \"blade1\"\nstiffness = 3\n",
+        (42, 1),
+        "stiffness",
+        &["a key of [structure] and of [[spring]]"],
+    );
+    // kinds of study have different keys: one that this kind has not is in no other table
+    check("[study]\n", "[study]\npoints = 3\n", (45, 1), "points", &["the keys of a study of kind `response` are"]);
+}
+
 #[test]
 fn kinds() {
     let swap = |study: &str| format!("{}{study}", &EXAMPLE[..EXAMPLE.find("[study]").unwrap()]);

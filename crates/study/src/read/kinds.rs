@@ -12,6 +12,29 @@ use stickslip::dimension::Dimension;
 use stickslip::law::{self, LawInfo};
 use stickslip::method;
 
+/// The tables of a file that have a key of this name, but for those that may be the table it was found in, whose keys are `own`.
+pub(super) fn homes(name: &str, own: &[Key]) -> Vec<String> {
+    let names = |keys: &[Key]| keys.iter().filter(|key| key.is_taken()).map(|key| key.name).collect::<Vec<_>>();
+    let tables = FILE.iter().filter_map(|table| {
+        let (keys, title) = match table.takes {
+            Takes::Table(keys) => (names(keys), format!("[{}]", table.name)),
+            Takes::List(keys) => (names(keys), format!("[[{}]]", table.name)),
+            Takes::Study => {
+                let of_kinds = kinds::TABLE.iter().flat_map(|row| names(row.info.keys));
+                (names(STUDY).into_iter().chain(of_kinds).collect(), format!("[{}]", table.name))
+            }
+            Takes::Method => {
+                let options = method::TABLE.iter().flat_map(|row| row.options).map(|option| option.key);
+                (names(schema::METHOD).into_iter().chain(options).collect(), format!("[{}]", table.name))
+            }
+            _ => return None,
+        };
+        let it_may_be = own.iter().all(|key| keys.contains(&key.name));
+        (keys.contains(&name) && !it_may_be).then_some(title)
+    });
+    tables.collect()
+}
+
 impl Reader {
     /// The row named by `kind` in a table of laws, methods or study kinds.
     fn kind<T: 'static>(

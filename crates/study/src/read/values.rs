@@ -1,5 +1,6 @@
 //! From a node of the document to a stated value: keys that are unknown or missing, types, names, quantities, ranges.
 
+use super::kinds::homes;
 use super::reader::Reader;
 use crate::document::{Content, Entry, Node, Table};
 use crate::error::{Place, Problem};
@@ -19,7 +20,11 @@ impl Reader {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => {
                         let taken = keys.iter().filter(|key| key.is_taken()).map(|key| key.name);
-                        format!("the keys of {owner} are {}", one_of(taken).replace(" or ", ", "))
+                        let taken = format!("the keys of {owner} are {}", one_of(taken).replace(" or ", ", "));
+                        match homes(&entry.key, keys)[..] {
+                            [] => taken,
+                            ref homes => format!("`{}` is a key of {}; {taken}", entry.key, homes.join(" and of ")),
+                        }
                     }
                 };
                 let message = format!("{owner} has no key `{}`", shown(&entry.key));
