@@ -1,6 +1,6 @@
 //! What to use instead of a method that cannot take a system: every method of the table is asked.
 
-use super::{MethodInfo, Options, Solver, TABLE, WIDTH, auto, event_driven, harmonic_balance, settling};
+use super::{MethodInfo, Options, Solver, TABLE, WIDTH, auto, event_driven, settling};
 use crate::model::System;
 use crate::orbit::{Orbit, OrbitError};
 use std::fmt;
@@ -106,9 +106,9 @@ fn advised(mut error: OrbitError, system: &System) -> OrbitError {
         if ways.any() { format!(", or {ways}") } else { String::new() }
     };
     match &mut error {
-        // a motion in time has no harmonics; waiting is the last resort
-        OrbitError::Truncation { instead, .. } => {
-            *instead = words(&|name| ![harmonic_balance::NAME, settling::INFO.name].contains(&name));
+        // waiting is the last resort
+        OrbitError::Truncation { method, instead, .. } | OrbitError::NotConverged { method, instead, .. } => {
+            *instead = words(&|name| ![*method, settling::INFO.name].contains(&name));
         }
         OrbitError::Unsettled { method, instead, repeats: None, .. } => *instead = words(&|name| name != *method),
         OrbitError::Drift { method, instead, .. } if *method != event_driven::INFO.name => {

@@ -123,7 +123,7 @@ pub enum OrbitError {
     /// The iteration did not converge.
     #[error(
         "{method} stopped at Ω = {omega:.4} rad/s after {iterations} iterations, residual {residual:.1e}; \
-         start from a neighbouring orbit, or check that a periodic motion exists (undamped resonance has none)"
+         start from a neighbouring orbit, or check that a periodic motion exists (undamped resonance has none){instead}"
     )]
     NotConverged {
         /// The method.
@@ -134,6 +134,8 @@ pub enum OrbitError {
         iterations: usize,
         /// Smallest residual reached.
         residual: f64,
+        /// What may find it instead, as words behind a comma; empty where nobody has asked or nothing does.
+        instead: String,
     },
     /// The motion does not settle.
     #[error(

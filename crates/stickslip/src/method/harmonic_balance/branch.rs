@@ -122,7 +122,13 @@ impl<'a> BranchEquations<'a> {
     }
 
     fn lost(&self, iterations: usize, residual: f64) -> OrbitError {
-        OrbitError::NotConverged { method: super::NAME, omega: self.omega, iterations, residual }
+        OrbitError::NotConverged {
+            method: super::NAME,
+            omega: self.omega,
+            iterations,
+            residual,
+            instead: String::new(),
+        }
     }
 
     /// The first point, found from the describing function.

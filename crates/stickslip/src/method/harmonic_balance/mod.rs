@@ -622,6 +622,7 @@ impl Balance<'_> {
             omega: self.drive,
             iterations: lost.iterations,
             residual: lost.residual,
+            instead: String::new(),
         }
     }
 
