@@ -2,12 +2,15 @@
 
 mod arrow;
 mod disk;
+mod drawn;
 mod error;
 mod law;
 mod lend;
 mod matrices;
 mod model;
 mod orbit;
+mod parameters;
+mod points;
 mod progress;
 mod python_law;
 mod quantity;

@@ -2,35 +2,32 @@
 
 use crate::law::PyLaw;
 use crate::orbit::{PyOrbit, instants};
+use crate::points::{Asked, along_frequencies, along_parameters, said};
 use crate::progress::{bar, close};
 use crate::python_law::Written;
 use crate::result::PyResultSet;
 use crate::rows::{self, Row};
 use crate::watch::{Watch, watched};
-use crate::{disk, error, matrices, quantity};
+use crate::{disk, drawn, error, matrices, parameters, quantity};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
-use rayon::prelude::*;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
-use stickslip::curve::modes::{ModePoint, ModeRequest, mode};
-use stickslip::curve::sweep::{BLOCK, Watch as Sweep, sweep};
+use stickslip::curve::modes::{ModeRequest, mode};
 use stickslip::dimension::Dimension;
-use stickslip::law::BuildError;
-use stickslip::method::{self, Method, Options, OrbitError, Solver};
+use stickslip::method::{self, Method, Options, Solver};
 use stickslip::model::{
     Around, Disk, Force, Joint, Mass, Model, ModelError, Motion, Spring, Substructure, SubstructureDamping, System,
 };
-use stickslip::orbit::Orbit;
 use stickslip::structure::Reduction;
-use stickslip_study::dataset::{Axis, Column, Dataset, Failure, Figure, Panel, Record, Series, Table};
+use stickslip_study::dataset::{Column, Dataset, Failure, Figure, Record, Table};
 use stickslip_study::hertz;
-use stickslip_study::run::{CONVERGED, Context, NOT_REACHED};
+use stickslip_study::run::{CONVERGED, NOT_REACHED};
 
 /// A structure with joints and its excitation, stated by calls.
 ///
@@ -78,15 +75,6 @@ fn kept_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solv
 
 /// Degrees of freedom up to which the natural frequencies of a model are computed in full, in a second.
 const MOST_SURVEYED: usize = 600;
-
-/// What orbits of a model are sought with.
-struct Asked {
-    system: Arc<System>,
-    method: Box<dyn Method>,
-}
-
-/// How the points of a response are told apart: values of parameters, one for each point.
-type Along = Vec<(String, Vec<f64>)>;
 
 impl PyModel {
     /// The model of a study.
@@ -141,95 +129,6 @@ impl PyModel {
             },
         })
     }
-
-    /// Gives a parameter of the model, one that `dimension` knows, another value, SI.
-    ///
-    /// # Errors
-    /// The value is none that the law can have. Those of masses, springs, forces and motions are checked when the model is assembled.
-    fn put(model: &mut Model, name: &str, value: f64) -> Result<(), BuildError> {
-        let Some((of, key)) = name.rsplit_once('.') else { return Ok(()) };
-        match key {
-            "mass" => model.masses.iter_mut().filter(|mass| mass.name == of).for_each(|mass| mass.mass = value),
-            "force" => model.forces.iter_mut().filter(|force| force.on == of).for_each(|force| force.amplitude = value),
-            "motion" => {
-                model.motions.iter_mut().filter(|motion| motion.on == of).for_each(|motion| motion.amplitude = value);
-            }
-            "stiffness" | "damping" if of.contains('-') => {
-                for spring in model.springs.iter_mut().filter(|spring| spring.between.join("-") == of) {
-                    *(if key == "stiffness" { &mut spring.stiffness } else { &mut spring.damping }) = value;
-                }
-            }
-            _ => {
-                for joint in model.joints.iter_mut().filter(|joint| joint.name == of) {
-                    let info = joint.law.info();
-                    let keys = info.parameters.iter().map(|parameter| parameter.key);
-                    let mut values: BTreeMap<&str, f64> = keys.zip(joint.law.values()).collect();
-                    values.insert(key, value);
-                    joint.law = info.build(&values)?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// The dimension of a parameter of the model; `None` if it has none of this name.
-    fn dimension(&self, name: &str) -> Option<Dimension> {
-        let (of, key) = name.rsplit_once('.')?;
-        let model = &self.model;
-        let springs = || model.springs.iter().any(|spring| spring.between.join("-") == of);
-        match key {
-            "mass" => model.masses.iter().any(|mass| mass.name == of).then_some(Dimension::MASS),
-            "force" => model.forces.iter().any(|force| force.on == of).then_some(Dimension::FORCE),
-            "motion" => model.motions.iter().any(|motion| motion.on == of).then_some(Dimension::LENGTH),
-            "stiffness" if of.contains('-') => springs().then_some(Dimension::STIFFNESS),
-            "damping" if of.contains('-') => springs().then_some(Dimension::DAMPING),
-            _ => {
-                let law = &model.joints.iter().find(|joint| joint.name == of)?.law;
-                let parameter = law.info().parameters.iter().find(|parameter| parameter.key == key)?;
-                // what is raised to a power that is no whole number is a plain number
-                Some(parameter.dimension_under(|key| law.value(key)).unwrap_or(Dimension::NONE))
-            }
-        }
-    }
-
-    /// The parameters of `vary`, as long as each other and as the frequencies.
-    fn along(&self, py: Python<'_>, vary: Option<&Bound<'_, PyDict>>, omegas: &mut Vec<f64>) -> PyResult<Along> {
-        let mut along = Along::new();
-        for (name, values) in vary.into_iter().flatten() {
-            let name: String = name.extract()?;
-            let Some(dimension) = self.dimension(&name) else {
-                let message = format!(
-                    "`{name}` is no parameter of the model: say JOINT.KEY for a parameter of its law, PLACE.mass, PLACE.force, PLACE.motion, \
-                     A-B.stiffness or A-B.damping"
-                );
-                return Err(error::model(py, message));
-            };
-            let values = quantity::many(&values, dimension, &format!("`{name}`"))?;
-            along.push((name, values));
-        }
-        if omegas.is_empty() {
-            return Err(error::model(py, "`frequency` has no values"));
-        }
-        let count = along.iter().map(|(_, values)| values.len()).chain([omegas.len()]).max().unwrap_or(0);
-        let lists = along.iter_mut().map(|(name, values)| (name.as_str(), values));
-        for (name, list) in lists.chain([("frequency", omegas)]) {
-            match list.len() {
-                len if len == count => {}
-                1 => list.resize(count, list[0]),
-                len => {
-                    let message =
-                        format!("`{name}` has {len} values where {count} are asked for: give as many, or one");
-                    return Err(error::model(py, message));
-                }
-            }
-        }
-        Ok(along)
-    }
-}
-
-/// What is wrong with a part of a model, by its name.
-fn said(cause: &ModelError, model: &Model) -> String {
-    format!("{}, `{}`: {}", cause.element.named(model), cause.key, cause.message)
 }
 
 fn refused(py: Python<'_>, cause: &ModelError, model: &Model) -> PyErr {
@@ -463,7 +362,7 @@ impl PyModel {
 
     /// Gives parameters other values: ``model.set({"shroud.limit": "3 N", "a.mass": 0.2, "a-ground.stiffness": 1e5, "a.force": 5})``.
     fn set(&mut self, py: Python<'_>, values: &Bound<'_, PyDict>) -> PyResult<()> {
-        let along = self.along(py, Some(values), &mut vec![1.0])?;
+        let along = parameters::along(py, &self.model, Some(values), &mut vec![1.0])?;
         if let Some((name, values)) = along.iter().find(|(_, values)| values.len() > 1) {
             return Err(error::model(
                 py,
@@ -472,7 +371,7 @@ impl PyModel {
         }
         let mut model = self.model.clone();
         for (name, values) in &along {
-            PyModel::put(&mut model, name, values[0]).map_err(|cause| error::model(py, cause))?;
+            parameters::put(&mut model, name, values[0]).map_err(|cause| error::model(py, cause))?;
         }
         self.model = model;
         self.changed();
@@ -614,7 +513,7 @@ impl PyModel {
     ) -> PyResult<PyResultSet> {
         let start = Instant::now();
         let mut omegas = quantity::many(frequency, Dimension::FREQUENCY, "frequency")?;
-        let along = self.along(py, vary, &mut omegas)?;
+        let along = parameters::along(py, &self.model, vary, &mut omegas)?;
         let asked = self.asked(py, method, options)?;
         let bar = bar(py, progress, "response")?;
         let watch =
@@ -623,7 +522,7 @@ impl PyModel {
             let rows = if along.is_empty() {
                 along_frequencies(&asked, &omegas, context)
             } else {
-                self.along_parameters(&asked, &omegas, &along, context)
+                along_parameters(&self.model, &asked, &omegas, &along, context)
             };
             (rows, context.threads)
         });
@@ -641,7 +540,7 @@ impl PyModel {
             .map(|(name, values)| Column::numbers(&name.replace(['.', '-'], "_"), values.clone()))
             .collect();
         let table = rows::table("curve", first, &asked.system, &*asked.method, &rows);
-        let figure = curves(&table, &asked.system, along.first().map(|(name, _)| name.as_str()));
+        let figure = drawn::curves(&table, &asked.system, along.first().map(|(name, _)| name.as_str()));
         Ok(self.result("response", "Response", vec![table], figure, told))
     }
 
@@ -658,43 +557,10 @@ impl PyModel {
     ) -> PyResult<PyResultSet> {
         let (start, points) = (Instant::now(), instants(py, points)?);
         let found = self.orbit(py, frequency, method, None, options)?;
-        let (mut labels, mut times, mut signals) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new(), Vec::new()]);
-        let mut figure = Figure::default();
-        for (j, joint) in found.system.joints().iter().enumerate() {
-            let (instants, values) = found.loop_of(j, points);
-            for (a, label) in joint.labels().enumerate() {
-                let pick =
-                    |signal: &[f64]| signal.iter().skip(a).step_by(joint.axes().len()).copied().collect::<Vec<_>>();
-                let picked: Vec<Vec<f64>> = values.iter().map(|signal| pick(signal)).collect();
-                labels.extend(std::iter::repeat_n(label.clone(), instants.len()));
-                times.extend(&instants);
-                signals.iter_mut().zip(&picked).for_each(|(all, one)| all.extend(one));
-                figure.panels.push(loop_panel(label, &picked[0], &picked[2]));
-            }
-        }
-        let [displacement, velocity, force] = signals;
-        let loops = Table {
-            name: "loops".to_owned(),
-            columns: vec![
-                Column::texts("joint", labels),
-                Column::numbers("time_s", times),
-                Column::numbers("displacement_m", displacement),
-                Column::numbers("velocity_m_per_s", velocity),
-                Column::numbers("force_N", force),
-            ],
-        };
-        let joints = &found.orbit.joints;
-        let summary = Table {
-            name: "loops_summary".to_owned(),
-            columns: vec![
-                Column::texts("joint", joints.iter().map(|joint| joint.name.clone()).collect()),
-                Column::numbers("dissipation_J", joints.iter().map(|joint| joint.dissipation).collect()),
-                Column::numbers("slip_fraction", joints.iter().map(|joint| joint.slip_fraction).collect()),
-            ],
-        };
+        let (tables, figure) = drawn::loops(&found, points);
         let row = Row::new(&found.system, found.orbit.omega, Ok(&found.orbit));
         let told = Told::of(&[row], &|_| String::new(), vec![found.orbit.method.to_owned()], 1, start);
-        Ok(self.result("hysteresis", "Hysteresis", vec![loops, summary], figure, told))
+        Ok(self.result("hysteresis", "Hysteresis", tables, figure, told))
     }
 
     /// A nonlinear mode: frequency and damping ratio over the amplitude (m √kg, modal), as a :class:`Result` with the table ``modes``.
@@ -732,41 +598,11 @@ impl PyModel {
         let outcome = py.detach(|| self::mode(&system, request));
         self.raised()?;
         let found = outcome.map_err(|cause| error::method(py, cause))?;
-        let numbers = |name: &str, value: &dyn Fn(&ModePoint) -> f64| {
-            Column::numbers(name, found.points.iter().map(value).collect())
-        };
-        let mut columns = vec![
-            numbers("modal_amplitude_m_sqrt_kg", &|point| point.amplitude),
-            numbers("frequency_Hz", &|point| point.omega / TAU),
-            numbers("damping_ratio", &|point| point.damping),
-            numbers("viscous_damping_ratio", &|point| point.viscous),
-        ];
-        let phases: Vec<Vec<f64>> = found.points.iter().map(ModePoint::phases).collect();
-        for (i, place) in system.places().iter().enumerate() {
-            let name = place.replace('.', "_");
-            columns.push(numbers(&format!("{name}_amplitude_m"), &|point| point.places[i].norm()));
-            let phase = phases.iter().map(|all| all[i].to_degrees()).collect();
-            columns.push(Column::numbers(&format!("{name}_phase_deg"), phase));
-        }
-        let table = Table { name: "modes".to_owned(), columns };
-        let x = Axis::new("modal amplitude", "m √kg").log();
-        let line = |quantity: &str, unit: &str, column: &str| Panel {
-            title: String::new(),
-            x: x.clone(),
-            y: Axis::new(quantity, unit),
-            series: vec![Series::line(
-                "",
-                table.numbers("modal_amplitude_m_sqrt_kg").unwrap_or_default().to_vec(),
-                table.numbers(column).unwrap_or_default().to_vec(),
-                0,
-            )],
-            ..Panel::default()
-        };
-        let panels = vec![line("frequency", "Hz", "frequency_Hz"), line("damping ratio", "", "damping_ratio")];
+        let (table, figure) = drawn::mode(&found, &system);
         let mut told = Told::of(&[], &|_| String::new(), Vec::new(), 1, start);
         told.points.insert(CONVERGED.to_owned(), found.points.len() as u64);
         told.notes.extend(found.lost.map(|lost| format!("The mode ends at {:.3e} m √kg: {}.", lost.at, lost.reason)));
-        Ok(self.result("modes", "Nonlinear mode", vec![table], Figure { panels, ..Figure::default() }, told))
+        Ok(self.result("modes", "Nonlinear mode", vec![table], figure, told))
     }
 
     fn __repr__(&self) -> String {
@@ -782,91 +618,4 @@ impl PyModel {
             own.unwrap_or_default()
         )
     }
-}
-
-/// Why a point cannot even be tried.
-enum Refusal {
-    Model(String),
-    Method(String),
-}
-
-impl Refusal {
-    fn raised(self, py: Python<'_>) -> PyErr {
-        match self {
-            Refusal::Model(message) => error::model(py, message),
-            Refusal::Method(message) => error::method(py, message),
-        }
-    }
-}
-
-fn along_frequencies(asked: &Asked, omegas: &[f64], context: &Context) -> Result<Vec<Row>, Refusal> {
-    let watch = Sweep { finished: &*context.finished, stop: &context.stop };
-    let row = |index: usize, outcome: Result<&Orbit, &OrbitError>| Row::new(&asked.system, omegas[index], outcome);
-    let rows = sweep(&*asked.method, &asked.system, omegas.len(), &|index| omegas[index], watch, &row);
-    // a run that was stopped ends with the exception that stopped it
-    Ok(rows.map_err(|cause| Refusal::Method(cause.to_string()))?.into_iter().flatten().collect())
-}
-
-impl PyModel {
-    /// One model for each point: in blocks, so that threads take whole stretches.
-    fn along_parameters(
-        &self,
-        asked: &Asked,
-        omegas: &[f64],
-        along: &Along,
-        context: &Context,
-    ) -> Result<Vec<Row>, Refusal> {
-        let point = |index: usize| -> Result<Option<Row>, Refusal> {
-            if context.stopped() {
-                return Ok(None);
-            }
-            let mut model = self.model.clone();
-            // a parameter of one sector makes it another one
-            disk::of_any_sectors(&mut model);
-            let at = |message: String| format!("point {index}: {message}");
-            for (name, values) in along {
-                PyModel::put(&mut model, name, values[index]).map_err(|cause| Refusal::Model(at(cause.to_string())))?;
-            }
-            let system = model.assemble().map_err(|cause| Refusal::Model(at(said(&cause, &model))))?;
-            let solver = asked.method.solver(&system);
-            let mut solver = solver.map_err(|cause| Refusal::Method(at(cause.to_string())))?;
-            let outcome = solver.orbit(omegas[index], None);
-            (context.finished)();
-            Ok(Some(Row::new(&system, omegas[index], outcome.as_ref())))
-        };
-        let blocks: Result<Vec<Vec<Row>>, Refusal> = (0..omegas.len().div_ceil(BLOCK))
-            .into_par_iter()
-            .map(|block| {
-                let points = block * BLOCK..((block + 1) * BLOCK).min(omegas.len());
-                points.filter_map(|index| point(index).transpose()).collect()
-            })
-            .collect();
-        Ok(blocks?.into_iter().flatten().collect())
-    }
-}
-
-/// Amplitudes over the frequency, or over the first parameter where the frequency is one.
-fn curves(table: &Table, system: &System, along: Option<&str>) -> Figure {
-    let numbers = |name: &str| table.numbers(name).unwrap_or_default().to_vec();
-    let frequencies = numbers("frequency_Hz");
-    let fixed = frequencies.windows(2).all(|pair| pair[0] == pair[1]);
-    let (x, values) = match along.filter(|_| fixed) {
-        Some(name) => (Axis::new(name, "SI"), numbers(&name.replace(['.', '-'], "_"))),
-        None => (Axis::new("frequency", "Hz"), frequencies),
-    };
-    let series = system.places().iter().enumerate();
-    let series =
-        series.map(|(i, place)| Series::line(place, values.clone(), numbers(&format!("{place}_amplitude_m")), i));
-    let y = Axis::new("amplitude", "m").log();
-    Figure {
-        panels: vec![Panel { title: String::new(), x, y, series: series.collect(), ..Panel::default() }],
-        ..Figure::default()
-    }
-}
-
-fn loop_panel(joint: String, displacement: &[f64], force: &[f64]) -> Panel {
-    // closed by its first point
-    let closed = |values: &[f64]| values.iter().chain(values.first()).copied().collect();
-    let series = vec![Series::line("", closed(displacement), closed(force), 0)];
-    Panel { title: joint, x: Axis::new("displacement", "m"), y: Axis::new("force", "N"), series, ..Panel::default() }
 }

@@ -88,6 +88,17 @@ def test_an_orbit_has_the_same_bits_whatever_was_computed_before():
     assert (used.orbit(120.0).start == fresh.orbit(120.0).start).all()
 
 
+def test_places_with_directions_are_drawn():
+    model = stickslip.Model()
+    model.mass("body", 1.0, directions=["x", "z"])
+    for place, stiffness in (("body.x", 1e4), ("body.z", 4e4)):
+        model.spring(place, "ground", stiffness=stiffness, damping=2.0)
+        model.force(place, 1.0)
+    response = model.response([14.0, 15.0, 16.0])
+    drawn = {series["label"]: series["y"] for series in response.figure["panels"][0]["series"]}
+    assert drawn == {place: list(response["curve"][f"{place.replace('.', '_')}_amplitude_m"]) for place in ("body.x", "body.z")}
+
+
 def test_one_call_for_many_parameters_is_many_calls():
     limits = np.linspace(0.5, 4.0, 130)
     together = couple().response("121 Hz", vary={"shroud.limit": limits})["curve"]

@@ -1,0 +1,99 @@
+//! The parameters of a model, by their names: those that calls set and vary.
+
+use crate::{error, quantity};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::collections::BTreeMap;
+use stickslip::dimension::Dimension;
+use stickslip::law::BuildError;
+use stickslip::model::Model;
+
+/// How the points of a response are told apart: values of parameters, one for each point.
+pub type Along = Vec<(String, Vec<f64>)>;
+
+/// Gives a parameter of the model, one that `dimension` knows, another value, SI.
+///
+/// # Errors
+/// The value is none that the law can have. Those of masses, springs, forces and motions are checked when the model is assembled.
+pub fn put(model: &mut Model, name: &str, value: f64) -> Result<(), BuildError> {
+    let Some((of, key)) = name.rsplit_once('.') else { return Ok(()) };
+    match key {
+        "mass" => model.masses.iter_mut().filter(|mass| mass.name == of).for_each(|mass| mass.mass = value),
+        "force" => model.forces.iter_mut().filter(|force| force.on == of).for_each(|force| force.amplitude = value),
+        "motion" => {
+            model.motions.iter_mut().filter(|motion| motion.on == of).for_each(|motion| motion.amplitude = value);
+        }
+        "stiffness" | "damping" if of.contains('-') => {
+            for spring in model.springs.iter_mut().filter(|spring| spring.between.join("-") == of) {
+                *(if key == "stiffness" { &mut spring.stiffness } else { &mut spring.damping }) = value;
+            }
+        }
+        _ => {
+            for joint in model.joints.iter_mut().filter(|joint| joint.name == of) {
+                let info = joint.law.info();
+                let keys = info.parameters.iter().map(|parameter| parameter.key);
+                let mut values: BTreeMap<&str, f64> = keys.zip(joint.law.values()).collect();
+                values.insert(key, value);
+                joint.law = info.build(&values)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The dimension of a parameter of the model; `None` if it has none of this name.
+pub fn dimension(model: &Model, name: &str) -> Option<Dimension> {
+    let (of, key) = name.rsplit_once('.')?;
+    let springs = || model.springs.iter().any(|spring| spring.between.join("-") == of);
+    match key {
+        "mass" => model.masses.iter().any(|mass| mass.name == of).then_some(Dimension::MASS),
+        "force" => model.forces.iter().any(|force| force.on == of).then_some(Dimension::FORCE),
+        "motion" => model.motions.iter().any(|motion| motion.on == of).then_some(Dimension::LENGTH),
+        "stiffness" if of.contains('-') => springs().then_some(Dimension::STIFFNESS),
+        "damping" if of.contains('-') => springs().then_some(Dimension::DAMPING),
+        _ => {
+            let law = &model.joints.iter().find(|joint| joint.name == of)?.law;
+            let parameter = law.info().parameters.iter().find(|parameter| parameter.key == key)?;
+            // what is raised to a power that is no whole number is a plain number
+            Some(parameter.dimension_under(|key| law.value(key)).unwrap_or(Dimension::NONE))
+        }
+    }
+}
+
+/// The parameters of `vary`, as long as each other and as the frequencies.
+pub fn along(
+    py: Python<'_>,
+    model: &Model,
+    vary: Option<&Bound<'_, PyDict>>,
+    omegas: &mut Vec<f64>,
+) -> PyResult<Along> {
+    let mut along = Along::new();
+    for (name, values) in vary.into_iter().flatten() {
+        let name: String = name.extract()?;
+        let Some(dimension) = dimension(model, &name) else {
+            let message = format!(
+                "`{name}` is no parameter of the model: say JOINT.KEY for a parameter of its law, PLACE.mass, PLACE.force, PLACE.motion, \
+                 A-B.stiffness or A-B.damping"
+            );
+            return Err(error::model(py, message));
+        };
+        let values = quantity::many(&values, dimension, &format!("`{name}`"))?;
+        along.push((name, values));
+    }
+    if omegas.is_empty() {
+        return Err(error::model(py, "`frequency` has no values"));
+    }
+    let count = along.iter().map(|(_, values)| values.len()).chain([omegas.len()]).max().unwrap_or(0);
+    let lists = along.iter_mut().map(|(name, values)| (name.as_str(), values));
+    for (name, list) in lists.chain([("frequency", omegas)]) {
+        match list.len() {
+            len if len == count => {}
+            1 => list.resize(count, list[0]),
+            len => {
+                let message = format!("`{name}` has {len} values where {count} are asked for: give as many, or one");
+                return Err(error::model(py, message));
+            }
+        }
+    }
+    Ok(along)
+}

@@ -1,0 +1,84 @@
+//! Many orbits of a model by one call: at many frequencies, or with many values of parameters.
+
+use crate::parameters::{self, Along};
+use crate::rows::Row;
+use crate::{disk, error};
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use std::sync::Arc;
+use stickslip::curve::sweep::{BLOCK, Watch as Sweep, sweep};
+use stickslip::method::{Method, OrbitError};
+use stickslip::model::{Model, ModelError, System};
+use stickslip::orbit::Orbit;
+use stickslip_study::run::Context;
+
+/// What orbits of a model are sought with.
+pub struct Asked {
+    pub system: Arc<System>,
+    pub method: Box<dyn Method>,
+}
+
+/// What is wrong with a part of a model, by its name.
+pub fn said(cause: &ModelError, model: &Model) -> String {
+    format!("{}, `{}`: {}", cause.element.named(model), cause.key, cause.message)
+}
+
+/// Why a point cannot even be tried.
+pub enum Refusal {
+    Model(String),
+    Method(String),
+}
+
+impl Refusal {
+    pub fn raised(self, py: Python<'_>) -> PyErr {
+        match self {
+            Refusal::Model(message) => error::model(py, message),
+            Refusal::Method(message) => error::method(py, message),
+        }
+    }
+}
+
+/// One model at all frequencies, from neighbour to neighbour.
+pub fn along_frequencies(asked: &Asked, omegas: &[f64], context: &Context) -> Result<Vec<Row>, Refusal> {
+    let watch = Sweep { finished: &*context.finished, stop: &context.stop };
+    let row = |index: usize, outcome: Result<&Orbit, &OrbitError>| Row::new(&asked.system, omegas[index], outcome);
+    let rows = sweep(&*asked.method, &asked.system, omegas.len(), &|index| omegas[index], watch, &row);
+    // a run that was stopped ends with the exception that stopped it
+    Ok(rows.map_err(|cause| Refusal::Method(cause.to_string()))?.into_iter().flatten().collect())
+}
+
+/// One model for each point: in blocks, so that threads take whole stretches.
+pub fn along_parameters(
+    model: &Model,
+    asked: &Asked,
+    omegas: &[f64],
+    along: &Along,
+    context: &Context,
+) -> Result<Vec<Row>, Refusal> {
+    let point = |index: usize| -> Result<Option<Row>, Refusal> {
+        if context.stopped() {
+            return Ok(None);
+        }
+        let mut model = model.clone();
+        // a parameter of one sector makes it another one
+        disk::of_any_sectors(&mut model);
+        let at = |message: String| format!("point {index}: {message}");
+        for (name, values) in along {
+            parameters::put(&mut model, name, values[index]).map_err(|cause| Refusal::Model(at(cause.to_string())))?;
+        }
+        let system = model.assemble().map_err(|cause| Refusal::Model(at(said(&cause, &model))))?;
+        let solver = asked.method.solver(&system);
+        let mut solver = solver.map_err(|cause| Refusal::Method(at(cause.to_string())))?;
+        let outcome = solver.orbit(omegas[index], None);
+        (context.finished)();
+        Ok(Some(Row::new(&system, omegas[index], outcome.as_ref())))
+    };
+    let blocks: Result<Vec<Vec<Row>>, Refusal> = (0..omegas.len().div_ceil(BLOCK))
+        .into_par_iter()
+        .map(|block| {
+            let points = block * BLOCK..((block + 1) * BLOCK).min(omegas.len());
+            points.filter_map(|index| point(index).transpose()).collect()
+        })
+        .collect();
+    Ok(blocks?.into_iter().flatten().collect())
+}
