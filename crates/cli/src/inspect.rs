@@ -23,6 +23,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
     let (mut text, mut wrong) = (String::new(), false);
     let mut square: Vec<Named> = Vec::new();
     let mut rows = Vec::new();
+    let mut beside = None;
     for file in files {
         match one(file, format, &mut text) {
             Ok(matrices) => square.extend(matrices),
@@ -42,6 +43,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
                     names.iter().filter(|name| !name.is_empty()).take(LOWEST).map(String::as_str).collect();
                 let _ =
                     writeln!(text, "{}\n  names of {} rows: {}, …\n", file.display(), names.len(), shown.join(", "));
+                beside = Some(names);
             }
             Err(other) => {
                 complain!("error: {}", if other.kind == Kind::Names { other } else { error });
@@ -52,7 +54,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
     if let [a, b] = &square[..]
         && a.matrix.rows() == b.matrix.rows()
     {
-        text += &pair(a, b);
+        text += &pair(a, b, beside.as_deref());
     }
     match (wrong, print(&text)) {
         (true, _) => Ending::WrongInput,
@@ -119,12 +121,13 @@ fn definite(matrix: &sparse::Matrix) -> &'static str {
     }
 }
 
-/// Lowest frequencies of two matrices, of which that with the larger entries is the stiffness, and what the units may be.
-fn pair(a: &Named, b: &Named) -> String {
+/// Lowest frequencies of two matrices, of which that with the larger entries is the stiffness, and what the units may be, if their rows have names, of
+/// their own or `beside` them.
+fn pair(a: &Named, b: &Named, beside: Option<&[String]>) -> String {
     let (stiffness, mass) = if a.matrix.largest() >= b.matrix.largest() { (a, b) } else { (b, a) };
     let mut text = format!("{} as stiffness, {} as mass\n", stiffness.name, mass.name);
     let rows = stiffness.matrix.rows();
-    let names = stiffness.matrix.names().or(mass.matrix.names());
+    let names = stiffness.matrix.names().or(mass.matrix.names()).or(beside.filter(|names| names.len() == rows));
     let names = names.map_or_else(|| vec![String::new(); rows], <[String]>::to_vec);
     let found =
         converted(&stiffness.matrix).zip(converted(&mass.matrix)).ok_or_else(|| "an entry is not finite".to_owned());

@@ -424,9 +424,11 @@ impl Level {
             let penalty = self.penalty[p];
             let (c, force) = (&motion.c[range.clone()], &motion.force[range.clone()]);
             let slot = &mut self.tangents[block(&self.blocks, p, port, nh)];
-            slot.fill(0.0);
             let image = &mut self.image[..range.len()];
-            let slot = (slopes != Slopes::None).then_some(slot);
+            let slot = (slopes != Slopes::None).then(|| {
+                slot.fill(0.0);
+                slot
+            });
             self.alternation.image(port, (omega, penalty, ease.limits), (c, force), image, slot);
             for (at, (force, image)) in range.zip(force.iter().zip(&*image)) {
                 let mut r = force - image;
@@ -502,6 +504,11 @@ impl Level {
     /// Samples of a period, also while those of a sketch stand in for them.
     pub fn all_samples(&self) -> usize {
         self.sketch.iter().map(|sketch| sketch.samples()).fold(self.alternation.samples(), usize::max)
+    }
+
+    /// Whether there are fewer samples beside all.
+    pub fn keeps_sketch(&self) -> bool {
+        self.sketch.is_some()
     }
 
     /// The sketch becomes what is sampled, and back: forces by fewer samples then, and derivatives that are theirs.

@@ -4,7 +4,7 @@
 //! - `rest`: the receptance of the linear rest, in closed form from its modes;
 //! - `closed`: the mean of bodies that nothing but contacts holds;
 //! - `equations`: those along the joints, and their derivative;
-//! - `solve`: Newton's method on them; `proximal`: the way to forces that nothing decides;
+//! - `solve`: Newton's method on them; `sampling`: what its samples leave out; `proximal`: the way to forces that nothing decides;
 //! - `path`: the orbit's numbers from its harmonics.
 //!
 //! The unknowns are the harmonics of the joints' relative motions, or of their forces where the velocity alone decides them: the cost
@@ -25,6 +25,7 @@ mod ports;
 mod proximal;
 mod receptance;
 mod rest;
+mod sampling;
 mod solve;
 mod sparse;
 mod uncoupled;
@@ -43,8 +44,9 @@ use equations::{Level, Motion};
 pub(crate) use mode::{LinearMode, ModeEquations, ModeState};
 use nalgebra::DVector;
 use num_complex::Complex64;
-use ports::Ports;
+use ports::{Port, Ports};
 use rest::Rest;
+use sampling::samples_for;
 use solve::Lost;
 use sparse::Sparse;
 use std::borrow::Cow;
@@ -124,8 +126,8 @@ const CANCELS: f64 = 1e-12;
 /// Where friction is rigid or steep, one doubling is not believed to have left less than this share of the distance of the one before: two
 /// motions may be near each other by chance, as 1.3e-3 where the error is 1e-2.
 const CHANCE: f64 = 0.1;
-/// Samples per period, at least, and per harmonic. Sliders and stops need them to tell turning points apart only; laws with rates have errors of
-/// about 1e-6 of their force.
+/// Samples per period, at least, and per harmonic. Sliders and stops need them to tell turning points apart only; laws with a memory
+/// need as many as [`samples_for`] the tolerance.
 const SAMPLES: usize = 1024;
 const SAMPLES_PER_HARMONIC: usize = 16;
 /// The same for laws that are steep or turn in a plane, whose samples place a change of sign to a sample only: they then grow with the
@@ -175,7 +177,9 @@ impl HarmonicBalance {
     /// it needs, so that too few are seen in the estimate.
     fn samples_at(&self, top: usize, ports: &Ports) -> usize {
         let each = if ports.has_steep() { SAMPLES_OF_STEEP } else { SAMPLES_PER_HARMONIC };
-        let needed = (each * (top + 1)).next_power_of_two();
+        let remembered = ports.iter().any(Port::marches);
+        let few = if remembered { samples_for(self.tolerance.unwrap_or(TOLERANCE)) } else { 0 };
+        let needed = (each * (top + 1)).max(few).next_power_of_two();
         match (self.samples, self.harmonics) {
             (Some(samples), Some(harmonics)) if top <= harmonics => samples,
             (Some(samples), Some(_)) => samples.max(needed).max(SAMPLES),
@@ -693,7 +697,7 @@ impl Balance<'_> {
         self.finish(top, omega, motion, x, truncation)
     }
 
-    /// Error of `motion` by one with twice the harmonics, which is returned too.
+    /// Error of `motion` by one with twice the harmonics, and of laws with a memory with twice the samples too; the former is returned.
     fn compare(
         &mut self,
         top: usize,
@@ -710,9 +714,14 @@ impl Balance<'_> {
         }
         let y = self.places(double, omega, &better)?;
         let finer = self.levels.get_mut(&double).expect("solved");
+        let sampled = finer.by_twice_the_samples(&self.ports, omega, &better);
+        let sampled = sampled.map(|motion| self.places(double, omega, &motion).map(|y| (motion, y))).transpose()?;
+        let fine = sampled.as_ref().map_or((&better, &y), |(motion, y)| (motion, y));
+        let finer = self.levels.get_mut(&double).expect("solved");
         let coarse = Compared { harmonics: &self.kept.up_to(top), places: x, along: &motion.c };
         let at = (self.kept, omega);
-        Ok((estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &better, &y)), better, y))
+        let error = estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, fine.0, fine.1));
+        Ok((error, better, y))
     }
 
     /// A start with twice the harmonics: a solution, and what these added to the last one that was compared.

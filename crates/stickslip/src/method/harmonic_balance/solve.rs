@@ -271,7 +271,7 @@ impl Level {
     }
 
     /// The Newton step into `self.step`, in the unknowns' units.
-    fn newton_step(&mut self, ports: &Ports, omega: f64, ease: Ease, near: Near) -> bool {
+    pub(super) fn newton_step(&mut self, ports: &Ports, omega: f64, ease: Ease, near: Near) -> bool {
         let pair = 2 * self.harmonics().len();
         self.step.copy_from_slice(&self.residual);
         match &mut self.sparse {
@@ -303,7 +303,7 @@ impl Level {
     }
 
     /// `self.before` less a fraction of the step, into `motion`.
-    fn advance(&self, ports: &Ports, motion: &mut Motion, fraction: f64, length: f64) {
+    pub(super) fn advance(&self, ports: &Ports, motion: &mut Motion, fraction: f64, length: f64) {
         let nh = self.harmonics().len();
         for port in ports.iter() {
             let range = port.first * nh..(port.first + port.axes) * nh;

@@ -129,7 +129,11 @@ pub(super) fn panels(drawing: &Drawing<'_>) -> Vec<Panel> {
         let rows = || group.iter().flat_map(|stretch| stretch.rows.clone());
         let values: Vec<f64> = rows().flat_map(|row| numbers(table, tables::RATIO, row..row + 1)).collect();
         let ends = rows().filter(|row| at_end.get(*row) == Some(&Some(true))).count();
-        let ends = if ends > 0 { format!("{ends} peaks at the end of the range") } else { String::new() };
+        let ends = match ends {
+            0 => String::new(),
+            1 => "1 peak at the end of the range".to_owned(),
+            ends => format!("{ends} peaks at the end of the range"),
+        };
         let title = [words, "amplification".to_owned(), ends].into_iter().filter(|part| !part.is_empty());
         histogram::panel_of_maxima(&values, &x, &title.collect::<Vec<_>>().join(", "), "disks")
     };
