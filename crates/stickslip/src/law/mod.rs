@@ -38,6 +38,7 @@ mod kink;
 mod lugre;
 mod parameter;
 mod plane;
+mod proportion;
 mod prox;
 mod rate;
 mod slopes;

@@ -147,6 +147,17 @@ impl Guess {
             .unwrap_or_else(|| DVector::from_element(n, Complex64::new(0.0, 0.0)))
     }
 
+    /// Force along an axis of a joint, by their numbers, at a harmonic and its displacements, N.
+    pub fn force(
+        &self,
+        system: &System,
+        (joint, axis): (usize, usize),
+        (h, x): (u32, &DVector<Complex64>),
+    ) -> Complex64 {
+        let axes = system.joints()[joint].axes().iter().enumerate();
+        axes.map(|(b, along)| self.joints[joint][(axis, b)] * (along.along_complex(x) + along.imposed_at(h))).sum()
+    }
+
     /// Displacements and velocities at t = 0, length 2n.
     pub fn state(&self, n: usize) -> Vec<f64> {
         let mut state = vec![0.0; 2 * n];

@@ -8,6 +8,7 @@ mod coordinates;
 mod disk;
 mod error;
 pub mod example;
+mod line;
 mod part;
 mod place;
 mod places;
@@ -16,6 +17,7 @@ mod system;
 
 pub use disk::{Around, Disk, LEAST_SECTORS, Mistuned, NEXT, Ring, normal_pattern, too_far};
 pub use error::{Element, ModelError};
+pub(crate) use line::{Line, PARALLEL};
 pub use place::{Frame, FrameError, Place};
 pub use places::{is_identifier, is_place};
 pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey, Unpressed, WaveModes};

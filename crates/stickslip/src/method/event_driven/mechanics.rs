@@ -6,7 +6,7 @@
 
 use crate::law::{Contact, Law, Piece};
 use crate::method::MethodError;
-use crate::model::{Axis, System};
+use crate::model::{Line, System};
 use crate::structure::Matrices;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Deref;
@@ -15,10 +15,6 @@ use std::sync::Arc;
 /// A relative velocity below this fraction of the largest one is rest. Switch instants are found to 1e-15 of the velocity scale;
 /// joints that switch together by symmetry differ by the rounding of the whole orbit, about 1e-12.
 pub(crate) const REST: f64 = 1e-10;
-
-/// Directions and imposed motions are parallel within this fraction of their largest entry: what the few roundings by which a direction is made
-/// leave. Directions farther apart are different ones.
-const PARALLEL: f64 = 64.0 * f64::EPSILON;
 
 /// What a part of a joint does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,46 +124,22 @@ impl Share {
 }
 
 /// A rigid slider of a joint, before those along one line are one part.
-struct Slider<'a> {
+struct Slider {
     joint: usize,
-    axis: &'a Axis,
+    line: Line,
     direction: DVector<f64>,
     limit: f64,
     static_limit: f64,
 }
 
-impl Slider<'_> {
-    /// The factor by which this one's relative motion is that of `other` at all times, if there is one.
-    fn along(&self, other: &Slider) -> Option<f64> {
-        let lead = (0..other.direction.len()).max_by(|&a, &b| {
-            let size = |i: usize| other.direction[i].abs();
-            size(a).total_cmp(&size(b))
-        })?;
-        let factor = self.direction[lead] / other.direction[lead];
-        if !factor.is_finite() || factor == 0.0 {
-            return None; // across, or nothing but imposed motion moves one of them
-        }
-        let near = PARALLEL * self.direction.amax();
-        if self.direction.iter().zip(&other.direction).any(|(own, w)| (own - factor * w).abs() > near) {
-            return None;
-        }
-        // a constant offset changes nothing for friction
-        let moving = |axis: &Axis| axis.imposed().iter().map(|(h, _)| *h).filter(|h| *h > 0).collect::<Vec<u32>>();
-        let (own, its) = (moving(self.axis), moving(other.axis));
-        let near = PARALLEL * own.iter().map(|&h| self.axis.imposed_at(h).norm()).fold(0.0, f64::max);
-        let apart = |&h: &u32| (self.axis.imposed_at(h) - other.axis.imposed_at(h) * factor).norm() > near;
-        (!own.iter().chain(&its).any(apart)).then_some(factor)
-    }
-}
-
-/// Rigid sliders along one line: the first, which is the part, and all of them.
-struct Line<'a> {
+/// Rigid sliders along one line: the part that they are, and all of them.
+struct Group {
     part: usize,
-    first: Slider<'a>,
+    line: Line,
     members: Vec<Member>,
 }
 
-/// A rigid slider on a line.
+/// One of them.
 struct Member {
     /// Which of the shares is its.
     share: usize,
@@ -177,7 +149,7 @@ struct Member {
     limits: (f64, f64),
 }
 
-impl Line<'_> {
+impl Group {
     /// Limit and static limit of all together, along the first, N.
     fn limits(&self) -> (f64, f64) {
         let add = |sum: (f64, f64), Member { factor, limits, .. }: &Member| {
@@ -189,39 +161,39 @@ impl Line<'_> {
 
 /// Parts and shares as they are gathered, joint after joint.
 #[derive(Default)]
-struct Gathered<'a> {
+struct Gathered {
     parts: Vec<Part>,
     shares: Vec<Share>,
-    lines: Vec<Line<'a>>,
+    groups: Vec<Group>,
 }
 
-impl<'a> Gathered<'a> {
+impl Gathered {
     fn push(&mut self, part: Part) {
         self.shares.push(Share::whole(part.joint, self.parts.len()));
         self.parts.push(part);
     }
 
-    fn push_rigid(&mut self, slider: Slider<'a>) {
+    fn push_rigid(&mut self, slider: Slider) {
         let (share, limits) = (self.shares.len(), (slider.limit, slider.static_limit));
-        let found = self.lines.iter().enumerate().find_map(|(i, line)| Some((i, slider.along(&line.first)?)));
-        let (line, factor) = found.unwrap_or((self.lines.len(), 1.0));
-        if let Some(line) = self.lines.get(line) {
-            self.shares.push(Share::whole(slider.joint, line.part));
+        let found = self.groups.iter().enumerate().find_map(|(i, group)| Some((i, slider.line.along(&group.line)?)));
+        let (group, factor) = found.unwrap_or((self.groups.len(), 1.0));
+        if let Some(group) = self.groups.get(group) {
+            self.shares.push(Share::whole(slider.joint, group.part));
         } else {
             let kind = Kind::Rigid { limit: limits.0, static_limit: limits.1 };
             let part = self.parts.len();
-            self.push(Part { joint: slider.joint, direction: slider.direction.clone(), kind });
-            self.lines.push(Line { part, first: slider, members: Vec::new() });
+            self.push(Part { joint: slider.joint, direction: slider.direction, kind });
+            self.groups.push(Group { part, line: slider.line, members: Vec::new() });
         }
-        self.lines[line].members.push(Member { share, factor, limits });
+        self.groups[group].members.push(Member { share, factor, limits });
     }
 
     /// Gives the parts of several the sums of their limits, and each joint its share.
     fn finish(mut self) -> (Arc<[Part]>, Arc<[Share]>) {
-        for line in self.lines.iter().filter(|line| line.members.len() > 1) {
-            let (limit, static_limit) = line.limits();
-            self.parts[line.part].kind = Kind::Rigid { limit, static_limit };
-            for Member { share, factor, limits } in &line.members {
+        for group in self.groups.iter().filter(|group| group.members.len() > 1) {
+            let (limit, static_limit) = group.limits();
+            self.parts[group.part].kind = Kind::Rigid { limit, static_limit };
+            for Member { share, factor, limits } in &group.members {
                 let share = &mut self.shares[*share];
                 // without any force in slip there is nothing to share
                 share.slipping = if limit > 0.0 { factor.signum() * limits.0 / limit } else { 0.0 };
@@ -303,7 +275,8 @@ impl Mechanics {
                     Piece::Slider(slider) => match slider.stiffness {
                         None => {
                             let (limit, static_limit) = (slider.limit, slider.static_limit);
-                            gathered.push_rigid(Slider { joint: j, axis, direction, limit, static_limit });
+                            let line = Line::of(axis);
+                            gathered.push_rigid(Slider { joint: j, line, direction, limit, static_limit });
                             continue;
                         }
                         Some(stiffness) => {

@@ -23,7 +23,7 @@ mod yardsticks;
 use super::coupled::{Coupled, Linear, Near, by_products};
 use super::ease::Ease;
 use super::hold::CLEAR;
-use super::ports::{Alternation, Beginning, Port, Ports, block, blocks};
+use super::ports::{Alternation, Beginning, Member, Port, Ports, block, blocks};
 use super::receptance::{Modal, Receptance};
 use super::rest::Rest;
 use super::sparse::Sparse;
@@ -338,20 +338,20 @@ impl Level {
         }
         let Some(guess) = guess else { return motion };
         for port in ports.iter() {
-            let axes = system.joints()[port.joint].axes();
             for (rate, x) in &guess.harmonics {
                 let h = (rate / omega).round() as usize;
                 let Ok(k) = self.harmonics().binary_search(&h) else { continue };
-                let u: Vec<Complex64> =
-                    axes.iter().map(|axis| axis.along_complex(x) + axis.imposed_at(h as u32)).collect();
                 for q in port.range() {
                     let (_, a) = ports.place(q);
-                    let force: Complex64 =
-                        u.iter().enumerate().map(|(b, u)| guess.joints[port.joint][(a, b)] * u).sum();
+                    // what does the work of all
+                    let work = |member: &Member| member.factor * guess.force(system, (member.joint, a), (h as u32, x));
+                    let force: Complex64 = port.members.iter().map(work).sum();
                     if !force.is_finite() {
                         continue; // rigid friction that does not move at all
                     }
-                    motion.c[q * nh + k] = u[a] - force * port.series;
+                    let axis = ports.axis(system, q);
+                    let moved = axis.along_complex(x) + axis.imposed_at(h as u32);
+                    motion.c[q * nh + k] = moved - force * port.series;
                     motion.force[q * nh + k] = force;
                 }
             }

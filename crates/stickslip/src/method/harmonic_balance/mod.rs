@@ -37,7 +37,7 @@ use crate::method::course::course;
 use crate::method::evidence::Judge;
 use crate::method::repeated::Afresh;
 use crate::model::{Axis, System};
-use crate::orbit::{Course, Orbit, Path};
+use crate::orbit::{Course, JointSample, Orbit, Path};
 pub(crate) use arc::ModeArc;
 pub(crate) use branch::BranchEquations;
 use equations::{Level, Motion};
@@ -604,7 +604,11 @@ impl Balance<'_> {
         for port in self.ports.iter() {
             for q in port.range() {
                 let (joint, axis) = self.ports.place(q);
-                let force: Vec<f64> = samples.iter().map(|now| now[joint].force[axis]).collect();
+                // what does the work of all
+                let work = |now: &[JointSample]| -> f64 {
+                    port.members.iter().map(|member| member.factor * now[member.joint].force[axis]).sum()
+                };
+                let force: Vec<f64> = samples.iter().map(|now| work(now)).collect();
                 let moved = samples.iter().zip(&force).map(|(now, f)| now[joint].displacement[axis] - f * port.series);
                 let range = q * nh..(q + 1) * nh;
                 level.alternation.add_signal(&mut moved.collect::<Vec<f64>>(), &mut motion.c[range.clone()]);

@@ -1,7 +1,7 @@
 //! The orbit of a solution of harmonic balance.
 
 use super::equations::{Level, Motion};
-use super::ports::Ports;
+use super::ports::{Member, Ports};
 use super::rest::Rest;
 use crate::law::{Contact, MOST_DIRECTIONS};
 use crate::method::evidence::{Judge, Judged};
@@ -200,15 +200,16 @@ fn sampled(context: &Context, level: &mut Level, motion: &Motion, x: &[DVector<C
         let (axes, force, contact) = (joint.axes(), &mut force[j], &mut contact[j]);
         // no port: what holds nothing slips all the time
         let mut told = false;
-        for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.joint == j) {
+        for (p, port) in ports.iter().enumerate() {
+            let Some(&Member { share, .. }) = port.member(j) else { continue };
             level.sample(ports, p, omega, motion);
             let alternation = &level.alternation;
             for (i, force) in force.iter_mut().enumerate() {
                 for (a, force) in force.iter_mut().enumerate().take(port.axes) {
-                    *force += alternation.force[a][i];
+                    *force += share * alternation.force[a][i];
                 }
                 if port.tells_slip() && alternation.slips[i] {
-                    contact[i] = Contact::slip(alternation.force[0][i]);
+                    contact[i] = Contact::slip(share * alternation.force[0][i]);
                 }
             }
             told |= port.tells_slip();
@@ -216,7 +217,7 @@ fn sampled(context: &Context, level: &mut Level, motion: &Motion, x: &[DVector<C
                 Some(rate) if port.is_force() => {
                     let mut z = vec![0.0; rate.states()];
                     // the sampled force is within the law's bounds, which that of the series may pass
-                    let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| alternation.force[a][0]);
+                    let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| share * alternation.force[a][0]);
                     rate.state_under(&now[..port.axes], &mut z);
                     states.extend(z);
                 }
@@ -250,8 +251,8 @@ fn relative(axis: &Axis, harmonics: &[usize], x: &[DVector<Complex64>]) -> Vec<C
     harmonics.iter().zip(x).map(|(&h, x)| axis.imposed_at(h as u32) + axis.along_complex(x)).collect()
 }
 
-/// The unknowns that act along each axis, among those of all ports.
-fn ports_of_axes(system: &System, ports: &Ports) -> Vec<Vec<usize>> {
+/// The unknowns that act along each axis, by their numbers among those of all ports, and what the joint has of them.
+fn ports_of_axes(system: &System, ports: &Ports) -> Vec<Vec<(usize, Member)>> {
     let mut firsts = Vec::with_capacity(system.joints().len());
     let mut count = 0;
     for joint in system.joints() {
@@ -259,9 +260,10 @@ fn ports_of_axes(system: &System, ports: &Ports) -> Vec<Vec<usize>> {
         count += joint.axes().len();
     }
     let mut of = vec![Vec::new(); count];
-    for q in 0..ports.count() {
-        let (joint, axis) = ports.place(q);
-        of[firsts[joint] + axis].push(q);
+    for port in ports.iter() {
+        for member in &port.members {
+            port.range().enumerate().for_each(|(axis, q)| of[firsts[member.joint] + axis].push((q, *member)));
+        }
     }
     of
 }
@@ -269,8 +271,8 @@ fn ports_of_axes(system: &System, ports: &Ports) -> Vec<Vec<usize>> {
 /// A solution that is measured.
 struct Measuring<'a> {
     axes: Vec<&'a Axis>,
-    /// The unknowns along each axis.
-    ports: Vec<Vec<usize>>,
+    /// See [`ports_of_axes`].
+    ports: Vec<Vec<(usize, Member)>>,
     motion: &'a Motion,
     x: &'a [DVector<Complex64>],
     harmonics: &'a [usize],
@@ -321,12 +323,16 @@ impl Signals for Measuring<'_> {
     fn relative_velocity(&self, axis: usize) -> Vec<Complex64> {
         // the unknown itself, and not what the forces do to the structure: the energies then balance only as well as the equations hold
         let nh = self.harmonics.len();
-        let unknown = self.ports[axis].first().map(|q| self.motion.c[q * nh..(q + 1) * nh].to_vec());
+        let unknown = self.ports[axis].first().map(|(q, Member { factor, .. })| {
+            let along = &self.motion.c[q * nh..(q + 1) * nh];
+            along.iter().map(|c| c * factor).collect()
+        });
         self.derivative(unknown.unwrap_or_else(|| relative(self.axes[axis], self.harmonics, self.x)))
     }
     fn force(&self, axis: usize) -> Vec<Complex64> {
         let nh = self.harmonics.len();
-        (0..nh).map(|k| self.ports[axis].iter().map(|q| self.motion.force[q * nh + k]).sum()).collect()
+        let acting = |k: usize| self.ports[axis].iter().map(move |(q, m)| self.motion.force[q * nh + k] * m.share);
+        (0..nh).map(|k| acting(k).sum()).collect()
     }
     fn harmonics(&self, parts: &[(f64, Complex64)]) -> Vec<Complex64> {
         let mut signal = vec![ZERO; self.harmonics.len()];

@@ -6,9 +6,11 @@
 //! - a *force port* (prox) has the force `λ`, and makes `P J(λ + ε u')` of it, which it must be.
 //!
 //! Both give the derivative by the unknowns exactly, over all axes and harmonics at once. The equations know nothing else of a law.
+//! Joints that move alike may have one force port together, see [`gathered`].
 
 mod alternation;
 mod events;
+mod gathered;
 mod march;
 mod memory;
 mod prox;
@@ -19,12 +21,13 @@ mod step;
 mod tests;
 
 pub(super) use alternation::{Alternation, Beginning};
-use prox::Rigid;
+use gathered::Gathered;
+use prox::{Rigid, Times};
 use sliders::Part;
 
-use crate::law::{MOST_DIRECTIONS, Piece, Prox, SharedLaw, Slider};
+use crate::law::{MOST_DIRECTIONS, Prox, SharedLaw};
 use crate::method::MethodError;
-use crate::model::{Axis, Cyclic, System};
+use crate::model::{Axis, Cyclic, System, SystemJoint};
 use num_complex::Complex64;
 
 /// Directions of joints from which what the structure couples among them is multiplied with and not eliminated: few with many harmonics have steps that are
@@ -39,18 +42,29 @@ enum Kernel {
     /// Rigid sliders side by side along one axis, as one.
     Rigid(Rigid),
     /// A law by its resolvent.
-    Prox(SharedLaw),
+    Prox(Times),
     /// A law by its return map.
     Step(SharedLaw),
     /// A law by its rates.
     Rate(SharedLaw),
 }
 
-/// A relative motion along one to three axes with what acts along it: that of a joint, or of a joint's inner slider behind a spring.
+/// A joint that acts at a port, along each of the port's axes by its own axis of the same number.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Member {
+    pub joint: usize,
+    /// Its motion per that of the port.
+    pub factor: f64,
+    /// Its force per that of the port.
+    pub share: f64,
+}
+
+/// A relative motion along one to three axes with what acts along it: that of a joint, of several that move alike, or of their inner sliders behind
+/// springs.
 #[derive(Debug, Clone)]
 pub(super) struct Port {
-    /// The joint.
-    pub joint: usize,
+    /// Its joints; it has the axes of the first.
+    pub members: Vec<Member>,
     /// Number of its first axis among those of all ports.
     pub first: usize,
     /// How many it has.
@@ -90,7 +104,7 @@ impl Port {
     pub fn is_rigid(&self) -> bool {
         match &self.kernel {
             Kernel::Rigid(_) => true,
-            Kernel::Prox(law) => law.prox().is_some_and(|prox| prox.at_velocity(0.0).is_none()),
+            Kernel::Prox(times) => times.at_velocity(0.0).is_none(),
             _ => false,
         }
     }
@@ -109,10 +123,18 @@ impl Port {
         self.first..self.first + self.axes
     }
 
+    /// What a joint has of it, if it is one of its own.
+    pub fn member(&self, joint: usize) -> Option<&Member> {
+        self.members.iter().find(|member| member.joint == joint)
+    }
+
     /// The same kind of port at the same place, whatever the numbers.
     pub fn is_like(&self, other: &Port) -> bool {
-        let kind = |port: &Port| (port.joint, port.first, port.axes, std::mem::discriminant(&port.kernel));
+        let kind = |port: &Port| (port.first, port.axes, std::mem::discriminant(&port.kernel));
+        let alike = |(own, its): (&Member, &Member)| own.joint == its.joint;
         kind(self) == kind(other)
+            && self.members.len() == other.members.len()
+            && self.members.iter().zip(&other.members).all(alike)
     }
 
     /// Stiffness at rest along its axes, N/m, roughly; zero if it is rigid.
@@ -157,7 +179,7 @@ impl Port {
     /// The law, if the velocity alone decides its bounded force, which is sampled.
     fn steep(&self) -> Option<&SharedLaw> {
         match &self.kernel {
-            Kernel::Prox(law) => Some(law),
+            Kernel::Prox(times) => Some(&times.law),
             Kernel::Rate(law) if law.rate().is_some_and(|rate| rate.states() == 0) => {
                 self.scale.is_finite().then_some(law)
             }
@@ -168,17 +190,17 @@ impl Port {
     fn prox(&self) -> Option<&dyn Prox> {
         match &self.kernel {
             Kernel::Rigid(rigid) => Some(rigid),
-            Kernel::Prox(law) => law.prox(),
+            Kernel::Prox(times) => Some(times),
             _ => None,
         }
     }
 }
 
 /// The ports of a system; a joint that carries no force has none.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Ports {
     list: Vec<Port>,
-    /// Joint and number within it of every axis.
+    /// Joint and number within it of every axis: of several joints the first.
     axes: Vec<(usize, usize)>,
     wave: Option<Cyclic>,
 }
@@ -194,90 +216,34 @@ impl Ports {
     /// # Errors
     /// A law whose views harmonic balance cannot take.
     pub fn new(system: &System) -> Result<Self, MethodError> {
-        let mut ports = Ports { list: Vec::new(), axes: Vec::new(), wave: None };
-        for (j, joint) in system.joints().iter().enumerate() {
-            let law = joint.law();
-            let unsupported = |misses| MethodError::law(super::NAME, joint, misses);
-            if law.is_free() {
-                continue;
-            }
-            let axes = joint.axes().len();
-            if axes == 1
-                && let Some(pieces) = law.pieces()
-            {
-                if pieces.iter().any(Piece::drops) {
-                    return Err(unsupported("its limit jumps when slip begins"));
-                }
-                ports.add_pieces(j, &pieces);
-                continue;
-            }
-            let (kernel, series, least) = if let Some(prox) = law.prox() {
-                (Kernel::Prox(law.clone()), prox.compliance(), prox.least_penalty())
-            } else if law.step().is_some() {
-                (Kernel::Step(law.clone()), 0.0, 0.0)
-            } else if law.rate().is_some() {
-                (Kernel::Rate(law.clone()), 0.0, 0.0)
-            } else {
-                return Err(unsupported(
-                    "it has none of the views prox, step and rate, nor pieces along one direction",
-                ));
-            };
-            let scale = law.scale();
-            if matches!(kernel, Kernel::Prox(_)) && !(scale.is_finite() && scale > 0.0) {
-                return Err(unsupported("its resolvent has no finite scale of forces"));
-            }
-            ports.add(j, axes, kernel, (series, scale, least));
-        }
-        Ok(ports)
+        Ports::of(system.joints())
     }
 
-    fn add(&mut self, joint: usize, axes: usize, kernel: Kernel, (series, scale, least_penalty): (f64, f64, f64)) {
-        let first = self.axes.len();
-        self.axes.extend((0..axes).map(|a| (joint, a)));
-        self.list.push(Port { joint, first, axes, series, scale, least_penalty, kernel });
+    fn of(joints: &[SystemJoint]) -> Result<Self, MethodError> {
+        let mut gathered = Gathered::default();
+        for (j, joint) in joints.iter().enumerate() {
+            gathered.push(j, joint)?;
+        }
+        Ok(gathered.finish())
     }
 
-    /// One port for elastic sliders and stops, and one for rigid sliders: both move alike.
-    fn add_pieces(&mut self, joint: usize, pieces: &[Piece]) {
-        let mut parts = Vec::new();
-        // rigid sliders side by side are one
-        let (mut rigid, mut scale) = (0.0, 0.0);
-        for piece in pieces {
-            match *piece {
-                Piece::Slider(Slider { limit: 0.0, .. }) => {}
-                Piece::Slider(Slider { stiffness: None, limit, .. }) => rigid += limit,
-                Piece::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {
-                    scale += limit;
-                    parts.push(Part::Slider { stiffness, limit });
-                }
-                Piece::Stop { stiffness: 0.0, .. } => {}
-                Piece::Stop { gap, stiffness } => {
-                    scale = f64::INFINITY;
-                    parts.push(Part::Stop { gap, stiffness });
-                }
-            }
-        }
-        if !parts.is_empty() {
-            self.add(joint, 1, Kernel::Sliders(parts), (0.0, scale, 0.0));
-        }
-        if rigid > 0.0 {
-            self.add(joint, 1, Kernel::Rigid(Rigid { limit: rigid }), (0.0, rigid, 0.0));
-        }
-    }
-
-    /// Those of a ring's first sector in a travelling wave, and those of the whole ring; of any other system all of them.
+    /// Those of a ring's first sector in a travelling wave, and those of the whole ring, sector by sector the same; of any other system all of them.
     ///
     /// # Errors
     /// As [`Ports::new`].
     pub fn of_sector(system: &System) -> Result<(Self, Option<Self>), MethodError> {
-        let all = Ports::new(system)?;
-        let Some(cyclic) = system.cyclic() else { return Ok((all, None)) };
+        let Some(cyclic) = system.cyclic() else { return Ok((Ports::new(system)?, None)) };
         let joints = system.joints().len() / cyclic.sectors;
-        let first = Ports {
-            list: all.iter().filter(|port| port.joint < joints).cloned().collect(),
-            axes: all.axes.iter().filter(|(joint, _)| *joint < joints).copied().collect(),
-            wave: Some(cyclic),
-        };
+        let first = Ports { wave: Some(cyclic), ..Ports::of(&system.joints()[..joints])? };
+        let mut all = Ports::default();
+        for sector in 0..cyclic.sectors {
+            let (before, axes) = (sector * joints, all.axes.len());
+            all.axes.extend(first.axes.iter().map(|(joint, a)| (before + joint, *a)));
+            all.list.extend(first.iter().map(|port| {
+                let members = port.members.iter().map(|member| Member { joint: before + member.joint, ..*member });
+                Port { members: members.collect(), first: axes + port.first, ..port.clone() }
+            }));
+        }
         Ok((first, Some(all)))
     }
 
@@ -297,7 +263,7 @@ impl Ports {
         &system.joints()[joint].axes()[axis]
     }
 
-    /// The joint of an axis, and which of its axes it is.
+    /// The joint of an axis, of several the first, and which of its axes it is.
     pub fn place(&self, number: usize) -> (usize, usize) {
         self.axes[number]
     }

@@ -10,7 +10,7 @@
 
 use super::Port;
 use super::alternation::{Alternation, add_block, as_block, pair, share};
-use crate::law::{MOST_DIRECTIONS, Mean, Prox};
+use crate::law::{MOST_DIRECTIONS, Mean, Prox, SharedLaw};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -33,6 +33,53 @@ impl Prox for Rigid {
     fn mean(&self, y: f64, e: f64, _penalty: f64) -> Mean {
         let mean = saturation(y / self.limit, e / self.limit);
         Mean { zeroth: self.limit * mean.zeroth, first: self.limit * mean.first, ..mean }
+    }
+}
+
+/// So many times the forces of a law that has a resolvent `J`: `τ φ` has `τ J(y/τ)` with the penalty `ε/τ`.
+#[derive(Debug, Clone)]
+pub(super) struct Times {
+    pub law: SharedLaw,
+    pub times: f64,
+}
+
+impl Times {
+    fn one(&self) -> &dyn Prox {
+        self.law.prox().expect("a law without a resolvent has another kernel")
+    }
+}
+
+impl Prox for Times {
+    fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
+        let mut share = [0.0; MOST_DIRECTIONS];
+        share.iter_mut().zip(y).for_each(|(share, y)| *share = y / self.times);
+        self.one().resolve(&share[..y.len()], penalty / self.times, force, slope);
+        force.iter_mut().for_each(|force| *force *= self.times);
+    }
+    fn at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
+        let (force, slope) = self.one().at_velocity(velocity)?;
+        Some((self.times * force, self.times * slope))
+    }
+    fn compliance(&self) -> f64 {
+        self.one().compliance() / self.times
+    }
+    fn least_penalty(&self) -> f64 {
+        self.one().least_penalty() * self.times
+    }
+    fn mean(&self, y: f64, e: f64, penalty: f64) -> Mean {
+        // the derivative of a resolvent has no unit
+        let mean = self.one().mean(y / self.times, e / self.times, penalty / self.times);
+        Mean { zeroth: self.times * mean.zeroth, first: self.times * mean.first, ..mean }
+    }
+    fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<Mean> {
+        let mean = self.one().mean_at_velocity(velocity, e)?;
+        Some(Mean {
+            zeroth: self.times * mean.zeroth,
+            first: self.times * mean.first,
+            slope: self.times * mean.slope,
+            slope_first: self.times * mean.slope_first,
+            slope_second: self.times * mean.slope_second,
+        })
     }
 }
 

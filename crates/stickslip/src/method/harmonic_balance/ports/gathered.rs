@@ -1,0 +1,210 @@
+//! Ports as they are gathered, joint after joint.
+//!
+//! Joints that have one relative motion, and whose forces are multiples of each other in it, have one force port: only the sum of their forces is
+//! decided where they stick, and rounding cannot let one of them slip and not the next. Each joint has its share of that sum: rigid contacts
+//! side by side by their limits.
+
+use super::sliders::Part;
+use super::{Kernel, Member, Port, Ports, Rigid, Times};
+use crate::law::{Piece, Slider};
+use crate::method::MethodError;
+use crate::method::harmonic_balance::NAME;
+use crate::model::{Line, PARALLEL, SystemJoint};
+
+/// What there is so far.
+#[derive(Default)]
+pub(super) struct Gathered {
+    ports: Ports,
+    /// Of force ports: their number, and the lines of their axes.
+    lines: Vec<(usize, Vec<Line>)>,
+}
+
+impl Gathered {
+    /// # Errors
+    /// A law whose views harmonic balance cannot take.
+    pub fn push(&mut self, j: usize, joint: &SystemJoint) -> Result<(), MethodError> {
+        let law = joint.law();
+        let unsupported = |misses| MethodError::law(NAME, joint, misses);
+        if law.is_free() {
+            return Ok(());
+        }
+        if joint.axes().len() == 1
+            && let Some(pieces) = law.pieces()
+        {
+            if pieces.iter().any(Piece::drops) {
+                return Err(unsupported("its limit jumps when slip begins"));
+            }
+            self.add_pieces(j, joint, &pieces);
+            return Ok(());
+        }
+        let scale = law.scale();
+        if let Some(prox) = law.prox() {
+            if !(scale.is_finite() && scale > 0.0) {
+                return Err(unsupported("its resolvent has no finite scale of forces"));
+            }
+            let measures = (prox.compliance(), scale, prox.least_penalty());
+            self.add_force(j, joint, Kernel::Prox(Times { law: law.clone(), times: 1.0 }), measures);
+        } else if law.step().is_some() {
+            self.add(j, joint, Kernel::Step(law.clone()), (0.0, scale, 0.0));
+        } else if law.rate().is_some() {
+            self.add(j, joint, Kernel::Rate(law.clone()), (0.0, scale, 0.0));
+        } else {
+            return Err(unsupported("it has none of the views prox, step and rate, nor pieces along one direction"));
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, j: usize, joint: &SystemJoint, kernel: Kernel, (series, scale, least_penalty): (f64, f64, f64)) {
+        let (first, axes) = (self.ports.axes.len(), joint.axes().len());
+        self.ports.axes.extend((0..axes).map(|a| (j, a)));
+        let members = vec![Member { joint: j, factor: 1.0, share: 1.0 }];
+        self.ports.list.push(Port { members, first, axes, series, scale, least_penalty, kernel });
+    }
+
+    /// One port for elastic sliders and stops, and one for rigid sliders: both move alike.
+    fn add_pieces(&mut self, j: usize, joint: &SystemJoint, pieces: &[Piece]) {
+        let mut parts = Vec::new();
+        // rigid sliders side by side are one
+        let (mut rigid, mut scale) = (0.0, 0.0);
+        for piece in pieces {
+            match *piece {
+                Piece::Slider(Slider { limit: 0.0, .. }) => {}
+                Piece::Slider(Slider { stiffness: None, limit, .. }) => rigid += limit,
+                Piece::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {
+                    scale += limit;
+                    parts.push(Part::Slider { stiffness, limit });
+                }
+                Piece::Stop { stiffness: 0.0, .. } => {}
+                Piece::Stop { gap, stiffness } => {
+                    scale = f64::INFINITY;
+                    parts.push(Part::Stop { gap, stiffness });
+                }
+            }
+        }
+        if !parts.is_empty() {
+            self.add(j, joint, Kernel::Sliders(parts), (0.0, scale, 0.0));
+        }
+        if rigid > 0.0 {
+            self.add_force(j, joint, Kernel::Rigid(Rigid { limit: rigid }), (0.0, rigid, 0.0));
+        }
+    }
+
+    /// Adds a force port, or its joint to one that moves as it does.
+    fn add_force(&mut self, joint: usize, of: &SystemJoint, kernel: Kernel, measures: (f64, f64, f64)) {
+        let lines: Vec<Line> = of.axes().iter().map(Line::of).collect();
+        let found = self.lines.iter().find_map(|(port, its)| {
+            let factor = along(&lines, its)?;
+            Some((*port, factor, times(&kernel, &self.ports.list[*port].kernel, factor)?))
+        });
+        if let Some((port, factor, times)) = found {
+            let share = factor.signum() * times;
+            self.ports.list[port].members.push(Member { joint, factor, share });
+        } else {
+            self.lines.push((self.ports.list.len(), lines));
+            self.add(joint, of, kernel, measures);
+        }
+    }
+
+    /// Gives every port the force of all its joints, and each of these its share.
+    pub fn finish(mut self) -> Ports {
+        for port in &mut self.ports.list {
+            // what does the same work: so far shares are those of the first one's force
+            let sum: f64 = port.members.iter().map(|member| member.factor * member.share).sum();
+            port.members.iter_mut().for_each(|member| member.share /= sum);
+            match &mut port.kernel {
+                Kernel::Rigid(rigid) => rigid.limit *= sum,
+                Kernel::Prox(of) => of.times *= sum,
+                Kernel::Sliders(_) | Kernel::Step(_) | Kernel::Rate(_) => {}
+            }
+            port.scale *= sum;
+            port.series /= sum;
+            port.least_penalty *= sum;
+        }
+        self.ports
+    }
+}
+
+/// The factor by which all motions along some axes are those along others.
+fn along(lines: &[Line], others: &[Line]) -> Option<f64> {
+    if lines.len() != others.len() {
+        return None;
+    }
+    let mut factors = lines.iter().zip(others).map(|(line, other)| line.along(other));
+    let first = factors.next()??;
+    factors.all(|factor| factor.is_some_and(|f| (f - first).abs() <= PARALLEL * first.abs())).then_some(first)
+}
+
+/// How many times as large as that of `other` the force is, where the motion is `factor` times that of `other`; `None` if that depends on the motion.
+fn times(kernel: &Kernel, other: &Kernel, factor: f64) -> Option<f64> {
+    match (kernel, other) {
+        // it does not ask how fast the motion is
+        (Kernel::Rigid(rigid), Kernel::Rigid(other)) => Some(rigid.limit / other.limit),
+        (Kernel::Prox(one), Kernel::Prox(other)) => {
+            let as_fast = (factor.abs() - 1.0).abs() <= PARALLEL;
+            if as_fast && (factor > 0.0 || other.law.is_odd()) { one.law.times(&*other.law) } else { None }
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Coulomb, Coulomb2d, CoulombArctan, Jenkins, SharedLaw};
+    use crate::model::{Axis, System};
+    use crate::structure::Structure;
+    use nalgebra::DMatrix;
+    use std::sync::Arc;
+
+    /// The members of every port, by joint, of contacts on three coordinates: their laws, and what their axes have of all of these.
+    fn members(joints: &[(SharedLaw, &[[f64; 3]])]) -> Vec<Vec<usize>> {
+        let places = ["x", "y", "z"].map(str::to_owned).to_vec();
+        let structure = Structure::new(places, DMatrix::identity(3, 3), DMatrix::zeros(3, 3), DMatrix::identity(3, 3));
+        let mut builder = System::builder(structure.unwrap());
+        for (j, (law, axes)) in joints.iter().enumerate() {
+            let axis = |weights: &[f64; 3]| Axis::new(weights.iter().copied().enumerate().collect());
+            builder = builder.joint(format!("j{j}"), law.clone(), axes.iter().map(axis).collect());
+        }
+        let ports = Ports::new(&builder.build().unwrap()).unwrap();
+        for port in ports.iter() {
+            let work: f64 = port.members.iter().map(|member| member.factor * member.share).sum();
+            assert!((work - 1.0).abs() < 1e-15, "{port:?}");
+        }
+        ports.iter().map(|port| port.members.iter().map(|member| member.joint).collect()).collect()
+    }
+
+    #[test]
+    fn rigid_contacts_share_a_line() {
+        let rigid = |limit: f64| -> SharedLaw { Arc::new(Coulomb { limit }) };
+        let elastic: SharedLaw = Arc::new(Jenkins { stiffness: 3.0, limit: 1.0 });
+        let (line, back, other): (&[_], &[_], &[_]) = (&[[1.0, -1.0, 0.0]], &[[-0.2, 0.2, 0.0]], &[[1.0, -1.0, 1e-6]]);
+        let joints = [
+            (rigid(1.0), line),
+            (elastic, line),
+            (rigid(1e-9), back),
+            (rigid(1.0), other),
+            (rigid(0.0), line),
+            (rigid(7.0), line),
+        ];
+        assert_eq!(members(&joints), [vec![0, 2, 5], vec![1], vec![3]]);
+    }
+
+    #[test]
+    fn laws_of_velocity_share_where_one_is_a_multiple() {
+        let plane = |limit: f64| -> SharedLaw { Arc::new(Coulomb2d { limit }) };
+        let smooth = |limit: f64, alpha: f64| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha }) };
+        let (axes, turned, back, half): (&[_], &[_], &[_], &[_]) = (
+            &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            &[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
+            &[[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]],
+            &[[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
+        );
+        let planes =
+            [(plane(1.0), axes), (plane(2.0), back), (plane(1.0), turned), (plane(1.0), half), (plane(0.1), axes)];
+        assert_eq!(members(&planes), [vec![0, 1, 4], vec![2], vec![3]]);
+        let (line, lever): (&[_], &[_]) = (&[[0.0, 0.0, 1.0]], &[[0.0, 0.0, 2.0]]);
+        let lines =
+            [(smooth(1.0, 9.0), line), (smooth(2.0, 9.0), line), (smooth(1.0, 8.0), line), (smooth(1.0, 9.0), lever)];
+        assert_eq!(members(&lines), [vec![0, 1], vec![2], vec![3]]);
+    }
+}

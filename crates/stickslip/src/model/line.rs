@@ -1,0 +1,104 @@
+//! The line along which an axis moves: which axes have one relative motion, but for a factor and a constant.
+
+use super::Axis;
+use num_complex::Complex64;
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
+/// Directions and imposed motions are parallel within this fraction of their largest entry: what the few roundings by which a direction is made
+/// leave. Directions farther apart are different ones.
+pub(crate) const PARALLEL: f64 = 64.0 * f64::EPSILON;
+
+/// An axis that can be held against others.
+#[derive(Debug, Clone)]
+pub(crate) struct Line {
+    /// Degrees of freedom with their weights, rising, each once.
+    rows: Vec<(usize, f64)>,
+    /// The one of the largest weight.
+    lead: Option<(usize, f64)>,
+    /// Imposed motion without its mean, by harmonic: a constant offset changes nothing for what asks for velocities alone.
+    imposed: Vec<(u32, Complex64)>,
+}
+
+impl Line {
+    pub fn of(axis: &Axis) -> Self {
+        let mut rows = BTreeMap::new();
+        axis.rows().iter().for_each(|&(row, weight)| *rows.entry(row).or_insert(0.0) += weight);
+        let rows: Vec<(usize, f64)> = rows.into_iter().collect();
+        let lead = rows.iter().copied().max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
+        Line { rows, lead, imposed: axis.imposed().iter().copied().filter(|(h, _)| *h > 0).collect() }
+    }
+
+    /// The factor by which the velocity along this one is that along `other` at all times, if there is one.
+    pub fn along(&self, other: &Line) -> Option<f64> {
+        let (lead, weight) = other.lead?;
+        let factor = self.weight(lead) / weight;
+        if !factor.is_finite() || factor == 0.0 {
+            return None; // across, or nothing but imposed motion moves one of them
+        }
+        let near = PARALLEL * self.lead.map_or(0.0, |(_, weight)| weight.abs());
+        let parallel = both(&self.rows, &other.rows).all(|(own, its)| (own - factor * its).abs() <= near);
+        let near = PARALLEL * self.imposed.iter().map(|(_, g)| g.norm()).fold(0.0, f64::max);
+        let together = || both(&self.imposed, &other.imposed).all(|(own, its)| (own - its * factor).norm() <= near);
+        (parallel && together()).then_some(factor)
+    }
+
+    fn weight(&self, row: usize) -> f64 {
+        self.rows.binary_search_by_key(&row, |(at, _)| *at).map_or(0.0, |i| self.rows[i].1)
+    }
+}
+
+/// Values of two lists that rise in their keys, side by side; zero where one has none.
+fn both<'a, K: Ord, T: Copy + Default>(one: &'a [(K, T)], other: &'a [(K, T)]) -> impl Iterator<Item = (T, T)> + 'a {
+    let (mut one, mut other) = (one.iter().peekable(), other.iter().peekable());
+    std::iter::from_fn(move || {
+        let order = match (one.peek(), other.peek()) {
+            (None, None) => return None,
+            (Some(_), None) => Ordering::Less,
+            (None, Some(_)) => Ordering::Greater,
+            (Some((a, _)), Some((b, _))) => a.cmp(b),
+        };
+        let own = if order.is_le() { one.next() } else { None };
+        let its = if order.is_ge() { other.next() } else { None };
+        Some((own.map_or_else(T::default, |(_, value)| *value), its.map_or_else(T::default, |(_, value)| *value)))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factor(one: &Axis, other: &Axis) -> Option<f64> {
+        Line::of(one).along(&Line::of(other))
+    }
+
+    #[test]
+    fn one_line_whatever_the_order_of_its_rows() {
+        let axis = |rows: &[(usize, f64)]| Axis::new(rows.to_vec());
+        let (first, turned) = (axis(&[(0, 1.0), (3, -1.0)]), axis(&[(3, 2.5), (0, -2.0), (0, -0.5), (7, 0.0)]));
+        assert_eq!(factor(&turned, &first), Some(-2.5));
+        assert_eq!(factor(&first, &turned), Some(-0.4));
+        for other in
+            [axis(&[(0, 1.0)]), axis(&[(0, 1.0), (3, 1.0)]), axis(&[(0, 1.0), (3, -1.0), (7, 1e-9)]), axis(&[])]
+        {
+            assert_eq!((factor(&first, &other), factor(&other, &first)), (None, None), "{other:?}");
+        }
+        // what roundings leave of a direction
+        let near = axis(&[(0, 0.1 + 0.2), (3, -0.3)]);
+        assert!((factor(&near, &first).unwrap() - 0.3).abs() < 1e-15);
+    }
+
+    #[test]
+    fn imposed_motion_goes_along_but_for_a_constant() {
+        let g = Complex64::new(0.3, -0.4);
+        let axis = |weight: f64, imposed: Vec<(u32, Complex64)>| Axis::new(vec![(1, weight)]).moved(imposed);
+        let first = axis(1.0, vec![(1, g), (0, Complex64::new(2.0, 0.0))]);
+        assert_eq!(factor(&axis(-2.0, vec![(1, g * -2.0)]), &first), Some(-2.0));
+        for imposed in [vec![], vec![(1, g)], vec![(1, g * -2.0), (3, g)]] {
+            assert_eq!(factor(&axis(-2.0, imposed), &first), None);
+        }
+        // motion that nothing but an imposed one makes has no direction
+        let moved = |rows| Axis::new(rows).moved([(1, g)]);
+        assert_eq!(factor(&moved(vec![]), &moved(vec![])), None);
+    }
+}
