@@ -1,6 +1,7 @@
 //! Dense linear equations in memory that the caller owns.
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::cholesky::llt::factor::{LltParams, cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::lu::partial_pivoting::factor::{PartialPivLuParams, lu_in_place, lu_in_place_scratch};
 use faer::linalg::lu::partial_pivoting::solve::{
     solve_in_place, solve_in_place_scratch, solve_transpose_in_place, solve_transpose_in_place_scratch,
@@ -182,6 +183,24 @@ pub fn multiply_in_blocks(
     };
     let c = MatMut::from_column_major_slice_mut(&mut c[..rows * columns], rows, columns);
     matmul(c, Accum::Replace, a, b, 1.0, Par::Seq);
+}
+
+/// `A = L Lᵀ` of a symmetric column-major matrix `n × n`, whose lower triangle is read and becomes L, in blocks that stay in the cache. Returns false if it
+/// is not positive definite, or not finite.
+///
+/// # Example
+/// ```
+/// let mut matrix = [4.0, 2.0, 2.0, 17.0];
+/// assert!(stickslip_numerics::dense::cholesky_in_blocks(&mut matrix, 2));
+/// assert_eq!((matrix[0], matrix[1], matrix[3]), (2.0, 1.0, 4.0));
+/// assert!(!stickslip_numerics::dense::cholesky_in_blocks(&mut [1.0, 2.0, 2.0, 3.0], 2));
+/// ```
+pub fn cholesky_in_blocks(matrix: &mut [f64], n: usize) -> bool {
+    let params = Spec::<LltParams, f64>::default();
+    let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(n, Par::Seq, params));
+    let lower = MatMut::from_column_major_slice_mut(&mut matrix[..n * n], n, n);
+    cholesky_in_place(lower, Default::default(), Par::Seq, MemStack::new(&mut memory), params).is_ok()
+        && (0..n).all(|k| matrix[k * n + k].is_finite())
 }
 
 /// Solves `L X = B`, or `Lᵀ X = B` if `transposed`, with the lower triangle L of a column-major matrix `n × n`, in place for columns of length n one after the

@@ -8,6 +8,7 @@
 //!
 //! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 7.4, 7.5 and 10.5; Parlett and Reinsch (1969) for the balance.
 
+use crate::dense::{cholesky_in_blocks, solve_lower_in_blocks};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, SelfAdjointEvdParams, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::{ColMut, MatMut, MatRef, Par, Spec};
@@ -67,6 +68,37 @@ pub fn symmetric_in_blocks(matrix: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f
     let wanted = MatMut::from_column_major_slice_mut(vectors.as_mut_slice(), n, n);
     let read = MatRef::from_column_major_slice(matrix.as_slice(), n, n);
     self_adjoint_evd(read, kept, Some(wanted), Par::Seq, stack, params).ok()?;
+    Some((values, vectors))
+}
+
+/// Eigenvalues θ of `A x = θ H x`, rising, and vectors X with `Xᵀ H X = 1`, `Xᵀ A X = θ`, of symmetric matrices in coordinates of any units. `None` if H is
+/// not positive definite, an entry is not finite or the iteration does not end in time.
+///
+/// # Example
+/// ```
+/// use nalgebra::dmatrix;
+/// let (values, vectors) = stickslip_numerics::eigen::symmetric_pair(&dmatrix![3.0, 0.0; 0.0, 8.0], &dmatrix![1.0, 0.0; 0.0, 4.0]).unwrap();
+/// assert!((values[0] - 2.0).abs() < 1e-14 && (values[1] - 3.0).abs() < 1e-14);
+/// assert!((vectors[(1, 0)].abs() - 0.5).abs() < 1e-14 && vectors[(0, 0)].abs() < 1e-14);
+/// ```
+pub fn symmetric_pair(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+    let n = h.nrows();
+    // ones on the diagonal, so that coordinates of any unit count alike
+    let unit = h.diagonal().map(|v| 1.0 / v.sqrt());
+    let scaled = |matrix: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, k| unit[i] * matrix[(i, k)] * unit[k]);
+    let mut lower = scaled(h);
+    if !cholesky_in_blocks(lower.as_mut_slice(), n) {
+        return None;
+    }
+    let solve = |mut right: DMatrix<f64>, transposed: bool| {
+        solve_lower_in_blocks(lower.as_slice(), n, right.as_mut_slice(), transposed);
+        right
+    };
+    let (values, vectors) = symmetric_in_blocks(&solve(solve(scaled(a), false).transpose(), false))?;
+    let mut vectors = solve(vectors, true);
+    for mut column in vectors.column_iter_mut() {
+        column.component_mul_assign(&unit);
+    }
     Some((values, vectors))
 }
 

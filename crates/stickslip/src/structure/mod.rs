@@ -6,6 +6,7 @@ mod dynamic;
 mod faces;
 pub mod reduction;
 mod sector;
+mod uncoupled;
 
 pub use component::{BetweenComponent, Component, ReducedComponent, Reduction, ReductionKind};
 pub(crate) use component::{Form as ReducedForm, KeptSector, SectorBlade};
@@ -15,6 +16,7 @@ pub use dynamic::DynamicStiffness;
 pub use faces::{Faces, FacesError, Node};
 pub(crate) use sector::turn;
 pub use sector::{Sector, Wave, WaveStiffness};
+pub(crate) use uncoupled::UncoupledModes;
 
 use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};
@@ -36,6 +38,7 @@ struct Kept {
     /// Largest magnitude of an entry of mass, damping, stiffness.
     largest: [f64; 3],
     dissipates: OnceLock<bool>,
+    uncoupled: OnceLock<Option<Arc<UncoupledModes>>>,
 }
 
 #[derive(Debug)]
@@ -239,7 +242,7 @@ impl Structure {
         };
         let [mass, damping, _] = self.0.largest;
         let (places, largest) = (self.0.places.clone(), [mass, damping, largest]);
-        largest[2].is_finite().then(|| Structure(Arc::new(Kept { places, form, largest, dissipates: OnceLock::new() })))
+        largest[2].is_finite().then(|| Structure::kept(places, form, largest))
     }
 
     fn checked(places: Vec<String>, form: Form) -> Result<Self, StructureError> {
@@ -263,7 +266,11 @@ impl Structure {
                 [mass, damping, stiffness].map(Matrix::largest)
             }
         };
-        Ok(Structure(Arc::new(Kept { places, form, largest, dissipates: OnceLock::new() })))
+        Ok(Structure::kept(places, form, largest))
+    }
+
+    fn kept(places: Vec<String>, form: Form, largest: [f64; 3]) -> Self {
+        Structure(Arc::new(Kept { places, form, largest, dissipates: OnceLock::new(), uncoupled: OnceLock::new() }))
     }
 
     /// Number of degrees of freedom, n.

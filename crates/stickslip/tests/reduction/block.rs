@@ -160,3 +160,35 @@ fn the_error_chooses_the_size() {
     }
     assert!(last < whole.dofs() / 4, "{last} of {}", whole.dofs());
 }
+
+/// Of many ports an error that modes can reach is reached by modes, with one vector for each port. Whatever the order of the vectors, neither mass nor
+/// stiffness couples the coordinates, also where ports depend on each other.
+#[test]
+fn many_ports_take_modes_before_orders() {
+    let brick = brick([4, 6, 6], true);
+    let up_to = TAU * 20e3;
+    let mut ports = brick.face(49);
+    let damping = Damping::Ratio { ratio: 0.005, up_to };
+    let whole = |ports| Whole::new(brick.mass.clone(), damping.clone(), brick.stiffness.clone(), ports).unwrap();
+    let chosen = Reduce { up_to, tolerance: 1e-4, kind: None }.of(&whole(ports.clone())).unwrap();
+    assert!(chosen.deviation.error <= 1e-4, "{:?}", chosen.deviation);
+    assert_eq!(chosen.reduced.dofs(), chosen.modes.count() + ports.len(), "{}", chosen.reduced.kind);
+    // a port that is the mean of two others
+    ports.push(vec![(ports[0][0].0, 0.5), (ports[3][0].0, 0.5)]);
+    let whole = whole(ports);
+    let modes = whole.modes(1.5 * up_to).unwrap();
+    let free = Free::new(&whole, &modes, 0.0, 2).unwrap();
+    let reference = Reference::new(&whole, &modes, up_to).unwrap();
+    let mut last = f64::INFINITY;
+    for order in 1..=2 {
+        let reduced = free.reduced(modes.count(), order).unwrap();
+        for matrix in [&reduced.mass, &reduced.damping, &reduced.stiffness] {
+            let beside = |i: usize, k: usize| i != k && matrix[(i, k)] != 0.0;
+            assert!(!(0..matrix.ncols()).any(|k| (0..matrix.nrows()).any(|i| beside(i, k))), "{}", reduced.kind);
+        }
+        assert!(order > 1 || reduced.dofs() == modes.count() + 147, "{}", reduced.kind);
+        let error = reference.deviation(&reduced).error;
+        assert!(error < 0.1 * last, "{}: {error:.1e} after {last:.1e}", reduced.kind);
+        last = error;
+    }
+}

@@ -56,7 +56,7 @@ pub(super) struct Modes {
 impl Modes {
     /// Of a structure in modes, with these springs along the axes, N/m.
     pub fn new(springs: &[f64], structure: &Arc<Uncoupled>) -> Self {
-        let (p, n) = (structure.axes, structure.own.len());
+        let (p, n) = (structure.axes, structure.own().len());
         let weighted: Vec<f64> =
             structure.at.chunks_exact(p.max(1)).flat_map(|at| at.iter().zip(springs).map(|(a, k)| a * k)).collect();
         let mut coupling = vec![0.0; n * n];
@@ -75,9 +75,9 @@ impl Modes {
         {
             return Ok(factor.clone());
         }
-        let n = self.structure.own.len();
+        let n = self.structure.own().len();
         let mut matrix = self.coupling.clone();
-        for (m, [mass, _, stiffness]) in self.structure.own.iter().enumerate() {
+        for (m, [mass, _, stiffness]) in self.structure.own().iter().enumerate() {
             matrix[m * n + m] += stiffness + (HOLD * omega).powi(2) * mass;
         }
         let factor = Arc::new(Lu::new(matrix, n).map_err(|_| Resonant)?);
@@ -97,7 +97,7 @@ impl Modes {
     /// Displacements along the axes under unit forces along them, m/N.
     pub fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
         let factor = self.factor(omega)?;
-        let (p, n) = (self.structure.axes, self.structure.own.len());
+        let (p, n) = (self.structure.axes, self.structure.own().len());
         let at = &self.structure.at;
         let mut moved: Vec<f64> = (0..p).flat_map(|q| (0..n).map(move |m| at[m * p + q])).collect();
         factor.solve(&mut moved);

@@ -357,14 +357,14 @@ impl Split {
         ports: &Ports,
     ) -> Option<Self> {
         let structure = &modal.structure;
-        let (p, n) = (structure.axes, structure.own.len());
+        let (p, n) = (structure.axes, structure.own().len());
         let is_low = |own: &[f64; 3]| own[2] <= bound * bound * own[0];
-        let (low, high): (Vec<usize>, Vec<usize>) = (0..n).partition(|&m| is_low(&structure.own[m]));
+        let (low, high): (Vec<usize>, Vec<usize>) = (0..n).partition(|&m| is_low(&structure.own()[m]));
         let column = |m: usize| &structure.at[m * p..(m + 1) * p];
         let above = above.unwrap_or_else(|| {
             let above: Vec<f64> = high.iter().flat_map(|&m| column(m)).copied().collect();
             let weighted: Vec<f64> =
-                high.iter().flat_map(|&m| column(m).iter().map(move |a| a / structure.own[m][2])).collect();
+                high.iter().flat_map(|&m| column(m).iter().map(move |a| a / structure.own()[m][2])).collect();
             let mut sum = vec![0.0; p * p];
             multiply_in_blocks(&weighted, &above, &mut sum, (p, high.len(), p), true);
             (0..p).for_each(|q| sum[q * p + q] += modal.series[q]);

@@ -67,7 +67,7 @@ impl Modal {
 
     /// The forces of all harmonics go through the modes together.
     fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
-        let (nh, p, n) = (self.rates.len(), self.structure.axes, self.structure.own.len());
+        let (nh, p, n) = (self.rates.len(), self.structure.axes, self.structure.own().len());
         let tall = 2 * nh;
         self.forces.clear();
         self.forces.extend(force.iter().flat_map(|f| [f.re, f.im]));

@@ -10,7 +10,7 @@
 use super::closed;
 use super::hold::HOLD;
 use super::ports::{MANY_DIRECTIONS, Ports};
-use super::uncoupled::{Resonant, Uncoupled, by_themselves};
+use super::uncoupled::{Resonant, Uncoupled};
 use crate::model::{Cyclic, System};
 use crate::structure::{DynamicStiffness, Matrices, Sector, Structure, Wave, WaveStiffness, turn};
 use nalgebra::{DMatrix, DVector};
@@ -540,7 +540,7 @@ fn is_factored(structure: &Structure) -> bool {
 
 /// Whether its coordinates are its modes, as those of a reduction are: real ones, whose receptances are made in blocks.
 fn is_modal(structure: &Structure) -> bool {
-    by_themselves(structure).is_some()
+    structure.diagonals().is_some()
 }
 
 /// As in the modal form, what nothing holds has a mean position by a soft spring, 1/s² times its mass.

@@ -1,24 +1,17 @@
 //! Large structures in modes that damping leaves uncoupled: their receptance is a product of real matrices, the same at all frequencies, and nothing is
 //! factored at any of them.
 //!
-//! `R(s) = Φ diag(1 / (m s² + c s + k)) Φᵀ`, with Φ the axes by modes. Structures that were reduced by free modes and residual vectors come in these
-//! coordinates; others are brought there once.
+//! `R(s) = Φ diag(1 / (m s² + c s + k)) Φᵀ`, with Φ the axes by modes, which the structure keeps.
 
 use super::hold::HOLD;
-use crate::structure::{Matrices, Structure};
+use crate::structure::{Structure, UncoupledModes};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use stickslip_numerics::dense::{multiply_in_blocks, solve_lower_in_blocks};
-use stickslip_numerics::eigen;
+use std::sync::Arc;
+use stickslip_numerics::dense::multiply_in_blocks;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Damping between modes that counts as the rounding of matrices: relative to that of the two, and to the largest of all.
-const UNCOUPLED: [f64; 2] = [1e-9, 1e-13];
-/// Springs that hold free motions, relative to the lowest ratio of stiffness and mass on the diagonals.
-const SHIFT: f64 = 1e-3;
-/// Degrees of freedom up to which modes are sought: the decomposition of so many takes a minute.
-const MOST: usize = 4000;
 /// A dynamic stiffness below this share of its parts is their rounding: a resonance without damping.
 const RESONANT: f64 = 1e-14;
 
@@ -29,10 +22,7 @@ pub(super) struct Resonant;
 /// A structure in its own modes.
 #[derive(Debug, Clone)]
 pub(super) struct Uncoupled {
-    /// Modal mass, damping and stiffness.
-    pub own: Vec<[f64; 3]>,
-    /// The places by modes, n × n; none where they are the same.
-    shapes: Option<DMatrix<f64>>,
+    modes: Arc<UncoupledModes>,
     /// The axes by modes, p × n, column after column.
     pub at: Vec<f64>,
     pub axes: usize,
@@ -41,30 +31,27 @@ pub(super) struct Uncoupled {
 impl Uncoupled {
     /// `None` if damping couples the modes, or if there are too many.
     pub fn new(structure: &Structure, directions: &[Vec<(usize, f64)>]) -> Option<Self> {
-        let n = structure.dofs();
-        let (own, shapes) = match by_themselves(structure) {
-            Some(own) => (own, None),
-            None if structure.is_sparse() || n > MOST => return None,
-            None => {
-                let (own, shapes) = modes(structure.full())?;
-                (own, Some(shapes))
-            }
-        };
-        let axes = directions.len();
+        let modes = structure.uncoupled()?.clone();
+        let (n, axes) = (structure.dofs(), directions.len());
         let mut at = vec![0.0; axes * n];
         for (q, rows) in directions.iter().enumerate() {
             rows.iter().for_each(|&(i, w)| at[i * axes + q] += w);
         }
-        if let Some(shapes) = &shapes {
+        if let Some(shapes) = &modes.shapes {
             let along = std::mem::replace(&mut at, vec![0.0; axes * n]);
             multiply_in_blocks(&along, shapes.as_slice(), &mut at, (axes, n, n), false);
         }
-        Some(Uncoupled { own, shapes, at, axes })
+        Some(Uncoupled { modes, at, axes })
+    }
+
+    /// Modal mass, damping and stiffness.
+    pub fn own(&self) -> &[[f64; 3]] {
+        &self.modes.own
     }
 
     /// `m s² + c s + k` of mode `m`, held as all are at rest; not a number that could be divided by at a resonance without damping.
     pub fn stiffness(&self, m: usize, s: Complex64, omega: f64) -> Result<Complex64, Resonant> {
-        let [mass, damping, stiffness] = self.own[m];
+        let [mass, damping, stiffness] = self.own()[m];
         let hold = if s == ZERO { (HOLD * omega).powi(2) } else { 0.0 };
         let of_mass = (s * s + hold) * mass;
         let sum = of_mass + s * damping + stiffness;
@@ -74,12 +61,12 @@ impl Uncoupled {
 
     /// The inverse of that, of all modes.
     pub fn gains(&self, s: Complex64, omega: f64) -> Result<Vec<Complex64>, Resonant> {
-        (0..self.own.len()).map(|m| Ok(1.0 / self.stiffness(m, s, omega)?)).collect()
+        (0..self.own().len()).map(|m| Ok(1.0 / self.stiffness(m, s, omega)?)).collect()
     }
 
     /// Receptance of the axes, p × p.
     pub fn receptance(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
-        let (p, n) = (self.axes, self.own.len());
+        let (p, n) = (self.axes, self.own().len());
         let gains = self.gains(s, omega)?;
         let part = |read: fn(&Complex64) -> f64| {
             let columns = self.at.chunks_exact(p.max(1)).zip(&gains);
@@ -105,12 +92,12 @@ impl Uncoupled {
 
     /// Forces on the modes from those on all places.
     pub fn onto_modes(&self, force: &DVector<f64>) -> DVector<f64> {
-        self.shapes.as_ref().map_or_else(|| force.clone(), |shapes| shapes.tr_mul(force))
+        self.modes.shapes.as_ref().map_or_else(|| force.clone(), |shapes| shapes.tr_mul(force))
     }
 
     /// Displacements of all places from those of the modes.
     pub fn of_modes(&self, modal: &DVector<f64>) -> DVector<f64> {
-        self.shapes.as_ref().map_or_else(|| modal.clone(), |shapes| shapes * modal)
+        self.modes.shapes.as_ref().map_or_else(|| modal.clone(), |shapes| shapes * modal)
     }
 
     /// Displacements of all places under the forces `force` on them.
@@ -121,7 +108,7 @@ impl Uncoupled {
         force: &DVector<Complex64>,
     ) -> Result<DVector<Complex64>, Resonant> {
         let gains = self.gains(s, omega)?;
-        let Some(shapes) = &self.shapes else {
+        let Some(shapes) = &self.modes.shapes else {
             return Ok(DVector::from_iterator(force.len(), force.iter().zip(&gains).map(|(f, g)| f * g)));
         };
         let modal = |read: fn(&Complex64) -> f64| shapes.tr_mul(&force.map(|f| read(&f)));
@@ -131,63 +118,6 @@ impl Uncoupled {
         let part = |read: fn(&Complex64) -> f64| shapes * DVector::from_iterator(moved.len(), moved.iter().map(read));
         Ok(part(|z| z.re).zip_map(&part(|z| z.im), Complex64::new))
     }
-}
-
-/// The diagonals of a structure that has nothing beside them.
-pub(super) fn by_themselves(structure: &Structure) -> Option<Vec<[f64; 3]>> {
-    let mut own = vec![[0.0; 3]; structure.dofs()];
-    for (i, k, values) in structure.entries() {
-        if i != k {
-            return None;
-        }
-        own[i] = values;
-    }
-    Some(own)
-}
-
-/// Modes `X` with `Xᵀ (K + σ M) X = 1` and `Xᵀ M X = θ`, so that motions without mass have their place: mass θ and stiffness `1 - σ θ`.
-fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
-    let Matrices { mass, damping, stiffness } = matrices;
-    let n = mass.nrows();
-    let mut ratios: Vec<f64> =
-        (0..n).map(|i| stiffness[(i, i)] / mass[(i, i)]).filter(|v| v.is_finite() && *v > 0.0).collect();
-    ratios.sort_by(f64::total_cmp);
-    let shift = SHIFT * ratios.first().copied().unwrap_or(1.0);
-    let held = stiffness + mass * shift;
-    // ones on the diagonal, so that coordinates of any unit count alike
-    let unit = held.diagonal().map(|v| 1.0 / v.sqrt());
-    let scaled = |matrix: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, k| unit[i] * matrix[(i, k)] * unit[k]);
-    let lower = scaled(&held).cholesky()?.unpack();
-    let solve = |mut right: DMatrix<f64>, transposed: bool| {
-        solve_lower_in_blocks(lower.as_slice(), n, right.as_mut_slice(), transposed);
-        right
-    };
-    let whole = solve(solve(scaled(mass), false).transpose(), false);
-    let (values, vectors) = eigen::symmetric_in_blocks(&whole)?;
-    let mut shapes = solve(vectors, true);
-    for mut column in shapes.column_iter_mut() {
-        column.component_mul_assign(&unit);
-    }
-    let product = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
-        let mut out = DMatrix::zeros(n, n);
-        multiply_in_blocks(a.as_slice(), b.as_slice(), out.as_mut_slice(), (n, n, n), false);
-        out
-    };
-    let modal = product(&shapes.transpose(), &product(damping, &shapes));
-    let size = modal.diagonal().amax();
-    for (i, k) in (0..n).flat_map(|k| (0..k).map(move |i| (i, k))) {
-        let both = (modal[(i, i)] * modal[(k, k)]).abs().sqrt();
-        let beside = modal[(i, k)].abs().max(modal[(k, i)].abs());
-        if beside > UNCOUPLED[0] * both + UNCOUPLED[1] * size {
-            return None;
-        }
-    }
-    // a mass below zero is the rounding of none
-    let own = values.iter().enumerate().map(|(m, theta)| {
-        let mass = theta.max(0.0);
-        [mass, modal[(m, m)], 1.0 - shift * mass]
-    });
-    Some((own.collect(), shapes))
 }
 
 #[cfg(test)]
@@ -216,6 +146,8 @@ mod tests {
         let structure = Structure::new(names(), light.clone(), damping.clone(), stiffness.clone()).unwrap();
         let directions = [vec![(0, 1.0), (4, -0.5)], vec![(3, 1.0)], vec![(7, 2.0), (1, 1.0)]];
         let modes = Uncoupled::new(&structure, &directions).unwrap();
+        // whoever asks next has the same modes
+        assert!(Arc::ptr_eq(&modes.modes, structure.clone().uncoupled().unwrap()));
         for (s, omega) in
             [(Complex64::new(0.0, 0.8), 0.8), (Complex64::new(0.0, 2.4), 0.8), (Complex64::new(1.5, 0.0), 0.8)]
         {

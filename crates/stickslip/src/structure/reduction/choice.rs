@@ -2,17 +2,21 @@
 
 use super::{Deviation, Free, Reduced, ReductionError, Reference, Whole};
 use crate::structure::ReductionKind;
+use std::ops::RangeInclusive;
 use stickslip_numerics::sparse::{ModesError, NaturalModes};
 
 /// Modes are computed up to these multiples of the frequency of interest, one after the other until a reduction is close enough.
 const EXTENTS: [f64; 2] = [1.5, 3.0];
+/// The same before all others where there are many ports: an order of residual vectors has a coordinate for every port, and the modes up to these are fewer.
+const EXTENTS_OF_MANY: [f64; 2] = [3.0, 6.0];
 /// How often the last multiple is doubled for Craig-Bampton where it is asked for, until 600 modes or all are taken: its error falls slowly. Measured
 /// on bricks of 144 rows up to 5 kHz: 2e-3 at 48 times that, with 53 modes.
 const DOUBLED: i32 = 12;
 /// Of these, up to these shares are tried.
 const SHARES: [f64; 4] = [0.67, 0.8, 0.9, 1.0];
-/// Ports beyond which all modes are taken at once: beside hundreds of residual vectors some modes fewer are no gain.
-const MANY: usize = 300;
+/// Ports beyond which more modes are tried before more orders, and all modes are taken at once: beside hundreds of residual vectors some modes fewer are
+/// no gain.
+const MANY: usize = 96;
 /// Orders of residual vectors that are tried.
 const ORDERS: usize = 3;
 /// Numbers of all residual vectors that are held at once: 1 GB.
@@ -54,6 +58,14 @@ pub struct Reduce {
     pub kind: Option<ReductionKind>,
 }
 
+/// Modes up to a multiple of the frequency of interest, and the orders of residual vectors that are tried with them.
+struct Attempt {
+    extent: f64,
+    orders: RangeInclusive<usize>,
+    /// Whether more follow that try other ways than still more modes.
+    early: bool,
+}
+
 /// A reduction with its error.
 #[derive(Debug, Clone)]
 pub struct Chosen {
@@ -81,8 +93,12 @@ impl Reduce {
         }
         let mut best: Option<(Deviation, usize)> = None;
         let (mut reference, mut last) = (None, None);
-        for extent in EXTENTS {
-            let modes = whole.modes(extent * self.up_to)?;
+        for Attempt { extent, orders, early } in self.attempts(whole) {
+            let modes = match whole.modes(extent * self.up_to) {
+                // more than are ever taken: fewer modes with more orders
+                Err(ReductionError::Modes(ModesError::TooMany { .. })) if early => continue,
+                modes => modes?,
+            };
             let reference = match &mut reference {
                 Some(reference) => reference,
                 none => none.insert(Reference::new(whole, &modes, self.up_to)?),
@@ -94,9 +110,9 @@ impl Reduce {
                 }
                 (deviation.error <= self.tolerance).then_some(deviation)
             };
-            if self.kind != Some(ReductionKind::CraigBampton) {
-                let free = Free::new(whole, &modes, 0.0, orders(whole))?;
-                for (count, order) in self.sizes(&modes, extent, whole) {
+            if self.kind != Some(ReductionKind::CraigBampton) && !orders.is_empty() {
+                let free = Free::new(whole, &modes, 0.0, *orders.end())?;
+                for (count, order) in self.sizes(&modes, (extent, orders.clone()), whole) {
                     let reduced = match free.reduced(count, order) {
                         Ok(reduced) => reduced,
                         // vectors of which only rounding tells the last apart: other numbers of them have no such one
@@ -108,7 +124,7 @@ impl Reduce {
                     }
                 }
             }
-            if self.kind == Some(ReductionKind::Rubin) {
+            if self.kind == Some(ReductionKind::Rubin) || early {
                 continue;
             }
             match whole.craig_bampton(extent * self.up_to) {
@@ -148,8 +164,22 @@ impl Reduce {
         Err(ReductionError::OutOfReach { best: least.error, at: least.omega, dofs, tolerance: self.tolerance })
     }
 
+    /// What is tried, the cheapest first.
+    fn attempts(self, whole: &Whole) -> Vec<Attempt> {
+        let all = orders(whole);
+        let many = whole.ports().len() > MANY && self.kind != Some(ReductionKind::CraigBampton);
+        let first = EXTENTS_OF_MANY.into_iter().filter(|_| many).map(|extent| (extent, 1..=1, true));
+        let usual = EXTENTS.into_iter().map(|extent| (extent, if many { 2 } else { 1 }..=all, false));
+        first.chain(usual).map(|(extent, orders, early)| Attempt { extent, orders, early }).collect()
+    }
+
     /// Numbers of modes and orders of residual vectors to try, the smallest first.
-    fn sizes(self, modes: &NaturalModes, extent: f64, whole: &Whole) -> Vec<(usize, usize)> {
+    fn sizes(
+        self,
+        modes: &NaturalModes,
+        (extent, orders): (f64, RangeInclusive<usize>),
+        whole: &Whole,
+    ) -> Vec<(usize, usize)> {
         let ports = whole.ports().len();
         let count = |share: f64| {
             let bound = (share * extent * self.up_to).powi(2);
@@ -157,7 +187,7 @@ impl Reduce {
         };
         let shares = if ports > MANY { &SHARES[SHARES.len() - 1..] } else { &SHARES[..] };
         let mut sizes: Vec<(usize, usize)> =
-            (1..=orders(whole)).flat_map(|order| shares.iter().map(move |share| (count(*share), order))).collect();
+            orders.flat_map(|order| shares.iter().map(move |share| (count(*share), order))).collect();
         sizes.sort_by_key(|&(count, order)| (count + order * ports, order));
         sizes.dedup();
         sizes

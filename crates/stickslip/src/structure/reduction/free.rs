@@ -1,16 +1,17 @@
 //! Free modes with residual vectors at the ports: Rubin's method, with vectors of higher order if asked for.
 //!
 //! One set of modes and residual vectors makes reductions of any smaller size: a mode that is left out goes back into the residual
-//! vectors, `Xⱼ + φ φᵀF / (λ - σ)ʲ⁺¹`. Coordinates are those of the modes (of unit mass), then of the residual vectors (of unit stiffness,
-//! independent of each
-//! other, without mass between them). MacNeal's method is Rubin's without the mass of the residual vectors; here they keep it.
+//! vectors, `Xⱼ + φ φᵀF / (λ - σ)ʲ⁺¹`. Coordinates are the natural modes of the structure in modes and residual vectors together (Ritz vectors), which
+//! neither mass nor stiffness couples: first those of the structure itself, then what stands for all others.
+//! MacNeal's method is Rubin's without the mass of the residual vectors; here they keep it.
 //! Of order J the receptance agrees with that of the whole structure at σ in the first 2 J terms of its series, beside the modes.
 //!
 //! Sources: as in `residual`; Craig and Chang (1977), "On the use of attachment modes in substructure coupling for dynamic analysis".
 
-use super::{AT_ONCE, Damping, Reduced, ReductionError, Whole, damping, product, residual, symmetric};
-use nalgebra::DMatrix;
+use super::{AT_ONCE, Damping, Reduced, ReductionError, Whole, damping, natural, product, residual, symmetric};
+use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
+use stickslip_numerics::dense::{cholesky_in_blocks, solve_lower_in_blocks};
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{Matrix, NaturalModes, columns};
 
@@ -18,9 +19,6 @@ use stickslip_numerics::sparse::{Matrix, NaturalModes, columns};
 /// and what rounding
 /// makes of it.
 const DEPENDENT: f64 = 1e-11;
-
-/// What is beside the diagonal of a reduced matrix, relative to the two on it, up to which it is the rounding of vectors that do not move each other.
-const ROUNDED: f64 = 1e-9;
 
 /// Modes and residual vectors, from which reductions are made.
 #[derive(Debug, Clone)]
@@ -104,13 +102,14 @@ impl<'a> Free<'a> {
         assert!(modes <= self.modes() && order <= self.counts.1, "of {} modes, {} orders", self.modes(), self.counts.1);
         // all modes leave nothing to the residual vectors but rounding
         let order = if modes < self.whole.dofs() { order } else { 0 };
-        let small = self.combination(modes, order).ok_or(ReductionError::OutOfRange)?;
-        let all = self.mass.nrows();
-        let project = |matrix: &DMatrix<f64>| {
-            without_rounding(symmetric(columns::products(all, small.as_slice(), product(matrix, &small).as_slice())))
-        };
-        let (mass, stiffness) = (project(&self.mass), project(&self.stiffness));
-        let own = self.damping.as_ref().map(|c| product(&small.transpose(), &product(c, &small)));
+        let (small, own) = self.combination(modes, order).ok_or(ReductionError::OutOfRange)?;
+        let diagonal =
+            |which: usize| DMatrix::from_diagonal(&DVector::from_iterator(own.len(), own.iter().map(|o| o[which])));
+        let (mass, stiffness) = (diagonal(0), diagonal(1));
+        let own = self
+            .damping
+            .as_ref()
+            .map(|c| columns::products(c.nrows(), small.as_slice(), product(c, &small).as_slice()));
         let damping = damping(&self.whole.damping, &mass, &stiffness, own)?;
         let n = self.whole.dofs();
         let (residual, plural) = (small.ncols() - modes, |count: usize| if count == 1 { "" } else { "s" });
@@ -127,29 +126,30 @@ impl<'a> Free<'a> {
         Ok(Reduced { kind, mass, damping, stiffness, ports, basis: self.basis.clone(), weights: small, n })
     }
 
-    /// Modes, then independent residual vectors of unit stiffness whose mass is diagonal.
-    fn combination(&self, modes: usize, order: usize) -> Option<DMatrix<f64>> {
+    /// The natural modes of the structure in its first modes and independent residual vectors, with the mass and the stiffness of each: of unit mass, or
+    /// of unit stiffness where they have none.
+    fn combination(&self, modes: usize, order: usize) -> Option<(DMatrix<f64>, Vec<[f64; 2]>)> {
         let all = self.mass.nrows();
+        let along = |a: &DMatrix<f64>, matrix: &DMatrix<f64>, b: &DMatrix<f64>| {
+            columns::products(all, a.as_slice(), product(matrix, b).as_slice())
+        };
         let mut vectors = DMatrix::zeros(all, 0);
-        // twice: the second time rounding of the first is projected out
         for order in 0..order {
             let mut block = self.block(modes, order);
-            for _ in 0..2 {
-                let along = columns::products(all, vectors.as_slice(), product(&self.stiffness, &block).as_slice());
-                block -= product(&vectors, &along);
+            // twice: the second time rounding of the first is projected out
+            for _ in 0..if vectors.is_empty() { 1 } else { 2 } {
+                block -= product(&vectors, &along(&vectors, &self.stiffness, &block));
                 block = independent(&block, &self.stiffness)?;
             }
             vectors = join(&vectors, &block);
         }
-        if vectors.ncols() > 0 {
-            let mass = columns::products(all, vectors.as_slice(), product(&self.mass, &vectors).as_slice());
-            let eigen = eigen::symmetric(symmetric(mass))?;
-            let mut rising: Vec<usize> = (0..vectors.ncols()).collect();
-            rising.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-            vectors = product(&vectors, &eigen.eigenvectors.select_columns(&rising));
-        }
         let chosen = DMatrix::from_fn(all, modes, |i, k| f64::from(u8::from(i == k)));
-        Some(join(&chosen, &vectors))
+        let together = join(&chosen, &vectors);
+        let [mass, stiffness] =
+            [&self.mass, &self.stiffness].map(|matrix| symmetric(along(&together, matrix, &together)));
+        let (values, shapes) = natural(&mass, &stiffness)?;
+        let own = values.into_iter().map(|value| if value.is_finite() { [1.0, value] } else { [0.0, 1.0] });
+        Some((product(&together, &shapes), own.collect()))
     }
 }
 
@@ -168,17 +168,6 @@ fn square(matrix: &Matrix, basis: &[f64]) -> DMatrix<f64> {
         }
     }
     square
-}
-
-/// A symmetric matrix without what is beside its diagonal, if that is rounding.
-fn without_rounding(matrix: DMatrix<f64>) -> DMatrix<f64> {
-    let n = matrix.nrows();
-    let own: Vec<f64> = matrix.diagonal().iter().map(|v| v.abs().sqrt()).collect();
-    let beside = |i: usize, k: usize| i != k && matrix[(i, k)].abs() > ROUNDED * own[i] * own[k];
-    if (0..n).any(|k| (0..n).any(|i| beside(i, k))) {
-        return matrix;
-    }
-    DMatrix::from_diagonal(&matrix.diagonal())
 }
 
 fn join(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
@@ -203,12 +192,37 @@ pub(super) fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> O
     let unit = DMatrix::from_fn(moving.len(), moving.len(), |i, k| {
         energies[(moving[i], moving[k])] / (size(moving[i]) * size(moving[k]))
     });
-    let eigen = eigen::symmetric(unit)?;
-    let mut kept: Vec<usize> =
-        (0..moving.len()).filter(|&k| eigen.eigenvalues[k] > DEPENDENT * eigen.eigenvalues.amax()).collect();
-    kept.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let weights = DMatrix::from_fn(moving.len(), kept.len(), |i, k| {
-        eigen.eigenvectors[(i, kept[k])] / (eigen.eigenvalues[kept[k]].sqrt() * size(moving[i]))
-    });
+    let mut weights = match all_independent(&unit) {
+        Some(weights) => weights,
+        None => leading(unit)?,
+    };
+    for (mut row, &i) in weights.row_iter_mut().zip(&moving) {
+        row /= size(i);
+    }
     Some(product(&vectors.select_columns(&moving), &weights))
+}
+
+/// `L⁻ᵀ` of `A = L Lᵀ` with ones on its diagonal, if none of its eigenvalues can be below the share of the largest at which vectors depend on each other: the
+/// largest is n at most, and the least no smaller than one by the trace of `A⁻¹`.
+fn all_independent(unit: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = unit.nrows();
+    let mut lower = unit.clone();
+    if !cholesky_in_blocks(lower.as_mut_slice(), n) {
+        return None;
+    }
+    let mut inverse = DMatrix::identity(n, n);
+    solve_lower_in_blocks(lower.as_slice(), n, inverse.as_mut_slice(), true);
+    (DEPENDENT * n as f64 * inverse.norm_squared() < 1.0).then_some(inverse)
+}
+
+/// Eigenvectors of the eigenvalues that are not rounding, divided by their roots.
+fn leading(unit: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let eigen = eigen::symmetric(unit)?;
+    let least = DEPENDENT * eigen.eigenvalues.amax();
+    let kept: Vec<usize> = (0..eigen.eigenvalues.len()).filter(|&k| eigen.eigenvalues[k] > least).collect();
+    let mut vectors = eigen.eigenvectors.select_columns(&kept);
+    for (mut column, &k) in vectors.column_iter_mut().zip(&kept) {
+        column /= eigen.eigenvalues[k].sqrt();
+    }
+    Some(vectors)
 }

@@ -509,25 +509,27 @@ fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
 
 /// Reduced damping: `own` if the structure has a matrix.
 fn damping(
-    damping: &Damping,
+    by: &Damping,
     mass: &DMatrix<f64>,
     stiffness: &DMatrix<f64>,
     own: Option<DMatrix<f64>>,
 ) -> Result<DMatrix<f64>, ReductionError> {
-    let Some((alpha, beta)) = damping.proportional() else {
+    let Some((alpha, beta)) = by.proportional() else {
         return own.ok_or(ReductionError::OutOfRange);
     };
     let mut c = mass * alpha + stiffness * beta;
-    if let Damping::Ratio { up_to, .. } = *damping
+    if let Damping::Ratio { up_to, .. } = *by
         && beta > 0.0
     {
         let (values, shapes) = natural(mass, stiffness).ok_or(ReductionError::OutOfRange)?;
-        for (k, value) in values.iter().enumerate().filter(|(_, value)| **value < up_to * up_to) {
-            let omega = value.max(0.0).sqrt();
-            let more = damping.of_mode(omega).unwrap_or(0.0) - beta * omega * omega;
-            let force = mass * shapes.column(k);
-            c += &force * force.transpose() * more;
+        let more = |omega: f64| by.of_mode(omega).unwrap_or(0.0) - beta * omega * omega;
+        let below: Vec<usize> = (0..values.len()).filter(|&k| values[k] < up_to * up_to).collect();
+        let forces = product(mass, &shapes.select_columns(&below));
+        let mut weighted = forces.clone();
+        for (mut force, &k) in weighted.column_iter_mut().zip(&below) {
+            force *= more(values[k].max(0.0).sqrt());
         }
+        c += symmetric(product(&weighted, &forces.transpose()));
     }
     Ok(c)
 }
@@ -546,21 +548,16 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
     let mut ratios: Vec<f64> = (0..r).map(ratio).filter(|v| v.is_finite() && *v > 0.0).collect();
     ratios.sort_by(f64::total_cmp);
     let shift = SHIFT * ratios.get(ratios.len() / 2).copied().unwrap_or(1.0);
-    let held = stiffness + mass * shift;
-    // ones on the diagonal, so that coordinates of any unit count alike
-    let unit = DMatrix::from_diagonal(&held.diagonal().map(|v| 1.0 / v.sqrt()));
-    let factor = (&unit * held * &unit).cholesky()?.l();
-    let inverse = factor.solve_lower_triangular(&DMatrix::identity(r, r))? * &unit;
-    let eigen = eigen::symmetric(symmetric(&inverse * mass * inverse.transpose()))?;
-    let largest = eigen.eigenvalues.amax();
-    let shapes = inverse.transpose() * &eigen.eigenvectors;
-    let mut order: Vec<usize> = (0..r).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let (thetas, mut shapes) = eigen::symmetric_pair(mass, &(stiffness + mass * shift))?;
+    let largest = thetas.iter().fold(0.0f64, |most, theta| most.max(theta.abs()));
     let massless = |theta: f64| theta <= MASSLESS * largest;
     let value = |theta: f64| if massless(theta) { f64::INFINITY } else { 1.0 / theta - shift };
-    let size = |theta: f64| if massless(theta) { 1.0 } else { theta.sqrt() };
-    let values = order.iter().map(|&k| value(eigen.eigenvalues[k])).collect();
-    Some((values, DMatrix::from_fn(r, r, |i, k| shapes[(i, order[k])] / size(eigen.eigenvalues[order[k]]))))
+    for (mut shape, &theta) in shapes.column_iter_mut().zip(&thetas) {
+        shape /= if massless(theta) { 1.0 } else { theta.sqrt() };
+    }
+    // the largest has the lowest frequency
+    let order: Vec<usize> = (0..r).rev().collect();
+    Some((order.iter().map(|&k| value(thetas[k])).collect(), shapes.select_columns(&order)))
 }
 
 /// The same of coordinates that do not move each other.

@@ -1,0 +1,83 @@
+//! Modes of a structure that its damping leaves uncoupled, computed once for all who ask.
+//!
+//! Structures that were reduced by free modes and residual vectors come in such coordinates; others are brought there, if they are full.
+
+use super::{Matrices, Structure};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+use stickslip_numerics::dense::multiply_in_blocks;
+use stickslip_numerics::eigen;
+
+/// Damping between modes that counts as the rounding of matrices: relative to that of the two, and to the largest of all.
+const UNCOUPLED: [f64; 2] = [1e-9, 1e-13];
+/// Springs that hold free motions, relative to the lowest ratio of stiffness and mass on the diagonals.
+const SHIFT: f64 = 1e-3;
+/// Degrees of freedom up to which modes are sought: the decomposition of so many takes a minute.
+const MOST: usize = 4000;
+
+/// A structure in its own modes.
+#[derive(Debug)]
+pub(crate) struct UncoupledModes {
+    /// Modal mass, damping and stiffness.
+    pub own: Vec<[f64; 3]>,
+    /// The places by modes, n × n; none where they are the same.
+    pub shapes: Option<DMatrix<f64>>,
+}
+
+impl Structure {
+    /// Its modes; `None` if damping couples them, or if there are too many. They are sought at the first call.
+    pub(crate) fn uncoupled(&self) -> Option<&Arc<UncoupledModes>> {
+        let find = || match self.diagonals() {
+            Some(own) => Some(UncoupledModes { own, shapes: None }),
+            None if self.is_sparse() || self.dofs() > MOST => None,
+            None => {
+                let (own, shapes) = modes(self.full())?;
+                Some(UncoupledModes { own, shapes: Some(shapes) })
+            }
+        };
+        self.0.uncoupled.get_or_init(|| find().map(Arc::new)).as_ref()
+    }
+
+    /// Mass, damping and stiffness of coordinates that do not move each other, as those of a reduction by free modes are.
+    pub(crate) fn diagonals(&self) -> Option<Vec<[f64; 3]>> {
+        let mut own = vec![[0.0; 3]; self.dofs()];
+        for (i, k, values) in self.entries() {
+            if i != k {
+                return None;
+            }
+            own[i] = values;
+        }
+        Some(own)
+    }
+}
+
+/// Modes `X` with `Xᵀ (K + σ M) X = 1` and `Xᵀ M X = θ`, so that motions without mass have their place: mass θ and stiffness `1 - σ θ`.
+fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
+    let Matrices { mass, damping, stiffness } = matrices;
+    let n = mass.nrows();
+    let mut ratios: Vec<f64> =
+        (0..n).map(|i| stiffness[(i, i)] / mass[(i, i)]).filter(|v| v.is_finite() && *v > 0.0).collect();
+    ratios.sort_by(f64::total_cmp);
+    let shift = SHIFT * ratios.first().copied().unwrap_or(1.0);
+    let (values, shapes) = eigen::symmetric_pair(mass, &(stiffness + mass * shift))?;
+    let product = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
+        let mut out = DMatrix::zeros(n, n);
+        multiply_in_blocks(a.as_slice(), b.as_slice(), out.as_mut_slice(), (n, n, n), false);
+        out
+    };
+    let modal = product(&shapes.transpose(), &product(damping, &shapes));
+    let size = modal.diagonal().amax();
+    for (i, k) in (0..n).flat_map(|k| (0..k).map(move |i| (i, k))) {
+        let both = (modal[(i, i)] * modal[(k, k)]).abs().sqrt();
+        let beside = modal[(i, k)].abs().max(modal[(k, i)].abs());
+        if beside > UNCOUPLED[0] * both + UNCOUPLED[1] * size {
+            return None;
+        }
+    }
+    // a mass below zero is the rounding of none
+    let own = values.iter().enumerate().map(|(m, theta)| {
+        let mass = theta.max(0.0);
+        [mass, modal[(m, m)], 1.0 - shift * mass]
+    });
+    Some((own.collect(), shapes))
+}
