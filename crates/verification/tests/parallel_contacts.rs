@@ -167,7 +167,9 @@ fn the_exact_method_shares_alike() {
 /// Other laws of velocity, as long as their forces are multiples of each other: in a plane, steep, falling, behind springs.
 #[test]
 fn laws_of_velocity_that_are_multiples_are_one() {
-    let cases: [(&str, fn(f64) -> SharedLaw); 5] = [
+    /// A law with so many times its usual forces.
+    type OfSize = fn(f64) -> SharedLaw;
+    let cases: [(&str, OfSize); 5] = [
         ("coulomb-2d", |share| Arc::new(Coulomb2d { limit: 0.7 * share })),
         ("coulomb-arctan", |share| Arc::new(CoulombArctan { limit: 0.7 * share, alpha: 30.0 })),
         ("jenkins-arctan", |share| Arc::new(JenkinsArctan { stiffness: 4.0 * share, limit: 0.7 * share, alpha: 30.0 })),
