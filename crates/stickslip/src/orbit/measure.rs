@@ -50,6 +50,10 @@ pub(crate) trait Signals {
             }
         }
     }
+    /// Displacement of a place, m.
+    fn seen(&self, place: &Axis) -> Self::Signal {
+        self.along(place, |row| self.displacement(row))
+    }
     /// What the `force` along an axis takes from the motion in the return, J.
     fn dissipation(&self, axis: usize, force: &Self::Signal) -> f64 {
         self.product(force, &self.relative_velocity(axis))
@@ -116,7 +120,7 @@ pub(crate) fn measure<S: Signals>(
     let mut places = Vec::with_capacity(system.places().len());
     for (name, place) in system.places().iter().zip(system.seen()) {
         let (minimum, maximum) = mirrored(signals.range(place)?);
-        let x = signals.along(place, |row| signals.displacement(row));
+        let x = signals.seen(place);
         places.push(PlaceMotion {
             name: name.clone(),
             maximum,

@@ -3,8 +3,8 @@
 
 use super::cyclic::{Blade, BladeError, Boundary, CyclicSector};
 use super::reduction::{
-    Damping, Deviation, Free, MistunedRing, Reduce, Reduced, ReducedSector, ReductionError, Reference, Row, STEPS,
-    Whole, alone, lacking_most,
+    Damping, Deviation, EXTENTS, Free, Lacking, Mixed, NominalRing, Reduce, Reduced, ReducedSector, ReductionError,
+    Reference, RingModes, Row, STEPS, Whole,
 };
 use super::{StructureError, symmetric};
 use nalgebra::DMatrix;
@@ -12,7 +12,7 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use stickslip_numerics::definite::sparse_definite;
-use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes, Wanted};
+use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted};
 
 /// Matrices of a structure and the names of their rows. A copy is a reference to the same matrices, and to the reductions made of them.
 ///
@@ -60,13 +60,11 @@ pub(crate) struct KeptSector {
 #[derive(Debug)]
 pub(crate) struct SectorBlade {
     blade: Blade,
-    /// The sector with its neighbours held.
-    alone: OnceLock<Result<Factor, ReductionError>>,
     entries: OnceLock<Vec<(usize, usize, f64)>>,
     /// In the coordinates of a reduction with that many steps of its vectors.
     reductions: Known<(Asked, usize), Relieved>,
     /// By the deviations of all blades.
-    mistuned: Known<Pattern, MistunedSector>,
+    mistuned: Known<Pattern, Arc<ReducedComponent>>,
 }
 
 type KeptBlade = Result<Arc<SectorBlade>, BladeError>;
@@ -74,20 +72,12 @@ type KeptBlade = Result<Arc<SectorBlade>, BladeError>;
 type Pattern = (Asked, Vec<f64>);
 type Relieved = Result<Arc<InFew>, ReductionError>;
 
-/// A sector in few coordinates, and what a share of one of its blade's stiffness adds over them.
+/// A sector in few coordinates, the ring that is sought in them, and what they lack of it.
 #[derive(Debug)]
 struct InFew {
     component: Arc<ReducedComponent>,
-    of_blade: Vec<(usize, usize, f64)>,
-    /// Frequencies of modes that lack most when the blades differ, rad/s.
-    suspect: Vec<f64>,
-}
-
-/// A sector for a ring whose blades differ.
-#[derive(Debug, Clone)]
-pub(crate) struct MistunedSector {
-    pub component: Arc<ReducedComponent>,
-    few: Arc<InFew>,
+    ring: NominalRing,
+    lacking: Lacking,
 }
 
 /// What was asked, and the answers.
@@ -179,10 +169,13 @@ pub(crate) enum Form {
     Alone(Arc<Reduced>),
     /// Of one sector of a ring.
     Sector(Arc<ReducedSector>),
+    /// Of a ring whose blades differ.
+    Ring(Arc<RingModes>),
 }
 
-/// Patterns of blades whose error is remembered: a case is assembled several times in a row, and a campaign has a million.
-const PATTERNS: usize = 64;
+/// Patterns of blades whose modes are remembered: a case is assembled several times in a row, and a campaign has a million. Those of 240 blades with five
+/// places each are 40 MB.
+const PATTERNS: usize = 16;
 
 /// A mode that is kept, in multiples of the frequency up to which it serves: the last ones only complete those below.
 const BEYOND: f64 = 1.5;
@@ -367,26 +360,14 @@ impl KeptSector {
     pub fn blade(&self, component: &Component, blade: &[usize]) -> KeptBlade {
         once(&self.blades, &blade.to_vec(), || {
             let blade = self.sector.blade(component.rows(), component.matrices().2, blade)?;
-            let (alone, entries) = (OnceLock::new(), OnceLock::new());
-            Ok(Arc::new(SectorBlade {
-                blade,
-                alone,
-                entries,
-                reductions: Mutex::default(),
-                mistuned: Mutex::default(),
-            }))
+            let (reductions, mistuned) = (Mutex::default(), Mutex::default());
+            Ok(Arc::new(SectorBlade { blade, entries: OnceLock::new(), reductions, mistuned }))
         })
     }
 
-    /// The sector in few coordinates for a ring whose blades deviate by these shares of their stiffness: with as many vectors of the blade as the
-    /// error of that ring asks for, or with those that come nearest.
-    pub fn mistuned(
-        &self,
-        blade: &SectorBlade,
-        deviations: &[f64],
-        seen: &[Row],
-        how: &Reduction,
-    ) -> Result<MistunedSector, ReductionError> {
+    /// The ring whose blades deviate by these shares of their stiffness in its own modes: with as many vectors of the blade in the coordinates of its
+    /// sectors as the error of that ring asks for, or with those that come nearest.
+    pub fn mistuned(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
         let asked = ((seen.to_vec(), *how), deviations.to_vec());
         let known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, answer)) = known.iter().find(|(key, _)| *key == asked) {
@@ -403,50 +384,41 @@ impl KeptSector {
         Ok(answer)
     }
 
-    fn nearest(
-        &self,
-        blade: &SectorBlade,
-        deviations: &[f64],
-        seen: &[Row],
-        how: &Reduction,
-    ) -> Result<MistunedSector, ReductionError> {
-        let ring = MistunedRing::new(&self.sector, (&blade.blade, blade.alone(&self.sector)?), deviations, seen)?;
+    fn nearest(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
+        // without vectors of the blade only as many modes as are stated
         let (steps, enough) = match *how {
-            Reduction::UpTo { tolerance, .. } => (STEPS.len(), tolerance),
-            _ => (1, f64::INFINITY),
+            Reduction::UpTo { tolerance, .. } => (1..STEPS.len(), tolerance),
+            _ => (0..1, f64::INFINITY),
         };
-        let mut best: Option<MistunedSector> = None;
-        for step in 0..steps {
+        let mut best: Option<(Arc<InFew>, Mixed, Deviation)> = None;
+        for step in steps {
             // what has served is kept where more of it fails
             let few = match (self.few(blade, seen, how, step), &best) {
                 (Ok(few), _) => few,
                 (Err(_), Some(_)) => continue,
                 (Err(error), None) => return Err(error),
             };
-            let own = &few.component;
-            let Form::Sector(sector) = &own.form else { return Err(ReductionError::NoPorts) };
-            let most = if step + 1 < steps { enough } else { f64::INFINITY };
-            let found = ring.deviation(sector, &few.of_blade, &few.suspect, own.up_to, most)?;
-            let deviation = if found.error > own.deviation.error { found } else { own.deviation };
-            let nearer = best.as_ref().is_none_or(|best| deviation.error < best.component.deviation.error);
-            if nearer {
-                let component = Arc::new(ReducedComponent { deviation, ..ReducedComponent::clone(own) });
-                best = Some(MistunedSector { component, few });
+            let mixed = few.ring.mixed(deviations, EXTENTS[0])?;
+            let (own, found) =
+                (few.component.deviation, few.lacking.deviation((&mixed.values, &mixed.shapes), deviations));
+            let deviation = if found.error > own.error { found } else { own };
+            if best.as_ref().is_none_or(|(.., best)| deviation.error < best.error) {
+                best = Some((few, mixed, deviation));
             }
             if deviation.error <= enough {
                 break;
             }
         }
-        let MistunedSector { component, few } = best.ok_or(ReductionError::NoPorts)?;
-        let Form::Sector(sector) = &component.form else { return Err(ReductionError::NoPorts) };
-        if component.deviation.error <= enough {
-            return Ok(MistunedSector { component, few });
+        let (few, mixed, deviation) = best.ok_or(ReductionError::NoPorts)?;
+        let (mut modes, mut left_out) = few.ring.modes(&mixed)?;
+        for extent in EXTENTS.into_iter().skip(1).filter(|_| enough.is_finite()) {
+            if left_out.error > enough {
+                (modes, left_out) = few.ring.modes(&few.ring.mixed(deviations, extent)?)?;
+            }
         }
-        // that of a step which was not enough is the first beyond, and not the largest
-        let found = ring.deviation(sector, &few.of_blade, &few.suspect, component.up_to, f64::INFINITY)?;
-        let deviation = if found.error > component.deviation.error { found } else { component.deviation };
-        let component = Arc::new(ReducedComponent { deviation, ..ReducedComponent::clone(&component) });
-        Ok(MistunedSector { component, few })
+        let deviation = if left_out.error > deviation.error { left_out } else { deviation };
+        let form = Form::Ring(Arc::new(modes));
+        Ok(Arc::new(ReducedComponent { form, deviation, ..ReducedComponent::clone(&few.component) }))
     }
 
     /// With the vectors of the blade from that step on.
@@ -457,29 +429,18 @@ impl KeptSector {
                 _ => self.chosen(seen, how, Some((&blade.blade, step)))?,
             };
             let Form::Sector(sector) = &component.form else { return Err(ReductionError::NoPorts) };
-            let of_blade = blade.blade.along(sector.n, &sector.basis);
-            let alone = blade.alone(&self.sector)?;
-            let suspect = lacking_most(&self.sector, &blade.blade, alone, sector, component.up_to)?;
-            Ok(Arc::new(InFew { component, of_blade, suspect }))
+            let (of_blade, up_to) = (blade.blade.along(sector.n, &sector.basis), component.up_to);
+            let lacking = Lacking::new((&self.sector, seen), &blade.blade, sector, up_to)?;
+            let ring = NominalRing::new(sector, of_blade, self.sector.sectors, up_to)?;
+            Ok(Arc::new(InFew { component, ring, lacking }))
         })
     }
 }
 
 impl SectorBlade {
-    fn alone(&self, sector: &CyclicSector) -> Result<&Factor, ReductionError> {
-        self.alone.get_or_init(|| alone(sector)).as_ref().map_err(Clone::clone)
-    }
-
     /// What a share of one of its stiffness adds, over all rows that are left.
     pub fn entries(&self) -> &[(usize, usize, f64)] {
         self.entries.get_or_init(|| self.blade.entries())
-    }
-}
-
-impl MistunedSector {
-    /// What a share of one of the blade's stiffness adds, over the coordinates.
-    pub fn of_blade(&self) -> &[(usize, usize, f64)] {
-        &self.few.of_blade
     }
 }
 
@@ -544,11 +505,12 @@ fn in_few(whole: &Whole, how: &Reduction) -> Result<Fewer, ReductionError> {
 }
 
 impl ReducedComponent {
-    /// Coordinates; of a sector of a ring those of one sector.
+    /// Coordinates; of a sector of a ring those of one sector, unless its blades differ.
     pub fn dofs(&self) -> usize {
         match &self.form {
             Form::Alone(reduced) => reduced.dofs(),
             Form::Sector(sector) => sector.dofs(),
+            Form::Ring(modes) => modes.own.len(),
         }
     }
 
@@ -557,6 +519,7 @@ impl ReducedComponent {
         match &self.form {
             Form::Alone(reduced) => &reduced.kind,
             Form::Sector(sector) => &sector.kind,
+            Form::Ring(modes) => &modes.kind,
         }
     }
 

@@ -5,6 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use std::collections::BTreeMap;
 use stickslip::model::{Around, Disk, DiskPart, Model, Place, Substructure, SubstructureDamping, System};
 use stickslip::structure::{Boundary, Component, Reduction, ReductionKind};
+use stickslip_numerics::sparse::{Analysis, Matrix};
 
 /// Elements of a sector along the blade, across, and through.
 const ELEMENTS: [usize; 3] = [6, 2, 1];
@@ -17,7 +18,7 @@ const BLADES: [f64; 4] = [0.04, -0.02, -0.04, 0.03];
 const HALF_WIDTH: f64 = 1e-3;
 
 /// A ring of steel strips side by side, held at one end, the first nodes welded to those of the next strip.
-fn ring(reduction: Reduction) -> System {
+fn ring(reduction: Reduction, blades: &[f64]) -> System {
     let brick = Brick::new(ELEMENTS, [0.08, 0.03, 0.006], true);
     let [nx, ny, nz] = ELEMENTS;
     let name = |[x, y, z]: [usize; 3]| format!("{x}_{y}_{z}");
@@ -45,8 +46,8 @@ fn ring(reduction: Reduction) -> System {
         let substructure = Some(Substructure { component, damping, reduction, disk: Some(disk) });
         Model { substructure, places: places.clone(), ..Model::default() }
     };
-    let disk = Disk { sectors: BLADES.len(), forces: Vec::<Around>::new(), motions: vec![] };
-    disk.ring(|s| sector(BLADES[s])).unwrap().assemble().unwrap()
+    let disk = Disk { sectors: blades.len(), forces: Vec::<Around>::new(), motions: vec![] };
+    disk.ring(|s| sector(blades[s])).unwrap().assemble().unwrap()
 }
 
 /// Displacements of the places of all sectors under loads on all of them.
@@ -78,7 +79,7 @@ fn resonances(system: &System) -> Vec<f64> {
 /// within a factor of two; and with a tolerance as many vectors are taken as it asks for.
 #[test]
 fn the_error_of_blades_that_differ_is_that_against_the_whole_ring() {
-    let whole = ring(Reduction::None);
+    let whole = ring(Reduction::None, &BLADES);
     let all = resonances(&whole);
     let mut exact: BTreeMap<usize, DVector<Complex<f64>>> = BTreeMap::new();
     let mut error = |few: &System, up_to: f64| {
@@ -90,7 +91,7 @@ fn the_error_of_blades_that_differ_is_that_against_the_whole_ring() {
         errors.fold(0.0, f64::max)
     };
     for modes in [3, 5] {
-        let few = ring(Reduction::Modes { modes, kind: ReductionKind::Rubin, up_to: 0.0 });
+        let few = ring(Reduction::Modes { modes, kind: ReductionKind::Rubin, up_to: 0.0 }, &BLADES);
         let said = few.reduced().unwrap();
         let error = error(&few, said.up_to());
         assert!(error > 0.01, "a reduction without an error tests nothing: {error:e}, {said}");
@@ -98,10 +99,71 @@ fn the_error_of_blades_that_differ_is_that_against_the_whole_ring() {
     }
     for (family, tolerance) in [(1, 1e-3), (2, 1e-4)] {
         let up_to = 1.1 * all[family * BLADES.len() - 1];
-        let few = ring(Reduction::UpTo { up_to, tolerance, kind: None });
+        let few = ring(Reduction::UpTo { up_to, tolerance, kind: None }, &BLADES);
         let said = few.reduced().unwrap();
         let error = error(&few, up_to);
         assert!(said.error() <= tolerance && error < 2.0 * tolerance, "{error:e}, {said}");
         assert!(said.kind().contains("of its blade"), "{said}");
     }
+}
+
+/// Mass and stiffness of a ring of many sectors.
+fn matrices(system: &System) -> [Matrix; 2] {
+    [0, 2].map(|of| {
+        let entries = system.structure().entries().map(|(i, k, values)| (i, k, values[of]));
+        Matrix::from_triplets(system.dofs(), entries).unwrap()
+    })
+}
+
+/// Displacements of the places of all sectors, one after the other, at these frequencies, rad/s.
+fn answers_of_many(system: &System, frequencies: &[f64]) -> Vec<Vec<Complex<f64>>> {
+    let [mass, stiffness] = matrices(system);
+    let analysis = Analysis::new(&[&stiffness, &mass]);
+    let load = |place: usize| (1.3 * place as f64).cos();
+    let one = |omega: &f64| {
+        let sum = [(Complex::new(1.0, 2.0 * HALF_WIDTH), &stiffness), (Complex::new(-omega * omega, 0.0), &mass)];
+        let mut moved = vec![Complex::new(0.0, 0.0); system.dofs()];
+        for (place, axis) in system.seen().iter().enumerate() {
+            axis.rows().iter().for_each(|(at, weight)| moved[*at] += weight * load(place));
+        }
+        analysis.factor_complex(&sum).unwrap().solve(&mut moved);
+        system.seen().iter().map(|axis| axis.rows().iter().map(|(at, weight)| moved[*at] * *weight).sum()).collect()
+    };
+    frequencies.iter().map(one).collect()
+}
+
+/// Sixty blades: frequencies by Lanczos' process on all rows of all sectors, answers by the factor of these. What is said of the error is that of the
+/// answers at resonances.
+#[test]
+fn sixty_blades_have_the_frequencies_and_answers_of_all_rows() {
+    let blades: Vec<f64> = (0..60).map(|s| 0.04 * (2.3 * f64::from(s * s)).sin()).collect();
+    let whole = ring(Reduction::None, &blades);
+    let [mass, stiffness] = matrices(&whole);
+    let all = Component::new(vec![String::new(); mass.n()], mass, None, stiffness).unwrap();
+    let exact = all.frequencies(blades.len()).unwrap();
+    let up_to = 1.02 * exact[blades.len() - 1];
+    let resonances: Vec<f64> = exact.iter().copied().step_by(5).collect();
+    let expected = answers_of_many(&whole, &resonances);
+    let error = |few: &System| {
+        let found = answers_of_many(few, &resonances);
+        let norm = |all: &mut dyn Iterator<Item = Complex<f64>>| all.map(|z| z.norm_sqr()).sum::<f64>().sqrt();
+        let apart = found.iter().zip(&expected).map(|(found, expected)| {
+            norm(&mut found.iter().zip(expected).map(|(a, b)| a - b)) / norm(&mut expected.iter().copied())
+        });
+        apart.fold(0.0, f64::max)
+    };
+    let few = ring(Reduction::UpTo { up_to, tolerance: 1e-4, kind: None }, &blades);
+    let mut own: Vec<f64> =
+        few.structure().entries().map(|(.., [mass, _, stiffness])| (stiffness / mass).sqrt()).collect();
+    own.sort_by(f64::total_cmp);
+    for (own, exact) in own.iter().zip(&exact) {
+        assert!((own / exact - 1.0).abs() < 1e-7, "{own} {exact}");
+    }
+    assert!(few.dofs() < blades.len() * 20, "{}", few.dofs());
+    let (said, error_of_few) = (few.reduced().unwrap(), error(&few));
+    assert!(said.error() <= 1e-4 && error_of_few < 2.0 * said.error(), "{error_of_few:e}, {said}");
+    let coarse = ring(Reduction::Modes { modes: 3, kind: ReductionKind::Rubin, up_to }, &blades);
+    let (said, error) = (coarse.reduced().unwrap(), error(&coarse));
+    assert!(error > 1e-3, "a reduction without an error tests nothing: {error:e}, {said}");
+    assert!((0.5..2.0).contains(&(said.error() / error)), "{error:e}, {said}");
 }

@@ -410,9 +410,9 @@ fn estimate(
     let mut compare = |coarse_at: &dyn Fn(usize) -> Complex64, fine_at: &dyn Fn(usize) -> Complex64, missing: f64| {
         let (mut d, mut s) = (missing, missing);
         for (k, h) in fine.harmonics.iter().enumerate().filter(|(_, h)| **h > 0) {
-            let x = coarse.harmonics.binary_search(h).map_or(Complex64::new(0.0, 0.0), coarse_at);
-            d += (x - fine_at(k)).norm_sqr();
-            s += fine_at(k).norm_sqr();
+            let (x, y) = (coarse.harmonics.binary_search(h).map_or(Complex64::new(0.0, 0.0), coarse_at), fine_at(k));
+            d += (x - y).norm_sqr();
+            s += y.norm_sqr();
         }
         (distance, size) = (distance.max(d), size.max(s));
     };

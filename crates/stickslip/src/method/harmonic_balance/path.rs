@@ -317,6 +317,10 @@ impl Signals for Measuring<'_> {
     fn displacement(&self, row: usize) -> Vec<Complex64> {
         self.x.iter().map(|x| x[row]).collect()
     }
+    // places in modes have as many rows as there are modes
+    fn seen(&self, place: &Axis) -> Vec<Complex64> {
+        self.x.iter().map(|x| place.along_complex(x)).collect()
+    }
     fn velocity(&self, row: usize) -> Vec<Complex64> {
         self.derivative(self.displacement(row))
     }
@@ -356,7 +360,7 @@ impl Signals for Measuring<'_> {
         self.harmonic(omega).map_or(ZERO, |k| signal[k] * (share * self.length()))
     }
     fn range(&self, place: &Axis) -> Result<(f64, f64), Infallible> {
-        Ok(self.range_of(&self.along(place, |row| self.displacement(row))))
+        Ok(self.range_of(&self.seen(place)))
     }
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(&relative(self.axes[axis], self.harmonics, self.x)))

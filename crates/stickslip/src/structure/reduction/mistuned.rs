@@ -1,373 +1,179 @@
 //! How far a reduced ring whose blades differ is from the whole one, all rows of all sectors.
 //!
-//! `A = (1 + jη)(K + ΔK) - ω² M` of the ring, with the stiffness of each blade deviating, answers loads on what is seen by `x`. The reduced ring
-//! answers with `x₀ = V p`, and leaves the residual `f - A x₀`, which no column of `V` sees. What it lacks is sought among vectors `e` that
-//! answer the residuals in every sector alone, with its neighbours held, each made free of what the reduced ring answers to it,
-//! `e - V (VᵀAV)⁻¹ VᵀA e`: a few of them, one after the other, until they change nothing. No factor is larger than a sector, or than the reduced ring.
+//! A mode of the reduced ring, `x = V p` with λ, leaves the residual `ρ = (K + ΔK - λM) x`, which no column of `V` sees. The whole ring answers it, and
+//! its eigenvalue is lower by `ρᵀ K⁻¹ ρ` (of unit mass; Lehmann's and Temple's bounds are of this order). With `A = K + σM` only what the coordinates
+//! cannot state of `λ + σ` times the inertia and of the forces of the blades is left of it,
 //!
-//! A factor of loss `η` stands for damping, of which a reduction adds no error of its own: at a resonance the error is the shift of its frequency
-//! by the half width. The loads have random signs, so that all modes answer. Frequencies are resonances of the reduced ring near those modes of the
-//! tuned one that lack most of what their blades' forces move, found by Rayleigh quotients from where the softest and the stiffest blade put them.
+//! `ρᵀ A⁻¹ ρ = gᵀ (A⁻¹ - V (VᵀAV)⁻¹ Vᵀ) g`, `g = ΔK V p - (λ + σ) M V p`,
 //!
-//! Source: Nicolaides (1987), "Deflation of conjugate gradients with applications to boundary value problems", SIAM J. Numer. Anal. 24, 355-365.
+//! and with A of the tuned ring that is a sum over its waves, of each a quadratic form in as many numbers as a sector has coordinates: the forms of a few
+//! nodal diameters are computed once, and serve their neighbours and every pattern of deviations. Every mode of every pattern is asked.
+//!
+//! Motions beyond the coordinates are taken as if at rest, which is right to the square of the ratio of the frequencies, and as stiff as those of the tuned
+//! ring, right to a deviation.
+//!
+//! Source: Parlett, "The Symmetric Eigenvalue Problem" (1998), Sec. 10.5 and 11.7.
 
-use super::evidence::sign;
 use super::ring::HALF_WIDTH;
-use super::{Deviation, ReducedSector, ReductionError, Row, natural};
+use super::{Deviation, ReducedSector, ReductionError, Row, Whole};
 use crate::structure::cyclic::{Blade, CyclicSector};
-use crate::structure::{RingEntry, RingRow};
+use crate::structure::sector::is_real;
+use crate::structure::turn;
 use nalgebra::DMatrix;
-use num_complex::Complex64;
-use stickslip_numerics::sparse::{Analysis, ComplexFactor, Factor, Matrix, columns};
+use stickslip_numerics::eigen;
+use stickslip_numerics::sparse::columns;
 
-const ZERO: Complex64 = Complex64::new(0.0, 0.0);
-const ONE: Complex64 = Complex64::new(1.0, 0.0);
-
-/// Modes of the tuned ring near which both are compared, at most.
-const MODES: usize = 5;
-/// Nodal diameters whose modes are looked at: those of this level.
+/// Level of the nodal diameters whose forms are computed.
 const LEVEL: usize = 1;
 /// Frequencies below this share of the range are those of free motions, which no blade's stiffness moves.
-const FREE: f64 = 1e-4;
-/// Frequencies closer than this share are of one family of blades.
-const SAME_FAMILY: f64 = 0.01;
-/// Steps by which the Rayleigh quotient of an answer finds a resonance: it converges with the third power.
-const TOWARDS: usize = 2;
-/// Vectors beside the reduced ring, at most.
-const VECTORS: usize = 12;
-/// Share of the error by which one more vector changes it, from which on it is known.
-const KNOWN: f64 = 0.05;
+pub(super) const FREE: f64 = 1e-4;
+/// σ by the square of the range: free motions have a factor, and others hardly feel it.
+const SHIFT: f64 = 1e-3;
+/// Energy beyond the coordinates, relative to that of the forces, below which it is rounding.
+const ROUNDED: f64 = 1e-15;
 
-/// A ring whose blades differ, whole.
-pub(in crate::structure) struct MistunedRing<'a> {
-    sector: &'a CyclicSector,
-    blade: &'a Blade,
-    /// Of the stiffness of every blade.
-    deviations: &'a [f64],
-    /// What is seen of each sector.
-    ports: Vec<RingRow>,
-    /// Sizes of the ports, √(m/N), so that units do not count.
-    scales: Vec<f64>,
-    alone: &'a Factor,
+/// σ, rad²/s², of a range up to `up_to`, rad/s.
+pub(super) fn shift(up_to: f64) -> f64 {
+    SHIFT * up_to * up_to
 }
 
-/// A sector with its neighbours held.
-pub(in crate::structure) fn alone(sector: &CyclicSector) -> Result<Factor, ReductionError> {
-    let stiffness = sector.alone(&sector.stiffness)?;
-    let factor = Analysis::new(&[&stiffness]).factor(&[(1.0, &stiffness)]);
-    factor.map_err(|singular| ReductionError::Singular { omega: 0.0, singular })
-}
-
-/// Frequencies (rad/s) up to `up_to` of modes φ of the tuned ring of which the reduced one may lack most: by the energy of what the forces `D φ` of
-/// their blades move in a sector with its neighbours held, beyond what the coordinates move, relative to that of the mode. The first lacks most; of modes
-/// of one family only the worst is there.
-pub(in crate::structure) fn lacking_most(
-    sector: &CyclicSector,
-    blade: &Blade,
-    alone: &Factor,
-    reduced: &ReducedSector,
-    up_to: f64,
-) -> Result<Vec<f64>, ReductionError> {
-    let (n, r) = (reduced.n, reduced.dofs());
-    let own = sector.alone(&sector.stiffness)?;
-    let small = columns::products(n, &reduced.basis, &own.times_columns(&reduced.basis));
-    let small = ((&small + small.transpose()) * 0.5).cholesky().ok_or(ReductionError::OutOfRange)?;
-    let mut found: Vec<(f64, f64)> = Vec::new();
-    for diameter in sector.diameters(LEVEL) {
-        let wave = reduced.wave(diameter, sector.sectors)?;
-        let (values, shapes) = natural(&wave.mass, &wave.stiffness).ok_or(ReductionError::OutOfRange)?;
-        let inside =
-            values.iter().enumerate().filter(|(_, value)| (FREE * up_to..=up_to).contains(&value.max(0.0).sqrt()));
-        for (k, &value) in inside {
-            let mut lacks = 0.0;
-            for part in shapes.column(k).as_slice().chunks_exact(r) {
-                let shape = columns::combination(n, &reduced.basis, &DMatrix::from_column_slice(r, 1, part));
-                let forces = blade.times(&shape);
-                let mut moved = forces.clone();
-                alone.solve(&mut moved);
-                let along = columns::products(n, &reduced.basis, &forces);
-                let all: f64 = forces.iter().zip(&moved).map(|(force, moved)| force * moved).sum();
-                lacks += all - along.dot(&small.solve(&along));
-            }
-            found.push((lacks / value, value.sqrt()));
-        }
-    }
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut frequencies: Vec<f64> = Vec::new();
-    for (_, omega) in found {
-        let met = frequencies.iter().any(|other| (omega / other - 1.0).abs() < SAME_FAMILY);
-        if !met && frequencies.len() < MODES {
-            frequencies.push(omega);
-        }
-    }
-    Ok(frequencies)
-}
-
-/// The reduced ring, its blades differing.
-struct Small<'a> {
-    sector: &'a ReducedSector,
+/// What the coordinates of a sector cannot state, wave by wave.
+#[derive(Debug)]
+pub(in crate::structure) struct Lacking {
     sectors: usize,
-    mass: Matrix,
-    stiffness: Matrix,
-    analysis: Analysis,
+    dofs: usize,
+    /// Modes are asked up to there, rad/s.
+    up_to: f64,
+    forms: Vec<Form>,
 }
 
-impl<'a> MistunedRing<'a> {
+/// Rows `L` of which `|L z|²` is the energy beyond the coordinates, `z` first the inertia by `up_to²`, then the forces of the blades, of each the
+/// real part and, if the wave has one, the imaginary part.
+#[derive(Debug)]
+struct Form {
+    diameter: usize,
+    rows: DMatrix<f64>,
+}
+
+impl Lacking {
+    /// Of a sector in few coordinates with this blade, up to `up_to`, rad/s.
     pub fn new(
-        sector: &'a CyclicSector,
-        (blade, alone): (&'a Blade, &'a Factor),
-        deviations: &'a [f64],
-        seen: &[Row],
-    ) -> Result<Self, ReductionError> {
-        let stiffness = sector.alone(&sector.stiffness)?;
-        let ports: Vec<RingRow> = seen.iter().map(|row| sector.row(row)).collect();
-        let size = |row: &RingRow| -> f64 {
-            let parts = row.iter().map(|(at, _, weight)| (weight, stiffness.get(*at, *at)));
-            parts.filter(|(_, own)| *own > 0.0).map(|(weight, own)| weight * weight / own).sum()
-        };
-        let scales = ports.iter().map(size).map(|size| if size > 0.0 { size.sqrt() } else { 1.0 }).collect();
-        Ok(MistunedRing { sector, blade, deviations, ports, scales, alone })
-    }
-
-    /// The largest error of the reduced ring at resonances up to `up_to` (rad/s) near these frequencies of the tuned one. Beyond `enough` no further one
-    /// is looked at.
-    pub fn deviation(
-        &self,
+        (sector, seen): (&CyclicSector, &[Row]),
+        blade: &Blade,
         reduced: &ReducedSector,
-        of_blade: &[(usize, usize, f64)],
-        near: &[f64],
         up_to: f64,
-        enough: f64,
-    ) -> Result<Deviation, ReductionError> {
-        let small = self.small(reduced, of_blade)?;
-        let of = |pick: fn(f64, f64) -> f64| self.deviations.iter().copied().fold(0.0, pick);
-        let ends = [of(f64::max), of(f64::min)].map(|deviation| (1.0 + deviation).sqrt());
-        let mut worst = Deviation { error: 0.0, omega: up_to };
-        for omega in near.iter().flat_map(|omega| ends.map(|end| omega * end)) {
-            let one = self.at_resonance(&small, omega, up_to)?;
-            if one.error > worst.error {
-                worst = one;
+    ) -> Result<Self, ReductionError> {
+        let form = |diameter: usize| Form::new(&sector.wave(diameter, seen)?, blade, reduced, (diameter, up_to));
+        let forms = sector.diameters(LEVEL).into_iter().map(form);
+        let forms = forms.collect::<Result<_, _>>()?;
+        Ok(Lacking { sectors: sector.sectors, dofs: reduced.dofs(), up_to, forms })
+    }
+
+    /// The largest error at a resonance of the reduced ring with these deviations of its blades, of modes of unit mass that have these eigenvalues, rising:
+    /// a relative shift of the frequency by the half width of errors is one.
+    pub fn deviation(&self, (values, shapes): (&[f64], &[f64]), deviations: &[f64]) -> Deviation {
+        let (r, sectors) = (self.dofs, self.sectors);
+        let phases = self.phases(deviations);
+        let [lowest, highest] = [FREE * self.up_to, self.up_to].map(|omega| omega * omega);
+        let mut worst = Deviation { error: 0.0, omega: self.up_to };
+        for (&value, shape) in values.iter().zip(shapes.chunks_exact(r * sectors)) {
+            if !(lowest..=highest).contains(&value) {
+                continue;
             }
-            if worst.error > enough {
-                break;
+            let waves = columns::combination(r, shape, &phases);
+            let inertia = -(value + shift(self.up_to)) / highest;
+            let mut beyond = 0.0;
+            for (diameter, wave) in waves.chunks_exact(4 * r).enumerate() {
+                let (moved, pushed) = wave.split_at(2 * r);
+                let parts = [moved, pushed].map(|of| of.split_at(r));
+                beyond += self.nearest(diameter).energy(parts, inertia);
+            }
+            let error = 0.5 * beyond / value / HALF_WIDTH;
+            // what is no number is no small error
+            let error = if error.is_nan() { f64::INFINITY } else { error };
+            if error > worst.error {
+                worst = Deviation { error, omega: value.sqrt() };
             }
         }
-        Ok(worst)
+        worst
     }
 
-    fn small<'b>(
-        &self,
-        reduced: &'b ReducedSector,
-        of_blade: &[(usize, usize, f64)],
-    ) -> Result<Small<'b>, ReductionError> {
-        let (r, sectors) = (reduced.dofs(), self.sector.sectors);
-        let ring = |entries: &[RingEntry], more: &[(usize, usize, f64)]| {
-            let around = (0..sectors).flat_map(|s| {
-                entries
-                    .iter()
-                    .map(move |&(row, column, shift, value)| (s * r + row, next(s, shift, sectors) * r + column, value))
-            });
-            let blades = (0..sectors).flat_map(|s| {
-                let deviation = self.deviations[s];
-                more.iter().map(move |&(row, column, value)| (s * r + row, s * r + column, deviation * value))
-            });
-            Matrix::from_triplets(sectors * r, around.chain(blades)).map_err(|_| ReductionError::OutOfRange)
-        };
-        let (mass, stiffness) = (ring(&reduced.mass, &[])?, ring(&reduced.stiffness, of_blade)?);
-        let analysis = Analysis::new(&[&stiffness, &mass]);
-        Ok(Small { sector: reduced, sectors, mass, stiffness, analysis })
-    }
-
-    /// At the resonance of the reduced ring that an answer near `omega` leads to.
-    fn at_resonance(&self, small: &Small, omega: f64, up_to: f64) -> Result<Deviation, ReductionError> {
-        let load = self.load();
-        let seen = small.along(&load);
-        let mut omega = omega;
-        for _ in 0..TOWARDS {
-            let mut answer = seen.clone();
-            small.factor(omega)?.solve(&mut answer);
-            let found = small.quotient(&answer).max(0.0).sqrt();
-            // an answer of many modes may lead out of the range
-            if found > 0.0 && found <= up_to {
-                omega = found;
-            }
-        }
-        let factor = small.factor(omega)?;
-        let mut coordinates = seen;
-        factor.solve(&mut coordinates);
-        let first = small.expanded(&coordinates);
-        let error = self.lacking(small, &factor, omega, &load, &first);
-        Ok(Deviation { error: if error.is_nan() { f64::INFINITY } else { error }, omega })
-    }
-
-    /// The relative change at the ports by what the whole ring adds to an answer of the reduced one.
-    fn lacking(
-        &self,
-        small: &Small,
-        factor: &ComplexFactor,
-        omega: f64,
-        load: &[Complex64],
-        first: &[Complex64],
-    ) -> f64 {
-        let residual = minus(load, &self.times(omega, first));
-        let seen = self.seen(first);
-        let size = norm(&seen);
-        // vectors, and the forces that they take
-        let (mut vectors, mut forces): (Vec<Vec<Complex64>>, Vec<Vec<Complex64>>) = Default::default();
-        let (mut left, mut added, mut error) = (residual.clone(), vec![ZERO; seen.len()], 0.0);
-        for _ in 0..VECTORS {
-            let mut vector = self.alone(&left);
-            let mut force = self.times(omega, &vector);
-            let mut answered = small.along(&force);
-            factor.solve(&mut answered);
-            let answered = small.expanded(&answered);
-            vector = minus(&vector, &answered);
-            force = minus(&force, &self.times(omega, &answered));
-            let length = norm(&vector);
-            if length == 0.0 {
-                break;
-            }
-            vector.iter_mut().chain(&mut force).for_each(|z| *z /= length);
-            vectors.push(vector);
-            forces.push(force);
-            let m = vectors.len();
-            let matrix = DMatrix::from_fn(m, m, |i, k| dot(&vectors[i], &forces[k]));
-            let right = nalgebra::DVector::from_fn(m, |i, _| dot(&vectors[i], &residual));
-            let Some(weights) = matrix.lu().solve(&right) else { break };
-            let sum = |all: &[Vec<Complex64>]| -> Vec<Complex64> {
-                let mut sum = vec![ZERO; residual.len()];
-                all.iter()
-                    .zip(weights.iter())
-                    .for_each(|(one, w)| sum.iter_mut().zip(one).for_each(|(s, z)| *s += w * z));
-                sum
-            };
-            left = minus(&residual, &sum(&forces));
-            let found = self.seen(&sum(&vectors));
-            let change = norm(&minus(&found, &added));
-            error = norm(&found)
-                / norm(&seen.iter().zip(&found).map(|(a, b)| a + b).collect::<Vec<_>>()).max(f64::MIN_POSITIVE);
-            added = found;
-            if change <= KNOWN * norm(&added) || norm(&added) <= NOTHING * size {
-                break;
-            }
-        }
-        error
-    }
-
-    /// Forces of random signs on everything that is seen, over all rows of all sectors.
-    fn load(&self) -> Vec<Complex64> {
-        let (n, sectors) = (self.sector.dofs, self.sector.sectors);
-        let mut load = vec![ZERO; n * sectors];
-        for s in 0..sectors {
-            for (p, (row, scale)) in self.ports.iter().zip(&self.scales).enumerate() {
-                for (at, shift, weight) in row {
-                    load[next(s, *shift, sectors) * n + at] += sign(s * self.ports.len() + p) * weight / scale;
-                }
-            }
-        }
-        load
-    }
-
-    /// What is seen of displacements, each port by its size.
-    fn seen(&self, x: &[Complex64]) -> Vec<Complex64> {
-        let (n, sectors) = (self.sector.dofs, self.sector.sectors);
-        let all = (0..sectors).flat_map(|s| self.ports.iter().zip(&self.scales).map(move |port| (s, port)));
-        all.map(|(s, (row, scale))| {
-            row.iter().map(|(at, shift, weight)| x[next(s, *shift, sectors) * n + at] * *weight).sum::<Complex64>()
-                / *scale
+    /// The waves of displacements and of these by the deviations, real and imaginary parts: weights of the sectors, columns for every nodal diameter.
+    fn phases(&self, deviations: &[f64]) -> DMatrix<f64> {
+        let sectors = self.sectors;
+        DMatrix::from_fn(sectors, 4 * (sectors / 2 + 1), |s, column| {
+            let (diameter, part) = (column / 4, column % 4);
+            let share = if is_real(diameter, sectors) { 1.0 } else { 2.0 } / sectors as f64;
+            let phase = turn(-((diameter * s) as i64), sectors) * share.sqrt();
+            let weight = if part < 2 { 1.0 } else { deviations[s] };
+            weight * if part % 2 == 0 { phase.re } else { phase.im }
         })
-        .collect()
     }
 
-    /// `A x`.
-    fn times(&self, omega: f64, x: &[Complex64]) -> Vec<Complex64> {
-        let (n, sectors) = (self.sector.dofs, self.sector.sectors);
-        let (of_stiffness, of_mass) = (lossy(), Complex64::new(-omega * omega, 0.0));
-        let mut y = vec![ZERO; x.len()];
-        for (entries, factor) in [(&self.sector.stiffness, of_stiffness), (&self.sector.mass, of_mass)] {
-            for s in 0..sectors {
-                for &(row, column, shift, value) in entries {
-                    y[s * n + row] += factor * (value * x[next(s, shift, sectors) * n + column]);
+    fn nearest(&self, diameter: usize) -> &Form {
+        let apart = |form: &&Form| form.diameter.abs_diff(diameter);
+        self.forms.iter().min_by_key(apart).expect("a ring has waves")
+    }
+}
+
+impl Form {
+    fn new(
+        whole: &Whole,
+        blade: &Blade,
+        reduced: &ReducedSector,
+        (diameter, up_to): (usize, f64),
+    ) -> Result<Self, ReductionError> {
+        let n = reduced.n;
+        let copies = whole.dofs() / n;
+        let lifted = |columns: &[f64]| -> Vec<f64> {
+            let all = (0..copies).flat_map(|copy| columns.chunks_exact(n).map(move |column| (copy, column)));
+            all.flat_map(|(copy, column)| {
+                let zeros = |count: usize| std::iter::repeat_n(0.0, count * n);
+                zeros(copy).chain(column.iter().copied()).chain(zeros(copies - 1 - copy)).collect::<Vec<_>>()
+            })
+            .collect()
+        };
+        let basis = lifted(&reduced.basis);
+        let mut forces: Vec<f64> = whole.mass.times_columns(&basis).iter().map(|force| force * up_to * up_to).collect();
+        forces
+            .extend(lifted(&reduced.basis.chunks_exact(n).flat_map(|column| blade.times(column)).collect::<Vec<_>>()));
+        let sum = [(1.0, &*whole.stiffness), (shift(up_to), &*whole.mass)];
+        let singular = |singular| ReductionError::Singular { omega: 0.0, singular };
+        let factor = whole.analysis.factor(&sum).map_err(singular)?;
+        let mut moved = forces.clone();
+        factor.solve(&mut moved);
+        let tall = copies * n;
+        let size = columns::products(tall, &moved, &forces).diagonal().amax();
+        // without what the coordinates answer
+        let mut own = columns::products(tall, &basis, &whole.stiffness.times_columns(&basis));
+        own += columns::products(tall, &basis, &whole.mass.times_columns(&basis)) * shift(up_to);
+        let own = ((&own + own.transpose()) * 0.5).cholesky().ok_or(ReductionError::OutOfRange)?;
+        let answered = own.solve(&columns::products(tall, &basis, &forces));
+        columns::add(tall, &mut moved, -1.0, &basis, &answered);
+        let energy = columns::products(tall, &moved, &forces);
+        let eigen = eigen::symmetric((&energy + energy.transpose()) * 0.5).ok_or(ReductionError::OutOfRange)?;
+        let kept: Vec<usize> = (0..energy.nrows()).filter(|&k| eigen.eigenvalues[k] > ROUNDED * size).collect();
+        let row = |i: usize, k: usize| eigen.eigenvectors[(k, kept[i])] * eigen.eigenvalues[kept[i]].sqrt();
+        Ok(Form { diameter, rows: DMatrix::from_fn(kept.len(), energy.nrows(), row) })
+    }
+
+    /// Of the real and imaginary parts of displacements and of forces; the former by the factor `inertia`.
+    fn energy(&self, [moved, pushed]: [(&[f64], &[f64]); 2], inertia: f64) -> f64 {
+        let r = moved.0.len();
+        let real = self.rows.ncols() == 2 * r;
+        let square = |parts: &[(f64, &[f64])]| -> f64 {
+            let mut sum = vec![0.0; self.rows.nrows()];
+            for ((factor, values), first) in parts.iter().zip((0..).step_by(r)) {
+                for (k, value) in values.iter().enumerate() {
+                    let column = self.rows.column(first + k);
+                    sum.iter_mut().zip(column.iter()).for_each(|(sum, l)| *sum += l * factor * value);
                 }
             }
-        }
-        for (s, &deviation) in self.deviations.iter().enumerate().filter(|(_, deviation)| **deviation != 0.0) {
-            let one = &x[s * n..(s + 1) * n];
-            let parts =
-                [|z: &Complex64| z.re, |z: &Complex64| z.im].map(|part| one.iter().map(part).collect::<Vec<f64>>());
-            let [re, im] = parts.map(|part| self.blade.times(&part));
-            for (i, (re, im)) in re.iter().zip(&im).enumerate() {
-                y[s * n + i] += deviation * of_stiffness * Complex64::new(*re, *im);
-            }
-        }
-        y
-    }
-
-    /// Answers of every sector with its neighbours held, at rest.
-    fn alone(&self, forces: &[Complex64]) -> Vec<Complex64> {
-        let mut parts: Vec<f64> = forces.iter().map(|z| z.re).chain(forces.iter().map(|z| z.im)).collect();
-        self.alone.solve(&mut parts);
-        let (re, im) = parts.split_at(forces.len());
-        re.iter().zip(im).map(|(re, im)| Complex64::new(*re, *im)).collect()
-    }
-}
-
-/// What the whole adds, relative to the answer, below which it is rounding.
-const NOTHING: f64 = 1e-10;
-
-impl Small<'_> {
-    fn factor(&self, omega: f64) -> Result<ComplexFactor, ReductionError> {
-        let sum = [(lossy(), &self.stiffness), (-omega * omega * ONE, &self.mass)];
-        self.analysis.factor_complex(&sum).map_err(|singular| ReductionError::Singular { omega, singular })
-    }
-
-    /// `ω²` of the Rayleigh quotient.
-    fn quotient(&self, x: &[Complex64]) -> f64 {
-        let energy = |matrix: &Matrix| -> f64 {
-            matrix.times_complex(x).iter().zip(x).map(|(force, x)| (x.conj() * force).re).sum()
+            sum.iter().map(|x| x * x).sum()
         };
-        energy(&self.stiffness) / energy(&self.mass)
+        match real {
+            true => square(&[(inertia, moved.0), (1.0, pushed.0)]) + square(&[(inertia, moved.1), (1.0, pushed.1)]),
+            false => square(&[(inertia, moved.0), (inertia, moved.1), (1.0, pushed.0), (1.0, pushed.1)]),
+        }
     }
-
-    /// `Vᵀ f`.
-    fn along(&self, forces: &[Complex64]) -> Vec<Complex64> {
-        let n = self.sector.n;
-        let [re, im] = parts(forces).map(|part| columns::products(n, &self.sector.basis, &part));
-        re.iter().zip(im.iter()).map(|(re, im)| Complex64::new(*re, *im)).collect()
-    }
-
-    /// `V p`.
-    fn expanded(&self, coordinates: &[Complex64]) -> Vec<Complex64> {
-        let (n, r) = (self.sector.n, self.sector.dofs());
-        let [re, im] = parts(coordinates)
-            .map(|part| columns::combination(n, &self.sector.basis, &DMatrix::from_vec(r, self.sectors, part)));
-        re.iter().zip(&im).map(|(re, im)| Complex64::new(*re, *im)).collect()
-    }
-}
-
-/// `1 + jη` with the half width of a resonance at which modes that shift are an error.
-fn lossy() -> Complex64 {
-    Complex64::new(1.0, 2.0 * HALF_WIDTH)
-}
-
-fn parts(of: &[Complex64]) -> [Vec<f64>; 2] {
-    [of.iter().map(|z| z.re).collect(), of.iter().map(|z| z.im).collect()]
-}
-
-/// A sector further by `shift`.
-fn next(sector: usize, shift: i64, sectors: usize) -> usize {
-    (sector as i64 + shift).rem_euclid(sectors as i64) as usize
-}
-
-fn minus(a: &[Complex64], b: &[Complex64]) -> Vec<Complex64> {
-    a.iter().zip(b).map(|(a, b)| a - b).collect()
-}
-
-/// `aᵀ b`: of a matrix that is symmetric and not Hermitian.
-fn dot(a: &[Complex64], b: &[Complex64]) -> Complex64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn norm(a: &[Complex64]) -> f64 {
-    a.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt()
 }

@@ -11,7 +11,7 @@
 //! and harmonic balance, which wants receptances only, may take modes and a series of residuals (`series`). Every reduction can be held against the
 //! whole structure (`evidence`; `mistuned` for a ring whose blades differ), and [`Reduce`] takes as many modes as a given error asks for. A sector of a ring is reduced for all its waves at once
 //! (`ring`). One basis may serve two
-//! stiffnesses and all between (`between`).
+//! stiffnesses and all between (`between`). A ring whose blades differ is brought into its own modes (`nominal`).
 //!
 //! Damping is a part of the whole structure and is reduced like the other matrices; [`Damping`] says what a modal damping ratio means
 //! beyond the modes that
@@ -23,6 +23,7 @@ mod craig_bampton;
 mod evidence;
 mod free;
 mod mistuned;
+mod nominal;
 mod residual;
 mod ring;
 mod series;
@@ -30,7 +31,9 @@ mod series;
 pub use choice::{Chosen, Reduce};
 pub use evidence::{Deviation, Reference};
 pub use free::Free;
-pub(in crate::structure) use mistuned::{MistunedRing, alone, lacking_most};
+pub(in crate::structure) use mistuned::Lacking;
+pub(crate) use nominal::RingModes;
+pub(in crate::structure) use nominal::{EXTENTS, Mixed, NominalRing};
 pub(crate) use ring::ReducedSector;
 pub(in crate::structure) use ring::STEPS;
 pub use series::Series;

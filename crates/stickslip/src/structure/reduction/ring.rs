@@ -4,7 +4,7 @@
 //! imaginary parts of those of some diameters make one real basis of the sector, `q(s) = V p(s)`, and the reduced ring couples neighbours
 //! only, as the whole does: `V* A(θ) V` for every θ at once. It has the modes of these diameters exactly, and is held against the waves of others;
 //! as many diameters are taken as the error asks for. What differs from sector to sector is seen by the same basis, `Vᵀ ΔA V`: the nominal modes
-//! of the ring span nearly what the mistuned ring does. Where that is not near enough, the residual vectors of the forces `D φ` join them, by which a
+//! of the ring span nearly what the mistuned ring does (`nominal`, `mistuned`). Where that is not near enough, the residual vectors of the forces `D φ` join them, by which a
 //! blade that deviates answers the modes φ.
 //!
 //! Source: Yang and Griffin (2001), "A reduced-order model of mistuning using a subset of nominal system modes", J. Eng. Gas Turbines Power 123,
