@@ -83,6 +83,9 @@ pub fn symmetric_in_blocks(matrix: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f
 /// ```
 pub fn symmetric_pair(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = h.nrows();
+    if n == 0 {
+        return Some((Vec::new(), DMatrix::zeros(0, 0)));
+    }
     // ones on the diagonal, so that coordinates of any unit count alike
     let unit = h.diagonal().map(|v| 1.0 / v.sqrt());
     let scaled = |matrix: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, k| unit[i] * matrix[(i, k)] * unit[k]);

@@ -490,6 +490,10 @@ impl Reduced {
 
 /// `A B`.
 fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    // columns of length zero cannot be counted
+    if a.is_empty() || b.is_empty() {
+        return DMatrix::zeros(a.nrows(), b.ncols());
+    }
     DMatrix::from_vec(a.nrows(), b.ncols(), columns::combination(a.nrows(), a.as_slice(), b))
 }
 
@@ -540,9 +544,6 @@ fn damping(
 /// Eigenvalues λ (rad²/s², rising, infinite without mass) and shapes of unit mass (or unit stiffness without mass) of a small structure.
 pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let r = mass.nrows();
-    if r == 0 {
-        return Some((vec![], DMatrix::zeros(0, 0)));
-    }
     let moves = |i: usize| mass[(i, i)] > 0.0 || (mass[(i, i)] == 0.0 && stiffness[(i, i)] > 0.0);
     if is_diagonal(mass) && is_diagonal(stiffness) && (0..r).all(moves) {
         return Some(natural_by_themselves(&mass.diagonal(), &stiffness.diagonal()));

@@ -13,12 +13,11 @@
 use super::evidence::sign;
 use super::mistuned::{FREE, shift};
 use super::ring::HALF_WIDTH;
-use super::{Damping, Deviation, ReducedSector, ReductionError, Row, UNSEEN, natural, product};
+use super::{Damping, Deviation, ReducedSector, ReductionError, Row, UNSEEN, natural, product, symmetric};
 use crate::structure::sector::is_real;
 use crate::structure::{RingEntry, turn};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
-use stickslip_numerics::dense::solve_lower_in_blocks;
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{Analysis, Factor, Matrix, ModesError, columns};
 
@@ -125,7 +124,11 @@ impl NominalRing {
             factor.solve(&mut moved);
             let held = columns::products(n, &moved, &forces);
             let mass = columns::products(n, &moved, &self.mass.times_columns(&moved));
-            let (thetas, mut mixing) = pencil(&held, &mass).ok_or(ReductionError::OutOfRange)?;
+            // the largest has the lowest frequency
+            let found = eigen::symmetric_pair(&symmetric(mass), &symmetric(held)).ok_or(ReductionError::OutOfRange)?;
+            let rising: Vec<usize> = (0..found.0.len()).rev().collect();
+            let thetas: Vec<f64> = rising.iter().map(|&k| found.0[k]).collect();
+            let mut mixing = found.1.select_columns(&rising);
             for (mut column, theta) in mixing.column_iter_mut().zip(&thetas) {
                 column.unscale_mut(theta.sqrt());
             }
@@ -346,31 +349,6 @@ fn independent(flexible: &DMatrix<f64>, whole: &[f64]) -> Result<DMatrix<f64>, R
         }
     }
     Ok(weights)
-}
-
-/// Vectors `v` with `vᵀAv = 1` and `vᵀMv = θ`, the largest θ first.
-fn pencil(a: &DMatrix<f64>, m: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
-    let n = a.nrows();
-    if n == 0 {
-        return Some((Vec::new(), DMatrix::zeros(0, 0)));
-    }
-    let unit = a.diagonal().map(|v| 1.0 / v.sqrt());
-    let scaled = |matrix: &DMatrix<f64>| {
-        DMatrix::from_fn(n, n, |i, k| 0.5 * unit[i] * (matrix[(i, k)] + matrix[(k, i)]) * unit[k])
-    };
-    let lower = scaled(a).cholesky()?.unpack();
-    let solve = |mut right: DMatrix<f64>, transposed: bool| {
-        solve_lower_in_blocks(lower.as_slice(), n, right.as_mut_slice(), transposed);
-        right
-    };
-    let whole = solve(solve(scaled(m), false).transpose(), false);
-    let (mut values, vectors) = eigen::symmetric_in_blocks(&whole)?;
-    let mut vectors = solve(vectors, true);
-    for mut column in vectors.column_iter_mut() {
-        column.component_mul_assign(&unit);
-    }
-    values.reverse();
-    Some((values, DMatrix::from_fn(n, n, |i, k| vectors[(i, n - 1 - k)])))
 }
 
 /// Entries of all sectors, of so many rows and columns each.
