@@ -10,7 +10,7 @@ use stickslip::law::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative, Sh
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::settling::Settling;
 use stickslip::method::shooting::Shooting;
-use stickslip::method::{Method, MethodError, OrbitError, Solver};
+use stickslip::method::{Breakdown, Method, MethodError, OrbitError, Solver};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Accuracy, Found, Orbit, Path, Sample, Symmetry};
 use stickslip_numerics::dual::Real;
@@ -62,8 +62,10 @@ impl RateLaw for TwoSurfaces {
     }
     fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let v = motion.velocity[0];
+        // without a limit it carries nothing, whatever its states are
+        let share = if self.limit > 0.0 { 1.0 / self.limit } else { 0.0 };
         for (i, stiffness) in [self.stiffness, self.stiffness * self.ratio].into_iter().enumerate() {
-            rate[i] = (v - v.abs() * z[i]) * (stiffness / self.limit);
+            rate[i] = (v - v.abs() * z[i]) * (stiffness * share);
         }
         [(z[0] + z[1]) * (0.5 * self.limit), S::from(0.0), S::from(0.0)]
     }
@@ -96,8 +98,9 @@ impl Law for Hardening {
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.limit, self.tangent]
     }
+    /// Without a limit two springs in a row are left, which nothing bounds.
     fn scale(&self) -> f64 {
-        self.limit
+        if self.limit > 0.0 { self.limit } else { f64::INFINITY }
     }
     fn step(&self) -> Option<&dyn Step> {
         Some(self)
@@ -109,7 +112,7 @@ impl StepLaw for Hardening {
         1
     }
     fn state_scale(&self) -> f64 {
-        self.limit / self.stiffness
+        if self.limit > 0.0 { self.limit / self.stiffness } else { 1.0 }
     }
     /// The state is where the slider stands.
     fn advance<S: Real>(&self, _from: &[S; 3], to: &[S; 3], z: &mut [S]) -> [S; 3] {
@@ -166,6 +169,121 @@ fn laws_from_outside_work_in_every_method_that_takes_their_view() {
         // a method that cannot take it says which view it misses, and names law and joint
         let error = stickslip::method::event_driven::EventDriven.solver(&system).err().unwrap().to_string();
         assert!(error.contains(law.name()) && error.contains("rub"), "{error}");
+    }
+}
+
+/// Without a limit the first law carries nothing and the second is two springs in a row: the motion is that of a linear structure, in closed form.
+#[test]
+fn laws_from_outside_without_a_limit_are_linear() {
+    let omega = TAU * 24.0;
+    let (series, beside) = (1e4, 2e3);
+    let laws: [(SharedLaw, f64); 2] = [
+        (Arc::new(TwoSurfaces { stiffness: 1e4, limit: 0.0, ratio: 3.0 }), 0.0),
+        (Arc::new(Hardening { stiffness: series, limit: 0.0, tangent: beside }), series * beside / (series + beside)),
+    ];
+    for (law, spring) in laws {
+        let system = model(law.clone()).assemble().unwrap();
+        // (k - m Ω² + i c Ω) x_a + spring (x_a - x_b) = F, and the same of b without F
+        let own = |mass: f64| Complex64::new(2e4 + spring - mass * omega * omega, 8.0 * omega);
+        let (a, b) = (own(1.0), own(0.6));
+        let determinant = a * b - spring * spring;
+        let expected = [12.0 * b / determinant, Complex64::from(12.0 * spring) / determinant].map(|x| x.norm());
+        let methods: [&dyn Method; 3] =
+            [&HarmonicBalance::default(), &Shooting::default(), &Settling { tolerance: 1e-6, ..Settling::default() }];
+        for method in methods {
+            let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+            for (found, expected) in amplitudes(&orbit).iter().zip(expected) {
+                let off = (found - expected).abs() / (12.0 / a.norm());
+                assert!(off < 2e-5, "{} {}: {found} {expected}", law.name(), method.name());
+            }
+        }
+    }
+}
+
+/// A law that goes wrong: states of no size, or a force that is no number beyond a distance.
+#[derive(Debug)]
+struct Wrong {
+    size: f64,
+    reach: f64,
+    by_rate: bool,
+}
+
+static WRONG: LawInfo = LawInfo {
+    name: "wrong",
+    summary: "no law",
+    parameters: &[],
+    sample: &[],
+    build: |_| Arc::new(Wrong { size: 1.0, reach: 0.0, by_rate: false }),
+};
+
+impl Law for Wrong {
+    fn info(&self) -> &'static LawInfo {
+        &WRONG
+    }
+    fn values(&self) -> Vec<f64> {
+        Vec::new()
+    }
+    fn scale(&self) -> f64 {
+        1.0
+    }
+    fn step(&self) -> Option<&dyn Step> {
+        if self.by_rate { None } else { Some(self) }
+    }
+    fn rate(&self) -> Option<&dyn Rate> {
+        if self.by_rate { Some(self) } else { None }
+    }
+}
+
+impl Wrong {
+    fn force<S: Real>(&self, u: S) -> [S; 3] {
+        let force = if u.re().abs() > self.reach { S::from(f64::NAN) } else { u * 1e3 };
+        [force, S::from(0.0), S::from(0.0)]
+    }
+}
+
+impl StepLaw for Wrong {
+    fn states(&self) -> usize {
+        1
+    }
+    fn state_scale(&self) -> f64 {
+        self.size
+    }
+    fn advance<S: Real>(&self, _from: &[S; 3], to: &[S; 3], z: &mut [S]) -> [S; 3] {
+        z[0] = to[0];
+        self.force(to[0])
+    }
+}
+
+impl RateLaw for Wrong {
+    fn states(&self) -> usize {
+        1
+    }
+    fn state_scale(&self) -> f64 {
+        self.size
+    }
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+        rate[0] = motion.velocity[0] - z[0];
+        self.force(motion.displacement[0])
+    }
+}
+
+/// States of no size are refused with the system; a force that is no number ends every search at once, with the joint and its law.
+#[test]
+fn laws_that_give_no_numbers_are_named() {
+    for by_rate in [false, true] {
+        for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let error = model(Arc::new(Wrong { size, reach: 1.0, by_rate })).assemble().unwrap_err().to_string();
+            assert!(error.contains("wrong") && error.contains("state_scale"), "{error}");
+        }
+        // the motion without a joint has an amplitude of some millimetres
+        let system = model(Arc::new(Wrong { size: 1e-3, reach: 1e-4, by_rate })).assemble().unwrap();
+        for method in [&Shooting::default() as &dyn Method, &Settling::default()] {
+            let error = method.solver(&system).unwrap().orbit(TAU * 24.0, None).unwrap_err();
+            let OrbitError::Breakdown { cause: Breakdown::NoNumber { joint, law, .. }, .. } = &error else {
+                panic!("{by_rate} {}: {error}", method.name())
+            };
+            assert_eq!((joint.as_str(), *law), ("rub", "wrong"));
+        }
     }
 }
 

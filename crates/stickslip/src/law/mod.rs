@@ -354,12 +354,22 @@ impl dyn Law + '_ {
         self.scale() == 0.0
     }
 
-    /// Checks that every parameter is finite and in its range, and that they fit each other.
+    /// Checks that every parameter is finite and in its range, that they fit each other, and that internal states have a size.
     ///
     /// # Errors
     /// [`LawError`] names the first parameter that is not.
     pub fn check(&self) -> Result<(), LawError> {
         parameter::check(self.info(), &self.values())?;
+        // what is compared with a size of nothing is no number
+        let sizes = [
+            self.step().filter(|step| step.states() > 0).map(|step| step.state_scale()),
+            self.rate().filter(|rate| rate.states() > 0).map(|rate| rate.state_scale()),
+        ];
+        if let Some(size) = sizes.into_iter().flatten().find(|size| !(size.is_finite() && *size > 0.0)) {
+            let message =
+                format!("the size of its internal states, `state_scale`, must be finite and above zero, found {size}");
+            return Err(LawError::Inconsistent { law: self.name(), message });
+        }
         self.consistent().map_err(|message| LawError::Inconsistent { law: self.name(), message })
     }
 }

@@ -1,7 +1,7 @@
 //! A system as flows in steps see it: full matrices, axes side by side, laws with the numbers of their axes and states.
 
-use super::MethodError;
 use super::drive::Drive;
+use super::{Breakdown, MethodError};
 use crate::law::SharedLaw;
 use crate::model::{Axis, System};
 use crate::structure::Matrices;
@@ -31,6 +31,8 @@ pub(crate) struct Assembly {
 /// A law with its place among axes and states.
 #[derive(Debug, Clone)]
 pub(crate) struct PlacedLaw {
+    /// Name of the joint.
+    pub joint: String,
     pub law: SharedLaw,
     pub first_axis: usize,
     pub directions: usize,
@@ -49,6 +51,10 @@ impl PlacedLaw {
     /// Its internal states.
     pub fn internal(&self) -> std::ops::Range<usize> {
         self.first_state..self.first_state + self.states
+    }
+    /// It answers by what is no number.
+    pub fn no_number(&self, time: f64) -> Breakdown {
+        Breakdown::NoNumber { time, joint: self.joint.clone(), law: self.law.name() }
     }
 }
 
@@ -84,7 +90,15 @@ impl Assembly {
             let (law, count, state_scale) =
                 states(joint.law()).map_err(|misses| MethodError::law(method, joint, misses))?;
             let directions = joint.axes().len();
-            joints.push(PlacedLaw { law, first_axis, directions, first_state: internal, states: count, state_scale });
+            joints.push(PlacedLaw {
+                joint: joint.name().to_owned(),
+                law,
+                first_axis,
+                directions,
+                first_state: internal,
+                states: count,
+                state_scale,
+            });
             first_axis += directions;
             internal += count;
         }

@@ -145,6 +145,9 @@ fn settle(
         let change: Vec<f64> = state.iter().zip(&before).map(|(a, b)| a - b).collect();
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
         let residual = norm(map.weights(), &change) / size;
+        if residual.is_nan() {
+            return Err(broke(Breakdown::OutOfRange { time: 0.0 })); // no later return has a size either
+        }
         smallest = f64::min(smallest, residual);
         changes.push(residual);
         last_states.push_front(before);
@@ -304,6 +307,9 @@ pub(crate) fn descended(
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
         let before = norm(map.weights(), gap.as_slice());
         let residual = before / size;
+        if residual.is_nan() {
+            return Err(broke(Breakdown::OutOfRange { time: 0.0 }));
+        }
         if aim.rest > 0.0 && size > LARGEST * aim.rest {
             // so large that the work of the loads drowns in rounding: an undamped resonance
             let (method, omega) = (aim.method, aim.omega);

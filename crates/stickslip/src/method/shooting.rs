@@ -377,7 +377,9 @@ impl<'a> Shooter<'a> {
         // steps that are too long for a law's states are no reason to give up
         let mut coarse = loop {
             match search.find(self, start, |shooter| shooter.first_state(aim.omega), aim) {
-                Err(OrbitError::Breakdown { cause: Breakdown::Stalled { .. }, .. }) if count < MOST => {
+                Err(OrbitError::Breakdown {
+                    cause: Breakdown::Stalled { .. } | Breakdown::NoNumber { .. }, ..
+                }) if count < MOST => {
                     count *= 2;
                     self.set_count(count);
                 }

@@ -55,6 +55,16 @@ pub enum Breakdown {
         /// The step, s.
         step: f64,
     },
+    /// A law answers by what is no number.
+    #[error("the law `{law}` of joint `{joint}` gives no number at t = {time:.6e} s")]
+    NoNumber {
+        /// When, s.
+        time: f64,
+        /// Name of the joint.
+        joint: String,
+        /// Name of its law.
+        law: &'static str,
+    },
     /// Equal steps, however short, do not reach the tolerance.
     #[error(
         "{steps} steps leave an estimated error of {estimate:.1e} where {tolerance:.1e} is wanted; \
@@ -110,6 +120,7 @@ impl Breakdown {
             | Breakdown::Defective { time, .. }
             | Breakdown::TooFast { time }
             | Breakdown::Stalled { time, .. }
+            | Breakdown::NoNumber { time, .. }
             | Breakdown::OutOfRange { time }
             | Breakdown::Unbounded { time, .. } => Some(time),
             Breakdown::Unresolved { .. } => None,

@@ -664,3 +664,120 @@ fn weighted_inverse(delassus: &DMatrix<f64>, limits: &[f64]) -> Option<DMatrix<f
     let inverse = eigen.eigenvalues.map(|value| if value > REDUNDANT * largest { 1.0 / value } else { 0.0 });
     Some(&weight * &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose() * &weight)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Coulomb, Jenkins, SharedLaw};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
+    use nalgebra::{Matrix2, Vector2};
+    use std::sync::Arc;
+    use stickslip_numerics::signal::real_dot;
+
+    const STIFFNESS: f64 = 4.0;
+    const DAMPING: f64 = 0.6;
+    const LIMIT: f64 = 0.5;
+    const LOAD: f64 = 1.7;
+    const MEAN: f64 = 0.3;
+    const OMEGA: f64 = 1.3;
+    /// Where the stretch begins and how long it is, s.
+    const TIME: f64 = 0.4;
+    const LENGTH: f64 = 2.1;
+
+    /// A mass of 1 kg on a spring and a damper under a harmonic and a constant force, with a law to what moves by `0.2 cos(ωt)`: displacement and velocity
+    /// at the end of the stretch, and the derivative of the whole state by that at its start.
+    fn after(law: SharedLaw, contact: Contact, state: &[f64]) -> ([f64; 2], DMatrix<f64>) {
+        let between = |other: &str| ["m".to_owned(), other.to_owned()];
+        let force = |amplitude: f64, harmonic: u32| Force { on: "m".into(), amplitude, phase: 0.0, harmonic };
+        let model = Model {
+            masses: vec![Mass::new("m", 1.0)],
+            springs: vec![Spring { between: between(GROUND), stiffness: STIFFNESS, damping: DAMPING }],
+            joints: vec![Joint { name: "j".into(), between: between("floor"), law }],
+            forces: vec![force(LOAD, 1), force(MEAN, 0)],
+            motions: vec![Motion { on: "floor".into(), amplitude: 0.2, phase: 0.0, harmonic: 1 }],
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let mechanics = Mechanics::new(&system).unwrap();
+        let drive = Drive::new(&system, &mechanics.owners(), OMEGA);
+        let pattern = Pattern::new(&mechanics, &[contact == Contact::Stick]).unwrap();
+        let driven = pattern.drive(&mechanics, &drive);
+        let mut work = Work::new(&mechanics, drive.rates.len());
+        let mut signal = vec![ZERO; driven.basis.len()];
+        let mut speed = signal.clone();
+        let beginning = Beginning { driven: &driven, contacts: &[contact], time: TIME, state };
+        pattern.displacement(&mechanics, &drive, beginning, &mut work, &mut signal);
+        driven.basis.differentiate(&signal, &mut speed);
+        let mut values = signal.clone();
+        driven.basis.evaluate(LENGTH, &mut values);
+        let mut derivative = DMatrix::identity(state.len(), state.len());
+        pattern.carry(&mechanics, LENGTH, &values, &mut derivative, &mut work);
+        ([real_dot(&signal, &values), real_dot(&speed, &values)], derivative)
+    }
+
+    /// Displacement and velocity at the end of the stretch of `x'' + c x' + k x = Re(load e^{iωt}) + constant` from these, and their derivative:
+    /// steady motion, and the exponential of the matrix for what is left.
+    fn closed_form(k: f64, load: Complex64, constant: f64, start: [f64; 2]) -> ([f64; 2], Matrix2<f64>) {
+        let s = Complex64::new(0.0, OMEGA);
+        let steady = |time: f64| {
+            let x = load / (k + s * DAMPING + s * s) * (s * time).exp();
+            Vector2::new(x.re + constant / k, (s * x).re)
+        };
+        let moved = (Matrix2::new(0.0, 1.0, -k, -DAMPING) * LENGTH).exp();
+        let end = steady(TIME + LENGTH) + moved * (Vector2::from(start) - steady(TIME));
+        ([end[0], end[1]], moved)
+    }
+
+    fn alike(found: [f64; 2], expected: [f64; 2]) {
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-13), "{found:?} {expected:?}");
+    }
+
+    /// A rigid slider that slips is a constant force against the motion.
+    #[test]
+    fn a_slipping_slider_is_a_constant_force() {
+        let start = [0.7, -0.2];
+        for (contact, sign) in [(Contact::SlipForward, 1.0), (Contact::SlipBackward, -1.0)] {
+            let (found, derivative) = after(Arc::new(Coulomb { limit: LIMIT }), contact, &start);
+            let (expected, moved) = closed_form(STIFFNESS, LOAD.into(), MEAN - sign * LIMIT, start);
+            alike(found, expected);
+            assert!((0..4).all(|i| (derivative[(i / 2, i % 2)] - moved[(i / 2, i % 2)]).abs() < 1e-13), "{derivative}");
+        }
+    }
+
+    /// A rigid slider that sticks keeps its place on what it rubs on, `x = x₀ + g₀ - g`, and no derivative of its velocity is left.
+    #[test]
+    fn a_sticking_slider_follows_the_floor() {
+        let floor = |t: f64| 0.2 * (OMEGA * t).cos();
+        let speed = |t: f64| -0.2 * OMEGA * (OMEGA * t).sin();
+        let (found, derivative) = after(Arc::new(Coulomb { limit: LIMIT }), Contact::Stick, &[0.7, speed(TIME)]);
+        let end = TIME + LENGTH;
+        alike(found, [0.7 + floor(end) - floor(TIME), speed(end)]);
+        assert!((derivative - DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.0])).amax() < 1e-13);
+    }
+
+    /// A slider that sticks behind a spring is that spring, stretched from where it was: `f = f₀ + kt (x - x₀ - (g - g₀))`. Its force is a state too.
+    #[test]
+    fn a_sticking_spring_is_a_spring() {
+        let (kt, force) = (2.5, 0.1);
+        let law = Arc::new(Jenkins { stiffness: kt, limit: LIMIT });
+        let (place, floor) = (0.7, 0.2 * (OMEGA * TIME).cos());
+        let (found, derivative) = after(law, Contact::Stick, &[place, -0.2, force]);
+        // kt (x - g) on the side of the structure, the rest constant
+        let constant = MEAN - force + kt * (place - floor);
+        let (expected, moved) = closed_form(STIFFNESS + kt, (LOAD + 0.2 * kt).into(), constant, [place, -0.2]);
+        alike(found, expected);
+        // by the start: the place also moves the centre, the force pushes by itself
+        let centre = |push: f64| {
+            let shift = push / (STIFFNESS + kt);
+            Vector2::new(shift * (1.0 - moved[(0, 0)]), -shift * moved[(1, 0)])
+        };
+        let columns = [moved.column(0) + centre(kt), moved.column(1).into_owned(), centre(-1.0)];
+        for (k, column) in columns.iter().enumerate() {
+            let own = [-kt, 0.0, 1.0][k] + kt * column[0];
+            for (i, expected) in [column[0], column[1], own].into_iter().enumerate() {
+                let found = derivative[(i, k)];
+                assert!((found - expected).abs() < 1e-13, "{i} by {k}: {found} {expected}");
+            }
+        }
+    }
+}

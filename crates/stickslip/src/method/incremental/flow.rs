@@ -171,7 +171,10 @@ impl Flow for IncrementalFlow {
         for i in 0..self.count {
             let time = i as f64 * h;
             if !self.step.advance(&self.assembly, &eliminated, &self.drive, (time, state), scale) {
-                return Err(Breakdown::Stalled { time, step: h });
+                return Err(match self.step.without_number(&self.assembly) {
+                    Some(joint) => joint.no_number(time),
+                    None => Breakdown::Stalled { time, step: h },
+                });
             }
             if state.iter().any(|z| !z.is_finite()) {
                 return Err(Breakdown::Unbounded { time, place: self.assembly.farthest(state) });
@@ -192,7 +195,7 @@ impl Flow for IncrementalFlow {
         let mut coarse = loop {
             match self.tried(state, duration) {
                 // steps that are too long for a law's states are no reason to give up
-                Err(Breakdown::Stalled { .. }) if self.count < MOST => self.count *= 2,
+                Err(Breakdown::Stalled { .. } | Breakdown::NoNumber { .. }) if self.count < MOST => self.count *= 2,
                 found => break found?,
             }
         };

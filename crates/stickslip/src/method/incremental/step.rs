@@ -5,7 +5,7 @@
 
 use super::law::{At, Follower};
 use crate::law::Relative;
-use crate::method::assembly::Assembly;
+use crate::method::assembly::{Assembly, PlacedLaw};
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::lu::Lu;
@@ -199,6 +199,12 @@ impl Step {
         true
     }
 
+    /// The joint whose law answered the last attempt by what is no number.
+    pub fn without_number<'a>(&self, assembly: &'a Assembly) -> Option<&'a PlacedLaw> {
+        let broken = |law: &Follower| law.force.iter().chain(&law.state).any(|value| value.is_nan());
+        assembly.joints.iter().zip(&self.laws).find_map(|(joint, law)| broken(law).then_some(joint))
+    }
+
     /// Residual and its derivative at the present unknowns, from the velocities `v` at the start.
     fn evaluate(
         &mut self,
@@ -257,7 +263,7 @@ impl Step {
             let (v, z) = rest.split_at(n);
             let along: Vec<(f64, f64)> = assembly.axes.iter().map(|axis| (axis.along(x), axis.along(v))).collect();
             // what all but the unknown does
-            let known = |slope: &[f64], joint: &crate::method::assembly::PlacedLaw| {
+            let known = |slope: &[f64], joint: &PlacedLaw| {
                 let (directions, after) = (joint.directions, 2 * joint.directions + joint.states);
                 let mut value = 0.0;
                 for (e, other) in joint.axes().enumerate() {
@@ -319,4 +325,100 @@ fn relative(assembly: &Assembly, q: usize, state: &[f64], drive: &Drive, time: f
         (motion.displacement[d], motion.velocity[d]) = assembly.relative(axis, state, drive, time);
     }
     motion
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::flow::IncrementalFlow;
+    use super::*;
+    use crate::law::{Cubic, Jenkins2d, SharedLaw};
+    use crate::model::{Axis, System};
+    use crate::structure::Structure;
+    use nalgebra::{Matrix2, Vector2};
+    use std::sync::Arc;
+
+    /// Places of 1 kg on springs (N/m) and dampers (kg/s), as many as the law has directions, with the law to the ground.
+    fn held(stiffness: f64, damping: f64, law: Option<SharedLaw>) -> (System, Assembly) {
+        let n = law.as_ref().map_or(1, |law| law.directions());
+        let each = |value: f64| DMatrix::identity(n, n) * value;
+        let places = (0..n).map(|i| format!("x{i}")).collect();
+        let structure = Structure::new(places, each(1.0), each(damping), each(stiffness)).unwrap();
+        let mut builder = System::builder(structure);
+        if let Some(law) = law {
+            builder = builder.joint("j".to_owned(), law, (0..n).map(|i| Axis::new(vec![(i, 1.0)])).collect());
+        }
+        let system = builder.build().unwrap();
+        let flow = IncrementalFlow::new(&system, None, "test").unwrap();
+        (system, flow.assembly)
+    }
+
+    /// The state after so many steps of length `h`, with its derivative by the start.
+    fn stepped(
+        (system, assembly): &(System, Assembly),
+        (h, count): (f64, usize),
+        start: &[f64],
+    ) -> (Vec<f64>, DMatrix<f64>) {
+        let (eliminated, drive) = (Eliminated::new(assembly, h).unwrap(), assembly.drive(system, 1.0));
+        let (mut step, mut state) = (Step::new(assembly), start.to_vec());
+        let mut derivative = DMatrix::identity(start.len(), start.len());
+        step.start(assembly, &state, &drive, Some(&derivative));
+        for k in 0..count {
+            assert!(step.advance(assembly, &eliminated, &drive, (k as f64 * h, &mut state), 1.0));
+            step.carry(assembly, &eliminated, &mut derivative);
+        }
+        (state, derivative)
+    }
+
+    /// Of a linear motion `y' = J y` a step is the trapezoidal rule, `(1 - hJ/2) y₁ = (1 + hJ/2) y₀`, which keeps the energy of one without damping.
+    #[test]
+    fn a_linear_step_is_the_trapezoidal_rule() {
+        for (k, c, h) in [(4.0, 0.6, 0.7), (4.0, 0.0, 3.0)] {
+            let (z, one) = (Matrix2::new(0.0, 1.0, -k, -c) * (0.5 * h), Matrix2::identity());
+            let ratio = (one - z).try_inverse().unwrap() * (one + z);
+            let (end, derivative) = stepped(&held(k, c, None), (h, 1), &[0.3, -0.8]);
+            let expected = ratio * Vector2::new(0.3, -0.8);
+            for i in 0..2 {
+                assert!((end[i] - expected[i]).abs() < 1e-14, "{end:?} {expected}");
+                assert!((0..2).all(|j| (derivative[(i, j)] - ratio[(i, j)]).abs() < 1e-14), "{derivative} {ratio}");
+            }
+            let energy = |x: f64, v: f64| 0.5 * (k * x * x + v * v);
+            let kept = energy(end[0], end[1]) / energy(0.3, -0.8);
+            assert!(if c == 0.0 { (kept - 1.0).abs() < 1e-14 } else { kept < 1.0 }, "{kept}");
+        }
+    }
+
+    /// On a cubic spring halved steps come closer by `2²`.
+    #[test]
+    fn steps_are_of_order_two() {
+        let system = held(4.0, 0.6, Some(Arc::new(Cubic { stiffness: 3.0 })));
+        let end = |count: usize| stepped(&system, (0.8 / count as f64, count), &[0.9, -0.4]).0;
+        let apart = |a: &[f64], b: &[f64]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        let (whole, halves, quarters) = (end(64), end(128), end(256));
+        let order = (apart(&whole, &halves) / apart(&halves, &quarters)).log2();
+        assert!((order - 2.0).abs() < 0.02, "{order}");
+    }
+
+    /// The derivative of the end by the start, of motion and of the forces of a contact that slips, against differences.
+    #[test]
+    fn the_derivative_is_that_of_the_step() {
+        let law = Jenkins2d { stiffness: 5.0, limit: 0.7 };
+        let system = held(4.0, 0.6, Some(Arc::new(law)));
+        // in motion, the forces near their limit: it sticks at first, then slips on a curve
+        let start = [0.1, -0.2, 1.2, 0.8, 0.5, 0.2];
+        let run = |start: &[f64]| stepped(&system, (0.05, 4), start);
+        let (end, derivative) = run(&start);
+        assert!((end[4].hypot(end[5]) / law.limit - 1.0).abs() < 1e-3, "{end:?}");
+        const SMALL: f64 = 1e-6;
+        for k in 0..start.len() {
+            let moved = |by: f64| {
+                let mut start = start;
+                start[k] += by;
+                run(&start).0
+            };
+            for (i, (up, down)) in moved(SMALL).iter().zip(moved(-SMALL)).enumerate() {
+                let (difference, found) = ((up - down) / (2.0 * SMALL), derivative[(i, k)]);
+                assert!((difference - found).abs() < 1e-7, "{i} by {k}: {found} {difference}");
+            }
+        }
+    }
 }

@@ -287,14 +287,17 @@ impl SmoothFlow {
     }
 
     /// Why no step is short enough any more: the motion is on its way to infinity, which it reaches in finite time where a force grows faster than
-    /// the distance, or the equations are too stiff. `speed` is the scale of velocities at the start, m/s.
+    /// the distance, or a law gives no number, or the equations are too stiff. `speed` is the scale of velocities at the start, m/s.
     fn stalled(&self, state: &[f64], (time, step): (f64, f64), speed: f64) -> Breakdown {
         let n = self.assembly.n;
         let fastest = state[n..2 * n].iter().fold(0.0f64, |fast, v| fast.max(v.abs()));
         if fastest > ESCAPED * speed {
             return Breakdown::Unbounded { time, place: self.assembly.farthest(state) };
         }
-        Breakdown::Stalled { time, step }
+        match self.step.without_number(&self.assembly) {
+            Some(joint) => joint.no_number(time),
+            None => Breakdown::Stalled { time, step },
+        }
     }
 
     /// The length of the next attempt (s), if it may be made; chooses the level where the mesh is given.

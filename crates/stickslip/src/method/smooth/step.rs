@@ -6,7 +6,7 @@
 //! a whole orbit. The filter of the error estimate is eliminated in the same way.
 
 use crate::law::{RatePoint, Relative};
-use crate::method::assembly::Assembly;
+use crate::method::assembly::{Assembly, PlacedLaw};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::lu::Lu;
 use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES, squared};
@@ -241,6 +241,13 @@ impl Step {
             previous = size;
         }
         false
+    }
+
+    /// The joint whose law answered the last attempt by what is no number.
+    pub fn without_number<'a>(&self, assembly: &'a Assembly) -> Option<&'a PlacedLaw> {
+        let broken = |point: &RatePoint| point.force.iter().chain(&point.rate).any(|value| value.is_nan());
+        let joints = assembly.joints.iter().cycle();
+        joints.zip(&self.points).find_map(|(joint, point)| broken(point).then_some(joint))
     }
 
     /// The laws at the present unknowns.
@@ -630,6 +637,123 @@ impl Filter {
         for i in 0..n {
             v[i] = self.v[i];
             x[i] = (x[i] + v[i]) / rate;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Cubic, JenkinsArctan, SharedLaw};
+    use crate::model::{Axis, System};
+    use crate::structure::Structure;
+    use nalgebra::{Matrix2, Vector2};
+    use std::sync::Arc;
+
+    /// A mass of 1 kg on a spring (N/m) and a damper (kg/s), with these laws to the ground.
+    fn oscillator(stiffness: f64, damping: f64, laws: &[SharedLaw]) -> Assembly {
+        let one = |value: f64| DMatrix::from_element(1, 1, value);
+        let structure = Structure::new(vec!["m".into()], one(1.0), one(damping), one(stiffness)).unwrap();
+        let mut builder = System::builder(structure);
+        for (i, law) in laws.iter().enumerate() {
+            builder = builder.joint(format!("j{i}"), law.clone(), vec![Axis::new(vec![(0, 1.0)])]);
+        }
+        super::super::assembly(&builder.build().unwrap(), None, "test").unwrap()
+    }
+
+    /// The state after so many steps of length `h` from the loads at their stages, with the derivative by `start` row after row.
+    fn stepped(
+        assembly: &Assembly,
+        (h, count): (f64, usize),
+        load: &dyn Fn(f64) -> f64,
+        start: &[f64],
+    ) -> (Vec<f64>, Vec<f64>) {
+        let (eliminated, states) = (Eliminated::new(assembly, h), assembly.states());
+        let mut step = Step::new(assembly);
+        let mut state = start.to_vec();
+        let mut derivative = DMatrix::<f64>::identity(states, states).as_slice().to_vec();
+        for k in 0..count {
+            let loads = StageLoads {
+                force: DVector::from_fn(STAGES, |i, _| load((k as f64 + C[i]) * h)),
+                stage: vec![(0.0, 0.0); STAGES * assembly.axes.len()],
+            };
+            assert!(step.solve(assembly, &eliminated, &loads, &state, (1.0, true)));
+            let mut end = state.clone();
+            step.end(assembly, &eliminated, &loads, &mut end);
+            step.carry(assembly, &eliminated, &mut derivative, states);
+            state = end;
+        }
+        (state, derivative)
+    }
+
+    fn still(_: f64) -> f64 {
+        0.0
+    }
+
+    /// Of a linear motion `y' = J y` a step of Radau IIA of order 5 is `y₁ = Q(hJ)⁻¹ P(hJ) y₀`, the (2,3) Padé approximation of the exponential.
+    /// Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), Table IV.5.
+    #[test]
+    fn a_linear_step_is_the_pade_approximation() {
+        let (k, c, h) = (4.0, 0.6, 0.7);
+        let (z, one) = (Matrix2::new(0.0, 1.0, -k, -c) * h, Matrix2::identity());
+        let above = one + z * 0.4 + z * z * 0.05;
+        let below = one - z * 0.6 + z * z * 0.15 - z * z * z / 60.0;
+        let ratio = below.try_inverse().unwrap() * above;
+        let (end, derivative) = stepped(&oscillator(k, c, &[]), (h, 1), &still, &[0.3, -0.8]);
+        let by_start = [ratio[(0, 0)], ratio[(0, 1)], ratio[(1, 0)], ratio[(1, 1)]];
+        assert!(derivative.iter().zip(by_start).all(|(a, b)| (a - b).abs() < 1e-14), "{derivative:?} {ratio}");
+        let expected = ratio * Vector2::new(0.3, -0.8);
+        for i in 0..2 {
+            assert!((end[i] - expected[i]).abs() < 1e-14, "{end:?} {expected}");
+        }
+    }
+
+    /// A force that is a polynomial in time of degree 3 moves a free mass exactly: `x = Σ aₙ hⁿ⁺²/((n+1)(n+2))`; one of degree 4 still in its velocity.
+    #[test]
+    fn polynomial_loads_are_exact() {
+        let h = 1.3f64;
+        for (degree, exact) in [(3, true), (4, false)] {
+            let load = |t: f64| (0..=degree).map(|n| f64::from(n + 1) * t.powi(n)).sum();
+            let (end, _) = stepped(&oscillator(0.0, 0.0, &[]), (h, 1), &load, &[0.0, 0.0]);
+            let velocity: f64 = (0..=degree).map(|n| h.powi(n + 1)).sum();
+            let place: f64 = (0..=degree).map(|n| h.powi(n + 2) / f64::from(n + 2)).sum();
+            assert!((end[1] - velocity).abs() < 1e-13 * velocity, "{degree}: {} {velocity}", end[1]);
+            assert_eq!((end[0] - place).abs() < 1e-13 * place, exact, "{degree}: {} {place}", end[0]);
+        }
+    }
+
+    /// On a cubic spring halved steps come closer by `2⁵`.
+    #[test]
+    fn steps_are_of_order_five() {
+        let assembly = oscillator(4.0, 0.6, &[Arc::new(Cubic { stiffness: 3.0 })]);
+        let end = |count: usize| stepped(&assembly, (0.8 / count as f64, count), &f64::cos, &[0.9, -0.4]).0;
+        let apart = |a: &[f64], b: &[f64]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        let (whole, halves, quarters) = (end(4), end(8), end(16));
+        let order = (apart(&whole, &halves) / apart(&halves, &quarters)).log2();
+        assert!((order - 5.0).abs() < 0.2, "{order}");
+    }
+
+    /// The derivative of the end by the start, of motion and internal state, against differences.
+    #[test]
+    fn the_derivative_is_that_of_the_step() {
+        let laws: [SharedLaw; 2] =
+            [Arc::new(JenkinsArctan { stiffness: 5.0, limit: 0.7, alpha: 2.0 }), Arc::new(Cubic { stiffness: 3.0 })];
+        let assembly = oscillator(4.0, 0.6, &laws);
+        let start = [0.4, 0.9, 0.2];
+        assert_eq!(assembly.states(), start.len());
+        let run = |start: &[f64]| stepped(&assembly, (0.1, 2), &f64::cos, start);
+        let derivative = run(&start).1;
+        const SMALL: f64 = 1e-5;
+        for k in 0..start.len() {
+            let moved = |by: f64| {
+                let mut start = start;
+                start[k] += by;
+                run(&start).0
+            };
+            for (i, (up, down)) in moved(SMALL).iter().zip(moved(-SMALL)).enumerate() {
+                let (difference, found) = ((up - down) / (2.0 * SMALL), derivative[i * start.len() + k]);
+                assert!((difference - found).abs() < 1e-8, "{i} by {k}: {found} {difference}");
+            }
         }
     }
 }
