@@ -166,6 +166,34 @@ fn engine_orders_alias() {
     }
 }
 
+/// Blades of 1 kg and 1 N/m without damping of their own, a damper between neighbours.
+fn dampers(stiffness: f64, limit: f64, load: f64) -> Model {
+    Model {
+        masses: vec![Mass::new("blade", 1.0)],
+        springs: vec![spring("blade", GROUND, 1.0, 0.0)],
+        joints: vec![Joint {
+            name: "damper".into(),
+            between: between("blade", "next.blade"),
+            law: Arc::new(Jenkins { stiffness, limit }),
+        }],
+        forces: vec![force("blade", load, 1)],
+        ..Model::default()
+    }
+}
+
+/// The largest amplitude of the first place between two frequencies, rad/s, by one-term harmonic balance.
+fn one_term_peak(model: &Model, [mut low, mut high]: [f64; 2]) -> f64 {
+    let system = model.assemble().unwrap();
+    let one_term = HarmonicBalance { harmonics: Some(1), ..HarmonicBalance::default() };
+    let mut solver = one_term.solver(&system).unwrap();
+    let mut at = |omega: f64| solver.orbit(omega, None).unwrap().places[0].amplitude();
+    for _ in 0..60 {
+        let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+        if at(a) < at(b) { low = a } else { high = b }
+    }
+    at(0.5 * (low + high))
+}
+
 /// Theory (10.5): dampers between the blades of a tuned disk, one-term harmonic balance, no viscous damping. The optimum of the limit
 /// is `π F0/(4 sin(θ/2))`, the amplitude there `π F0/(4 kd sin²(θ/2))`.
 #[test]
@@ -175,32 +203,63 @@ fn eq10_5_optimum_of_dampers_between_blades() {
     let best = PI * load / (4.0 * half.sin());
     let amplitude = PI * load / (4.0 * stiffness * half.sin().powi(2));
     assert!((best - 2.052_344_3).abs() < 1e-7 && (amplitude - 26.815_170_6).abs() < 1e-7, "{best} {amplitude}");
-    let one_term = HarmonicBalance { harmonics: Some(1), ..HarmonicBalance::default() };
     // the peak: phase resonance at ω² = k + 4 sin²(θ/2) Re K_J(2 A sin(θ/2)), at a limit beside the optimum, and at it
-    let peak = |limit: f64, from: f64, to: f64| {
-        let law = Arc::new(Jenkins { stiffness, limit });
-        let sector = Model {
-            masses: vec![Mass::new("blade", 1.0)],
-            springs: vec![spring("blade", GROUND, 1.0, 0.0)],
-            joints: vec![Joint { name: "damper".into(), between: between("blade", "next.blade"), law }],
-            forces: vec![force("blade", load, 1)],
-            ..Model::default()
-        };
-        let system = ring(&sector, sectors, &[Around::EngineOrder(diameter)]).assemble().unwrap();
-        let mut solver = one_term.solver(&system).unwrap();
-        let at =
-            |solver: &mut dyn stickslip::Solver, omega: f64| solver.orbit(omega, None).unwrap().places[0].amplitude();
-        let (mut low, mut high) = (from, to);
-        for _ in 0..60 {
-            let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-            if at(&mut *solver, a) < at(&mut *solver, b) { low = a } else { high = b }
-        }
-        at(&mut *solver, 0.5 * (low + high))
+    let peak = |limit: f64| {
+        let system = ring(&dampers(stiffness, limit, load), sectors, &[Around::EngineOrder(diameter)]);
+        one_term_peak(&system, [1.0, 1.06])
     };
-    let found = peak(best, 1.0, 1.06);
+    let found = peak(best);
     assert!((found / amplitude - 1.0).abs() < 1e-7, "{found} {amplitude}");
     for limit in [0.97 * best, 1.03 * best] {
-        assert!(peak(limit, 1.0, 1.06) > amplitude * (1.0 + 1e-5));
+        assert!(peak(limit) > amplitude * (1.0 + 1e-5));
+    }
+}
+
+/// Theory (10.5) at θ = 0: blades that move alike do not rub, whatever the limit, and have the amplitude `F0/|k - m ω²|` of one alone.
+#[test]
+fn eq10_5_engine_order_zero_is_not_damped() {
+    for limit in [1e-3, 1.0, 1e3] {
+        let system = ring(&dampers(0.2, limit, 1.0), 6, &[Around::EngineOrder(0)]);
+        for omega in [0.7, 0.99, 1.3] {
+            let alone = 1.0 / (1.0f64 - omega * omega).abs();
+            for method in [&HarmonicBalance::default() as &dyn Method, &EventDriven] {
+                let found = orbit(&system, method, omega);
+                for place in &found.places {
+                    assert!((place.amplitude() / alone - 1.0).abs() < 1e-10, "{limit} {omega}: {place:?} {alone}");
+                }
+                assert!(found.joints.iter().all(|joint| joint.dissipation.abs() < 1e-12 * alone), "{limit} {omega}");
+            }
+        }
+    }
+}
+
+/// Theory (10.5), the couple with one joint in anti-phase under `F0` on each blade: `k + 2 K_J`, so that the optimum of the limit is `π F0/2`, and the
+/// amplitude there `π F0/(2 kd)`.
+#[test]
+fn eq10_5_couple_in_anti_phase() {
+    let (stiffness, load) = (0.2, 1.0);
+    let (best, amplitude) = (PI * load / 2.0, PI * load / (2.0 * stiffness));
+    assert!((amplitude - 7.853_981_4).abs() < 1e-6, "{amplitude}");
+    let peak = |limit: f64| {
+        let opposed = Force { phase: 0.3 + PI, ..force("b", load, 1) };
+        let couple = Model {
+            masses: vec![Mass::new("a", 1.0), Mass::new("b", 1.0)],
+            springs: vec![spring("a", GROUND, 1.0, 0.0), spring("b", GROUND, 1.0, 0.0)],
+            joints: vec![Joint {
+                name: "damper".into(),
+                between: between("a", "b"),
+                law: Arc::new(Jenkins { stiffness, limit }),
+            }],
+            forces: vec![force("a", load, 1), opposed],
+            ..Model::default()
+        };
+        // between the free frequency and the stuck one, √(1 + 2 kd); both are undamped
+        one_term_peak(&couple, [1.04, 1.14])
+    };
+    let found = peak(best);
+    assert!((found / amplitude - 1.0).abs() < 1e-7, "{found} {amplitude}");
+    for limit in [0.97 * best, 1.03 * best] {
+        assert!(peak(limit) > amplitude * (1.0 + 1e-5));
     }
 }
 
