@@ -3,6 +3,7 @@
 
 #![allow(clippy::print_stdout)] // tests say what they measured
 
+use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use stickslip::law::{Contact, Coulomb, Gap, Jenkins, Law, LawInfo, Parameter, Piece, SharedLaw, Stribeck};
@@ -142,6 +143,7 @@ fn subharmonic_motion_beside_an_unstable_one() {
     let omega = 2.6;
     let single = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
     assert_eq!(single.is_stable(), Some(false));
+    multiplied(&single, [-1.878_280_61, -0.418_107_06].map(Complex64::from));
     let double = Subharmonic { period: 2 }.solver(&system).unwrap().orbit(omega, Some(&[-1.0, 0.3])).unwrap();
     let other = Shooting { period: 2, tolerance: 1e-10, ..Shooting::default() };
     let other = other.solver(&system).unwrap().orbit(omega, Some(&double.start)).unwrap();
@@ -149,6 +151,49 @@ fn subharmonic_motion_beside_an_unstable_one() {
     assert_eq!(double.is_stable(), Some(true));
     let later = double.sample(TAU / omega).displacement[0];
     assert!((double.start[0] - later).abs() > 0.1, "it repeats after one period");
+    multiplied(&double, [1.0, -1.0].map(|sign| Complex64::new(0.446_922_44, sign * 0.645_748_85)));
+}
+
+/// Multipliers to eight digits: of the products of exponentials between the times of contact, which were found by bisection (NumPy, apart from this code).
+const PRINTED: f64 = 1e-7;
+
+/// The multipliers of an orbit of one mass of 1 kg with one damper: these two, and their product is the shrinking of areas, `e^{-c T}`.
+#[track_caller]
+fn multiplied(orbit: &Orbit, expected: [Complex64; 2]) {
+    let found = orbit.multipliers().unwrap();
+    for one in expected {
+        let nearest = found.iter().map(|other| (other - one).norm()).fold(f64::INFINITY, f64::min);
+        assert!(nearest < PRINTED, "{found:?} {expected:?}");
+    }
+}
+
+/// Theory 11.13: stable motions that repeat after one, three and five periods, side by side. Starts and multipliers as [`multiplied`] has them.
+#[test]
+fn motions_of_one_three_and_five_periods_side_by_side() {
+    let (omega, damping) = (4.9, 0.05);
+    let mut model = oscillator(1.0, damping, &[Arc::new(Gap { gap: 0.0, stiffness: 8.0 })]);
+    model.forces = vec![force("m", 1.0, 1)];
+    let system = model.assemble().unwrap();
+    for (period, start, multiplier) in [
+        (1, [-0.073_211_21, 0.002_435_47], Complex64::new(-0.881_520_5, 0.401_023_13)),
+        (3, [-0.174_251_88, 0.009_158_85], Complex64::new(0.427_379_23, 0.801_480_7)),
+        (5, [-0.080_541_91, 0.024_359_53], Complex64::new(0.255_525_43, 0.812_675_53)),
+    ] {
+        let shrinks = (-damping * f64::from(period) * TAU / omega).exp();
+        assert!((multiplier.norm_sqr() - shrinks).abs() < PRINTED, "{period}");
+        let method = Subharmonic { period: period as usize };
+        let orbit = method.solver(&system).unwrap().orbit(omega, Some(&start)).unwrap();
+        for (found, expected) in orbit.start.iter().zip(start) {
+            near("start", *found, expected, 1e-7);
+        }
+        assert_eq!(orbit.is_stable(), Some(true), "{period}");
+        multiplied(&orbit, [multiplier, multiplier.conj()]);
+        let repeats = |later: i32| {
+            let now = orbit.sample(f64::from(later) * TAU / omega);
+            (now.displacement[0] - start[0]).hypot(now.velocity[0] - start[1]) < 1e-6
+        };
+        assert!(repeats(period) && !(1..period).any(repeats), "{period}");
+    }
 }
 
 /// A motion that just touches the stop, or just does not, or presses a little: at the turning point velocity and depth vanish together, and the
