@@ -4,7 +4,7 @@
 use nalgebra::dmatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip::law::{Gap, Iwan, Jenkins, SharedLaw, Valanis};
+use stickslip::law::{FrictionContact, Gap, Iwan, Jenkins, SharedLaw, Valanis};
 use stickslip::method::Method;
 use stickslip::method::event_driven::EventDriven;
 use stickslip::method::harmonic_balance::HarmonicBalance;
@@ -178,5 +178,43 @@ fn forces_beyond_a_slip_limit_are_reported_whole() {
         }
         assert!(largest > 1.2 * stickslip::law::Law::scale(&law), "{largest}: the slip limit is not passed");
         assert!(worst < 1e-3 * largest, "{}: {worst} of {largest}", method.name());
+    }
+}
+
+/// What harmonic balance errs by with 1024 samples of a period beside the error of its series, relative to the motion: a contact that closes between
+/// two samples is known to their distance.
+const SAMPLED: f64 = 1e-5;
+
+/// A contact that slips, sticks and parts within every period: integration in time, by Newton's method and by waiting, against the series, within what
+/// they say of their errors.
+#[test]
+fn methods_agree_on_a_contact_that_opens_and_closes() {
+    let contact = FrictionContact { tangential: 5e3, normal: 8e3, friction: 0.3, preload: 4.0, tangents: 1 };
+    let both = |value: f64| dmatrix![value, 0.0; 0.0, value];
+    let places = vec!["along".into(), "across".into()];
+    let structure = Structure::new(places, both(1.0), both(40.0), both(1e4)).unwrap();
+    let axes = vec![Axis::new(vec![(0, 1.0)]), Axis::new(vec![(1, 1.0)])];
+    for (omega, across) in [(80.0, 12.0), (110.0, 20.0)] {
+        let system = System::builder(structure.clone())
+            .joint("rub".to_owned(), Arc::new(contact), axes.clone())
+            .force(0, 1, Complex64::from_polar(10.0, 1.0))
+            .force(1, 1, Complex64::new(across, 0.0))
+            .build()
+            .unwrap();
+        let series = orbit(&HarmonicBalance { harmonics: Some(63), ..HarmonicBalance::default() }, &system, omega);
+        let error = |orbit: &Orbit| orbit.evidence.truncation.expect("an estimate");
+        let shooting = Shooting { tolerance: 1e-9, ..Shooting::default() };
+        for found in [orbit(&shooting, &system, omega), orbit(&Settling::default(), &system, omega)] {
+            // without friction, without slip or without an opening this were another test
+            let force = |i: i32| found.sample(found.period() * f64::from(i) / 1000.0).joints[0].force;
+            let pressed: Vec<f64> = (0..1000).map(|i| force(i)[1]).collect();
+            assert!(pressed.contains(&0.0) && pressed.iter().any(|force| *force > contact.preload), "{omega}");
+            assert!((0.05..0.95).contains(&found.joints[0].slip_fraction), "{}", found.joints[0].slip_fraction);
+            let allowed = error(&found) + error(&series) + SAMPLED;
+            for (a, b) in found.places.iter().zip(&series.places) {
+                let off = (a.maximum - b.maximum).abs().max((a.minimum - b.minimum).abs()) / a.amplitude();
+                assert!(off < allowed, "{} {omega}: {off:.1e} of {allowed:.1e}", found.method);
+            }
+        }
     }
 }
