@@ -448,3 +448,100 @@ fn a_mode_is_given_at_places() {
         }
     }
 }
+
+/// Rows that a program has constrained, by 1e36 on the diagonal or by leaving them empty, are left out; damping from a file; a place that is a weighted
+/// sum of rows, and one that is the mean of two nodes.
+#[test]
+fn constrained_rows_sums_means_and_damping_by_a_file() {
+    let brick = blade();
+    let (n, unit) = (brick.dofs(), 1e3); // mm-t-s: N/mm and t
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows = named(&brick);
+    rows.extend(["900.x".to_owned(), "901.x".to_owned()]);
+    let (mass, stiffness) = (full(&brick.mass), full(&brick.stiffness));
+    let damping = &mass * RAYLEIGH.0 + &stiffness * RAYLEIGH.1;
+    for (name, matrix, clamped) in [("k", stiffness, Some(1e36)), ("m", mass, None), ("c", damping, None)] {
+        let entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).map(|at| (at.0, at.1, matrix[at] / unit));
+        let entries = entries.filter(|entry| entry.2 != 0.0).chain(clamped.map(|value| (n, n, value)));
+        let made = Matrix::new(n + 2, n + 2, Symmetry::General, entries).unwrap();
+        write(folder.path().join(format!("{name}.mtx")), &made).unwrap();
+        names::write(folder.path().join("rows.csv"), &made.with_names(rows.clone()).unwrap()).unwrap();
+    }
+    let (a, b) = (tip(&brick, 0, 1), tip(&brick, 2, 1));
+    let at = |y: usize, along: usize| brick.row([8, y, 1], along).unwrap();
+    for (reduce, tolerance) in [("false", 1e-8), ("{ up_to = \"5 kHz\", tolerance = 1e-7 }", 1e-5)] {
+        let text = structure("mtx", "rows.csv", "mm-t-s", &format!("damping = \"c.mtx\"\nreduce = {reduce}"))
+            + &format!("[[place]]\nname = \"lever\"\nsum = {{ \"{a}.z\" = 0.75, \"{b}.z\" = -0.5 }}\n")
+            + &format!("[[place]]\nname = \"both\"\nnodes = [\"{a}\", \"{b}\"]\n")
+            + &FORCED.replace("tip.z", "lever")
+            + "[method]\nkind = \"harmonic-balance\"\n";
+        let data = results(folder.path(), &text);
+        let mut load = DVector::zeros(n);
+        (load[at(0, 2)], load[at(2, 2)]) = (0.75, -0.5);
+        for (i, hertz) in HERTZ.iter().enumerate() {
+            let x = dense(&brick, *hertz, &load, &[]);
+            let check = |column: &str, expected: Complex64| {
+                let found = numbers(&data, column)[i];
+                let off = (found - expected.norm()).abs() / x[at(0, 2)].norm();
+                assert!(off < tolerance, "{reduce} {column} {hertz}: {found} {expected}");
+            };
+            check("lever_amplitude_m", x[at(0, 2)] * 0.75 - x[at(2, 2)] * 0.5);
+            for (k, along) in DIRECTIONS.iter().enumerate() {
+                check(&format!("both_{along}_amplitude_m"), (x[at(0, k)] + x[at(2, k)]) * 0.5);
+            }
+        }
+    }
+}
+
+/// Matrices as Nastran punches them: a row without mass, and a free body whose rigid motion comes back at 1 Hz by the digits that are lost.
+#[test]
+fn a_row_without_mass_and_a_rigid_motion_at_one_hertz() {
+    let folder = tempfile::tempdir().unwrap();
+    // mass - spring - nothing - spring - mass, held to the ground by next to nothing
+    let (spring, mass) = (4e5, 0.5);
+    let rigid = mass * TAU.powi(2);
+    let k = [[spring + rigid, -spring, 0.0], [-spring, 2.0 * spring, -spring], [0.0, -spring, spring + rigid]];
+    let m = [[mass, 0.0, 0.0], [0.0; 3], [0.0, 0.0, mass]];
+    for (name, matrix) in [("KAAX", k), ("MAAX", m)] {
+        let mut text = format!("DMIG    {name}           0       6       2       0                       3\n");
+        for column in 0..3 {
+            let entries = (column..3).filter(|row| matrix[*row][column] != 0.0);
+            let lines: String = entries
+                .map(|row| {
+                    format!(
+                        "*       {:>16}{:>16}{:>16}\n",
+                        row + 1,
+                        0,
+                        format!("{:.9e}", matrix[row][column]).replace('e', "D")
+                    )
+                })
+                .collect();
+            if !lines.is_empty() {
+                text += &format!("DMIG*   {name:<16}{:>16}{:>16}\n{lines}", column + 1, 0);
+            }
+        }
+        std::fs::write(folder.path().join(format!("{name}.pch")), text).unwrap();
+    }
+    for reduce in ["false", "{ up_to = \"1 kHz\" }"] {
+        let text = format!(
+            "schema = 1\n[structure]\nstiffness = \"KAAX.pch\"\nmass = \"MAAX.pch\"\nunits = \"m-kg-s\"\n\
+             rayleigh = {{ mass = \"20 /s\" }}\nreduce = {reduce}\n\
+             [[place]]\nname = \"one\"\ndof = 1\n[[place]]\nname = \"middle\"\ndof = 2\n\
+             [[force]]\non = \"one\"\namplitude = \"1 N\"\n\
+             [study]\nkind = \"response\"\nfrequency = [\"0.5 Hz\", \"1 Hz\", \"90 Hz\", \"200 Hz\"]\n\
+             [method]\nkind = \"harmonic-balance\"\n"
+        );
+        let data = results(folder.path(), &text);
+        for (i, hertz) in [0.5, 1.0, 90.0, 200.0].into_iter().enumerate() {
+            let s = Complex64::new(0.0, hertz * TAU);
+            // the massless row is in the middle: two masses on one spring of half the stiffness, by their common and their opposed motion
+            let own = s * s * mass + s * 20.0 * mass + rigid;
+            let (common, opposed) = (0.5 / own, 0.5 / (own + spring));
+            for (column, expected) in [("one_amplitude_m", common + opposed), ("middle_amplitude_m", common)] {
+                let off = numbers(&data, column)[i] / expected.norm() - 1.0;
+                // ten digits of a stiffness that is 2e4 times that of the rigid motion
+                assert!(off.abs() < 1e-5, "{reduce} {column} {hertz}: {off:e}");
+            }
+        }
+    }
+}
