@@ -570,3 +570,26 @@ fn a_structure_that_rotation_stiffens_is_saved_for_all_speeds() {
         assert!(tightened(100.0) > 1.2 * tightened(1.0), "{whole:?}");
     }
 }
+
+/// Two matrices and the names of their rows in a file of its own: the lowest frequencies, and the mass along x, which tells the units. The mass is the sum of
+/// the entries of `bricks.mas` between rows along x, by hand.
+#[test]
+fn inspect_tells_frequencies_and_mass() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/data");
+    let inspect = |files: &[&str]| {
+        let inspected = stickslip(&data, &[&["inspect"], files].concat());
+        assert_eq!(code(&inspected), 0, "{}", stderr(&inspected));
+        String::from_utf8_lossy(&inspected.stdout).into_owned()
+    };
+    let said = inspect(&["bricks.sti", "bricks.mas", "bricks.dof"]);
+    for words in [
+        "names of 30 rows",
+        "bricks.sti as stiffness, bricks.mas as mass",
+        "mass along x, of what is free: 1.354889e-8",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    // without names there are no directions
+    let unnamed = inspect(&["bricks.sti", "bricks.mas"]);
+    assert!(unnamed.contains("lowest frequencies") && !unnamed.contains("mass along x"), "{unnamed}");
+}
