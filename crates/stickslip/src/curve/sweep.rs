@@ -180,13 +180,7 @@ mod tests {
         fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
             let from_above = start.is_some() && self.last.is_some_and(|last| last > omega);
             if omega > self.fold.0 && omega < self.fold.1 && !from_above {
-                return Err(OrbitError::NotConverged {
-                    method: "folded",
-                    omega,
-                    iterations: 1,
-                    residual: 1.0,
-                    instead: String::new(),
-                });
+                return Err(OrbitError::not_converged("folded", omega, 1, 1.0));
             }
             self.last = Some(omega);
             self.solver.orbit(omega, start)

@@ -196,13 +196,7 @@ fn settle(
         let missing = if at_rounding { ROUNDING } else { missing };
         return Ok(Closed { state, derivative, residual, iterations: count, missing: Some(missing) });
     }
-    Err(OrbitError::NotConverged {
-        method: aim.method,
-        omega: aim.omega,
-        iterations: returns,
-        residual: smallest,
-        instead: String::new(),
-    })
+    Err(OrbitError::not_converged(aim.method, aim.omega, returns, smallest))
 }
 
 /// The window over which the decay is measured after so many returns: half of them while they are few, and then every [`DECAY_WINDOW`].
@@ -279,13 +273,7 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
         }
         returns = returns * 3 / 2;
     }
-    Err(OrbitError::NotConverged {
-        method: aim.method,
-        omega: aim.omega,
-        iterations,
-        residual: smallest,
-        instead: String::new(),
-    })
+    Err(OrbitError::not_converged(aim.method, aim.omega, iterations, smallest))
 }
 
 /// Steps of Newton's method, shortened where they do not help, until the orbit is closed, no step leaves less of the residual, a whole one
@@ -313,13 +301,7 @@ pub(crate) fn descended(
         if aim.rest > 0.0 && size > LARGEST * aim.rest {
             // so large that the work of the loads drowns in rounding: an undamped resonance
             let (method, omega) = (aim.method, aim.omega);
-            return Err(OrbitError::NotConverged {
-                method,
-                omega,
-                iterations: *iterations,
-                residual: 1.0,
-                instead: String::new(),
-            });
+            return Err(OrbitError::not_converged(method, omega, *iterations, 1.0));
         }
         let mut accepted = false;
         if residual > aim.residual && *iterations < ITERATIONS {

@@ -360,6 +360,16 @@ fn unsettled(repeats: Option<usize>, instead: &str) -> String {
 }
 
 impl OrbitError {
+    /// The search of `method` at `omega` ended after so many iterations, with this least residual.
+    pub(crate) fn not_converged(method: &'static str, omega: f64, iterations: usize, residual: f64) -> Self {
+        OrbitError::NotConverged { method, omega, iterations, residual, instead: String::new() }
+    }
+
+    /// No motion that `method` finds at `omega` stays where it is.
+    pub(crate) fn drift(method: &'static str, omega: f64) -> Self {
+        OrbitError::Drift { method, omega, instead: String::new() }
+    }
+
     /// One word for tables.
     pub fn status(&self) -> &'static str {
         match self {

@@ -240,7 +240,7 @@ impl Solver for Exact<'_> {
         };
         let closed = search.find(self, start, |exact| exact.first_state(omega), aim).map_err(|error| match error {
             OrbitError::NotConverged { .. } | OrbitError::Unsettled { .. } if self.drifts() => {
-                OrbitError::Drift { method: name, omega, instead: String::new() }
+                OrbitError::drift(name, omega)
             }
             error => error,
         })?;

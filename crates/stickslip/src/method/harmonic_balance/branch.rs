@@ -122,13 +122,7 @@ impl<'a> BranchEquations<'a> {
     }
 
     fn lost(&self, iterations: usize, residual: f64) -> OrbitError {
-        OrbitError::NotConverged {
-            method: super::NAME,
-            omega: self.omega,
-            iterations,
-            residual,
-            instead: String::new(),
-        }
+        OrbitError::not_converged(super::NAME, self.omega, iterations, residual)
     }
 
     /// The first point, found from the describing function.

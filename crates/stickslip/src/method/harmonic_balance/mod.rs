@@ -623,15 +623,9 @@ impl Balance<'_> {
             return OrbitError::Resonance { method: NAME, omega: self.drive, resonance };
         }
         if lost.away {
-            return OrbitError::Drift { method: NAME, omega: self.drive, instead: String::new() };
+            return OrbitError::drift(NAME, self.drive);
         }
-        OrbitError::NotConverged {
-            method: NAME,
-            omega: self.drive,
-            iterations: lost.iterations,
-            residual: lost.residual,
-            instead: String::new(),
-        }
+        OrbitError::not_converged(NAME, self.drive, lost.iterations, lost.residual)
     }
 
     /// Harmonics of the places.
@@ -659,11 +653,7 @@ impl Balance<'_> {
             judge: Some(&mut self.judge),
         };
         let level = self.levels.get_mut(&top).expect("solved");
-        let orbit = path::orbit(context, level, &motion, x).ok_or(OrbitError::Drift {
-            method: NAME,
-            omega: self.drive,
-            instead: String::new(),
-        })?;
+        let orbit = path::orbit(context, level, &motion, x).ok_or(OrbitError::drift(NAME, self.drive))?;
         if !path::balances(&self.system, &orbit) {
             let lost = Lost::after(motion.iterations, orbit.evidence.energy_gap);
             return Err(self.lost(lost));

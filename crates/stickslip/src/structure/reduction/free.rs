@@ -15,10 +15,9 @@ use stickslip_numerics::dense::{cholesky_in_blocks, solve_lower_in_blocks};
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{Matrix, NaturalModes, columns};
 
-/// Residual vectors whose stiffness is below this share of the others', each of unit size, depend on them: ports that see the same motion,
-/// and what rounding
-/// makes of it.
-const DEPENDENT: f64 = 1e-11;
+/// Residual vectors whose stiffness is below this share of the others', each of unit size, depend on them: ports that see the same motion, and what rounding
+/// makes of it. A port whose residual flexibility is below this share of its whole has none but rounding.
+pub(super) const DEPENDENT: f64 = 1e-11;
 
 /// Modes and residual vectors, from which reductions are made.
 #[derive(Debug, Clone)]
@@ -194,7 +193,7 @@ pub(super) fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> O
     });
     let mut weights = match all_independent(&unit) {
         Some(weights) => weights,
-        None => leading(unit)?,
+        None => leading(&unit)?,
     };
     for (mut row, &i) in weights.row_iter_mut().zip(&moving) {
         row /= size(i);
@@ -215,14 +214,14 @@ fn all_independent(unit: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     (DEPENDENT * n as f64 * inverse.norm_squared() < 1.0).then_some(inverse)
 }
 
-/// Eigenvectors of the eigenvalues that are not rounding, divided by their roots.
-fn leading(unit: DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let eigen = eigen::symmetric(unit)?;
-    let least = DEPENDENT * eigen.eigenvalues.amax();
-    let kept: Vec<usize> = (0..eigen.eigenvalues.len()).filter(|&k| eigen.eigenvalues[k] > least).collect();
-    let mut vectors = eigen.eigenvectors.select_columns(&kept);
+/// Eigenvectors of the eigenvalues that are not rounding, divided by their roots: combinations of vectors with these products that are independent.
+pub(super) fn leading(products: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let (values, vectors) = eigen::symmetric_in_blocks(products)?;
+    let least = DEPENDENT * values.last().copied().unwrap_or(0.0);
+    let kept: Vec<usize> = (0..values.len()).filter(|&k| values[k] > least).collect();
+    let mut vectors = vectors.select_columns(&kept);
     for (mut column, &k) in vectors.column_iter_mut().zip(&kept) {
-        column /= eigen.eigenvalues[k].sqrt();
+        column /= values[k].sqrt();
     }
     Some(vectors)
 }

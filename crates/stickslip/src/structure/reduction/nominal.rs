@@ -11,6 +11,7 @@
 //! reduced-order model of mistuning using a subset of nominal system modes", J. Eng. Gas Turbines Power 123, 893-900; Rubin as in `free`.
 
 use super::evidence::sign;
+use super::free::{DEPENDENT, leading};
 use super::mistuned::{FREE, shift};
 use super::ring::HALF_WIDTH;
 use super::{Damping, Deviation, ReducedSector, ReductionError, Row, UNSEEN, natural, product, symmetric};
@@ -29,8 +30,6 @@ pub(in crate::structure) const EXTENTS: [f64; 2] = [3.0, 6.0];
 const SETTLED: f64 = 1e-5 * HALF_WIDTH;
 /// Steps at most: three or four are usual.
 const STEPS: usize = 40;
-/// Residual flexibility of a place, relative to its flexibility, and of a residual vector, relative to others, below which it is rounding.
-const DEPENDENT: f64 = 1e-11;
 /// Inertia of a mode by its stiffness, relative to the largest, below which it has none.
 const MASSLESS: f64 = 1e-14;
 
@@ -339,14 +338,10 @@ fn independent(flexible: &DMatrix<f64>, whole: &[f64]) -> Result<DMatrix<f64>, R
     if moving.is_empty() {
         return Ok(DMatrix::zeros(whole.len(), 0));
     }
-    let (values, vectors) = eigen::symmetric_in_blocks(&gram).ok_or(ReductionError::OutOfRange)?;
-    let least = DEPENDENT * values.last().copied().unwrap_or(0.0);
-    let kept: Vec<usize> = (0..values.len()).filter(|&k| values[k] > least).collect();
-    let mut weights = DMatrix::zeros(whole.len(), kept.len());
-    for (column, &k) in kept.iter().enumerate() {
-        for (i, &row) in moving.iter().enumerate() {
-            weights[(row, column)] = vectors[(i, k)] / (values[k].sqrt() * size[i]);
-        }
+    let few = leading(&gram).ok_or(ReductionError::OutOfRange)?;
+    let mut weights = DMatrix::zeros(whole.len(), few.ncols());
+    for (i, &row) in moving.iter().enumerate() {
+        weights.set_row(row, &(few.row(i) / size[i]));
     }
     Ok(weights)
 }
