@@ -5,12 +5,13 @@ use faer::linalg::cholesky::llt::factor::{LltParams, cholesky_in_place, cholesky
 use faer::linalg::lu::partial_pivoting::factor::{PartialPivLuParams, lu_in_place, lu_in_place_scratch};
 use faer::linalg::lu::partial_pivoting::solve::{
     solve_in_place, solve_in_place_scratch, solve_transpose_in_place, solve_transpose_in_place_scratch,
+    solve_transpose_in_place_with_conj,
 };
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::perm::PermRef;
 use faer::traits::ComplexField;
-use faer::{Accum, MatMut, MatRef, Par, Spec};
+use faer::{Accum, Conj, MatMut, MatRef, Par, Spec};
 use num_complex::Complex64;
 
 /// Size from which elimination in blocks is the faster one.
@@ -302,6 +303,25 @@ impl<T: Number> Lu<T> {
         let exchanges = PermRef::new_checked(&self.order, &self.inverse, n);
         let right = MatMut::from_column_major_slice_mut(right, n, columns);
         solve_in_place(factors, factors, exchanges, right, Par::Seq, MemStack::new(&mut memory));
+    }
+
+    /// The same with the conjugate transpose of the matrix.
+    ///
+    /// # Panics
+    /// If the length of `right` is no multiple of n.
+    pub fn solve_adjoint(&self, right: &mut [T]) {
+        let n = self.n;
+        if n == 0 || right.is_empty() {
+            return;
+        }
+        assert!(right.len().is_multiple_of(n), "{} numbers are no columns of {n}", right.len());
+        let columns = right.len() / n;
+        let mut memory = MemBuffer::new(solve_transpose_in_place_scratch::<u32, T>(n, columns, Par::Seq));
+        let factors = MatRef::from_column_major_slice(&self.factors, n, n);
+        let exchanges = PermRef::new_checked(&self.order, &self.inverse, n);
+        let right = MatMut::from_column_major_slice_mut(right, n, columns);
+        let stack = MemStack::new(&mut memory);
+        solve_transpose_in_place_with_conj(factors, factors, exchanges, Conj::Yes, right, Par::Seq, stack);
     }
 }
 

@@ -13,6 +13,7 @@ pub mod leading;
 pub mod lu;
 pub mod maximum;
 pub mod modes;
+mod null_space;
 pub mod radau;
 pub mod random;
 pub mod signal;

@@ -6,6 +6,7 @@
 //! Source: Tisseur and Meerbergen, "The quadratic eigenvalue problem", SIAM Review 43 (2001), Sec. 3.
 
 use crate::eigen;
+use crate::null_space::null_space;
 use nalgebra::{DMatrix, DVector, Dyn, Schur, SymmetricEigen};
 use num_complex::Complex64;
 
@@ -263,19 +264,6 @@ fn quadratic(c: &DMatrix<Complex64>, k: &DMatrix<f64>, lambda: Complex64) -> DMa
     })
 }
 
-/// Orthonormal basis of the directions that the matrix maps closest to zero, one per column.
-fn null_space(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
-    let r = matrix.nrows();
-    if r == 1 {
-        return Some(DMatrix::from_element(1, 1, Complex64::new(1.0, 0.0)));
-    }
-    let svd = eigen::singular(matrix.clone())?;
-    let v_t = svd.v_t.expect("asked for");
-    let mut order: Vec<usize> = (0..r).collect();
-    order.sort_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
-    Some(DMatrix::from_fn(r, dimension.min(r), |i, j| v_t[(order[j], i)].conj()))
-}
-
 /// A real basis of the space that the columns span, which is known to have one.
 fn real_basis(columns: &DMatrix<Complex64>) -> Option<DMatrix<Complex64>> {
     let (r, count) = columns.shape();
@@ -333,6 +321,24 @@ mod tests {
         let turn = dmatrix![h, 0.0, h, 0.0; 0.0, h, 0.0, h; -h, 0.0, h, 0.0; 0.0, -h, 0.0, h];
         check(&(&turn * twice(&c) * turn.transpose()), &(&turn * twice(&k) * turn.transpose()), 1e-10);
         assert!(Modes::new(&dmatrix![2.0], &dmatrix![1.0]).is_err(), "critical damping is defective");
+    }
+
+    /// A chain of many masses with dampers that couple all of its modes, and two such chains side by side, whose modes are pairs.
+    #[test]
+    fn chains_with_dampers_of_their_own() {
+        let n = 24;
+        let chain = |of: fn(usize) -> f64| {
+            DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {
+                0 => of(i) + of(i + 1),
+                1 => -of(i.max(j)),
+                _ => 0.0,
+            })
+        };
+        let (c, k) = (chain(|i| 1e-3 * (1.0 + (i % 5) as f64)), chain(|i| 1.0 + 0.1 * (i % 3) as f64));
+        check(&c, &k, 1e-11);
+        let twice = |a: &DMatrix<f64>| a.kronecker(&DMatrix::<f64>::identity(2, 2));
+        let turn = DMatrix::from_fn(2 * n, 2 * n, |i, j| (0.3 + (i * j) as f64).sin()).qr().q();
+        check(&(&turn * twice(&c) * turn.transpose()), &(&turn * twice(&k) * turn.transpose()), 1e-8);
     }
 
     #[test]

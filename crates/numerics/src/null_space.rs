@@ -1,0 +1,141 @@
+//! The directions that a nearly singular matrix maps closest to zero: its right singular vectors of the least singular values.
+//!
+//! Of few rows they come from the whole decomposition. Of many they are the limit of inverse iteration with `QᴴQ`, one factorisation and
+//! two solutions a step: the nearer to singular the matrix is, the faster, and where it is the value of a polynomial matrix at an eigenvalue two
+//! steps are enough. Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 8.2.3 (orthogonal iteration).
+
+use crate::dense::ComplexLu;
+use crate::eigen;
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+
+/// Rows from which iteration takes less time than the whole decomposition.
+const MANY: usize = 8;
+/// Steps at most: each divides the error by the square of the ratio of the singular values, which is at least 10⁶ where it is of use at all.
+const STEPS: usize = 6;
+/// The directions are found when a step turns them by less than this: some times the rounding of a solution.
+const TURNED: f64 = 1e-13;
+/// A matrix without a pivot is factored with this share of its largest entry more on the diagonal, which is within its own rounding.
+const NUDGE: f64 = f64::EPSILON;
+
+/// Orthonormal basis of the `dimension` directions that a square matrix maps closest to zero, one per column; `None` if an entry is not finite or the
+/// decomposition does not end.
+pub(crate) fn null_space(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
+    let r = matrix.nrows();
+    if r == 1 {
+        return Some(DMatrix::from_element(1, 1, Complex64::ONE));
+    }
+    let iterated = if r >= MANY && dimension < r { iterated(matrix, dimension) } else { None };
+    iterated.or_else(|| decomposed(matrix, dimension))
+}
+
+fn decomposed(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
+    let r = matrix.nrows();
+    let svd = eigen::singular(matrix.clone())?;
+    let v_t = svd.v_t.expect("asked for");
+    let mut order: Vec<usize> = (0..r).collect();
+    order.sort_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
+    Some(DMatrix::from_fn(r, dimension.min(r), |i, j| v_t[(order[j], i)].conj()))
+}
+
+/// By inverse iteration; `None` where it does not settle, since the next singular value is not much larger.
+fn iterated(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
+    let r = matrix.nrows();
+    let factor = ComplexLu::new(matrix.as_slice().to_vec(), r).or_else(|_| {
+        let size = matrix.iter().map(|z| z.norm()).fold(0.0, f64::max);
+        let nudged = matrix + DMatrix::from_diagonal_element(r, r, Complex64::new(NUDGE * size, 0.0));
+        ComplexLu::new(nudged.as_slice().to_vec(), r)
+    });
+    let factor = factor.ok()?;
+    // columns without a pattern: none is across what is looked for but by chance, which the decomposition then mends
+    let mut found = DMatrix::from_fn(r, dimension, |i, j| {
+        let at = (i * dimension + j) as f64;
+        Complex64::new((1.0 + 7.0 * at).sin(), (2.0 + 11.0 * at).sin())
+    });
+    found = orthonormal(found)?;
+    for _ in 0..STEPS {
+        let mut next = found.clone();
+        factor.solve_adjoint(next.as_mut_slice());
+        next = orthonormal(next)?;
+        factor.solve(next.as_mut_slice());
+        next = orthonormal(next)?;
+        let turned = &next - &found * (found.adjoint() * &next);
+        found = next;
+        if turned.iter().all(|z| z.norm() <= TURNED) {
+            return Some(found);
+        }
+    }
+    None
+}
+
+/// Orthonormal columns of the same span; `None` if an entry is not finite.
+fn orthonormal(mut columns: DMatrix<Complex64>) -> Option<DMatrix<Complex64>> {
+    // of the size of one first: what a nearly singular matrix answers may be too large to be squared
+    for mut column in columns.column_iter_mut() {
+        let size = column.iter().map(|z| z.re.abs().max(z.im.abs())).fold(0.0, f64::max);
+        let finite = column.iter().all(|z| z.is_finite());
+        if !finite || size == 0.0 {
+            return None;
+        }
+        column /= Complex64::new(size, 0.0);
+    }
+    Some(columns.qr().q())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Matrices `U Σ Vᴴ` of random directions and chosen singular values.
+    fn made(values: &[f64], seed: f64) -> (DMatrix<Complex64>, DMatrix<Complex64>) {
+        let r = values.len();
+        let random = |first: f64| {
+            let entry = |i: usize, j: usize| {
+                let at = first + (i * r + j) as f64;
+                Complex64::new((1.3 * at * at).sin(), (0.7 * at * at + 1.0).sin())
+            };
+            DMatrix::from_fn(r, r, entry).qr().q()
+        };
+        let (u, v) = (random(seed), random(seed + 0.5));
+        let sigma = DMatrix::from_fn(r, r, |i, j| Complex64::new(if i == j { values[i] } else { 0.0 }, 0.0));
+        (u * sigma * v.adjoint(), v)
+    }
+
+    /// Both ways find the directions that the matrix was made with, one or several of them, singular to rounding or not.
+    #[test]
+    fn both_ways_find_the_directions() {
+        for least in [0.0, 1e-16, 1e-9] {
+            for dimension in [1, 2, 3] {
+                let values: Vec<f64> = (0..MANY + 5)
+                    .map(|i| if i < dimension { least * (1.0 + i as f64) } else { 1.0 + i as f64 })
+                    .collect();
+                let (matrix, v) = made(&values, 3.0 + dimension as f64);
+                let exact = v.columns(0, dimension);
+                let of_iteration = iterated(&matrix, dimension).expect("it settles");
+                for found in [&of_iteration, &decomposed(&matrix, dimension).unwrap()] {
+                    assert!((found.adjoint() * found - DMatrix::identity(dimension, dimension)).camax() < 1e-14);
+                    let missed = found - exact * (exact.adjoint() * found);
+                    assert!(missed.camax() < 1e-13, "{least} {dimension}: {:.1e}", missed.camax());
+                }
+            }
+        }
+    }
+
+    /// Where the next direction is as close, iteration says that it does not settle, and the decomposition answers.
+    #[test]
+    fn directions_that_are_not_apart_are_left_to_the_decomposition() {
+        let values: Vec<f64> = (0..MANY + 2).map(|i| 1.0 + 0.01 * i as f64).collect();
+        let (matrix, _) = made(&values, 5.0);
+        assert!(iterated(&matrix, 1).is_none());
+        let found = null_space(&matrix, 1).unwrap();
+        assert!(((&matrix * &found).norm() - 1.0).abs() < 1e-13);
+    }
+
+    /// Numbers that are none have no directions.
+    #[test]
+    fn what_is_not_finite_is_refused() {
+        let mut matrix = DMatrix::from_element(MANY, MANY, Complex64::ONE);
+        matrix[(1, 2)] = Complex64::new(f64::NAN, 0.0);
+        assert!(null_space(&matrix, 1).is_none());
+    }
+}
