@@ -28,10 +28,13 @@ const STUDIES: usize = 1000;
 const SEED: u64 = 1;
 /// How much longer than estimated a study may take.
 const FACTOR: f64 = 10.0;
-/// What it may take beside, s: estimates below that are of no interest to anybody.
-const SLACK: f64 = 1.0;
+/// What it may take beside, s: estimates below that are of no interest to anybody, and a search that ends without an orbit takes up to half a second
+/// where one that finds it takes a millisecond.
+const SLACK: f64 = 4.0;
 /// Studies that are estimated to take longer than this are read and checked only, s.
 const LONG: f64 = 10.0;
+/// How many of the studies that come nearest to their limits are told.
+const NEAREST: usize = 8;
 /// Most memory of the whole process, bytes.
 const MEMORY: u64 = 500_000_000;
 /// Fewest studies in a hundred that are accepted; the others test that refusals are errors.
@@ -126,6 +129,7 @@ fn not_finite(table: &Table) -> Option<String> {
 
 /// A study that was accepted.
 struct Done {
+    seed: u64,
     kind: &'static str,
     /// Time that it took and that was estimated, s; zero if it was not run for being too long.
     seconds: f64,
@@ -147,7 +151,7 @@ fn one(seed: u64, text: &str, slot: &Mutex<Option<Running>>) -> Result<Option<Do
     let (estimate, usual) = (summary.seconds, summary.usual_seconds);
     if estimate > number("STICKSLIP_RANDOM_LONG").map_or(LONG, |long| long as f64) {
         let kind = study.kind().name;
-        return Ok(Some(Done { kind, seconds: 0.0, estimate: 0.0, usual: 0.0, points: BTreeMap::new() }));
+        return Ok(Some(Done { seed, kind, seconds: 0.0, estimate: 0.0, usual: 0.0, points: BTreeMap::new() }));
     }
     *slot.lock().unwrap() = running(SLACK + FACTOR * estimate);
     if number("STICKSLIP_RANDOM_STUDIES") == Some(1) {
@@ -160,7 +164,7 @@ fn one(seed: u64, text: &str, slot: &Mutex<Option<Running>>) -> Result<Option<Do
         Some(fault) => Err(fault),
         None => {
             let kind = study.kind().name;
-            Ok(Some(Done { kind, seconds: clock.seconds(), estimate, usual, points: dataset.record.points }))
+            Ok(Some(Done { seed, kind, seconds: clock.seconds(), estimate, usual, points: dataset.record.points }))
         }
     }
 }
@@ -235,6 +239,16 @@ fn random_studies_end_in_time() {
             of_kind.len()
         );
         assert!(of_kind.len() * 30 >= count / 2, "{} of {count} are of the kind {}", of_kind.len(), kind.info.name);
+    }
+    // those that come nearest to their limits
+    let share = |one: &Done| one.seconds / (SLACK + FACTOR * one.estimate);
+    let mut nearest: Vec<&Done> = done.iter().collect();
+    nearest.sort_by(|a, b| share(b).total_cmp(&share(a)));
+    for one in nearest.iter().take(NEAREST) {
+        println!(
+            "study {}, {}: {:.2} s, estimated {:.2} to {:.2} s",
+            one.seed, one.kind, one.seconds, one.usual, one.estimate
+        );
     }
     if let Some(peak) = peak_memory() {
         println!("{} MB", peak / 1_000_000);

@@ -64,6 +64,8 @@ pub(super) const KIND: Kind = Kind {
 
 /// Solutions per point, each of full equations. Measured: 0.3 s a point for a disk of 24 sectors.
 const FOLLOWED: f64 = 8.0;
+/// Steps of the curve from its large end, whatever is asked of it: usually, and where modes are near each other.
+const STEPS: (f64, f64) = (100.0, 200.0);
 
 fn cost(costing: &Costing<'_>) -> Cost {
     let values = &costing.case.values;
@@ -77,7 +79,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: 2.0 * rows,
         unit: points * costing.series_bytes(harmonics),
-        work: rows * FOLLOWED * costing.series(values.count("harmonics").map(|h| h as f64)),
+        work: (rows * FOLLOWED + costing.cases * costing.steps(STEPS)) * costing.series(Some(harmonics)),
     }
 }
 

@@ -53,7 +53,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let rows = points * costing.instants();
     let orbits = costing.orbits(points);
     let wanted = costing.case.values.flag("multipliers") == Some(true);
-    let multipliers = if wanted { points * 2.0 * costing.masses } else { 0.0 };
+    let (multipliers, map) = if wanted { (points * 2.0 * costing.masses, costing.period()) } else { (0.0, 0.0) };
     Cost {
         tables: vec![
             costing.motion(rows),
@@ -63,7 +63,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         // the panels beyond the most that are drawn are made all the same
         drawn: rows * (costing.places + costing.joints),
         unit: costing.kept_orbits(),
-        work: points * (costing.orbit() + costing.extra() + costing.reading(costing.instants())),
+        work: points * (costing.orbit() + map + costing.extra() + costing.reading(costing.instants())),
     }
 }
 

@@ -121,9 +121,10 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let table = costing.motion(points * samples);
     // the motion follows the drive and the modes alike
     let fastest = costing.range().map_or(0.0, |(_, high)| high).max(costing.slowest_mode());
+    let periods = duration * fastest / TAU;
     // the cycles of a free decay, and their summary
     let free = costing.range().is_none();
-    let cycles = if free { points * (duration * fastest / TAU).floor() } else { 0.0 };
+    let cycles = if free { points * periods.floor() } else { 0.0 };
     let summaries = if free { points } else { 0.0 };
     Cost {
         tables: vec![
@@ -134,7 +135,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: points.min(MOST_PANELS as f64) * samples * costing.places,
         unit: 0.0,
-        work: points * (duration * fastest / TAU * costing.period() + costing.reading(samples)),
+        work: points * (periods * costing.period() + costing.patterns(periods) + costing.reading(samples)),
     }
 }
 
