@@ -2,8 +2,8 @@
 //!
 //! At small amplitude joints stick and the mode is the linear one with their springs, or with rigid contacts closed; at large amplitude
 //! it is the linear one without joints. A mode is *followed* from an amplitude at which friction hardly matters, by arc length, in steps
-//! that its own curve decides: neither the range that is asked for nor its points change them. The points are then solved for, each
-//! from the followed states beside it.
+//! that its own curve decides: neither the range that is asked for nor its points change them. Where all joints stick, every smaller motion
+//! is a multiple of the last one. The points above are solved for, each from the followed states beside it.
 //!
 //! Where friction pulls two frequencies together, two modes nearly become one: [`Mode::merges`]. Below there are two again, in other motions,
 //! and little decides which mode goes on to which, the number of harmonics for example. There the curve may also turn: its amplitude grows
@@ -169,6 +169,8 @@ const LOCATED: f64 = 1e-3;
 struct Path {
     linear: Option<LinearMode>,
     arcs: Vec<ModeArc>,
+    /// Whether all motions below the last followed one are its multiples: the joints stick.
+    sticks: bool,
     lost: Option<Lost>,
 }
 
@@ -270,7 +272,7 @@ impl Path {
         let modes = equations.linear_modes();
         let none = |linear| {
             let lost = Lost { at: f64::INFINITY, reason: Reason::NoBeginning };
-            Path { linear, arcs: Vec::new(), lost: Some(lost) }
+            Path { linear, arcs: Vec::new(), sticks: false, lost: Some(lost) }
         };
         let Some(linear) = modes.get(index).cloned() else { return none(None) };
         let faint = equations.faint(&modes, index, FAINT, APART);
@@ -284,13 +286,18 @@ impl Path {
         });
         let Some(start) = start else { return none(Some(linear)) };
         let top = start.amplitude;
-        let mut path = Path { linear: Some(linear), arcs: vec![start], lost: None };
+        let mut path = Path { linear: Some(linear), arcs: vec![start], sticks: false, lost: None };
         let mut length = FIRST;
         let (mut lowest, mut since) = (0, 0);
         for _ in 0..MOST_STEPS {
             let now = &path.arcs[path.arcs.len() - 1];
             let at = now.amplitude;
             if at < low {
+                return path;
+            }
+            // of equal blades whose joints stick any mixture is a motion as good, and no step would find its way among them
+            if equations.is_proportional(&now.state, at) {
+                path.sticks = true;
                 return path;
             }
             let step = equations.step(now, length, length < CORNER).filter(|step| {
@@ -332,6 +339,9 @@ impl Path {
 
     /// The smallest amplitude that was reached.
     fn end(&self) -> f64 {
+        if self.sticks {
+            return 0.0;
+        }
         self.arcs.iter().fold(f64::INFINITY, |least, arc| least.min(arc.amplitude))
     }
 
@@ -343,7 +353,10 @@ impl Path {
             let found = equations.solve(&guess, a, a).or_else(|| equations.solve(&first.state, first.amplitude, a))?;
             return (equations.assurance(&guess, &found) >= SHAPE).then_some(found);
         }
-        let pair = self.arcs.windows(2).find(|pair| pair[0].amplitude >= a && pair[1].amplitude < a)?;
+        let Some(pair) = self.arcs.windows(2).find(|pair| pair[0].amplitude >= a && pair[1].amplitude < a) else {
+            let last = self.arcs.last().filter(|_| self.sticks)?;
+            return Some(equations.scaled(&last.state, a / last.amplitude));
+        };
         let guess = pair[0].between(&pair[1], a);
         let room = equations.distance(&pair[0], &pair[1].state, pair[1].amplitude);
         let near = |equations: &mut ModeEquations<'_>, from: &ModeState, before: f64| {
@@ -481,14 +494,38 @@ fn point(equations: &ModeEquations<'_>, amplitude: f64, state: &ModeState) -> Mo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::Coulomb;
+    use crate::law::{Coulomb, Jenkins};
     use crate::method::{Method, event_driven::EventDriven};
-    use crate::model::{Force, example};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
     use std::f64::consts::PI;
 
     /// What the energy of an exact orbit and the amplitudes of its places may differ by from a mode with 31 harmonics: rigid friction makes
     /// the error of a series fall as 1/H, and a motion close to where two modes become one magnifies it.
     const SERIES: f64 = 0.02;
+
+    /// Equal blades in a ring have modes in pairs, and while their dampers stick every mixture of two is a motion. The frequency is that of
+    /// the wave with one nodal diameter, `√((k + 4 kt sin²(π/N))/m)`.
+    #[test]
+    fn the_modes_of_a_tuned_ring_go_down_to_where_all_sticks() {
+        let (blades, k, kt) = (6, 4.0, 0.8);
+        let mut model = Model::default();
+        let name = |i: usize| format!("b{}", i % blades);
+        for i in 0..blades {
+            model.masses.push(Mass::new(name(i), 1.0));
+            model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness: k, damping: 0.01 });
+            let law = std::sync::Arc::new(Jenkins { stiffness: kt, limit: 0.2 });
+            model.joints.push(Joint { name: format!("j{i}"), between: [name(i), name(i + 1)], law });
+        }
+        let system = model.assemble().unwrap();
+        let request = ModeRequest { mode: 1, range: (1e-6, 1e-2), points: 5, harmonics: 3, samples: 128 };
+        let mode = mode(&system, request).unwrap();
+        assert_eq!((mode.points.len(), mode.lost, &mode.missing[..]), (5, None, &[][..]));
+        let stuck = (k + 4.0 * kt * (PI / blades as f64).sin().powi(2)).sqrt();
+        for point in &mode.points {
+            assert!((point.omega / stuck - 1.0).abs() < 1e-10, "{} instead of {stuck}", point.omega);
+            assert!((point.damping * 2.0 * stuck / 0.01 - 1.0).abs() < 1e-9, "{}", point.damping);
+        }
+    }
 
     /// A mode is the forced vibration under the forces `2 ζ ω M x'`, all harmonics of them. The exact method, which knows nothing of modes,
     /// finds the mode's amplitudes and its loss of energy `2 π ζ ω² Σ h² Xₕᴴ M Xₕ` under these forces. With positive damping its orbit is the

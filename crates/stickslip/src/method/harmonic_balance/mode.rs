@@ -24,6 +24,8 @@ pub(super) const ITERATIONS: usize = 60;
 pub(super) const SOLVED: f64 = 1e-11;
 /// The same where rounding lets Newton's method come no closer: a stiff joint between soft springs loses three digits.
 pub(super) const ROUNDED: f64 = 1e-8;
+/// Multiples of a motion that balance too where all smaller ones do.
+const SMALLER: [f64; 3] = [0.7, 0.5, 0.01];
 
 /// A point of a nonlinear mode.
 #[derive(Debug, Clone)]
@@ -454,6 +456,28 @@ impl<'a> ModeEquations<'a> {
         scale.extend(self.contacts.iter().flat_map(|placed| vec![placed.port.scale; width * placed.port.axes]));
         scale.extend([1.0; 2]);
         scale
+    }
+
+    /// Whether every smaller motion is a multiple of this one, about the same mean: nothing slips in it, and nothing opens or closes.
+    pub fn is_proportional(&mut self, state: &ModeState, a: f64) -> bool {
+        let mut residual = vec![0.0; self.size()];
+        SMALLER.iter().all(|factor| {
+            let (smaller, a) = (self.scaled(state, *factor), a * factor);
+            let units = self.units(&smaller, a);
+            self.evaluate(&smaller, (&smaller, a), &mut residual, None);
+            residual.iter().zip(&units).map(|(r, s)| (r / s) * (r / s)).sum::<f64>().sqrt() <= SOLVED
+        })
+    }
+
+    /// A multiple of a motion about the same mean.
+    pub fn scaled(&self, state: &ModeState, factor: f64) -> ModeState {
+        let (mut scaled, n) = (state.clone(), self.system.dofs());
+        let harmonics = &self.alternation.harmonics;
+        for (k, _) in harmonics.iter().enumerate().filter(|(_, h)| **h > 0) {
+            scaled.x[k * n..(k + 1) * n].iter_mut().for_each(|x| *x *= factor);
+            scaled.force.iter_mut().skip(k).step_by(harmonics.len()).for_each(|force| *force *= factor);
+        }
+        scaled
     }
 
     /// Solves at amplitude `a` from `start`, whose motion is scaled to it; forces along laws of velocity stay, as in slip.
