@@ -44,7 +44,9 @@ pub(crate) enum Kind {
 impl Kind {
     /// Sliders and stops alone are followed exactly, laws with a rate alone by integration, everything else in small steps.
     pub fn of(system: &System, width: Option<f64>) -> Kind {
-        if width.is_none() && system.joints().iter().all(|joint| takes(joint.law().as_ref())) {
+        // a width that smooths no law asks for nothing
+        let smooths = |width| system.joints().iter().any(|joint| joint.law().regularised(width).is_some());
+        if !width.is_some_and(smooths) && system.joints().iter().all(|joint| takes(joint.law().as_ref())) {
             return Kind::Exact;
         }
         Kind::integrated(system, width)
@@ -253,6 +255,14 @@ mod tests {
 
     fn shoot(system: &System, omega: f64) -> Orbit {
         Shooting::default().solver(system).unwrap().orbit(omega, None).unwrap()
+    }
+
+    /// A width is for laws that it smooths: springs and stops alone are followed exactly whatever it is.
+    #[test]
+    fn a_width_that_smooths_nothing_changes_nothing() {
+        let of = |law: SharedLaw| Kind::of(&system(&[(law, vec![Axis::new(vec![(0, 1.0)])])]), Some(1e-3));
+        assert_eq!(of(Arc::new(Gap { gap: 0.1, stiffness: 2.0 })), Kind::Exact);
+        assert_eq!(of(Arc::new(Coulomb { limit: 0.1 })), Kind::Smooth);
     }
 
     /// Linear laws of one and two directions, without and with states, have a linear response, over full mass matrices; in both flows.
