@@ -1,10 +1,12 @@
 //! A motion in time to hold every method against: small implicit steps, none of the library's methods, derivatives by differences.
 //!
 //! Newmark's average acceleration (trapezoidal rule) for the structure, of second order; laws by the first of their views, step by step:
-//! return maps and rate laws as they are, sliders by trial and clamp, rigid ones behind a spring that is stiff beyond what the steps resolve.
+//! return maps as they are, rate laws by steps that damp what is too fast for them, sliders by trial and clamp, rigid ones behind a spring that is
+//! stiff beyond what the steps resolve.
 
-use nalgebra::{DMatrix, DVector};
-use stickslip::law::{MOST_DIRECTIONS, Piece, RatePoint, Relative, SharedLaw, Slider};
+use crate::replay::{self, NODES};
+use nalgebra::DVector;
+use stickslip::law::{MOST_DIRECTIONS, Piece, Relative, SharedLaw, Slider};
 use stickslip::model::{Axis, System};
 
 type Along = [f64; MOST_DIRECTIONS];
@@ -50,8 +52,6 @@ fn travel(system: &System, omega: f64) -> f64 {
 
 /// Stiffness of the spring in front of a rigid slider, in masses over the square of a step.
 const RIGID: f64 = 100.0;
-/// The longest change of a state in an iteration, in sizes of states.
-const STRIDE: f64 = 2.0;
 /// Newton iterations of a step.
 const ITERATIONS: usize = 40;
 /// Residual relative to the forces at which a step is solved.
@@ -244,31 +244,14 @@ impl Contact {
             return (force, z, moving);
         }
         if let Some(rate) = self.law.rate() {
-            let motion = Relative { displacement: u, velocity: v };
-            let before = Relative { displacement: self.u, velocity: self.v };
-            let (s, directions) = (z.len(), self.axes.len());
-            let mut rates = vec![0.0; s];
-            if s > 0 {
-                rate.value(&before, &self.z, &mut rates);
-                let first = rates.clone();
-                let mut point = RatePoint::new(directions, s);
-                for _ in 0..ITERATIONS {
-                    rate.linearise(directions, &motion, &z, &mut point);
-                    let residual = DVector::from_fn(s, |i, _| z[i] - self.z[i] - 0.5 * h * (point.rate[i] + first[i]));
-                    let jacobian = DMatrix::from_fn(s, s, |i, l| {
-                        f64::from(u8::from(i == l)) - 0.5 * h * point.rate_slope(i)[2 * directions + l]
-                    });
-                    let Some(mut change) = jacobian.lu().solve(&residual) else { break };
-                    // some states are logarithms of what they stand for
-                    let far = change.amax() / (STRIDE * rate.state_scale());
-                    change /= far.max(1.0);
-                    z.iter_mut().zip(change.iter()).for_each(|(z, d)| *z -= d);
-                    if change.amax() <= SOLVED * (1.0 + z.iter().fold(0.0f64, |a, z| a.max(z.abs()))) {
-                        break;
-                    }
-                }
-            }
-            let force = rate.value(&motion, &z, &mut rates);
+            // as the structure moves, with the mean acceleration of the step
+            let motion = NODES.map(|c| {
+                let velocity = std::array::from_fn(|a| self.v[a] + c * (v[a] - self.v[a]));
+                let way = |a: usize| c * h * (self.v[a] + 0.5 * c * (v[a] - self.v[a]));
+                Relative { displacement: std::array::from_fn(|a| self.u[a] + way(a)), velocity }
+            });
+            z = replay::after(rate, self.axes.len(), h, &motion, &self.z);
+            let force = rate.value(&Relative { displacement: u, velocity: v }, &z, &mut vec![0.0; z.len()]);
             return (force, z, moving);
         }
         let mut force = 0.0;

@@ -9,8 +9,8 @@ use crate::Random;
 /// Displacement (m) and velocity (m/s) along all directions.
 pub type Instant = ([f64; MOST_DIRECTIONS], [f64; MOST_DIRECTIONS]);
 
-/// A motion in time, for times from zero on.
-pub type Motion<'a> = &'a dyn Fn(f64) -> Instant;
+/// A given motion, for times from zero on.
+pub type Given<'a> = &'a dyn Fn(f64) -> Instant;
 
 /// A view of a law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub fn views(law: &dyn Law) -> Vec<View> {
 ///
 /// # Panics
 /// If the law does not offer the view.
-pub fn forces(law: &dyn Law, view: View, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+pub fn forces(law: &dyn Law, view: View, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
     match view {
         View::Pieces => pieces(&law.pieces().expect("pieces"), motion, times),
         View::Step => step(law.step().expect("a step"), motion, times),
@@ -49,7 +49,7 @@ pub fn forces(law: &dyn Law, view: View, motion: Motion<'_>, times: &[f64]) -> V
     }
 }
 
-fn pieces(pieces: &[Piece], motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+fn pieces(pieces: &[Piece], motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
     let mut held = vec![0.0; pieces.len()];
     let mut before = motion(times[0]).0[0];
     times
@@ -74,7 +74,7 @@ fn pieces(pieces: &[Piece], motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST
         .collect()
 }
 
-fn step(step: &dyn Step, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+fn step(step: &dyn Step, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
     let mut z = vec![0.0; step.states()];
     let mut before = motion(times[0]).0;
     times
@@ -90,14 +90,54 @@ fn step(step: &dyn Step, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST_DI
 
 /// Newton iterations for the stages of a step.
 const ITERATIONS: usize = 30;
+/// The longest change of a stage in an iteration: some states are logarithms of what they stand for.
+const STRIDE: f64 = 2.0;
+/// Nodes and matrix of the two-stage Radau IIA method, of order 3: what is too fast for a step is damped in it, and does not ring.
+pub const NODES: [f64; 2] = [1.0 / 3.0, 1.0];
+const STAGES: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
 
-fn rate(directions: usize, law: &dyn Rate, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
-    // nodes and matrix of the two-stage Radau IIA method
-    const C: [f64; 2] = [1.0 / 3.0, 1.0];
-    const A: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
+/// The states of a rate law at the end of a step of length `h` (s), from those before it and the motion at the [`NODES`].
+///
+/// # Panics
+/// If the equations of the step are singular.
+#[must_use]
+pub fn after(law: &dyn Rate, directions: usize, h: f64, motion: &[Relative<f64>; 2], z: &[f64]) -> Vec<f64> {
     let n = law.states();
-    let mut z = vec![0.0; n];
     let mut point = RatePoint::new(directions, n);
+    let mut stages = DVector::from_fn(2 * n, |i, _| z[i % n]);
+    for _ in 0..if n == 0 || h == 0.0 { 0 } else { ITERATIONS } {
+        let mut rates = vec![0.0; 2 * n];
+        let mut slopes = DMatrix::zeros(2 * n, n);
+        for s in 0..2 {
+            law.linearise(directions, &motion[s], &stages.as_slice()[s * n..(s + 1) * n], &mut point);
+            rates[s * n..(s + 1) * n].copy_from_slice(&point.rate);
+            for i in 0..n {
+                for j in 0..n {
+                    slopes[(s * n + i, j)] = point.rate_slope(i)[2 * directions + j];
+                }
+            }
+        }
+        let residual = DVector::from_fn(2 * n, |i, _| {
+            stages[i] - z[i % n] - h * (0..2).map(|t| STAGES[i / n][t] * rates[t * n + i % n]).sum::<f64>()
+        });
+        let jacobian = DMatrix::from_fn(2 * n, 2 * n, |i, j| {
+            f64::from(u8::from(i == j)) - h * STAGES[i / n][j / n] * slopes[(j / n * n + i % n, j % n)]
+        });
+        let mut change = jacobian.lu().solve(&residual).expect("a regular step");
+        let longest = change.amax();
+        if longest > STRIDE {
+            change *= STRIDE / longest;
+        }
+        stages -= &change;
+        if longest < 1e-14 * (1.0 + stages.amax()) {
+            break;
+        }
+    }
+    stages.as_slice()[n..].to_vec()
+}
+
+fn rate(directions: usize, law: &dyn Rate, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+    let mut z = vec![0.0; law.states()];
     let relative = |time: f64| {
         let (displacement, velocity) = motion(time);
         Relative { displacement, velocity }
@@ -107,45 +147,14 @@ fn rate(directions: usize, law: &dyn Rate, motion: Motion<'_>, times: &[f64]) ->
         .iter()
         .map(|&time| {
             let h = time - last;
-            let mut stages = DVector::from_fn(2 * n, |i, _| z[i % n]);
-            for _ in 0..if n == 0 || h == 0.0 { 0 } else { ITERATIONS } {
-                let mut rates = vec![0.0; 2 * n];
-                let mut slopes = DMatrix::zeros(2 * n, n);
-                for s in 0..2 {
-                    let at: Vec<f64> = stages.rows(s * n, n).iter().copied().collect();
-                    law.linearise(directions, &relative(last + C[s] * h), &at, &mut point);
-                    rates[s * n..(s + 1) * n].copy_from_slice(&point.rate);
-                    for i in 0..n {
-                        for j in 0..n {
-                            slopes[(s * n + i, j)] = point.rate_slope(i)[2 * directions + j];
-                        }
-                    }
-                }
-                let residual = DVector::from_fn(2 * n, |i, _| {
-                    stages[i] - z[i % n] - h * (0..2).map(|t| A[i / n][t] * rates[t * n + i % n]).sum::<f64>()
-                });
-                let jacobian = DMatrix::from_fn(2 * n, 2 * n, |i, j| {
-                    f64::from(u8::from(i == j)) - h * A[i / n][j / n] * slopes[(j / n * n + i % n, j % n)]
-                });
-                let mut change = jacobian.lu().solve(&residual).expect("a regular step");
-                // states in a logarithm of the velocity: a long step of Newton's method would leave it
-                let longest = change.amax();
-                if longest > 2.0 {
-                    change *= 2.0 / longest;
-                }
-                stages -= &change;
-                if longest < 1e-14 * (1.0 + stages.amax()) {
-                    break;
-                }
-            }
-            z.copy_from_slice(stages.rows(n, n).as_slice());
+            z = after(law, directions, h, &NODES.map(|c| relative(last + c * h)), &z);
             last = time;
-            law.value(&relative(time), &z, &mut vec![0.0; n])
+            law.value(&relative(time), &z, &mut vec![0.0; z.len()])
         })
         .collect()
 }
 
-fn prox(directions: usize, law: &dyn Prox, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+fn prox(directions: usize, law: &dyn Prox, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
     let resolve = |y: &[f64], penalty: f64| {
         let (mut force, mut slope) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS * MOST_DIRECTIONS]);
         law.resolve(y, penalty, &mut force[..directions], &mut slope[..directions * directions]);
@@ -178,7 +187,7 @@ fn prox(directions: usize, law: &dyn Prox, motion: Motion<'_>, times: &[f64]) ->
 }
 
 /// Energy lost between the samples, `∫ f · du` by the trapezoidal rule, J.
-pub fn lost(motion: Motion<'_>, times: &[f64], forces: &[[f64; MOST_DIRECTIONS]]) -> f64 {
+pub fn lost(motion: Given<'_>, times: &[f64], forces: &[[f64; MOST_DIRECTIONS]]) -> f64 {
     let places: Vec<_> = times.iter().map(|&time| motion(time).0).collect();
     let each = |k: usize| -> f64 {
         let along = |a: usize| 0.5 * (forces[k][a] + forces[k + 1][a]) * (places[k + 1][a] - places[k][a]);

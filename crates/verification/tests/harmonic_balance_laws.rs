@@ -47,18 +47,21 @@ fn load(a: usize) -> Complex64 {
     Complex64::from_polar(FORCE / (1 + a) as f64, 0.9 * a as f64)
 }
 
-/// The forces that the law gives in the orbit's motion, one period after some that it may forget: samples, and what it loses.
-fn answer(law: &SharedLaw, view: View, orbit: &Orbit) -> (Vec<[f64; 3]>, f64) {
+/// Periods after which a law is asked what it answers to the orbit's motion, until that balances the structure: one forgets at once how it began,
+/// another creeps for hundreds of periods. What answers no orbit does so after none of them.
+const PERIODS: [usize; 4] = [5, 20, 80, 320];
+
+/// The forces that the law gives in the last of so many periods of the orbit's motion: samples, and what it loses.
+fn answer(law: &SharedLaw, view: View, orbit: &Orbit, periods: usize) -> (Vec<[f64; 3]>, f64) {
     const SAMPLES: usize = 4096;
-    const PERIODS: usize = 5;
     let period = orbit.period();
     let motion = |t: f64| {
         let joint = orbit.sample(t).joints[0];
         (joint.displacement, joint.velocity)
     };
-    let times: Vec<f64> = (0..=SAMPLES * PERIODS).map(|i| period * i as f64 / SAMPLES as f64).collect();
+    let times: Vec<f64> = (0..=SAMPLES * periods).map(|i| period * i as f64 / SAMPLES as f64).collect();
     let forces = replay::forces(&**law, view, &motion, &times);
-    let last = SAMPLES * (PERIODS - 1);
+    let last = SAMPLES * (periods - 1);
     let loss = replay::lost(&motion, &times[last..], &forces[last..]);
     (forces[last..times.len() - 1].to_vec(), loss)
 }
@@ -68,6 +71,20 @@ fn harmonic(samples: &[[f64; 3]], a: usize, h: usize) -> Complex64 {
     let n = samples.len() as f64;
     let scale = if h == 0 { 1.0 } else { 2.0 } / n;
     samples.iter().enumerate().map(|(i, f)| Complex64::cis(-TAU * (h * i) as f64 / n) * (f[a] * scale)).sum()
+}
+
+/// How far the law's answer to the orbit's motion is from losing what the orbit says, and from balancing the structure in first harmonic and mean
+/// along each direction, in shares of the drive's work and force.
+fn off_balance(law: &SharedLaw, view: View, orbit: &Orbit, constant: f64, periods: usize) -> Vec<f64> {
+    let (forces, loss) = answer(law, view, orbit, periods);
+    let mut off = vec![(orbit.joints[0].dissipation - loss).abs() / orbit.energy.work_in];
+    for (a, place) in orbit.places.iter().enumerate() {
+        let dynamic = Complex64::new(STIFFNESS - OMEGA * OMEGA * MASS, OMEGA * DAMPING);
+        let moving = dynamic * place.first_harmonic + harmonic(&forces, a, 1) - load(a);
+        let mean = STIFFNESS * place.mean + harmonic(&forces, a, 0).re - constant;
+        off.extend([moving.norm() / FORCE, mean.abs() / FORCE]);
+    }
+    off
 }
 
 #[test]
@@ -97,18 +114,15 @@ fn every_law_balances_the_structure() {
             assert!(defect < bound, "{} {constant}: returns {defect:.1e} of {bound:.1e}", info.name);
             returned += 1;
         }
-        let (forces, loss) = answer(&law, view, &orbit);
         let bound = SAMPLED + SERIES * orbit.evidence.truncation.expect("an estimate");
-        let off = (orbit.joints[0].dissipation - loss).abs() / orbit.energy.work_in;
-        assert!(off < bound, "{} {constant}: loss {off:.1e} of {bound:.1e}", info.name);
-        for (a, place) in orbit.places.iter().enumerate() {
-            let dynamic = Complex64::new(STIFFNESS - OMEGA * OMEGA * MASS, OMEGA * DAMPING);
-            let moving = dynamic * place.first_harmonic + harmonic(&forces, a, 1) - load(a);
-            let mean = STIFFNESS * place.mean + harmonic(&forces, a, 0).re - constant;
-            for off in [moving.norm() / FORCE, mean.abs() / FORCE] {
-                assert!(off < bound, "{} {constant} {a}: {off:.1e} of {bound:.1e}", info.name);
-            }
-        }
+        let off = |periods: &usize| off_balance(&law, view, &orbit, constant, *periods);
+        let balances = |off: Vec<f64>| off.iter().all(|off| *off < bound);
+        assert!(
+            PERIODS.iter().map(off).any(balances),
+            "{} {constant}: {:?} of {bound:.1e}",
+            info.name,
+            off(&PERIODS[3])
+        );
     }
     assert!(taken > TABLE.len() && 2 * returned > taken, "most laws: {taken} {returned}");
 }

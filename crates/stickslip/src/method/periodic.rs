@@ -17,6 +17,9 @@ pub(crate) trait ReturnMap {
     fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), Breakdown>;
     /// Weights of the energy norm, one per state.
     fn weights(&self) -> &[f64];
+    /// Tells it that the last return changed the state by `change`, relative; infinite before the first. Who chooses steps anew in every return
+    /// errs otherwise in each, so that a motion may go round in what steps do, for ever: when it moves by no more, it must go in the same steps.
+    fn moves(&mut self, _change: f64) {}
 }
 
 /// What the iteration aims at, and how long it may take.
@@ -135,6 +138,7 @@ fn settle(
     let mut last_states = VecDeque::with_capacity(MOST_REPEATS + 1);
     let mut hopeless = 0;
     let mut smallest = f64::INFINITY;
+    map.moves(f64::INFINITY);
     for count in 1..=returns {
         let before = state.clone();
         map.returned(&mut state, None).map_err(broke)?;
@@ -148,6 +152,7 @@ fn settle(
         if residual.is_nan() {
             return Err(broke(Breakdown::OutOfRange { time: 0.0 })); // no later return has a size either
         }
+        map.moves(residual);
         smallest = f64::min(smallest, residual);
         changes.push(residual);
         last_states.push_front(before);

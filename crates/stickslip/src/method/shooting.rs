@@ -13,7 +13,7 @@ use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
 use super::periodic::{Aim, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm};
 use super::relaxed::{Closing, Spring, relaxed};
 use super::repeated::Afresh;
-use super::smooth::flow::SmoothFlow;
+use super::smooth::flow::{Lengths, SmoothFlow};
 use super::stepped::SteppedPath;
 use super::{
     Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, WIDTH, periods, width,
@@ -44,7 +44,7 @@ const CLOSED: f64 = 1e-11;
 /// Meshes made for one orbit: the first is as good as the first search, the second nearly always enough.
 const MESHES: usize = 6;
 /// A mesh is good when closing the orbit on it moves the state by at most this many times the error per step: that is what the
-/// choice of the steps alone does.
+/// choice of the steps alone does. A motion that is waited for and changes by no more from one return to the next goes on in the same steps.
 const SETTLED: f64 = 100.0;
 /// Energy gap above which an orbit is not reported as converged.
 const ENERGY_GAP: f64 = 1e-5;
@@ -181,6 +181,12 @@ impl ReturnMap for Shooter<'_> {
     fn weights(&self) -> &[f64] {
         &self.weights
     }
+    fn moves(&mut self, change: f64) {
+        if let Stepping::Smooth(flow) = &mut self.stepping {
+            let apart = change > SETTLED * flow.tolerance;
+            flow.lengths = if apart { Lengths::Chosen } else { Lengths::Halved };
+        }
+    }
 }
 
 impl Closing for Shooter<'_> {
@@ -245,7 +251,7 @@ impl<'a> Shooter<'a> {
     /// The orbit of the stiff integration: searched, brought near, and closed on the steps of one run.
     fn smooth_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
         let search = self.search;
-        self.freeze(false);
+        self.set_lengths(Lengths::Chosen);
         if let Search::Settle { tolerance, returns } = search {
             let fine = self.set_tolerance(self.tolerance.max(COARSE));
             let coarse = Search::Settle { tolerance: tolerance.max(COARSE), returns: returns.min(COARSE_RETURNS) };
@@ -280,10 +286,10 @@ impl<'a> Shooter<'a> {
         loop {
             mesh += 1;
             if !fits {
-                self.freeze(false);
+                self.set_lengths(Lengths::Chosen);
                 self.returned(&mut state.clone(), None).map_err(self.broke(aim.omega))?;
             }
-            self.freeze(true);
+            self.set_lengths(Lengths::Repeated);
             self.stepping.flow().keep(true);
             let closed = close(self, &state, Aim { residual: CLOSED, ..aim });
             self.stepping.flow().keep(false);
@@ -347,9 +353,9 @@ impl<'a> Shooter<'a> {
         kept.map_err(self.broke(self.omega))
     }
 
-    fn freeze(&mut self, frozen: bool) {
+    fn set_lengths(&mut self, lengths: Lengths) {
         if let Stepping::Smooth(flow) = &mut self.stepping {
-            flow.frozen = frozen;
+            flow.lengths = lengths;
         }
     }
 
@@ -478,7 +484,7 @@ impl Solver for Shooter<'_> {
         let near;
         let known = start.filter(|state| state.len() == self.weights.len());
         let start = if self.periods > 1 && known.is_none() {
-            self.freeze(false);
+            self.set_lengths(Lengths::Chosen);
             self.set_count(FIRST * self.periods);
             let first = self.first_state(omega);
             near = approached(self, first, sign);

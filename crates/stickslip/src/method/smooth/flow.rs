@@ -30,8 +30,22 @@ const STEP_LIMIT: usize = 200_000;
 const ESCAPED: f64 = 1e5;
 /// The new step aims at this share of the tolerance.
 const SAFETY: f64 = 0.8;
+/// Steps that are only ever halved are chosen anew when they are so many times as many: layers move on and leave short steps behind.
+const GROWN: usize = 2;
 /// Order of the error estimate plus one.
 const ORDER: f64 = 4.0;
+
+/// Where the steps of a run have their lengths from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Lengths {
+    /// From the error of each.
+    Chosen,
+    /// From the last run, halved where the error asks for it. Runs from neighbouring states go in the same steps, where those of chosen length
+    /// differ by up to their error, and none of them errs by more than a chosen one.
+    Halved,
+    /// From the last run as they are: the end state is a smooth function of the start.
+    Repeated,
+}
 
 /// Runs the motion of a structure with smooth laws.
 pub(crate) struct SmoothFlow {
@@ -41,10 +55,10 @@ pub(crate) struct SmoothFlow {
     pub tolerance: f64,
     keep: bool,
     steps: Steps,
-    /// Whether runs repeat the step lengths of the last free run: the end state is then a smooth function of the start.
-    pub frozen: bool,
-    /// Levels of the accepted steps of the last free run, in order.
+    pub lengths: Lengths,
+    /// Levels of the accepted steps of the last run, in order, and how many they were when they were chosen.
     mesh: Vec<usize>,
+    chosen: usize,
     /// Accepted and rejected steps of the last run.
     accepted: usize,
     rejected: usize,
@@ -77,8 +91,9 @@ impl SmoothFlow {
             tolerance,
             keep: false,
             steps: Steps { nodes, ..Steps::default() },
-            frozen: false,
+            lengths: Lengths::Chosen,
             mesh: Vec::new(),
+            chosen: 0,
             accepted: 0,
             rejected: 0,
             stretch: 0.0,
@@ -301,8 +316,8 @@ impl SmoothFlow {
     }
 
     /// The length of the next attempt (s), if it may be made; chooses the level where the mesh is given.
-    fn attempt(&mut self, frozen: bool, tick: f64) -> Option<f64> {
-        if frozen {
+    fn attempt(&mut self, lengths: Lengths, tick: f64) -> Option<f64> {
+        if lengths != Lengths::Chosen {
             // the mesh covers the stretch exactly
             self.level = self.mesh[self.accepted];
         }
@@ -317,9 +332,9 @@ impl SmoothFlow {
     }
 
     /// Shortens the step after a failed one.
-    fn shorten(&mut self, frozen: bool, error: f64) -> bool {
+    fn shorten(&mut self, lengths: Lengths, error: f64) -> bool {
         self.rejected += 1;
-        if frozen {
+        if lengths != Lengths::Chosen {
             // a layer has moved out of its fine steps: from now on the mesh has two halves here
             if self.level == LEVELS {
                 return false;
@@ -399,8 +414,12 @@ impl Flow for SmoothFlow {
         let mut position = 0u64;
         // level: the step is 2^(LEVELS - level) ticks; a run starts like every run of the same stretch does, for equal bits
         self.level = FIRST_LEVEL;
-        let frozen = self.frozen && !self.mesh.is_empty();
-        if !frozen {
+        let lengths = match self.lengths {
+            Lengths::Halved if self.mesh.len() > GROWN * self.chosen => Lengths::Chosen,
+            _ if self.mesh.is_empty() => Lengths::Chosen,
+            lengths => lengths,
+        };
+        if lengths == Lengths::Chosen {
             self.mesh.clear();
         }
         let joints = self.assembly.joints.len();
@@ -417,7 +436,7 @@ impl Flow for SmoothFlow {
         while position < total {
             let time = position as f64 * tick;
             let h =
-                self.attempt(frozen, tick).ok_or_else(|| self.stalled(state, (time, self.length(tick)), scale.1))?;
+                self.attempt(lengths, tick).ok_or_else(|| self.stalled(state, (time, self.length(tick)), scale.1))?;
             let ticks = 1u64 << (LEVELS - self.level);
             self.set_loads(time, h);
             self.predict(state, h, length, time);
@@ -426,13 +445,13 @@ impl Flow for SmoothFlow {
             };
             let how = (scale.1, sensitivity.is_some());
             let solved = self.step.solve(&self.assembly, eliminated, &self.loads, state, how);
-            let error = match (solved, frozen) {
-                (true, true) => 0.0,
-                (true, false) => self.error(state, time, scale),
+            let error = match (solved, lengths) {
+                (true, Lengths::Repeated) => 0.0,
+                (true, Lengths::Chosen | Lengths::Halved) => self.error(state, time, scale),
                 (false, _) => f64::INFINITY,
             };
             if !error.is_finite() || error > 1.0 {
-                if !self.shorten(frozen, error) {
+                if !self.shorten(lengths, error) {
                     return Err(self.stalled(state, (time, h), scale.1));
                 }
                 continue;
@@ -449,7 +468,7 @@ impl Flow for SmoothFlow {
             }
             // the last stage is the end
             self.laws.swap_with_slice(&mut self.step.points[(STAGES - 1) * joints..]);
-            if !frozen {
+            if lengths != Lengths::Repeated {
                 let work = (self.next.as_slice(), self.load.as_mut_slice(), self.force.as_mut_slice());
                 slope(&self.assembly, work, &self.laws, &self.drive, time + h, &mut self.next_slope);
                 std::mem::swap(&mut self.slope, &mut self.next_slope);
@@ -463,7 +482,7 @@ impl Flow for SmoothFlow {
             std::mem::swap(&mut self.previous, &mut self.step.unknown);
             self.step.unknown.resize(self.previous.len(), 0.0);
             self.accepted += 1;
-            if !frozen {
+            if lengths == Lengths::Chosen {
                 self.mesh.push(self.level);
             }
             position += ticks;
@@ -474,6 +493,9 @@ impl Flow for SmoothFlow {
             {
                 self.level -= 1;
             }
+        }
+        if lengths == Lengths::Chosen {
+            self.chosen = self.mesh.len();
         }
         if let Some(sensitivity) = sensitivity {
             let columns = sensitivity.ncols();
