@@ -3,6 +3,7 @@
 //! After a change of the schema, a law, a method, a template or a study kind, write the generated parts anew:
 //! `STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-study --test book`
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
@@ -84,8 +85,8 @@ fn the_reference_of_keys_is_up_to_date() {
     up_to_date(&root().join("docs/src/study_file_keys.md"), &format!("{head}{}", book::markdown()));
 }
 
-const BEGIN: &str = "<!-- begin generated: methods x laws -->\n";
-const END: &str = "<!-- end generated: methods x laws -->";
+const METHODS_BY_LAWS: [&str; 2] =
+    ["<!-- begin generated: methods x laws -->\n", "<!-- end generated: methods x laws -->"];
 
 /// A mass on a spring that rubs on the ground with this law, along all directions of the law.
 fn rubbing(law: law::SharedLaw) -> System {
@@ -128,23 +129,59 @@ fn methods_by_laws() -> String {
     table + "\n"
 }
 
-#[test]
-fn every_law_has_its_section_in_the_book() {
-    let page = text_of(&root().join("docs/src/laws.md"));
-    for law in law::TABLE {
-        assert!(page.contains(&format!("\n## {}\n", law.name)), "docs/src/laws.md has no section `{}`", law.name);
-        assert!(page.contains(&format!("](#{})", law.name)), "docs/src/laws.md does not list `{}`", law.name);
+/// Every law in a row: what it says of itself.
+fn laws() -> String {
+    let mut table = "| law | what it is | directions | says to methods |\n| --- | --- | --- | --- |\n".to_owned();
+    for row in law::TABLE {
+        let law = row.sample();
+        let (name, summary) = (row.name, row.summary.replace('|', "\\|"));
+        // as few and as many tangents as a law that leaves them open can have
+        let directions: BTreeSet<_> = [1.0, 2.0]
+            .iter()
+            .map(|count| law.with(law::TANGENTS, *count).unwrap_or(law.clone()).directions())
+            .collect();
+        let directions: Vec<_> = directions.iter().map(usize::to_string).collect();
+        let pieces = law.pieces().unwrap_or_default();
+        let says = [
+            ("sliders", pieces.iter().any(|piece| matches!(piece, law::Piece::Slider(_)))),
+            ("stops", pieces.iter().any(|piece| matches!(piece, law::Piece::Stop { .. }))),
+            ("resolvent", law.prox().is_some()),
+            ("step", law.step().is_some()),
+            ("rates", law.rate().is_some()),
+        ];
+        let says: Vec<_> = says.iter().filter(|(_, says)| *says).map(|(word, _)| *word).collect();
+        table += &format!("| [`{name}`](#{name}) | {summary} | {} | {} |\n", directions.join(" or "), says.join(", "));
     }
+    table
+}
+
+/// The page with what stands between two lines replaced.
+fn with_generated(page: &str, [begin, end]: [&str; 2], generated: &str) -> String {
+    let from = page.find(begin).unwrap_or_else(|| panic!("no `{begin}`")) + begin.len();
+    let to = from + page[from..].find(end).unwrap_or_else(|| panic!("no `{end}`"));
+    format!("{}{generated}{}", &page[..from], &page[to..])
+}
+
+const LAWS: [&str; 2] = ["<!-- begin generated: laws -->\n", "<!-- end generated: laws -->"];
+
+/// The table is generated, and a law without a section gets one of its summary, to be written out by who knows more.
+#[test]
+fn the_page_of_laws_has_every_law() {
+    let path = root().join("docs/src/laws.md");
+    let mut page = with_generated(&text_of(&path), LAWS, &laws());
+    for row in law::TABLE {
+        if !page.contains(&format!("\n## {}\n", row.name)) {
+            page += &format!("\n## {}\n\n{}.\n", row.name, row.summary);
+        }
+    }
+    up_to_date(&path, &page);
 }
 
 #[test]
 fn the_table_of_methods_and_laws_is_up_to_date() {
     for page in ["docs/src/laws_and_methods.md", "README.md"] {
         let path = root().join(page);
-        let text = text_of(&path);
-        let begin = text.find(BEGIN).unwrap_or_else(|| panic!("{page} has no `{BEGIN}`")) + BEGIN.len();
-        let end = begin + text[begin..].find(END).unwrap_or_else(|| panic!("{page} has no `{END}`"));
-        up_to_date(&path, &format!("{}{}{}", &text[..begin], methods_by_laws(), &text[end..]));
+        up_to_date(&path, &with_generated(&text_of(&path), METHODS_BY_LAWS, &methods_by_laws()));
     }
 }
 
