@@ -45,7 +45,7 @@ impl Eliminated {
 }
 
 /// The motion along the axes at an instant.
-type Motion = Vec<Relative<f64>>;
+type Relatives = Vec<Relative<f64>>;
 
 /// Memory and result of a step.
 #[derive(Debug, Clone)]
@@ -56,8 +56,8 @@ pub(super) struct Step {
     pub before: DVector<f64>,
     pub force: DVector<f64>,
     /// Motion of the joints at the start and at the end.
-    from: Motion,
-    to: Motion,
+    from: Relatives,
+    to: Relatives,
     /// Velocities of the structure along the axes at the end.
     unknown: Vec<f64>,
     free: Vec<f64>,

@@ -9,7 +9,7 @@ mod hold;
 mod linear;
 mod loose;
 mod onset;
-mod rest;
+mod preload;
 mod waves;
 
 pub use waves::WaveModes;
@@ -128,8 +128,8 @@ impl Model {
         let system = self.assemble()?;
         let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(Stuck::of_joint).collect();
         let loose = self.loose(&system, &joints);
-        let at_rest = rest::carried(&system, &joints);
-        let unpressed = if loose.is_empty() { None } else { rest::unpressed(&system, &joints, &at_rest) };
+        let at_rest = preload::carried(&system, &joints);
+        let unpressed = if loose.is_empty() { None } else { preload::unpressed(&system, &joints, &at_rest) };
         if system.dofs() > LARGEST {
             let lost = system.dofs();
             let unknown = || Linear { modes: Modes { lost, ..Modes::default() }, shapes: None };

@@ -1,4 +1,4 @@
-//! Contacts at rest: `(K + W k Wᵀ) x = F - W f₀` with the springs `k` of closed contacts that stick, and their forces `f₀` before anything moves.
+//! What preloaded contacts carry before anything moves: `(K + W k Wᵀ) x = F - W f₀`, with the springs `k` of closed contacts that stick and their forces `f₀`.
 
 use super::super::System;
 use super::Unpressed;
