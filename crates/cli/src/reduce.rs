@@ -4,7 +4,7 @@ use crate::{Ending, print, run};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use stickslip::model::{Axis, Model, Place, Substructure, SubstructureDamping, System};
+use stickslip::model::{Axis, Model, Place, ReductionEvidence, Substructure, SubstructureDamping, System};
 use stickslip::structure::reduction::Row;
 use stickslip::structure::{Reduction, ReductionKind};
 use stickslip_formats::{Matrix, Symmetry};
@@ -60,6 +60,8 @@ struct Few {
     system: System,
     /// How it was made, and its error.
     what: String,
+    /// Its error, with that of what it was made of.
+    reduction: Option<ReductionEvidence>,
     /// More keys of `[structure]`.
     keys: Vec<String>,
     /// The stiffness at a speed.
@@ -73,7 +75,8 @@ fn at_rest(substructure: &Substructure, places: &[Place]) -> Result<Few, String>
     let alone = Model { substructure: Some(substructure.clone()), places: places.to_vec(), ..Model::default() };
     let system = alone.assemble().map_err(|error| error.to_string())?;
     let what = system.reduced().map(ToString::to_string).unwrap_or_default();
-    Ok(Few { system, what, keys: vec!["reduce = false".to_owned()], there: None })
+    let reduction = system.reduction_evidence();
+    Ok(Few { system, what, reduction, keys: vec!["reduce = false".to_owned()], there: None })
 }
 
 /// In coordinates that serve all speeds up to that of the second export.
@@ -88,7 +91,9 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports)
     rows.zip(&mut seen).for_each(|(row, seen)| *row = seen);
     let n = few.component.dofs();
     let (component, damping) = (few.component, SubstructureDamping::Own);
-    let whole = Substructure { component, damping, reduction: Reduction::None, disk: None };
+    let earlier = ReductionEvidence { error: few.error, up_to: few.up_to };
+    let earlier = substructure.earlier.map_or(earlier, |first| first.then(earlier));
+    let whole = Substructure { component, damping, reduction: Reduction::None, earlier: Some(earlier), disk: None };
     let model = Model { substructure: Some(whole), places, ..Model::default() };
     let system = model.assemble().map_err(|error| error.to_string())?;
     let what = format!(
@@ -103,7 +108,8 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports)
         exports.at, exports.speed
     );
     let keys = [vec![speed], damping_keys(substructure)].concat();
-    Ok(Few { system, what, keys, there: Some(few.there) })
+    let reduction = system.reduction_evidence();
+    Ok(Few { system, what, reduction, keys, there: Some(few.there) })
 }
 
 /// Damping that follows the stiffness at every speed; of modes that of those that a reduction at that speed has.
@@ -145,6 +151,9 @@ fn save(few: &Few, out: &Path) -> Result<(), String> {
     }
     files.extend(few.there.iter().map(|there| ("stiffened", there.entries().collect())));
     let mut text = format!("# {}\n[structure]\nunits = \"m-kg-s\"\n{}\n", few.what, few.keys.join("\n"));
+    if let Some(ReductionEvidence { error, up_to }) = few.reduction {
+        let _ = writeln!(text, "reduced = {{ error = {error:e}, up_to = \"{up_to:e} rad/s\" }}");
+    }
     for (key, entries) in files {
         let path: PathBuf = out.join(format!("{key}.mtx"));
         let made =

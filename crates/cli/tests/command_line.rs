@@ -507,6 +507,79 @@ fn a_run_that_needs_too_much_memory_is_refused_in_advance() {
 
 /// One set of coordinates serves all speeds of a structure that rotation stiffens: saved, it has the frequencies of the whole from rest to the speed of the
 /// second export, within the error that is said, and its damping follows them.
+/// A rod of equal masses, held at one end and driven at the other: `x/F` of the tip by eliminating mass after mass,
+/// `d₁ = 2k - mω²`, `dᵢ = 2k - mω² - k²/dᵢ₋₁`, at the tip with one k. What is saved errs from it by no more than its results say, reduced on
+/// the spot, read again, or reduced once more, when the errors add.
+#[test]
+fn a_reduction_that_is_saved_keeps_its_error() {
+    let folder = TempDir::new().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    let (n, k, m) = (120, 1e7, 0.01);
+    let mut stiffness = format!("%%MatrixMarket matrix coordinate real symmetric\n{n} {n} {}\n", 2 * n - 1);
+    for i in 1..=n {
+        stiffness += &format!("{i} {i} {:e}\n", if i < n { 2.0 * k } else { k });
+        if i < n {
+            stiffness += &format!("{} {i} {:e}\n", i + 1, -k);
+        }
+    }
+    write("k.mtx", &stiffness);
+    let diagonal: String = (1..=n).map(|i| format!("{i} {i} {m}\n")).collect();
+    write("m.mtx", &format!("%%MatrixMarket matrix coordinate real symmetric\n{n} {n} {n}\n{diagonal}"));
+    // between resonances, near 66, 197 and 328 Hz, and what stands still between them
+    let hertz = [20.0, 100.0, 230.0, 300.0];
+    let exact = |hertz: f64| {
+        let own = m * (std::f64::consts::TAU * hertz).powi(2);
+        let before = (1..n - 1).fold(2.0 * k - own, |d, _| 2.0 * k - own - k * k / d);
+        1.0 / (k - own - k * k / before).abs()
+    };
+    let response = "[[force]]\non = \"tip\"\namplitude = \"1 N\"\n[study]\nkind = \"response\"\n\
+                    frequency = [\"20 Hz\", \"100 Hz\", \"230 Hz\", \"300 Hz\"]\n\
+                    [method]\nkind = \"harmonic-balance\"\nharmonics = 1\n";
+    // the error, which is the largest of every row
+    let errs = |study: &str| -> f64 {
+        let out = format!("{}-out", study.replace('/', "-"));
+        let run = stickslip(folder.path(), &["run", study, "--out", &out]);
+        assert_eq!(code(&run), 0, "{}", stderr(&run));
+        let mut table = csv::Reader::from_path(folder.path().join(&out).join("study/curve.csv")).unwrap();
+        let columns = table.headers().unwrap().clone();
+        let at = |name: &str| columns.iter().position(|column| column == name).unwrap_or_else(|| panic!("no {name}"));
+        let (amplitude, error) = (at("tip_amplitude_m"), at("reduction_error"));
+        let rows: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
+        assert_eq!(rows.len(), hertz.len());
+        for (row, hertz) in rows.iter().zip(hertz) {
+            let [found, error]: [f64; 2] = [amplitude, error].map(|at| row[at].parse().unwrap());
+            let off = (found / exact(hertz) - 1.0).abs();
+            assert!(error > 0.0 && off <= error, "{study} at {hertz} Hz: {off:e} and said {error:e}");
+        }
+        rows[0][error].parse().unwrap()
+    };
+    let reduce = "reduce = { up_to = \"400 Hz\" }";
+    let structure = format!(
+        "[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\nunits = \"m-kg-s\"\n{reduce}\n[[place]]\nname = \"tip\"\ndof = {n}\n"
+    );
+    write("study.toml", &format!("schema = 1\n{structure}{response}"));
+    let saved = |study: &str, out: &str| {
+        let saved = stickslip(folder.path(), &["reduce", study, "--out", out]);
+        assert_eq!(code(&saved), 0, "{}", stderr(&saved));
+        fs::read_to_string(folder.path().join(out).join("structure.toml")).unwrap()
+    };
+    let few = saved("study.toml", "few");
+    write("few/study.toml", &format!("schema = 1\n{few}{response}"));
+    let (spot, read) = (errs("study.toml"), errs("few/study.toml"));
+    assert!(spot == read && spot < 1e-4, "{spot:e} {read:e}");
+    let said = stickslip(folder.path(), &["check", "few/study.toml"]);
+    let said = String::from_utf8_lossy(&said.stdout).into_owned();
+    assert!(said.contains("before, error") && said.contains("up to 400 Hz"), "{said}");
+    // fewer still
+    let again = few.replace("reduce = false", "reduce = { modes = 5 }");
+    write("few/again.toml", &format!("schema = 1\n{again}{response}"));
+    let fewer = saved("few/again.toml", "fewer");
+    assert_eq!(fewer.matches("reduced = {").count(), 1, "{fewer}");
+    write("fewer/study.toml", &format!("schema = 1\n{fewer}{response}"));
+    let twice = errs("fewer/study.toml");
+    assert!(twice > read, "{twice:e} {read:e}");
+}
+
 #[test]
 fn a_structure_that_rotation_stiffens_is_saved_for_all_speeds() {
     let folder = TempDir::new().unwrap();

@@ -198,44 +198,185 @@ fn damaged_names_of_rows() {
     }
 }
 
-/// A million entries of a chain of masses: memory is at most ten times the file, whatever the format.
+/// Rows of a chain of masses: a million bytes and more in every format of sparse matrices; and of full ones.
+const CHAIN: usize = 100_000;
+const FULL: usize = 1000;
+
+/// A large file of a format, by its documentation, as it packs numbers most tightly where there are several ways.
+fn large(format: &str) -> Vec<u8> {
+    // row, column from 1, value, of the lower triangle, column by column
+    let chain = || {
+        let columns = 1..=CHAIN as u32;
+        columns.flat_map(|i| [(i, i, 2.0 + 1e-3 * f64::from(i)), (i + 1, i, -1.0)]).take(2 * CHAIN - 1)
+    };
+    let lines = |line: &dyn Fn(u32, u32, f64) -> String| -> Vec<u8> {
+        chain().flat_map(|(row, column, value)| line(row, column, value).into_bytes()).collect()
+    };
+    let written = |ending: &str| {
+        let entries = chain().map(|(row, column, value)| (row as usize - 1, column as usize - 1, value));
+        let matrix = Matrix::new(CHAIN, CHAIN, Symmetry::Symmetric, entries).expect("a matrix");
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join(format!("chain.{ending}"));
+        write(&path, &matrix).expect("a file");
+        std::fs::read(&path).expect("a file")
+    };
+    match format {
+        "matrix-market" => written("mtx"),
+        "npz" => written("npz"),
+        "npy" => {
+            // numbers of one byte are the worst case: 16 bytes for each
+            let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+            let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (1000, 1000), }";
+            bytes.extend(format!("{header:117}\n").into_bytes());
+            bytes.extend((0..FULL * FULL).map(|at| u8::from(at % 7 < 3)));
+            bytes
+        }
+        "matlab" => matlab(),
+        "hdf5" => {
+            let mut file = hdf5_pure::FileBuilder::new();
+            let values: Vec<f64> = (0..FULL * FULL).map(|at| (at % FULL + at / FULL) as f64 + 1.0).collect();
+            file.create_dataset("K").with_f64_data(&values).with_shape(&[FULL as u64, FULL as u64]);
+            file.finish().expect("a file")
+        }
+        "coordinate" => lines(&|row, column, value| format!("{row} {column} {value}\n")),
+        "abaqus-matrix-input" => lines(&|row, column, value| format!("{row},1, {column},1, {value:.15e}\n")),
+        "abaqus-element" => {
+            let nodes: Vec<String> = (1..=FULL).map(|node| node.to_string()).collect();
+            let mut text = format!("*USER ELEMENT,NODES={FULL},LINEAR\n** ELEMENT NODES\n");
+            nodes.chunks(8).for_each(|some| text += &format!("** {},\n", some.join(", ")));
+            text += "1\n*MATRIX,TYPE=STIFFNESS\n";
+            for row in 0..FULL {
+                let values: Vec<String> =
+                    (0..=row).map(|column| format!("{:.12e}", 1.5 + (row + column) as f64)).collect();
+                values.chunks(4).for_each(|some| text += &format!("{},\n", some.join(",")));
+            }
+            text.into_bytes()
+        }
+        "nastran-dmig" => {
+            let mut cards = b"DMIG    K              0       6       2\n".to_vec();
+            cards.extend(lines(&|row, column, value| {
+                format!("DMIG*   {:16}{column:16}{:16}{:16}\n*       {row:16}{:16}{value:16.9e}\n", "K", 1, "", 1)
+            }));
+            cards
+        }
+        "nastran-op4" => {
+            let mut text = format!("{FULL:8}{FULL:8}{:8}{:8}{:8}1P,3E23.16\n", 6, 2, "K");
+            let value = |row: usize, column: usize| format!("{:>23}", fortran(1.5 + (row + column) as f64));
+            for column in 0..FULL {
+                text += &format!("{:8}{:8}{FULL:8}\n", column + 1, 1);
+                let values: Vec<String> = (0..FULL).map(|row| value(row, column)).collect();
+                values.chunks(3).for_each(|some| text += &format!("{}\n", some.concat()));
+            }
+            text += &format!("{:8}{:8}{:8}\n{:>23}\n", FULL + 1, 1, 1, fortran(1.0));
+            text.into_bytes()
+        }
+        "harwell-boeing" => {
+            let block =
+                |words: Vec<String>, per: usize| -> Vec<String> { words.chunks(per).map(<[String]>::concat).collect() };
+            let first = (0..=CHAIN).map(|column| format!("{:10}", (2 * column).min(2 * CHAIN - 1) + 1));
+            let parts = [
+                block(first.collect(), 8),
+                block(chain().map(|(row, ..)| format!("{row:10}")).collect(), 8),
+                block(chain().map(|(.., value)| format!("{:>25}", fortran(value))).collect(), 3),
+            ];
+            let [columns, rows, values] = parts.each_ref().map(Vec::len);
+            let mut text = format!("{:72}{:8}\n", "Stiffness matrix", "KMAT");
+            text += &format!("{:14}{columns:14}{rows:14}{values:14}{:14}\n", columns + rows + values, 0);
+            text += &format!("{:14}{CHAIN:14}{CHAIN:14}{:14}{:14}\n", "RSA", 2 * CHAIN - 1, 0);
+            text += &format!("{:16}{:16}{:20}{:20}\n", "(8I10)", "(8I10)", "(3E25.16)", "");
+            text += &(parts.concat().join("\n") + "\n");
+            text.into_bytes()
+        }
+        "ansys-full" => ansys_full(),
+        other => panic!("write a large file of {other} here"),
+    }
+}
+
+/// A number as Fortran writes it: two digits of the exponent, with its sign.
+fn fortran(value: f64) -> String {
+    let text = format!("{value:.16E}");
+    let (digits, exponent) = text.split_once('E').expect("an exponent");
+    format!("{digits}E{:+03}", exponent.parse::<i32>().expect("a number"))
+}
+
+/// MAT-file of version 5 with a sparse matrix: flags, sizes, name, rows, first entries of columns, values.
+fn matlab() -> Vec<u8> {
+    let part = |kind: u32, data: Vec<u8>| -> Vec<u8> {
+        let mut bytes = [kind.to_le_bytes(), (data.len() as u32).to_le_bytes()].concat();
+        bytes.extend(data);
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+        bytes
+    };
+    let whole = |kind: u32, values: Vec<u32>| part(kind, values.into_iter().flat_map(u32::to_le_bytes).collect());
+    let (n, count) = (CHAIN as u32, 2 * CHAIN as u32 - 1);
+    // the lower triangle alone: both would be as many numbers for each entry
+    let rows = (0..n).flat_map(|i| [i, i + 1]).take(count as usize).collect();
+    let values = (0..count).flat_map(|at| (1.0 + f64::from(at)).to_le_bytes()).collect();
+    let (sparse, int8, int32, uint32, double) = (5, 1, 5, 6, 9);
+    let matrix = [
+        whole(uint32, vec![sparse, count]),
+        whole(int32, vec![n, n]),
+        part(int8, b"K".to_vec()),
+        whole(int32, rows),
+        whole(int32, (0..=n).map(|column| (2 * column).min(count)).collect()),
+        part(double, values),
+    ];
+    let mut bytes = format!("{:124}", "MATLAB 5.0 MAT-file").into_bytes();
+    bytes.extend(b"\x00\x01IM");
+    bytes.extend(part(14, matrix.concat()));
+    bytes
+}
+
+/// Records of ANSYS: the standard header, that of the matrices, the stiffness by two records a row.
+fn ansys_full() -> Vec<u8> {
+    fn record(words: &mut Vec<u32>, flags: u32, data: &[u32]) -> u32 {
+        let start = words.len() as u32;
+        words.extend([data.len() as u32, flags]);
+        words.extend(data);
+        words.push(0);
+        start
+    }
+    let (integers, n, mut words) = (1 << 31, CHAIN as u32, Vec::new());
+    let mut standard = vec![0; 100];
+    standard[0] = 4;
+    record(&mut words, integers, &standard);
+    let header = record(&mut words, integers, &[0; 160]) as usize + 2;
+    record(&mut words, integers, &[1, 2, 3]);
+    let nodes: Vec<u32> = (1..=n).collect();
+    record(&mut words, integers, &nodes);
+    let mut first = None;
+    for row in 1..=n {
+        let last = row == n;
+        // the columns from the diagonal on, the diagonal last
+        let columns = if last { vec![row] } else { vec![row + 1, row] };
+        let start = record(&mut words, integers, &columns);
+        first.get_or_insert(start);
+        let values = [-1.0, 2.0 + f64::from(row)];
+        let halves = |value: &f64| [value.to_bits() as u32, (value.to_bits() >> 32) as u32];
+        let values: Vec<u32> = values[usize::from(last)..].iter().flat_map(halves).collect();
+        record(&mut words, 0, &values);
+    }
+    let each = record(&mut words, integers, &vec![1; CHAIN]);
+    record(&mut words, integers, &vec![1; CHAIN]);
+    for (item, value) in [(0, -4i32 as u32), (1, n), (2, n), (3, 1), (4, 2), (18, first.unwrap_or(0)), (35, each)] {
+        words[header + item] = value;
+    }
+    words.into_iter().flat_map(u32::to_le_bytes).collect()
+}
+
+/// Memory is at most ten times the file, whatever the format: of every one that there is.
 #[test]
 fn memory_follows_the_file() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let size = 100_000;
-    let chain = (0..size).flat_map(|i| [(i, i, 2.0 + 1e-3 * i as f64), (i.min(size - 2) + 1, i.min(size - 2), -1.0)]);
-    let matrix = Matrix::new(size, size, Symmetry::Symmetric, chain).expect("a matrix");
-    let folder = tempfile::tempdir().expect("a folder");
-    let check = |name: &str, bytes: &[u8]| {
+    for format in TABLE {
+        let bytes = large(format.name);
         MEMORY.reset_peak_usage();
         let before = MEMORY.current_usage();
-        let entries = read_bytes(bytes, None, None).expect(name).entries().len();
+        let matrix = read_bytes(&bytes, None, None).unwrap_or_else(|error| panic!("{}: {error}", format.name));
         let memory = MEMORY.peak_usage().saturating_sub(before);
-        assert_eq!(entries, matrix.entries().len(), "{name}");
-        assert!(memory <= 10 * bytes.len(), "{name}: {memory} bytes of memory for {} bytes", bytes.len());
-    };
-    for ending in ["mtx", "npz"] {
-        let path = folder.path().join(format!("chain.{ending}"));
-        write(&path, &matrix).expect("a file");
-        check(ending, &std::fs::read(&path).expect("a file"));
+        assert_eq!(matrix.origin().format, format.name);
+        assert!(bytes.len() >= 1_000_000 && matrix.entries().len() > 190_000, "{}: {}", format.name, bytes.len());
+        assert!(memory <= 10 * bytes.len(), "{}: {memory} bytes of memory for {} bytes", format.name, bytes.len());
+        eprintln!("{}: {:.1} times its {} bytes", format.name, memory as f64 / bytes.len() as f64, bytes.len());
     }
-    let (full_size, mut full) = (1000_usize, b"\x93NUMPY\x01\x00\x76\x00".to_vec());
-    full.extend(format!("{:117}\n", "{'descr': '|u1', 'fortran_order': False, 'shape': (1000, 1000), }").into_bytes());
-    full.extend((0..full_size * full_size).map(|at| if at % 7 < 3 { 1 } else { 0 }));
-    MEMORY.reset_peak_usage();
-    let before = MEMORY.current_usage();
-    assert!(read_bytes(&full, None, None).is_ok_and(|matrix| matrix.entries().len() > 400_000));
-    let memory = MEMORY.peak_usage().saturating_sub(before);
-    // A matrix that is not sparse, of numbers of one byte, is the worst case: 16 bytes for each.
-    assert!(memory <= 8 * full.len(), "{memory} bytes of memory for {} bytes", full.len());
-    let lines = |line: &dyn Fn(u32, u32, f64) -> String| -> Vec<u8> {
-        matrix.entries().iter().flat_map(|e| line(e.row + 1, e.column + 1, e.value).into_bytes()).collect()
-    };
-    check("coordinate", &lines(&|row, column, value| format!("{row} {column} {value}\n")));
-    check("abaqus-matrix-input", &lines(&|row, column, value| format!("{row},1, {column},1, {value:.15e}\n")));
-    let mut cards = b"DMIG    K              0       6       2\n".to_vec();
-    cards.extend(lines(&|row, column, value| {
-        format!("DMIG*   {:16}{column:16}{:16}{:16}\n*       {row:16}{:16}{value:16.9e}\n", "K", 1, "", 1)
-    }));
-    check("nastran-dmig", &cards);
 }

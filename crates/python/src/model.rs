@@ -240,7 +240,7 @@ impl PyModel {
             None => Reduction::None,
             Some(reduce) => Reduction::up_to(quantity::si(&reduce, Dimension::FREQUENCY, "reduce")?),
         };
-        let substructure = Some(Substructure { component, damping, reduction, disk: None });
+        let substructure = Some(Substructure { component, damping, reduction, earlier: None, disk: None });
         let made = PyModel::from_model(Model { substructure, places, ..Model::default() });
         py.detach(|| made.model.assemble()).map_err(|cause| refused(py, &cause, &made.model))?;
         Ok(made)

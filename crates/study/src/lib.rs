@@ -12,6 +12,7 @@ mod decay;
 mod disk;
 mod document;
 mod drawing;
+mod draws;
 mod error;
 pub mod expression;
 mod extra;

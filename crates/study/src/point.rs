@@ -106,8 +106,8 @@ impl Summary {
         if !prepared.method.closes_motions(&prepared.system) {
             rows.number("return_defect", self.return_defect);
         }
-        if let Some(reduced) = system.reduced() {
-            rows.number(columns::REDUCTION_ERROR, reduced.error());
+        if let Some(reduction) = system.reduction_evidence() {
+            rows.number(columns::REDUCTION_ERROR, reduction.error);
         }
         rows.integer("iterations", self.iterations);
         rows.text("status", &self.status);

@@ -164,6 +164,12 @@ pub const STRUCTURE: &[Key] = &[
          frequency; false: not at all",
         "{ up_to = \"5 kHz\" }",
     ),
+    optional(
+        "reduced",
+        Takes::Table(REDUCED),
+        "where the files are a reduction already, as `stickslip reduce` writes them: its error, which every `reduction_error` then counts",
+        "{ error = 2e-6, up_to = \"5 kHz\" }",
+    ),
 ];
 
 /// The keys of a file that has several matrices, or none of the formats that are found by content.
@@ -225,6 +231,16 @@ const REDUCE: &[Key] = &[
         "the kind; absent: whichever is small and close enough",
         "\"rubin\"",
     ),
+];
+
+const REDUCED: &[Key] = &[
+    required(
+        "error",
+        Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
+        "the largest relative error of what the places see",
+        "2e-6",
+    ),
+    required("up_to", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "up to there", "\"5 kHz\""),
 ];
 
 fn unit_sets() -> Vec<(&'static str, &'static str)> {

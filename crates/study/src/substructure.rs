@@ -5,7 +5,7 @@ use crate::near::{nearest, one_of, shown};
 use crate::stated::Matrices;
 use crate::statement::{Environment, StatedTable};
 use crate::values::Values;
-use stickslip::model::{Frame, Mass, Model, Place, Substructure, SubstructureDamping};
+use stickslip::model::{Frame, Mass, Model, Place, ReductionEvidence, Substructure, SubstructureDamping};
 use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 
@@ -59,7 +59,10 @@ pub(crate) fn of(
         (None, Some(false)) => Reduction::None,
         _ => Reduction::up_to(0.0),
     };
-    Substructure { component, damping, reduction, disk: None }
+    let earlier = values.table("reduced").and_then(|reduced| {
+        Some(ReductionEvidence { error: reduced.quantity("error")?, up_to: reduced.quantity("up_to")? })
+    });
+    Substructure { component, damping, reduction, earlier, disk: None }
 }
 
 fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'static str, &'static str)> {

@@ -72,6 +72,7 @@ impl Model {
         let matrices = assembler.matrices()?;
         let motions = assembler.motions()?;
         let builder = System::builder(assembler.structure(&matrices)?).reduced(assembler.coordinates.reduced.clone());
+        let builder = builder.earlier(self.substructure.as_ref().and_then(|substructure| substructure.earlier));
         let (builder, forces) = assembler.forces(assembler.seen(builder))?;
         let builder = assembler.loads_of_motions(builder, &matrices, &motions);
         let (builder, signs) = assembler.joints(builder, &motions)?;

@@ -64,8 +64,27 @@ pub struct Substructure {
     pub damping: SubstructureDamping,
     /// How it is brought into few coordinates.
     pub reduction: Reduction,
+    /// Where its matrices are themselves those of a reduction: what that one left out.
+    pub earlier: Option<ReductionEvidence>,
     /// If it is a sector of a [`Disk`]: how it goes on.
     pub disk: Option<DiskPart>,
+}
+
+/// How far a structure in few coordinates is from the whole.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ReductionEvidence {
+    /// The largest relative error of what is seen.
+    pub error: f64,
+    /// The error holds up to there, rad/s.
+    pub up_to: f64,
+}
+
+impl ReductionEvidence {
+    /// Of one reduction and another of its result: small relative errors add.
+    #[must_use]
+    pub fn then(self, next: ReductionEvidence) -> ReductionEvidence {
+        ReductionEvidence { error: self.error + next.error, up_to: self.up_to.min(next.up_to) }
+    }
 }
 
 /// A structure by its matrices as a sector of a disk.
@@ -100,12 +119,16 @@ impl Serialize for Substructure {
     /// What it is, without its matrices.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let (mass, _, stiffness) = self.component.matrices();
-        let mut out = serializer.serialize_struct("Substructure", 5)?;
+        let fields = 5 + usize::from(self.earlier.is_some());
+        let mut out = serializer.serialize_struct("Substructure", fields)?;
         out.serialize_field("rows", &self.component.dofs())?;
         out.serialize_field("entries_of_mass", &mass.len())?;
         out.serialize_field("entries_of_stiffness", &stiffness.len())?;
         out.serialize_field("damping", &format!("{:?}", self.damping))?;
         out.serialize_field("reduction", &format!("{:?}", self.reduction))?;
+        if let Some(earlier) = &self.earlier {
+            out.serialize_field("earlier", earlier)?;
+        }
         out.end()
     }
 }

@@ -318,7 +318,7 @@ mod tests {
         let boundary = Boundary::of_nodes(component.rows(), &[("1".into(), "2".into())], None).unwrap();
         let disk = Some(DiskPart { boundary, blade: vec![2, 3], deviations: vec![deviation] });
         Model {
-            substructure: Some(Substructure { component, damping, reduction, disk }),
+            substructure: Some(Substructure { component, damping, reduction, earlier: None, disk }),
             places: vec![Place::new("rim", vec![(1, 1.0)]), Place::new("tip", vec![(3, 1.0)])],
             forces: force(),
             ..Model::default()

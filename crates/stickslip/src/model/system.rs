@@ -1,5 +1,6 @@
 //! A model checked and assembled: a structure, its joints, its excitation.
 
+use super::ReductionEvidence;
 use crate::law::{LawError, SharedLaw};
 use crate::structure::{Matrices, ReducedComponent, Sector, Structure, turn};
 use nalgebra::{DMatrix, DVector};
@@ -41,6 +42,7 @@ pub struct System {
     places: Vec<String>,
     seen: Vec<Axis>,
     reduced: Option<Arc<ReducedComponent>>,
+    earlier: Option<ReductionEvidence>,
     joints: Vec<SystemJoint>,
     loads: Vec<Load>,
     moved: Vec<MovedPlace>,
@@ -302,6 +304,7 @@ pub struct SystemBuilder {
     structure: Structure,
     places: Option<(Vec<String>, Vec<Axis>)>,
     reduced: Option<Arc<ReducedComponent>>,
+    earlier: Option<ReductionEvidence>,
     joints: Vec<SystemJoint>,
     loads: BTreeMap<u32, Load>,
     moved: Vec<MovedPlace>,
@@ -322,6 +325,12 @@ impl SystemBuilder {
     #[must_use]
     pub(super) fn reduced(self, reduced: Option<Arc<ReducedComponent>>) -> Self {
         SystemBuilder { reduced, ..self }
+    }
+
+    /// Says that part of the structure came in few coordinates.
+    #[must_use]
+    pub(super) fn earlier(self, earlier: Option<ReductionEvidence>) -> Self {
+        SystemBuilder { earlier, ..self }
     }
 
     /// Adds a joint with one axis for each of its law's directions.
@@ -396,6 +405,7 @@ impl SystemBuilder {
             places,
             seen,
             reduced: self.reduced,
+            earlier: self.earlier,
             joints: self.joints,
             loads: self.loads.into_values().collect(),
             moved: self.moved,
@@ -414,6 +424,7 @@ impl System {
             structure,
             places: None,
             reduced: None,
+            earlier: None,
             joints: Vec::new(),
             loads: BTreeMap::new(),
             moved: Vec::new(),
@@ -435,6 +446,7 @@ impl System {
         let builder = SystemBuilder {
             places: Some((self.places.clone(), self.seen.clone())),
             reduced: self.reduced.clone(),
+            earlier: self.earlier,
             joints: self.joints.clone(),
             loads: loads.collect(),
             moved: self.moved.clone(),
@@ -539,6 +551,16 @@ impl System {
     /// The component in few coordinates that part of the structure is, and its error.
     pub fn reduced(&self) -> Option<&ReducedComponent> {
         self.reduced.as_deref()
+    }
+
+    /// What its structure lacks of the whole: the largest relative error of what places see, of all reductions that made it, one after the other, and up
+    /// to which frequency (rad/s) it holds; none where nothing was reduced.
+    pub fn reduction_evidence(&self) -> Option<ReductionEvidence> {
+        let now = self.reduced().map(|reduced| ReductionEvidence { error: reduced.error(), up_to: reduced.up_to() });
+        match (self.earlier, now) {
+            (Some(first), Some(then)) => Some(first.then(then)),
+            (one, other) => one.or(other),
+        }
     }
 
     /// `√(φᵀMφ)` of mode `index` without the joints, scaled to a largest displacement of one: the modal amplitude (m √kg) of a metre at the

@@ -43,7 +43,7 @@ fn ring(reduction: Reduction, blades: &[f64]) -> System {
     let sector = |deviation: f64| {
         let disk = DiskPart { boundary: boundary.clone(), blade: blade.clone(), deviations: vec![deviation] };
         let (component, damping) = (component.clone(), SubstructureDamping::Own);
-        let substructure = Some(Substructure { component, damping, reduction, disk: Some(disk) });
+        let substructure = Some(Substructure { component, damping, reduction, earlier: None, disk: Some(disk) });
         Model { substructure, places: places.clone(), ..Model::default() }
     };
     let disk = Disk { sectors: blades.len(), forces: Vec::<Around>::new(), motions: vec![] };

@@ -5,7 +5,8 @@ use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Style, Table};
-use crate::drawing::{Drawing, largest, numbers};
+use crate::drawing::{Drawing, Stretch, largest, numbers};
+use crate::draws;
 use crate::info::Complaint;
 use crate::info::KindInfo;
 use crate::key::ENDS;
@@ -265,30 +266,48 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         false => vec![places],
     };
     let unstable = unstable(table);
-    let mut series = Vec::new();
-    let mut colour = 0;
-    for stretch in &stretches {
-        for places in &shown {
-            let label =
-                if one { system.places()[places[0]].clone() } else { varied_text(&stretch.varied[..outer.len()]) };
-            let mut from = stretch.rows.start;
-            // unstable stretches are dashed; each begins at the last point of the one before
-            for run in unstable[stretch.rows.clone()].chunk_by(|a, b| a == b) {
-                let shown = from.max(stretch.rows.start + 1) - 1..from + run.len();
-                from += run.len();
-                let all: Vec<Vec<f64>> = places.iter().map(|p| numbers(table, &column(*p), shown.clone())).collect();
-                let largest = |i: usize| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max);
-                let y = (0..shown.len()).map(|i| largest(i) * factor).collect();
-                let label = if run[0] { format!("{label}, unstable") } else { label.clone() };
-                let line = Series::line(label, numbers(table, &name_of_axis(table, outer.len()), shown), y, colour);
-                series.push(if run[0] { Series { style: Style::Dashed, ..line } } else { line });
-            }
-            colour += 1;
-        }
-    }
+    let line_of = |stretch: &Stretch, places: &[usize], label: &str, colour: usize| -> Vec<Series> {
+        let mut from = stretch.rows.start;
+        // unstable stretches are dashed; each begins at the last point of the one before
+        let runs = unstable[stretch.rows.clone()].chunk_by(|a, b| a == b).map(|run| {
+            let shown = from.max(stretch.rows.start + 1) - 1..from + run.len();
+            from += run.len();
+            let all: Vec<Vec<f64>> = places.iter().map(|p| numbers(table, &column(*p), shown.clone())).collect();
+            let largest = |i: usize| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max);
+            let y = (0..shown.len()).map(|i| largest(i) * factor).collect();
+            let label = if run[0] { format!("{label}, unstable") } else { label.to_owned() };
+            let line = Series::line(label, numbers(table, &name_of_axis(table, outer.len()), shown), y, colour);
+            if run[0] { Series { style: Style::Dashed, ..line } } else { line }
+        });
+        runs.collect()
+    };
     let quantity = if along.is_some() { name } else { "frequency".to_owned() };
-    let panel = Panel { title: String::new(), x: Axis::new(quantity, along_unit), y, series, ..Panel::default() };
-    Figure { panels: vec![panel], ..Figure::default() }
+    let x = Axis::new(quantity, along_unit);
+    let panel = |title: String, series| Panel { title, x: x.clone(), y: y.clone(), series, ..Panel::default() };
+    if drawing.study.draws().is_some() {
+        let name = |places: &[usize]| {
+            places.iter().map(|place| system.places()[*place].as_str()).collect::<Vec<_>>().join(", ")
+        };
+        let of_draw = |stretch: &Stretch, title: String| {
+            let lines =
+                shown.iter().enumerate().flat_map(|(colour, places)| line_of(stretch, places, &name(places), colour));
+            vec![panel(title, lines.collect())]
+        };
+        // what the branch runs along tells no draws apart
+        let apart: Vec<Stretch> = stretches
+            .iter()
+            .map(|stretch| Stretch { varied: stretch.varied[..outer.len()].to_vec(), ..stretch.clone() })
+            .collect();
+        return Figure { panels: draws::panels(drawing, &apart, &of_draw), ..Figure::default() };
+    }
+    let several = stretches.iter().flat_map(|stretch| shown.iter().map(move |places| (stretch, places)));
+    let line = |(colour, (stretch, places)): (usize, (&Stretch, &Vec<usize>))| {
+        let varied = || varied_text(&stretch.varied[..outer.len()]);
+        let label = if one { system.places()[places[0]].clone() } else { varied() };
+        line_of(stretch, places, &label, colour)
+    };
+    let series = several.enumerate().flat_map(line).collect();
+    Figure { panels: vec![panel(String::new(), series)], ..Figure::default() }
 }
 
 /// The column of what a branch runs along stands behind the outer varied parameters.

@@ -8,7 +8,8 @@ use super::nodal_diameter::{STATES, waves};
 use crate::columns::FREQUENCY;
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Figure, Panel, Series, Style, Table};
-use crate::drawing::{Drawing, MOST_PANELS, Stretch, largest, numbers, words};
+use crate::drawing::{Drawing, Stretch, largest, numbers, words};
+use crate::draws;
 use crate::info::{Complaint, KindInfo};
 use crate::key::RANGE;
 use crate::key::{Takes, default, required};
@@ -308,7 +309,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let (y, y_factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
     let crossings = drawing.table(CROSSINGS);
     let marks = crossings.map(|table| drawing.stretches(table)).unwrap_or_default();
-    let panel = |stretch: &Stretch| {
+    let panel = |stretch: &Stretch, title: String| {
         let case = drawing.study.case(stretch.case).ok();
         let orders = case.as_ref().and_then(|case| case.values.count("engine_orders")).unwrap_or(6) as usize;
         let ring = case.and_then(|case| case.model.ring).filter(|ring| ring.equal);
@@ -340,9 +341,9 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 series.push(Series::marks("crossings", column(SPEED, x_factor), column(FREQUENCY, y_factor), colour));
             }
         }
-        Panel { title: stretch.label(), x: x.clone(), y: y.clone().between(0.0, top), series, ..Panel::default() }
+        vec![Panel { title, x: x.clone(), y: y.clone().between(0.0, top), series, ..Panel::default() }]
     };
-    Figure { panels: drawing.stretches(table).iter().take(MOST_PANELS).map(panel).collect(), ..Figure::default() }
+    Figure { panels: draws::panels(drawing, &drawing.stretches(table), &panel), ..Figure::default() }
 }
 
 /// Room above the highest frequency, as a share of it.

@@ -10,13 +10,15 @@ use super::orbits;
 use crate::columns::{ENERGY_GAP, FREQUENCY as DRIVE, RESIDUAL};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Figure, Panel, Series};
-use crate::drawing::{Drawing, largest, numbers, words};
+use crate::drawing::{Drawing, Stretch, join, largest, numbers, words};
+use crate::draws;
 use crate::info::Complaint;
 use crate::info::KindInfo;
 use crate::key::{Takes, default, optional};
 use crate::kind::Kind;
 use crate::names::Names;
 use crate::rows::Rows;
+use crate::study::varied_text;
 use crate::values::{Values, hertz};
 use crate::warnings::driven;
 use crate::words::shown_hertz;
@@ -334,36 +336,40 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     }
     let frequencies = table.numbers(DRIVE);
     let several = joints.iter().any(|joint| *joint != joints[0]);
-    let mut panels: Vec<Panel> = Vec::new();
-    for stretch in drawing.stretches(table) {
-        let (outer, inner) = stretch.varied.split_at(stretch.varied.len().saturating_sub(1));
-        for rows in tables::single(table, stretch.rows.clone()) {
-            let from = rows.start;
-            let mut title: Vec<String> = outer.iter().map(|v| v.text.clone()).collect();
-            if several {
-                title.push(joints[from].clone());
-            }
-            let title = title.join(", ");
-            let mut label: Vec<String> = inner.iter().map(|v| v.text.clone()).collect();
-            if let Some(frequencies) = frequencies {
-                label.push(shown_hertz(frequencies[from]));
-            }
-            let label = if label.is_empty() { joints[from].clone() } else { label.join(", ") };
-            let at = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
-                panels.push(Panel {
-                    title,
-                    x: x_axis.clone(),
-                    y: y_axis.clone(),
-                    series: Vec::new(),
-                    ..Panel::default()
+    let panels_of = |stretches: &[Stretch], words: &dyn Fn(&Stretch) -> (String, String)| {
+        let mut panels: Vec<Panel> = Vec::new();
+        for stretch in stretches {
+            let (outer, inner) = words(stretch);
+            for rows in tables::single(table, stretch.rows.clone()) {
+                let from = rows.start;
+                let joint = Some(joints[from].clone()).filter(|_| several);
+                let title = join([outer.clone()].into_iter().chain(joint));
+                let frequency = frequencies.map(|frequencies| shown_hertz(frequencies[from]));
+                let label = join([inner.clone()].into_iter().chain(frequency));
+                let label = if label.is_empty() { joints[from].clone() } else { label };
+                let at = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
+                    let (x, y) = (x_axis.clone(), y_axis.clone());
+                    panels.push(Panel { title, x, y, ..Panel::default() });
+                    panels.len() - 1
                 });
-                panels.len() - 1
-            });
-            let x = numbers(table, DISPLACEMENT, rows.clone()).iter().map(|u| u * x_factor).collect();
-            let y = numbers(table, FORCE, rows).iter().map(|f| f * y_factor).collect();
-            let colour = panels[at].series.len();
-            panels[at].series.push(Series::line(label, x, y, colour));
+                let x = numbers(table, DISPLACEMENT, rows.clone()).iter().map(|u| u * x_factor).collect();
+                let y = numbers(table, FORCE, rows).iter().map(|f| f * y_factor).collect();
+                let colour = panels[at].series.len();
+                panels[at].series.push(Series::line(label, x, y, colour));
+            }
         }
+        panels
+    };
+    let stretches = drawing.stretches(table);
+    if drawing.study.draws().is_some() {
+        let of_draw = |stretch: &Stretch, title: String| {
+            panels_of(std::slice::from_ref(stretch), &|_| (title.clone(), String::new()))
+        };
+        return Figure { panels: draws::panels(drawing, &stretches, &of_draw), ..Figure::default() };
     }
-    Figure { panels, ..Figure::default() }
+    let split = |stretch: &Stretch| {
+        let (outer, inner) = stretch.varied.split_at(stretch.varied.len().saturating_sub(1));
+        (varied_text(outer), varied_text(inner))
+    };
+    Figure { panels: panels_of(&stretches, &split), ..Figure::default() }
 }

@@ -6,6 +6,7 @@ use crate::columns::{amplitude_of, phase_of};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Table, Values as Cells};
 use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers};
+use crate::draws;
 use crate::info::Complaint;
 use crate::info::KindInfo;
 use crate::key::{Key, Takes, Within, default, required};
@@ -242,20 +243,25 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         Some(Cells::Integer(parts)) => parts.clone(),
         _ => vec![1; table.rows()],
     };
-    let panel = |quantity: &str, unit_of: &str, read: &str, scale: f64| Panel {
-        title: String::new(),
+    let widest_of = |stretch: &Stretch| {
+        let at_last = |place: &&String| numbers(table, &column(place), stretch.rows.clone()).last().copied();
+        let moves = |place: &&String| at_last(place).unwrap_or(0.0);
+        system.places().iter().max_by(|a, b| moves(a).total_cmp(&moves(b)))
+    };
+    // draws in one band are of one place: that of the first
+    let common = stretches.first().filter(|_| drawing.study.draws().is_some()).and_then(widest_of);
+    let panel = |stretches: &[Stretch], title: &str, (quantity, unit_of): (&str, &str), read: &str, scale: f64| Panel {
+        title: title.to_owned(),
         x: x_axis.clone().log(),
         y: Axis::new(quantity, unit_of),
         series: stretches
             .iter()
             .enumerate()
             .flat_map(|(colour, stretch)| {
-                let at_last = |place: &&String| numbers(table, &column(place), stretch.rows.clone()).last().copied();
-                let moves = |place: &&String| at_last(place).unwrap_or(0.0);
-                let Some(widest) = system.places().iter().max_by(|a, b| moves(a).total_cmp(&moves(b))) else {
-                    return Vec::new();
-                };
-                let label = if stretch.varied.is_empty() { widest.clone() } else { stretch.label() };
+                let Some(widest) = common.or_else(|| widest_of(stretch)) else { return Vec::new() };
+                // of many draws the curves are one band
+                let alone = stretch.varied.is_empty() || drawing.study.draws().is_some();
+                let label = if alone { widest.clone() } else { stretch.label() };
                 let mut from = stretch.rows.start;
                 // the line is interrupted where the curve turns
                 let lines = parts[stretch.rows.clone()].chunk_by(|a, b| a == b).map(|part| {
@@ -270,10 +276,15 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             .collect(),
         ..Panel::default()
     };
-    let mut panels = vec![
-        panel("frequency", "Hz", "frequency_Hz", 1.0),
-        panel("equivalent damping ratio", "%", "damping_ratio", 100.0),
-    ];
+    let both = |stretches: &[Stretch], title: &str| {
+        let frequency = panel(stretches, title, ("frequency", "Hz"), "frequency_Hz", 1.0);
+        vec![frequency, panel(stretches, title, ("equivalent damping ratio", "%"), "damping_ratio", 100.0)]
+    };
+    if drawing.study.draws().is_some() {
+        let of_draw = |stretch: &Stretch, title: String| both(std::slice::from_ref(stretch), &title);
+        return Figure { panels: draws::panels(drawing, &stretches, &of_draw), ..Figure::default() };
+    }
+    let mut panels = both(&stretches, "");
     if panels.len() + 2 * stretches.len() <= MOST_PANELS {
         panels.extend(
             stretches.iter().flat_map(|stretch| wheels(drawing, table, system.places(), (stretch, stretches.len()))),

@@ -6,6 +6,7 @@ use crate::columns::{FREQUENCY, phase_of, shape_of};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Style, Table};
 use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers, words};
+use crate::draws;
 use crate::info::{Complaint, KindInfo};
 use crate::key::{Takes, default, optional};
 use crate::kind::Kind;
@@ -191,8 +192,8 @@ fn places(model: &Model) -> Vec<(String, String)> {
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let Some(table) = drawing.table(TABLE) else { return Figure::default() };
     let (y, factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
-    let panel = |stretch: &Stretch| Panel {
-        title: stretch.label(),
+    let panel = |stretch: &Stretch, title: String| Panel {
+        title,
         x: Axis::new("nodal diameters", "").whole(),
         y: y.clone(),
         series: lines(table, stretch, factor),
@@ -200,11 +201,11 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     };
     let stretches = drawing.stretches(table);
     let room = stretches.len() * (1 + WHEELS) <= MOST_PANELS;
-    let of_case = |stretch: &Stretch| {
+    let of_case = |stretch: &Stretch, title: String| {
         let shapes = if room { wheels(drawing, table, stretch) } else { Vec::new() };
-        std::iter::once(panel(stretch)).chain(shapes).collect::<Vec<_>>()
+        std::iter::once(panel(stretch, title)).chain(shapes).collect::<Vec<_>>()
     };
-    Figure { panels: stretches.iter().take(MOST_PANELS).flat_map(of_case).collect(), ..Figure::default() }
+    Figure { panels: draws::panels(drawing, &stretches, &of_case), ..Figure::default() }
 }
 
 /// The shapes of a case: the lowest modes of a nodal diameter, one mode of the lowest nodal diameters, or the one that is both.

@@ -4,7 +4,8 @@ use super::keys::{FREQUENCY, OUTPUT, SAMPLES, anything, check_output};
 use super::orbits;
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, MOST_PANELS, largest, numbers};
+use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers};
+use crate::draws;
 use crate::info::KindInfo;
 use crate::key::{Takes, default};
 use crate::kind::Kind;
@@ -15,6 +16,7 @@ use crate::values::hertz;
 use crate::warnings::driven;
 use crate::words::{display_unit, shown_hertz};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
+use std::ops::Range;
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
@@ -153,46 +155,55 @@ fn word(contact: Contact) -> &'static str {
 /// Displacements of the masses, and forces of the joints, over time: two panels for every orbit.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(motion), Some(system)) = (drawing.table("orbit"), drawing.system()) else { return Figure::default() };
-    let mut panels = Vec::new();
     // a table from elsewhere may lack columns
     let Some(frequencies) = motion.numbers("frequency_Hz") else { return Figure::default() };
-    for stretch in drawing.stretches(motion) {
+    let times_of = |rows: Range<usize>| numbers(motion, "time_s", rows);
+    let longest = times_of(0..motion.rows()).into_iter().fold(0.0, f64::max);
+    let of_orbit = |title: &str, rows: Range<usize>| {
+        let times = times_of(rows.clone());
+        // draws in one panel have one unit
+        let last = if drawing.study.draws().is_some() { longest } else { times.last().copied().unwrap_or(0.0) };
+        let (time_unit, time_factor) = display_unit(last, "s");
+        let x: Vec<f64> = times.iter().map(|time| time * time_factor).collect();
+        let panel = |what: &str, si: &str, names: Vec<&str>, column: &str, colour: usize| {
+            let columns: Vec<String> = names.iter().map(|name| format!("{name}_{column}")).collect();
+            let (unit, factor) = display_unit(largest(motion, columns.clone()), si);
+            let line = |(i, column): (usize, &String)| {
+                let y = numbers(motion, column, rows.clone()).iter().map(|value| value * factor).collect();
+                Series::line(names[i], x.clone(), y, colour + i)
+            };
+            Panel {
+                title: format!("{what}, {title}"),
+                x: Axis::new("time", time_unit.clone()),
+                y: Axis::new(what, unit),
+                series: columns.iter().enumerate().map(line).collect(),
+                ..Panel::default()
+            }
+        };
+        let mut panels = Vec::new();
+        if !system.places().is_empty() {
+            let names = system.places().iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
+            panels.push(panel("displacement", "m", names, "displacement_m", 0));
+        }
+        if !system.joints().is_empty() {
+            let labels: Vec<String> = system.joints().iter().flat_map(|joint| joint.labels()).collect();
+            let names = labels.iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
+            panels.push(panel("joint force", "N", names, "force_N", system.places().len()));
+        }
+        panels.retain(|panel| !panel.series.is_empty());
+        panels
+    };
+    let of_case = |stretch: &Stretch, title: String| -> Vec<Panel> {
         let mut from = stretch.rows.start;
-        for run in frequencies[stretch.rows.clone()].chunk_by(|a, b| a == b) {
+        let runs = frequencies[stretch.rows.clone()].chunk_by(|a, b| a == b).take(MOST_PANELS);
+        let of_run = |run: &[f64]| {
             let rows = from..from + run.len();
             from = rows.end;
-            let frequency = shown_hertz(run[0]);
-            let title = if stretch.varied.is_empty() { frequency } else { format!("{}, {frequency}", stretch.label()) };
-            let times = numbers(motion, "time_s", rows.clone());
-            let (time_unit, time_factor) = display_unit(times.last().copied().unwrap_or(0.0), "s");
-            let x: Vec<f64> = times.iter().map(|time| time * time_factor).collect();
-            let panel = |what: &str, si: &str, names: Vec<&str>, column: &str, colour: usize| {
-                let columns: Vec<String> = names.iter().map(|name| format!("{name}_{column}")).collect();
-                let (unit, factor) = display_unit(largest(motion, columns.clone()), si);
-                let line = |(i, column): (usize, &String)| {
-                    let y = numbers(motion, column, rows.clone()).iter().map(|value| value * factor).collect();
-                    Series::line(names[i], x.clone(), y, colour + i)
-                };
-                Panel {
-                    title: format!("{what}, {title}"),
-                    x: Axis::new("time", time_unit.clone()),
-                    y: Axis::new(what, unit),
-                    series: columns.iter().enumerate().map(line).collect(),
-                    ..Panel::default()
-                }
-            };
-            if !system.places().is_empty() {
-                let names = system.places().iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
-                panels.push(panel("displacement", "m", names, "displacement_m", 0));
-            }
-            if !system.joints().is_empty() {
-                let labels: Vec<String> = system.joints().iter().flat_map(|joint| joint.labels()).collect();
-                let names = labels.iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
-                panels.push(panel("joint force", "N", names, "force_N", system.places().len()));
-            }
-        }
-    }
-    panels.retain(|panel| !panel.series.is_empty());
+            of_orbit(&join([title.clone(), shown_hertz(run[0])]), rows)
+        };
+        runs.flat_map(of_run).collect()
+    };
+    let mut panels = draws::panels(drawing, &drawing.stretches(motion), &of_case);
     panels.truncate(MOST_PANELS);
     Figure { panels, ..Figure::default() }
 }

@@ -5,7 +5,8 @@ use super::orbit::write_sample;
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Figure, Panel, Series};
 use crate::decay::Decay;
-use crate::drawing::{Drawing, MOST_PANELS, numbers};
+use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, numbers};
+use crate::draws;
 use crate::info::Complaint;
 use crate::info::KindInfo;
 use crate::key::RANGE;
@@ -20,6 +21,7 @@ use crate::warnings::moved;
 use crate::words::shown_hertz;
 use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use std::f64::consts::TAU;
+use std::ops::Range;
 use stickslip::dimension::Dimension;
 use stickslip::method::WIDTH;
 use stickslip::method::transient::{Excitation, Transient, TransientError};
@@ -247,7 +249,7 @@ fn compute(work: &Work<'_>) -> Computed {
             if work.several_frequencies() {
                 rows.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
             }
-            rows.number("time_s", time);
+            rows.number(TIME, time);
             rows.number("frequency_Hz", hertz(omega));
             write_sample(prepared, sample, &mut rows);
             rows.end();
@@ -270,7 +272,7 @@ fn compute(work: &Work<'_>) -> Computed {
             }
             extremes.text("mass", place);
             extremes.number("largest_displacement_m", displacement);
-            extremes.number("time_s", time);
+            extremes.number(TIME, time);
             extremes.end();
         }
         if excitation == Excitation::Free {
@@ -303,7 +305,7 @@ fn read_off(prepared: &Prepared, decays: &[Decay], step: f64, rows: &mut Rows, s
     }
     for cycle in &cycles {
         rows.varied(&prepared.case);
-        rows.number("time_s", cycle.time);
+        rows.number(TIME, cycle.time);
         rows.text("mass", mass);
         rows.number("amplitude_m", cycle.amplitude);
         rows.number("frequency_Hz", cycle.frequency);
@@ -323,45 +325,42 @@ fn read_off(prepared: &Prepared, decays: &[Decay], step: f64, rows: &mut Rows, s
     None
 }
 
+/// A column.
+const TIME: &str = "time_s";
+
+/// A panel for every case and drive, with a line for every place.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(motion), Some(system)) = (drawing.table("motion"), drawing.system()) else { return Figure::default() };
     let drives = motion.numbers("drive_frequency_Hz");
-    let mut panels = Vec::new();
-    for stretch in drawing.stretches(motion) {
+    let column = |place: &String| format!("{place}_displacement_m");
+    let panel = |title: String, rows: Range<usize>| {
+        // draws in one panel have one unit
+        let scope = if drawing.study.draws().is_some() { 0..motion.rows() } else { rows.clone() };
+        let all = system.places().iter().flat_map(|place| numbers(motion, &column(place), scope.clone()));
+        let highest = all.map(f64::abs).filter(|x| x.is_finite()).fold(0.0, f64::max);
+        let (y, factor) = drawing.axis(1, "displacement", highest, "m");
+        let last = numbers(motion, TIME, scope.clone()).into_iter().fold(0.0, f64::max);
+        let (x, x_factor) = drawing.axis(0, "time", last, "s");
+        let times: Vec<f64> = numbers(motion, TIME, rows.clone()).iter().map(|time| time * x_factor).collect();
+        let line = |(i, place): (usize, &String)| {
+            let displacement = numbers(motion, &column(place), rows.clone());
+            Series::line(place, times.clone(), displacement.iter().map(|y| y * factor).collect(), i)
+        };
+        let shown = system.places().iter().enumerate().filter(|(_, place)| drawing.shows(place));
+        Panel { title, x, y, series: shown.map(line).collect(), ..Panel::default() }
+    };
+    let of_case = |stretch: &Stretch, title: String| -> Vec<Panel> {
+        let Some(drives) = drives else { return vec![panel(title, stretch.rows.clone())] };
         let mut from = stretch.rows.start;
-        while from < stretch.rows.end && panels.len() < MOST_PANELS {
-            let same = |row: usize| drives.is_none_or(|drives| drives[row] == drives[from]);
-            let to = (from + 1..stretch.rows.end).find(|row| !same(*row)).unwrap_or(stretch.rows.end);
-            let mut title = stretch.label();
-            if let Some(drives) = drives {
-                let frequency = format!("frequency = {}", shown_hertz(drives[from]));
-                title = if title.is_empty() { frequency } else { format!("{title}, {frequency}") };
-            }
-            let displacement = |place: &String| numbers(motion, &format!("{place}_displacement_m"), from..to);
-            let all = system.places().iter().flat_map(displacement);
-            let highest = all.map(f64::abs).filter(|x| x.is_finite()).fold(0.0, f64::max);
-            let (y_axis, factor) = drawing.axis(1, "displacement", highest, "m");
-            let times = numbers(motion, "time_s", from..to);
-            let (x_axis, x_factor) = drawing.axis(0, "time", times.last().copied().unwrap_or(0.0), "s");
-            let x: Vec<f64> = times.iter().map(|time| time * x_factor).collect();
-            let line = |(i, place): (usize, &String)| {
-                Series::line(place, x.clone(), displacement(place).iter().map(|y| y * factor).collect(), i)
-            };
-            panels.push(Panel {
-                title,
-                x: x_axis,
-                y: y_axis,
-                series: system
-                    .places()
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, place)| drawing.shows(place))
-                    .map(line)
-                    .collect(),
-                ..Panel::default()
-            });
-            from = to;
-        }
-    }
+        let of_drive = |run: &[f64]| {
+            let rows = from..from + run.len();
+            from = rows.end;
+            panel(join([title.clone(), format!("frequency = {}", shown_hertz(run[0]))]), rows)
+        };
+        let runs = drives[stretch.rows.clone()].chunk_by(|a, b| a == b);
+        runs.take(MOST_PANELS).map(of_drive).collect()
+    };
+    let mut panels = draws::panels(drawing, &drawing.stretches(motion), &of_case);
+    panels.truncate(MOST_PANELS);
     Figure { panels, ..Figure::default() }
 }

@@ -55,7 +55,21 @@ const LEAST: usize = 3;
 /// Points of the circle at rest.
 const CIRCLE: usize = 180;
 /// More places than these cover each other: those that move most are drawn.
-const MOST: usize = 4;
+pub(super) const MOST: usize = 4;
+
+/// So many places at most, those that move most, by their numbers in their own order.
+pub(super) fn leaders(places: &[Around], most: usize) -> Vec<usize> {
+    let mut leaders: Vec<usize> = (0..places.len()).collect();
+    leaders.sort_by(|a, b| places[*b].largest().total_cmp(&places[*a].largest()));
+    leaders.truncate(most);
+    leaders.sort_unstable();
+    leaders
+}
+
+/// How many of so many places are shown, if not all.
+pub(super) fn left_out(shown: usize, places: usize) -> String {
+    if shown < places { format!("{shown} of {places} places") } else { String::new() }
+}
 
 /// The picture of some places of a ring of so many sectors, in colours from `colour` on. Sector 0 is at the top, the next to the right of it.
 pub(super) fn panel(places: &[Around], sectors: usize, title: String, colour: usize) -> Option<Panel> {
@@ -66,11 +80,8 @@ pub(super) fn panel(places: &[Around], sectors: usize, title: String, colour: us
     if sectors < LEAST || places.iter().all(|around| around.of.len() < LEAST) {
         return None;
     }
-    let mut shown: Vec<usize> = (0..places.len()).collect();
-    shown.sort_by(|a, b| places[*b].largest().total_cmp(&places[*a].largest()));
-    shown.truncate(MOST);
-    shown.sort_unstable();
-    let left_out = (shown.len() < places.len()).then(|| format!("{} of {} places", shown.len(), places.len()));
+    let shown = leaders(places, MOST);
+    let left_out = left_out(shown.len(), places.len());
     let at = |turn: f64, radius: f64| (radius * (TAU * turn).sin(), radius * (TAU * turn).cos());
     let rest = (0..=CIRCLE).map(|i| at(i as f64 / CIRCLE as f64, 1.0)).unzip();
     let (x, y): (Vec<f64>, Vec<f64>) = rest;
@@ -95,7 +106,7 @@ pub(super) fn panel(places: &[Around], sectors: usize, title: String, colour: us
     }
     let first = series.iter().rev().find_map(|line| Some((*line.x.first()?, *line.y.first()?)))?;
     series.push(Series::marks("sector 0", vec![first.0], vec![first.1], 6));
-    let title = join([title].into_iter().chain(left_out));
+    let title = join([title, left_out]);
     let axis = || Axis::default().between(-ROOM, ROOM);
     Some(Panel { title, x: axis(), y: axis(), series, picture: true })
 }

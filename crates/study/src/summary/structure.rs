@@ -5,6 +5,7 @@ use crate::survey::Surveyed;
 use crate::words::{plural, significant};
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
+use stickslip::model::{ReductionEvidence, Substructure};
 
 /// Frequencies that are listed.
 const LISTED: usize = 6;
@@ -18,6 +19,8 @@ pub struct StructureSummary {
     pub left_out: usize,
     /// Entries of stiffness and mass that are not zero.
     pub entries: [usize; 2],
+    /// What a reduction left out that made the files.
+    pub earlier: Option<ReductionEvidence>,
     /// What it was reduced to; none where all its rows are degrees of freedom.
     pub reduced: Option<ReducedSummary>,
 }
@@ -41,7 +44,7 @@ pub struct ReducedSummary {
 
 impl StructureSummary {
     pub(super) fn new(study: &Study, one: &Surveyed) -> Option<Self> {
-        let component = &one.case.model.substructure.as_ref()?.component;
+        let Substructure { component, earlier, .. } = one.case.model.substructure.as_ref()?;
         let (mass, _, stiffness) = component.matrices();
         let reduced = one.survey.system().reduced().map(|reduced| ReducedSummary {
             coordinates: reduced.dofs(),
@@ -55,6 +58,7 @@ impl StructureSummary {
             rows: component.dofs(),
             left_out: study.structure.matrices.as_ref().map_or(0, |matrices| matrices.left_out),
             entries: [stiffness.len(), mass.len()],
+            earlier: *earlier,
             reduced,
         })
     }
@@ -69,11 +73,15 @@ impl StructureSummary {
             text += &format!("; {left_out} constrained row{} left out", plural(*left_out));
         }
         let mut lines = vec![("structure", text)];
+        let hertz = |omega: f64| significant(omega / TAU, 6);
+        let within =
+            |error: f64, up_to: f64| format!("error {} % up to {} Hz", significant(100.0 * error, 2), hertz(up_to));
+        let before = self.earlier.map(|earlier| format!("before, {}", within(earlier.error, earlier.up_to)));
         let Some(reduced) = &self.reduced else {
-            lines.push(("reduced", "not at all".to_owned()));
+            lines.push(("reduced", before.unwrap_or_else(|| "not at all".to_owned())));
             return lines;
         };
-        let hertz = |omega: f64| significant(omega / TAU, 6);
+        lines.extend(before.map(|before| ("reduced", before)));
         let mut own: Vec<String> = reduced.frequencies.iter().map(|omega| hertz(*omega)).collect();
         if own.is_empty() {
             own.push("none".to_owned());
@@ -83,12 +91,8 @@ impl StructureSummary {
             Some(free) => format!(", {free} free motion{}", plural(free)),
         };
         lines.push(("frequencies", format!("{} Hz{free}", own.join(", "))));
-        let error = significant(100.0 * reduced.error, 2);
-        let ReducedSummary { coordinates, kind, up_to, .. } = reduced;
-        lines.push((
-            "reduced",
-            format!("{coordinates} coordinates ({kind}), error {error} % up to {} Hz", hertz(*up_to)),
-        ));
+        let ReducedSummary { coordinates, kind, error, up_to, .. } = reduced;
+        lines.push(("reduced", format!("{coordinates} coordinates ({kind}), {}", within(*error, *up_to))));
         lines
     }
 
@@ -109,6 +113,9 @@ impl StructureSummary {
             "constrained_rows": self.left_out,
             "entries_of_stiffness": self.entries[0],
             "entries_of_mass": self.entries[1],
+            "reduced_before": self.earlier.map(|earlier| {
+                json!({ "reduction_error": earlier.error, "up_to_Hz": earlier.up_to / TAU })
+            }),
             "reduced": reduced,
         })
     }

@@ -11,6 +11,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use stickslip::dimension::Dimension;
 use stickslip::model::{Axis, Loose};
+use stickslip::structure::ReducedComponent;
 
 /// Names that a warning lists; of more it gives the number.
 const NAMED: usize = 6;
@@ -121,7 +122,31 @@ const REDUCTION_ERROR: f64 = 1e-3;
 
 /// What looks like a mistake in a structure by its matrices.
 fn structure(case: &Surveyed) -> Vec<String> {
-    let Some(reduced) = case.survey.system().reduced() else { return Vec::new() };
+    let system = case.survey.system();
+    let mut found = system.reduced().map_or_else(Vec::new, coordinates);
+    let Some(reduction) = system.reduction_evidence() else { return found };
+    let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
+    if reduction.error > REDUCTION_ERROR {
+        let worst = system.reduced().map_or(reduction.up_to, ReducedComponent::worst_at);
+        found.push(format!(
+            "the reduced structure errs by {} % at {}; take more modes, or `reduce = {{ up_to = … }}`, which takes as many as are needed",
+            significant(100.0 * reduction.error, 3),
+            hertz(worst)
+        ));
+    }
+    let beyond = crate::survey::range(&case.case).filter(|(_, high)| *high > reduction.up_to);
+    if let Some((_, high)) = beyond {
+        found.push(format!(
+            "the drive reaches {}, and the error of the reduced structure is known up to {} only",
+            hertz(high),
+            hertz(reduction.up_to)
+        ));
+    }
+    found
+}
+
+/// What looks like a mistake in the frequencies of a structure in few coordinates.
+fn coordinates(reduced: &ReducedComponent) -> Vec<String> {
     let mut found = Vec::new();
     let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
     let lowest = reduced.frequencies().get(reduced.free()).copied();
@@ -137,21 +162,6 @@ fn structure(case: &Surveyed) -> Vec<String> {
             hertz(reduced.up_to())
         )),
         Some(_) => {}
-    }
-    if reduced.error() > REDUCTION_ERROR {
-        found.push(format!(
-            "the reduced structure errs by {} % at {}; take more modes, or `reduce = {{ up_to = … }}`, which takes as many as are needed",
-            significant(100.0 * reduced.error(), 3),
-            hertz(reduced.worst_at())
-        ));
-    }
-    let beyond = crate::survey::range(&case.case).filter(|(_, high)| *high > reduced.up_to());
-    if let Some((_, high)) = beyond {
-        found.push(format!(
-            "the drive reaches {}, and the error of the reduced structure is known up to {} only",
-            hertz(high),
-            hertz(reduced.up_to())
-        ));
     }
     found
 }

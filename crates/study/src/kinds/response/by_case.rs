@@ -10,6 +10,8 @@ use crate::words::significant;
 
 /// A mass below this share of the heaviest is drawn dashed, like the paper's contact masses.
 const LIGHT: f64 = 0.5;
+/// Bars of a panel that still tell one from the next: two for each of 60 blades.
+const BARS: usize = 120;
 /// Masses that are drawn behind the largest of them, those with the highest peaks: the curves of thousands would be one grey area in megabytes.
 const BEHIND: usize = 100;
 
@@ -105,30 +107,37 @@ impl Drawn<'_> {
         by_height.into_iter().map(|(index, _)| names[index]).collect()
     }
 
-    /// Of a disk a bar for every sector, at the frequency where the largest amplitude is, and its shape there, in colours from `first` on.
+    /// Of a disk a bar for every sector, at the frequency where the largest amplitude is, and its shape there, in colours from `first` on; of the places
+    /// that move most, each in one colour in both.
     fn sectors_of(&self, stretch: &Stretch, first: usize) -> Option<[Option<Panel>; 2]> {
         let ring = self.drawing.study.case(0).ok()?.model.ring?;
         let columns: Vec<(&str, Vec<f64>)> =
             self.shown.iter().map(|(name, _)| (name.as_str(), self.amplitudes(name, stretch.rows.clone()))).collect();
         let highest = |row: usize| columns.iter().map(|(_, values)| values[row]).fold(f64::NEG_INFINITY, f64::max);
         let row = (0..stretch.rows.len()).max_by(|a, b| highest(*a).total_cmp(&highest(*b)))?;
-        // what is one place in a sector has one colour
         let at = stretch.rows.start + row;
         let phase = |name: &str| numbers(self.curve, &phase_of(name), at..at + 1)[0];
         let shape = columns.iter().map(|(name, values)| (*name, values[row], phase(name)));
-        let shape = Around::of_ring(shape)?;
-        let bars = |(colour, around): (usize, &Around)| {
+        let all = Around::of_ring(shape)?;
+        let places = all.len();
+        let shape: Vec<Around> =
+            wheel::leaders(&all, wheel::MOST).into_iter().map(|place| all[place].clone()).collect();
+        let bars = |colour: usize| {
+            let around = &shape[colour];
             let (x, y) = around.of.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
             Series::bars(&around.place, x, y, first + colour)
         };
-        let series: Vec<Series> = shape.iter().enumerate().map(bars).collect();
+        let fit = (BARS / ring.sectors.max(1)).clamp(1, wheel::MOST);
+        let series: Vec<Series> = wheel::leaders(&shape, fit).into_iter().map(bars).collect();
         if series.iter().all(|bars| bars.x.len() < 2) {
             return None;
         }
         let frequency = format!("{} Hz", significant(numbers(self.curve, DRIVE, stretch.rows.clone())[row], 6));
         let title = join([stretch.label(), format!("at {frequency}")]);
         let (x, y) = (Axis::new("sector", "").whole(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
-        let wheel = wheel::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone()]), first);
+        let of = wheel::left_out(shape.len(), places);
+        let wheel = wheel::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone(), of]), first);
+        let title = join([title, wheel::left_out(series.len(), places)]);
         Some([Some(Panel { title, x, y, series, ..Panel::default() }), wheel])
     }
 }

@@ -1,7 +1,7 @@
 //! What the figure of a response draws: curves of places and joints, read off its tables.
 
 use super::super::shares::{self, State};
-use super::super::wheel::of_sector;
+use super::super::wheel::{self, of_sector};
 use super::tables;
 use crate::columns::{FREQUENCY as DRIVE, amplitude_of};
 use crate::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
@@ -190,7 +190,7 @@ impl Drawn<'_> {
         };
         let in_sector: BTreeSet<String> =
             self.shown.iter().filter_map(|(name, _)| Some(of_sector(name)?.0)).filter(|_| self.ring()).collect();
-        let joints = places + in_sector.len();
+        let joints = places + in_sector.len().min(wheel::MOST);
         [places, joints, joints + if self.joints.is_empty() { 0 } else { self.pulling().len() }]
     }
 

@@ -1,0 +1,156 @@
+//! Panels of many draws: what the panels of one case show, of all draws at once.
+//!
+//! Curves over an abscissa become their median and band, point by point. Where that has no meaning, because a curve turns back (a loop, a branch around
+//! a fold) or draws do not show the same curves (one has an unstable stretch), every draw has its own curve, pale. Pictures of a plane, and
+//! marks and bars that stand elsewhere in each draw, are left to the tables.
+
+use crate::dataset::{Emphasis, Panel, Series, Style};
+use crate::drawing::{Drawing, MOST_CURVES, MOST_PANELS, Stretch, join, thinned};
+use crate::percentiles::percentiles;
+
+/// The panels of all cases, as `of_case` draws them under a title; of draws those of each combination of `vary`.
+pub(crate) fn panels(
+    drawing: &Drawing<'_>,
+    stretches: &[Stretch],
+    of_case: &dyn Fn(&Stretch, String) -> Vec<Panel>,
+) -> Vec<Panel> {
+    if drawing.study.draws().is_none() {
+        let cases = stretches.iter().take(MOST_PANELS);
+        return cases.flat_map(|stretch| of_case(stretch, stretch.label())).collect();
+    }
+    let of_group = |(words, group): (String, Vec<&Stretch>)| -> Vec<Panel> {
+        let title = join([words, drawing.draws(group.len())]);
+        let cases: Vec<Vec<Panel>> = group.iter().map(|stretch| of_case(stretch, title.clone())).collect();
+        let most = cases.iter().map(Vec::len).max().unwrap_or(0);
+        let same = |at: usize| cases.iter().filter_map(|case| case.get(at)).collect::<Vec<_>>();
+        (0..most).filter_map(|at| together(&same(at))).collect()
+    };
+    drawing.by_listed(stretches).into_iter().take(MOST_PANELS).flat_map(of_group).take(MOST_PANELS).collect()
+}
+
+/// One panel of that of every draw; none of pictures.
+fn together(draws: &[&Panel]) -> Option<Panel> {
+    let first = draws.first().filter(|panel| !panel.picture)?;
+    let lines: Vec<Vec<&Series>> = draws.iter().map(|panel| curves(panel, is_line)).collect();
+    let alike = |one: &[&Series]| {
+        let same = |(a, b): (&&Series, &&Series)| a.label == b.label && a.style == b.style;
+        one.len() == lines[0].len() && one.iter().zip(&lines[0]).all(same)
+    };
+    let rises = |line: &&Series| line.x.is_sorted();
+    let bands = lines.iter().all(|one| alike(one) && one.iter().all(rises));
+    let mut series: Vec<Series> =
+        first.series.iter().filter(|series| series.emphasis == Emphasis::Reference).cloned().collect();
+    if bands {
+        // bands first, so that none hides a median
+        let pairs: Vec<Vec<Series>> = (0..lines[0].len()).map(|at| of_lines(&lines, at)).collect();
+        series.extend(pairs.iter().flat_map(|pair| pair.first()).cloned());
+        series.extend(pairs.iter().flat_map(|pair| pair.get(1)).cloned());
+        series.extend(of_points(draws));
+    } else {
+        let shown = thinned(&lines, MOST_CURVES);
+        series.extend(shown.into_iter().flatten().map(|line| (*line).clone().pale()));
+    }
+    let ends = draws.iter().map(|panel| panel.y.range).reduce(|a, b| {
+        let ([a_low, a_high], [b_low, b_high]) = (a?, b?);
+        Some([a_low.min(b_low), a_high.max(b_high)])
+    });
+    let mut panel = Panel { series, ..(*first).clone() };
+    panel.y.range = ends.flatten();
+    Some(panel)
+}
+
+fn is_line(style: Style) -> bool {
+    matches!(style, Style::Solid | Style::Dashed | Style::Dotted)
+}
+
+/// The results of a panel whose style is one of these.
+fn curves(panel: &Panel, of: fn(Style) -> bool) -> Vec<&Series> {
+    panel.series.iter().filter(|series| series.emphasis == Emphasis::Normal && of(series.style)).collect()
+}
+
+/// Band and median of one line of all draws.
+fn of_lines(lines: &[Vec<&Series>], at: usize) -> Vec<Series> {
+    let line = lines[0][at];
+    let all: Vec<(Vec<f64>, Vec<f64>)> = lines.iter().map(|one| (one[at].x.clone(), one[at].y.clone())).collect();
+    let mut pair = percentiles(&all, &line.label, line.colour);
+    pair.iter_mut().filter(|series| series.style != Style::Band).for_each(|median| median.style = line.style);
+    pair
+}
+
+/// Marks and bars at the same abscissae in all draws, at their medians.
+fn of_points(draws: &[&Panel]) -> Vec<Series> {
+    let points: Vec<Vec<&Series>> =
+        draws.iter().map(|panel| curves(panel, |style| matches!(style, Style::Marks | Style::Bars))).collect();
+    let at = |at: usize| {
+        let own = *points[0].get(at)?;
+        let all: Option<Vec<(Vec<f64>, Vec<f64>)>> = points
+            .iter()
+            .map(|one| one.get(at).filter(|one| one.x == own.x).map(|one| (one.x.clone(), one.y.clone())))
+            .collect();
+        let median = percentiles(&all?, &own.label, own.colour).pop()?;
+        Some(Series { y: median.y, ..own.clone() })
+    };
+    (0..points[0].len()).filter_map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::Axis;
+
+    fn panel(series: Vec<Series>) -> Panel {
+        Panel {
+            x: Axis::new("speed", "rpm"),
+            y: Axis::new("frequency", "Hz").between(0.0, 2.0),
+            series,
+            ..Panel::default()
+        }
+    }
+
+    /// Three draws: the median is the middle one, the band reaches 5 % and 95 % of the way between them (NumPy 2: `np.percentile([1, 2, 4], [5, 95])`
+    /// is 1.1, 3.8); marks at the same abscissae stand at the median, others are left out.
+    #[test]
+    fn lines_become_bands() {
+        let x = vec![0.0, 1.0];
+        let draws: Vec<Panel> = [1.0, 4.0, 2.0]
+            .iter()
+            .map(|y| {
+                let line = Series::line("joints stuck", x.clone(), vec![*y, 2.0 * y], 1);
+                let line = Series { style: Style::Dashed, ..line };
+                let same = Series::marks("", x.clone(), vec![*y, 2.0 * y], 1);
+                let elsewhere = Series::marks("crossings", vec![*y], vec![1.0], 1);
+                let order = Series::line("engine order 1", x.clone(), x.clone(), 0).reference();
+                let mut panel = panel(vec![line, order, same, elsewhere]);
+                panel.y = panel.y.between(0.0, *y);
+                panel
+            })
+            .collect();
+        let made = together(&draws.iter().collect::<Vec<_>>()).unwrap();
+        assert_eq!(made.y.range, Some([0.0, 4.0]));
+        let [order, band, median, marks] = &made.series[..] else { panic!("{:?}", made.series) };
+        assert_eq!(order.emphasis, Emphasis::Reference);
+        assert_eq!((band.style, band.label.as_str(), band.colour), (Style::Band, "joints stuck, 5 % to 95 %", 1));
+        let near = |found: &[f64], expected: [f64; 2]| {
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{found:?} {expected:?}");
+        };
+        near(&band.base, [1.1, 2.2]);
+        near(&band.y, [3.8, 7.6]);
+        near(&median.y, [2.0, 4.0]);
+        near(&marks.y, [2.0, 4.0]);
+        assert_eq!((median.style, marks.style), (Style::Dashed, Style::Marks));
+    }
+
+    /// What turns back has no value at an abscissa, and what only some draws have none in the others: each draw has its curve.
+    #[test]
+    fn what_has_no_band_is_drawn_draw_by_draw() {
+        let around = |y: f64| panel(vec![Series::line("joint", vec![0.0, 1.0, 0.5], vec![y, 1.0, 2.0], 0)]);
+        let straight = |label: &str| panel(vec![Series::line(label, vec![0.0, 1.0], vec![1.0, 2.0], 0)]);
+        for draws in [[around(1.0), around(2.0)], [straight("stable"), straight("unstable")]] {
+            let made = together(&[&draws[0], &draws[1]]).unwrap();
+            assert_eq!(made.series.len(), 2);
+            assert!(made.series.iter().all(|line| line.emphasis == Emphasis::Pale && line.style == Style::Solid));
+        }
+        let wheel = Panel { picture: true, ..straight("shape") };
+        assert!(together(&[&wheel, &wheel]).is_none());
+    }
+}
