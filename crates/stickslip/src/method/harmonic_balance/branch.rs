@@ -1,10 +1,12 @@
 //! The equations of harmonic balance with a parameter, for continuation.
 
 use super::equations::{Level, Motion, transfer};
+use super::estimate::{Compared, estimate};
+use super::kept::Kept;
 use super::ports::Ports;
 use super::rest::Rest;
 use super::sparse::GUESSED;
-use super::{Compared, HarmonicBalance, Kept, LARGEST, TOLERANCE, estimate, path};
+use super::{HarmonicBalance, LARGEST, TOLERANCE, path};
 use crate::method::evidence::Judge;
 use crate::method::guess::Guess;
 use crate::method::{MethodError, OrbitError};

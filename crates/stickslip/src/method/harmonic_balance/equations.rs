@@ -20,10 +20,10 @@
 mod unknowns;
 mod yardsticks;
 
-use super::coupled::{Coupled, Linear, Near, by_products};
+use super::coupled::{Coupled, Linear, Near, by_products, dot};
 use super::ease::Ease;
 use super::hold::CLEAR;
-use super::ports::{Alternation, Beginning, Member, Port, Ports, block, blocks};
+use super::ports::{Alternation, Beginning, Member, Port, Ports, REPEATS, block, blocks};
 use super::receptance::{Modal, Receptance};
 use super::rest::Rest;
 use super::sparse::Sparse;
@@ -43,6 +43,8 @@ const RIGID: f64 = 1e-14;
 /// points apart.
 const FEWER: usize = 4;
 const SKETCHED: usize = 16;
+/// Distance of the states from those a period later, relative to their size, at which sketched derivatives are taken: what fewer samples leave out.
+const ALMOST: f64 = 1e-3;
 /// The share of the springs of closed contacts that a law's derivative has beside a structure that has them.
 const OPEN: f64 = -1.0;
 /// All that belongs to one number of harmonics.
@@ -94,12 +96,16 @@ pub(super) struct Level {
     image: Vec<Complex64>,
     /// Of ports with a memory, the states at t = 0 in the motion that was evaluated last, and what is forgotten of them.
     states: Vec<Beginning>,
-    /// Whether they begin there in the next motion.
+    /// Whether those that forget where they began do so there in the next motion: the same states as from rest, in fewer periods.
     pub(super) nearby: bool,
     /// The same period by a quarter of the samples, for derivatives of many contacts: see [`Level::follow_slopes`].
     pub(super) sketch: Option<Alternation>,
     /// Whether the present search goes by these.
     pub(super) sketches: bool,
+    /// The same period by twice the samples, once it was needed, see [`Level::by_twice_the_samples`].
+    pub(super) twice: Option<Alternation>,
+    /// Whether the derivatives are those of the present search, with nothing added.
+    pub(super) linearised: bool,
     /// Motions along the axes under their forces, [axis][harmonic].
     moved: Vec<Complex64>,
     product: Vec<f64>,
@@ -201,6 +207,8 @@ impl Level {
             nearby: false,
             sketch: None,
             sketches: false,
+            twice: None,
+            linearised: false,
             moved: vec![ZERO; nh * axes],
             product: vec![0.0; (2 * nh * widest).pow(2)],
         }
@@ -371,6 +379,28 @@ impl Level {
         slopes: Slopes,
     ) -> f64 {
         self.assembled += usize::from(slopes != Slopes::None);
+        self.respond(ports, omega, motion, ease, slopes);
+        self.follow(motion, ease);
+        self.image(ports, omega, motion, ease, slopes);
+        self.measure(ports, motion, length);
+        // relative to the motion, weighted as velocities are, and to the limits
+        let nh = self.harmonics().len();
+        let mut sum = 0.0;
+        for port in ports.iter() {
+            for q in port.range() {
+                for (k, &h) in self.alternation.harmonics.iter().enumerate() {
+                    let at = 2 * (q * nh + k);
+                    let square = self.residual[at] * self.residual[at] + self.residual[at + 1] * self.residual[at + 1];
+                    let unit = self.units[at];
+                    sum += square * if port.is_force() { 1.0 } else { weight(h) } / (unit * unit);
+                }
+            }
+        }
+        sum.sqrt()
+    }
+
+    /// The forces of motion ports, and their derivatives.
+    fn respond(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, ease: Ease, slopes: Slopes) {
         let nh = self.harmonics().len();
         self.alternation.relaxed_at_zero = motion.relaxed_at_zero;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
@@ -379,7 +409,7 @@ impl Level {
             let slot = wanted.then_some(&mut self.tangents[block(&self.blocks, p, port, nh)]);
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
             if port.marches() && self.nearby {
-                self.alternation.begin.clone_from(&self.states[p]);
+                self.alternation.begin = self.states[p].forgotten();
             }
             self.alternation.respond(port, (omega, ease.limits), c, force, slot);
             if wanted {
@@ -389,9 +419,13 @@ impl Level {
                 self.states[p].state.clone_from(&self.alternation.state);
             }
         }
+    }
+
+    /// What the structure does under the forces of a motion: into the residual of motions, and into the motions whose force is unknown.
+    pub(super) fn follow(&mut self, motion: &mut Motion, ease: Ease) {
+        let nh = self.harmonics().len();
         let share = self.load(ease);
         self.act(motion, share);
-        // what the structure does: into the residual of motions, and into the motions whose force is unknown
         let acting = if self.springs.is_empty() { &motion.force } else { &self.acting };
         if self.sparse.is_none() {
             self.receptance.apply(acting, &mut self.moved);
@@ -419,6 +453,11 @@ impl Level {
                 }
             }
         }
+    }
+
+    /// What the forces of force ports must be: into their residual, and its derivatives.
+    fn image(&mut self, ports: &Ports, omega: f64, motion: &Motion, ease: Ease, slopes: Slopes) {
+        let nh = self.harmonics().len();
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.is_force()) {
             let range = port.first * nh..(port.first + port.axes) * nh;
             let penalty = self.penalty[p];
@@ -438,20 +477,22 @@ impl Level {
                 (self.residual[2 * at], self.residual[2 * at + 1]) = (r.re, r.im);
             }
         }
-        self.measure(ports, motion, length);
-        // relative to the motion, weighted as velocities are, and to the limits
-        let mut sum = 0.0;
-        for port in ports.iter() {
-            for q in port.range() {
-                for (k, &h) in self.alternation.harmonics.iter().enumerate() {
-                    let at = 2 * (q * nh + k);
-                    let square = self.residual[at] * self.residual[at] + self.residual[at + 1] * self.residual[at + 1];
-                    let unit = self.units[at];
-                    sum += square * if port.is_force() { 1.0 } else { weight(h) } / (unit * unit);
-                }
+    }
+
+    /// The forces of motion ports after the step that was made last, by the derivatives with which it was made, which are those of the laws alone then.
+    pub(super) fn step_forces(&mut self, ports: &Ports, motion: &mut Motion, length: f64) {
+        let pair = 2 * self.harmonics().len();
+        for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
+            self.add_springs(p, port, -OPEN);
+            let (wide, unit) = (pair * port.axes, port.unit(length));
+            let step = &self.step[port.first * pair..][..wide];
+            let rows = self.tangents[block(&self.blocks, p, port, pair / 2)].chunks_exact(2 * wide);
+            for (force, rows) in motion.force[port.first * pair / 2..].iter_mut().zip(rows) {
+                let (re, im) = rows.split_at(wide);
+                *force -= Complex64::new(dot(re, step), dot(im, step)) * unit;
             }
         }
-        sum.sqrt()
+        self.linearised = false;
     }
 
     /// The derivatives that [`Slopes::Cheap`] left out, at the motion that was evaluated last. If they are `sketched` those of return maps are taken by
@@ -476,7 +517,9 @@ impl Level {
                 let image = &mut self.image[..range.len()];
                 sketch.relaxed_at_zero = alternation.relaxed_at_zero;
                 sketch.begin.state.clone_from(&self.states[p].state);
+                sketch.repeats = ALMOST;
                 sketch.respond(port, (omega, ease.limits), c, image, Some(&mut *slot));
+                sketch.repeats = REPEATS;
                 rough = image.iter().all(|f| f.is_finite());
                 if rough {
                     alternation = sketch;
@@ -491,13 +534,14 @@ impl Level {
             self.states[p].forgets.clone_from(&alternation.forgets);
             self.add_springs(p, port, OPEN);
         }
+        self.linearised = true;
         any
     }
 
     /// Forgets what a search has seen of the laws' memories.
     pub fn begin_anew(&mut self) {
         (self.assembled, self.products, self.alternation.marched) = (0, 0, 0);
-        (self.nearby, self.sketches) = (false, self.sketch.is_some());
+        (self.nearby, self.linearised, self.sketches) = (false, false, self.sketch.is_some());
         self.states.iter_mut().for_each(|known| *known = Beginning::default());
     }
 
@@ -576,6 +620,9 @@ impl Level {
     pub fn sample(&mut self, ports: &Ports, p: usize, omega: f64, motion: &Motion) {
         let nh = self.harmonics().len();
         let port = &ports[p];
+        if self.linearised && port.marches() {
+            self.alternation.begin = self.states[p].forgotten();
+        }
         self.alternation.relaxed_at_zero = motion.relaxed_at_zero;
         let range = port.first * nh..(port.first + port.axes) * nh;
         self.alternation.sample(port, (omega, self.penalty[p]), (&motion.c[range.clone()], &motion.force[range]));

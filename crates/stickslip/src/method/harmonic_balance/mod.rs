@@ -4,7 +4,7 @@
 //! - `rest`: the receptance of the linear rest, in closed form from its modes;
 //! - `closed`: the mean of bodies that nothing but contacts holds;
 //! - `equations`: those along the joints, and their derivative;
-//! - `solve`: Newton's method on them; `sampling`: what its samples leave out; `proximal`: the way to forces that nothing decides;
+//! - `solve`: Newton's method on them; `estimate`: the error by a finer solution; `sampling`: what samples leave out; `proximal`: the way to forces that nothing decides;
 //! - `path`: the orbit's numbers from its harmonics.
 //!
 //! The unknowns are the harmonics of the joints' relative motions, or of their forces where the velocity alone decides them: the cost
@@ -18,7 +18,9 @@ mod closed;
 mod coupled;
 mod ease;
 mod equations;
+mod estimate;
 mod hold;
+mod kept;
 mod mode;
 mod path;
 mod ports;
@@ -36,11 +38,13 @@ use crate::dimension::Dimension;
 use crate::method::course::course;
 use crate::method::evidence::Judge;
 use crate::method::repeated::Afresh;
-use crate::model::{Axis, System};
+use crate::model::System;
 use crate::orbit::{Course, JointSample, Orbit, Path};
 pub(crate) use arc::ModeArc;
 pub(crate) use branch::BranchEquations;
 use equations::{Level, Motion};
+use estimate::{Compared, estimate};
+use kept::Kept;
 pub(crate) use mode::{LinearMode, ModeEquations, ModeState};
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -115,14 +119,6 @@ const ESTIMATED: f64 = 1e7;
 /// Laws of velocity begin with this many harmonics at most, and double them from there: the sets of slipping samples are then nearly
 /// known.
 const COLD: usize = 15;
-/// The error relative to the distance from the solution with twice the harmonics. Where rigid friction makes accelerations jump, the
-/// doubling leaves four tenths of the error, between order 1 (one half) and 3/2 (a third): both are observed.
-const RIGID_SHARE: f64 = 1.7;
-/// The same of laws that are steep: until the series resolves their layer they leave half of it, as order 1 does, and where friction falls with
-/// velocity no less. Elsewhere the doubling leaves next to nothing.
-const STEEP_SHARE: f64 = 2.0;
-/// A motion that is less than this share of what it would be without the joints is rest, which their forces and the loads leave in rounding.
-const CANCELS: f64 = 1e-12;
 /// Where friction is rigid or steep, one doubling is not believed to have left less than this share of the distance of the one before: two
 /// motions may be near each other by chance, as 1.3e-3 where the error is 1e-2.
 const CHANCE: f64 = 0.1;
@@ -317,143 +313,6 @@ impl Method for Subharmonic {
         let slowed = system.slowed(u32::try_from(period).map_err(too_high)?);
         Ok(Box::new(Afresh(Balance::new(Cow::Owned(slowed), balance, period)?)))
     }
-}
-
-/// Which harmonics the motion has: the multiples of `unit`, the greatest common divisor of the excitation's, and of these the odd ones if
-/// the excitation has no others and all laws are odd. Any other would be found zero.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Kept {
-    unit: usize,
-    /// The harmonic of the slowest excitation: what one drive frequency is among harmonics.
-    scale: usize,
-    odd: bool,
-    /// The excitation's highest.
-    highest: usize,
-}
-
-impl Kept {
-    /// By the harmonics of the excitation that `counts` accepts, by their amplitudes.
-    fn new(system: &System, counts: impl Fn(Complex64) -> bool) -> Self {
-        let present = Kept::present(system, counts);
-        let unit = present.iter().fold(0, |a, &b| common_divisor(a, b)).max(1);
-        Kept::by(system, &present, (unit, unit))
-    }
-
-    /// Of a motion that may repeat after `periods` periods of the drive only: all harmonics of its own frequency, but for what the laws' symmetry
-    /// leaves out.
-    fn slowed(system: &System, periods: usize) -> Self {
-        let present = Kept::present(system, |z| z != Complex64::new(0.0, 0.0));
-        Kept::by(system, &present, (1, periods))
-    }
-
-    fn present(system: &System, counts: impl Fn(Complex64) -> bool) -> Vec<usize> {
-        system.harmonics_of_excitation(counts).into_iter().map(|h| h as usize).collect()
-    }
-
-    fn by(system: &System, present: &[usize], (unit, scale): (usize, usize)) -> Self {
-        let highest = present.iter().copied().max().unwrap_or(0);
-        let laws = system.joints().iter().all(|joint| joint.law().is_odd());
-        Kept { unit, scale, odd: laws && present.iter().all(|h| (h / unit) % 2 == 1), highest }
-    }
-
-    /// The harmonics up to `top`.
-    fn up_to(self, top: usize) -> Vec<usize> {
-        let first = if self.odd { self.unit } else { 0 };
-        (first..=top.max(first)).step_by(if self.odd { 2 * self.unit } else { self.unit }).collect()
-    }
-
-    fn has(self, h: usize) -> bool {
-        h.is_multiple_of(self.unit) && !(self.odd && (h / self.unit).is_multiple_of(2))
-    }
-
-    /// Twice as many.
-    fn double(self, top: usize) -> usize {
-        2 * top + self.unit
-    }
-
-    /// The motion changes its sign after half a period.
-    fn half_period(self) -> bool {
-        self.odd && self.unit % 2 == 1
-    }
-}
-
-fn common_divisor(a: usize, b: usize) -> usize {
-    if b == 0 { a } else { common_divisor(b, a % b) }
-}
-
-/// A motion for the comparison with a finer one: its harmonics and, per harmonic, the motions of the places and along the axes of the ports.
-struct Compared<'a> {
-    harmonics: &'a [usize],
-    places: &'a [DVector<Complex64>],
-    along: &'a [Complex64],
-}
-
-/// The error of a motion by a finer one: their distance, as the largest of the places and of the inner sliders behind springs, relative to
-/// the largest of these motions, without means ([`CANCELS`]), times the share that the finer one may be off itself. What the finer one lacks at
-/// resonances above its own harmonics counts too. The finer one is its level, its motion and, per harmonic, the motions of the places.
-fn estimate(
-    seen: &[Axis],
-    ports: &Ports,
-    rest: &Rest,
-    (kept, omega): (Kept, f64),
-    coarse: &Compared,
-    (finer, better, places): (&mut Level, &Motion, &[DVector<Complex64>]),
-) -> f64 {
-    let above = above(finer, rest, ports, kept, omega, better);
-    let fine = Compared { harmonics: finer.harmonics(), places, along: &better.c };
-    let unhindered = |place: &Axis| {
-        let moving = fine.harmonics.iter().zip(&finer.free).filter(|(h, _)| **h > 0);
-        moving.map(|(_, free)| place.along_complex(free).norm_sqr()).sum::<f64>()
-    };
-    let largest = seen.iter().map(unhindered).fold(0.0, f64::max);
-    let (mut distance, mut size) = (0.0f64, CANCELS * CANCELS * largest);
-    let mut compare = |coarse_at: &dyn Fn(usize) -> Complex64, fine_at: &dyn Fn(usize) -> Complex64, missing: f64| {
-        let (mut d, mut s) = (missing, missing);
-        for (k, h) in fine.harmonics.iter().enumerate().filter(|(_, h)| **h > 0) {
-            let (x, y) = (coarse.harmonics.binary_search(h).map_or(Complex64::new(0.0, 0.0), coarse_at), fine_at(k));
-            d += (x - y).norm_sqr();
-            s += y.norm_sqr();
-        }
-        (distance, size) = (distance.max(d), size.max(s));
-    };
-    for place in seen {
-        let missing = above.iter().map(|x| place.along_complex(x).norm_sqr()).sum();
-        let at = |places: &[DVector<Complex64>], k: usize| place.along_complex(&places[k]);
-        compare(&|k| at(coarse.places, k), &|k| at(fine.places, k), missing);
-    }
-    let (few, many) = (coarse.harmonics.len(), fine.harmonics.len());
-    for q in ports.iter().filter(|port| port.series > 0.0).flat_map(|port| port.range()) {
-        compare(&|k| coarse.along[q * few + k], &|k| fine.along[q * many + k], 0.0);
-    }
-    let share = if ports.has_steep() {
-        STEEP_SHARE
-    } else if ports.has_forces() {
-        RIGID_SHARE
-    } else {
-        1.0
-    };
-    if size > 0.0 { share * (distance / size).sqrt() } else { 0.0 }
-}
-
-/// What a solution lacks at the resonances above its harmonics: the motions of the places there, under the forces that it has.
-fn above(
-    level: &mut Level,
-    rest: &Rest,
-    ports: &Ports,
-    kept: Kept,
-    omega: f64,
-    motion: &Motion,
-) -> Vec<DVector<Complex64>> {
-    let top = *level.harmonics().last().expect("a series has harmonics");
-    let mut wanted = rest.resonances_above(top, omega);
-    wanted.retain(|h| kept.has(*h));
-    if wanted.is_empty() {
-        return Vec::new();
-    }
-    let forces = level.forces_at(ports, omega, motion, &wanted);
-    let infinite = || DVector::from_element(level.free[0].len(), Complex64::new(f64::INFINITY, 0.0));
-    let respond = |h: usize, forces: &[Complex64]| rest.respond(h, omega, &rest.spread(h, |q| forces[q]));
-    wanted.iter().zip(&forces).map(|(h, forces)| respond(*h, forces).unwrap_or_else(|_| infinite())).collect()
 }
 
 struct Balance<'a> {
@@ -691,7 +550,7 @@ impl Balance<'_> {
         self.finish(top, omega, motion, x, truncation)
     }
 
-    /// Error of `motion` by one with twice the harmonics, and of laws with a memory with twice the samples too; the former is returned.
+    /// Error of `motion` by one with twice the harmonics, and of laws with a memory with twice the samples too, which is returned with its places.
     fn compare(
         &mut self,
         top: usize,
@@ -701,20 +560,25 @@ impl Balance<'_> {
     ) -> Result<(f64, Motion, Vec<DVector<Complex64>>), Lost> {
         let double = self.kept.double(top);
         let start = self.refined(top, motion);
+        let (few, many) = (self.kept.up_to(top), self.kept.up_to(double));
+        let coarse = equations::transfer(motion, &few, &many);
         self.level(double, omega)?;
-        let better = self.levels.get_mut(&double).expect("made above").solve(&self.ports, omega, start)?;
-        if self.levels[&double].is_coupled() {
+        let finer = self.levels.get_mut(&double).expect("made above");
+        let better = match finer.approach_by_twice_the_samples(&self.ports, omega, &start, &coarse) {
+            Some(better) => better,
+            None => {
+                let solved = finer.solve(&self.ports, omega, start)?;
+                finer.by_twice_the_samples(&self.ports, omega, &solved, &coarse).map_or(solved, |(motion, _)| motion)
+            }
+        };
+        if finer.is_coupled() {
             self.compared.insert(top, [motion.clone(), better.clone()]);
         }
         let y = self.places(double, omega, &better)?;
         let finer = self.levels.get_mut(&double).expect("solved");
-        let sampled = finer.by_twice_the_samples(&self.ports, omega, &better);
-        let sampled = sampled.map(|motion| self.places(double, omega, &motion).map(|y| (motion, y))).transpose()?;
-        let fine = sampled.as_ref().map_or((&better, &y), |(motion, y)| (motion, y));
-        let finer = self.levels.get_mut(&double).expect("solved");
-        let coarse = Compared { harmonics: &self.kept.up_to(top), places: x, along: &motion.c };
+        let coarse = Compared { harmonics: &few, places: x, along: &motion.c };
         let at = (self.kept, omega);
-        let error = estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, fine.0, fine.1));
+        let error = estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &better, &y));
         Ok((error, better, y))
     }
 
@@ -760,6 +624,11 @@ impl Balance<'_> {
             }
             (checked, estimate) = (top, error);
             (top, motion, x) = (self.kept.double(top), finer, y);
+            if self.ports.iter().any(Port::marches) {
+                // that has other samples
+                motion = self.solve(top, omega, Some((top, &motion))).map_err(|l| self.lost(l))?;
+                x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
+            }
         }
         let harmonics = checked / self.periods;
         Err(OrbitError::Truncation {

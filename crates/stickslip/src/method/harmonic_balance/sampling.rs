@@ -1,7 +1,7 @@
 //! What the samples of a solution leave out: laws that are followed through the period, sample by sample, err by the square of its step.
 
 use super::coupled::Near;
-use super::ease::GIVEN;
+use super::ease::{GIVEN, SOLVED};
 use super::equations::{Level, Motion, Slopes};
 use super::ports::{Alternation, Port, Ports};
 
@@ -11,6 +11,11 @@ const SEEN: f64 = 2e-5;
 /// Samples from which that is reckoned, and at most as many.
 const AT: f64 = 1024.0;
 const MOST: f64 = 65536.0;
+/// The last step by twice the samples, at most, as a share of the distance that is to be known: steps leave some hundredths of themselves.
+const SHARE: f64 = 0.1;
+/// Steps, and what each is to leave of the one before.
+const MOST_STEPS: usize = 8;
+const CLOSER: f64 = 0.3;
 
 /// Samples per period that laws with a memory need for an error of the motion, relative.
 pub(super) fn samples_for(tolerance: f64) -> usize {
@@ -18,35 +23,97 @@ pub(super) fn samples_for(tolerance: f64) -> usize {
 }
 
 impl Level {
-    /// A solution after a step of Newton's method with twice the samples and the derivative by those that there are: its distance is what the samples
-    /// leave out, three quarters of it. `None` where no law is followed through the period: other forces are exact, or see their samples in the longer
-    /// series.
-    pub(super) fn by_twice_the_samples(&mut self, ports: &Ports, omega: f64, solution: &Motion) -> Option<Motion> {
+    /// The motion near `start` by twice the samples, as exactly as its distance from `coarse` is to be known. `None` where no law is followed through the
+    /// period, and where it was not found.
+    pub(super) fn approach_by_twice_the_samples(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        start: &Motion,
+        coarse: &Motion,
+    ) -> Option<Motion> {
         if !ports.iter().any(Port::marches) {
             return None;
         }
-        let length = self.length(solution);
-        let mut motion = solution.clone();
-        self.nearby = false;
-        self.evaluate(ports, omega, &mut motion, GIVEN, length, Slopes::Cheap);
-        let sketched = self.follow_slopes(ports, omega, &mut motion, (GIVEN, self.keeps_sketch()));
-        let mut twice = Alternation::new(self.harmonics().to_vec(), 2 * self.alternation.samples());
-        std::mem::swap(&mut self.alternation, &mut twice);
-        let residual = self.evaluate(ports, omega, &mut motion, GIVEN, length, Slopes::None);
-        let stepped = self.newton_step(ports, omega, GIVEN, Near { length, residual, sketched });
-        if stepped {
+        let near = self.approach(ports, omega, start)?;
+        let (motion, found) = self.by_twice_the_samples(ports, omega, &near, coarse)?;
+        found.then_some(motion)
+    }
+
+    /// Steps from a motion that was sought last to the one by twice the samples, until the distance from `coarse` is known; and whether it is. `None`
+    /// where no law is followed through the period: other forces are exact, or see their samples in the longer series.
+    ///
+    /// The derivative is the last of the search, by the samples that there are or by fewer: a step leaves some hundredths of itself, and the next one
+    /// shows it.
+    pub(super) fn by_twice_the_samples(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        near: &Motion,
+        coarse: &Motion,
+    ) -> Option<(Motion, bool)> {
+        if !ports.iter().any(Port::marches) {
+            return None;
+        }
+        let mut motion = near.clone();
+        let length = self.length(&motion);
+        if !self.linearised {
+            self.evaluate(ports, omega, &mut motion, GIVEN, length, Slopes::Cheap);
+            self.follow_slopes(ports, omega, &mut motion, (GIVEN, self.keeps_sketch()));
+        }
+        let (mut last, mut found, mut left) = (f64::INFINITY, false, MOST_STEPS);
+        loop {
+            self.exchange_for_twice();
+            self.nearby = true;
+            let residual = self.evaluate(ports, omega, &mut motion, GIVEN, length, Slopes::None);
+            self.nearby = false;
+            self.exchange_for_twice();
+            if residual <= SOLVED {
+                return Some((motion, true));
+            }
+            if !self.newton_step(ports, omega, GIVEN, Near { length, residual, sketched: true }) {
+                return None;
+            }
             self.before.copy(&motion);
             self.advance(ports, &mut motion, 1.0, length);
-            self.evaluate(ports, omega, &mut motion, GIVEN, length, Slopes::None);
+            let step = self.apart(ports, &motion, &self.before, length);
+            found |= step <= SHARE * self.apart(ports, &motion, coarse, length);
+            left -= 1;
+            if found || left == 0 || step > CLOSER * last {
+                self.step_forces(ports, &mut motion, length);
+                self.follow(&mut motion, GIVEN);
+                return Some((motion, found));
+            }
+            last = step;
         }
-        std::mem::swap(&mut self.alternation, &mut twice);
-        stepped.then_some(motion)
+    }
+
+    /// The distance of the unknowns of two motions, without means, relative to their units.
+    fn apart(&self, ports: &Ports, one: &Motion, other: &Motion, length: f64) -> f64 {
+        let nh = self.harmonics().len();
+        let moving = |at: &usize| self.harmonics()[at % nh] > 0;
+        let squares = ports.iter().map(|port| {
+            let (a, b) = if port.is_force() { (&one.force, &other.force) } else { (&one.c, &other.c) };
+            let range = (port.first * nh..(port.first + port.axes) * nh).filter(moving);
+            range.map(|at| (a[at] - b[at]).norm_sqr()).sum::<f64>() / port.unit(length).powi(2)
+        });
+        squares.sum::<f64>().sqrt()
+    }
+
+    /// Twice the samples become what is sampled, and back.
+    fn exchange_for_twice(&mut self) {
+        let (harmonics, samples) = (&self.alternation.harmonics, 2 * self.alternation.samples());
+        let twice = self.twice.get_or_insert_with(|| Alternation::new(harmonics.clone(), samples));
+        std::mem::swap(&mut self.alternation, twice);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::HarmonicBalance;
+    use super::super::equations::{Level, Motion, transfer};
+    use super::super::ports::Ports;
+    use super::super::rest::Rest;
     use crate::law::{Dahl, Jenkins2d, SharedLaw, Valanis};
     use crate::method::Method;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
@@ -72,6 +139,62 @@ mod tests {
         model.masses.push(Mass { name: "m".to_owned(), mass: 1.0, directions });
         model.joints.push(Joint { name: "j".to_owned(), between: ["m".to_owned(), ground], law });
         model.assemble().unwrap()
+    }
+
+    /// A row of bodies on springs that rub in a plane, each on the next one.
+    fn row(bodies: usize) -> System {
+        let name = |i: usize| format!("m{i}");
+        let ground = GROUND.to_owned();
+        let mut model = Model::default();
+        for i in 0..bodies {
+            let directions = vec!["x".to_owned(), "z".to_owned()];
+            model.masses.push(Mass { name: name(i), mass: 1.0 + 0.02 * i as f64, directions });
+            for (place, stiffness) in [("x", 1e4), ("z", 1.2e4)] {
+                let between = [format!("m{i}.{place}"), ground.clone()];
+                model.springs.push(Spring { between, stiffness, damping: 5.0 });
+            }
+            if i > 0 {
+                let law: SharedLaw = Arc::new(Jenkins2d { stiffness: 5e3, limit: 1.5 + 0.1 * i as f64 });
+                model.joints.push(Joint { name: format!("j{i}"), between: [name(i - 1), name(i)], law });
+            }
+        }
+        model.forces.push(Force { on: "m0.x".to_owned(), amplitude: 8.0, phase: 0.0, harmonic: 1 });
+        model.forces.push(Force { on: "m1.z".to_owned(), amplitude: 4.0, phase: 0.7, harmonic: 1 });
+        model.assemble().unwrap()
+    }
+
+    /// With a few steps the distance from a motion of half the harmonics and samples is that of the whole solution, also where there are so many contacts
+    /// that derivatives are by fewer samples.
+    #[test]
+    fn a_few_steps_know_the_distance() {
+        for bodies in [3, 22] {
+            let system = row(bodies);
+            let ports = Ports::new(&system).unwrap();
+            let rest = Rest::new(&system, &ports);
+            let (few, many, omega) = (vec![1, 3, 5], vec![1, 3, 5, 7, 9, 11], 110.0);
+            let level = |harmonics: &[usize], samples: usize| {
+                let mut level = Level::new(harmonics.to_vec(), samples, &ports, None);
+                level.drive(&system, &ports, &rest, omega).unwrap();
+                level
+            };
+            let solve = |mut level: Level| {
+                let start = level.begin(&system, &ports, None, omega);
+                level.solve(&ports, omega, start).unwrap()
+            };
+            let coarse = transfer(&solve(level(&few, 1024)), &few, &many);
+            let whole = solve(level(&many, 2048));
+            let mut near = level(&many, 1024);
+            assert_eq!(near.keeps_sketch(), bodies > 20);
+            let found = near.approach_by_twice_the_samples(&ports, omega, &coarse, &coarse).unwrap();
+            let apart = |a: &Motion, b: &Motion| near.apart(&ports, a, b, 1.0);
+            let (distance, error) = (apart(&whole, &coarse), apart(&whole, &found));
+            assert!(distance > 1e-5 * apart(&whole, &Motion::rest(whole.c.len())), "{distance:.1e} shows nothing");
+            assert!(error < 0.01 * distance, "{bodies} bodies: {error:.1e} of {distance:.1e}");
+            let forces = |a: &Motion, b: &Motion| -> f64 {
+                a.force.iter().zip(&b.force).map(|(a, b)| (a - b).norm_sqr()).sum::<f64>().sqrt()
+            };
+            assert!(forces(&whole, &found) < 0.01 * forces(&whole, &coarse), "{bodies} bodies");
+        }
     }
 
     /// The relative distance of the first harmonics.

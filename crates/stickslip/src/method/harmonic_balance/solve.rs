@@ -27,6 +27,9 @@ const ROUGH: f64 = 1e-4;
 /// Residual from which on a step by sketched derivatives is to leave no more than a share; where it leaves more they are given up.
 const NEAR: f64 = 1e-3;
 const SKETCH: f64 = 0.1;
+/// Share of the residual that a step by sketched derivatives leaves where the next one goes by the same: new ones would leave no less, since what fewer
+/// samples leave out is in them too.
+const KEPT: f64 = 0.03;
 /// Steps by fewer samples, of whose residuals one has only to come below the largest: where contacts begin to slip and to open, the way to the solution
 /// leads over larger ones, and steps that never do are short and many. Four take a third of the steps fewer at the onset of slip of 16 to 300 nodes.
 /// Source: Grippo, Lampariello, Lucidi (1986), "A nonmonotone line search technique for Newton's method".
@@ -127,10 +130,10 @@ impl Level {
     ) -> Result<(), Lost> {
         let rough = solved > SOLVED;
         let mut length = self.length(motion);
-        // what repeats may depend on where it begins, so that the first motion and the last begin at rest
-        self.nearby = false;
+        self.nearby = self.sketches;
         let mut residual = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
-        let (mut trusted, mut sketched) = (self.sketches, self.sketches && !rough);
+        let mut sketched = self.sketches && !rough;
+        let (mut rough_slopes, mut kept) = (false, false);
         let mut recent = [residual; REMEMBERED];
         let mut least = f64::INFINITY;
         // the residual that is to be halved, and for how long it was not
@@ -139,16 +142,14 @@ impl Level {
         let hope = if ports.has_forces() { PATIENCE } else { most };
         let (mut reach, mut flat) = (REACH * self.extent(motion), 0);
         for _ in 0..most {
-            if residual <= solved && self.nearby && !rough {
-                (self.nearby, trusted) = (false, false);
-                residual = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
-            }
             let found = residual <= solved || (waited > PATIENCE && least <= ROUNDED);
             if found || self.is_exhausted(ports) || (waited > hope && least < f64::INFINITY) {
                 break;
             }
-            let near = Near { length, residual, sketched: self.follow_slopes(ports, omega, motion, (ease, sketched)) };
-            self.nearby = trusted;
+            if !kept {
+                rough_slopes = self.follow_slopes(ports, omega, motion, (ease, sketched));
+            }
+            let near = Near { length, residual, sketched: rough_slopes };
             let Some(held) = self.bounded_step(ports, omega, ease, near, reach) else { break };
             motion.iterations += 1;
             self.before.copy(motion);
@@ -176,6 +177,7 @@ impl Level {
                 break; // no friction carries a mean here
             }
             sketched &= after < SKETCH * residual || residual > NEAR;
+            kept = rough_slopes && after < KEPT * residual && self.linearised;
             residual = after;
             recent[motion.iterations % REMEMBERED] = residual;
             if residual < least {
@@ -192,16 +194,14 @@ impl Level {
                 least = f64::INFINITY;
             }
         }
-        let nearby = std::mem::replace(&mut self.nearby, false);
         if residual > solved && least < f64::INFINITY {
             let iterations = motion.iterations;
             motion.c.clone_from(&self.best.c);
             motion.force.clone_from(&self.best.force);
             motion.iterations = iterations;
             residual = self.evaluate(ports, omega, motion, ease, length, Slopes::None);
-        } else if nearby && !rough {
-            residual = self.evaluate(ports, omega, motion, ease, length, Slopes::None);
         }
+        self.nearby = false;
         motion.residual = residual;
         if residual <= solved || (waited > PATIENCE && residual <= ROUNDED) {
             Ok(())
@@ -226,6 +226,7 @@ impl Level {
                 for (p, port) in ports.iter().enumerate() {
                     self.add_springs(p, port, share - held);
                 }
+                self.linearised = false;
                 held = share;
                 if !self.newton_step(ports, omega, ease, at) {
                     return None;
@@ -314,6 +315,16 @@ impl Level {
                 values[i] = before[i] - d * (fraction * port.unit(length));
             }
         }
+    }
+
+    /// A motion near the solution that is near `start`, by fewer samples where there are such.
+    pub fn approach(&mut self, ports: &Ports, omega: f64, start: &Motion) -> Option<Motion> {
+        self.begin_anew();
+        let mut motion = Motion { iterations: 0, ..start.clone() };
+        self.exchange_samples();
+        let found = self.search(ports, omega, &mut motion, GIVEN, (ITERATIONS, ROUGH));
+        self.exchange_samples();
+        (found.is_ok() && !self.is_away(&motion)).then_some(motion)
     }
 
     /// The solution that Newton's method finds from `motion`, which is nearby.

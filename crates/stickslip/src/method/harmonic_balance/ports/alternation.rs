@@ -15,6 +15,8 @@ pub(in super::super) struct Alternation {
     pub relaxed_at_zero: bool,
     /// Steps that laws with a memory were marched, in the present search.
     pub marched: usize,
+    /// Distance of the states of these from those a period later, relative to their size, at which they repeat.
+    pub repeats: f64,
     pub harmonics: Vec<usize>,
     pub fourier: Fourier,
     pairs: Vec<(usize, Complex64)>,
@@ -60,6 +62,13 @@ pub(in super::super) struct Beginning {
     pub forgets: Vec<f64>,
 }
 
+impl Beginning {
+    /// The same where a law forgets where it began; what does not must begin at rest.
+    pub fn forgotten(&self) -> Self {
+        if self.forgets.is_empty() { Beginning::default() } else { self.clone() }
+    }
+}
+
 impl Alternation {
     pub fn new(harmonics: Vec<usize>, samples: usize) -> Self {
         let zeros = vec![0.0; samples];
@@ -68,6 +77,7 @@ impl Alternation {
         Alternation {
             relaxed_at_zero: false,
             marched: 0,
+            repeats: super::REPEATS,
             fourier: Fourier::new(samples),
             pairs: harmonics.iter().map(|&h| (h, ZERO)).collect(),
             signal: zeros.clone(),

@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 use stickslip_numerics::dense::multiply_in_blocks;
 
 /// Distance of the states from those a period later, relative to their size, at which they repeat: the rounding of a thousand steps.
-const REPEATS: f64 = 1e-12;
+pub(in super::super) const REPEATS: f64 = 1e-12;
 /// The same where they come no closer.
 const ROUNDED: f64 = 1e-9;
 /// Periods, at most: hysteresis that slips forgets in a few.
@@ -126,7 +126,7 @@ impl Alternation {
         for _ in 0..PERIODS {
             let (after, product) = self.linear_period(march, &z, memory)?;
             let gap = (&after - &z).amax() / scale;
-            if m == 0 || gap <= REPEATS || (gap <= ROUNDED && gap >= 0.5 * last) {
+            if m == 0 || gap <= self.repeats || (gap <= ROUNDED && gap >= 0.5 * last) {
                 self.state.clear();
                 self.state.extend(z.iter());
                 return Some(product);
@@ -204,7 +204,9 @@ impl Alternation {
         memory: &mut Memory,
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let after = self.period(march, z, Some(&mut memory.rows))?;
-        Some((after, Chain::of(march, &memory.rows, self.samples()).product(None)))
+        let n = self.samples();
+        memory.by_state.resize(n * march.axes() * march.states(), 0.0);
+        Some((after, Chain::of(march, &memory.rows, n).product(&mut memory.by_state)))
     }
 
     /// Adds the derivative of the forces. False if the first movement has none.
@@ -218,8 +220,6 @@ impl Alternation {
         let (n, nh) = (self.samples(), self.harmonics.len());
         let (m, d) = (march.states(), march.axes());
         let size = 2 * nh * d;
-        memory.by_state.resize(n * d * m, 0.0);
-        Chain::of(march, &memory.rows, n).product(Some(&mut memory.by_state));
         let open = DMatrix::identity(m, m) - product;
         let neutral = m > 0 && open.clone().singular_values().min() <= NEUTRAL;
         let inverse = pseudo_inverse(open);
@@ -421,8 +421,8 @@ impl<'a> Chain<'a> {
         Chain { rows, width: width(march), before: march.inputs() * axes, states, axes, samples }
     }
 
-    /// Π, the states after a period by those before it; the forces by these into `forces`, [sample][axis][state].
-    fn product(&self, forces: Option<&mut [f64]>) -> DMatrix<f64> {
+    /// Π, the states after a period by those before it; the forces at the samples by these into `forces`, [sample][axis][state].
+    fn product(&self, forces: &mut [f64]) -> DMatrix<f64> {
         match self.states {
             0 => DMatrix::zeros(0, 0),
             1 => self.multiplied::<1>(forces),
@@ -432,7 +432,7 @@ impl<'a> Chain<'a> {
     }
 
     /// With so many states: most laws have one or two.
-    fn multiplied<const M: usize>(&self, mut forces: Option<&mut [f64]>) -> DMatrix<f64> {
+    fn multiplied<const M: usize>(&self, forces: &mut [f64]) -> DMatrix<f64> {
         let mut product: [[f64; M]; M] = std::array::from_fn(|s| std::array::from_fn(|t| f64::from(u8::from(s == t))));
         for step in 1..=self.samples {
             let i = step % self.samples;
@@ -442,16 +442,14 @@ impl<'a> Chain<'a> {
                 let row = &row[self.before..self.before + M];
                 std::array::from_fn(|t| row.iter().zip(&product).map(|(x, p)| x * p[t]).sum())
             };
-            if let Some(forces) = forces.as_deref_mut() {
-                let out = forces[i * self.axes * M..][..self.axes * M].chunks_exact_mut(M);
-                own.chunks_exact(self.width).zip(out).for_each(|(row, out)| out.copy_from_slice(&times(row)));
-            }
+            let out = forces[i * self.axes * M..][..self.axes * M].chunks_exact_mut(M);
+            own.chunks_exact(self.width).zip(out).for_each(|(row, out)| out.copy_from_slice(&times(row)));
             product = std::array::from_fn(|s| times(&states[s * self.width..]));
         }
         DMatrix::from_fn(M, M, |s, t| product[s][t])
     }
 
-    fn of_any(&self, mut forces: Option<&mut [f64]>) -> DMatrix<f64> {
+    fn of_any(&self, forces: &mut [f64]) -> DMatrix<f64> {
         let m = self.states;
         let mut product = DMatrix::identity(m, m);
         for step in 1..=self.samples {
@@ -459,10 +457,8 @@ impl<'a> Chain<'a> {
             let size = (m + self.axes) * self.width;
             let rows = DMatrix::from_row_slice(m + self.axes, self.width, &self.rows[i * size..(i + 1) * size]);
             let next = rows.columns(self.before, m) * &product;
-            if let Some(forces) = forces.as_deref_mut() {
-                let out = &mut forces[i * self.axes * m..][..self.axes * m];
-                out.iter_mut().enumerate().for_each(|(at, out)| *out = next[(m + at / m, at % m)]);
-            }
+            let out = &mut forces[i * self.axes * m..][..self.axes * m];
+            out.iter_mut().enumerate().for_each(|(at, out)| *out = next[(m + at / m, at % m)]);
             product = next.rows(0, m).into_owned();
         }
         product

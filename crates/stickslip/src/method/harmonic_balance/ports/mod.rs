@@ -22,6 +22,7 @@ mod tests;
 
 pub(super) use alternation::{Alternation, Beginning};
 use gathered::Gathered;
+pub(super) use march::REPEATS;
 use prox::{Rigid, Times};
 use sliders::Part;
 
