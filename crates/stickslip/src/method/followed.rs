@@ -27,7 +27,7 @@ pub(crate) fn of(
     method: &'static str,
 ) -> Result<Box<dyn Flow>, MethodError> {
     match Kind::of(system, width) {
-        Kind::Exact => Ok(Box::new(ExactFlow::new(Mechanics::new(system)?))),
+        Kind::Exact => Ok(Box::new(ExactFlow::new(Mechanics::new(system, method)?))),
         Kind::Smooth => Ok(Box::new(SmoothFlow::new(super::smooth::assembly(system, width, method)?, tolerance))),
         Kind::Incremental => Ok(Box::new(IncrementalFlow::new(system, width, method)?)),
     }

@@ -460,7 +460,7 @@ mod tests {
             ..Model::default()
         };
         let system = model.assemble().unwrap();
-        let mechanics = Mechanics::new(&system).unwrap();
+        let mechanics = Mechanics::new(&system, "test").unwrap();
         let drive = Drive::new(&system, &mechanics.owners(), 1.0);
         let mut decision = Decision::new(&mechanics);
         assert!(decision.decide(&mechanics, &drive, 0.0, &[0.0; 4], 1.0));

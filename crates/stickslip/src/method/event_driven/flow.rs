@@ -565,7 +565,7 @@ mod tests {
             ..Model::default()
         };
         let system = model.assemble().unwrap();
-        let mechanics = Mechanics::new(&system).unwrap();
+        let mechanics = Mechanics::new(&system, "test").unwrap();
         let drive = Drive::new(&system, &mechanics.owners(), 0.7);
         let mut flow = Flow::new(mechanics, Drive::default());
         flow.set_drive(drive);

@@ -250,21 +250,23 @@ impl Deref for Mechanics {
 }
 
 impl Mechanics {
+    /// For `method`, which names itself where it refuses.
+    ///
     /// # Errors
     /// A joint whose law has no exact view, or none that can be followed ([`refusal`]); a place without mass.
-    pub fn new(system: &System) -> Result<Self, MethodError> {
+    pub fn new(system: &System, method: &'static str) -> Result<Self, MethodError> {
         let n = system.dofs();
-        if let Some(error) = MethodError::too_large(super::NAME, system) {
+        if let Some(error) = MethodError::too_large(method, system) {
             return Err(error);
         }
         if let Some(i) = (0..n).find(|&i| system.structure().own_mass(i) <= 0.0) {
-            return Err(MethodError::needs_mass(super::NAME, system, i));
+            return Err(MethodError::needs_mass(method, system, i));
         }
         let mut gathered = Gathered::default();
         let mut elastic = 0;
         for (j, joint) in system.joints().iter().enumerate() {
             if let Some(misses) = refusal(joint.law().as_ref()) {
-                return Err(MethodError::law(super::NAME, joint, misses));
+                return Err(MethodError::law(method, joint, misses));
             }
             let axis = &joint.axes()[0];
             for piece in joint.law().pieces().unwrap_or_default() {
@@ -298,7 +300,7 @@ impl Mechanics {
             .clone()
             .try_inverse()
             .filter(|inverse| positive && inverse.iter().all(|x| x.is_finite()))
-            .ok_or_else(|| MethodError::mass_not_positive(super::NAME))?;
+            .ok_or_else(|| MethodError::mass_not_positive(method))?;
         let fastest = (0..n)
             .map(|i| (system.structure().stiffness()[(i, i)] / system.structure().mass()[(i, i)]).sqrt())
             .fold(0.0, f64::max);

@@ -123,7 +123,7 @@ mod tests {
             ..Model::default()
         };
         let system = model.assemble().unwrap();
-        let mechanics = Mechanics::new(&system).unwrap();
+        let mechanics = Mechanics::new(&system, "test").unwrap();
         let drive = Drive::new(&system, &mechanics.owners(), 3.0);
         (mechanics, drive)
     }

@@ -180,7 +180,7 @@ impl<'a> Exact<'a> {
     /// # Errors
     /// See [`Mechanics::new`].
     pub fn new(system: &'a System, name: &'static str, search: Search, periods: usize) -> Result<Self, MethodError> {
-        let mechanics = Mechanics::new(system)?;
+        let mechanics = Mechanics::new(system, name)?;
         let weights = vec![1.0; mechanics.states()];
         let flow = Flow::new(mechanics, Drive::default());
         Ok(Exact {

@@ -698,7 +698,7 @@ mod tests {
             ..Model::default()
         };
         let system = model.assemble().unwrap();
-        let mechanics = Mechanics::new(&system).unwrap();
+        let mechanics = Mechanics::new(&system, "test").unwrap();
         let drive = Drive::new(&system, &mechanics.owners(), OMEGA);
         let pattern = Pattern::new(&mechanics, &[contact == Contact::Stick]).unwrap();
         let driven = pattern.drive(&mechanics, &drive);
