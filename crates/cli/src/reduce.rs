@@ -1,5 +1,6 @@
 //! `stickslip reduce`: the structure of a study in few coordinates, as files that a study can read instead of the whole.
 
+use crate::speak;
 use crate::{Ending, print, run};
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -25,16 +26,20 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
         }
     };
     let failed = |message: &str| Ending::Failed(format!("{}: {message}", file.display()));
+    let wrong = |message: &str| {
+        speak::error(&format!("{}: {message}", file.display()));
+        Ending::WrongInput
+    };
     let Some(substructure) = &model.substructure else {
-        return failed("there is no [structure] that could be reduced");
+        return wrong("there is no [structure] that could be reduced");
     };
     if model.ring.is_some() {
-        return failed(
+        return wrong(
             "a sector of a disk is reduced for all of its waves by every study of it, and has no files of its own",
         );
     }
     if substructure.reduction == Reduction::None {
-        return failed(
+        return wrong(
             "its [structure] says reduce = false: nothing is to be saved; say how far the reduction is to reach",
         );
     }

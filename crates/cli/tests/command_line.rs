@@ -570,6 +570,13 @@ fn a_reduction_that_is_saved_keeps_its_error() {
     let said = stickslip(folder.path(), &["check", "few/study.toml"]);
     let said = String::from_utf8_lossy(&said.stdout).into_owned();
     assert!(said.contains("before, error") && said.contains("up to 400 Hz"), "{said}");
+    // what is reduced already has nothing to save
+    let said = stickslip(folder.path(), &["reduce", "few/study.toml", "--out", "fewer"]);
+    assert_eq!(said.status.code(), Some(2), "{}", String::from_utf8_lossy(&said.stderr));
+    assert!(
+        String::from_utf8_lossy(&said.stderr).contains("nothing is to be saved")
+            && !folder.path().join("fewer").exists()
+    );
     // fewer still
     let again = few.replace("reduce = false", "reduce = { modes = 5 }");
     write("few/again.toml", &format!("schema = 1\n{again}{response}"));

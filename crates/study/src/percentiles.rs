@@ -4,6 +4,8 @@ use crate::dataset::{Series, Style};
 
 /// The ends of the band and the line in it, as shares.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
+/// Relative distance of abscissae that are the same but for rounding: amplitudes that were computed, at which a curve begins.
+const SAME: f64 = 1e-9;
 
 /// Median and band of curves `(x, y)` over the abscissae of the first one. A point that a curve has not, because it failed or lies outside, does
 /// not count there.
@@ -34,6 +36,11 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     below + (above - below) * at.fract()
 }
 
+/// Whether two abscissae differ by rounding only.
+fn same(one: f64, other: f64) -> bool {
+    (one - other).abs() <= SAME * one.abs().max(other.abs())
+}
+
 /// A curve at other abscissae, in straight lines between its points; nothing outside.
 fn over(grid: &[f64], x: &[f64], y: &[f64]) -> Vec<f64> {
     if grid == x {
@@ -41,7 +48,8 @@ fn over(grid: &[f64], x: &[f64], y: &[f64]) -> Vec<f64> {
     }
     grid.iter()
         .map(|at| match x.partition_point(|x| x < at) {
-            above if x.get(above) == Some(at) => y[above],
+            above if x.get(above).is_some_and(|x| same(*x, *at)) => y[above],
+            above if above > 0 && same(x[above - 1], *at) => y[above - 1],
             above @ 1.. if above < x.len() => {
                 let share = (at - x[above - 1]) / (x[above] - x[above - 1]);
                 y[above - 1] + share * (y[above] - y[above - 1])
@@ -70,6 +78,10 @@ mod tests {
         near(&series[0].y, [14.4, 28.8, 7.0]);
         near(&series[1].y, [4.0, 8.0, 7.0]);
         assert_eq!((series[0].style, series[1].label.as_str()), (Style::Band, "blade1, median"));
+        // one that begins a rounding later has its first point all the same
+        let later = (vec![1.0 + 1e-15, 2.0], vec![3.0, 5.0]);
+        let series = percentiles(&[(vec![1.0, 2.0], vec![1.0, 5.0]), later], "", 0);
+        assert_eq!(series[1].y, [2.0, 5.0]);
         // a curve with other points counts between them, and not beyond
         let other = (vec![1.0, 3.0], vec![10.0, 30.0]);
         let series = percentiles(&[(vec![0.0, 2.0], vec![5.0, 20.0]), other], "", 0);

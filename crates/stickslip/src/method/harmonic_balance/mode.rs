@@ -15,7 +15,7 @@ use crate::method::MethodError;
 use crate::model::{Axis, System};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use stickslip_numerics::dense;
+use stickslip_numerics::{dense, eigen};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Newton iterations at one amplitude; 2 to 10 are usual.
@@ -70,8 +70,6 @@ impl Placed {
 const TRACE: f64 = 1e-9;
 /// Distance of the squares of two frequencies, relative, up to which modes count as equal: well above [`TRACE`].
 const EQUAL: f64 = 1e-7;
-/// Steps of the eigenvalue iteration; two or three for each mode are usual.
-const EIGEN_STEPS: usize = 10_000;
 
 /// A linear mode of the structure without its joints.
 #[derive(Debug, Clone)]
@@ -142,10 +140,7 @@ impl<'a> ModeEquations<'a> {
         let Some(factor) = self.system.structure().mass().clone().cholesky() else { return Vec::new() };
         let lower = factor.l();
         let Some(inverse) = lower.solve_lower_triangular(&DMatrix::identity(n, n)) else { return Vec::new() };
-        let Some(eigen) = (&inverse * stiffness * inverse.transpose()).try_symmetric_eigen(f64::EPSILON, EIGEN_STEPS)
-        else {
-            return Vec::new();
-        };
+        let Some(eigen) = eigen::symmetric(&inverse * stiffness * inverse.transpose()) else { return Vec::new() };
         let shapes = inverse.transpose() * eigen.eigenvectors;
         let mut modes: Vec<LinearMode> = (0..n)
             .map(|k| LinearMode { square: eigen.eigenvalues[k].max(0.0), shape: shapes.column(k).into_owned() })

@@ -5,7 +5,8 @@ use super::loose::Groups;
 use super::{LinearMode, Modes};
 use crate::structure::Matrices;
 use crate::structure::reduction::natural;
-use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use stickslip_numerics::eigen;
 
 /// A spring and damper along a direction of the free places.
 pub(super) struct Link {
@@ -38,8 +39,6 @@ const ZERO: f64 = 1e-12;
 /// Degrees of freedom beyond which modes are not computed: they would take longer than a second. Measured: 0.35 s at
 /// 500, with the third power.
 pub(super) const LARGEST: usize = 700;
-/// Iterations of the eigenvalue search per degree of freedom; a few are needed.
-const ITERATIONS: usize = 100;
 
 impl Linear {
     /// The modes of a structure with springs at joints, and constraints `Σ w x = 0`.
@@ -206,9 +205,7 @@ fn reduced(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Reduced 
     let Some(inverse) = inverse_root(&m) else { return unknown() };
     let standard = &inverse * k * inverse.transpose();
     let standard = (&standard + standard.transpose()) * 0.5;
-    let Some(eigen) = SymmetricEigen::try_new(standard, f64::EPSILON, ITERATIONS * heavy) else {
-        return unknown();
-    };
+    let Some(eigen) = eigen::symmetric(standard) else { return unknown() };
     let mut rising: Vec<usize> = (0..heavy).collect();
     rising.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
     let modal = inverse.transpose() * eigen.eigenvectors;
