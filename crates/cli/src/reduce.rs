@@ -1,7 +1,6 @@
 //! `stickslip reduce`: the structure of a study in few coordinates, as files that a study can read instead of the whole.
 
-use crate::speak;
-use crate::{Ending, print, run};
+use crate::{Ending, print, run, speak};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -65,8 +64,6 @@ struct Few {
     system: System,
     /// How it was made, and its error.
     what: String,
-    /// Its error, with that of what it was made of.
-    reduction: Option<ReductionEvidence>,
     /// More keys of `[structure]`.
     keys: Vec<String>,
     /// The stiffness at a speed.
@@ -80,8 +77,7 @@ fn at_rest(substructure: &Substructure, places: &[Place]) -> Result<Few, String>
     let alone = Model { substructure: Some(substructure.clone()), places: places.to_vec(), ..Model::default() };
     let system = alone.assemble().map_err(|error| error.to_string())?;
     let what = system.reduced().map(ToString::to_string).unwrap_or_default();
-    let reduction = system.reduction_evidence();
-    Ok(Few { system, what, reduction, keys: vec!["reduce = false".to_owned()], there: None })
+    Ok(Few { system, what, keys: vec!["reduce = false".to_owned()], there: None })
 }
 
 /// In coordinates that serve all speeds up to that of the second export.
@@ -113,8 +109,7 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports)
         exports.at, exports.speed
     );
     let keys = [vec![speed], damping_keys(substructure)].concat();
-    let reduction = system.reduction_evidence();
-    Ok(Few { system, what, reduction, keys, there: Some(few.there) })
+    Ok(Few { system, what, keys, there: Some(few.there) })
 }
 
 /// Damping that follows the stiffness at every speed; of modes that of those that a reduction at that speed has.
@@ -156,7 +151,7 @@ fn save(few: &Few, out: &Path) -> Result<(), String> {
     }
     files.extend(few.there.iter().map(|there| ("stiffened", there.entries().collect())));
     let mut text = format!("# {}\n[structure]\nunits = \"m-kg-s\"\n{}\n", few.what, few.keys.join("\n"));
-    if let Some(ReductionEvidence { error, up_to }) = few.reduction {
+    if let Some(ReductionEvidence { error, up_to }) = few.system.reduction_evidence() {
         let _ = writeln!(text, "reduced = {{ error = {error:e}, up_to = \"{up_to:e} rad/s\" }}");
     }
     for (key, entries) in files {

@@ -3,6 +3,7 @@
 //! The library part holds what several tests share: random models, templates with changes, and small numerics (search, quadrature)
 //! written apart from the library's own.
 
+pub mod held;
 pub mod reference;
 pub mod replay;
 

@@ -1,21 +1,17 @@
 //! Every law in harmonic balance: the orbit's motion is given to the law alone, by a view of it and not by a port, and what it answers must
 //! balance the structure and lose what the orbit says.
 
-use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip::law::{SharedLaw, TABLE};
 use stickslip::method::{Method, MethodError, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Axis, System};
 use stickslip::orbit::Orbit;
-use stickslip::structure::Structure;
+use stickslip_verification::held::{FORCE, MASS, OMEGA, STIFFNESS, held, load};
 use stickslip_verification::replay::{self, View};
 
-const MASS: f64 = 0.182;
-const STIFFNESS: f64 = 105_103.0;
+/// Viscous damping, N s/m.
 const DAMPING: f64 = 5.0;
-const FORCE: f64 = 10.0;
-const OMEGA: f64 = TAU * 118.0;
 
 /// What errors of the series may come to in the force, in units of the estimated error of the motion: elastic forces are ten times the drive's,
 /// and a steep law answers the motion's ripple.
@@ -24,28 +20,6 @@ const SERIES: f64 = 100.0;
 const RETURN: f64 = 30.0;
 /// The same of what a port samples: the way between two of 1024 samples is curved, and a rate law's step is of order 3.
 const SAMPLED: f64 = 5e-6;
-
-/// A mass on springs along each of the law's directions, held by the law too, with a harmonic force and a constant one.
-fn system(law: &SharedLaw, constant: f64) -> System {
-    let d = law.directions();
-    let one = DMatrix::identity(d, d);
-    let places = (0..d).map(|a| format!("x{a}")).collect();
-    let structure = Structure::new(places, &one * MASS, &one * DAMPING, &one * STIFFNESS).unwrap();
-    let axes = (0..d).map(|a| Axis::new(vec![(a, 1.0)])).collect();
-    let mut builder = System::builder(structure).joint("j", law.clone(), axes);
-    for a in 0..d {
-        builder = builder.force(a, 1, load(a));
-        if constant != 0.0 {
-            builder = builder.force(a, 0, Complex64::new(constant, 0.0));
-        }
-    }
-    builder.build().unwrap()
-}
-
-/// Amplitude of the force along a direction, N.
-fn load(a: usize) -> Complex64 {
-    Complex64::from_polar(FORCE / (1 + a) as f64, 0.9 * a as f64)
-}
 
 /// Periods after which a law is asked what it answers to the orbit's motion, until that balances the structure: one forgets at once how it began,
 /// another creeps for hundreds of periods. What answers no orbit does so after none of them.
@@ -92,7 +66,7 @@ fn every_law_balances_the_structure() {
     let (mut taken, mut returned) = (0, 0);
     for (info, constant) in TABLE.iter().flat_map(|info| [(info, 0.0), (info, 1.5)]) {
         let law = (info.build)(info.sample);
-        let system = system(&law, constant);
+        let system = held(&law, DAMPING, constant);
         let method = HarmonicBalance { harmonics: Some(31), ..HarmonicBalance::default() };
         let mut solver = match method.solver(&system) {
             Ok(solver) => solver,
@@ -133,7 +107,7 @@ fn every_law_has_small_and_large_orbits() {
     for (info, share) in TABLE.iter().flat_map(|info| [(info, 0.01), (info, 10.0)]) {
         let law = (info.build)(info.sample);
         let d = law.directions();
-        let mut builder = System::builder(system(&law, 0.0).structure().clone()).joint(
+        let mut builder = System::builder(held(&law, DAMPING, 0.0).structure().clone()).joint(
             "j",
             law.clone(),
             (0..d).map(|a| Axis::new(vec![(a, 1.0)])).collect(),

@@ -5,19 +5,16 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use stickslip::law::{SharedLaw, TABLE};
+use stickslip::law::TABLE;
 use stickslip::method::{self, Method, MethodError, Options, auto::Auto};
 use stickslip::model::{Axis, System};
 use stickslip::orbit::Orbit;
 use stickslip::structure::Structure;
+use stickslip_verification::held::{OMEGA, held};
 use stickslip_verification::reference::Reference;
 
-const MASS: f64 = 0.182;
-const STIFFNESS: f64 = 105_103.0;
 /// A damping ratio of 0.1: a transient falls to 1e-8 in 30 periods.
 const DAMPING: f64 = 28.0;
-const FORCE: f64 = 10.0;
-const OMEGA: f64 = TAU * 118.0;
 
 /// Steps of a period of the reference, and of the coarser one beside it.
 const STEPS: usize = 2000;
@@ -34,20 +31,6 @@ const SHARE: f64 = 3.0;
 /// What the sampling of amplitudes errs by, both of the references and of the orbits: the square of half a step.
 const SAMPLED: f64 = 5e-6;
 
-/// A mass on springs along each of the law's directions, held by the law too.
-fn system(law: &SharedLaw) -> System {
-    let d = law.directions();
-    let one = DMatrix::identity(d, d);
-    let places = (0..d).map(|a| format!("x{a}")).collect();
-    let structure = Structure::new(places, &one * MASS, &one * DAMPING, &one * STIFFNESS).unwrap();
-    let axes = (0..d).map(|a| Axis::new(vec![(a, 1.0)])).collect();
-    let mut builder = System::builder(structure).joint("j", law.clone(), axes);
-    for a in 0..d {
-        builder = builder.force(a, 1, Complex64::from_polar(FORCE / (1 + a) as f64, 0.9 * a as f64));
-    }
-    builder.build().unwrap()
-}
-
 /// Amplitudes of the motion in so many steps of a period that begins as an orbit does, followed until it repeats, and how far from that it ends. From
 /// rest a smooth law creeps for thousands of periods; a motion that is no orbit leaves its beginning all the same.
 fn followed(system: &System, steps: usize, orbit: &Orbit) -> (Vec<f64>, f64) {
@@ -62,7 +45,7 @@ fn followed(system: &System, steps: usize, orbit: &Orbit) -> (Vec<f64>, f64) {
 fn every_law_in_every_method_moves_as_the_reference() {
     for info in TABLE {
         let law = info.sample();
-        let system = system(&law);
+        let system = held(&law, DAMPING, 0.0);
         let begins = Auto.solver(&system).unwrap().orbit(OMEGA, None).unwrap();
         let [(fine, missing), (coarse, _)] = [STEPS, COARSE].map(|steps| followed(&system, steps, &begins));
         let size = fine.iter().fold(0.0f64, |size, x| size.max(*x));
