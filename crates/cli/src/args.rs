@@ -23,7 +23,7 @@ pub enum Command {
     /// Compute every figure of Pust, Pesek, Radolfova (2015) and check the paper's claims
     Paper {
         #[command(flatten)]
-        place: Place,
+        destination: Destination,
         /// Show the report in the browser
         #[arg(long)]
         open: bool,
@@ -34,7 +34,7 @@ pub enum Command {
         #[arg(required = true)]
         files: Vec<PathBuf>,
         #[command(flatten)]
-        place: Place,
+        destination: Destination,
         /// Change a parameter, for example --set Ft=3N (may be given several times)
         #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
         set: Vec<(String, String)>,
@@ -172,7 +172,7 @@ pub enum Command {
 
 /// Where results go and how many threads compute them.
 #[derive(Debug, Args)]
-pub struct Place {
+pub struct Destination {
     /// Folder of the results; each study gets a folder of its name in it
     #[arg(long, default_value = "stickslip-out")]
     pub out: PathBuf,

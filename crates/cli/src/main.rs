@@ -52,10 +52,10 @@ impl Ending {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let ending = match cli.command {
-        Command::Paper { place, open } => run::paper(&place, open),
+        Command::Paper { destination, open } => run::paper(&destination, open),
         Command::Run {
             files,
-            place,
+            destination,
             set,
             method,
             memory,
@@ -77,7 +77,7 @@ fn main() -> ExitCode {
             };
             run::run(
                 &request,
-                &place,
+                &destination,
                 &run::Wanted { only: &only, also: &also, json, open, watch, start, shard, progress },
             )
         }

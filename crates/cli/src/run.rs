@@ -1,6 +1,6 @@
 //! `stickslip run`, `check` and `paper`.
 
-use crate::args::Place;
+use crate::args::Destination;
 use crate::progress::{self, Progress};
 use crate::{Ending, open, print, speak};
 use serde_json::json;
@@ -154,7 +154,7 @@ pub(crate) fn outputs(only: &[String], also: &[String]) -> Result<Outputs, Endin
 }
 
 /// `stickslip run`.
-pub fn run(request: &Request<'_>, place: &Place, wanted: &Wanted<'_>) -> Ending {
+pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>) -> Ending {
     if wanted.progress == crate::args::Progress::Json {
         speak::for_programs();
     }
@@ -166,7 +166,7 @@ pub fn run(request: &Request<'_>, place: &Place, wanted: &Wanted<'_>) -> Ending 
         complain!("error: standard input does not change, --watch needs files");
         return Ending::WrongInput;
     }
-    let threads = match pool(place) {
+    let threads = match pool(destination) {
         Ok(threads) => threads,
         Err(ending) => return ending,
     };
@@ -174,7 +174,7 @@ pub fn run(request: &Request<'_>, place: &Place, wanted: &Wanted<'_>) -> Ending 
     let mut open = wanted.open;
     loop {
         let before = contents(request.files);
-        let ending = once(request, place, (&outputs, &Wanted { open, ..*wanted }), threads, &stop);
+        let ending = once(request, destination, (&outputs, &Wanted { open, ..*wanted }), threads, &stop);
         if !wanted.watch || stop.load(Ordering::Relaxed) {
             return ending;
         }
@@ -204,7 +204,7 @@ fn contents(files: &[PathBuf]) -> Vec<Option<Vec<u8>>> {
 /// One run of all files.
 fn once(
     request: &Request<'_>,
-    place: &Place,
+    destination: &Destination,
     (outputs, wanted): (&Outputs, &Wanted<'_>),
     threads: usize,
     stop: &Arc<AtomicBool>,
@@ -219,7 +219,7 @@ fn once(
         return Ending::WrongInput;
     }
     if let Some(error) =
-        studies.iter().find_map(|checked| check_writable(&place.out.join(checked.study().name())).err())
+        studies.iter().find_map(|checked| check_writable(&destination.out.join(checked.study().name())).err())
     {
         return Ending::Failed(error.to_string());
     }
@@ -232,7 +232,7 @@ fn once(
         } else if let Some(long) = summary.long_run() {
             complain!("{}: {long}", study.name());
         }
-        match one(&checked, place, outputs, wanted, (threads, stop)) {
+        match one(&checked, destination, outputs, wanted, (threads, stop)) {
             Ending::Done => {}
             Ending::SomeFailed => failed = true,
             other => return other,
@@ -244,13 +244,13 @@ fn once(
 /// One run of one study.
 fn one(
     checked: &Checked,
-    place: &Place,
+    destination: &Destination,
     outputs: &Outputs,
     wanted: &Wanted<'_>,
     (threads, stop): (usize, &Arc<AtomicBool>),
 ) -> Ending {
     let study = checked.study();
-    let mut journal = match stream::begin(checked, &place.out, wanted.shard, wanted.start, threads) {
+    let mut journal = match stream::begin(checked, &destination.out, wanted.shard, wanted.start, threads) {
         Ok(journal) => journal,
         Err(error @ (StreamError::Other { .. } | StreamError::Unfinished { .. } | StreamError::Name(_))) => {
             speak::error(&error.to_string());
@@ -291,7 +291,7 @@ fn one(
     let mut outline = journal.head().outline.clone();
     outline.record.threads = threads;
     let parts = Parts { outline: &outline, journals: std::slice::from_ref(&journal), rest: &rest };
-    let assembled = match assemble(&parts, study, outputs, &place.out, &folder) {
+    let assembled = match assemble(&parts, study, outputs, &destination.out, &folder) {
         Ok(assembled) => assembled,
         Err(error) => {
             return Ending::Failed(format!(
@@ -309,8 +309,8 @@ fn one(
     let ending = told(&assembled, &outline.notes, (wanted.json, wanted.open));
     match ending {
         Ending::Done | Ending::SomeFailed if stop.load(Ordering::Relaxed) => {
-            let results = assembled.files.first().and_then(|file| file.parent()).unwrap_or(&place.out);
-            let whole = place.out.join(study.name());
+            let results = assembled.files.first().and_then(|file| file.parent()).unwrap_or(&destination.out);
+            let whole = destination.out.join(study.name());
             let beside = if results == whole || !interrupted {
                 String::new()
             } else {
@@ -435,11 +435,11 @@ pub(crate) fn show_figure(files: &[PathBuf]) {
 }
 
 /// `stickslip paper`.
-pub fn paper(place: &Place, open: bool) -> Ending {
-    if let Err(error) = check_writable(&place.out) {
+pub fn paper(destination: &Destination, open: bool) -> Ending {
+    if let Err(error) = check_writable(&destination.out) {
         return Ending::Failed(error.to_string());
     }
-    let threads = match pool(place) {
+    let threads = match pool(destination) {
         Ok(threads) => threads,
         Err(ending) => return ending,
     };
@@ -449,7 +449,7 @@ pub fn paper(place: &Place, open: bool) -> Ending {
             complain!("{line}");
         }
     };
-    match stickslip_paper::paper(&place.out, &context, &say) {
+    match stickslip_paper::paper(&destination.out, &context, &say) {
         Err(error) => Ending::Failed(error.to_string()),
         Ok(outcome) => {
             if let ending @ Ending::Failed(_) = print(&outcome.summary) {
@@ -470,9 +470,9 @@ pub fn paper(place: &Place, open: bool) -> Ending {
 }
 
 /// Sets up the threads; returns their number.
-fn pool(place: &Place) -> Result<usize, Ending> {
+fn pool(destination: &Destination) -> Result<usize, Ending> {
     let mut builder = rayon::ThreadPoolBuilder::new();
-    if let Some(threads) = place.threads {
+    if let Some(threads) = destination.threads {
         builder = builder.num_threads(usize::from(threads));
     }
     builder.build_global().map_err(|error| Ending::Failed(format!("no threads: {error}")))?;

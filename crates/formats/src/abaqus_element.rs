@@ -18,7 +18,7 @@
 
 use std::rc::Rc;
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::names::direction;
@@ -175,7 +175,7 @@ fn free_name(line: &Line, items: &[Item]) -> String {
 fn read(block: &Block) -> Result<Matrix, Error> {
     let Block { rows, general, .. } = *block;
     let expected = if general { rows * rows } else { rows * (rows + 1) / 2 };
-    let mut triplets = Triplets::new(rows, rows, 0, Place::File)?;
+    let mut triplets = Triplets::new(rows, rows, 0, Location::File)?;
     let (mut row, mut column, mut count) = (0, 0, 0);
     let mut lines = block.lines.clone();
     for line in lines.by_ref() {
@@ -188,9 +188,9 @@ fn read(block: &Block) -> Result<Matrix, Error> {
         for field in fields(line.text) {
             count += 1;
             if count > expected {
-                return Err(wrong_count(line.place(), expected, "more"));
+                return Err(wrong_count(line.location(), expected, "more"));
             }
-            triplets.push(row, column, line.real(field)?, line.place())?;
+            triplets.push(row, column, line.real(field)?, line.location())?;
             if general {
                 row += 1;
                 (row, column) = if row == rows { (0, column + 1) } else { (row, column) };
@@ -201,15 +201,15 @@ fn read(block: &Block) -> Result<Matrix, Error> {
         }
     }
     if count < expected {
-        return Err(wrong_count(lines.place(), expected, &count.to_string()));
+        return Err(wrong_count(lines.location(), expected, &count.to_string()));
     }
     let matrix = triplets.finish(if general { Symmetry::General } else { Symmetry::Symmetric })?;
     if block.names.len() == rows { matrix.with_names(block.names.to_vec()) } else { Ok(matrix) }
 }
 
-fn wrong_count(place: Place, expected: usize, found: &str) -> Error {
+fn wrong_count(location: Location, expected: usize, found: &str) -> Error {
     let problem = format!("{expected} numbers were expected for the rows of this element, {found} are there");
-    Error::new(Kind::Count, place, problem, "export the file again")
+    Error::new(Kind::Count, location, problem, "export the file again")
 }
 
 #[cfg(test)]
@@ -243,20 +243,20 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_said_with_its_line() {
-        let check = |text: &str, kind, place| {
-            let found = read_bytes(text.as_bytes(), None, None).map(|_| ()).map_err(|e| (e.kind, e.place));
-            assert_eq!(found, Err((kind, place)), "{text}");
+        let check = |text: &str, kind, location| {
+            let found = read_bytes(text.as_bytes(), None, None).map(|_| ()).map_err(|e| (e.kind, e.location));
+            assert_eq!(found, Err((kind, location)), "{text}");
         };
         let one = "*USER ELEMENT,NODES=1\n1,2\n*MATRIX,TYPE=MASS\n";
-        check(&format!("{one}1,2\n"), Kind::Count, Place::Line(4));
-        check(&format!("{one}1,2,3,4\n"), Kind::Count, Place::Line(4));
-        check(&format!("{one}1,x,3\n"), Kind::Malformed, Place::Line(4));
-        check("*USER ELEMENT\n1\n", Kind::Malformed, Place::Line(1));
-        check("*USER ELEMENT,NODES=999999999999\n1\n*MATRIX\n1\n", Kind::Malformed, Place::Line(1));
-        check("*USER ELEMENT,NODES=1000000\n1,2\n*MATRIX\n1\n", Kind::Malformed, Place::Line(3));
-        check("*USER ELEMENT,NODES=1\n1\n0,1\n", Kind::Malformed, Place::Line(3));
-        check("*USER ELEMENT,NODES=1\n1\n , ,\n", Kind::Malformed, Place::Line(3));
-        check("*USER ELEMENT,NODES=1\n,\n", Kind::Malformed, Place::Line(2));
-        check("*USER ELEMENT,NODES=1\n1\n", Kind::Choice, Place::File);
+        check(&format!("{one}1,2\n"), Kind::Count, Location::Line(4));
+        check(&format!("{one}1,2,3,4\n"), Kind::Count, Location::Line(4));
+        check(&format!("{one}1,x,3\n"), Kind::Malformed, Location::Line(4));
+        check("*USER ELEMENT\n1\n", Kind::Malformed, Location::Line(1));
+        check("*USER ELEMENT,NODES=999999999999\n1\n*MATRIX\n1\n", Kind::Malformed, Location::Line(1));
+        check("*USER ELEMENT,NODES=1000000\n1,2\n*MATRIX\n1\n", Kind::Malformed, Location::Line(3));
+        check("*USER ELEMENT,NODES=1\n1\n0,1\n", Kind::Malformed, Location::Line(3));
+        check("*USER ELEMENT,NODES=1\n1\n , ,\n", Kind::Malformed, Location::Line(3));
+        check("*USER ELEMENT,NODES=1\n,\n", Kind::Malformed, Location::Line(2));
+        check("*USER ELEMENT,NODES=1\n1\n", Kind::Choice, Location::File);
     }
 }

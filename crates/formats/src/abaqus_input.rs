@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::names::direction;
@@ -75,7 +75,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     }
     if count == 0 {
         let problem = "the file has no entry, lines `node, dof, node, dof, value` were expected".into();
-        return Err(Error::new(Kind::Truncated, Place::File, problem, "export it again"));
+        return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
     }
     let mut rows: Vec<Row> = places.keys().copied().collect();
     rows.sort_unstable();
@@ -87,10 +87,10 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 }
 
 fn read(bytes: &[u8], rows: &[Row], places: &HashMap<Row, usize>, count: usize) -> Result<Matrix, Error> {
-    let mut triplets = Triplets::new(rows.len(), rows.len(), count, Place::File)?;
+    let mut triplets = Triplets::new(rows.len(), rows.len(), count, Location::File)?;
     for entry in entries(bytes) {
         let (row, column, value, line) = entry?;
-        triplets.push(places[&row], places[&column], value, line.place())?;
+        triplets.push(places[&row], places[&column], value, line.location())?;
     }
     let name = |(node, dof): &Row| match node {
         Node::Number(number) => format!("{number}.{}", direction(*dof)),
@@ -129,13 +129,13 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_said_with_its_line() {
-        let check = |text, kind, place| {
-            assert_eq!(read(text).map(|_| ()).map_err(|e| (e.kind, e.place)), Err((kind, place)), "{text}");
+        let check = |text, kind, location| {
+            assert_eq!(read(text).map(|_| ()).map_err(|e| (e.kind, e.location)), Err((kind, location)), "{text}");
         };
-        check("", Kind::Truncated, Place::File);
-        check("1,1,1,1,1\n1,1,1,1\n", Kind::Malformed, Place::Line(2));
-        check("1,1,1,1,1\n1,1,1,1,1,1\n", Kind::Malformed, Place::Line(2));
-        check("1,x,1,1,1\n", Kind::Malformed, Place::Line(1));
-        check("1,1,1,1,1e999\n", Kind::NotFinite, Place::Line(1));
+        check("", Kind::Truncated, Location::File);
+        check("1,1,1,1,1\n1,1,1,1\n", Kind::Malformed, Location::Line(2));
+        check("1,1,1,1,1\n1,1,1,1,1,1\n", Kind::Malformed, Location::Line(2));
+        check("1,x,1,1,1\n", Kind::Malformed, Location::Line(1));
+        check("1,1,1,1,1e999\n", Kind::NotFinite, Location::Line(1));
     }
 }

@@ -8,7 +8,7 @@
 use std::rc::Rc;
 
 use crate::bytes::{Bytes, Order};
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::names::direction;
@@ -61,13 +61,13 @@ fn seek(file: &mut Bytes, word: usize) -> Result<(), Error> {
 
 /// The next record: its flags, and its data.
 fn record<'a>(file: &mut Bytes<'a>) -> Result<(u32, Bytes<'a>), Error> {
-    let place = file.clone();
+    let location = file.clone();
     let words = file.u32()? as usize;
     let flags = file.u32()?;
     if flags & PACKED != 0 {
         let problem = format!("the record is compressed (flags {flags:#x}), which is not read");
         let remedy = "switch compression off by /FCOMP before the solution, or export by HBMAT";
-        return Err(Error::new(Kind::Unsupported, place.place(), problem, remedy));
+        return Err(Error::new(Kind::Unsupported, location.location(), problem, remedy));
     }
     let data = file.take(words.saturating_mul(4))?;
     file.skip(4);
@@ -76,10 +76,10 @@ fn record<'a>(file: &mut Bytes<'a>) -> Result<(u32, Bytes<'a>), Error> {
 
 /// The next record, of whole numbers.
 fn integers(file: &mut Bytes) -> Result<Vec<i64>, Error> {
-    let place = file.clone();
+    let location = file.clone();
     let (flags, mut data) = record(file)?;
     if flags & INTEGERS == 0 {
-        return Err(place.malformed("a record of whole numbers", format!("one with flags {flags:#x}")));
+        return Err(location.malformed("a record of whole numbers", format!("one with flags {flags:#x}")));
     }
     match flags & SHORT {
         0 => (0..data.left() / 4).map(|_| data.i32().map(i64::from)).collect(),
@@ -89,10 +89,10 @@ fn integers(file: &mut Bytes) -> Result<Vec<i64>, Error> {
 
 /// The next record, of real numbers.
 fn reals(file: &mut Bytes) -> Result<Vec<f64>, Error> {
-    let place = file.clone();
+    let location = file.clone();
     let (flags, mut data) = record(file)?;
     if flags & INTEGERS != 0 {
-        return Err(place.malformed("a record of real numbers", format!("one with flags {flags:#x}")));
+        return Err(location.malformed("a record of real numbers", format!("one with flags {flags:#x}")));
     }
     match flags & SHORT {
         0 => (0..data.left() / 8).map(|_| data.f64()).collect(),
@@ -121,7 +121,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         return Err(file.malformed(&format!("a header of at least {} items", item::COUNT), header.len()));
     }
     let refuse =
-        |problem: &str| Err(Error::new(Kind::Unsupported, file.place(), problem.into(), "export by HBMAT instead"));
+        |problem: &str| Err(Error::new(Kind::Unsupported, file.location(), problem.into(), "export by HBMAT instead"));
     if header[item::ORIGIN] > 0 {
         return refuse("the file was assembled by the frontal solver, which is not read");
     }
@@ -162,10 +162,10 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 
 /// Names of all equations, which are those of the first node, then of the second, and so on.
 fn names_of(labels: &[i64], nodes: &[i64], counts: &[i64], dofs: &[i64]) -> Option<Vec<String>> {
-    // A degree of freedom is stated by its number, or by its place among those of the analysis.
+    // A degree of freedom is stated by its number, or by its position among those of the analysis.
     let label = |dof: i64| {
-        let place = usize::try_from(dof - 1).ok();
-        if labels.contains(&dof) { Some(dof) } else { labels.get(place?).copied() }
+        let location = usize::try_from(dof - 1).ok();
+        if labels.contains(&dof) { Some(dof) } else { labels.get(location?).copied() }
     };
     let mut left = dofs.iter();
     let mut names = Vec::with_capacity(dofs.len());
@@ -180,33 +180,33 @@ fn names_of(labels: &[i64], nodes: &[i64], counts: &[i64], dofs: &[i64]) -> Opti
 fn read(system: &System, name: &str, start: usize) -> Result<Matrix, Error> {
     let mut file = system.file.clone();
     seek(&mut file, start)?;
-    let mut triplets = Triplets::new(system.equations, system.equations, 0, Place::File)?;
+    let mut triplets = Triplets::new(system.equations, system.equations, 0, Location::File)?;
     if name == "mass" && system.lumped {
-        let place = file.place();
+        let location = file.location();
         let diagonal = reals(&mut file)?;
         if diagonal.len() != system.equations {
             let problem = format!("{} masses for {} equations", diagonal.len(), system.equations);
             return Err(Error::new(
                 Kind::Count,
-                place,
+                location,
                 problem,
                 "switch lumped masses off (LUMPM), or export by HBMAT",
             ));
         }
         for (at, value) in diagonal.into_iter().enumerate() {
-            triplets.push(at, at, value, place.clone())?;
+            triplets.push(at, at, value, location.clone())?;
         }
     } else {
         for row in 0..system.equations {
-            let place = file.clone();
+            let location = file.clone();
             let (columns, values) = (integers(&mut file)?, reals(&mut file)?);
             if columns.len() != values.len() {
                 let problem = format!("{} columns and {} values in row {}", columns.len(), values.len(), row + 1);
-                return Err(Error::new(Kind::Count, place.place(), problem, "the file is damaged: solve again"));
+                return Err(Error::new(Kind::Count, location.location(), problem, "the file is damaged: solve again"));
             }
             for (column, value) in columns.into_iter().zip(values) {
-                let column = usize::try_from(column - 1).map_err(|_| place.malformed("a column from 1", column))?;
-                triplets.push(row, column, value, place.place())?;
+                let column = usize::try_from(column - 1).map_err(|_| location.malformed("a column from 1", column))?;
+                triplets.push(row, column, value, location.location())?;
             }
         }
     }
@@ -266,7 +266,7 @@ mod tests {
         header[item::MASS] = file.reals(&[1.0, 2.0, 3.0, 4.0]);
         header[item::LUMPED] = 1;
         header[item::DOFS] = file.integers(&[2, 2]);
-        // Stated by place and by number.
+        // Stated by position and by number.
         file.integers(&[-1, 2, 1, 6]);
         change(&mut header);
         let at = (HEADER + 2) * 4;

@@ -1,6 +1,6 @@
 //! Binary files: a cursor that never reads beyond the end, in either order of bytes.
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 
 /// Order of the bytes of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +42,7 @@ impl<'a> Bytes<'a> {
         let end = end.ok_or_else(|| {
             Error::new(
                 Kind::Truncated,
-                self.place(),
+                self.location(),
                 format!("{count} bytes were expected, the file ends after {}", self.left()),
                 "it is not complete: export or copy it again",
             )
@@ -74,14 +74,14 @@ impl<'a> Bytes<'a> {
         self.all.len() - self.at
     }
 
-    pub fn place(&self) -> Place {
-        Place::Byte(self.at)
+    pub fn location(&self) -> Location {
+        Location::Byte(self.at)
     }
 
     pub fn malformed(&self, expected: &str, found: impl std::fmt::Display) -> Error {
         Error::new(
             Kind::Malformed,
-            self.place(),
+            self.location(),
             format!("{expected} was expected, {found} is there"),
             "the file is damaged or of another format: export it again, or state its format",
         )
@@ -157,7 +157,7 @@ mod tests {
         assert_eq!(Bytes::new(&bytes, Order::Big).u32()?, 256);
         let mut cursor = Bytes::new(&bytes, Order::Little);
         assert_eq!(cursor.u32()?, 65536);
-        assert_eq!(cursor.u16().map_err(|e| (e.kind, e.place)), Err((Kind::Truncated, Place::Byte(4))));
+        assert_eq!(cursor.u16().map_err(|e| (e.kind, e.location)), Err((Kind::Truncated, Location::Byte(4))));
         assert_eq!(cursor.u8()?, 7);
         assert_eq!(cursor.take(usize::MAX).map_err(|e| e.kind), Err(Kind::Truncated));
         assert_eq!(cursor.seek(6).map_err(|e| e.kind), Err(Kind::Truncated));
@@ -170,6 +170,6 @@ mod tests {
     fn a_negative_index_is_refused_where_it_stands() {
         let bytes = [255; 8];
         let found = Number::I64.index(&mut Bytes::new(&bytes, Order::Little));
-        assert_eq!(found.map_err(|e| e.place), Err(Place::Byte(0)));
+        assert_eq!(found.map_err(|e| e.location), Err(Location::Byte(0)));
     }
 }

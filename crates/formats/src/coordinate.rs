@@ -4,7 +4,7 @@
 //! The size is the largest row or column there is.
 //! Source: CalculiX CrunchiX manual, `*FREQUENCY, SOLVER=MATRIXSTORAGE`; Abaqus Analysis User's Guide, Generating matrices.
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::text::{Line, Lines, integer, real};
@@ -40,16 +40,16 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     }
     if count == 0 {
         let problem = "the file has no entry, lines `row column value` were expected".into();
-        return Err(Error::new(Kind::Truncated, Place::File, problem, "export it again"));
+        return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
     }
     Ok(vec![Item::new("", size, size, move || read(bytes, size, count))])
 }
 
 fn read(bytes: &[u8], size: usize, count: usize) -> Result<Matrix, Error> {
-    let mut triplets = Triplets::new(size, size, count, Place::File)?;
+    let mut triplets = Triplets::new(size, size, count, Location::File)?;
     for entry in entries(bytes) {
         let (row, column, value, line) = entry?;
-        triplets.push(row, column, value, line.place())?;
+        triplets.push(row, column, value, line.location())?;
     }
     triplets.finish(Symmetry::Unsaid)
 }
@@ -72,16 +72,16 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_said_with_its_line() {
-        let check = |text: &str, kind, place| {
+        let check = |text: &str, kind, location| {
             let error =
-                read_bytes(text.as_bytes(), Some("coordinate"), None).map(|_| ()).map_err(|e| (e.kind, e.place));
-            assert_eq!(error, Err((kind, place)), "{text}");
+                read_bytes(text.as_bytes(), Some("coordinate"), None).map(|_| ()).map_err(|e| (e.kind, e.location));
+            assert_eq!(error, Err((kind, location)), "{text}");
         };
-        check("", Kind::Truncated, Place::File);
-        check("1 1 1\n2 2\n", Kind::Malformed, Place::Line(2));
-        check("1 1 1\n2 x 1\n", Kind::Malformed, Place::Line(2));
-        check("1 1 inf\n", Kind::NotFinite, Place::Line(1));
-        check("1 4000000000 1\n", Kind::TooLarge, Place::File);
-        check("1 1 1\n\n0 1 1\n", Kind::Malformed, Place::Line(3));
+        check("", Kind::Truncated, Location::File);
+        check("1 1 1\n2 2\n", Kind::Malformed, Location::Line(2));
+        check("1 1 1\n2 x 1\n", Kind::Malformed, Location::Line(2));
+        check("1 1 inf\n", Kind::NotFinite, Location::Line(1));
+        check("1 4000000000 1\n", Kind::TooLarge, Location::File);
+        check("1 1 1\n\n0 1 1\n", Kind::Malformed, Location::Line(3));
     }
 }

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 /// A file that could not be read or written.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}{problem}; {remedy}", Prefix(.path.as_deref(), .place))]
+#[error("{}{problem}; {remedy}", Prefix(.path.as_deref(), .location))]
 pub struct Error {
     /// What kind of fault it is.
     pub kind: Kind,
     /// The file, where it is known.
     pub path: Option<PathBuf>,
     /// Where in the file.
-    pub place: Place,
+    pub location: Location,
     /// What is there, and what was expected.
     pub problem: String,
     /// What to do about it.
@@ -21,8 +21,8 @@ pub struct Error {
 
 impl Error {
     /// An error that does not know its file yet.
-    pub(crate) fn new(kind: Kind, place: Place, problem: String, remedy: impl Into<String>) -> Self {
-        Self { kind, path: None, place, problem, remedy: remedy.into() }
+    pub(crate) fn new(kind: Kind, location: Location, problem: String, remedy: impl Into<String>) -> Self {
+        Self { kind, path: None, location, problem, remedy: remedy.into() }
     }
 
     /// The same error, of the file at `path`.
@@ -31,10 +31,10 @@ impl Error {
         self
     }
 
-    /// The same error at another place, where it knows none yet.
-    pub(crate) fn at(mut self, place: Place) -> Self {
-        if self.place == Place::File {
-            self.place = place;
+    /// The same error at another location, where it knows none yet.
+    pub(crate) fn at(mut self, location: Location) -> Self {
+        if self.location == Location::File {
+            self.location = location;
         }
         self
     }
@@ -74,7 +74,7 @@ pub enum Kind {
 
 /// Where in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub enum Location {
     /// The file as a whole.
     File,
     /// A line, from one.
@@ -86,24 +86,24 @@ pub enum Place {
 }
 
 /// `path, line 3: ` of an error message.
-struct Prefix<'a>(Option<&'a Path>, &'a Place);
+struct Prefix<'a>(Option<&'a Path>, &'a Location);
 
 impl fmt::Display for Prefix<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(path, place) = self;
+        let Self(path, location) = self;
         if let Some(path) = path {
             write!(f, "{}", path.display())?;
         }
-        if path.is_some() && **place != Place::File {
+        if path.is_some() && **location != Location::File {
             f.write_str(", ")?;
         }
-        match place {
-            Place::File => {}
-            Place::Line(line) => write!(f, "line {line}")?,
-            Place::Byte(byte) => write!(f, "byte {byte}")?,
-            Place::Variable(name) => write!(f, "`{name}`")?,
+        match location {
+            Location::File => {}
+            Location::Line(line) => write!(f, "line {line}")?,
+            Location::Byte(byte) => write!(f, "byte {byte}")?,
+            Location::Variable(name) => write!(f, "`{name}`")?,
         }
-        if path.is_some() || **place != Place::File { f.write_str(": ") } else { Ok(()) }
+        if path.is_some() || **location != Location::File { f.write_str(": ") } else { Ok(()) }
     }
 }
 
@@ -114,11 +114,11 @@ mod tests {
     #[test]
     fn a_message_says_file_place_problem_and_remedy() {
         let error =
-            Error::new(Kind::Count, Place::Line(3), "two numbers, three were expected".into(), "export it again");
+            Error::new(Kind::Count, Location::Line(3), "two numbers, three were expected".into(), "export it again");
         assert_eq!(error.to_string(), "line 3: two numbers, three were expected; export it again");
         let error = error.of(Path::new("blade.mtx"));
         assert_eq!(error.to_string(), "blade.mtx, line 3: two numbers, three were expected; export it again");
-        let whole = Error::new(Kind::Io, Place::File, "no such file".into(), "check the path");
+        let whole = Error::new(Kind::Io, Location::File, "no such file".into(), "check the path");
         assert_eq!(whole.clone().of(Path::new("a")).to_string(), "a: no such file; check the path");
         assert_eq!(whole.to_string(), "no such file; check the path");
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::matrix::Matrix;
 
 /// A format of files that hold matrices.
@@ -41,7 +41,7 @@ impl<'a> Item<'a> {
         let (name, note) = (name.into(), note.into());
         let error = Error::new(
             if note == COMPLEX { Kind::Complex } else { Kind::Unsupported },
-            if name.is_empty() { Place::File } else { Place::Variable(name.clone()) },
+            if name.is_empty() { Location::File } else { Location::Variable(name.clone()) },
             format!("a real matrix was expected, this is {note}"),
             "name another one",
         );

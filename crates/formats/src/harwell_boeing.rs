@@ -10,7 +10,7 @@
 //! Source: Duff, Grimes, Lewis, Users' Guide for the Harwell-Boeing Sparse Matrix Collection, TR/PA/92/86 (1992); ANSYS Mechanical APDL
 //! Command Reference, HBMAT.
 
-use crate::error::{Error, Place};
+use crate::error::{Error, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets, compressed};
 use crate::text::{Line, Lines, shown};
@@ -151,9 +151,9 @@ fn read(bytes: &[u8]) -> Result<Matrix, Error> {
         b'Z' => Symmetry::Skew,
         _ => Symmetry::General,
     };
-    let mut triplets = Triplets::new(rows, columns, indices.len(), Place::File)?;
+    let mut triplets = Triplets::new(rows, columns, indices.len(), Location::File)?;
     compressed(&pointers, &indices, &values, columns, |column, row, value| {
-        triplets.push(row, column, value, Place::File)
+        triplets.push(row, column, value, Location::File)
     })?;
     triplets.finish(symmetry)
 }
@@ -212,19 +212,19 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_said_with_its_line() {
-        let check = |kind: &str, formats: &str, body: &str, fault, place| {
+        let check = |kind: &str, formats: &str, body: &str, fault, location| {
             let text = file(kind, formats, body);
             let found = read_bytes(text.as_bytes(), Some("harwell-boeing"), None).map(|_| ());
-            assert_eq!(found.map_err(|e| (e.kind, e.place)), Err((fault, place)), "{text}");
+            assert_eq!(found.map_err(|e| (e.kind, e.location)), Err((fault, location)), "{text}");
         };
-        check("RSA", FORMATS, "F\n  1  3  4  5\n  1  3  2  3\n", Kind::Truncated, Place::Line(8));
-        check("RSA", FORMATS, "F\n  1  3  4\n", Kind::Malformed, Place::Line(6));
-        check("RSA", FORMATS, &BODY.replace("1  3  2  3", "1  3  2  9"), Kind::Count, Place::File);
-        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "1  3  2  5"), Kind::Count, Place::File);
-        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "0  3  4  5"), Kind::Malformed, Place::Line(6));
-        check("RSA", "(8I3)           (8I3)           (2A20.12)", BODY, Kind::Malformed, Place::Line(4));
-        check("CSA", FORMATS, BODY, Kind::Complex, Place::File);
-        check("RSE", FORMATS, BODY, Kind::Unsupported, Place::File);
-        check("XYZ", FORMATS, BODY, Kind::Malformed, Place::Line(3));
+        check("RSA", FORMATS, "F\n  1  3  4  5\n  1  3  2  3\n", Kind::Truncated, Location::Line(8));
+        check("RSA", FORMATS, "F\n  1  3  4\n", Kind::Malformed, Location::Line(6));
+        check("RSA", FORMATS, &BODY.replace("1  3  2  3", "1  3  2  9"), Kind::Count, Location::File);
+        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "1  3  2  5"), Kind::Count, Location::File);
+        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "0  3  4  5"), Kind::Malformed, Location::Line(6));
+        check("RSA", "(8I3)           (8I3)           (2A20.12)", BODY, Kind::Malformed, Location::Line(4));
+        check("CSA", FORMATS, BODY, Kind::Complex, Location::File);
+        check("RSE", FORMATS, BODY, Kind::Unsupported, Location::File);
+        check("XYZ", FORMATS, BODY, Kind::Malformed, Location::Line(3));
     }
 }

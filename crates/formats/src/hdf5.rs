@@ -10,7 +10,7 @@ use std::rc::Rc;
 
 use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::inflate::Limit;
 use crate::matrix::{Along, Symmetry, Triplets, compressed, dense};
@@ -41,7 +41,7 @@ const MEMBERS: usize = 10_000;
 const GROUPS: usize = 1000;
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    let file = guarded(Place::File, || File::from_bytes(bytes.to_vec()))?;
+    let file = guarded(Location::File, || File::from_bytes(bytes.to_vec()))?;
     let mut items = Vec::new();
     let root = Rc::new(file.root());
     Walk { limit: Limit::of(bytes.len()), groups: 0, items: &mut items }.through(&root, "", DEPTH)?;
@@ -49,7 +49,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 }
 
 /// What the crate `hdf5-pure` answers. It adds up numbers of damaged files without a check (0.47, positions of chunks), and may panic.
-fn guarded<T>(place: Place, ask: impl FnOnce() -> Result<T, hdf5_pure::Error>) -> Result<T, Error> {
+fn guarded<T>(location: Location, ask: impl FnOnce() -> Result<T, hdf5_pure::Error>) -> Result<T, Error> {
     // What it was working on is dropped with the error: nobody sees a half-made state.
     let answer = catch_unwind(AssertUnwindSafe(ask));
     let problem = match answer {
@@ -59,7 +59,7 @@ fn guarded<T>(place: Place, ask: impl FnOnce() -> Result<T, hdf5_pure::Error>) -
     };
     let problem = format!("the HDF5 file cannot be read: {problem}");
     let remedy = "save or copy it again, in MATLAB without -v7.3 if that does not help";
-    Err(Error::new(Kind::Malformed, place, problem, remedy))
+    Err(Error::new(Kind::Malformed, location, problem, remedy))
 }
 
 /// A walk through the groups of a file.
@@ -74,7 +74,7 @@ impl Walk<'_, '_> {
     /// Adds what a group and the groups in it hold.
     fn through(&mut self, group: &Rc<Group>, path: &str, depth: usize) -> Result<(), Error> {
         self.groups += 1;
-        let here = || Place::Variable(path.to_string());
+        let here = || Location::Variable(path.to_string());
         // MATLAB keeps the parts of cells and objects in groups of its own, `#refs#` and `#subsystem#`.
         let own = |name: &String| !name.starts_with('#');
         let full = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
@@ -82,23 +82,23 @@ impl Walk<'_, '_> {
             if self.items.len() >= MEMBERS || self.groups >= GROUPS {
                 return Ok(());
             }
-            let dataset = guarded(Place::Variable(full(&name)), || group.dataset(&name))?;
+            let dataset = guarded(Location::Variable(full(&name)), || group.dataset(&name))?;
             self.items.push(dense_item(dataset, full(&name), self.limit)?);
         }
         for name in guarded(here(), || group.groups())?.into_iter().filter(own) {
             if self.items.len() >= MEMBERS || self.groups >= GROUPS {
                 return Ok(());
             }
-            let place = || Place::Variable(full(&name));
-            let inner = Rc::new(guarded(place(), || group.group(&name))?);
-            let attributes = guarded(place(), || inner.attrs())?;
+            let location = || Location::Variable(full(&name));
+            let inner = Rc::new(guarded(location(), || group.group(&name))?);
+            let attributes = guarded(location(), || inner.attrs())?;
             if attributes.contains_key("OCTAVE_NEW_FORMAT") {
                 // Its matrices are transposed, and nothing at them says so.
                 self.items.push(Item::other(full(&name), "in the form of Octave's `save -hdf5` (`save -v7` is read)"));
             } else if let Some(rows) = attributes.get("MATLAB_sparse") {
                 let rows = whole(rows).ok_or_else(|| {
                     let problem = "the attribute MATLAB_sparse is no number of rows".into();
-                    Error::new(Kind::Malformed, place(), problem, "save the file again")
+                    Error::new(Kind::Malformed, location(), problem, "save the file again")
                 })?;
                 self.items.push(sparse_item(inner, full(&name), rows, self.limit)?);
             } else if depth > 0 {
@@ -123,8 +123,8 @@ fn whole(value: &AttrValue) -> Option<usize> {
 }
 
 fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'static>, Error> {
-    let place = Place::Variable(name.clone());
-    let note = match guarded(place.clone(), || dataset.dtype())? {
+    let location = Location::Variable(name.clone());
+    let note = match guarded(location.clone(), || dataset.dtype())? {
         DType::Compound(fields) if fields.iter().any(|(field, _)| field == "imag" || field == "i") => Some(COMPLEX),
         DType::F32 | DType::F64 => None,
         DType::I8 | DType::I16 | DType::I32 | DType::I64 | DType::U8 | DType::U16 | DType::U32 | DType::U64 => None,
@@ -132,13 +132,13 @@ fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'stat
         DType::ObjectReference => Some("a cell array or an object"),
         _ => Some("of a type that is no number"),
     };
-    let attributes = guarded(place.clone(), || dataset.attrs())?;
+    let attributes = guarded(location.clone(), || dataset.attrs())?;
     let note = note.or_else(|| of_matlab(&attributes));
     if let Some(note) = note {
         return Ok(Item::other(name, note));
     }
     let matlab = attributes.contains_key("MATLAB_class");
-    let shape = sizes(&dataset, &place)?;
+    let shape = sizes(&dataset, &location)?;
     let (rows, columns) = match shape[..] {
         [] => (1, 1),
         [rows] => (rows, 1),
@@ -150,10 +150,10 @@ fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'stat
         let values = numbers(&dataset, limit, &name, Dataset::read_f64)?;
         if rows.checked_mul(columns) != Some(values.len()) {
             let problem = format!("{} numbers for {rows} x {columns}", values.len());
-            return Err(Error::new(Kind::Count, Place::Variable(name.clone()), problem, "save the file again"));
+            return Err(Error::new(Kind::Count, Location::Variable(name.clone()), problem, "save the file again"));
         }
         let along = if matlab { Along::Columns } else { Along::Rows };
-        dense((rows, columns), along, &Place::Variable(name.clone()), |at| Ok(values[at]))
+        dense((rows, columns), along, &Location::Variable(name.clone()), |at| Ok(values[at]))
     }))
 }
 
@@ -169,14 +169,14 @@ fn of_matlab(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
     }
 }
 
-fn sizes(dataset: &Dataset, place: &Place) -> Result<Vec<usize>, Error> {
-    let shape = guarded(place.clone(), || dataset.shape())?;
-    shape.into_iter().map(usize::try_from).collect::<Result<_, _>>().map_err(|_| too_large(place.clone()))
+fn sizes(dataset: &Dataset, location: &Location) -> Result<Vec<usize>, Error> {
+    let shape = guarded(location.clone(), || dataset.shape())?;
+    shape.into_iter().map(usize::try_from).collect::<Result<_, _>>().map_err(|_| too_large(location.clone()))
 }
 
-fn too_large(place: Place) -> Error {
+fn too_large(location: Location) -> Error {
     let problem = "the dataset states more numbers than a file of this length can hold".into();
-    Error::new(Kind::TooLarge, place, problem, "save the file again, without compression if it is right")
+    Error::new(Kind::TooLarge, location, problem, "save the file again, without compression if it is right")
 }
 
 /// All numbers of a dataset.
@@ -186,30 +186,30 @@ fn numbers<T>(
     name: &str,
     read: impl Fn(&Dataset) -> Result<Vec<T>, hdf5_pure::Error>,
 ) -> Result<Vec<T>, Error> {
-    let place = Place::Variable(name.to_string());
+    let location = Location::Variable(name.to_string());
     // A chunk is unpacked as a whole, even where the dataset ends within it.
-    let chunk = guarded(place.clone(), || dataset.chunk_shape())?.unwrap_or_default();
+    let chunk = guarded(location.clone(), || dataset.chunk_shape())?.unwrap_or_default();
     let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
-    let shape = guarded(place.clone(), || dataset.shape())?;
+    let shape = guarded(location.clone(), || dataset.shape())?;
     // Of a dataset in chunks, what is in the file; the index of some kinds of chunks cannot be asked.
     let stored = match chunk[..] {
         [] => None,
-        _ => guarded(place.clone(), || dataset.chunks())
+        _ => guarded(location.clone(), || dataset.chunks())
             .ok()
             .map(|chunks| chunks.iter().map(|one| one.storage_size).sum()),
     };
     let room = stored.map_or(u64::MAX, |stored: u64| stored.saturating_mul(DEFLATE)).max(FEW).min(limit.numbers());
     let count = product(&shape).filter(|&count| count <= room);
     if count.is_none_or(|count| product(&chunk).is_none_or(|chunk| chunk > count.max(FEW))) {
-        return Err(too_large(place));
+        return Err(too_large(location));
     }
-    guarded(place, || read(dataset))
+    guarded(location, || read(dataset))
 }
 
 fn sparse_item(group: Rc<Group>, name: String, rows: usize, limit: Limit) -> Result<Item<'static>, Error> {
-    let place = Place::Variable(name.clone());
-    let part = move |part: &str| guarded(place.clone(), || group.dataset(part));
-    let pointers = sizes(&part("jc")?, &Place::Variable(name.clone()))?;
+    let location = Location::Variable(name.clone());
+    let part = move |part: &str| guarded(location.clone(), || group.dataset(part));
+    let pointers = sizes(&part("jc")?, &Location::Variable(name.clone()))?;
     let columns = pointers.first().copied().unwrap_or_default().saturating_sub(1);
     Ok(Item::new(name.clone(), rows, columns, move || {
         let whole = |name_of: &str| -> Result<Vec<usize>, Error> {
@@ -217,12 +217,12 @@ fn sparse_item(group: Rc<Group>, name: String, rows: usize, limit: Limit) -> Res
             Ok(found.into_iter().map(|index| usize::try_from(index).unwrap_or(usize::MAX)).collect())
         };
         let pointers = whole("jc")?;
-        let mut triplets = Triplets::new(rows, columns, 0, Place::File)?;
+        let mut triplets = Triplets::new(rows, columns, 0, Location::File)?;
         // A matrix without entries has neither rows nor values.
         if pointers.last().is_some_and(|&count| count > 0) {
             let (inner, values) = (whole("ir")?, numbers(&part("data")?, limit, &name, Dataset::read_f64)?);
             compressed(&pointers, &inner, &values, columns, |column, row, value| {
-                triplets.push(row, column, value, Place::Variable(name.clone()))
+                triplets.push(row, column, value, Location::Variable(name.clone()))
             })?;
         }
         triplets.finish(Symmetry::General)
@@ -235,9 +235,9 @@ mod tests {
 
     #[test]
     fn a_panic_of_the_library_is_an_error() {
-        let found = guarded::<()>(Place::Byte(3), || panic!("attempt to add with overflow, on purpose"));
-        assert_eq!(found.map_err(|error| (error.kind, error.place)), Err((Kind::Malformed, Place::Byte(3))));
-        let found = guarded(Place::File, || File::from_bytes(vec![0; 600])).map(|_| ());
+        let found = guarded::<()>(Location::Byte(3), || panic!("attempt to add with overflow, on purpose"));
+        assert_eq!(found.map_err(|error| (error.kind, error.location)), Err((Kind::Malformed, Location::Byte(3))));
+        let found = guarded(Location::File, || File::from_bytes(vec![0; 600])).map(|_| ());
         assert_eq!(found.map_err(|error| error.kind), Err(Kind::Malformed));
     }
 }

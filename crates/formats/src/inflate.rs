@@ -4,7 +4,7 @@ use std::io::Read;
 
 use flate2::read::{DeflateDecoder, ZlibDecoder};
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 
 /// How many times as large as its file what is unpacked may become, beyond [`UNPACKED_ALWAYS`].
 ///
@@ -41,10 +41,10 @@ pub(crate) enum Wrapping {
 }
 
 /// Unpacks all of `packed`.
-pub(crate) fn inflate(packed: &[u8], wrapping: Wrapping, limit: Limit, place: &Place) -> Result<Vec<u8>, Error> {
+pub(crate) fn inflate(packed: &[u8], wrapping: Wrapping, limit: Limit, location: &Location) -> Result<Vec<u8>, Error> {
     let most = limit.0;
     let (bytes, damage) = up_to(packed, wrapping, most + 1);
-    let fault = |kind, problem: String, remedy: &str| Err(Error::new(kind, place.clone(), problem, remedy));
+    let fault = |kind, problem: String, remedy: &str| Err(Error::new(kind, location.clone(), problem, remedy));
     if bytes.len() > most {
         let problem = format!("{} compressed bytes become more than {most}", packed.len());
         return fault(Kind::TooLarge, problem, "save it as a sparse matrix, or without compression");
@@ -91,8 +91,8 @@ mod tests {
         let limit = Limit::of(1);
         let bomb = pack(&vec![0; UNPACKED_ALWAYS + 1])?;
         assert!(bomb.len() < 300_000);
-        let found = inflate(&bomb, Wrapping::Zlib, limit, &Place::Byte(7)).map_err(|e| (e.kind, e.place));
-        assert_eq!(found, Err((Kind::TooLarge, Place::Byte(7))));
+        let found = inflate(&bomb, Wrapping::Zlib, limit, &Location::Byte(7)).map_err(|e| (e.kind, e.location));
+        assert_eq!(found, Err((Kind::TooLarge, Location::Byte(7))));
         assert_eq!(beginning(&bomb, Wrapping::Zlib, 5), [0; 5]);
         Ok(())
     }
@@ -101,10 +101,10 @@ mod tests {
     fn what_is_damaged_or_short_is_refused() -> std::io::Result<()> {
         let packed = pack(b"a text that is packed")?;
         assert_eq!(
-            inflate(&packed, Wrapping::Zlib, Limit::of(1), &Place::File).as_deref(),
+            inflate(&packed, Wrapping::Zlib, Limit::of(1), &Location::File).as_deref(),
             Ok(&b"a text that is packed"[..])
         );
-        let short = inflate(&packed[..packed.len() - 6], Wrapping::Zlib, Limit::of(1), &Place::File);
+        let short = inflate(&packed[..packed.len() - 6], Wrapping::Zlib, Limit::of(1), &Location::File);
         assert_eq!(short.map_err(|e| e.kind), Err(Kind::Malformed));
         Ok(())
     }

@@ -45,7 +45,7 @@ use std::path::Path;
 use file::{io, load};
 use format::Item;
 
-pub use error::{Error, Kind, Place};
+pub use error::{Error, Kind, Location};
 pub use format::{Format, Variable};
 pub use inflate::{EXPANSION, UNPACKED_ALWAYS};
 pub use matrix::{Entry, Matrix, Origin, Symmetry};
@@ -73,7 +73,7 @@ pub const TABLE: &[Format] = &[
 /// `format` is a name of [`TABLE`]; without it the content decides. `name` is needed where the file holds several matrices.
 ///
 /// # Errors
-/// With file, place, what was expected, and what to do, see [`Kind`].
+/// With file, location, what was expected, and what to do, see [`Kind`].
 pub fn read(path: impl AsRef<Path>, format: Option<&str>, name: Option<&str>) -> Result<Matrix, Error> {
     let path = path.as_ref();
     read_bytes(&load(path)?, format, name).map_err(|error| error.of(path))
@@ -90,7 +90,7 @@ pub fn read_bytes(bytes: &[u8], format: Option<&str>, name: Option<&str>) -> Res
     check_size(item.variable.rows, item.variable.columns, bytes.len())?;
     let mut matrix = (item.read)().map_err(|error| match item.variable.name.as_str() {
         "" => error,
-        name => error.at(Place::Variable(name.to_string())),
+        name => error.at(Location::Variable(name.to_string())),
     })?;
     check_size(matrix.rows(), matrix.columns(), bytes.len())?;
     matrix.set_origin(format.name, &item.variable.name);
@@ -128,7 +128,9 @@ pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
         Some("npz") => npz::write(matrix).map_err(|error| error.of(path))?,
         _ => {
             let problem = "matrices are written as .mtx (Matrix Market) or .npz (SciPy)".into();
-            return Err(Error::new(Kind::Format, Place::File, problem, "give the file one of these endings").of(path));
+            return Err(
+                Error::new(Kind::Format, Location::File, problem, "give the file one of these endings").of(path)
+            );
         }
     };
     std::fs::write(path, bytes).map_err(|error| io(path, &error))
@@ -137,7 +139,7 @@ pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
 /// The format of that name, or the one that the content is of.
 fn find(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
     let names = || TABLE.iter().map(|format| format.name).collect::<Vec<_>>().join(", ");
-    let fault = |problem, remedy| Error::new(Kind::Format, Place::File, problem, remedy);
+    let fault = |problem, remedy| Error::new(Kind::Format, Location::File, problem, remedy);
     if let Some(name) = name {
         let found = TABLE.iter().find(|format| format.name == name);
         return found.ok_or_else(|| fault(format!("no format is called `{name}`"), format!("there are {}", names())));
@@ -156,7 +158,7 @@ fn find(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
 
 /// The matrix of that name, or the only one.
 fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> Result<&'i Item<'a>, Error> {
-    let fault = |problem: String, remedy: &str| Err(Error::new(Kind::Choice, Place::File, problem, remedy));
+    let fault = |problem: String, remedy: &str| Err(Error::new(Kind::Choice, Location::File, problem, remedy));
     let there = || match items {
         [] => "nothing".to_string(),
         items => items.iter().map(|item| item.variable.to_string()).collect::<Vec<_>>().join(", "),
@@ -194,7 +196,7 @@ fn check_size(rows: usize, columns: usize, length: usize) -> Result<(), Error> {
     }
     Err(Error::new(
         Kind::TooLarge,
-        Place::File,
+        Location::File,
         format!("{rows} rows and {columns} columns in a file of {length} bytes"),
         "an index or a size in it is damaged: export it again",
     ))

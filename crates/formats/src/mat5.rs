@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 
 use crate::bytes::{Bytes, Number, Order};
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::inflate::{Limit, Wrapping, beginning, inflate};
 use crate::matrix::{Along, Matrix, Symmetry, Triplets, compressed, dense};
@@ -49,26 +49,26 @@ fn order(bytes: &[u8]) -> Option<Order> {
 struct Element<'a> {
     kind: u32,
     data: &'a [u8],
-    place: Place,
+    location: Location,
 }
 
 /// The next element, within `bytes`, and the cursor behind it.
 fn element<'a>(bytes: &mut Bytes<'a>) -> Result<Element<'a>, Error> {
-    let place = bytes.place();
+    let location = bytes.location();
     let kind = bytes.u32()?;
     // A small element has its length in the upper half of its type, and its data in place of the length.
     if kind >> 16 != 0 {
         let length = (kind >> 16) as usize;
         let data = bytes.take(4)?;
         let data = data.get(..length).ok_or_else(|| bytes.malformed("a small element of at most 4 bytes", length))?;
-        return Ok(Element { kind: kind & 0xffff, data, place });
+        return Ok(Element { kind: kind & 0xffff, data, location });
     }
     let length = bytes.u32()? as usize;
     let data = bytes.take(length)?;
     if kind != COMPRESSED {
         bytes.skip(length.next_multiple_of(8) - length);
     }
-    Ok(Element { kind, data, place })
+    Ok(Element { kind, data, location })
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
@@ -79,12 +79,12 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let limit = Limit::of(bytes.len());
     let mut items = Vec::new();
     while file.left() >= 8 {
-        let Element { kind, data, place } = element(&mut file)?;
+        let Element { kind, data, location } = element(&mut file)?;
         let found = match kind {
-            MATRIX => variable(Source { data: Cow::Borrowed(data), packed: None, order, place }),
+            MATRIX => variable(Source { data: Cow::Borrowed(data), packed: None, order, location }),
             COMPRESSED => {
                 let start = beginning(data, Wrapping::Zlib, BEGINNING);
-                variable(Source { data: start.into(), packed: Some((data, limit)), order, place })
+                variable(Source { data: start.into(), packed: Some((data, limit)), order, location })
             }
             _ => continue,
         };
@@ -99,14 +99,14 @@ struct Source<'a> {
     data: Cow<'a, [u8]>,
     packed: Option<(&'a [u8], Limit)>,
     order: Order,
-    place: Place,
+    location: Location,
 }
 
 impl<'a> Source<'a> {
     /// All of its bytes, from its first part on.
     fn whole(&self) -> Result<Cow<'_, [u8]>, Error> {
         let Some((packed, limit)) = self.packed else { return Ok(Cow::Borrowed(&self.data)) };
-        let mut all = inflate(packed, Wrapping::Zlib, limit, &self.place)?;
+        let mut all = inflate(packed, Wrapping::Zlib, limit, &self.location)?;
         // Past the tag of the matrix within.
         all.drain(..all.len().min(8));
         Ok(Cow::Owned(all))
@@ -158,9 +158,9 @@ fn class_name(class: u8) -> Option<&'static str> {
 fn variable(mut source: Source) -> Result<Vec<Item>, Error> {
     if source.packed.is_some() {
         let mut inside = Bytes::new(&source.data, source.order);
-        let kind = inside.u32().map_err(|_| damaged(&source.place))?;
+        let kind = inside.u32().map_err(|_| damaged(&source.location))?;
         if kind != MATRIX {
-            return Err(damaged(&source.place));
+            return Err(damaged(&source.location));
         }
         let rest = source.data.get(8..).unwrap_or_default().to_vec();
         source.data = rest.into();
@@ -172,14 +172,14 @@ fn variable(mut source: Source) -> Result<Vec<Item>, Error> {
     Ok(vec![item(source, head)])
 }
 
-fn damaged(place: &Place) -> Error {
+fn damaged(location: &Location) -> Error {
     let problem = "a compressed variable was expected, its beginning is damaged".into();
-    Error::new(Kind::Malformed, place.clone(), problem, "save or copy the file again")
+    Error::new(Kind::Malformed, location.clone(), problem, "save or copy the file again")
 }
 
-/// An error whose byte counts from the beginning of a variable, at the place of the variable in the file.
+/// An error whose byte counts from the beginning of a variable, at the location of the variable in the file.
 fn error_in(error: Error, source: &Source) -> Error {
-    Error { place: source.place.clone(), ..error }
+    Error { location: source.location.clone(), ..error }
 }
 
 fn item(source: Source, head: Head) -> Item {
@@ -195,8 +195,8 @@ fn item(source: Source, head: Head) -> Item {
     }
     Item::new(name, head.rows, head.columns, move || {
         let bytes = source.whole()?;
-        matrix(&bytes, source.order).map_err(|error| match error.place {
-            Place::Byte(_) => error_in(error, &source),
+        matrix(&bytes, source.order).map_err(|error| match error.location {
+            Location::Byte(_) => error_in(error, &source),
             _ => error,
         })
     })
@@ -232,8 +232,12 @@ fn structure<'a>(source: &Source<'a>, name: &str, depth: usize) -> Result<Vec<It
             continue;
         }
         // The bytes of a compressed structure were unpacked here and go with the item.
-        let inner =
-            Source { data: found.data.to_vec().into(), packed: None, order: source.order, place: source.place.clone() };
+        let inner = Source {
+            data: found.data.to_vec().into(),
+            packed: None,
+            order: source.order,
+            location: source.location.clone(),
+        };
         let head = self::head(&mut Bytes::new(&inner.data, inner.order)).map_err(|error| error_in(error, source))?;
         if head.class == STRUCTURE {
             items.extend(structure(&inner, &name, depth - 1)?);
@@ -276,9 +280,9 @@ fn matrix(bytes: &[u8], order: Order) -> Result<Matrix, Error> {
         let inner = numbers(&mut parts, Number::index)?;
         let pointers = numbers(&mut parts, Number::index)?;
         let values = numbers(&mut parts, Number::real)?;
-        let mut triplets = Triplets::new(rows, columns, values.len(), Place::File)?;
+        let mut triplets = Triplets::new(rows, columns, values.len(), Location::File)?;
         compressed(&pointers, &inner, &values, columns, |column, row, value| {
-            triplets.push(row, column, value, Place::File)
+            triplets.push(row, column, value, Location::File)
         })?;
         return triplets.finish(Symmetry::General);
     }
@@ -288,9 +292,9 @@ fn matrix(bytes: &[u8], order: Order) -> Result<Matrix, Error> {
     let there = data.left() / number.size();
     if rows.checked_mul(columns) != Some(there) {
         let problem = format!("{rows} x {columns} numbers were expected, {there} are there");
-        return Err(Error::new(Kind::Count, Place::File, problem, "save or copy the file again"));
+        return Err(Error::new(Kind::Count, Location::File, problem, "save or copy the file again"));
     }
-    dense((rows, columns), Along::Columns, &Place::File, |at| number.real(&mut data.ahead(at * number.size())))
+    dense((rows, columns), Along::Columns, &Location::File, |at| number.real(&mut data.ahead(at * number.size())))
 }
 
 #[cfg(test)]

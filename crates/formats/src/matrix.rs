@@ -3,7 +3,7 @@
 //! An entry stands once, is finite and is not zero; a symmetric matrix keeps its lower triangle only. So two files of the same
 //! matrix in two formats give equal matrices.
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 
 /// A number of a matrix and where it stands, rows and columns counted from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,9 +73,9 @@ impl Matrix {
         symmetry: Symmetry,
         entries: impl IntoIterator<Item = (usize, usize, f64)>,
     ) -> Result<Self, Error> {
-        let mut triplets = Triplets::new(rows, columns, 0, Place::File)?;
+        let mut triplets = Triplets::new(rows, columns, 0, Location::File)?;
         for (row, column, value) in entries {
-            triplets.push(row, column, value, Place::File)?;
+            triplets.push(row, column, value, Location::File)?;
         }
         triplets.finish(symmetry)
     }
@@ -156,7 +156,7 @@ impl Matrix {
         if asymmetry > tolerance * largest {
             return Err(Error::new(
                 Kind::NotSymmetric,
-                Place::File,
+                Location::File,
                 format!(
                     "the matrix is not symmetric: its triangles differ by {asymmetry:e}, its largest value is {largest:e}"
                 ),
@@ -194,7 +194,7 @@ impl Matrix {
         }
         Err(Error::new(
             Kind::NotSquare,
-            Place::File,
+            Location::File,
             format!("the matrix has {} rows and {} columns, a square one was expected", self.rows, self.columns),
             "name the matrix of the structure: stiffness, mass or damping",
         ))
@@ -231,11 +231,11 @@ impl Matrix {
         self.must_be_square()?;
         check_names(names, names.len())?;
         let places: std::collections::BTreeMap<&str, usize> =
-            names.iter().enumerate().map(|(place, name)| (name.as_str(), place)).collect();
+            names.iter().enumerate().map(|(location, name)| (name.as_str(), location)).collect();
         let own = self.names.as_deref().ok_or_else(|| {
             Error::new(
                 Kind::Names,
-                Place::File,
+                Location::File,
                 "the rows of the matrix have no names".into(),
                 "give the file of names that belongs to it",
             )
@@ -244,7 +244,7 @@ impl Matrix {
             places.get(own[row as usize].as_str()).copied().ok_or_else(|| {
                 Error::new(
                     Kind::Names,
-                    Place::File,
+                    Location::File,
                     format!(
                         "row `{}` of the matrix is not among the {} names it shall follow",
                         own[row as usize],
@@ -255,9 +255,9 @@ impl Matrix {
             })
         };
         let symmetry = if self.symmetric { Symmetry::Symmetric } else { Symmetry::General };
-        let mut triplets = Triplets::new(names.len(), names.len(), self.entries.len(), Place::File)?;
+        let mut triplets = Triplets::new(names.len(), names.len(), self.entries.len(), Location::File)?;
         for e in &self.entries {
-            triplets.push(place_of(e.row)?, place_of(e.column)?, e.value, Place::File)?;
+            triplets.push(place_of(e.row)?, place_of(e.column)?, e.value, Location::File)?;
         }
         let mut matrix = triplets.finish(symmetry)?;
         matrix.names = Some(names.to_vec());
@@ -279,9 +279,9 @@ impl Matrix {
         }
         let places: Vec<u32> = (left.iter())
             .scan(0, |next, &left| {
-                let place = *next;
+                let location = *next;
                 *next += u32::from(left);
-                Some(place)
+                Some(location)
             })
             .collect();
         self.entries.retain(|e| left[e.row as usize] && left[e.column as usize]);
@@ -313,12 +313,12 @@ impl Matrix {
         }
         for (at, e) in self.entries.iter().enumerate() {
             if e.row > e.column {
-                let place = &mut above[e.row as usize];
-                let mirror = self.entries.get(*place);
+                let location = &mut above[e.row as usize];
+                let mirror = self.entries.get(*location);
                 if mirror.is_none_or(|m| (m.column, m.row, m.value) != (e.row, e.column, e.value)) {
                     return false;
                 }
-                *place += 1;
+                *location += 1;
             } else if e.row < e.column && at >= above[e.column as usize] {
                 // Met before its mirror image, which stands in an earlier column: there is none.
                 return false;
@@ -342,7 +342,7 @@ impl Matrix {
 /// Refuses names that stand twice, and a number of them other than `rows`; empty ones may repeat, they name nothing.
 fn check_names(names: &[String], rows: usize) -> Result<(), Error> {
     let fault = |problem| {
-        Err(Error::new(Kind::Names, Place::File, problem, "give the file of names that was written with the matrix"))
+        Err(Error::new(Kind::Names, Location::File, problem, "give the file of names that was written with the matrix"))
     };
     if names.len() != rows {
         return fault(format!("{} names for {rows} rows", names.len()));
@@ -365,11 +365,11 @@ pub(crate) struct Triplets {
 
 impl Triplets {
     /// Room for `expected` entries, which must be bounded by the size of the file, not by what its header says.
-    pub fn new(rows: usize, columns: usize, expected: usize, place: Place) -> Result<Self, Error> {
+    pub fn new(rows: usize, columns: usize, expected: usize, location: Location) -> Result<Self, Error> {
         if rows.max(columns) > u32::MAX as usize {
             return Err(Error::new(
                 Kind::TooLarge,
-                place,
+                location,
                 format!("{rows} rows and {columns} columns, at most {} were expected", u32::MAX),
                 "check the size in the header of the file",
             ));
@@ -378,11 +378,11 @@ impl Triplets {
     }
 
     /// Adds one entry, from zero.
-    pub fn push(&mut self, row: usize, column: usize, value: f64, place: Place) -> Result<(), Error> {
+    pub fn push(&mut self, row: usize, column: usize, value: f64, location: Location) -> Result<(), Error> {
         if row >= self.rows || column >= self.columns {
             return Err(Error::new(
                 Kind::Count,
-                place,
+                location,
                 format!(
                     "an entry in row {}, column {} of a matrix of {} rows and {} columns",
                     row.saturating_add(1),
@@ -396,7 +396,7 @@ impl Triplets {
         if !value.is_finite() {
             return Err(Error::new(
                 Kind::NotFinite,
-                place,
+                location,
                 format!("the value in row {}, column {} is {value}", row + 1, column + 1),
                 "a structure has finite numbers only: look for elements without material or with negative volume",
             ));
@@ -416,7 +416,7 @@ impl Triplets {
         if square && self.rows != self.columns {
             return Err(Error::new(
                 Kind::NotSquare,
-                Place::File,
+                Location::File,
                 format!("a symmetric matrix with {} rows and {} columns", self.rows, self.columns),
                 "the header of the file is damaged: export it again",
             ));
@@ -459,7 +459,7 @@ impl Triplets {
         if (lower && upper) || self.entries.iter().any(|e| e.row == e.column) {
             return Err(Error::new(
                 Kind::NotSymmetric,
-                Place::File,
+                Location::File,
                 "a skew-symmetric matrix with entries in both triangles or on its diagonal".into(),
                 "store one triangle only",
             ));
@@ -481,17 +481,17 @@ pub(crate) enum Along {
     Columns,
 }
 
-/// A full matrix whose numbers, as many as its size says, `value` gives by their place in the file.
+/// A full matrix whose numbers, as many as its size says, `value` gives by their position in the file.
 pub(crate) fn dense(
     (rows, columns): (usize, usize),
     along: Along,
-    place: &Place,
+    location: &Location,
     value: impl Fn(usize) -> Result<f64, Error>,
 ) -> Result<Matrix, Error> {
     let count = rows.saturating_mul(columns);
     // Memory for what is not zero: full matrices of structures are mostly zeros.
     let filled = (0..count).map(&value).filter(|value| value.as_ref().is_ok_and(|&value| value != 0.0)).count();
-    let mut triplets = Triplets::new(rows, columns, filled, place.clone())?;
+    let mut triplets = Triplets::new(rows, columns, filled, location.clone())?;
     // In the order of a matrix, so that nothing is left to sort.
     for column in 0..columns {
         for row in 0..rows {
@@ -499,7 +499,7 @@ pub(crate) fn dense(
                 Along::Rows => row * columns + column,
                 Along::Columns => column * rows + row,
             };
-            triplets.push(row, column, value(at)?, place.clone())?;
+            triplets.push(row, column, value(at)?, location.clone())?;
         }
     }
     triplets.finish(Symmetry::General)
@@ -513,7 +513,7 @@ pub(crate) fn compressed(
     outer: usize,
     mut push: impl FnMut(usize, usize, f64) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    let fault = |problem| Err(Error::new(Kind::Count, Place::File, problem, "the file is damaged: export it again"));
+    let fault = |problem| Err(Error::new(Kind::Count, Location::File, problem, "the file is damaged: export it again"));
     if Some(pointers.len()) != outer.checked_add(1) {
         return fault(format!("{} pointers for {outer} columns or rows, one more was expected", pointers.len()));
     }
@@ -531,7 +531,7 @@ pub(crate) fn compressed(
     Ok(())
 }
 
-/// Sorts entries and sums those of one place, in the order of the file.
+/// Sorts entries and sums those of one position, in the order of the file.
 fn sum_equal(entries: &mut Vec<Entry>) -> Result<(), Error> {
     let key = |e: &Entry| (e.column, e.row);
     if !entries.is_sorted_by_key(key) {
@@ -549,7 +549,7 @@ fn sum_equal(entries: &mut Vec<Entry>) -> Result<(), Error> {
         None => Ok(()),
         Some(e) => Err(Error::new(
             Kind::NotFinite,
-            Place::File,
+            Location::File,
             format!("the entries in row {}, column {} sum up to {}", e.row + 1, e.column + 1, e.value),
             "a structure has finite numbers only: check its units",
         )),

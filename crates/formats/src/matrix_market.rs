@@ -9,7 +9,7 @@
 //! Source: Boisvert, Pozo, Remington, The Matrix Market Exchange Formats: Initial Design, NISTIR 5935 (1996).
 //! Symmetric and skew-symmetric matrices store their lower triangle.
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::text::{Line, Lines, shown, truncated};
@@ -59,7 +59,7 @@ fn header(lines: &mut Lines) -> Result<Header, Error> {
         "complex" => {
             return Err(Error::new(
                 Kind::Complex,
-                banner.place(),
+                banner.location(),
                 "the matrix is complex, a real one was expected".into(),
                 "write its real part; structural damping is no matrix of a real structure",
             ));
@@ -109,7 +109,7 @@ fn read(bytes: &[u8]) -> Result<Matrix, Error> {
     // The shortest line of an entry is `1 1` and its end, of a number `0` and its end.
     let shortest = if header.coordinate { 4 } else { 2 };
     let room = header.entries.min(lines.left() / shortest + 1);
-    let mut triplets = Triplets::new(header.rows, header.columns, room, lines.place())?;
+    let mut triplets = Triplets::new(header.rows, header.columns, room, lines.location())?;
     if header.coordinate {
         coordinates(&mut lines, &header, &mut triplets)?;
     } else {
@@ -126,7 +126,7 @@ fn coordinates(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> R
         }
         count += 1;
         if count > header.entries {
-            return Err(too_many(line.place(), header.entries));
+            return Err(too_many(line.location(), header.entries));
         }
         let (row, column, value) = if header.pattern {
             let [row, column] = line.exactly("row and column")?;
@@ -135,9 +135,9 @@ fn coordinates(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> R
             let [row, column, value] = line.exactly("row, column and value")?;
             (row, column, line.real(value)?)
         };
-        triplets.push(line.index(row)?, line.index(column)?, value, line.place())?;
+        triplets.push(line.index(row)?, line.index(column)?, value, line.location())?;
     }
-    if count == header.entries { Ok(()) } else { Err(too_few(lines.place(), count, header.entries)) }
+    if count == header.entries { Ok(()) } else { Err(too_few(lines.location(), count, header.entries)) }
 }
 
 fn array(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<(), Error> {
@@ -151,31 +151,31 @@ fn array(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<
         for word in line.words() {
             count += 1;
             if count > header.entries {
-                return Err(too_many(line.place(), header.entries));
+                return Err(too_many(line.location(), header.entries));
             }
             // The last column of a skew-symmetric matrix has nothing below its diagonal.
             while row >= header.rows {
                 column += 1;
                 row = first(column);
             }
-            triplets.push(row, column, line.real(word)?, line.place())?;
+            triplets.push(row, column, line.real(word)?, line.location())?;
             row += 1;
         }
     }
-    if count == header.entries { Ok(()) } else { Err(too_few(lines.place(), count, header.entries)) }
+    if count == header.entries { Ok(()) } else { Err(too_few(lines.location(), count, header.entries)) }
 }
 
-fn too_many(place: Place, expected: usize) -> Error {
+fn too_many(location: Location, expected: usize) -> Error {
     Error::new(
         Kind::Count,
-        place,
+        location,
         format!("more than the {expected} entries that the header states"),
         "correct the line of sizes, or export the file again",
     )
 }
 
-fn too_few(place: Place, found: usize, expected: usize) -> Error {
-    let error = truncated(place, &format!("entry {} of {expected}", found + 1));
+fn too_few(location: Location, found: usize, expected: usize) -> Error {
+    let error = truncated(location, &format!("entry {} of {expected}", found + 1));
     Error { kind: Kind::Truncated, ..error }
 }
 
@@ -244,28 +244,28 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_said_with_its_line() {
-        let check = |text: &str, kind, place| {
-            let error = read(text).map(|_| ()).map_err(|e| (e.kind, e.place));
-            assert_eq!(error, Err((kind, place)), "{text}");
+        let check = |text: &str, kind, location| {
+            let error = read(text).map(|_| ()).map_err(|e| (e.kind, e.location));
+            assert_eq!(error, Err((kind, location)), "{text}");
         };
         let real = "%%MatrixMarket matrix coordinate real general\n";
-        check(&format!("{real}2 2 2\n1 1 1\n"), Kind::Truncated, Place::Line(3));
-        check(&format!("{real}2 2 1\n1 1 1\n2 2 1\n"), Kind::Count, Place::Line(4));
-        check(&format!("{real}2 2 1\n3 1 1\n"), Kind::Count, Place::Line(3));
-        check(&format!("{real}2 2 1\n0 1 1\n"), Kind::Malformed, Place::Line(3));
-        check(&format!("{real}2 2 1\n1 1 nan\n"), Kind::NotFinite, Place::Line(3));
-        check(&format!("{real}2 2 1\n1 1 1 0\n"), Kind::Malformed, Place::Line(3));
-        check(&format!("{real}2 2\n1 1 1\n"), Kind::Malformed, Place::Line(2));
-        check(real, Kind::Truncated, Place::Line(2));
-        check(&format!("{real}99999999999 1 0\n"), Kind::TooLarge, Place::File);
-        check("%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0\n", Kind::Complex, Place::Line(1));
-        check("%%MatrixMarket vector coordinate real general\n1 1 1\n", Kind::Malformed, Place::Line(1));
-        check("%%MatrixMarket matrix coordinate real symmetric\n1 2 1\n", Kind::Malformed, Place::Line(2));
+        check(&format!("{real}2 2 2\n1 1 1\n"), Kind::Truncated, Location::Line(3));
+        check(&format!("{real}2 2 1\n1 1 1\n2 2 1\n"), Kind::Count, Location::Line(4));
+        check(&format!("{real}2 2 1\n3 1 1\n"), Kind::Count, Location::Line(3));
+        check(&format!("{real}2 2 1\n0 1 1\n"), Kind::Malformed, Location::Line(3));
+        check(&format!("{real}2 2 1\n1 1 nan\n"), Kind::NotFinite, Location::Line(3));
+        check(&format!("{real}2 2 1\n1 1 1 0\n"), Kind::Malformed, Location::Line(3));
+        check(&format!("{real}2 2\n1 1 1\n"), Kind::Malformed, Location::Line(2));
+        check(real, Kind::Truncated, Location::Line(2));
+        check(&format!("{real}99999999999 1 0\n"), Kind::TooLarge, Location::File);
+        check("%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0\n", Kind::Complex, Location::Line(1));
+        check("%%MatrixMarket vector coordinate real general\n1 1 1\n", Kind::Malformed, Location::Line(1));
+        check("%%MatrixMarket matrix coordinate real symmetric\n1 2 1\n", Kind::Malformed, Location::Line(2));
         // A header that asks for more memory than there is.
-        check(&format!("{real}1000000 1000000 999999999999\n1 1 1\n"), Kind::Truncated, Place::Line(3));
+        check(&format!("{real}1000000 1000000 999999999999\n1 1 1\n"), Kind::Truncated, Location::Line(3));
         let array = "%%MatrixMarket matrix array real general\n";
-        check(&format!("{array}4000000000 4000000000\n1\n"), Kind::TooLarge, Place::File);
-        check(&format!("{array}4000000000000 4000000000000\n1\n"), Kind::Malformed, Place::Line(2));
+        check(&format!("{array}4000000000 4000000000\n1\n"), Kind::TooLarge, Location::File);
+        check(&format!("{array}4000000000000 4000000000000\n1\n"), Kind::Malformed, Location::Line(2));
     }
 
     #[test]

@@ -14,7 +14,7 @@
 
 use std::path::Path;
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::file::{io, load};
 use crate::matrix::Matrix;
 use crate::text::{Line, Lines, integer, shown};
@@ -75,7 +75,7 @@ pub fn read_bytes(bytes: &[u8], rows: usize) -> Result<Vec<String>, Error> {
     let format = TABLE.iter().find(|format| (format.sniff)(&first)).ok_or_else(|| {
         let problem = format!("names of rows were expected, {} is there", shown(first.text));
         let known = TABLE.iter().map(|format| format.summary).collect::<Vec<_>>().join("; ");
-        Error::new(Kind::Format, first.place(), problem, format!("give one of these: {known}"))
+        Error::new(Kind::Format, first.location(), problem, format!("give one of these: {known}"))
     })?;
     let mut names = Names { names: Vec::new(), rows };
     for (at, line) in std::iter::once(first).chain(lines).filter(|line| !line.text.trim_ascii().is_empty()).enumerate()
@@ -95,7 +95,7 @@ pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     let path = path.as_ref();
     let names = matrix.names().ok_or_else(|| {
         let problem = "the rows of the matrix have no names".into();
-        Error::new(Kind::Names, Place::File, problem, "give it names first").of(path)
+        Error::new(Kind::Names, Location::File, problem, "give it names first").of(path)
     })?;
     let mut text = String::from("row,name\n");
     for (at, name) in names.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
@@ -126,7 +126,7 @@ impl Names {
     fn put(&mut self, row: usize, name: String, line: &Line) -> Result<(), Error> {
         let fault = |problem| {
             let remedy = "give the file of names that was written with the matrix";
-            Err(Error::new(Kind::Names, line.place(), problem, remedy))
+            Err(Error::new(Kind::Names, line.location(), problem, remedy))
         };
         if row >= self.rows {
             return fault(format!("a name for row {} of a matrix of {} rows", row + 1, self.rows));
@@ -149,7 +149,7 @@ impl Names {
         if named != self.rows && !gaps {
             return Err(Error::new(
                 Kind::Names,
-                Place::File,
+                Location::File,
                 format!("{named} names for {} rows", self.rows),
                 "give the file of names that was written with the matrix",
             ));
@@ -213,8 +213,8 @@ fn mapping_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
 mod tests {
     use super::*;
 
-    fn check(text: &str, rows: usize, expected: Result<&[&str], (Kind, Place)>) {
-        let found = read_bytes(text.as_bytes(), rows).map_err(|e| (e.kind, e.place));
+    fn check(text: &str, rows: usize, expected: Result<&[&str], (Kind, Location)>) {
+        let found = read_bytes(text.as_bytes(), rows).map_err(|e| (e.kind, e.location));
         assert_eq!(found, expected.map(|names| names.iter().map(ToString::to_string).collect()), "{text}");
     }
 
@@ -222,19 +222,19 @@ mod tests {
     fn csv_may_leave_rows_without_a_name() {
         check("row,name\n3,tip\n1,\"a, \"\"b\"\"\"\n", 3, Ok(&["a, \"b\"", "", "tip"]));
         check("\u{feff}Row, Name\r\n1,x\r\n", 1, Ok(&["x"]));
-        check("row,name\n1,a\n1,b\n", 2, Err((Kind::Names, Place::Line(3))));
-        check("row,name\n3,a\n", 2, Err((Kind::Names, Place::Line(2))));
-        check("row,name\n0,a\n", 2, Err((Kind::Malformed, Place::Line(2))));
-        check("row,name\n1,\n", 2, Err((Kind::Names, Place::Line(2))));
-        check("row,name\nx\n", 2, Err((Kind::Malformed, Place::Line(2))));
+        check("row,name\n1,a\n1,b\n", 2, Err((Kind::Names, Location::Line(3))));
+        check("row,name\n3,a\n", 2, Err((Kind::Names, Location::Line(2))));
+        check("row,name\n0,a\n", 2, Err((Kind::Malformed, Location::Line(2))));
+        check("row,name\n1,\n", 2, Err((Kind::Names, Location::Line(2))));
+        check("row,name\nx\n", 2, Err((Kind::Malformed, Location::Line(2))));
     }
 
     #[test]
     fn calculix_directions_are_no_decimals() {
         check("10.1\n10.10\n7.4\n", 3, Ok(&["10.x", "10.10", "7.rx"]));
-        check("10.1\n10.2\n", 3, Err((Kind::Names, Place::File)));
-        check("10.1\n10.2\n", 1, Err((Kind::Names, Place::Line(2))));
-        check("10.1\nx\n", 2, Err((Kind::Malformed, Place::Line(2))));
+        check("10.1\n10.2\n", 3, Err((Kind::Names, Location::File)));
+        check("10.1\n10.2\n", 1, Err((Kind::Names, Location::Line(2))));
+        check("10.1\nx\n", 2, Err((Kind::Malformed, Location::Line(2))));
     }
 
     #[test]
@@ -242,12 +242,12 @@ mod tests {
         let text = "   Matrix Eqn      Node      DOF\n       2         7     ROTZ\n       1         7     UX\n";
         check(text, 2, Ok(&["7.x", "7.rz"]));
         check("1 7 UX\n2 7 TEMP\n", 2, Ok(&["7.x", "7.TEMP"]));
-        check("1 7 UX\nmore\n", 2, Err((Kind::Malformed, Place::Line(2))));
+        check("1 7 UX\nmore\n", 2, Err((Kind::Malformed, Location::Line(2))));
     }
 
     #[test]
     fn what_is_no_list_of_names_is_refused() {
-        check("hello\n", 1, Err((Kind::Format, Place::Line(1))));
-        check("", 1, Err((Kind::Truncated, Place::Line(1))));
+        check("hello\n", 1, Err((Kind::Format, Location::Line(1))));
+        check("", 1, Err((Kind::Truncated, Location::Line(1))));
     }
 }

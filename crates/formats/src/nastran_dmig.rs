@@ -13,7 +13,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::names::direction;
@@ -136,7 +136,7 @@ fn entries(
             continue;
         }
         if rest.first().is_some_and(|imaginary| !imaginary.is_empty() && line.real(imaginary).is_ok_and(|x| x != 0.0)) {
-            return Err(complex(name, line.place()));
+            return Err(complex(name, line.location()));
         }
         let component = if component.is_empty() { 0 } else { line.integer(component)? };
         let row = (line.integer(grid)?, component);
@@ -145,11 +145,11 @@ fn entries(
     Ok(())
 }
 
-fn complex(name: &str, place: Place) -> Error {
+fn complex(name: &str, location: Location) -> Error {
     let problem = format!("the matrix {name} is complex, a real one was expected");
     Error::new(
         Kind::Complex,
-        place,
+        location,
         problem,
         "export the real stiffness; structural damping is a matrix of its own, K4AAX",
     )
@@ -200,7 +200,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 fn read(bytes: &[u8], wanted: &str, matrix: &Found) -> Result<Matrix, Error> {
     let places: BTreeMap<Row, usize> = matrix.rows.iter().enumerate().map(|(at, row)| (*row, at)).collect();
     let (rows, columns) = matrix.size();
-    let mut triplets = Triplets::new(rows, columns, matrix.entries, Place::File)?;
+    let mut triplets = Triplets::new(rows, columns, matrix.entries, Location::File)?;
     scan(bytes, |said, line| {
         let Said::Entry { name, column, row, value } = said else { return Ok(()) };
         if name != wanted {
@@ -213,7 +213,7 @@ fn read(bytes: &[u8], wanted: &str, matrix: &Found) -> Result<Matrix, Error> {
             }
             false => places[&column],
         };
-        triplets.push(places[&row], column, value, line.place())
+        triplets.push(places[&row], column, value, line.location())
     })?;
     let symmetry = if matrix.form == 6 { Symmetry::Symmetric } else { Symmetry::General };
     let name = |(grid, component): &Row| match component {
@@ -274,20 +274,20 @@ mod tests {
         let two = format!("{PUNCH}DMIG    C       0       6       4\n");
         let listed: Vec<_> = list_bytes(two.as_bytes(), None)?.iter().map(ToString::to_string).collect();
         assert_eq!(listed, ["KAAX (2 x 2)", "C (complex)"]);
-        let check = |text: &str, kind, place| {
-            let found = read_bytes(text.as_bytes(), None, None).map(|_| ()).map_err(|e| (e.kind, e.place));
-            assert_eq!(found, Err((kind, place)), "{text}");
+        let check = |text: &str, kind, location| {
+            let found = read_bytes(text.as_bytes(), None, None).map(|_| ()).map_err(|e| (e.kind, e.location));
+            assert_eq!(found, Err((kind, location)), "{text}");
         };
-        check("DMIG,C,0,6,4\n", Kind::Complex, Place::Variable("C".into()));
-        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,2.0,3.0\n", Kind::Complex, Place::Line(2));
-        check("DMIG,M,1,1,,1,1,2.0\n", Kind::Malformed, Place::Line(1));
-        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,x\n", Kind::Malformed, Place::Line(2));
-        check("DMIG,M,0,7,2\n", Kind::Malformed, Place::Line(1));
-        check("DMIG,M,0,9,2\nDMIG,M,-1,,,1,1,1.0\n", Kind::Malformed, Place::Line(2));
+        check("DMIG,C,0,6,4\n", Kind::Complex, Location::Variable("C".into()));
+        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,2.0,3.0\n", Kind::Complex, Location::Line(2));
+        check("DMIG,M,1,1,,1,1,2.0\n", Kind::Malformed, Location::Line(1));
+        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,x\n", Kind::Malformed, Location::Line(2));
+        check("DMIG,M,0,7,2\n", Kind::Malformed, Location::Line(1));
+        check("DMIG,M,0,9,2\nDMIG,M,-1,,,1,1,1.0\n", Kind::Malformed, Location::Line(2));
         check(
             "DMIG,M,0,6,2\nDMIG,M,1,1,,2,1,1.0\nDMIG,M,2,1,,1,1,2.0\n",
             Kind::NotSymmetric,
-            Place::Variable("M".into()),
+            Location::Variable("M".into()),
         );
         Ok(())
     }

@@ -6,7 +6,7 @@
 //! Source: MSC Nastran DMAP Programmer's Guide, module OUTPUT4, and Utility Guide.
 
 use crate::bytes::{Bytes, Order};
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::text::{Line, Lines, integer, shown};
@@ -133,7 +133,7 @@ fn skip_text(lines: &mut Lines, columns: usize) -> Result<(), Error> {
 
 fn read_text(mut lines: Lines, header: &Header, width: usize) -> Result<Matrix, Error> {
     let words = if header.kind == 2 { 2 } else { 1 };
-    let mut triplets = Triplets::new(header.rows, header.columns, 0, Place::File)?;
+    let mut triplets = Triplets::new(header.rows, header.columns, 0, Location::File)?;
     let mut line = lines.expect("a column of the matrix")?;
     loop {
         let Some([column, first, count]) = column_of(&line)? else {
@@ -168,7 +168,7 @@ fn read_text(mut lines: Lines, header: &Header, width: usize) -> Result<Matrix, 
 
 fn wrong_count(line: &Line, words: usize, found: usize) -> Error {
     let problem = format!("{words} words are stated, {found} numbers follow");
-    Error::new(Kind::Count, line.place(), problem, "the file is damaged: export it again")
+    Error::new(Kind::Count, line.location(), problem, "the file is damaged: export it again")
 }
 
 /// First row, from zero, and words of a string.
@@ -205,7 +205,7 @@ fn values<'a>(
         let text = line.text.trim_ascii_end();
         for at in 0..text.len().div_ceil(width) {
             let value = line.real(line.columns(at * width, (at + 1) * width))?;
-            triplets.push(first.saturating_add(found), column, value, line.place())?;
+            triplets.push(first.saturating_add(found), column, value, line.location())?;
             found += 1;
         }
         *line = lines.expect("the next column of the matrix")?;
@@ -258,9 +258,9 @@ fn open_binary(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let mut file = Bytes::new(bytes, order);
     let mut items = Vec::new();
     while file.left() > 0 {
-        let place = file.clone();
+        let location = file.clone();
         let header = header_of(record(&mut file)?, order, whole)
-            .ok_or_else(|| place.malformed("the header of a matrix", "something else"))?;
+            .ok_or_else(|| location.malformed("the header of a matrix", "something else"))?;
         let start = file.clone();
         loop {
             let mut column = Bytes::new(record(&mut file)?, order);
@@ -278,10 +278,10 @@ fn read_binary(mut file: Bytes, header: &Header, whole: usize) -> Result<Matrix,
     // With whole numbers of 8 bytes, so are words, and all numbers have one.
     let double = header.kind == 2 || whole == 8;
     let words = if header.kind == 2 && whole == 4 { 2 } else { 1 };
-    let mut triplets = Triplets::new(header.rows, header.columns, 0, Place::File)?;
+    let mut triplets = Triplets::new(header.rows, header.columns, 0, Location::File)?;
     loop {
-        let place = file.clone();
-        let wrong = |what: &str| place.malformed(what, "something else");
+        let location = file.clone();
+        let wrong = |what: &str| location.malformed(what, "something else");
         let mut record = Bytes::new(record(&mut file)?, order);
         let column = whole_number(&mut record, whole)?;
         if column > header.columns as i64 {
@@ -296,8 +296,8 @@ fn read_binary(mut file: Bytes, header: &Header, whole: usize) -> Result<Matrix,
             for at in 0..count {
                 let value = if double { record.f64() } else { record.f32().map(f64::from) };
                 // The cursor counts within its record.
-                let value = value.map_err(|error| Error { place: place.place(), ..error })?;
-                triplets.push(row.saturating_add(at), column, value, place.place())?;
+                let value = value.map_err(|error| Error { location: location.location(), ..error })?;
+                triplets.push(row.saturating_add(at), column, value, location.location())?;
             }
             Ok(())
         };
@@ -356,18 +356,22 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_said_with_its_line() {
-        let check = |text: String, kind, place| {
+        let check = |text: String, kind, location| {
             let found =
-                read_bytes(text.as_bytes(), Some("nastran-op4"), None).map(|_| ()).map_err(|e| (e.kind, e.place));
-            assert_eq!(found, Err((kind, place)), "{text}");
+                read_bytes(text.as_bytes(), Some("nastran-op4"), None).map(|_| ()).map_err(|e| (e.kind, e.location));
+            assert_eq!(found, Err((kind, location)), "{text}");
         };
-        check(DENSE.replace("       1       2       4", "       1       2       5"), Kind::Count, Place::Line(2));
-        check(DENSE.replace("       1       2       4", "       1       3       4"), Kind::Count, Place::Line(3));
-        check(DENSE.replace("       1       2       4", "       0       2       4"), Kind::Malformed, Place::Line(2));
-        check(DENSE.lines().take(3).map(|line| format!("{line}\n")).collect(), Kind::Truncated, Place::Line(4));
-        check(DENSE.replace("       2       2K", "       2       4K"), Kind::Complex, Place::Variable("K".into()));
-        check(DENSE.replace("2E23.16", "2X23.16"), Kind::Malformed, Place::Line(1));
-        check(SPARSE.replace("     327681", "     262145"), Kind::Count, Place::Line(3));
-        check(SPARSE.replace("     327681", "          1"), Kind::Malformed, Place::Line(3));
+        check(DENSE.replace("       1       2       4", "       1       2       5"), Kind::Count, Location::Line(2));
+        check(DENSE.replace("       1       2       4", "       1       3       4"), Kind::Count, Location::Line(3));
+        check(
+            DENSE.replace("       1       2       4", "       0       2       4"),
+            Kind::Malformed,
+            Location::Line(2),
+        );
+        check(DENSE.lines().take(3).map(|line| format!("{line}\n")).collect(), Kind::Truncated, Location::Line(4));
+        check(DENSE.replace("       2       2K", "       2       4K"), Kind::Complex, Location::Variable("K".into()));
+        check(DENSE.replace("2E23.16", "2X23.16"), Kind::Malformed, Location::Line(1));
+        check(SPARSE.replace("     327681", "     262145"), Kind::Count, Location::Line(3));
+        check(SPARSE.replace("     327681", "          1"), Kind::Malformed, Location::Line(3));
     }
 }

@@ -6,7 +6,7 @@
 //! Source: NumPy Enhancement Proposal 1, A Simple File Format for NumPy Arrays.
 
 use crate::bytes::{Bytes, Number, Order};
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Along, Matrix, dense};
 use crate::text::shown;
@@ -121,7 +121,7 @@ impl<'a> Array<'a> {
             Some(count) if count <= room => Ok(count),
             _ => Err(Error::new(
                 Kind::Truncated,
-                self.data.place(),
+                self.data.location(),
                 format!("the header states the shape {:?}, the file has {room} numbers", self.shape),
                 "it is not complete: export or copy it again",
             )),
@@ -132,16 +132,16 @@ impl<'a> Array<'a> {
         let size = self.size().map_err(|note| {
             let kind = if self.element == Element::Complex { Kind::Complex } else { Kind::Unsupported };
             let remedy = "save a real array of two dimensions";
-            Error::new(kind, Place::File, format!("a real matrix was expected, this is {note}"), remedy)
+            Error::new(kind, Location::File, format!("a real matrix was expected, this is {note}"), remedy)
         });
         let size = size?;
         let Element::Number(number) = self.element else {
             return Err(self.data.malformed("an array of numbers", format!("{:?}", self.element)));
         };
-        // Every number is there, so that no place is beyond the end.
+        // Every number is there, so that no position is beyond the end.
         self.count(number)?;
         let along = if self.fortran { Along::Columns } else { Along::Rows };
-        dense(size, along, &self.data.place(), |at| number.real(&mut self.data.ahead(at * number.size())))
+        dense(size, along, &self.data.location(), |at| number.real(&mut self.data.ahead(at * number.size())))
     }
 }
 

@@ -5,7 +5,7 @@
 use std::borrow::Cow;
 
 use crate::bytes::{Bytes, Number, Order};
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
 use crate::inflate::{Limit, Wrapping, beginning, inflate};
 use crate::matrix::{Entry, Matrix, Symmetry, Triplets, compressed};
@@ -31,9 +31,9 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     if sparse("format") && sparse("shape") && sparse("data") {
         let size = array(&find(&members, "shape")?.contents()?)?.numbers(Number::index)?;
         let [rows, columns] = size[..] else {
-            let place = Place::Variable("shape".into());
+            let location = Location::Variable("shape".into());
             let problem = format!("{} sizes, rows and columns were expected", size.len());
-            return Err(Error::new(Kind::Unsupported, place, problem, "save a matrix of two dimensions"));
+            return Err(Error::new(Kind::Unsupported, location, problem, "save a matrix of two dimensions"));
         };
         return Ok(vec![Item::new("", rows, columns, move || read_sparse(&members, rows, columns))]);
     }
@@ -46,7 +46,7 @@ fn item(member: Member) -> Result<Item, Error> {
     if !start.starts_with(npy::MAGIC) {
         return Ok(Item::other(member.name.clone(), "no array"));
     }
-    let array = Array::new(&start).map_err(|error| error.at(Place::Variable(member.name.clone())))?;
+    let array = Array::new(&start).map_err(|error| error.at(Location::Variable(member.name.clone())))?;
     Ok(match array.size() {
         Ok((rows, columns)) => {
             Item::new(member.name.clone(), rows, columns, move || self::array(&member.contents()?)?.matrix())
@@ -62,55 +62,60 @@ fn array(contents: &[u8]) -> Result<Array<'_>, Error> {
 fn find<'m, 'a>(members: &'m [Member<'a>], name: &str) -> Result<&'m Member<'a>, Error> {
     members.iter().find(|member| member.name == name).ok_or_else(|| {
         let problem = format!("the sparse matrix has no part `{name}`");
-        Error::new(Kind::Malformed, Place::File, problem, "write it by scipy.sparse.save_npz")
+        Error::new(Kind::Malformed, Location::File, problem, "write it by scipy.sparse.save_npz")
     })
 }
 
 fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix, Error> {
     let part = |name: &str| -> Result<Cow<[u8]>, Error> { find(members, name)?.contents() };
     let indices = |name: &str| -> Result<Vec<usize>, Error> {
-        array(&part(name)?)?.numbers(Number::index).map_err(|error| error.at(Place::Variable(name.into())))
+        array(&part(name)?)?.numbers(Number::index).map_err(|error| error.at(Location::Variable(name.into())))
     };
     let layout = part("format")?;
     let layout: Vec<u8> = array(&layout)?.text()?.iter().copied().filter(|&byte| byte != 0).collect();
     let data = part("data")?;
     let values = array(&data)?;
     if values.element == npy::Element::Complex {
-        let place = Place::Variable("data".into());
+        let location = Location::Variable("data".into());
         return Err(Error::new(
             Kind::Complex,
-            place,
+            location,
             "the matrix is complex, a real one was expected".into(),
             "save its real part",
         ));
     }
     let values = values.numbers(Number::real)?;
-    let mut triplets = Triplets::new(rows, columns, values.len(), Place::File)?;
+    let mut triplets = Triplets::new(rows, columns, values.len(), Location::File)?;
     match &layout[..] {
         b"csc" | b"csr" => {
             let (pointers, inner) = (indices("indptr")?, indices("indices")?);
             let outer = if layout == b"csc" { columns } else { rows };
             compressed(&pointers, &inner, &values, outer, |outer, inner, value| {
                 let (row, column) = if layout == b"csc" { (inner, outer) } else { (outer, inner) };
-                triplets.push(row, column, value, Place::Variable("data".into()))
+                triplets.push(row, column, value, Location::Variable("data".into()))
             })?;
         }
         b"coo" => {
             let (row, column) = (indices("row")?, indices("col")?);
             if row.len() != values.len() || column.len() != values.len() {
                 let problem = format!("{} rows, {} columns, {} values", row.len(), column.len(), values.len());
-                return Err(Error::new(Kind::Count, Place::File, problem, "write it again by scipy.sparse.save_npz"));
+                return Err(Error::new(
+                    Kind::Count,
+                    Location::File,
+                    problem,
+                    "write it again by scipy.sparse.save_npz",
+                ));
             }
             for ((row, column), value) in row.into_iter().zip(column).zip(values) {
-                triplets.push(row, column, value, Place::Variable("data".into()))?;
+                triplets.push(row, column, value, Location::Variable("data".into()))?;
             }
         }
         other => {
             let problem = format!("the matrix is stored as {}, {LAYOUTS} was expected", shown(other));
-            let place = Place::Variable("format".into());
+            let location = Location::Variable("format".into());
             return Err(Error::new(
                 Kind::Unsupported,
-                place,
+                location,
                 problem,
                 "save it as csc: save_npz(path, matrix.tocsc())",
             ));
@@ -130,8 +135,8 @@ struct Member<'a> {
 }
 
 impl<'a> Member<'a> {
-    fn place(&self) -> Place {
-        Place::Variable(self.name.clone())
+    fn location(&self) -> Location {
+        Location::Variable(self.name.clone())
     }
 
     fn beginning(&self) -> Cow<'a, [u8]> {
@@ -143,7 +148,7 @@ impl<'a> Member<'a> {
 
     fn contents(&self) -> Result<Cow<'a, [u8]>, Error> {
         let contents = match self.deflated {
-            true => Cow::Owned(inflate(self.packed, Wrapping::Bare, self.limit, &self.place())?),
+            true => Cow::Owned(inflate(self.packed, Wrapping::Bare, self.limit, &self.location())?),
             false => Cow::Borrowed(self.packed),
         };
         let mut crc = flate2::Crc::new();
@@ -152,7 +157,7 @@ impl<'a> Member<'a> {
             return Ok(contents);
         }
         let problem = "its checksum differs from the one the zip states".into();
-        Err(Error::new(Kind::Malformed, self.place(), problem, "the file is damaged: copy or export it again"))
+        Err(Error::new(Kind::Malformed, self.location(), problem, "the file is damaged: copy or export it again"))
     }
 }
 
@@ -189,7 +194,7 @@ fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
         if flags & 1 != 0 || !matches!(method, 0 | 8) {
             let problem = format!("the member is encrypted or packed by method {method}, deflate was expected");
             let remedy = "write it by numpy.savez or savez_compressed";
-            return Err(Error::new(Kind::Unsupported, Place::Variable(name), problem, remedy));
+            return Err(Error::new(Kind::Unsupported, Location::Variable(name), problem, remedy));
         }
         let mut data = Bytes::new(bytes, Order::Little);
         data.seek(local)?;
@@ -227,7 +232,7 @@ fn directory(bytes: &[u8]) -> Result<usize, Error> {
     let mark = END.to_le_bytes();
     let end = bytes[from..].windows(4).rposition(|four| four == mark).map(|at| from + at).ok_or_else(|| {
         let problem = "the zip has no directory at its end".into();
-        Error::new(Kind::Truncated, Place::Byte(bytes.len()), problem, "it is not complete: export or copy it again")
+        Error::new(Kind::Truncated, Location::Byte(bytes.len()), problem, "it is not complete: export or copy it again")
     })?;
     let mut zip = Bytes::new(bytes, Order::Little);
     zip.seek(end + 16)?;
@@ -256,7 +261,7 @@ pub(crate) fn write(matrix: &Matrix) -> Result<Vec<u8>, Error> {
     let largest = i32::MAX as usize;
     if matrix.rows().max(matrix.columns()).max(entries.len()) > largest {
         let problem = format!("more than {largest} rows, columns or entries");
-        return Err(Error::new(Kind::TooLarge, Place::File, problem, "write it as Matrix Market"));
+        return Err(Error::new(Kind::TooLarge, Location::File, problem, "write it as Matrix Market"));
     }
     let mut pointers = vec![0_i32; matrix.columns() + 1];
     for e in &entries {
@@ -283,7 +288,8 @@ fn zip(parts: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, Error> {
     let (mut bytes, mut directory) = (Vec::new(), Vec::new());
     let small = |size: usize| {
         let problem = format!("{size} bytes do not fit into a zip of 32 bits");
-        u32::try_from(size).map_err(|_| Error::new(Kind::TooLarge, Place::File, problem, "write it as Matrix Market"))
+        u32::try_from(size)
+            .map_err(|_| Error::new(Kind::TooLarge, Location::File, problem, "write it as Matrix Market"))
     };
     for (name, contents) in parts {
         let name = format!("{name}.npy");

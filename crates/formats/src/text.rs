@@ -1,6 +1,6 @@
 //! Text files: lines with their numbers, fields, and numbers as Fortran writes them.
 
-use crate::error::{Error, Kind, Place};
+use crate::error::{Error, Kind, Location};
 
 /// Characters of a wrong field that a message shows.
 const SHOWN: usize = 40;
@@ -19,8 +19,8 @@ impl<'a> Lines<'a> {
 
     /// The next line without its end, or what an early end of the file is called.
     pub fn expect(&mut self, what: &str) -> Result<Line<'a>, Error> {
-        let place = Place::Line(self.number + 1);
-        self.next().ok_or_else(|| truncated(place, what))
+        let location = Location::Line(self.number + 1);
+        self.next().ok_or_else(|| truncated(location, what))
     }
 
     /// The next line that is not blank.
@@ -38,9 +38,9 @@ impl<'a> Lines<'a> {
         self.rest.len()
     }
 
-    /// The place of the line read last.
-    pub fn place(&self) -> Place {
-        Place::Line(self.number)
+    /// The location of the line read last.
+    pub fn location(&self) -> Location {
+        Location::Line(self.number)
     }
 }
 
@@ -67,8 +67,8 @@ pub(crate) struct Line<'a> {
 }
 
 impl<'a> Line<'a> {
-    pub fn place(&self) -> Place {
-        Place::Line(self.number)
+    pub fn location(&self) -> Location {
+        Location::Line(self.number)
     }
 
     /// What stands between blanks.
@@ -120,7 +120,7 @@ impl<'a> Line<'a> {
     pub fn malformed(&self, expected: &str, found: &str) -> Error {
         Error::new(
             Kind::Malformed,
-            self.place(),
+            self.location(),
             format!("{expected} was expected, {found} is there"),
             "the file is damaged or of another format: export it again, or state its format",
         )
@@ -128,10 +128,10 @@ impl<'a> Line<'a> {
 }
 
 /// A file that ends before `what`.
-pub(crate) fn truncated(place: Place, what: &str) -> Error {
+pub(crate) fn truncated(location: Location, what: &str) -> Error {
     Error::new(
         Kind::Truncated,
-        place,
+        location,
         format!("the file ends where {what} was expected"),
         "it is not complete: export or copy it again",
     )
@@ -200,7 +200,7 @@ mod tests {
         assert_eq!(
             real(b"1e999"),
             Some(f64::INFINITY),
-            "refused as not finite, where the place in the matrix is known"
+            "refused as not finite, where the position in the matrix is known"
         );
         assert_eq!(integer(b"9223372036854775807"), None);
         assert_eq!(integer(b"+12"), Some(12));
@@ -212,7 +212,7 @@ mod tests {
         assert_eq!(lines, [(1, &b"a"[..]), (2, b""), (3, b"b c")]);
         let line = Line { text: b"b c", number: 3 };
         assert_eq!(line.exactly::<2>("two fields"), Ok([&b"b"[..], b"c"]));
-        assert_eq!(line.exactly::<3>("three fields").map_err(|e| e.place), Err(Place::Line(3)));
+        assert_eq!(line.exactly::<3>("three fields").map_err(|e| e.location), Err(Location::Line(3)));
         assert_eq!((line.columns(2, 9), line.columns(7, 9)), (&b"c"[..], &b""[..]));
     }
 }

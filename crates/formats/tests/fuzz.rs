@@ -73,7 +73,7 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
         0 => bytes[at] = random.next() as u8,
         1 => bytes[at] = byte ^ (1 << random.below(8)),
         2 => {
-            // The word at this place becomes another one.
+            // The word at this position becomes another one.
             let inside = |byte: &u8| byte.is_ascii_alphanumeric() || b"+-.".contains(byte);
             let start = bytes[..at].iter().rposition(|byte| !inside(byte)).map_or(0, |before| before + 1);
             let end = bytes[at..].iter().position(|byte| !inside(byte)).map_or(bytes.len(), |length| at + length);

@@ -10,14 +10,14 @@ fn value() -> impl Strategy<Value = f64> {
     prop_oneof![8 => any::<f64>().prop_filter("finite", |value| value.is_finite()), 2 => -10.0..10.0, 1 => Just(0.0)]
 }
 
-/// Size and entries, each place at most once.
+/// Size and entries, each position at most once.
 fn entries(most: usize) -> impl Strategy<Value = (usize, usize, BTreeMap<(usize, usize), f64>)> {
     (1..=most, 1..=most).prop_flat_map(|(rows, columns)| {
         (Just(rows), Just(columns), prop::collection::btree_map((0..rows, 0..columns), value(), 0..40))
     })
 }
 
-/// A square matrix of one triangle, each place at most once, with a last row and column that are not empty.
+/// A square matrix of one triangle, each position at most once, with a last row and column that are not empty.
 fn triangle() -> impl Strategy<Value = (usize, Vec<(usize, usize, f64)>)> {
     (1..12_usize).prop_flat_map(|size| {
         let places = prop::collection::btree_map((0..size, 0..size), value(), 0..40);

@@ -292,17 +292,9 @@ impl<T: Number> Lu<T> {
     /// # Panics
     /// If the length of `right` is no multiple of n.
     pub fn solve(&self, right: &mut [T]) {
-        let n = self.n;
-        if n == 0 || right.is_empty() {
-            return;
-        }
-        assert!(right.len().is_multiple_of(n), "{} numbers are no columns of {n}", right.len());
-        let columns = right.len() / n;
-        let mut memory = MemBuffer::new(solve_in_place_scratch::<u32, T>(n, columns, Par::Seq));
-        let factors = MatRef::from_column_major_slice(&self.factors, n, n);
-        let exchanges = PermRef::new_checked(&self.order, &self.inverse, n);
-        let right = MatMut::from_column_major_slice_mut(right, n, columns);
-        solve_in_place(factors, factors, exchanges, right, Par::Seq, MemStack::new(&mut memory));
+        self.apply(right, solve_in_place_scratch::<u32, T>, |factors, exchanges, right, stack| {
+            solve_in_place(factors, factors, exchanges, right, Par::Seq, stack);
+        });
     }
 
     /// The same with the conjugate transpose of the matrix.
@@ -310,18 +302,28 @@ impl<T: Number> Lu<T> {
     /// # Panics
     /// If the length of `right` is no multiple of n.
     pub fn solve_adjoint(&self, right: &mut [T]) {
+        self.apply(right, solve_transpose_in_place_scratch::<u32, T>, |factors, exchanges, right, stack| {
+            solve_transpose_in_place_with_conj(factors, factors, exchanges, Conj::Yes, right, Par::Seq, stack);
+        });
+    }
+
+    fn apply(
+        &self,
+        right: &mut [T],
+        scratch: fn(usize, usize, Par) -> StackReq,
+        solve: impl FnOnce(MatRef<'_, T>, PermRef<'_, u32>, MatMut<'_, T>, &mut MemStack),
+    ) {
         let n = self.n;
         if n == 0 || right.is_empty() {
             return;
         }
         assert!(right.len().is_multiple_of(n), "{} numbers are no columns of {n}", right.len());
         let columns = right.len() / n;
-        let mut memory = MemBuffer::new(solve_transpose_in_place_scratch::<u32, T>(n, columns, Par::Seq));
+        let mut memory = MemBuffer::new(scratch(n, columns, Par::Seq));
         let factors = MatRef::from_column_major_slice(&self.factors, n, n);
         let exchanges = PermRef::new_checked(&self.order, &self.inverse, n);
         let right = MatMut::from_column_major_slice_mut(right, n, columns);
-        let stack = MemStack::new(&mut memory);
-        solve_transpose_in_place_with_conj(factors, factors, exchanges, Conj::Yes, right, Par::Seq, stack);
+        solve(factors, exchanges, right, MemStack::new(&mut memory));
     }
 }
 

@@ -315,8 +315,8 @@ impl Size {
         let help = format!("{}{fewer}{split}or allow more with --memory", given.concat());
         // at what makes most of it
         let place = match (study.varied.first(), study.points() / study.cases().max(1)) {
-            (Some(varied), frequencies) if study.cases() >= frequencies => &varied.place,
-            _ => study.study.place_of("frequency", None),
+            (Some(varied), frequencies) if study.cases() >= frequencies => &varied.location,
+            _ => study.study.location_of("frequency", None),
         };
         Some(StudyError::at(&study.sources, Problem::new(place, "memory", message).help(help)))
     }

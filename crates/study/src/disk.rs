@@ -56,13 +56,13 @@ pub(crate) fn ring_of(
         let most = MOST_MASSES / first.masses.len().max(1);
         if sectors > most {
             let message = format!("{sectors} sectors of {} masses; the limit is {MOST_MASSES}", first.masses.len());
-            return Err(vec![Problem::new(disk.table.place_of("sectors", None), "sectors", message)]);
+            return Err(vec![Problem::new(disk.table.location_of("sectors", None), "sectors", message)]);
         }
         let rows = first.substructure.as_ref().filter(|own| matches!(own.reduction, Reduction::None));
         let rows = rows.map_or(0, |own| own.component.dofs());
         if rows * sectors > MOST_ROWS {
             let message = format!("{sectors} sectors of {rows} rows; the limit without a reduction is {MOST_ROWS}");
-            let problem = Problem::new(disk.table.place_of("sectors", None), "sectors", message);
+            let problem = Problem::new(disk.table.location_of("sectors", None), "sectors", message);
             return Err(vec![
                 problem.help("leave out `reduce = false` in [structure]: few coordinates then serve all sectors"),
             ]);
@@ -70,7 +70,7 @@ pub(crate) fn ring_of(
         let ring = around.ring(|s| all.get(s).unwrap_or(&first).clone());
         ring.map_err(|error| {
             vec![if error.element == Element::Whole {
-                Problem::new(disk.table.place_of(error.key, None), error.key, error.message.clone())
+                Problem::new(disk.table.location_of(error.key, None), error.key, error.message.clone())
             } else {
                 problem_of(structure, &error, &first)
             }]
@@ -85,7 +85,7 @@ pub(crate) fn ring_of(
 /// Ties a sector by its matrices to the next.
 fn tied(structure: &Structure, disk: &StatedDisk, sectors: usize, sector: &mut Model) -> Result<(), Problem> {
     let table = &disk.table;
-    let problem = |key: &'static str, message: String| Problem::new(table.place_of(key, None), key, message);
+    let problem = |key: &'static str, message: String| Problem::new(table.location_of(key, None), key, message);
     if structure.matrices.is_none() {
         return match ["boundary", "nodes", "axis", "blade"].into_iter().find(|key| table.entry(key).is_some()) {
             Some(key) => {
@@ -134,7 +134,7 @@ fn pairs<'a>(
     sectors: usize,
 ) -> Result<Cow<'a, [(String, String)]>, Problem> {
     let table = &disk.table;
-    let problem = |key: &'static str, message: String| Problem::new(table.place_of(key, None), key, message);
+    let problem = |key: &'static str, message: String| Problem::new(table.location_of(key, None), key, message);
     let Some(nodes) = &disk.nodes else {
         return disk.boundary.as_deref().map(Cow::from).ok_or_else(|| {
             let message = "a sector by its matrices needs `boundary`: the node pairs of its low and its high side";
@@ -187,7 +187,7 @@ fn sectors(disk: &StatedDisk, values: &Values) -> Result<usize, Vec<Problem>> {
     let sectors = whole(&disk.table, values, "sectors").map_err(|problem| vec![problem])?.unwrap_or(0);
     usize::try_from(sectors).ok().filter(|sectors| *sectors >= LEAST_SECTORS).ok_or_else(|| {
         let message = format!("a disk has {LEAST_SECTORS} sectors or more, found {sectors}");
-        vec![Problem::new(disk.table.place_of("sectors", None), "sectors", message)]
+        vec![Problem::new(disk.table.location_of("sectors", None), "sectors", message)]
     })
 }
 
@@ -197,7 +197,7 @@ fn deviations(disk: &StatedDisk, values: &Values, sectors: usize) -> Result<Opti
     if let Some(pattern) = &disk.pattern {
         if pattern.len() != sectors {
             let message = format!("the pattern has {} sectors, and the disk has {sectors}", pattern.len());
-            return Err(vec![Problem::new(table.place_of("file", None), "file", message)]);
+            return Err(vec![Problem::new(table.location_of("file", None), "file", message)]);
         }
         return Ok(Some(pattern.clone()));
     }
@@ -225,7 +225,7 @@ fn mistuned(
     let of = target(disk, table, environment, first).map_err(|problem| vec![problem])?;
     if let Some(message) = too_far(deviations) {
         let key = if disk.pattern.is_some() { "file" } else { "deviation" };
-        let problem = Problem::new(table.place_of(key, None), key, message);
+        let problem = Problem::new(table.location_of(key, None), key, message);
         return Err(vec![problem.help("deviations are shares: 0.02 is 2 %")]);
     }
     let mut models = Vec::with_capacity(deviations.len());
@@ -251,7 +251,7 @@ fn mistuned(
                     let message = format!(
                         "[structure] or a [[place]] depends on `{name}`, and they are the same in every sector"
                     );
-                    let problem = Problem::new(table.place_of("of", None), "of", message);
+                    let problem = Problem::new(table.location_of("of", None), "of", message);
                     return Err(vec![problem.help("blades by their matrices differ by of = \"blade.frequency\"")]);
                 }
                 model
@@ -272,7 +272,7 @@ fn target(
         Some(Stated::Names(names)) => names.iter().map(|(name, _)| name.clone()).collect(),
         _ => Vec::new(),
     };
-    let place = table.place_of("of", None);
+    let place = table.location_of("of", None);
     match &names[..] {
         [name] => {
             if let Some((_, part)) = OF_BLADE.into_iter().find(|(known, _)| known == name) {

@@ -1,6 +1,6 @@
-//! A TOML text as a tree in which every key and value knows its place.
+//! A TOML text as a tree in which every key and value knows its location.
 
-use crate::error::{Place, Problem};
+use crate::error::{Location, Problem};
 use crate::near::shown;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 /// A value of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Node {
-    pub place: Place,
+    pub location: Location,
     pub value: Content,
 }
 
@@ -34,14 +34,14 @@ pub(crate) enum Content {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Table {
     /// Its header, or all of an inline table.
-    pub place: Place,
+    pub location: Location,
     pub entries: Vec<Entry>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry {
     pub key: String,
-    pub key_place: Place,
+    pub key_location: Location,
     pub node: Node,
 }
 
@@ -84,7 +84,7 @@ pub(crate) fn parse(text: &str, source: usize) -> Result<Table, Problem> {
             message = format!("this is not TOML: {message}");
             help = Some("texts and quantities stand in quotes: mass = \"182 g\"".to_owned());
         }
-        Problem::new(&Place { source, span }, shown(key), message).maybe_help(help)
+        Problem::new(&Location { source, span }, shown(key), message).maybe_help(help)
     })?;
     let reader = Reader { text, source };
     Ok(reader.table(tree.get_ref(), 0..0))
@@ -96,8 +96,8 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn place(&self, span: Range<usize>) -> Place {
-        Place { source: self.source, span }
+    fn location(&self, span: Range<usize>) -> Location {
+        Location { source: self.source, span }
     }
 
     // the parser refuses more than 80 levels, so this recursion is shallow
@@ -106,16 +106,16 @@ impl Reader<'_> {
             .iter()
             .map(|(key, value)| Entry {
                 key: key.get_ref().to_string(),
-                key_place: self.place(key.span()),
+                key_location: self.location(key.span()),
                 node: self.node(value.get_ref(), value.span(), key.span()),
             })
             .collect();
-        entries.sort_by_key(|entry| entry.key_place.span.start);
-        Table { place: self.place(span), entries }
+        entries.sort_by_key(|entry| entry.key_location.span.start);
+        Table { location: self.location(span), entries }
     }
 
     fn node(&self, value: &DeValue<'_>, span: Range<usize>, key: Range<usize>) -> Node {
-        // tables made by dotted keys have no place of their own
+        // tables made by dotted keys have no location of their own
         let span = if span.is_empty() { key.clone() } else { span };
         let value = match value {
             DeValue::String(text) => {
@@ -140,7 +140,7 @@ impl Reader<'_> {
             }
             DeValue::Table(table) => Content::Table(self.table(table, span.clone())),
         };
-        Node { place: self.place(span), value }
+        Node { location: self.location(span), value }
     }
 }
 
@@ -153,11 +153,11 @@ mod tests {
         let text = "a = \"2 mm\"\n[[mass]]\nname = 'x'\nmass = 0x10\n";
         let tree = parse(text, 0).unwrap();
         let a = tree.get("a").unwrap();
-        assert_eq!(&text[a.node.place.span.clone()], "\"2 mm\"");
+        assert_eq!(&text[a.node.location.span.clone()], "\"2 mm\"");
         assert_eq!(a.node.value, Content::Text { text: "2 mm".into(), inner: Some(5) });
         let Content::List(list) = &tree.get("mass").unwrap().node.value else { panic!() };
         let Content::Table(mass) = &list[0].value else { panic!() };
-        assert_eq!(&text[mass.place.span.clone()], "[[mass]]");
+        assert_eq!(&text[mass.location.span.clone()], "[[mass]]");
         assert_eq!(mass.get("mass").unwrap().node.value, Content::Number { value: 16.0, whole: Some(16) });
     }
 
@@ -170,9 +170,9 @@ mod tests {
     #[test]
     fn syntax_errors_have_a_place() {
         let problem = parse("a = 1\nb = = 2\n", 0).unwrap_err();
-        assert_eq!(problem.place.span.start, 10, "{problem:?}");
+        assert_eq!(problem.location.span.start, 10, "{problem:?}");
         let problem = parse("a = 1\na = 2\n", 0).unwrap_err();
-        assert_eq!((problem.place.span.start, problem.key.as_str()), (6, "a"));
+        assert_eq!((problem.location.span.start, problem.key.as_str()), (6, "a"));
         assert!(parse(&format!("a = {}", "[".repeat(10_000)), 0).is_err());
     }
 }

@@ -15,7 +15,7 @@ pub(crate) struct Source {
 
 /// Where a value stands: the text (by index) and its bytes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(crate) struct Place {
+pub(crate) struct Location {
     pub source: usize,
     pub span: Range<usize>,
 }
@@ -23,15 +23,15 @@ pub(crate) struct Place {
 /// An error before it knows its text.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Problem {
-    pub place: Place,
+    pub location: Location,
     pub key: String,
     pub message: String,
     pub help: Option<String>,
 }
 
 impl Problem {
-    pub fn new(place: &Place, key: impl Into<String>, message: impl Into<String>) -> Self {
-        Problem { place: place.clone(), key: key.into(), message: message.into(), help: None }
+    pub fn new(location: &Location, key: impl Into<String>, message: impl Into<String>) -> Self {
+        Problem { location: location.clone(), key: key.into(), message: message.into(), help: None }
     }
 
     pub fn help(mut self, help: impl Into<String>) -> Self {
@@ -44,14 +44,14 @@ impl Problem {
         self
     }
 
-    /// A fault inside the text at `place`; `inner` says where the text begins in the source, if it stands there as it is.
-    pub fn fault(place: &Place, inner: Option<usize>, key: &str, fault: Fault) -> Self {
+    /// A fault inside the text at `location`; `inner` says where the text begins in the source, if it stands there as it is.
+    pub fn fault(location: &Location, inner: Option<usize>, key: &str, fault: Fault) -> Self {
         let span = match inner {
             Some(start) => start + fault.span.start..start + fault.span.end,
-            None => place.span.clone(),
+            None => location.span.clone(),
         };
-        let place = Place { source: place.source, span };
-        Problem { place, key: key.to_owned(), message: fault.message, help: fault.help }
+        let location = Location { source: location.source, span };
+        Problem { location, key: key.to_owned(), message: fault.message, help: fault.help }
     }
 }
 
@@ -80,14 +80,14 @@ impl StudyError {
         StudyError(Box::new(Inner { source, at: None, key: None, message: message.into(), help, others: Vec::new() }))
     }
 
-    /// An error at a place of one of the texts.
+    /// An error at a location of one of the texts.
     pub(crate) fn at(sources: &[Arc<Source>], problem: Problem) -> Self {
-        let source = match sources.get(problem.place.source) {
+        let source = match sources.get(problem.location.source) {
             Some(source) => Arc::clone(source),
             None => Arc::new(Source { name: String::new(), text: String::new() }),
         };
-        let start = boundary(&source.text, problem.place.span.start);
-        let end = boundary(&source.text, problem.place.span.end.max(start));
+        let start = boundary(&source.text, problem.location.span.start);
+        let end = boundary(&source.text, problem.location.span.end.max(start));
         let (line, column) = line_and_column(&source.text, start);
         StudyError(Box::new(Inner {
             source,
@@ -101,9 +101,9 @@ impl StudyError {
 
     /// The first of several errors, in the order of the file, with the rest behind it.
     pub(crate) fn all(sources: &[Arc<Source>], mut problems: Vec<Problem>) -> Option<Self> {
-        problems.sort_by_key(|p| (p.place.source, p.place.span.start));
+        problems.sort_by_key(|p| (p.location.source, p.location.span.start));
         // one mistake in an entry that is repeated is one error
-        problems.dedup_by(|later, first| later.place == first.place && later.key == first.key);
+        problems.dedup_by(|later, first| later.location == first.location && later.key == first.key);
         let mut errors = problems.into_iter().map(|problem| StudyError::at(sources, problem));
         let mut first = errors.next()?;
         first.0.others = errors.collect();

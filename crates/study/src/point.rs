@@ -9,7 +9,7 @@ use stickslip::method::OrbitError;
 use stickslip::orbit::{Orbit, Symmetry};
 
 /// The place of a point in words: the varied parameters and the frequency.
-pub(crate) fn place_of(case: &Case, omega: f64) -> String {
+pub(crate) fn location_of(case: &Case, omega: f64) -> String {
     let frequency = format!("frequency = {:.6} Hz", omega / std::f64::consts::TAU);
     if case.varied.is_empty() { frequency } else { format!("{}, {frequency}", case.label()) }
 }

@@ -20,7 +20,7 @@ mod values;
 pub use template::TemplateParameter;
 
 use crate::document::{self, Content, Node, Table};
-use crate::error::{Place, Problem, Source, StudyError};
+use crate::error::{Location, Problem, Source, StudyError};
 use crate::near::nearest;
 use crate::schema::{self, FILE, MOST_BYTES};
 use crate::stated::Structure;
@@ -80,7 +80,7 @@ pub fn read_bytes(name: &str, bytes: &[u8], overrides: &[(String, String)]) -> R
             let text = String::from_utf8_lossy(bytes).into_owned();
             let span = valid..valid + char::REPLACEMENT_CHARACTER.len_utf8();
             let message = format!("the file is not UTF-8 text: byte {:#04x} has no meaning here", bytes[valid]);
-            let problem = Problem::new(&Place { source: 0, span }, "", message)
+            let problem = Problem::new(&Location { source: 0, span }, "", message)
                 .help("save the file as UTF-8; a binary file is no study");
             Err(StudyError::at(&[Arc::new(Source { name: name.to_owned(), text })], problem))
         }

@@ -40,7 +40,7 @@ pub(crate) fn sector_of(
             if let Some(place) = own(lists).next() {
                 let message = "a place is one of a structure, and there is none";
                 let help = "add [structure] with `stiffness` and `mass`; a point mass is a [[mass]], a turned face of one is a place with `of`";
-                problems.push(Problem::new(&place.place, "place", message).help(help));
+                problems.push(Problem::new(&place.location, "place", message).help(help));
             }
         }
     }
@@ -144,7 +144,7 @@ pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Pr
             let message = format!("`{one}` and `{other}` say different things of the same wave");
             let help =
                 format!("keep one of them; for two waves write two entries, one with `{one}`, one with `{other}`");
-            problems.push(Problem::new(table.place_of(other, None), other, message).help(help));
+            problems.push(Problem::new(table.location_of(other, None), other, message).help(help));
             Around::EngineOrder(0)
         }
     }
@@ -156,7 +156,7 @@ pub(crate) fn none_around(table: &StatedTable, problems: &mut Vec<Problem>) {
         if let Some(entry) = table.entry(key) {
             let message = format!("`{key}` is for bladed disks, and there is no [disk]");
             let help = "add a table [disk] with `sectors`, and state one sector as the model";
-            problems.push(Problem::new(&entry.place, key, message).help(help));
+            problems.push(Problem::new(&entry.location, key, message).help(help));
         }
     }
 }
@@ -171,5 +171,5 @@ pub(crate) fn whole(table: &StatedTable, values: &Values, key: &'static str) -> 
         return Ok(Some(value as i64));
     }
     let message = format!("must be a whole number, found {value}");
-    Err(Problem::new(table.place_of(key, None), key, message))
+    Err(Problem::new(table.location_of(key, None), key, message))
 }

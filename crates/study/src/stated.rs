@@ -1,6 +1,6 @@
 //! How a model is stated: the lists, files and template of a study, and where in them a problem of the model is.
 
-use crate::error::{Place, Problem};
+use crate::error::{Location, Problem};
 use crate::expression::displayed;
 use crate::names::Names;
 use crate::near::{nearest, one_of};
@@ -60,12 +60,12 @@ pub(crate) struct NamedTemplate {
 }
 
 impl NamedTemplate {
-    /// Rewords a problem in the template's file for a user who has not written it: at the place where the template is
+    /// Rewords a problem in the template's file for a user who has not written it: at the location where the template is
     /// named.
     pub fn reword(&self, element: Element, problem: &mut Problem) {
-        if problem.place.source == self.source {
+        if problem.location.source == self.source {
             problem.message = self.blame(element, &problem.key, &problem.message);
-            problem.place = self.table.place_of("template", None).clone();
+            problem.location = self.table.location_of("template", None).clone();
         }
     }
 
@@ -137,22 +137,22 @@ impl StatedDisk {
     }
 }
 
-/// What is wrong with a model, at the place in the file that states it; `model` has the names that there are.
+/// What is wrong with a model, at the location in the file that states it; `model` has the names that there are.
 pub(crate) fn problem_of(structure: &Structure, error: &ModelError, model: &Model) -> Problem {
     let (list, index) = error.element.entry();
-    let whole = Place::default();
-    let (place, message) = match &structure.template {
+    let whole = Location::default();
+    let (location, message) = match &structure.template {
         None => {
             let matrices = structure.matrices.as_ref().filter(|_| list == "structure");
             let table =
                 matrices.map(|matrices| &matrices.table).or_else(|| structure.lists.get(list).get(index.unwrap_or(0)));
-            let place = table.map_or(&whole, |table| table.place_of(error.key, error.wrong_name.as_deref()));
+            let location = table.map_or(&whole, |table| table.location_of(error.key, error.wrong_name.as_deref()));
             let message = if error.key == "reduce" && has_no_end(model) { NO_END } else { &error.message };
-            (place, table.map_or_else(|| message.to_owned(), |table| table.with_turn(message)))
+            (location, table.map_or_else(|| message.to_owned(), |table| table.with_turn(message)))
         }
         Some(template) => {
-            let place = template.table.place_of(if error.key == "law" { "law" } else { "template" }, None);
-            (place, template.blame(error.element, error.key, &error.message))
+            let location = template.table.location_of(if error.key == "law" { "law" } else { "template" }, None);
+            (location, template.blame(error.element, error.key, &error.message))
         }
     };
     let places = model.place_names();
@@ -173,7 +173,7 @@ pub(crate) fn problem_of(structure: &Structure, error: &ModelError, model: &Mode
         None if error.key == "name" => Some("choose another name".to_owned()),
         None => None,
     };
-    Problem::new(place, error.key, message).maybe_help(help)
+    Problem::new(location, error.key, message).maybe_help(help)
 }
 
 /// Lowest frequencies that are shown where a structure cannot be reduced.

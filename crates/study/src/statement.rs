@@ -1,6 +1,6 @@
-//! What a file states, compiled: every expression parsed, every place known, nothing evaluated yet.
+//! What a file states, compiled: every expression parsed, every location known, nothing evaluated yet.
 
-use crate::error::{Place, Problem};
+use crate::error::{Location, Problem};
 use crate::expression::{Expression, Value, described, displayed};
 use crate::key::Within;
 use crate::values::{Frequencies, Given, Values};
@@ -11,7 +11,7 @@ use stickslip::law::{LawError, LawInfo, Parameter, SharedLaw};
 /// A quantity as it stands in a text.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Quantity {
-    pub place: Place,
+    pub location: Location,
     /// Where its text begins in the source, see [`crate::document::Content::Text`].
     pub inner: Option<usize>,
     pub text: String,
@@ -20,7 +20,7 @@ pub(crate) struct Quantity {
 
 #[derive(Debug, Clone)]
 pub(crate) struct StatedTable {
-    pub place: Place,
+    pub location: Location,
     /// The indices of the repetition that states it, in words; empty for most.
     pub turn: String,
     pub entries: Vec<StatedEntry>,
@@ -30,22 +30,22 @@ pub(crate) struct StatedTable {
 pub(crate) struct StatedEntry {
     pub key: &'static str,
     /// Its value; the table if it is a default.
-    pub place: Place,
+    pub location: Location,
     pub value: Stated,
 }
 
 /// Rows with their weights.
-pub(crate) type Weights = Vec<(String, Place, Quantity)>;
+pub(crate) type Weights = Vec<(String, Location, Quantity)>;
 
 #[derive(Debug, Clone)]
 pub(crate) enum Stated {
     Fixed(Given),
-    Names(Vec<(String, Place)>),
+    Names(Vec<(String, Location)>),
     Quantity { quantity: Quantity, dimension: Dimension, within: Within, example: &'static str },
     List(Vec<Quantity>),
     Range { from: Quantity, to: Quantity, points: usize },
     Adaptive { from: Quantity, to: Quantity, tolerance: Quantity },
-    ByName(Vec<(String, Place, Quantity)>, Dimension),
+    ByName(Vec<(String, Location, Quantity)>, Dimension),
     Vector(Vec<Quantity>),
     Sums(Vec<Weights>),
     Law(&'static LawInfo, StatedTable),
@@ -62,16 +62,16 @@ impl StatedTable {
         if self.turn.is_empty() { message.to_owned() } else { format!("{message} ({})", self.turn) }
     }
 
-    /// The place of a key's value, or of a name in it; the table's own if there is no such key.
-    pub fn place_of(&self, key: &str, name: Option<&str>) -> &Place {
-        let Some(entry) = self.entry(key) else { return &self.place };
+    /// The location of a key's value, or of a name in it; the table's own if there is no such key.
+    pub fn location_of(&self, key: &str, name: Option<&str>) -> &Location {
+        let Some(entry) = self.entry(key) else { return &self.location };
         let inside = name.and_then(|name| match &entry.value {
-            Stated::Names(names) => names.iter().find(|(n, _)| n == name).map(|(_, place)| place),
-            Stated::ByName(names, _) => names.iter().find(|(n, _, _)| n == name).map(|(_, place, _)| place),
-            Stated::Sums(sums) => sums.iter().flatten().find(|(n, _, _)| n == name).map(|(_, place, _)| place),
+            Stated::Names(names) => names.iter().find(|(n, _)| n == name).map(|(_, location)| location),
+            Stated::ByName(names, _) => names.iter().find(|(n, _, _)| n == name).map(|(_, location, _)| location),
+            Stated::Sums(sums) => sums.iter().flatten().find(|(n, _, _)| n == name).map(|(_, location, _)| location),
             _ => None,
         });
-        inside.unwrap_or(&entry.place)
+        inside.unwrap_or(&entry.location)
     }
 }
 
@@ -86,7 +86,7 @@ impl Quantity {
     pub fn value(&self, key: &str, environment: &Environment<'_>) -> Result<Value, Problem> {
         self.expression
             .evaluate(&environment.values)
-            .map_err(|fault| Problem::fault(&self.place, self.inner, key, fault))
+            .map_err(|fault| Problem::fault(&self.location, self.inner, key, fault))
     }
 
     /// The value in SI, of this dimension and in this range.
@@ -163,9 +163,9 @@ impl Quantity {
     pub fn problem(&self, key: &str, message: impl Into<String>) -> Problem {
         let span = match self.inner {
             Some(start) => start..start + self.text.len(),
-            None => self.place.span.clone(),
+            None => self.location.span.clone(),
         };
-        Problem::new(&Place { source: self.place.source, span }, key, message)
+        Problem::new(&Location { source: self.location.source, span }, key, message)
     }
 }
 
@@ -242,7 +242,7 @@ impl Stated {
             }
             Stated::Sums(sums) => {
                 let one = |sum: &Weights| {
-                    let weight = |(name, _, quantity): &(String, Place, Quantity)| {
+                    let weight = |(name, _, quantity): &(String, Location, Quantity)| {
                         let weight = quantity.number(name, (Dimension::NONE, Within::Finite), "", environment)?;
                         Ok((name.clone(), weight))
                     };
@@ -292,9 +292,9 @@ fn law(
     }
     if problems.len() > before {
         // already said; the caller only needs to know that there is no law
-        return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.place, key, "")));
+        return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.location, key, "")));
     }
-    row.build(&numbers).map_err(|error| Problem::new(&table.place, key, error.to_string()))
+    row.build(&numbers).map_err(|error| Problem::new(&table.location, key, error.to_string()))
 }
 
 /// Tolerances of adaptive frequencies: finer ones take more points than they are worth, coarser ones show nothing.

@@ -1,7 +1,7 @@
 //! A study that has been read: its cases, each with its model and the values of its kind.
 
 use crate::disk::{self, Again};
-use crate::error::{Place, Problem, Source, StudyError};
+use crate::error::{Location, Problem, Source, StudyError};
 use crate::expression::{Value, displayed};
 use crate::figure;
 use crate::immovable::immovable;
@@ -59,7 +59,7 @@ pub(crate) struct Parameter {
 #[derive(Debug, Clone)]
 pub(crate) struct Varied {
     pub index: usize,
-    pub place: Place,
+    pub location: Location,
     pub points: VariedPoints,
 }
 
@@ -375,16 +375,16 @@ impl Study {
         let Some(row) = method::find(name) else {
             let words = method::TABLE.iter().map(|row| row.name);
             let source = Arc::new(Source { name: "--method".to_owned(), text: name.to_owned() });
-            let place = Place { source: 0, span: 0..name.len() };
+            let location = Location { source: 0, span: 0..name.len() };
             let message = format!("there is no method `{}`, expected {}", shown(name), one_of(words.clone()));
             let help = nearest(name, words).map(|near| format!("did you mean `{near}`?"));
-            return Err(StudyError::at(&[source], Problem::new(&place, "method", message).maybe_help(help)));
+            return Err(StudyError::at(&[source], Problem::new(&location, "method", message).maybe_help(help)));
         };
         let same = |entry: &StatedEntry| matches!(&entry.value, Stated::Fixed(Given::Text(text)) if text == row.name);
         if !self.method.entry("kind").is_some_and(same) {
-            let place = self.method.place.clone();
+            let location = self.method.location.clone();
             let kind = Stated::Fixed(Given::Text(row.name.to_owned()));
-            self.method.entries = vec![StatedEntry { key: "kind", place, value: kind }];
+            self.method.entries = vec![StatedEntry { key: "kind", location, value: kind }];
         }
         Ok(self)
     }
@@ -444,12 +444,12 @@ impl Study {
                 list.get(if self.structure.lists.disk.is_some() { index % list.len().max(1) } else { index })
             }
         };
-        let whole = Place::default();
-        let place = stated.map_or(&whole, |table| match (table.entry(key), &self.structure.template) {
-            (None, Some(_)) => table.place_of("template", None),
-            _ => table.place_of(key, None),
+        let whole = Location::default();
+        let location = stated.map_or(&whole, |table| match (table.entry(key), &self.structure.template) {
+            (None, Some(_)) => table.location_of("template", None),
+            _ => table.location_of(key, None),
         });
-        StudyError::at(&self.sources, Problem::new(place, key, message).maybe_help(help))
+        StudyError::at(&self.sources, Problem::new(location, key, message).maybe_help(help))
     }
 
     /// What tells the matrices of `[structure]`, and what files say of it as a sector, from others; none of a study without them.
@@ -512,8 +512,9 @@ impl Study {
                 && *sectors.get_or_insert(found) != found
             {
                 let message = "the number of sectors is another in another case, and results are named after them";
-                let place = self.structure.lists.disk.as_ref().map(|disk| disk.table.place_of("sectors", None).clone());
-                let problem = Problem::new(&place.unwrap_or_default(), "sectors", message);
+                let location =
+                    self.structure.lists.disk.as_ref().map(|disk| disk.table.location_of("sectors", None).clone());
+                let problem = Problem::new(&location.unwrap_or_default(), "sectors", message);
                 return Err(StudyError::at(&self.sources, problem.help("make a study for every number of sectors")));
             }
             if let Some(error) = StudyError::all(&self.sources, problems) {
@@ -638,8 +639,8 @@ impl Study {
             return None;
         }
         if first_look && let Err(complaint) = figure::check(&self.figure_values(), self.kind, &model) {
-            let place = self.figure.place_of(complaint.key, complaint.name.as_deref());
-            problems.push(Problem::new(place, complaint.key, complaint.message).maybe_help(complaint.help));
+            let location = self.figure.location_of(complaint.key, complaint.name.as_deref());
+            problems.push(Problem::new(location, complaint.key, complaint.message).maybe_help(complaint.help));
             return None;
         }
         Some(Parts { environment: environment.values, model, values, method })
@@ -677,8 +678,8 @@ impl Study {
     }
 
     fn complaint(&self, complaint: Complaint) -> Problem {
-        let place = self.study.place_of(complaint.key, complaint.name.as_deref());
-        Problem::new(place, complaint.key, complaint.message).maybe_help(complaint.help)
+        let location = self.study.location_of(complaint.key, complaint.name.as_deref());
+        Problem::new(location, complaint.key, complaint.message).maybe_help(complaint.help)
     }
 }
 

@@ -35,12 +35,12 @@ pub(crate) fn of(
     let share = values.table("stiffened").and_then(|spin| Some(spin.quantity("speed")? / spin.quantity("at")?));
     let spinning = stiffened.as_ref().zip(share).map(|(stiffened, share)| stiffened.at(component, share * share));
     let component = spinning.unwrap_or_else(|| Ok(component.clone())).unwrap_or_else(|error| {
-        problems.push(Problem::new(table.place_of("stiffened", None), "stiffened", error.to_string()));
+        problems.push(Problem::new(table.location_of("stiffened", None), "stiffened", error.to_string()));
         component.clone()
     });
     if let Some(ratio) = values.quantity("modal_damping").filter(|ratio| *ratio >= CRITICAL) {
         let message = format!("a damping ratio of {ratio}, and from 1 on no mode vibrates");
-        let problem = Problem::new(table.place_of("modal_damping", None), "modal_damping", message);
+        let problem = Problem::new(table.location_of("modal_damping", None), "modal_damping", message);
         problems.push(problem.help("say percent, as in modal_damping = \"0.1 %\""));
     }
     let damping = match (values.quantity("modal_damping"), values.table("rayleigh")) {
@@ -53,7 +53,7 @@ pub(crate) fn of(
     };
     let reduction = match (values.table("reduce"), values.flag("reduce")) {
         (Some(reduce), _) => stated_reduction(reduce).unwrap_or_else(|(key, message, help)| {
-            problems.push(Problem::new(table.place_of("reduce", None), key, message).help(help));
+            problems.push(Problem::new(table.location_of("reduce", None), key, message).help(help));
             Reduction::None
         }),
         (None, Some(false)) => Reduction::None,
@@ -126,8 +126,9 @@ const IN_PLANE: [&str; 2] = ["t", "n"];
 
 /// A `[[place]]` that is another view of a node of masses: its directions are a tangent, or two, and the normal.
 pub(crate) fn view(table: &StatedTable, values: &Values, masses: &[Mass]) -> Result<Place, Box<Problem>> {
-    let problem =
-        |key: &str, message: String| Box::new(Problem::new(table.place_of(key, None), key, table.with_turn(&message)));
+    let problem = |key: &str, message: String| {
+        Box::new(Problem::new(table.location_of(key, None), key, table.with_turn(&message)))
+    };
     if let Some(key) = ["dof", "dofs", "nodes", "sum"].into_iter().find(|key| table.entry(key).is_some()) {
         let message = format!("`of` makes it a place of a mass, and `{key}` of a structure");
         return Err(problem(key, message).map_help("take one of the two out"));
@@ -200,7 +201,7 @@ pub(crate) fn stand_in(table: &StatedTable, values: &Values) -> Mass {
 /// Names of the directions of a place, none if it has one displacement; and what the rows of nodes are called.
 fn directions(table: &StatedTable, values: &Values) -> Result<(Vec<String>, Vec<String>), Box<Problem>> {
     let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-    let problem = |key: &str, message: String| Box::new(Problem::new(table.place_of(key, None), key, message));
+    let problem = |key: &str, message: String| Box::new(Problem::new(table.location_of(key, None), key, message));
     let stated = values.names("directions").map(<[String]>::to_vec);
     let framed = values.vector("normal").is_some();
     let sums = values.sums("sum").map(<[_]>::len);
@@ -246,7 +247,7 @@ impl Helped for Box<Problem> {
 }
 
 fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<Place, Box<Problem>> {
-    let problem = |key: &str, message: String| Box::new(Problem::new(table.place_of(key, None), key, message));
+    let problem = |key: &str, message: String| Box::new(Problem::new(table.location_of(key, None), key, message));
     let stated: Vec<&str> =
         ["dof", "dofs", "nodes", "sum"].into_iter().filter(|key| table.entry(key).is_some()).collect();
     let [key] = stated[..] else {
@@ -260,7 +261,7 @@ fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<P
     };
     let find = |name: &str| {
         component.row(name).ok_or_else(|| {
-            let place = table.place_of(key, Some(name));
+            let place = table.location_of(key, Some(name));
             Box::new(
                 Problem::new(place, key, format!("the structure has no row `{}`", shown(name)))
                     .help(near(component, name)),
@@ -316,7 +317,7 @@ fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<P
 fn find_of(component: &Component, table: &StatedTable, node: &str, along: &str) -> Result<usize, Box<Problem>> {
     let name = format!("{node}.{along}");
     component.row(&name).ok_or_else(|| {
-        let place = table.place_of("nodes", Some(node));
+        let place = table.location_of("nodes", Some(node));
         Box::new(
             Problem::new(place, "nodes", format!("the structure has no row `{}`", shown(&name)))
                 .help(near(component, &name)),

@@ -14,7 +14,7 @@ pub(super) struct Layout {
     pub(super) height: f64,
     pub(super) title: Vec<String>,
     pub(super) legend: Vec<Placed>,
-    pub(super) panels: Vec<Place>,
+    pub(super) panels: Vec<PlotArea>,
     pub(super) shades: Shades,
     pub(super) bar: Option<Bar>,
 }
@@ -40,7 +40,7 @@ pub(super) struct Bar {
 }
 
 /// The plot area of a panel with its axes and texts.
-pub(super) struct Place {
+pub(super) struct PlotArea {
     pub(super) left: f64,
     pub(super) top: f64,
     pub(super) width: f64,
@@ -66,11 +66,11 @@ impl Layout {
             2 => (430.0, if rows == 1 { 330.0 } else { 270.0 }),
             _ => (350.0, 240.0),
         };
-        let mut panels: Vec<Place> = figure
+        let mut panels: Vec<PlotArea> = figure
             .panels
             .iter()
             .zip(frame::axes(figure))
-            .map(|(panel, axes)| Place::new(panel, &axes, plot_width, plot_height))
+            .map(|(panel, axes)| PlotArea::new(panel, &axes, plot_width, plot_height))
             .collect();
         // where neighbours have the same axis, its title stands once, at the outside
         for i in 0..panels.len() {
@@ -109,9 +109,9 @@ impl Layout {
             let members = (row * columns)..((row + 1) * columns).min(panels.len());
             let lines = panels[members.clone()].iter().map(|p| p.title.len()).max().unwrap_or(0);
             let top = y + 8.0 + PANEL_TITLE * LEADING * lines as f64;
-            let below = panels[members.clone()].iter().map(Place::bottom_side).fold(0.0, f64::max);
-            for place in &mut panels[members] {
-                place.top = top;
+            let below = panels[members.clone()].iter().map(PlotArea::bottom_side).fold(0.0, f64::max);
+            for plot in &mut panels[members] {
+                plot.top = top;
             }
             y = top + plot_height + below + if row + 1 < rows { 10.0 } else { 0.0 };
         }
@@ -146,10 +146,10 @@ impl Bar {
     }
 }
 
-impl Place {
-    pub(super) fn new(panel: &Panel, axes: &Axes, width: f64, height: f64) -> Place {
+impl PlotArea {
+    pub(super) fn new(panel: &Panel, axes: &Axes, width: f64, height: f64) -> PlotArea {
         if panel.picture {
-            return Place::of_picture(panel, axes, width, height);
+            return PlotArea::of_picture(panel, axes, width, height);
         }
         let Axes { x, y, own_x, own_y } = *axes;
         let y_ticks = axis::ticks_of(&panel.y, y, height / 46.0);
@@ -159,7 +159,7 @@ impl Place {
         let x_ticks = (3..=8).rev().map(|n| axis::ticks_of(&panel.x, x, f64::from(n))).find(fits);
         let x_ticks = x_ticks.unwrap_or_else(|| axis::ticks_of(&panel.x, x, 2.0));
         let y_title_offset = TICK_LENGTH + 5.0 + widest(&y_ticks) + 9.0;
-        Place {
+        PlotArea {
             left: 0.0,
             top: 0.0,
             width,
@@ -178,9 +178,9 @@ impl Place {
     }
 
     /// Of a picture: equal lengths on both axes, and nothing beside it.
-    fn of_picture(panel: &Panel, axes: &Axes, width: f64, height: f64) -> Place {
+    fn of_picture(panel: &Panel, axes: &Axes, width: f64, height: f64) -> PlotArea {
         let (x, y) = frame::level(axes.x, axes.y, width / height);
-        Place {
+        PlotArea {
             left: 0.0,
             top: 0.0,
             width,

@@ -15,7 +15,7 @@ use crate::file::{File, Output, ReportError};
 use crate::font::Weight;
 use crate::frame::{self, AREA, PALE, Shades};
 use document::{Pen, Svg, Text};
-use layout::{Bar, Layout, Place, Placed, SAMPLE};
+use layout::{Bar, Layout, Placed, PlotArea, SAMPLE};
 use stickslip_study::dataset::{Dataset, Emphasis, Figure, Panel, Series, Style};
 
 /// The output `svg`.
@@ -61,8 +61,8 @@ pub fn to_svg(figure: &Figure) -> String {
     for placed in &layout.legend {
         draw_entry(&mut svg, placed);
     }
-    for (panel, place) in figure.panels.iter().zip(&layout.panels) {
-        draw_panel(&mut svg, panel, place, &layout.shades);
+    for (panel, plot) in figure.panels.iter().zip(&layout.panels) {
+        draw_panel(&mut svg, panel, plot, &layout.shades);
     }
     if let Some(bar) = &layout.bar {
         draw_bar(&mut svg, bar);
@@ -120,8 +120,8 @@ fn draw_bar(svg: &mut Svg, bar: &Bar) {
     for (value, label) in bar.ticks.at.iter().zip(&bar.ticks.labels) {
         let y = at(*value);
         svg.line((bar.left + BAR, y), (bar.left + BAR + TICK_LENGTH, y), AXIS);
-        let place = Text::at(bar.left + BAR + TICK_LENGTH + 5.0, y + 0.36 * TICK);
-        svg.text(label, Text { size: TICK, anchor: "start", ..place });
+        let beside = Text::at(bar.left + BAR + TICK_LENGTH + 5.0, y + 0.36 * TICK);
+        svg.text(label, Text { size: TICK, anchor: "start", ..beside });
     }
     for (i, line) in bar.title.iter().enumerate() {
         let x = bar.left + bar.title_offset + LABEL * (0.8 + LEADING * i as f64);
@@ -130,30 +130,30 @@ fn draw_bar(svg: &mut Svg, bar: &Bar) {
     svg.close();
 }
 
-fn draw_panel(svg: &mut Svg, panel: &Panel, place: &Place, shades: &Shades) {
-    let (right, bottom, middle) = (place.left + place.width, place.top + place.height, place.left + place.width / 2.0);
+fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
+    let (right, bottom, middle) = (plot.left + plot.width, plot.top + plot.height, plot.left + plot.width / 2.0);
     svg.open(&panel.title);
-    for (i, line) in place.title.iter().enumerate() {
-        let y = place.top - 8.0 - PANEL_TITLE * LEADING * (place.title.len() - 1 - i) as f64;
+    for (i, line) in plot.title.iter().enumerate() {
+        let y = plot.top - 8.0 - PANEL_TITLE * LEADING * (plot.title.len() - 1 - i) as f64;
         svg.text(line, Text { size: PANEL_TITLE, weight: Weight::Bold, ..Text::at(middle, y) });
     }
-    let x_of = |x: &f64| place.map((*x, place.y.from)).0;
-    let y_of = |y: &f64| place.map((place.x.from, *y)).1;
-    for (values, colour) in [(&place.x_ticks.minor, FINE_GRID), (&place.x_ticks.at, GRID)] {
+    let x_of = |x: &f64| plot.map((*x, plot.y.from)).0;
+    let y_of = |y: &f64| plot.map((plot.x.from, *y)).1;
+    for (values, colour) in [(&plot.x_ticks.minor, FINE_GRID), (&plot.x_ticks.at, GRID)] {
         for x in values.iter().map(x_of) {
-            svg.line((x, place.top), (x, bottom), colour);
+            svg.line((x, plot.top), (x, bottom), colour);
         }
     }
-    for (values, colour) in [(&place.y_ticks.minor, FINE_GRID), (&place.y_ticks.at, GRID)] {
+    for (values, colour) in [(&plot.y_ticks.minor, FINE_GRID), (&plot.y_ticks.at, GRID)] {
         for y in values.iter().map(y_of) {
-            svg.line((place.left, y), (right, y), colour);
+            svg.line((plot.left, y), (right, y), colour);
         }
     }
     // the axes through zero of a loop
     let zeros = if panel.picture { 0 } else { 2 };
     for (inside, from, to) in [
-        (place.x.from < 0.0 && place.x.to > 0.0, place.map((0.0, place.y.from)), place.map((0.0, place.y.to))),
-        (place.y.from < 0.0 && place.y.to > 0.0, place.map((place.x.from, 0.0)), place.map((place.x.to, 0.0))),
+        (plot.x.from < 0.0 && plot.x.to > 0.0, plot.map((0.0, plot.y.from)), plot.map((0.0, plot.y.to))),
+        (plot.y.from < 0.0 && plot.y.to > 0.0, plot.map((plot.x.from, 0.0)), plot.map((plot.x.to, 0.0))),
     ]
     .into_iter()
     .take(zeros)
@@ -163,33 +163,33 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, place: &Place, shades: &Shades) {
         }
     }
     if !panel.picture {
-        svg.frame(place.left, place.top, place.width, place.height);
+        svg.frame(plot.left, plot.top, plot.width, plot.height);
     }
-    for x in place.x_ticks.minor.iter().map(x_of) {
+    for x in plot.x_ticks.minor.iter().map(x_of) {
         svg.line((x, bottom), (x, bottom + MINOR_LENGTH), AXIS);
     }
-    for (x, label) in place.x_ticks.at.iter().map(x_of).zip(&place.x_ticks.labels) {
+    for (x, label) in plot.x_ticks.at.iter().map(x_of).zip(&plot.x_ticks.labels) {
         svg.line((x, bottom), (x, bottom + TICK_LENGTH), AXIS);
         svg.text(label, Text { size: TICK, ..Text::at(x, bottom + TICK_LENGTH + 3.0 + TICK * 0.95) });
     }
-    for y in place.y_ticks.minor.iter().map(y_of) {
-        svg.line((place.left - MINOR_LENGTH, y), (place.left, y), AXIS);
+    for y in plot.y_ticks.minor.iter().map(y_of) {
+        svg.line((plot.left - MINOR_LENGTH, y), (plot.left, y), AXIS);
     }
-    for (y, label) in place.y_ticks.at.iter().map(y_of).zip(&place.y_ticks.labels) {
-        svg.line((place.left - TICK_LENGTH, y), (place.left, y), AXIS);
-        let at = Text::at(place.left - TICK_LENGTH - 5.0, y + 0.36 * TICK);
+    for (y, label) in plot.y_ticks.at.iter().map(y_of).zip(&plot.y_ticks.labels) {
+        svg.line((plot.left - TICK_LENGTH, y), (plot.left, y), AXIS);
+        let at = Text::at(plot.left - TICK_LENGTH - 5.0, y + 0.36 * TICK);
         svg.text(label, Text { size: TICK, anchor: "end", ..at });
     }
-    for (i, line) in place.x_title.iter().enumerate() {
+    for (i, line) in plot.x_title.iter().enumerate() {
         let y = bottom + TICK_LENGTH + 3.0 + TICK * LEADING + 5.0 + LABEL * (0.9 + LEADING * i as f64);
         svg.text(line, Text::at(middle, y));
     }
-    for (i, line) in place.y_title.iter().enumerate() {
-        let x = place.left - place.y_title_offset - LABEL * (0.25 + LEADING * (place.y_title.len() - 1 - i) as f64);
-        svg.text(line, Text { upright: true, ..Text::at(x, place.top + place.height / 2.0) });
+    for (i, line) in plot.y_title.iter().enumerate() {
+        let x = plot.left - plot.y_title_offset - LABEL * (0.25 + LEADING * (plot.y_title.len() - 1 - i) as f64);
+        svg.text(line, Text { upright: true, ..Text::at(x, plot.top + plot.height / 2.0) });
     }
     if !frame::has_data(panel) {
-        svg.text("no data", Text { colour: "#777777", ..Text::at(middle, place.top + place.height / 2.0) });
+        svg.text("no data", Text { colour: "#777777", ..Text::at(middle, plot.top + plot.height / 2.0) });
     }
     let crowd = frame::crowded(panel);
     let bars: Vec<&Series> = panel.series.iter().filter(|s| s.style == Style::Bars).collect();
@@ -198,26 +198,26 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, place: &Place, shades: &Shades) {
         match series.style {
             Style::Marks => {
                 let size = if crowd { SMALL_MARK } else { MARK };
-                let at = frame::drawn(panel, series).map(|p| place.map(p));
-                for point in at.filter(|p| place.window().contains(*p)) {
+                let at = frame::drawn(panel, series).map(|p| plot.map(p));
+                for point in at.filter(|p| plot.window().contains(*p)) {
                     svg.mark(point, colour, size);
                 }
             }
-            Style::Stripe => draw_stripe(svg, series, place, shades),
-            Style::Band => draw_band(svg, panel, series, place, colour),
+            Style::Stripe => draw_stripe(svg, series, plot, shades),
+            Style::Band => draw_band(svg, panel, series, plot, colour),
             Style::Bars => {
-                let slot = frame::bar_slot(panel, place.x);
+                let slot = frame::bar_slot(panel, plot.x);
                 let which = bars.iter().position(|s| std::ptr::eq(*s, series)).unwrap_or(0);
                 let slot =
                     Slot { width: slot / bars.len() as f64, shift: slot * (which as f64 / bars.len() as f64 - 0.5) };
-                draw_bars(svg, panel, series, place, &slot, colour);
+                draw_bars(svg, panel, series, plot, &slot, colour);
             }
             Style::Solid | Style::Dashed | Style::Dotted => {
                 let pale = series.emphasis == Emphasis::Pale;
                 let width = if pale || crowd { THIN } else { LINE };
                 let opacity = if pale { PALE } else { 1.0 };
                 let pen = Pen { colour, width, dashes: dashes(frame::line_style(series)), opacity };
-                draw_line(svg, panel, series, place, &pen);
+                draw_line(svg, panel, series, plot, &pen);
             }
         }
     }
@@ -225,16 +225,16 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, place: &Place, shades: &Shades) {
 }
 
 /// The pieces between the gaps of a curve; a piece of one point is a dot.
-fn draw_line(svg: &mut Svg, panel: &Panel, series: &Series, place: &Place, pen: &Pen<'_>) {
+fn draw_line(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, pen: &Pen<'_>) {
     let points: Vec<Point> = frame::points(panel, series).collect();
     for piece in points.split(|p| !frame::drawable(*p)) {
-        let piece: Vec<Point> = piece.iter().map(|p| place.map(*p)).collect();
+        let piece: Vec<Point> = piece.iter().map(|p| plot.map(*p)).collect();
         match piece.as_slice() {
             [] => {}
-            [point] if place.window().contains(*point) => svg.dot(*point, pen.colour),
+            [point] if plot.window().contains(*point) => svg.dot(*point, pen.colour),
             [_] => {}
             line => {
-                for part in place.window().line(line) {
+                for part in plot.window().line(line) {
                     svg.polyline(&clip::visible(part), pen);
                 }
             }
@@ -243,30 +243,30 @@ fn draw_line(svg: &mut Svg, panel: &Panel, series: &Series, place: &Place, pen: 
 }
 
 /// The pieces between the gaps of a band, each as an area.
-fn draw_band(svg: &mut Svg, panel: &Panel, series: &Series, place: &Place, colour: &str) {
-    let floor = place.top + place.height;
+fn draw_band(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, colour: &str) {
+    let floor = plot.top + plot.height;
     let points: Vec<(Point, f64)> = frame::points(panel, series)
         .enumerate()
         .map(|(i, p)| {
-            let upper = place.map(p);
-            (upper, frame::base(panel, series, i).map_or(floor, |base| place.map((p.0, base)).1))
+            let upper = plot.map(p);
+            (upper, frame::base(panel, series, i).map_or(floor, |base| plot.map((p.0, base)).1))
         })
         .collect();
     for piece in points.split(|((x, y), _)| !(x.is_finite() && y.is_finite())) {
         let upper = clip::visible(piece.iter().map(|(p, _)| *p).collect());
         let lower = clip::visible(piece.iter().map(|((x, _), base)| (*x, *base)).collect());
         let outline: Vec<Point> = upper.into_iter().chain(lower.into_iter().rev()).collect();
-        svg.area(&place.window().polygon(&outline), colour, AREA);
+        svg.area(&plot.window().polygon(&outline), colour, AREA);
     }
 }
 
 /// The cells of a stripe, as high as the distance to the next one.
-fn draw_stripe(svg: &mut Svg, series: &Series, place: &Place, shades: &Shades) {
+fn draw_stripe(svg: &mut Svg, series: &Series, plot: &PlotArea, shades: &Shades) {
     let Some(y) = series.y.first() else { return };
-    for ((from, to, _), colour) in frame::cells(series, place.x, shades) {
-        let ((left, top), (right, bottom)) = (place.map((from, y + 0.5)), place.map((to, y - 0.5)));
+    for ((from, to, _), colour) in frame::cells(series, plot.x, shades) {
+        let ((left, top), (right, bottom)) = (plot.map((from, y + 0.5)), plot.map((to, y - 0.5)));
         let corners = box_around(left, top, right - left, bottom - top);
-        svg.tile(&place.window().polygon(&corners), &colour.light);
+        svg.tile(&plot.window().polygon(&corners), &colour.light);
     }
 }
 
@@ -276,14 +276,14 @@ struct Slot {
     shift: f64,
 }
 
-fn draw_bars(svg: &mut Svg, panel: &Panel, series: &Series, place: &Place, slot: &Slot, colour: &str) {
+fn draw_bars(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, slot: &Slot, colour: &str) {
     let opacity = if series.emphasis == Emphasis::Pale { PALE } else { 1.0 };
-    let scale = place.width / place.x.span();
+    let scale = plot.width / plot.x.span();
     for (i, point) in frame::points(panel, series).enumerate().filter(|(_, p)| frame::drawable(*p)) {
-        let (x, y) = place.map(point);
-        let base = frame::base(panel, series, i).map_or(place.top + place.height, |base| place.map((point.0, base)).1);
+        let (x, y) = plot.map(point);
+        let base = frame::base(panel, series, i).map_or(plot.top + plot.height, |base| plot.map((point.0, base)).1);
         let corners = box_around(x + slot.shift * scale, y, slot.width * scale, base - y);
-        svg.area(&place.window().polygon(&corners), colour, opacity);
+        svg.area(&plot.window().polygon(&corners), colour, opacity);
     }
 }
 

@@ -106,14 +106,14 @@ fn compute(work: &Work<'_>) -> Computed {
     let mut part = Part::default();
     let Some(unit) = prepared.system.modal_unit(number(prepared)) else {
         (work.context.finished)();
-        part.count(|| place_of(prepared), "failed", Some(UNSEEN.to_owned()));
+        part.count(|| location_of(prepared), "failed", Some(UNSEEN.to_owned()));
         part.tables = vec![Rows::default(), Rows::default()];
         return Ok(part);
     };
     let mode = follow(prepared, unit).map_err(|error| (prepared.case.index, error))?;
     (work.context.finished)();
     let (status, reason) = judged(unit, &mode);
-    part.count(|| place_of(prepared), status, reason);
+    part.count(|| location_of(prepared), status, reason);
     part.notes.extend(remarks(prepared, unit, &mode).into_iter().map(Note::Said));
     let (mut rows, mut summary) = (Rows::default(), Rows::default());
     let (mut stretch, mut before) = (1, f64::INFINITY);
@@ -173,7 +173,7 @@ fn follow(prepared: &Prepared, unit: f64) -> Result<Mode, MethodError> {
 }
 
 /// The mode and its parameters in words.
-fn place_of(prepared: &Prepared) -> String {
+fn location_of(prepared: &Prepared) -> String {
     let (mode, label) = (format!("mode {}", number(prepared) + 1), prepared.case.label());
     if label.is_empty() { mode } else { format!("{label}, {mode}") }
 }
@@ -213,7 +213,7 @@ const SLIPS: f64 = 1e-9;
 
 /// What the reader must know of a mode that was followed.
 fn remarks(prepared: &Prepared, unit: f64, mode: &Mode) -> Vec<String> {
-    let place = place_of(prepared);
+    let place = location_of(prepared);
     let mut remarks: Vec<String> = mode
         .turns
         .iter()

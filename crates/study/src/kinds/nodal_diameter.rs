@@ -144,17 +144,17 @@ fn compute(work: &Work<'_>) -> Computed {
     let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
     match waves(&prepared.case.model, most) {
         Ok(waves) => {
-            part.count(|| place_of(prepared), CONVERGED, None);
+            part.count(|| location_of(prepared), CONVERGED, None);
             write(prepared, &waves, &mut rows);
         }
-        Err(reason) => part.count(|| place_of(prepared), "failed", Some(reason)),
+        Err(reason) => part.count(|| location_of(prepared), "failed", Some(reason)),
     }
     (work.context.finished)();
     part.tables = vec![rows];
     Ok(part)
 }
 
-fn place_of(prepared: &Prepared) -> String {
+fn location_of(prepared: &Prepared) -> String {
     prepared.case.label()
 }
 

@@ -10,7 +10,7 @@ use crate::info::KindInfo;
 use crate::key::{Takes, default};
 use crate::kind::Kind;
 use crate::note::Note;
-use crate::point::{Summary, place_of};
+use crate::point::{Summary, location_of};
 use crate::rows::Rows;
 use crate::values::hertz;
 use crate::warnings::driven;
@@ -87,7 +87,7 @@ fn compute(work: &Work<'_>) -> Computed {
         let wanted = prepared.case.values.flag("multipliers") == Some(true);
         let all = if wanted { orbit.multipliers() } else { Some(Vec::new()) };
         if all.is_none() {
-            let place = place_of(&prepared.case, omega);
+            let place = location_of(&prepared.case, omega);
             part.notes
                 .push(Note::Said(format!("{place}: the multipliers are not known, as the orbit has no return map.")));
         }
@@ -117,7 +117,7 @@ fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
     (orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
         Note::Said(format!(
             "{}: {} sticks for the whole period; the orbit is one of a continuum, the symmetric one is shown.",
-            place_of(&prepared.case, orbit.omega),
+            location_of(&prepared.case, orbit.omega),
             orbit.evidence.stuck.join(", ")
         ))
     })

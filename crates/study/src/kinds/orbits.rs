@@ -1,7 +1,7 @@
 //! What the kinds share that look at whole orbits: the orbits of a unit, their instants, their failures.
 
 use crate::note::Note;
-use crate::point::place_of;
+use crate::point::location_of;
 use crate::study::Case;
 use crate::work::{NOT_REACHED, Part, Work};
 use stickslip::curve::sweep::{See, Watch, stretch};
@@ -51,15 +51,15 @@ pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Judged>, (us
 
 /// Counts an orbit and notes what its stability and its accuracy ask for, in the words of the kind.
 pub(super) fn count(part: &mut Part, case: &Case, orbit: &Orbit, (stable, words): (Option<bool>, fn(Note) -> Note)) {
-    part.count(|| place_of(case, orbit.omega), orbit.evidence.accuracy.status(), None);
+    part.count(|| location_of(case, orbit.omega), orbit.evidence.accuracy.status(), None);
     Note::of_orbit(orbit, stable).into_iter().map(words).for_each(|note| note.join(&mut part.notes));
 }
 
 /// Counts a point that has no orbit.
 fn count_missing(part: &mut Part, case: &Case, omega: f64, point: Option<&Result<Orbit, OrbitError>>) {
     match point {
-        Some(Err(error)) => part.count(|| place_of(case, omega), error.status(), Some(error.to_string())),
-        _ => part.count(|| place_of(case, omega), NOT_REACHED, None),
+        Some(Err(error)) => part.count(|| location_of(case, omega), error.status(), Some(error.to_string())),
+        _ => part.count(|| location_of(case, omega), NOT_REACHED, None),
     }
 }
 

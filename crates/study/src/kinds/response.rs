@@ -21,7 +21,7 @@ use crate::info::KindInfo;
 use crate::key::{Key, Takes, default};
 use crate::kind::Kind;
 use crate::note::{Note, WARNING};
-use crate::point::{Summary, place_of};
+use crate::point::{Summary, location_of};
 use crate::rows::Rows;
 use crate::survey::Surveyed;
 use crate::values::{Frequencies, hertz};
@@ -147,7 +147,7 @@ fn compute(work: &Work<'_>) -> Computed {
         for found in &all {
             if found.peak.unsettled {
                 let at = || {
-                    format!("peak of {}, {}", prepared.system.places()[found.mass], place_of(case, found.peak.omega))
+                    format!("peak of {}, {}", prepared.system.places()[found.mass], location_of(case, found.peak.omega))
                 };
                 let reason = "orbits beside this peak were not found, and the real one may be higher: much higher with little or \
                               no damping, or where friction cannot bound the motion; look closer with a finer range or another method";
@@ -198,9 +198,9 @@ impl<'a> Computing<'a> {
     fn add(&mut self, omega: f64, point: Option<(Summary, Vec<Note>)>) {
         let case = &self.prepared.case;
         let Some((summary, notes)) = point else {
-            return self.part.count(|| place_of(case, omega), NOT_REACHED, None);
+            return self.part.count(|| location_of(case, omega), NOT_REACHED, None);
         };
-        self.part.count(|| place_of(case, omega), &summary.status, summary.failure.clone());
+        self.part.count(|| location_of(case, omega), &summary.status, summary.failure.clone());
         self.stuck += usize::from(summary.stuck);
         notes.into_iter().for_each(|note| note.join(&mut self.part.notes));
         self.omegas.push(omega);

@@ -14,7 +14,7 @@ use crate::key::{Key, Takes, Within, default, optional, required};
 use crate::kind::Kind;
 use crate::names::Names;
 use crate::note::Note;
-use crate::point::place_of;
+use crate::point::location_of;
 use crate::rows::Rows;
 use crate::values::{Values, hertz};
 use crate::warnings::moved;
@@ -279,7 +279,7 @@ fn compute(work: &Work<'_>) -> Computed {
             part.notes.extend(read_off(prepared, &decays, step, &mut decay, &mut summary));
         }
         (work.context.finished)();
-        let at = || drive.map_or_else(|| case.label(), |omega| place_of(case, omega));
+        let at = || drive.map_or_else(|| case.label(), |omega| location_of(case, omega));
         match end {
             Ok(()) if stopped => part.count(at, NOT_REACHED, None),
             Ok(()) => part.count(at, CONVERGED, None),

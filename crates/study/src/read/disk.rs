@@ -52,7 +52,7 @@ impl Reader {
                 (format!("`{}`, line {line}: {message}", shown(name)), Some(help.to_owned()))
             })
         });
-        let refuse = |(message, help): Refused| Problem::new(&entry.place, "nodes", message).maybe_help(help);
+        let refuse = |(message, help): Refused| Problem::new(&entry.location, "nodes", message).maybe_help(help);
         read.map_err(|problem| self.problems.push(refuse(problem))).ok()
     }
 
@@ -67,7 +67,7 @@ impl Reader {
         let entry = stated.entry(key).filter(|_| !self.without_files)?;
         let Stated::Fixed(Given::Text(name)) = &entry.value else { return None };
         let refuse =
-            |(message, help): (String, Option<String>)| Problem::new(&entry.place, key, message).maybe_help(help);
+            |(message, help): (String, Option<String>)| Problem::new(&entry.location, key, message).maybe_help(help);
         let rows = self.text_of(name).and_then(|text| {
             csv(&text, columns).map_err(|(line, message)| {
                 (format!("`{}`, line {line}: {message}", shown(name)), Some(help.to_owned()))
@@ -78,14 +78,14 @@ impl Reader {
 
     /// The deviations of a file, if one is named.
     fn pattern(&mut self, mistuning: &StatedTable) -> Option<Vec<f64>> {
-        let file = mistuning.entry("file").map(|entry| (&entry.value, entry.place.clone()));
+        let file = mistuning.entry("file").map(|entry| (&entry.value, entry.location.clone()));
         if self.without_files && file.is_some() {
             return None;
         }
-        let Some((Stated::Fixed(Given::Text(name)), place)) = file else {
+        let Some((Stated::Fixed(Given::Text(name)), location)) = file else {
             if mistuning.entry("deviation").is_none() {
                 let message = "`deviation` or `file` is missing in the mistuning";
-                let problem = Problem::new(&mistuning.place, "mistuning", message);
+                let problem = Problem::new(&mistuning.location, "mistuning", message);
                 self.problems.push(problem.help("add deviation = \"2 %\" and seed = 7, or file = \"pattern.csv\""));
             }
             return None;
@@ -93,13 +93,13 @@ impl Reader {
         for key in ["deviation", "seed"] {
             if let Some(entry) = mistuning.entry(key) {
                 let message = format!("the file has the deviations, `{key}` says nothing beside it");
-                self.problems.push(Problem::new(&entry.place, key, message).help("take one of the two out"));
+                self.problems.push(Problem::new(&entry.location, key, message).help("take one of the two out"));
             }
         }
         match self.pattern_of(name) {
             Ok(pattern) => Some(pattern),
             Err((message, help)) => {
-                self.problems.push(Problem::new(&place, "file", message).maybe_help(help));
+                self.problems.push(Problem::new(&location, "file", message).maybe_help(help));
                 None
             }
         }

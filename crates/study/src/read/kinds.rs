@@ -2,7 +2,7 @@
 
 use super::reader::Reader;
 use crate::document::{Content, Entry, Node, Table};
-use crate::error::{Place, Problem};
+use crate::error::{Location, Problem};
 use crate::info::KindInfo;
 use crate::kinds;
 use crate::near::one_of;
@@ -47,21 +47,22 @@ impl Reader {
         let words: Vec<&str> = rows.iter().map(name).collect();
         let Some(entry) = table.get("kind") else {
             let message = format!("`kind` is missing in {what}: one of {}", one_of(words));
-            self.problems.push(Problem::new(&table.place, "kind", message).help(format!("add kind = \"{example}\"")));
+            self.problems
+                .push(Problem::new(&table.location, "kind", message).help(format!("add kind = \"{example}\"")));
             return None;
         };
-        let place = &entry.node.place;
+        let location = &entry.node.location;
         match &entry.node.value {
             Content::Text { text, .. } => match rows.iter().find(|row| name(row) == text) {
                 Some(row) => Some(row),
                 None => {
-                    self.unknown_word("kind", text, place, words);
+                    self.unknown_word("kind", text, location, words);
                     None
                 }
             },
             other => {
                 let message = format!("expected one of {}, found {}", one_of(words), other.described());
-                self.problems.push(Problem::new(place, "kind", message));
+                self.problems.push(Problem::new(location, "kind", message));
                 None
             }
         }
@@ -88,7 +89,7 @@ impl Reader {
             Some(node) => {
                 let message = format!("expected a table, found {}", node.value.described());
                 self.problems
-                    .push(Problem::new(&node.place, "method", message).help("write [method] and below it its kind"));
+                    .push(Problem::new(&node.location, "method", message).help("write [method] and below it its kind"));
                 return None;
             }
         };
@@ -128,7 +129,8 @@ impl Reader {
         let node = &root.get("study")?.node;
         let Content::Table(table) = &node.value else {
             let message = format!("expected a table, found {}", node.value.described());
-            self.problems.push(Problem::new(&node.place, "study", message).help("write [study] and below it its kind"));
+            self.problems
+                .push(Problem::new(&node.location, "study", message).help("write [study] and below it its kind"));
             return None;
         };
         let kind = &self.kind(table, ("[study]", "response"), kinds::TABLE, |row| row.info.name)?.info;
@@ -148,7 +150,7 @@ impl Reader {
         let stated = root.get("figure").zip(key).and_then(|(entry, key)| self.value(key, &entry.node));
         match stated {
             Some(Stated::Table(table)) => table,
-            _ => StatedTable { place: Place::default(), entries: Vec::new(), turn: Default::default() },
+            _ => StatedTable { location: Location::default(), entries: Vec::new(), turn: Default::default() },
         }
     }
 }

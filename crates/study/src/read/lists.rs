@@ -2,7 +2,7 @@
 
 use super::reader::Reader;
 use crate::document::{Content, Entry, Node, Table};
-use crate::error::{Place, Problem};
+use crate::error::{Location, Problem};
 use crate::expression::is_reserved;
 use crate::near::shown;
 use crate::repeat::{Index, Repetition};
@@ -46,7 +46,7 @@ impl Reader {
                                 elements = repetition.count().saturating_add(elements);
                                 if elements > most {
                                     let message = format!("{elements} elements; the limit is {most}");
-                                    self.problems.push(Problem::new(&node.place, name, message));
+                                    self.problems.push(Problem::new(&node.location, name, message));
                                     break;
                                 }
                                 let stated = self.repeated(table, keys, &owner, repetition);
@@ -54,7 +54,7 @@ impl Reader {
                             }
                             other => {
                                 let message = format!("expected a table, found {}", other.described());
-                                let problem = Problem::new(&node.place, name, message);
+                                let problem = Problem::new(&node.location, name, message);
                                 self.problems.push(problem.help(format!("write [[{name}]] and its keys below")));
                             }
                         }
@@ -62,7 +62,7 @@ impl Reader {
                 }
                 (Takes::List(_), other) => {
                     let message = format!("expected a list of tables, found {}", other.described());
-                    let problem = Problem::new(&node.place, name, message);
+                    let problem = Problem::new(&node.location, name, message);
                     self.problems.push(problem.help(format!("write [[{name}]] with two brackets")));
                 }
                 _ => {}
@@ -72,7 +72,7 @@ impl Reader {
             if spring.entry("stiffness").is_none() && spring.entry("damping").is_none() && self.problems.is_empty() {
                 let message = "a spring needs a stiffness, a damping, or both";
                 self.problems
-                    .push(Problem::new(&spring.place, "stiffness", message).help("add stiffness = \"105103 N/m\""));
+                    .push(Problem::new(&spring.location, "stiffness", message).help("add stiffness = \"105103 N/m\""));
             }
         }
         Some(lists)
@@ -106,18 +106,18 @@ impl Reader {
     fn repetition(&mut self, table: &Table, owner: &str) -> Option<Repetition> {
         let Some(entry) = table.get("repeat") else { return Some(Repetition::default()) };
         let before = self.problems.len();
-        let mut refuse = |place: &Place, message: String, help: Option<&str>| {
-            let problem = Problem::new(place, "repeat", message);
+        let mut refuse = |location: &Location, message: String, help: Option<&str>| {
+            let problem = Problem::new(location, "repeat", message);
             self.problems.push(problem.maybe_help(help.map(str::to_owned)));
         };
         let example = Some("write it as in repeat = { i = 12 } or repeat = { i = [2, 11] }");
         let Content::Table(repeat) = &entry.node.value else {
             let message = format!("expected a table of indices in {owner}, found {}", entry.node.value.described());
-            refuse(&entry.node.place, message, example);
+            refuse(&entry.node.location, message, example);
             return None;
         };
         let mut indices = Vec::new();
-        for Entry { key, key_place, node } in repeat.entries.iter().filter(|entry| entry.key != "wrap") {
+        for Entry { key, key_location, node } in repeat.entries.iter().filter(|entry| entry.key != "wrap") {
             let whole = |node: &Node| match node.value {
                 Content::Number { whole, .. } => whole.filter(|whole| whole.unsigned_abs() <= LARGEST_INDEX),
                 _ => None,
@@ -128,12 +128,12 @@ impl Reader {
             };
             if !is_identifier(key) {
                 let message = format!("`{}` is no index: a letter first, then letters, digits and `_`", shown(key));
-                refuse(key_place, message, None);
+                refuse(key_location, message, None);
             } else if is_reserved(key) {
-                refuse(key_place, format!("`{key}` has a meaning of its own in expressions"), None);
+                refuse(key_location, format!("`{key}` has a meaning of its own in expressions"), None);
             } else if self.index.contains_key(key) {
                 let help = Some("give the index another name");
-                refuse(key_place, format!("`{key}` is a parameter already"), help);
+                refuse(key_location, format!("`{key}` is a parameter already"), help);
             } else {
                 match range.filter(|(from, to)| from <= to) {
                     Some((from, to)) => indices.push(Index { name: key.clone(), from, to, wraps: false }),
@@ -145,13 +145,13 @@ impl Reader {
                                 other => other.described(),
                             }
                         );
-                        refuse(&node.place, message, example);
+                        refuse(&node.location, message, example);
                     }
                 }
             }
         }
         if indices.is_empty() && self.problems.len() == before {
-            let problem = Problem::new(&entry.node.place, "repeat", format!("an index is missing in {owner}"));
+            let problem = Problem::new(&entry.node.location, "repeat", format!("an index is missing in {owner}"));
             self.problems.push(problem.maybe_help(example.map(str::to_owned)));
         }
         if let Some(wrap) = repeat.get("wrap") {
@@ -171,14 +171,14 @@ impl Reader {
         for node in named {
             let Content::Text { text, .. } = &node.value else {
                 let message = format!("expected true, or the name of an index, found {}", node.value.described());
-                self.problems.push(Problem::new(&node.place, "wrap", message));
+                self.problems.push(Problem::new(&node.location, "wrap", message));
                 return;
             };
             match indices.iter_mut().find(|index| index.name == *text) {
                 Some(index) => index.wraps = true,
                 None => {
                     let message = format!("there is no index `{}` in this entry", shown(text));
-                    self.problems.push(Problem::new(&node.place, "wrap", message));
+                    self.problems.push(Problem::new(&node.location, "wrap", message));
                 }
             }
         }

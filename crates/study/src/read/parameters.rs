@@ -28,11 +28,11 @@ impl Reader {
         if let Some(entry) = root.get("parameters") {
             let Content::Table(table) = &entry.node.value else {
                 let message = format!("expected a table of quantities, found {}", entry.node.value.described());
-                self.problems.push(Problem::new(&entry.node.place, "parameters", message));
+                self.problems.push(Problem::new(&entry.node.location, "parameters", message));
                 return None;
             };
             for entry in &table.entries {
-                let problem = |message: String| Problem::new(&entry.key_place, shown(&entry.key), message);
+                let problem = |message: String| Problem::new(&entry.key_location, shown(&entry.key), message);
                 if !is_identifier(&entry.key) {
                     let message = "no name of a parameter: a letter first, then letters, digits and `_`";
                     self.problems.push(problem(message.to_owned()));
@@ -70,7 +70,7 @@ impl Reader {
         }
         self.settle_dimensions(parameters, &self.index.values().copied().collect::<Vec<_>>())?;
         for (name, text) in overrides {
-            let place = self.text(format!("--set {}", shown(name)), text.clone());
+            let location = self.text(format!("--set {}", shown(name)), text.clone());
             let Some(&index) = self.index.get(name) else {
                 let message = format!("there is no parameter `{}` to set", shown(name));
                 let help = match nearest(name, self.names.iter().map(String::as_str)) {
@@ -81,10 +81,10 @@ impl Reader {
                         one_of(self.names.iter().take(20).map(String::as_str)).replace(" or ", ", ")
                     ),
                 };
-                self.problems.push(Problem::new(&place, shown(name), message).help(help));
+                self.problems.push(Problem::new(&location, shown(name), message).help(help));
                 continue;
             };
-            let node = Node { place, value: Content::Text { text: text.clone(), inner: Some(0) } };
+            let node = Node { location, value: Content::Text { text: text.clone(), inner: Some(0) } };
             if let Some(quantity) = self.quantity(name, &node) {
                 parameters[index].quantity = quantity;
             }
@@ -111,7 +111,7 @@ impl Reader {
     pub(super) fn vary(&mut self, entry: &Entry, parameters: &mut [Parameter]) -> Option<Vec<Varied>> {
         let Content::Table(table) = &entry.node.value else {
             let message = format!("expected a table from parameters to values, found {}", entry.node.value.described());
-            let problem = Problem::new(&entry.node.place, "vary", message);
+            let problem = Problem::new(&entry.node.location, "vary", message);
             self.problems.push(problem.help("write it as in vary = { Ft = [\"2 N\", \"4 N\"] }"));
             return None;
         };
@@ -119,13 +119,13 @@ impl Reader {
         for entry in &table.entries {
             let Some(index) = self.parameter(entry, "vary") else { continue };
             let points = match &entry.node.value {
-                Content::List(list) => self.quantities(&entry.key, list, &entry.node.place).map(VariedPoints::List),
+                Content::List(list) => self.quantities(&entry.key, list, &entry.node.location).map(VariedPoints::List),
                 Content::Table(table) => self
                     .range(table, schema::RANGE, &entry.key)
                     .map(|(from, to, points)| VariedPoints::Range { from, to, points }),
                 _ => self.quantity(&entry.key, &entry.node).map(|quantity| VariedPoints::List(vec![quantity])),
             };
-            varied.extend(points.map(|points| Varied { index, place: entry.node.place.clone(), points }));
+            varied.extend(points.map(|points| Varied { index, location: entry.node.location.clone(), points }));
         }
         let which: Vec<usize> = varied.iter().map(|varied| varied.index).collect();
         if self.problems.is_empty() {
@@ -145,7 +145,7 @@ impl Reader {
         let Content::Table(table) = &entry.node.value else {
             let message = format!("expected a table, found {}", entry.node.value.described());
             let help = "write [sample] and below it count = 1000 and of = { Ft = { normal = [\"2 N\", \"0.2 N\"] } }";
-            self.problems.push(Problem::new(&entry.node.place, "sample", message).help(help));
+            self.problems.push(Problem::new(&entry.node.location, "sample", message).help(help));
             return None;
         };
         self.check_keys(table, SAMPLE, "`[sample]`");
@@ -163,31 +163,31 @@ impl Reader {
         let Content::Table(of) = &of.value else {
             let message = format!("expected a table from parameters to distributions, found {}", of.value.described());
             let help = "write it as in of = { Ft = { normal = [\"2 N\", \"0.2 N\"] } }";
-            self.problems.push(Problem::new(&table.get("of")?.node.place, "of", message).help(help));
+            self.problems.push(Problem::new(&table.get("of")?.node.location, "of", message).help(help));
             return None;
         };
         let sample = Sample { count: usize::try_from(count("count")?).ok()?, seed: count("seed")?, design: design? };
         if of.entries.is_empty() {
             let message = "no parameter is drawn: name one at least";
-            self.problems.push(Problem::new(&table.get("of")?.node.place, "of", message));
+            self.problems.push(Problem::new(&table.get("of")?.node.location, "of", message));
         }
         if sample.design == Design::Sobol && of.entries.len() > MOST_SOBOL {
             let message =
                 format!("a Sobol sequence has up to {MOST_SOBOL} parameters here, found {}", of.entries.len());
             let help = "take design = \"latin-hypercube\"";
-            self.problems.push(Problem::new(&table.get("of")?.node.place, "design", message).help(help));
+            self.problems.push(Problem::new(&table.get("of")?.node.location, "design", message).help(help));
         }
         let mut drawn = Vec::new();
         for (coordinate, entry) in of.entries.iter().enumerate() {
             let Some(index) = self.parameter(entry, "draw") else { continue };
             if listed.iter().any(|varied| varied.index == index) {
                 let message = format!("`{}` is in `vary` too: a parameter is listed or drawn", shown(&entry.key));
-                self.problems.push(Problem::new(&entry.key_place, shown(&entry.key), message));
+                self.problems.push(Problem::new(&entry.key_location, shown(&entry.key), message));
                 continue;
             }
             let Some((distribution, numbers, within)) = self.distribution(entry) else { continue };
             let points = VariedPoints::Drawn(Drawn { sample, coordinate, distribution, numbers, within });
-            drawn.push(Varied { index, place: entry.node.place.clone(), points });
+            drawn.push(Varied { index, location: entry.node.location.clone(), points });
         }
         let which: Vec<usize> = drawn.iter().map(|drawn| drawn.index).collect();
         if self.problems.is_empty() {
@@ -202,23 +202,23 @@ impl Reader {
         let example = "write it as in { normal = [\"2 N\", \"0.2 N\"] }";
         let Content::Table(table) = &entry.node.value else {
             let message = format!("expected a distribution, found {}", entry.node.value.described());
-            self.problems.push(Problem::new(&entry.node.place, shown(&entry.key), message).help(example));
+            self.problems.push(Problem::new(&entry.node.location, shown(&entry.key), message).help(example));
             return None;
         };
         let (mut found, mut within) = (None, None);
         for part in &table.entries {
             let Content::List(list) = &part.node.value else {
                 let message = format!("expected a list of quantities, found {}", part.node.value.described());
-                self.problems.push(Problem::new(&part.node.place, shown(&part.key), message).help(example));
+                self.problems.push(Problem::new(&part.node.location, shown(&part.key), message).help(example));
                 return None;
             };
-            let quantities = self.quantities(&entry.key, list, &part.node.place)?;
+            let quantities = self.quantities(&entry.key, list, &part.node.location)?;
             let row = DISTRIBUTIONS.iter().find(|(name, ..)| *name == part.key);
             match (row, <[Quantity; 2]>::try_from(quantities)) {
                 (None, Ok(bounds)) if part.key == WITHIN => within = Some(bounds),
                 (None, Err(_)) if part.key == WITHIN => {
                     let message = "expected two bounds: the least and the largest value";
-                    self.problems.push(Problem::new(&part.node.place, WITHIN, message));
+                    self.problems.push(Problem::new(&part.node.location, WITHIN, message));
                     return None;
                 }
                 (Some((name, ..)), quantities) if found.is_none() => {
@@ -226,11 +226,11 @@ impl Reader {
                 }
                 (Some(_), _) => {
                     let message = "a parameter has one distribution";
-                    self.problems.push(Problem::new(&part.key_place, shown(&part.key), message));
+                    self.problems.push(Problem::new(&part.key_location, shown(&part.key), message));
                     return None;
                 }
                 (None, _) => {
-                    self.unknown_word("distribution", &part.key, &part.key_place, names().chain([WITHIN]).collect());
+                    self.unknown_word("distribution", &part.key, &part.key_location, names().chain([WITHIN]).collect());
                     return None;
                 }
             }
@@ -239,7 +239,7 @@ impl Reader {
             Some((name, numbers)) => Some((name, numbers, within)),
             None => {
                 let message = format!("a distribution is missing: one of {}", one_of(names()));
-                self.problems.push(Problem::new(&entry.node.place, shown(&entry.key), message).help(example));
+                self.problems.push(Problem::new(&entry.node.location, shown(&entry.key), message).help(example));
                 None
             }
         }
@@ -255,7 +255,7 @@ impl Reader {
             Some(near) => format!("did you mean `{near}`?"),
             None => format!("add it to [parameters] and use it in the model: {} = \"…\"", shown(&entry.key)),
         };
-        self.problems.push(Problem::new(&entry.key_place, shown(&entry.key), message).help(help));
+        self.problems.push(Problem::new(&entry.key_location, shown(&entry.key), message).help(help));
         None
     }
 
@@ -272,7 +272,7 @@ impl Reader {
             let Some((_, text)) = overrides.iter().rfind(|(set, _)| set == name) else { continue };
             replaced.push(Replaced { name: name.clone(), text: text.trim().to_owned(), values: varied.points.len() });
             let quantity = parameters[varied.index].quantity.clone();
-            varied.place = quantity.place.clone();
+            varied.location = quantity.location.clone();
             varied.points = VariedPoints::List(vec![quantity]);
         }
         replaced
@@ -290,9 +290,9 @@ impl Reader {
             Ok(order) => Some(order),
             Err(circle) => {
                 let first = circle[0];
-                let place = match varied.iter().find(|varied| varied.index == first) {
-                    Some(varied) => &varied.place,
-                    None => &parameters[first].quantity.place,
+                let location = match varied.iter().find(|varied| varied.index == first) {
+                    Some(varied) => &varied.location,
+                    None => &parameters[first].quantity.location,
                 };
                 let mut shown: Vec<&str> = circle.iter().map(|&i| self.names[i].as_str()).collect();
                 shown.push(shown[0]);
@@ -300,7 +300,7 @@ impl Reader {
                     shown.splice(6..shown.len() - 5, ["…"]);
                 }
                 let message = format!("the parameters need each other in a circle: {}", shown.join(" -> "));
-                let problem = Problem::new(place, self.names[first].clone(), message);
+                let problem = Problem::new(location, self.names[first].clone(), message);
                 self.problems.push(problem.help("give one of them a value of its own"));
                 None
             }
@@ -325,15 +325,15 @@ impl Reader {
         if cases <= MOST_CASES && cases.saturating_mul(frequencies) <= MOST_POINTS {
             return Some(());
         }
-        let (place, key) = match (frequency, varied.first()) {
-            (Some(entry), _) if frequencies >= cases => (&entry.place, "frequency"),
-            (_, Some(varied)) => (&varied.place, "vary"),
-            _ => (&study.place, "frequency"),
+        let (location, key) = match (frequency, varied.first()) {
+            (Some(entry), _) if frequencies >= cases => (&entry.location, "frequency"),
+            (_, Some(varied)) => (&varied.location, "vary"),
+            _ => (&study.location, "frequency"),
         };
         let message = format!(
             "{cases} cases times {frequencies} frequencies are too many: the limit is {MOST_CASES} cases and {MOST_POINTS} points"
         );
-        self.problems.push(Problem::new(place, key, message).help("split the study, or take fewer points"));
+        self.problems.push(Problem::new(location, key, message).help("split the study, or take fewer points"));
         None
     }
 }

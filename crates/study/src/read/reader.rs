@@ -1,6 +1,6 @@
 //! What a reader knows while it reads: its texts, what was wrong so far, the parameters, and the turn of a repetition.
 
-use crate::error::{Place, Problem, Source, StudyError};
+use crate::error::{Location, Problem, Source, StudyError};
 use crate::expression::Expression;
 use crate::repeat::{Repetition, Turn};
 use std::collections::HashMap;
@@ -36,10 +36,10 @@ impl Reader {
     }
 
     /// A text that is not in the file.
-    pub(super) fn text(&mut self, name: String, text: String) -> Place {
+    pub(super) fn text(&mut self, name: String, text: String) -> Location {
         let span = 0..text.len();
         self.sources.push(Arc::new(Source { name, text }));
-        Place { source: self.sources.len() - 1, span }
+        Location { source: self.sources.len() - 1, span }
     }
 
     /// The turn of the repetition that is being read.

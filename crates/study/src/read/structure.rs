@@ -29,7 +29,7 @@ impl Reader {
         if let [first, second, ..] = several[..] {
             let message = format!("a structure has one damping, and both `{first}` and `{second}` are stated");
             self.problems
-                .push(Problem::new(stated.place_of(second, None), second, message).help("leave out one of them"));
+                .push(Problem::new(stated.location_of(second, None), second, message).help("leave out one of them"));
         }
         if self.problems.len() > before {
             return None;
@@ -54,7 +54,7 @@ impl Reader {
 type Read = (&'static str, formats::Matrix);
 
 fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffened>, usize), Problem> {
-    let problem = |key: &str, message: String| Problem::new(stated.place_of(key, None), key, message);
+    let problem = |key: &str, message: String| Problem::new(stated.location_of(key, None), key, message);
     let one = |key: &'static str| -> Result<Option<Read>, Problem> {
         let Some(file) = file(stated, key) else { return Ok(None) };
         let path = folder.join(&file.path);
@@ -185,7 +185,7 @@ fn row_names(stated: &StatedTable, folder: &Path, matrices: [&formats::Matrix; 2
             let path = folder.join(&file.path);
             names::read(&path, rows).map_err(|error| {
                 let (message, help) = said(error, &path);
-                Problem::new(stated.place_of("dofs", None), "dofs", message).help(help)
+                Problem::new(stated.location_of("dofs", None), "dofs", message).help(help)
             })?
         }
         None => {

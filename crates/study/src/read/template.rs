@@ -64,7 +64,7 @@ impl Reader {
                     "change its parameters, or start from `stickslip new {}`, which writes it out as lists",
                     row.name
                 );
-                self.problems.push(Problem::new(&entry.node.place, key.name, message).help(help));
+                self.problems.push(Problem::new(&entry.node.location, key.name, message).help(help));
             }
         }
         if let Some(entry) = root.get("disk") {
@@ -72,14 +72,14 @@ impl Reader {
             {
                 (None, ..) => {
                     let message = format!("the template `{}` is no sector of a disk", row.name);
-                    self.problems.push(Problem::new(&entry.node.place, "disk", message));
+                    self.problems.push(Problem::new(&entry.node.location, "disk", message));
                 }
                 (Some(own), Some(Takes::Table(keys)), Content::Table(table)) => {
                     *own = self.disk(table, keys)?;
                 }
                 _ => {
                     let message = format!("expected a table, found {}", entry.node.value.described());
-                    self.problems.push(Problem::new(&entry.node.place, "disk", message));
+                    self.problems.push(Problem::new(&entry.node.location, "disk", message));
                 }
             }
         }
@@ -181,7 +181,7 @@ impl Template {
                 dimension: value.dimension.unwrap_or(Dimension::NONE),
                 default: quantity.text.clone(),
                 value: value.si,
-                doc: comment_behind(self.study, quantity.place.span.end).to_owned(),
+                doc: comment_behind(self.study, quantity.location.span.end).to_owned(),
             });
         }
         parameters

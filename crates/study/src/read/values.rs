@@ -3,7 +3,7 @@
 use super::kinds::homes;
 use super::reader::Reader;
 use crate::document::{Content, Entry, Node, Table};
-use crate::error::{Place, Problem};
+use crate::error::{Location, Problem};
 use crate::expression::Expression;
 use crate::near::{nearest, one_of, shown};
 use crate::schema::{self, Key, MOST_POINTS, Presence, Takes};
@@ -28,7 +28,7 @@ impl Reader {
                     }
                 };
                 let message = format!("{owner} has no key `{}`", shown(&entry.key));
-                self.problems.push(Problem::new(&entry.key_place, shown(&entry.key), message).help(help));
+                self.problems.push(Problem::new(&entry.key_location, shown(&entry.key), message).help(help));
             }
         }
         for key in keys.iter().filter(|key| key.presence == Presence::Required) {
@@ -38,7 +38,7 @@ impl Reader {
                     Takes::Study => "add a table [study] with kind = \"response\" and a frequency".to_owned(),
                     _ => format!("add {} = {}", key.name, key.example),
                 };
-                self.problems.push(Problem::new(&table.place, key.name, message).help(help));
+                self.problems.push(Problem::new(&table.location, key.name, message).help(help));
             }
         }
     }
@@ -52,18 +52,20 @@ impl Reader {
     pub(super) fn stated(&mut self, table: &Table, keys: &[Key]) -> StatedTable {
         let mut entries = Vec::with_capacity(keys.len());
         for key in keys {
-            let (place, value) = match (table.get(key.name), key.presence) {
-                (Some(entry), _) => (entry.node.place.clone(), self.value(key, &entry.node)),
-                (None, Presence::Default(text)) => (table.place.clone(), self.standing_for(key, text, &table.place)),
+            let (location, value) = match (table.get(key.name), key.presence) {
+                (Some(entry), _) => (entry.node.location.clone(), self.value(key, &entry.node)),
+                (None, Presence::Default(text)) => {
+                    (table.location.clone(), self.standing_for(key, text, &table.location))
+                }
                 (None, _) => continue,
             };
-            entries.extend(value.map(|value| StatedEntry { key: key.name, place, value }));
+            entries.extend(value.map(|value| StatedEntry { key: key.name, location, value }));
         }
-        StatedTable { place: table.place.clone(), turn: String::new(), entries }
+        StatedTable { location: table.location.clone(), turn: String::new(), entries }
     }
 
     /// The value that stands for an absent key.
-    fn standing_for(&mut self, key: &Key, text: &str, place: &Place) -> Option<Stated> {
+    fn standing_for(&mut self, key: &Key, text: &str, location: &Location) -> Option<Stated> {
         let value = match key.takes {
             Takes::Count(..) => {
                 let whole = text.parse::<i64>().ok();
@@ -72,13 +74,13 @@ impl Reader {
             Takes::Flag => Content::Flag(text == "true"),
             _ => Content::Text { text: text.to_owned(), inner: None },
         };
-        self.value(key, &Node { place: place.clone(), value })
+        self.value(key, &Node { location: location.clone(), value })
     }
 
     pub(super) fn wrong_type(&mut self, key: &Key, node: &Node) -> Option<Stated> {
         let expected = schema::described(&key.takes);
         self.problems.push(
-            Problem::new(&node.place, key.name, format!("expected {expected}, found {}", node.value.described()))
+            Problem::new(&node.location, key.name, format!("expected {expected}, found {}", node.value.described()))
                 .help(format!("write it as in {} = {}", key.name, key.example)),
         );
         None
@@ -88,13 +90,13 @@ impl Reader {
         match (&key.takes, &node.value) {
             (Takes::Text, Content::Text { text, .. }) => Some(Stated::Fixed(Given::Text(text.clone()))),
             (Takes::Name, Content::Text { text, inner }) => {
-                Some(Stated::Fixed(Given::Text(self.name(key.name, text, *inner, &node.place)?)))
+                Some(Stated::Fixed(Given::Text(self.name(key.name, text, *inner, &node.location)?)))
             }
             (Takes::Names, Content::Text { text, inner }) => {
-                Some(Stated::Names(vec![(self.name(key.name, text, *inner, &node.place)?, node.place.clone())]))
+                Some(Stated::Names(vec![(self.name(key.name, text, *inner, &node.location)?, node.location.clone())]))
             }
             (Takes::Refused(why), _) => {
-                self.problems.push(Problem::new(&node.place, key.name, *why).help(key.doc));
+                self.problems.push(Problem::new(&node.location, key.name, *why).help(key.doc));
                 None
             }
             (Takes::Repeat, _) => None, // read before the other keys, whose values depend on it
@@ -103,7 +105,7 @@ impl Reader {
             (Takes::Pair, Content::List(list)) => {
                 let message = format!("expected two names of places, found {}", list.len());
                 let help = format!("write it as in {} = {}", key.name, key.example);
-                self.problems.push(Problem::new(&node.place, key.name, message).help(help));
+                self.problems.push(Problem::new(&node.location, key.name, message).help(help));
                 None
             }
             (Takes::Quantity(dimension, within), Content::Text { .. } | Content::Number { .. }) => {
@@ -116,7 +118,7 @@ impl Reader {
                     return Some(Stated::Fixed(Given::Count(u64::try_from(*whole).unwrap_or(0))));
                 }
                 let message = format!("expected {}, found {whole}", schema::described(&key.takes));
-                let problem = Problem::new(&node.place, key.name, message);
+                let problem = Problem::new(&node.location, key.name, message);
                 let limit = key.name == "points" && *to == MOST_POINTS as i64 && whole > to;
                 let help = limit.then(|| format!("the limit of a study is {MOST_POINTS} points"));
                 self.problems.push(problem.maybe_help(help));
@@ -127,7 +129,7 @@ impl Reader {
                 Some(Stated::List(vec![self.quantity(key.name, node)?]))
             }
             (Takes::Frequencies(_), Content::List(list)) => {
-                Some(Stated::List(self.quantities(key.name, list, &node.place)?))
+                Some(Stated::List(self.quantities(key.name, list, &node.location)?))
             }
             (Takes::Frequencies(_), Content::Table(table)) if table.get("tolerance").is_some() => {
                 let before = self.problems.len();
@@ -153,7 +155,7 @@ impl Reader {
                 let mut names = Vec::new();
                 for entry in &table.entries {
                     let quantity = self.quantity(&entry.key, &entry.node)?;
-                    names.push((entry.key.clone(), entry.key_place.clone(), quantity));
+                    names.push((entry.key.clone(), entry.key_location.clone(), quantity));
                 }
                 Some(Stated::ByName(names, *dimension))
             }
@@ -166,10 +168,10 @@ impl Reader {
                 Some(Stated::Table(self.table(table, keys, &format!("`{}`", key.name))))
             }
             (Takes::Row, Content::Text { .. } | Content::Number { whole: Some(_), .. }) => {
-                Some(Stated::Names(vec![(self.row(key, node)?, node.place.clone())]))
+                Some(Stated::Names(vec![(self.row(key, node)?, node.location.clone())]))
             }
             (Takes::Rows, Content::List(list)) if !list.is_empty() => {
-                let rows = list.iter().map(|node| Some((self.row(key, node)?, node.place.clone())));
+                let rows = list.iter().map(|node| Some((self.row(key, node)?, node.location.clone())));
                 Some(Stated::Names(rows.collect::<Option<_>>()?))
             }
             (Takes::Weights, Content::Table(table)) if !table.entries.is_empty() => {
@@ -186,7 +188,7 @@ impl Reader {
                 Some(Stated::Sums(sums))
             }
             (Takes::Vector, Content::List(list)) if list.len() == 3 => {
-                Some(Stated::Vector(self.quantities(key.name, list, &node.place)?))
+                Some(Stated::Vector(self.quantities(key.name, list, &node.location)?))
             }
             (Takes::Table(keys), Content::Table(table)) => {
                 Some(Stated::Table(self.table(table, keys, &format!("`{}`", key.name))))
@@ -197,21 +199,21 @@ impl Reader {
                 if words.iter().any(|(word, _)| word == text) {
                     return Some(Stated::Fixed(Given::Text(text.clone())));
                 }
-                self.unknown_word(key.name, text, &node.place, words.iter().map(|(word, _)| *word).collect());
+                self.unknown_word(key.name, text, &node.location, words.iter().map(|(word, _)| *word).collect());
                 None
             }
             _ => self.wrong_type(key, node),
         }
     }
 
-    pub(super) fn unknown_word(&mut self, key: &str, word: &str, place: &Place, words: Vec<&str>) {
+    pub(super) fn unknown_word(&mut self, key: &str, word: &str, location: &Location, words: Vec<&str>) {
         let message = format!("there is no `{}`, expected {}", shown(word), one_of(words.iter().copied()));
         let help = nearest(word, words).map(|near| format!("did you mean `{near}`?"));
-        self.problems.push(Problem::new(place, key, message).maybe_help(help));
+        self.problems.push(Problem::new(location, key, message).maybe_help(help));
     }
 
     /// A name, with the indices of a repetition filled in. What names a place may be a direction of a node, `node.direction`.
-    fn name(&mut self, key: &str, text: &str, inner: Option<usize>, place: &Place) -> Option<String> {
+    fn name(&mut self, key: &str, text: &str, inner: Option<usize>, location: &Location) -> Option<String> {
         let problem = match self.turn().name(text) {
             Ok(name) if is_identifier(&name) => return Some(name),
             // of a disk's next sector likewise
@@ -220,13 +222,13 @@ impl Reader {
             }
             Ok(name) => {
                 let message = format!("`{}` is no name: a letter first, then letters, digits and `_`", shown(&name));
-                Problem::new(place, key, message)
+                Problem::new(location, key, message)
             }
             Err(fault) if self.repetition.indices.is_empty() => {
                 let help = "braces are for entries of lists that have an index: repeat = { i = 12 }";
-                Problem::fault(place, inner, key, fault).help(help)
+                Problem::fault(location, inner, key, fault).help(help)
             }
-            Err(fault) => Problem::fault(place, inner, key, fault),
+            Err(fault) => Problem::fault(location, inner, key, fault),
         };
         self.problems.push(problem);
         None
@@ -235,7 +237,7 @@ impl Reader {
     /// The name of a row, or its number, with the indices of a repetition filled in.
     fn row(&mut self, key: &Key, node: &Node) -> Option<String> {
         match &node.value {
-            Content::Text { text, inner } => self.filled(key, text, *inner, &node.place),
+            Content::Text { text, inner } => self.filled(key, text, *inner, &node.location),
             Content::Number { whole: Some(number), .. } => Some(number.to_string()),
             _ => self.wrong_type(key, node).and(None),
         }
@@ -244,17 +246,17 @@ impl Reader {
     /// Rows with their weights.
     fn weights(&mut self, key: &Key, table: &Table) -> Option<Weights> {
         let one = |entry: &Entry| {
-            let name = self.filled(key, &entry.key, None, &entry.key_place)?;
-            Some((name, entry.key_place.clone(), self.quantity(&entry.key, &entry.node)?))
+            let name = self.filled(key, &entry.key, None, &entry.key_location)?;
+            Some((name, entry.key_location.clone(), self.quantity(&entry.key, &entry.node)?))
         };
         table.entries.iter().map(one).collect()
     }
 
-    fn filled(&mut self, key: &Key, text: &str, inner: Option<usize>, place: &Place) -> Option<String> {
+    fn filled(&mut self, key: &Key, text: &str, inner: Option<usize>, location: &Location) -> Option<String> {
         match self.turn().name(text) {
             Ok(name) => Some(name),
             Err(fault) => {
-                self.problems.push(Problem::fault(place, inner, key.name, fault));
+                self.problems.push(Problem::fault(location, inner, key.name, fault));
                 None
             }
         }
@@ -264,7 +266,7 @@ impl Reader {
         let mut names = Vec::with_capacity(list.len());
         for node in list {
             let Content::Text { text, inner } = &node.value else { return self.wrong_type(key, node) };
-            names.push((self.name(key.name, text, *inner, &node.place)?, node.place.clone()));
+            names.push((self.name(key.name, text, *inner, &node.location)?, node.location.clone()));
         }
         Some(Stated::Names(names))
     }
@@ -282,7 +284,7 @@ impl Reader {
                 shown(from),
                 shown(to)
             );
-            self.problems.push(Problem::new(&node.place, key, message).help(help));
+            self.problems.push(Problem::new(&node.location, key, message).help(help));
         }
         quantity
     }
@@ -297,36 +299,41 @@ impl Reader {
     }
 
     fn any_quantity(&mut self, key: &str, node: &Node) -> Option<Quantity> {
-        let place = &node.place;
+        let location = &node.location;
         let problem = match &node.value {
             Content::Text { text, inner } => match self.compile(text) {
                 Ok(expression) => {
-                    return Some(Quantity { place: place.clone(), inner: *inner, text: text.clone(), expression });
+                    return Some(Quantity {
+                        location: location.clone(),
+                        inner: *inner,
+                        text: text.clone(),
+                        expression,
+                    });
                 }
-                Err(fault) => Problem::fault(place, *inner, key, fault),
+                Err(fault) => Problem::fault(location, *inner, key, fault),
             },
             Content::Number { value, .. } if value.is_finite() => {
                 let text = value.to_string();
                 return Some(Quantity {
-                    place: place.clone(),
+                    location: location.clone(),
                     inner: None,
                     text,
                     expression: Expression::number(*value),
                 });
             }
             Content::Number { value, .. } => {
-                Problem::new(place, key, format!("a finite number is needed, found {value}"))
+                Problem::new(location, key, format!("a finite number is needed, found {value}"))
             }
-            other => Problem::new(place, key, format!("expected a quantity, found {}", other.described()))
+            other => Problem::new(location, key, format!("expected a quantity, found {}", other.described()))
                 .help("write a number with its unit in quotes, as in \"2 N\""),
         };
         self.problems.push(problem);
         None
     }
 
-    pub(super) fn quantities(&mut self, key: &str, list: &[Node], place: &Place) -> Option<Vec<Quantity>> {
+    pub(super) fn quantities(&mut self, key: &str, list: &[Node], location: &Location) -> Option<Vec<Quantity>> {
         if list.is_empty() {
-            let problem = Problem::new(place, key, "the list is empty, at least one value is needed");
+            let problem = Problem::new(location, key, "the list is empty, at least one value is needed");
             self.problems.push(problem);
             return None;
         }

@@ -169,7 +169,7 @@ fn coordinates(reduced: &ReducedComponent) -> Vec<String> {
 fn unused(study: &Study) -> Option<String> {
     let used = used_parameters(study);
     let from_template = |index: usize| {
-        let source = study.parameters[index].quantity.place.source;
+        let source = study.parameters[index].quantity.location.source;
         study.structure.template.as_ref().is_some_and(|template| template.source == source)
     };
     let varied: BTreeSet<usize> = study.varied.iter().map(|varied| varied.index).collect();
