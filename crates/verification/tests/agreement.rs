@@ -8,8 +8,8 @@ use stickslip::law::{FrictionContact, Gap, Iwan, Jenkins, SharedLaw, Valanis};
 use stickslip::method::Method;
 use stickslip::method::event_driven::EventDriven;
 use stickslip::method::harmonic_balance::HarmonicBalance;
-use stickslip::method::settling::Settling;
 use stickslip::method::shooting::Shooting;
+use stickslip::method::transient::Transient;
 use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Orbit, Symmetry};
 use stickslip::structure::Structure;
@@ -58,7 +58,7 @@ fn methods_agree_where_parts_of_a_joint_never_slip() {
         }
         assert_eq!(exact.evidence.history, ["j0"]);
         // waiting leads to any of them, and says so; the mean force of what never slips is another
-        let waited = orbit(&Settling { tolerance: 1e-6, ..Settling::default() }, &system, omega);
+        let waited = orbit(&Transient { tolerance: 1e-6, ..Transient::default() }, &system, omega);
         assert_eq!(waited.evidence.history, ["j0"]);
     }
 }
@@ -130,7 +130,7 @@ fn methods_agree_with_gyroscopic_damping() {
             };
             let exact = amplitudes(&EventDriven);
             let precise = HarmonicBalance { tolerance: Some(1e-5), ..HarmonicBalance::default() };
-            let settled = amplitudes(&Settling::default());
+            let settled = amplitudes(&Transient::default());
             for (other, bound) in [(amplitudes(&precise), 3e-5), (settled, 1e-7)] {
                 for (a, b) in exact.iter().zip(other) {
                     assert!((a / b - 1.0).abs() < bound, "{damping} {joint}: {exact:?} {other:?}");
@@ -166,7 +166,7 @@ fn forces_beyond_a_slip_limit_are_reported_whole() {
     };
     let system = model.assemble().unwrap();
     let omega = 103.0;
-    for method in [&Shooting::default() as &dyn Method, &Settling::default()] {
+    for method in [&Shooting::default() as &dyn Method, &Transient::default()] {
         let orbit = orbit(method, &system, omega);
         let period = std::f64::consts::TAU / omega;
         let (mut worst, mut largest) = (0.0f64, 0.0f64);
@@ -203,7 +203,7 @@ fn methods_agree_on_a_contact_that_opens_and_closes() {
         let series = orbit(&HarmonicBalance { harmonics: Some(63), ..HarmonicBalance::default() }, &system, omega);
         let error = |orbit: &Orbit| orbit.evidence.truncation.expect("an estimate");
         let shooting = Shooting { tolerance: 1e-9, ..Shooting::default() };
-        for found in [orbit(&shooting, &system, omega), orbit(&Settling::default(), &system, omega)] {
+        for found in [orbit(&shooting, &system, omega), orbit(&Transient::default(), &system, omega)] {
             // without friction, without slip or without an opening this were another test
             let force = |i: i32| found.sample(found.period() * f64::from(i) / 1000.0).joints[0].force;
             let pressed: Vec<f64> = (0..1000).map(|i| force(i)[1]).collect();

@@ -7,7 +7,7 @@
 use std::f64::consts::{FRAC_PI_4, PI};
 use std::sync::Arc;
 use stickslip::law::{Coulomb, Jenkins};
-use stickslip::method::transient::{Excitation, Transient};
+use stickslip::method::time_history::{Excitation, TimeHistory};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
 use stickslip::orbit::{Orbit, Symmetry};
 use stickslip_verification::{close, exact, integral, maximum, near, zero};
@@ -208,7 +208,7 @@ fn theory_7_free_decay() {
     let mut model = oscillator(m, k, limit);
     model.forces.clear();
     let system = model.assemble().unwrap();
-    let motion = Transient {
+    let motion = TimeHistory {
         displacement: vec![x0],
         velocity: vec![0.0],
         excitation: Excitation::Free,

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use stickslip::dimension::Dimension;
 use stickslip::law::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative, SharedLaw, Step, StepLaw};
 use stickslip::method::harmonic_balance::HarmonicBalance;
-use stickslip::method::settling::Settling;
 use stickslip::method::shooting::Shooting;
+use stickslip::method::transient::Transient;
 use stickslip::method::{Breakdown, Method, MethodError, OrbitError, Solver};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Accuracy, Found, Orbit, Path, Sample, Symmetry};
@@ -152,7 +152,7 @@ fn laws_from_outside_work_in_every_method_that_takes_their_view() {
         let (expected, change) = Reference::new(&system, omega, 2000, &start, &start).settle(80, 1e-6);
         assert!(change <= 1e-6, "{change}");
         let methods: [&dyn Method; 3] =
-            [&HarmonicBalance::default(), &Shooting::default(), &Settling { tolerance: 1e-6, ..Settling::default() }];
+            [&HarmonicBalance::default(), &Shooting::default(), &Transient { tolerance: 1e-6, ..Transient::default() }];
         for method in methods {
             let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
             let allowed = 2e-4 + 2.0 * orbit.evidence.truncation.unwrap_or(0.0);
@@ -189,7 +189,7 @@ fn laws_from_outside_without_a_limit_are_linear() {
         let determinant = a * b - spring * spring;
         let expected = [12.0 * b / determinant, Complex64::from(12.0 * spring) / determinant].map(|x| x.norm());
         let methods: [&dyn Method; 3] =
-            [&HarmonicBalance::default(), &Shooting::default(), &Settling { tolerance: 1e-6, ..Settling::default() }];
+            [&HarmonicBalance::default(), &Shooting::default(), &Transient { tolerance: 1e-6, ..Transient::default() }];
         for method in methods {
             let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
             for (found, expected) in amplitudes(&orbit).iter().zip(expected) {
@@ -277,7 +277,7 @@ fn laws_that_give_no_numbers_are_named() {
         }
         // the motion without a joint has an amplitude of some millimetres
         let system = model(Arc::new(Wrong { size: 1e-3, reach: 1e-4, by_rate })).assemble().unwrap();
-        for method in [&Shooting::default() as &dyn Method, &Settling::default()] {
+        for method in [&Shooting::default() as &dyn Method, &Transient::default()] {
             let error = method.solver(&system).unwrap().orbit(TAU * 24.0, None).unwrap_err();
             let OrbitError::Breakdown { cause: Breakdown::NoNumber { joint, law, .. }, .. } = &error else {
                 panic!("{by_rate} {}: {error}", method.name())

@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use stickslip::law::{Contact, Coulomb, Gap, Jenkins, Law, LawInfo, Parameter, Piece, SharedLaw, Stribeck};
 use stickslip::method::event_driven::{EventDriven, Subharmonic};
-use stickslip::method::transient::{Excitation, Transient};
+use stickslip::method::time_history::{Excitation, TimeHistory};
 use stickslip::method::{Method, auto::Auto, shooting::Shooting};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
 use stickslip::orbit::{Orbit, Sample};
@@ -32,7 +32,7 @@ fn force(on: &str, amplitude: f64, harmonic: u32) -> Force {
 
 /// The displacements of the first place at these times of a free motion that begins at rest at `start`.
 fn free(model: &Model, start: f64, step: f64, duration: f64) -> Vec<f64> {
-    let motion = Transient {
+    let motion = TimeHistory {
         displacement: vec![start],
         velocity: vec![0.0],
         excitation: Excitation::Free,
@@ -451,7 +451,7 @@ fn rigid_contacts_side_by_side_start_as_one() {
         for limits in [vec![(0.9, 0.9); count], vec![(0.7, 0.91); count]] {
             let sums = limits.iter().fold((0.0, 0.0), |sum, limit| (sum.0 + limit.0, sum.1 + limit.1));
             let samples = |limits: &[(f64, f64)]| {
-                let motion = Transient {
+                let motion = TimeHistory {
                     displacement: vec![0.0; 2],
                     velocity: vec![0.0; 2],
                     excitation: Excitation::Steady(TAU * 6.0),
@@ -500,7 +500,7 @@ fn creeping_to_a_stop_is_no_chatter() {
                 }
                 // in a drive that does nothing, too
                 let system = model.assemble().unwrap();
-                let motion = Transient {
+                let motion = TimeHistory {
                     displacement: vec![1.0],
                     velocity: vec![0.0],
                     excitation: Excitation::Steady(1.0),

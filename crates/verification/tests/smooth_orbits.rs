@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::time::Instant;
 use stickslip::law::CoulombArctan;
-use stickslip::method::{Method, event_driven::EventDriven, settling::Settling, shooting::Shooting};
+use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting, transient::Transient};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
 use stickslip_verification::{close, exact, near, number, table, template, template_with};
@@ -161,8 +161,8 @@ fn width_is_one_over_alpha() {
 fn settling_agrees_with_newton_within_its_own_estimate() {
     for (smooth, omega) in [(false, TAU * 120.75), (true, TAU * 121.25)] {
         let system = if smooth { couple(4.0, 25e3) } else { template("blade-couple", &[("Ft", 4.0)]) };
-        let settling = Settling { tolerance: 1e-4, ..Settling::default() };
-        let waited = settling.solver(&system).unwrap().orbit(omega, None).unwrap();
+        let waiting = Transient { tolerance: 1e-4, ..Transient::default() };
+        let waited = waiting.solver(&system).unwrap().orbit(omega, None).unwrap();
         let found = if smooth {
             Shooting::default().solver(&system).unwrap().orbit(omega, None).unwrap()
         } else {

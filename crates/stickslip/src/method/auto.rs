@@ -4,7 +4,7 @@ use super::event_driven::takes;
 use super::harmonic_balance::HarmonicBalance;
 use super::{
     Choice, Method, MethodError, MethodInfo, Options, Solver, Ways, event_driven::EventDriven, harmonic_balance,
-    settling, shooting::Shooting,
+    shooting::Shooting, transient,
 };
 use crate::law::Slider;
 use crate::model::System;
@@ -54,7 +54,7 @@ impl Auto {
         }
         let methods = Ways::of(system).methods;
         // waiting is the last resort
-        let other = methods.iter().find(|name| **name != settling::INFO.name).or(methods.first());
+        let other = methods.iter().find(|name| **name != transient::INFO.name).or(methods.first());
         match other.and_then(|name| super::find(name)).and_then(|row| (row.build)(&Options::new()).ok()) {
             Some(other) => (other, format!("{} refuses a law", harmonic_balance::NAME)),
             // who refuses says what else there is

@@ -75,7 +75,7 @@ mod tests {
     use crate::law::{Coulomb, Gap, Jenkins, Law, LawInfo, Parameter, Rate, RateLaw, Relative, StepLaw};
     use crate::method::harmonic_balance::{self, HarmonicBalance};
     use crate::method::shooting::Shooting;
-    use crate::method::{Method, OrbitError, event_driven, settling::Settling};
+    use crate::method::{Method, OrbitError, event_driven, transient::Transient};
     use crate::model::Axis;
     use crate::orbit::{Orbit, Symmetry};
     use crate::structure::Structure;
@@ -320,7 +320,7 @@ mod tests {
         let nothing = DMatrix::zeros(0, 0);
         let empty = Structure::new(Vec::new(), nothing.clone(), nothing.clone(), nothing).unwrap();
         let system = System::builder(empty).joint("led", Arc::new(Sample::Sliding), circle.to_vec()).build().unwrap();
-        let orbit = Settling::default().solver(&system).unwrap().orbit(2.0, None).unwrap();
+        let orbit = Transient::default().solver(&system).unwrap().orbit(2.0, None).unwrap();
         let (stiffness, limit) = SLIDING;
         let r = limit / stiffness;
         near(orbit.joints[0].dissipation, TAU * limit * (a * a - r * r).sqrt(), 1e-5);
@@ -451,8 +451,8 @@ mod tests {
             assert!((ends[0] - ends[periods]).abs() < 1e-9 && (ends[0] - ends[1]).abs() > 0.1, "{ends:?}");
             let system = stopped(k);
             let shooting = Shooting { period: periods, ..Shooting::default() };
-            let settling = Settling { period: periods, ..Settling::default() };
-            for method in [&shooting as &dyn Method, &settling] {
+            let waiting = Transient { period: periods, ..Transient::default() };
+            for method in [&shooting as &dyn Method, &waiting] {
                 let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
                 assert_eq!(orbit.periods, periods);
                 near(orbit.period(), periods as f64 * TAU / omega, 1e-14);
@@ -494,7 +494,7 @@ mod tests {
     #[test]
     fn waiting_ends_where_nothing_settles() {
         let wait = |system: &System, omega: f64| {
-            let error = Settling::default().solver(system).unwrap().orbit(omega, None).unwrap_err();
+            let error = Transient::default().solver(system).unwrap().orbit(omega, None).unwrap_err();
             assert_eq!(error.status(), "not-settled", "{error}");
             let OrbitError::Unsettled { returns, repeats, .. } = error else { panic!("{error}") };
             (returns, repeats)

@@ -18,10 +18,10 @@ mod incremental;
 mod periodic;
 mod relaxed;
 mod repeated;
-pub mod settling;
 pub mod shooting;
 mod smooth;
 mod stepped;
+pub mod time_history;
 pub mod transient;
 mod ways;
 
@@ -285,7 +285,7 @@ pub struct MethodInfo {
 
 /// Every method there is.
 pub const TABLE: &[MethodInfo] =
-    &[auto::INFO, event_driven::INFO, settling::INFO, shooting::INFO, harmonic_balance::INFO];
+    &[auto::INFO, event_driven::INFO, transient::INFO, shooting::INFO, harmonic_balance::INFO];
 
 /// The method with this name.
 pub fn find(name: &str) -> Option<&'static MethodInfo> {

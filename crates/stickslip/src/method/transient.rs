@@ -1,420 +1,102 @@
-//! Motion in time from given displacements: free decay, switched-on drive, run-up.
+//! Brute force: the motion is followed until its transient has died.
 //!
-//! Exact laws are followed by events, smooth laws by stiff integration, others and mixtures in equal steps, all in stretches of one drive
-//! period. In a run-up every cycle has its own frequency, constant over the cycle and continuous in phase, as in a stepped-sine test.
+//! Exact laws are followed by events, smooth ones by stiff integration, others and mixtures in equal steps. What is still missing when the search
+//! stops is estimated from the measured decay, and from the derivative of a return where the decay was measured over few, and reported as the
+//! orbit's truncation: a lightly damped structure needs hundreds of periods per digit, and a smooth law creeps for seconds. Which orbit that is,
+//! nothing but time tells, so it is an independent check of the other methods; in equal steps Newton's method then finds it again in finer ones.
 
-use super::flow::Flow;
-use super::{Breakdown, MethodError, followed};
+use super::event_driven::Exact;
+use super::followed::Kind;
+use super::periodic::Search;
+use super::shooting::{Shooter, Shooting};
+use super::{Method, MethodError, MethodInfo, MethodOption, PERIOD, Solver, WIDTH, periods, width};
+use crate::dimension::Dimension;
 use crate::model::System;
-use crate::orbit::{Path, Sample, Symmetry};
-use std::f64::consts::TAU;
-use std::sync::Arc;
 
 const NAME: &str = "transient";
 
-/// Relative error per step for smooth laws.
-const TOLERANCE: f64 = 1e-9;
-/// A free decay is followed in stretches of this many samples.
-const STRETCH: usize = 64;
+/// Estimated distance to the orbit, relative to it, at which a motion counts as settled when none is given.
+const TOLERANCE: f64 = 1e-7;
+/// Periods after which the search is given up when none are given: ten times what a structure with Q of 700 takes.
+const PERIODS: usize = 50_000;
 
-/// What drives the motion.
+/// The row of this method in [`super::TABLE`].
+pub(super) const INFO: MethodInfo = MethodInfo {
+    name: NAME,
+    summary: "brute force: follow the motion until its transient has died, with an estimate of the rest",
+    options: &[
+        MethodOption {
+            key: "tolerance",
+            dimension: Dimension::NONE,
+            count: false,
+            doc: "estimated relative distance to the orbit at which the motion counts as settled; 1e-7 when absent",
+        },
+        MethodOption {
+            key: "periods",
+            dimension: Dimension::NONE,
+            count: true,
+            doc: "periods after which the search is given up; 50000 when absent",
+        },
+        MethodOption {
+            key: WIDTH,
+            dimension: Dimension::VELOCITY,
+            count: false,
+            doc: "replaces exact laws by smooth ones that change sign over this velocity; exact laws are followed exactly when absent",
+        },
+        PERIOD,
+    ],
+    build: |options| {
+        let tolerance = options.get("tolerance").copied().unwrap_or(TOLERANCE);
+        if !(1e-12..=1e-2).contains(&tolerance) {
+            let message = format!("must lie between 1e-12 and 1e-2, found {tolerance}");
+            return Err(MethodError::Option { method: NAME, key: "tolerance", message });
+        }
+        let most = options.get("periods").map_or(PERIODS, |periods| *periods as usize);
+        let (width, period) = (width(NAME, options)?, periods(NAME, options)?);
+        Ok(Box::new(Transient { tolerance, periods: most, width, period }))
+    },
+};
+
+/// Waiting for the transient to die.
+///
+/// # Example
+/// ```
+/// use stickslip::method::{Method, event_driven::EventDriven, transient::Transient};
+/// let system = stickslip::model::example::blade_couple().assemble().unwrap();
+/// let omega = std::f64::consts::TAU * 121.25;
+/// let waited = Transient::default().solver(&system).unwrap().orbit(omega, None).unwrap();
+/// let found = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+/// assert!((waited.places[0].amplitude() / found.places[0].amplitude() - 1.0).abs() < 1e-6);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Excitation {
-    /// Nothing but constant forces.
-    Free,
-    /// A constant drive frequency, rad/s.
-    Steady(f64),
-    /// A drive frequency that changes linearly from `from` to `to` (rad/s) within `duration` (s).
-    RunUp {
-        /// First frequency, rad/s.
-        from: f64,
-        /// Last frequency, rad/s.
-        to: f64,
-        /// Time between them, s.
-        duration: f64,
-    },
-}
-
-/// A motion to be computed.
-#[derive(Debug, Clone, PartialEq)]
 pub struct Transient {
-    /// Displacements at the start, length n, m.
-    pub displacement: Vec<f64>,
-    /// Velocities at the start, length n, m/s.
-    pub velocity: Vec<f64>,
-    /// What drives it.
-    pub excitation: Excitation,
-    /// Time to be computed, s.
-    pub duration: f64,
-    /// Distance of the samples, s.
-    pub step: f64,
-    /// Velocity over which exact laws are smoothed, m/s; exact when absent.
+    /// Estimated relative distance to the orbit at which the motion counts as settled.
+    pub tolerance: f64,
+    /// Periods after which the search is given up.
+    pub periods: usize,
+    /// Velocity over which exact laws are smoothed, m/s; they are followed exactly without it.
     pub width: Option<f64>,
+    /// Periods of the drive after which the motion repeats.
+    pub period: usize,
 }
 
-/// Why a transient was not computed, or not to its end.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TransientError {
-    /// The laws do not fit together.
-    #[error(transparent)]
-    Method(#[from] MethodError),
-    /// The motion broke down; the samples before were handed on, and are good.
-    #[error("{cause}; {}", good(*.last))]
-    Breakdown {
-        /// Time of the last good sample, s; none where the motion breaks down before the first.
-        last: Option<f64>,
-        /// Why, and when.
-        cause: Breakdown,
-    },
-}
-
-fn good(last: Option<f64>) -> String {
-    last.map_or("no sample before is good".to_owned(), |last| format!("the samples until t = {last:.6e} s are good"))
-}
-
-/// Times that a stretch in which the motion broke down is followed anew, each time up to where it broke down, or half as far where the reason
-/// names no time: enough to find one of [`STRETCH`] samples.
-const SHORTENED: usize = 6;
-
-/// Motion over a stretch of time that begins at `begin` (s).
-struct Stretch {
-    begin: f64,
-    length: f64,
-    /// Index of the last sample in it, if there is one.
-    last: Option<usize>,
-    path: Arc<dyn Path>,
-}
-
-impl Transient {
-    /// Computes the motion; `sample` receives time (s), drive frequency (rad/s, zero if free) and state, and stops the motion by
-    /// returning false.
-    ///
-    /// # Errors
-    /// [`TransientError`].
-    ///
-    /// # Example
-    /// A sliding oscillator loses `4 F/k` of amplitude per cycle.
-    /// ```
-    /// use stickslip::law::{Coulomb, Law};
-    /// use std::sync::Arc;
-    /// use stickslip::method::transient::{Excitation, Transient};
-    /// use stickslip::model::{GROUND, Joint, Mass, Model, Spring};
-    /// let model = Model {
-    ///     masses: vec![Mass::new("m", 1.0)],
-    ///     springs: vec![Spring { between: ["m".into(), GROUND.into()], stiffness: 1.0, damping: 0.0 }],
-    ///     joints: vec![Joint { name: "j".into(), between: ["m".into(), GROUND.into()], law: Arc::new(Coulomb { limit: 0.01 }) }],
-    ///     ..Model::default()
-    /// };
-    /// let motion = Transient { displacement: vec![1.0], velocity: vec![0.0], excitation: Excitation::Free,
-    ///     duration: std::f64::consts::TAU, step: std::f64::consts::TAU, width: None };
-    /// let mut last = 0.0;
-    /// motion.run(&model.assemble().unwrap(), &mut |_, _, state| { last = state.displacement[0]; true }).unwrap();
-    /// assert!((last - 0.96).abs() < 1e-12);
-    /// ```
-    pub fn run(
-        &self,
-        system: &System,
-        sample: &mut dyn FnMut(f64, f64, &Sample) -> bool,
-    ) -> Result<(), TransientError> {
-        let shared = Arc::new(system.clone());
-        let mut flow = Transient::flow(system, self.width)?;
-        flow.keep(true);
-        let mut state = [self.displacement.as_slice(), &self.velocity].concat();
-        state.resize(flow.states(), 0.0);
-        let mut begin = 0.0;
-        let mut next = 0usize; // index of the next sample
-        let samples = (self.duration / self.step * (1.0 + f64::EPSILON)).floor() as usize;
-        while next <= samples {
-            let omega = self.frequency(begin);
-            let length = if omega > 0.0 { TAU / omega } else { STRETCH as f64 * self.step };
-            // of a cycle that outlasts the motion only what is asked for
-            let length = if length > self.duration { self.duration + self.step } else { length };
-            flow.set_drive(system, omega);
-            let start = state.clone();
-            let followed = flow.follow(&mut state, length);
-            let end = begin + length;
-            let inside = (next..=samples).take_while(|i| (*i as f64 * self.step) < end);
-            let whole = inside.last();
-            let stretch = match &followed {
-                Ok(()) => {
-                    let path = flow.path(&shared, Symmetry::FullPeriod, length);
-                    Some(Stretch { begin, length, last: whole, path })
-                }
-                Err(cause) => whole.and_then(|last| self.before(&shared, &start, (begin, next, last), cause)),
-            };
-            if let Some(stretch) = stretch {
-                while stretch.last.is_some_and(|last| next <= last) {
-                    let time = next as f64 * self.step;
-                    let since = (time - stretch.begin).clamp(0.0, stretch.length);
-                    if !sample(time, omega, &stretch.path.sample(since)) {
-                        return Ok(());
-                    }
-                    next += 1;
-                }
-            }
-            followed.map_err(|cause| TransientError::Breakdown {
-                last: next.checked_sub(1).map(|last| last as f64 * self.step),
-                cause: cause.later(begin),
-            })?;
-            begin = end;
-        }
-        Ok(())
-    }
-
-    /// What there is of a stretch before the motion breaks down in it, up to a sample: it begins at `begin` from the state `start`, and has the
-    /// samples `first` to `last`. `None` where there is no motion at all before, or no sample.
-    fn before(
-        &self,
-        system: &Arc<System>,
-        start: &[f64],
-        (begin, first, mut last): (f64, usize, usize),
-        cause: &Breakdown,
-    ) -> Option<Stretch> {
-        let since = |sample: usize| sample as f64 * self.step - begin;
-        let mut cause = cause.clone();
-        for _ in 0..SHORTENED {
-            let reached = cause.time().unwrap_or(0.5 * since(last + 1));
-            last = (first..=last).take_while(|sample| since(*sample) < reached).last()?;
-            // a sample at the very beginning needs some motion behind it
-            let length = if since(last) > 0.0 { since(last) } else { 0.5 * reached };
-            // one that knows nothing of the attempt that broke down
-            let mut flow = Transient::flow(system, self.width).ok()?;
-            flow.keep(true);
-            flow.set_drive(system, self.frequency(begin));
-            match flow.follow(&mut start.to_vec(), length) {
-                Ok(()) => {
-                    let path = flow.path(system, Symmetry::FullPeriod, length);
-                    return Some(Stretch { begin, length, last: Some(last), path });
-                }
-                Err(again) => cause = again,
-            }
-        }
-        None
-    }
-
-    /// Whether such motions of a system can be followed, with laws smoothed over `width` (m/s) if it is given.
-    ///
-    /// # Errors
-    /// [`MethodError`], as [`Transient::run`].
-    pub fn check(system: &System, width: Option<f64>) -> Result<(), MethodError> {
-        Transient::flow(system, width).map(drop)
-    }
-
-    fn flow(system: &System, width: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
-        followed::of(system, width, TOLERANCE, NAME).map_err(|error| error.with_ways(system))
-    }
-
-    /// Drive frequency of the cycle that begins at `time`: of a run-up the one with which the cycle ends when that of the frequency that
-    /// changes all the time does, so that the phase never runs late.
-    fn frequency(&self, time: f64) -> f64 {
-        match self.excitation {
-            Excitation::Free => 0.0,
-            Excitation::Steady(omega) => omega,
-            Excitation::RunUp { from, to, duration } => {
-                let (rate, left) = ((to - from) / duration, duration - time);
-                if left <= 0.0 {
-                    return to;
-                }
-                let begin = from + rate * time;
-                // ω τ + ½ ω' τ² = 2π
-                let discriminant = begin * begin + 2.0 * TAU * rate;
-                let whole = 2.0 * TAU / (begin + discriminant.max(0.0).sqrt());
-                if discriminant >= 0.0 && whole <= left {
-                    return TAU / whole;
-                }
-                // the rest of the cycle has the last frequency
-                let turned = begin * left + 0.5 * rate * left * left;
-                TAU / (left + (TAU - turned) / to)
-            }
-        }
+impl Default for Transient {
+    fn default() -> Self {
+        Transient { tolerance: TOLERANCE, periods: PERIODS, width: None, period: 1 }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::law::{Coulomb, Cubic, FrictionContact, SharedLaw};
-    use crate::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring};
-    use crate::structure::Structure;
-    use nalgebra::dmatrix;
-
-    /// A contact that is pressed before anything moves sets off from rest. While it stays closed and its tangent is not moved, its normal is
-    /// a spring: `x = x₀ (1 - cos ωt)` with `x₀ = preload/(k + kn)` about the static position.
-    #[test]
-    fn a_pressed_contact_sets_off_from_rest() {
-        let (mass, k, kn, preload) = (2.0, 3e4, 5e3, 40.0);
-        let law: SharedLaw =
-            Arc::new(FrictionContact { tangential: 1e3, normal: kn, friction: 0.3, preload, tangents: 1 });
-        let structure = Structure::new(
-            vec!["x".into(), "y".into()],
-            dmatrix![mass, 0.0; 0.0, mass],
-            dmatrix![0.0, 0.0; 0.0, 0.0],
-            dmatrix![k, 0.0; 0.0, k],
-        );
-        let axes = vec![Axis::new(vec![(0, 1.0)]), Axis::new(vec![(1, 1.0)])];
-        let system = System::builder(structure.unwrap()).joint("j", law, axes).build().unwrap();
-        let omega = ((k + kn) / mass).sqrt();
-        let motion = Transient {
-            displacement: vec![0.0; 2],
-            velocity: vec![0.0; 2],
-            excitation: Excitation::Free,
-            duration: 3.0 * TAU / omega,
-            step: TAU / omega / 40.0,
-            width: None,
-        };
-        let static_position = -preload / (k + kn); // its force pushes against the direction of closing
-        let mut worst = 0.0f64;
-        let run = motion.run(&system, &mut |time, _, sample| {
-            let expected = static_position * (1.0 - (omega * time).cos());
-            worst = worst.max((sample.displacement[1] - expected).abs() / static_position.abs());
-            assert_eq!(sample.displacement[0], 0.0);
-            true
-        });
-        assert!(run.is_ok() && worst < 1e-4, "{run:?} {worst}");
+impl Method for Transient {
+    fn name(&self) -> &'static str {
+        NAME
     }
-
-    /// `x'' + x - 2 x³ = 0` from rest at 1 is `1/cos t`, which is infinite at π/2: in the second stretch, as 100 samples fit before.
-    #[test]
-    fn a_motion_that_escapes_is_followed_until_it_does() {
-        let between = || ["m".to_owned(), GROUND.to_owned()];
-        let model = Model {
-            masses: vec![Mass::new("m", 1.0)],
-            springs: vec![Spring { between: between(), stiffness: 1.0, damping: 0.0 }],
-            joints: vec![Joint { name: "j".into(), between: between(), law: Arc::new(Cubic { stiffness: -2.0 }) }],
-            ..Model::default()
-        };
-        let end = 0.25 * TAU;
-        let motion = Transient {
-            displacement: vec![1.0],
-            velocity: vec![0.0],
-            excitation: Excitation::Free,
-            duration: 3.0 * end,
-            step: end / 100.5,
-            width: None,
-        };
-        let mut count = 0;
-        let run = motion.run(&model.assemble().unwrap(), &mut |time, _, sample| {
-            let expected = 1.0 / time.cos();
-            // what is left until infinity loses as many digits as the motion gained
-            let error = (sample.displacement[0] / expected - 1.0).abs();
-            assert!(error < 1e-6, "{time}: {error:e}");
-            count += 1;
-            true
-        });
-        let Err(TransientError::Breakdown { last: Some(last), cause: Breakdown::Unbounded { time, place } }) = run
-        else {
-            panic!("{run:?}")
-        };
-        assert_eq!((count, place.as_deref()), (101, Some("m")));
-        assert!((last - 100.0 * motion.step).abs() < 1e-12, "{last}");
-        // it is named once it is 1e5 times as fast as where the stretch began, at 64 samples: the velocity is 1/(π/2 - t)²
-        let began = 64.0 * motion.step;
-        let left = (began.cos().powi(2) / began.sin() / 1e5).sqrt();
-        assert!((0.0..left).contains(&(end - time)), "{time}");
-    }
-
-    /// Three rigid joints in a triangle share what they carry in no unique way as soon as all stick: what was computed before is the motion of a
-    /// shorter run, and the time is that of the motion.
-    #[test]
-    fn what_comes_before_a_breakdown_is_handed_on() {
-        let between = [["a", GROUND], ["b", GROUND], ["a", "b"]].map(|pair| pair.map(str::to_owned));
-        let law: SharedLaw = Arc::new(Coulomb { limit: 5.0 });
-        let springs = between.iter().zip([2e4, 3e4]);
-        let force = |on: &str, amplitude| Force { on: on.into(), amplitude, phase: 0.0, harmonic: 1 };
-        let model = Model {
-            masses: vec![Mass::new("a", 1.0), Mass::new("b", 0.7)],
-            springs: springs
-                .map(|(between, stiffness)| Spring { between: between.clone(), stiffness, damping: 3.0 })
-                .collect(),
-            joints: between
-                .iter()
-                .map(|between| Joint { name: between.concat(), between: between.clone(), law: law.clone() })
-                .collect(),
-            forces: vec![force("a", 20.0), Force { phase: 0.7, ..force("b", 12.0) }],
-            ..Model::default()
-        };
-        let system = model.assemble().unwrap();
-        let omega = TAU * 5.0;
-        let motion = Transient {
-            displacement: vec![0.0; 2],
-            velocity: vec![0.0; 2],
-            excitation: Excitation::Steady(omega),
-            duration: 1.0,
-            step: TAU / omega / 64.0,
-            width: None,
-        };
-        let samples = |motion: &Transient| {
-            let mut samples = Vec::new();
-            let run = motion.run(&system, &mut |time, _, sample| {
-                samples.push((time, sample.displacement.clone()));
-                true
-            });
-            (run, samples)
-        };
-        let (run, found) = samples(&motion);
-        let Err(TransientError::Breakdown { last: Some(last), cause: Breakdown::Redundant { time, .. } }) = run else {
-            panic!("{run:?}")
-        };
-        assert!(last < time && time <= last + motion.step, "{last} {time}");
-        assert_eq!(found.last().unwrap().0, last);
-        let (run, short) = samples(&Transient { duration: last - 0.5 * motion.step, ..motion.clone() });
-        assert!(run.is_ok() && short.len() + 1 == found.len(), "{run:?}");
-        for ((time, a), (_, b)) in short.iter().zip(&found) {
-            a.iter().zip(b).for_each(|(a, b)| assert!((a - b).abs() < 1e-15, "{time}: {a} {b}"));
+    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        let returns = self.periods.div_ceil(self.period);
+        let search = Search::Settle { tolerance: self.tolerance, returns };
+        if Kind::of(system, self.width) == Kind::Exact {
+            return Ok(Box::new(Exact::new(system, NAME, search, self.period)?));
         }
-    }
-
-    /// A linear oscillator run up through its resonance, against the classical Runge-Kutta method with the phase of a frequency that
-    /// changes all the time.
-    #[test]
-    fn a_run_up_has_the_phase_of_its_frequency() {
-        let between = || ["m".to_owned(), GROUND.to_owned()];
-        let model = Model {
-            masses: vec![Mass::new("m", 1.0)],
-            springs: vec![Spring { between: between(), stiffness: 1e4, damping: 2.0 }],
-            forces: vec![Force { on: "m".into(), amplitude: 5.0, phase: 0.0, harmonic: 1 }],
-            ..Model::default()
-        };
-        let (from, to) = (TAU * 10.0, TAU * 22.0);
-        for (from, to, duration) in [(from, to, 2.0), (to, from, 3.0), (from, to, 20.0)] {
-            let step = 1e-3;
-            let run_up = Transient {
-                displacement: vec![0.0],
-                velocity: vec![0.0],
-                excitation: Excitation::RunUp { from, to, duration },
-                duration,
-                step,
-                width: None,
-            };
-            let mut motion = Vec::new();
-            run_up
-                .run(&model.assemble().unwrap(), &mut |_, _, state| {
-                    motion.push(state.displacement[0]);
-                    true
-                })
-                .unwrap();
-            let rate = |t: f64, [x, v]: [f64; 2]| {
-                let phase = from * t + 0.5 * (to - from) / duration * t * t;
-                [v, 5.0 * phase.cos() - 1e4 * x - 2.0 * v]
-            };
-            let (mut state, mut largest, mut worst) = ([0.0f64; 2], 0.0f64, 0.0f64);
-            let small = step / 10.0;
-            for (i, x) in motion.iter().enumerate() {
-                largest = largest.max(state[0].abs());
-                worst = worst.max((x - state[0]).abs());
-                for j in 0..10 {
-                    let t = i as f64 * step + f64::from(j) * small;
-                    let on = |k: [f64; 2], h: f64| [state[0] + h * k[0], state[1] + h * k[1]];
-                    let a = rate(t, state);
-                    let b = rate(t + 0.5 * small, on(a, 0.5 * small));
-                    let c = rate(t + 0.5 * small, on(b, 0.5 * small));
-                    let d = rate(t + small, on(c, small));
-                    state = std::array::from_fn(|k| state[k] + small / 6.0 * (a[k] + 2.0 * b[k] + 2.0 * c[k] + d[k]));
-                }
-            }
-            // within a cycle the frequency is held, and the phase is off by its change over a quarter of a cycle
-            let change = (to - from).abs() / duration * (TAU / from.min(to)).powi(2) / 8.0;
-            assert!(worst < (0.002 + change) * largest, "{from} {duration}: {worst} of {largest}, {change}");
-        }
+        let options = Shooting { width: self.width, period: self.period, ..Shooting::default() };
+        Ok(Box::new(Shooter::new(system, options, NAME, search)?))
     }
 }

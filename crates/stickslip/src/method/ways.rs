@@ -1,6 +1,6 @@
 //! What to use instead of a method that cannot take a system: every method of the table is asked.
 
-use super::{MethodInfo, Options, Solver, TABLE, WIDTH, auto, event_driven, settling};
+use super::{MethodInfo, Options, Solver, TABLE, WIDTH, auto, event_driven, transient};
 use crate::model::System;
 use crate::orbit::{Orbit, OrbitError};
 use std::fmt;
@@ -108,7 +108,7 @@ fn advised(mut error: OrbitError, system: &System) -> OrbitError {
     match &mut error {
         // waiting is the last resort
         OrbitError::Truncation { method, instead, .. } | OrbitError::NotConverged { method, instead, .. } => {
-            *instead = words(&|name| ![*method, settling::INFO.name].contains(&name));
+            *instead = words(&|name| ![*method, transient::INFO.name].contains(&name));
         }
         OrbitError::Unsettled { method, instead, repeats: None, .. } => *instead = words(&|name| name != *method),
         OrbitError::Drift { method, instead, .. } if *method != event_driven::INFO.name => {

@@ -24,7 +24,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 use stickslip::method::WIDTH;
-use stickslip::method::transient::{Excitation, Transient, TransientError};
+use stickslip::method::time_history::{Excitation, TimeHistory, TimeHistoryError};
 use stickslip::model::Model;
 
 const FREQUENCY: Takes = Takes::Quantity(Dimension::FREQUENCY, Within::Positive);
@@ -93,7 +93,7 @@ pub(super) const KIND: Kind = Kind {
         axes: [Some(Dimension::TIME), Some(Dimension::LENGTH)],
         // exact and smooth laws alike are followed in time; there is no orbit to be found
         uses_method: false,
-        needs: |_, options, system| Transient::check(system, options.get(WIDTH).copied()),
+        needs: |_, options, system| TimeHistory::check(system, options.get(WIDTH).copied()),
         adapts: false,
         tables: &["motion", "motion_summary", "decay", "decay_summary"],
     },
@@ -232,7 +232,7 @@ fn compute(work: &Work<'_>) -> Computed {
         let duration = values.quantity("duration").or(cycles).or(run_up_time).unwrap_or(0.0);
         let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
         let step = values.quantity("time_step").or(fastest.map(|w| TAU / w / per_cycle)).unwrap_or(duration);
-        let transient = Transient {
+        let transient = TimeHistory {
             displacement: initial("start"),
             velocity: initial("start_velocity"),
             excitation,
@@ -283,7 +283,7 @@ fn compute(work: &Work<'_>) -> Computed {
         match end {
             Ok(()) if stopped => part.count(at, NOT_REACHED, None),
             Ok(()) => part.count(at, CONVERGED, None),
-            Err(TransientError::Method(error)) => return Err((case.index, error)),
+            Err(TimeHistoryError::Method(error)) => return Err((case.index, error)),
             Err(error) => part.count(at, "breakdown", Some(error.to_string())),
         }
     }
