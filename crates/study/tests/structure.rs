@@ -545,3 +545,47 @@ fn a_row_without_mass_and_a_rigid_motion_at_one_hertz() {
         }
     }
 }
+
+/// A free body with modal damping, whose free motion has none, and a mass on a spring of its own beside it; from event to event, where roots that fall
+/// together nearly are no modes. The free chain of three masses has the shapes (1, 0, -1) and (1, -2, 1) at k/m and 3 k/m.
+#[test]
+fn a_free_body_with_modal_damping_and_a_sprung_mass() {
+    let folder = tempfile::tempdir().unwrap();
+    let (spring, ratio, beside, soft) = (1e5, 0.01, 0.1, (1e4, 1.0));
+    let chain = |a: f64, b: f64, c: f64| [(0, 0, a), (1, 1, b), (2, 2, a), (0, 1, c), (1, 0, c), (1, 2, c), (2, 1, c)];
+    for (name, entries) in [("k", chain(spring, 2.0 * spring, -spring)), ("m", chain(1.0, 1.0, 0.0))] {
+        let entries = entries.into_iter().filter(|entry| entry.2 != 0.0);
+        write(folder.path().join(format!("{name}.mtx")), &Matrix::new(3, 3, Symmetry::General, entries).unwrap())
+            .unwrap();
+    }
+    let text = "schema = 1\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\nunits = \"m-kg-s\"\nmodal_damping = 0.01\n\
+         [[place]]\nname = \"one\"\ndof = 1\n[[place]]\nname = \"mean\"\nsum = { \"2\" = 0.5, \"3\" = 0.5 }\n\
+         [[mass]]\nname = \"beside\"\nmass = \"100 g\"\n\
+         [[spring]]\nbetween = [\"beside\", \"mean\"]\nstiffness = \"10 N/mm\"\ndamping = \"1 kg/s\"\n\
+         [[force]]\non = \"one\"\namplitude = \"1 N\"\n\
+         [study]\nkind = \"response\"\nfrequency = [\"20 Hz\", \"45 Hz\", \"70 Hz\"]\npeaks = false\n\
+         [method]\nkind = \"event-driven\"\n";
+    let data = results(folder.path(), text);
+    let shapes = [([1.0, 0.0, -1.0], 2.0, spring), ([1.0, -2.0, 1.0], 6.0, 3.0 * spring)];
+    let tie = [0.0, -0.5, -0.5, 1.0];
+    for (i, hertz) in [20.0, 45.0, 70.0].into_iter().enumerate() {
+        let s = Complex64::new(0.0, hertz * TAU);
+        let mut stiffness = DMatrix::from_fn(4, 4, |i, j| (s * soft.1 + soft.0) * tie[i] * tie[j]);
+        for at in 0..4 {
+            stiffness[(at, at)] += s * s * if at < 3 { 1.0 } else { beside };
+        }
+        for (shape, size, value) in shapes {
+            let own = (s * 2.0 * ratio * f64::sqrt(value) + value) / size;
+            for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
+                stiffness[(row, column)] += own * shape[row] * shape[column];
+            }
+        }
+        let x = stiffness.lu().solve(&DVector::from_fn(4, |i, _| Complex64::new(f64::from(i == 0), 0.0))).unwrap();
+        for (column, expected) in
+            [("one_amplitude_m", x[0]), ("mean_amplitude_m", (x[1] + x[2]) * 0.5), ("beside_amplitude_m", x[3])]
+        {
+            let off = numbers(&data, column)[i] / expected.norm() - 1.0;
+            assert!(off.abs() < 1e-9, "{column} {hertz}: {off:e}");
+        }
+    }
+}

@@ -58,6 +58,8 @@ const AT_ONCE: usize = 64;
 const MASSLESS: f64 = 1e-14;
 /// A negative shift, relative to the ratio of stiffness and mass, by which free motions have a factor.
 const SHIFT: f64 = 1e-6;
+/// Eigenvalues below this share of the shift are the rounding of the stiffness, and the motion is free: its root would damp it by a ratio of nothing.
+const FREE: f64 = 1e-9;
 
 /// Damping of the whole structure.
 #[derive(Debug, Clone, PartialEq)]
@@ -555,7 +557,12 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
     let (thetas, mut shapes) = eigen::symmetric_pair(mass, &(stiffness + mass * shift))?;
     let largest = thetas.iter().fold(0.0f64, |most, theta| most.max(theta.abs()));
     let massless = |theta: f64| theta <= MASSLESS * largest;
-    let value = |theta: f64| if massless(theta) { f64::INFINITY } else { 1.0 / theta - shift };
+    let free = |value: f64| value.abs() <= FREE * shift;
+    let value = |theta: f64| match 1.0 / theta - shift {
+        _ if massless(theta) => f64::INFINITY,
+        value if free(value) => 0.0,
+        value => value,
+    };
     for (mut shape, &theta) in shapes.column_iter_mut().zip(&thetas) {
         shape /= if massless(theta) { 1.0 } else { theta.sqrt() };
     }
