@@ -217,6 +217,9 @@ impl Law for Graded {
     fn values(&self) -> Vec<f64> {
         Vec::new()
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn pieces(&self) -> Option<Vec<Piece>> {
         Some(self.0.clone())
     }

@@ -48,6 +48,9 @@ impl Law for TwoSurfaces {
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.limit, self.ratio]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn scale(&self) -> f64 {
         self.limit
     }
@@ -97,6 +100,9 @@ impl Law for Hardening {
     }
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.limit, self.tangent]
+    }
+    fn is_odd(&self) -> bool {
+        true
     }
     /// Without a limit two springs in a row are left, which nothing bounds.
     fn scale(&self) -> f64 {
@@ -223,6 +229,9 @@ impl Law for Wrong {
     fn values(&self) -> Vec<f64> {
         Vec::new()
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn scale(&self) -> f64 {
         1.0
     }
@@ -284,6 +293,69 @@ fn laws_that_give_no_numbers_are_named() {
             };
             assert_eq!((joint.as_str(), *law), ("rub", "wrong"));
         }
+    }
+}
+
+/// A spring that pulls on one side only, and says that it is odd.
+#[derive(Debug)]
+struct OneSided {
+    by_rate: bool,
+}
+
+static ONE_SIDED: LawInfo = LawInfo {
+    name: "one-sided",
+    summary: "f = 1 N/mm max(u - 1 mm, 0)",
+    parameters: &[],
+    sample: &[],
+    build: |_| Arc::new(OneSided { by_rate: false }),
+};
+
+impl Law for OneSided {
+    fn info(&self) -> &'static LawInfo {
+        &ONE_SIDED
+    }
+    fn values(&self) -> Vec<f64> {
+        Vec::new()
+    }
+    fn is_odd(&self) -> bool {
+        true
+    }
+    fn step(&self) -> Option<&dyn Step> {
+        if self.by_rate { None } else { Some(self) }
+    }
+    fn rate(&self) -> Option<&dyn Rate> {
+        if self.by_rate { Some(self) } else { None }
+    }
+}
+
+impl OneSided {
+    fn force<S: Real>(u: S) -> [S; 3] {
+        let beyond = u - S::from(1e-3);
+        [if beyond.re() > 0.0 { beyond * 1e3 } else { S::from(0.0) }, S::from(0.0), S::from(0.0)]
+    }
+}
+
+impl StepLaw for OneSided {
+    fn states(&self) -> usize {
+        0
+    }
+    fn advance<S: Real>(&self, _from: &[S; 3], to: &[S; 3], _z: &mut [S]) -> [S; 3] {
+        Self::force(to[0])
+    }
+}
+
+impl RateLaw for OneSided {
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+        Self::force(motion.displacement[0])
+    }
+}
+
+/// A law that says of itself what is not true would be mirrored into a symmetric orbit that is none.
+#[test]
+fn a_law_that_is_not_odd_must_not_say_so() {
+    for by_rate in [false, true] {
+        let error = model(Arc::new(OneSided { by_rate })).assemble().unwrap_err().to_string();
+        assert!(error.contains("one-sided") && error.contains("is_odd"), "{error}");
     }
 }
 

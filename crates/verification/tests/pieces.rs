@@ -565,6 +565,9 @@ fn a_drop_behind_a_spring_is_refused() {
         fn values(&self) -> Vec<f64> {
             vec![1.0]
         }
+        fn is_odd(&self) -> bool {
+            true
+        }
         fn pieces(&self) -> Option<Vec<Piece>> {
             let slider = stickslip::law::Slider { stiffness: Some(2.0), limit: 0.3, static_limit: 0.4 };
             Some(vec![Piece::Slider(slider)])

@@ -74,6 +74,9 @@ impl Law for BoucWen {
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.beta, self.gamma, self.exponent]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn scale(&self) -> f64 {
         self.stiffness * self.bound()
     }

@@ -38,6 +38,9 @@ impl Law for Coulomb {
     fn values(&self) -> Vec<f64> {
         vec![self.limit]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn scale(&self) -> f64 {
         self.limit
     }

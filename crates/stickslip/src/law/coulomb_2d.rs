@@ -39,6 +39,9 @@ impl Law for Coulomb2d {
     fn values(&self) -> Vec<f64> {
         vec![self.limit]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn directions(&self) -> usize {
         2
     }

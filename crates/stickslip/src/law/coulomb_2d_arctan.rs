@@ -56,6 +56,9 @@ impl Law for Coulomb2dArctan {
     fn values(&self) -> Vec<f64> {
         vec![self.limit, self.alpha]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn directions(&self) -> usize {
         2
     }

@@ -47,6 +47,9 @@ impl Law for CoulombArctan {
     fn values(&self) -> Vec<f64> {
         vec![self.limit, self.alpha]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn scale(&self) -> f64 {
         self.limit
     }

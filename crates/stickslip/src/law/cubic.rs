@@ -44,6 +44,9 @@ impl Law for Cubic {
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn rate(&self) -> Option<&dyn Rate> {
         Some(self)
     }

@@ -101,6 +101,9 @@ impl Law for Iwan {
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.limit, self.chi, self.beta, f64::from(self.elements)]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn scale(&self) -> f64 {
         self.limit
     }

@@ -43,6 +43,9 @@ impl Law for Jenkins {
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.limit]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn scale(&self) -> f64 {
         self.limit
     }

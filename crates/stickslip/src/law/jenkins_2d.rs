@@ -49,6 +49,9 @@ impl Law for Jenkins2d {
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.limit]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn directions(&self) -> usize {
         2
     }

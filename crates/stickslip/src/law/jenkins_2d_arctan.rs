@@ -55,6 +55,9 @@ impl Law for Jenkins2dArctan {
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.limit, self.alpha]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn directions(&self) -> usize {
         2
     }

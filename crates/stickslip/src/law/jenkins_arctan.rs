@@ -57,6 +57,9 @@ impl Law for JenkinsArctan {
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.limit, self.alpha]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn scale(&self) -> f64 {
         self.limit
     }

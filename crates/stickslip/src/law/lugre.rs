@@ -85,6 +85,9 @@ impl Law for LuGre {
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.damping, self.viscous, self.limit, self.static_limit, self.velocity]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     /// The static limit; without any limit, viscous friction alone is bounded by nothing.
     fn scale(&self) -> f64 {
         if self.static_limit == 0.0 && self.viscous > 0.0 { f64::INFINITY } else { self.static_limit }

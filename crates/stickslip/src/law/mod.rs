@@ -36,6 +36,7 @@ mod jenkins_2d_arctan;
 mod jenkins_arctan;
 mod kink;
 mod lugre;
+mod mirror;
 mod parameter;
 mod plane;
 mod proportion;
@@ -138,6 +139,7 @@ pub const MOST_DIRECTIONS: usize = 3;
 /// impl Law for Stiffening {
 ///     fn info(&self) -> &'static LawInfo { &INFO }
 ///     fn values(&self) -> Vec<f64> { vec![self.stiffness, self.growth] }
+///     fn is_odd(&self) -> bool { true }
 ///     fn rate(&self) -> Option<&dyn Rate> { Some(self) }
 /// }
 ///
@@ -190,10 +192,9 @@ pub trait Law: Debug + Send + Sync {
     fn prox(&self) -> Option<&dyn Prox> {
         None
     }
-    /// Whether the force changes its sign with the motion: `f(-u) = -f(u)` for whole histories.
-    fn is_odd(&self) -> bool {
-        true
-    }
+    /// Whether the force changes its sign with the motion: `f(-u) = -f(u)` for whole histories. Methods halve the period of systems that are odd,
+    /// so that a law that says so is tried when its system is built.
+    fn is_odd(&self) -> bool;
     /// Whether two contacts with this law that move differently never give energy to their difference: `∫ δf δu' dt` from equal states on is
     /// never negative. Then what both keep of it elastically cannot exceed what went in, and motions do not separate
     /// ([`crate::model::System::contracts`]). Friction that grows with velocity or does not depend on it is of this kind at constant slip limits;
@@ -354,7 +355,7 @@ impl dyn Law + '_ {
         self.scale() == 0.0
     }
 
-    /// Checks that every parameter is finite and in its range, that they fit each other, and that internal states have a size.
+    /// Checks that every parameter is finite and in its range, that they fit each other, that internal states have a size, and that an odd law is one.
     ///
     /// # Errors
     /// [`LawError`] names the first parameter that is not.
@@ -369,6 +370,11 @@ impl dyn Law + '_ {
             let message =
                 format!("the size of its internal states, `state_scale`, must be finite and above zero, found {size}");
             return Err(LawError::Inconsistent { law: self.name(), message });
+        }
+        if self.is_odd() && mirror::is_broken(self) {
+            let message = "it says that it is odd, and the mirror image of a motion does not have the mirror image of its force: `is_odd` must be \
+                           false";
+            return Err(LawError::Inconsistent { law: self.name(), message: message.to_owned() });
         }
         self.consistent().map_err(|message| LawError::Inconsistent { law: self.name(), message })
     }

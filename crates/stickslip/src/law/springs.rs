@@ -47,6 +47,9 @@ impl Law for Springs {
     fn values(&self) -> Vec<f64> {
         self.stiffness.iter().copied().chain([self.directions as f64]).collect()
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn directions(&self) -> usize {
         self.directions
     }

@@ -98,6 +98,9 @@ impl Law for Stribeck {
     fn values(&self) -> Vec<f64> {
         vec![self.limit, self.static_limit, self.velocity]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn scale(&self) -> f64 {
         self.static_limit
     }

@@ -60,6 +60,9 @@ impl Law for StribeckArctan {
     fn values(&self) -> Vec<f64> {
         vec![self.limit, self.static_limit, self.velocity, self.alpha]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn scale(&self) -> f64 {
         self.static_limit
     }

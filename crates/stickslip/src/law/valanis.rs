@@ -64,6 +64,9 @@ impl Law for Valanis {
     fn values(&self) -> Vec<f64> {
         vec![self.stiffness, self.slip_stiffness, self.lambda, self.kappa]
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     /// What the force beyond the spring Et tends to in slip.
     fn scale(&self) -> f64 {
         self.stiffness / self.lambda * self.sliding()

@@ -117,6 +117,9 @@ mod tests {
         fn values(&self) -> Vec<f64> {
             vec![1.0]
         }
+        fn is_odd(&self) -> bool {
+            true
+        }
         fn directions(&self) -> usize {
             if matches!(self, Sample::Relaxing) { 1 } else { 2 }
         }

@@ -44,6 +44,9 @@ impl Law for Plane {
     fn values(&self) -> Vec<f64> {
         Vec::new()
     }
+    fn is_odd(&self) -> bool {
+        true
+    }
     fn directions(&self) -> usize {
         2
     }
