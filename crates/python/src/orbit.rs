@@ -117,7 +117,7 @@ impl PyOrbit {
         evidence.set_item("residual", found.residual)?;
         evidence.set_item("energy_gap", found.energy_gap)?;
         evidence.set_item("truncation", found.truncation)?;
-        evidence.set_item("return_defect", found.return_defect)?;
+        evidence.set_item("return_defect", self.orbit.return_defect())?;
         evidence.set_item("status", found.accuracy.status())?;
         evidence.set_item("iterations", found.iterations)?;
         evidence.set_item("switches", found.switches)?;

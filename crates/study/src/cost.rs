@@ -226,7 +226,7 @@ impl<'a> Costing<'a> {
     }
 
     /// Whether the method of the study finds series of harmonics.
-    fn is_series(&self) -> bool {
+    pub fn is_series(&self) -> bool {
         match self.case.method.name.as_str() {
             "harmonic-balance" => true,
             "auto" => Auto.choice(self.surveyed.survey.system()).method == harmonic_balance::NAME,

@@ -15,7 +15,8 @@ use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Degrees of freedom up to which orbits are judged without being asked: the return map is dense, and its cost grows with the cube.
+/// Degrees of freedom up to which orbits are judged without being asked: the return map is dense, and its cost grows with the cube. Beyond, one period
+/// of motion takes ten times as long as its orbit by harmonic balance, and [`crate::orbit::Orbit::return_defect`] follows it when it is asked.
 const LARGEST: usize = 24;
 /// Joints up to which the return of a motion whose stability is proven is followed all the same.
 const JOINTS: usize = 12;
@@ -90,13 +91,22 @@ impl Judge {
 
     /// Follows the return, over the half period if `odd`, from the state at t = 0, which begins with `start`.
     pub fn judge(&mut self, system: &System, omega: f64, odd: bool, start: &[f64]) -> Judged {
+        self.follow(system, omega, odd, start, !self.proven)
+    }
+
+    /// How far the motion from `start` is from it after a return, relative to the state, without the derivative that costs most.
+    pub fn defect(&mut self, system: &System, omega: f64, odd: bool, start: &[f64]) -> Option<f64> {
+        self.follow(system, omega, odd, start, false).defect
+    }
+
+    fn follow(&mut self, system: &System, omega: f64, odd: bool, start: &[f64], sensitive: bool) -> Judged {
         let Some(flow) = &mut self.flow else { return Judged::default() };
         let (share, sign) = if odd { (0.5, -1.0) } else { (1.0, 1.0) };
         flow.set_drive(system, omega);
         let states = flow.states();
         let mut state = start.to_vec();
         state.resize(states, 0.0);
-        let mut derivative = (!self.proven).then(|| DMatrix::identity(states, states));
+        let mut derivative = sensitive.then(|| DMatrix::identity(states, states));
         if flow.run(&mut state, share * TAU / omega, derivative.as_mut()).is_err() {
             return Judged::default();
         }
@@ -115,7 +125,7 @@ mod tests {
     use crate::law::{Coulomb, CoulombArctan, Jenkins, SharedLaw};
     use crate::method::Method;
     use crate::method::harmonic_balance::HarmonicBalance;
-    use crate::model::example;
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
     use std::sync::Arc;
 
     fn couple(law: SharedLaw) -> System {
@@ -144,6 +154,37 @@ mod tests {
             let (few, many) = (defect(1), defect(31));
             assert!(few < 0.1 && many < 0.3 * few, "{few} {many}");
         }
+    }
+
+    /// Many bodies on springs and joints in a row are not followed at every point of a curve, and are where an orbit is asked for its return: what a
+    /// series lacks is seen there too, and a motion from event to event returns to itself.
+    #[test]
+    fn an_orbit_of_many_bodies_is_followed_when_it_is_asked() {
+        let name = |i: usize| format!("b{i}");
+        let law: SharedLaw = Arc::new(Jenkins { stiffness: 2e4, limit: 0.3 });
+        let held = |i: usize| Spring { between: [name(i), GROUND.into()], stiffness: 105_103.0, damping: 20.0 };
+        let tied = |i: usize| Joint { name: format!("j{i}"), between: [name(i - 1), name(i)], law: law.clone() };
+        let force = Force { on: name(0), amplitude: 10.0, phase: 0.0, harmonic: 1 };
+        let model = Model {
+            masses: (0..30).map(|i| Mass::new(name(i), 0.182)).collect(),
+            springs: (0..30).map(held).collect(),
+            joints: (1..30).map(tied).collect(),
+            forces: vec![force],
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let omega = TAU * 121.0;
+        let defect = |harmonics: usize| {
+            let method =
+                HarmonicBalance { harmonics: Some(harmonics), tolerance: Some(0.9), ..HarmonicBalance::default() };
+            let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+            assert_eq!(orbit.evidence.return_defect, None);
+            orbit.return_defect().unwrap()
+        };
+        let (few, many) = (defect(1), defect(15));
+        assert!(few < 0.1 && many < 0.3 * few, "{few} {many}");
+        let orbit = crate::method::event_driven::EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+        assert_eq!(orbit.return_defect(), Some(orbit.evidence.residual));
     }
 
     /// A state that is none of an orbit does not return, by as much as it is off; one that has not all states says nothing.

@@ -157,7 +157,8 @@ pub struct Evidence {
     /// Whether that is as little as was asked for.
     pub accuracy: Accuracy,
     /// Distance between the state at t = 0 and where an independent flow brings it after a return, relative to the state, in the energy norm;
-    /// the residual itself where the orbit was found by a flow, `None` where no flow follows the system, or where it is too large.
+    /// the residual itself where the orbit was found by a flow, `None` where no flow follows the system, or where it is too large to be followed
+    /// without being asked ([`Orbit::return_defect`]).
     pub return_defect: Option<f64>,
     /// Names of joints that stick for the whole period: their offset is not unique, the orbit is one of a continuum
     /// (the symmetric one, with [`Symmetry::HalfPeriod`]).
@@ -246,6 +247,11 @@ pub trait Path: Send + Sync {
     fn switch_times(&self) -> Vec<f64>;
     /// The derivative of the return from `start`, of a method that makes none by itself; `None` if there is none.
     fn return_map(&self, _start: &[f64], _symmetry: Symmetry) -> Option<DMatrix<f64>> {
+        None
+    }
+    /// How far an independent motion from `start` is from it after a return, relative to the state, of a method that finds its orbits in another way
+    /// than by motion; `None` if nothing follows it.
+    fn return_defect(&self, _start: &[f64], _symmetry: Symmetry) -> Option<f64> {
         None
     }
 }

@@ -70,6 +70,13 @@ impl Orbit {
         Some(multipliers)
     }
 
+    /// Distance between the state at t = 0 and where an independent flow brings it after a return, relative to the state, in the energy norm
+    /// ([`super::Evidence::return_defect`]), of an orbit of any size: where its method did not follow the motion, it is followed now, over one period.
+    /// `None` where no flow takes the laws of the system.
+    pub fn return_defect(&self) -> Option<f64> {
+        self.evidence.return_defect.or_else(|| self.path.return_defect(&self.start, self.symmetry))
+    }
+
     /// The multiplier of the full period from that of a return.
     fn over_period(&self, value: Complex64) -> Complex64 {
         match self.symmetry {

@@ -20,6 +20,9 @@ use std::ops::Range;
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
+/// Length of a state up to which an orbit by itself is followed for its return, however it was found: a minute at most.
+const FOLLOWED: usize = 200;
+
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
         name: "orbit",
@@ -55,6 +58,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let rows = points * costing.instants();
     let orbits = costing.orbits(points);
     let wanted = costing.case.values.flag("multipliers") == Some(true);
+    // a series is followed over a period for its return, and once more with the derivative for multipliers
+    let followed = if costing.is_series() { costing.period() } else { 0.0 };
     let (multipliers, map) = if wanted { (points * 2.0 * costing.masses, costing.period()) } else { (0.0, 0.0) };
     Cost {
         tables: vec![
@@ -65,7 +70,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         // the panels beyond the most that are drawn are made all the same
         drawn: rows * (costing.places + costing.joints),
         unit: costing.kept_orbits(),
-        work: points * (costing.orbit() + map + costing.extra() + costing.reading(costing.instants())),
+        work: points * (costing.orbit() + followed + map + costing.extra() + costing.reading(costing.instants())),
     }
 }
 
@@ -78,7 +83,11 @@ fn compute(work: &Work<'_>) -> Computed {
         part.notes.extend(one_of_many(prepared, &orbit));
         summary.varied(&prepared.case);
         summary.number("frequency_Hz", hertz(omega));
-        Summary::of(prepared, &orbit, stable).write(prepared, &mut summary);
+        let mut row = Summary::of(prepared, &orbit, stable);
+        if orbit.start.len() <= FOLLOWED {
+            row.return_defect = orbit.return_defect().unwrap_or(f64::NAN);
+        }
+        row.write(prepared, &mut summary);
         summary.number("work_in_J", orbit.energy.work_in);
         summary.number("viscous_J", orbit.energy.viscous);
         summary.number("friction_J", orbit.energy.friction);

@@ -541,4 +541,9 @@ impl Path for Series {
         let odd = symmetry == Symmetry::HalfPeriod;
         Judge::of_any_size(&self.system).judge(&self.system, self.omega, odd, start).derivative
     }
+
+    fn return_defect(&self, start: &[f64], symmetry: Symmetry) -> Option<f64> {
+        let odd = symmetry == Symmetry::HalfPeriod;
+        Judge::of_any_size(&self.system).defect(&self.system, self.omega, odd, start)
+    }
 }
