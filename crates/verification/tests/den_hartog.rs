@@ -239,7 +239,7 @@ fn theory_7_free_decay() {
 /// What the closed forms of a ringing spring neglect, relative: the fall of the holding force over one of the hundred rings of a stick and more, twice.
 const RINGS: f64 = 0.02;
 
-/// Theory 11.12: a stiff spring before the slider rings in stick at `w = √(kt/m)`, and tends to rigid friction slowly. Rigid friction holds with
+/// (11.12): a stiff spring before the slider rings in stick at `w = √(kt/m)`, and tends to rigid friction slowly. Rigid friction holds with
 /// `R = P cos(Ωt) - k x₀` until `R = -F`. A ring about it is cut where its force reaches the limit, so that its amplitude is `a = F + R` while R falls:
 /// a velocity `a/√(kt m)`, of order `kt^-1/2`. From ring to ring R falls by `δ = |R'| 2π/w`, and of each the share `√(2δ/a)/2π` slips: of order
 /// `kt^-1/4`.

@@ -47,6 +47,7 @@ fn cycles(a: f64) -> [f64; 8] {
     [0.0, a, -a, a, -a, a, -a, a]
 }
 
+/// (11.1)
 #[test]
 fn jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form() {
     // kt a, kt, loss, stiffness, damping for a slip limit of 1
@@ -71,6 +72,7 @@ fn jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form() {
     }
 }
 
+/// (11.2)
 #[test]
 fn circular_motion_slips_all_the_time() {
     let (stiffness, limit, a) = (3.0, 1.0, 0.8);
@@ -94,6 +96,7 @@ fn circular_motion_slips_all_the_time() {
     near("damping", stiffness.im, 1.136_324_2, 1e-6);
 }
 
+/// (11.3)
 #[test]
 fn a_normal_load_in_phase_makes_a_polygon() {
     let (mu, preload, kt, nu, a) = (0.4, 10.0, 20.0, 6.0, 1.0);
@@ -120,6 +123,7 @@ fn a_normal_load_in_phase_makes_a_polygon() {
     }
 }
 
+/// (11.4)
 #[test]
 fn iwan_has_segalmans_backbone_and_loss() {
     let law = |elements: u32| Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements };
@@ -143,6 +147,7 @@ fn iwan_has_segalmans_backbone_and_loss() {
     close("at rest", law(32).linearised(1e-12, 1.0).re, 10.0, 1e-12);
 }
 
+/// (11.5)
 #[test]
 fn dahls_loop_is_a_hyperbolic_tangent() {
     let law = Dahl { stiffness: 5.0, limit: 1.0 };
@@ -151,6 +156,7 @@ fn dahls_loop_is_a_hyperbolic_tangent() {
     close("loss", loop_loss(&law, View::Rate, &places, FINE), 2.001_457_681_9, 1e-8);
 }
 
+/// (11.6)
 #[test]
 fn bouc_wen_and_lugre_contain_dahl() {
     let dahl = Dahl { stiffness: 5.0, limit: 2.0 };
@@ -166,7 +172,7 @@ fn bouc_wen_and_lugre_contain_dahl() {
     near("bound", bouc_wen.scale(), 2.0, 1e-14);
 }
 
-/// A long way to one side ends at the bound whatever gamma and the exponent are; without `beta + gamma > 0` there is none, and the law is refused.
+/// (11.15): a long way to one side ends at the bound whatever gamma and the exponent are; without `beta + gamma > 0` there is none, and the law is refused.
 #[test]
 fn bouc_wen_is_bounded_if_beta_and_gamma_are_positive_together() {
     for (beta, gamma, exponent) in [(1.0, 0.5, 1.0), (1.0, -0.6, 2.0), (0.5, 3.0, 1.5), (2.0, 0.0, 6.0)] {
@@ -239,7 +245,7 @@ impl Graded {
     }
 }
 
-/// An elastic bar on rigid-plastic shear: Goodman and Klumpp's micro-slip in its limit of many sliders.
+/// (11.7): an elastic bar on rigid-plastic shear: Goodman and Klumpp's micro-slip in its limit of many sliders.
 #[test]
 fn micro_slip_of_a_bar_loses_with_the_cube_of_the_force() {
     let (ea, tau, length) = (7.0, 0.4, 2.0);
@@ -256,6 +262,7 @@ fn micro_slip_of_a_bar_loses_with_the_cube_of_the_force() {
     near("all slips", first(&law, View::Pieces, &[0.0, 2.0 * far], 1)[1], tau * length, 1e-12);
 }
 
+/// (11.8)
 #[test]
 fn spheres_of_cattaneo_and_mindlin() {
     let (limit, far) = (1.3, 0.02);
@@ -271,7 +278,7 @@ fn spheres_of_cattaneo_and_mindlin() {
     }
 }
 
-/// Masing's rule: after a turning point the force is the first loading at twice the scale, and the loss follows from the first loading alone.
+/// (11.9), Masing's rule: after a turning point the force is the first loading at twice the scale, and the loss follows from the first loading alone.
 #[test]
 fn sliders_obey_masings_rule() {
     let iwan = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.3, beta: 0.2, elements: 12 };
@@ -290,7 +297,7 @@ fn sliders_obey_masings_rule() {
     }
 }
 
-/// Along straight ways a step of any length is exact: the same forces at the corners, whatever lies between them.
+/// (11.10): along straight ways a step of any length is exact: the same forces at the corners, whatever lies between them.
 #[test]
 fn steps_do_not_depend_on_their_length() {
     let plane = Jenkins2d { stiffness: 3.0, limit: 1.0 };
@@ -312,7 +319,7 @@ fn steps_do_not_depend_on_their_length() {
     }
 }
 
-/// A contact that opens and closes under harmonic motion, in the plane: the error of its steps is of second order.
+/// (11.11): a contact that opens and closes under harmonic motion, in the plane: the error of its steps is of second order.
 #[test]
 fn separation_costs_no_order_of_accuracy() {
     let law = FrictionContact { tangential: 20.0, normal: 15.0, friction: 0.4, preload: 2.0, tangents: 2 };
@@ -333,7 +340,7 @@ fn separation_costs_no_order_of_accuracy() {
     assert!(errors[1] < errors[0] / 10.0 && errors[2] < errors[1] / 10.0, "of second order: {errors:?}");
 }
 
-/// Below full slip the mean force of Iwan's model tells its history; amplitude and loss do not.
+/// (11.14): below full slip the mean force of Iwan's model tells its history; amplitude and loss do not.
 #[test]
 fn iwan_remembers_in_its_mean_alone() {
     let law = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements: 64 };

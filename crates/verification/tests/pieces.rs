@@ -134,7 +134,7 @@ fn stops_agree_with_integration() {
     assert!(unstable > 0, "no unstable orbit was met");
 }
 
-/// Theory 11.13: where a motion of one period of the drive is unstable, it says so, and that of two is found and stable.
+/// (11.13): where a motion of one period of the drive is unstable, it says so, and that of two is found and stable.
 #[test]
 fn subharmonic_motion_beside_an_unstable_one() {
     let mut model = oscillator(1.0, 0.1, &[Arc::new(Gap { gap: 0.0, stiffness: 4.0 })]);
@@ -167,7 +167,7 @@ fn multiplied(orbit: &Orbit, expected: [Complex64; 2]) {
     }
 }
 
-/// Theory 11.13: stable motions that repeat after one, three and five periods, side by side. Starts and multipliers as [`multiplied`] has them.
+/// (11.13): stable motions that repeat after one, three and five periods, side by side. Starts and multipliers as [`multiplied`] has them.
 #[test]
 fn motions_of_one_three_and_five_periods_side_by_side() {
     let (omega, damping) = (4.9, 0.05);

@@ -15,7 +15,7 @@
 //! A joint acts along one to three directions. Along each of them `u` is the motion of its first place relative to its second, and the law's
 //! force `f` acts on the first place as `-f`. A law that knows a normal has it as its last direction.
 //!
-//! To add a law: write its file, with its [`LawInfo`], then one line in [`TABLE`]. A law from another crate, or one that only a test needs,
+//! To add a law: write its file, with its [`LawInfo`], name it beside the others (`mod`), then add one line to [`TABLE`]. A law from another crate, or one that only a test needs,
 //! is put into a [`crate::model::Joint`] without any line.
 
 mod bouc_wen;
