@@ -14,6 +14,7 @@ pub mod lu;
 pub mod maximum;
 pub mod modes;
 mod null_space;
+pub mod quadrature;
 pub mod radau;
 pub mod random;
 pub mod signal;

@@ -9,6 +9,7 @@
 //! Values, derivatives, integrals and bounds of such a signal are closed forms. The bound on the second derivative gives a step
 //! over which the signal provably has no zero: [`Basis::first_zero`] marches with such steps and therefore misses none.
 
+use crate::quadrature;
 use num_complex::Complex64;
 
 /// Number of polynomial basis functions: `1, τ, τ²/2`.
@@ -434,14 +435,8 @@ impl FourierIntegrals {
     }
 }
 
-/// Nodes and weights of the 8-point Gauss-Legendre rule on `[-1, 1]`, positive half. Abramowitz and Stegun, Table 25.4.
-const GAUSS: [(f64, f64); 4] = [
-    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
-    (0.525_532_409_916_329, 0.313_706_645_877_887_3),
-    (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
-    (0.960_289_856_497_536_2, 0.101_228_536_290_376_26),
-];
-
+/// Those of a panel.
+const NODES: [(f64, f64); 8] = quadrature::outwards(quadrature::EIGHT);
 /// A panel of the quadrature spans at most this phase of the fastest exponential: the 8-point rule is exact to rounding there.
 const PANEL_PHASE: f64 = 1.0;
 
@@ -454,13 +449,11 @@ fn quadrature((g_basis, g): (&Basis, &[Complex64]), (h_basis, h): (&Basis, &[Com
     let mut sum = 0.0;
     for panel in 0..panels {
         let middle = (panel as f64 + 0.5) * width;
-        for (node, weight) in GAUSS {
-            for sign in [-1.0, 1.0] {
-                let time = middle + sign * node * 0.5 * width;
-                g_basis.evaluate(time, &mut gv);
-                h_basis.evaluate(time, &mut hv);
-                sum += weight * real_dot(g, &gv) * real_dot(h, &hv);
-            }
+        for (node, weight) in NODES {
+            let time = middle + node * 0.5 * width;
+            g_basis.evaluate(time, &mut gv);
+            h_basis.evaluate(time, &mut hv);
+            sum += weight * real_dot(g, &gv) * real_dot(h, &hv);
         }
     }
     0.5 * width * sum

@@ -7,6 +7,9 @@
 //! Source: Castanier, Pierre, Using intentional mistuning in the design of turbomachinery rotors, AIAA J. 40 (2002) 2077-2086;
 //! Smith, Maximum likelihood estimation in a class of nonregular cases, Biometrika 72 (1985) 67-90.
 
+use std::convert::Infallible;
+use stickslip_numerics::maximum::maximum;
+
 /// The distribution that fits some values best.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Maxima {
@@ -26,9 +29,10 @@ const LEAST: usize = 20;
 const NEAR: f64 = 1e-4;
 /// … to so many ranges: from there on the distribution is that of Gumbel, which has none, to a thousandth of its shape.
 const FAR: f64 = 1e3;
-/// Steps by which the bound is sought, in equal ratios, and then halvings of one of them: to a millionth of the bound's distance.
+/// Steps by which the bound is sought, in equal ratios.
 const STEPS: usize = 48;
-const HALVINGS: usize = 48;
+/// Relative change of the bound's distance to which it is then located.
+const LOCATED: f64 = 1e-10;
 /// Iterations of the equation of the shape: Newton's method takes half a dozen, and bisection keeps it inside.
 const ITERATIONS: usize = 80;
 /// Where the shape does not change by more than this share it is found.
@@ -67,14 +71,8 @@ impl Maxima {
         let at = |i: usize| from + step * i as f64;
         let heights: Vec<f64> = (0..=STEPS).map(|i| height(at(i))).collect();
         let best = (0..=STEPS).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
-        let (mut left, mut right) = (at(best.saturating_sub(1)), at((best + 1).min(STEPS)));
-        // golden sections: of two points inside, the part beyond the lower one goes
-        const GOLDEN: f64 = 0.618_033_988_749_894_9;
-        for _ in 0..HALVINGS {
-            let (a, b) = (right - GOLDEN * (right - left), left + GOLDEN * (right - left));
-            if height(a) >= height(b) { right = b } else { left = a }
-        }
-        let s = 0.5 * (left + right);
+        let ends = (at(best.saturating_sub(1)), at((best + 1).min(STEPS)));
+        let Ok((s, _)) = maximum(ends, |a, b| b - a < LOCATED, |s| Ok::<_, Infallible>(height(s)));
         let Profile { scale, shape, .. } = profile(s)?;
         let found = Maxima { bound: bound(s), scale, shape, covariance: [[0.0; 3]; 3] };
         // at the far end, and where the bound is no regular parameter, it counts as known

@@ -5,6 +5,7 @@
 //! Source: Alart and Curnier (1991); Parikh and Boyd, "Proximal Algorithms" (2014).
 
 use std::fmt::Debug;
+use stickslip_numerics::quadrature;
 
 /// A law of velocity by its resolvent.
 pub trait Prox: Debug + Send + Sync {
@@ -53,13 +54,6 @@ pub struct Mean {
     pub slope_second: f64,
 }
 
-/// Nodes and weights of the 6-point Gauss-Legendre rule, positive half. Abramowitz and Stegun, Table 25.4.
-const GAUSS: [(f64, f64); 3] = [
-    (0.238_619_186_083_196_9, 0.467_913_934_572_691),
-    (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
-    (0.932_469_514_203_152, 0.171_324_492_379_170_35),
-];
-
 impl Mean {
     /// By quadrature of g and g', which `g` gives.
     #[inline]
@@ -69,15 +63,13 @@ impl Mean {
             return Mean { zeroth, slope, slope_second: slope / 3.0, ..Mean::default() };
         }
         let mut mean = Mean::default();
-        for (node, weight) in GAUSS {
-            for xi in [-node, node] {
-                let (value, slope) = g(y + e * xi);
-                mean.zeroth += 0.5 * weight * value;
-                mean.first += 0.5 * weight * xi * value;
-                mean.slope += 0.5 * weight * slope;
-                mean.slope_first += 0.5 * weight * xi * slope;
-                mean.slope_second += 0.5 * weight * xi * xi * slope;
-            }
+        for (xi, weight) in const { quadrature::outwards(quadrature::SIX) } {
+            let (value, slope) = g(y + e * xi);
+            mean.zeroth += 0.5 * weight * value;
+            mean.first += 0.5 * weight * xi * value;
+            mean.slope += 0.5 * weight * slope;
+            mean.slope_first += 0.5 * weight * xi * slope;
+            mean.slope_second += 0.5 * weight * xi * xi * slope;
         }
         mean
     }

@@ -6,10 +6,8 @@ use crate::law::Contact;
 use crate::model::{Axis, System};
 use num_complex::Complex64;
 use std::convert::Infallible;
+use stickslip_numerics::quadrature;
 
-/// Nodes and weights of Gauss and Legendre on [0, 1], exact to degree 5.
-const GAUSS: [(f64, f64); 3] =
-    [(0.112_701_665_379_258_31, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 /// Intervals of a period, and at least two between switches: harmonics up to the twentieth are then integrated to 1e-9.
 const INTERVALS: f64 = 512.0;
 
@@ -35,7 +33,8 @@ impl<'a> Sampled<'a> {
             let count = (INTERVALS * (pair[1] - pair[0]) / period).ceil().max(2.0);
             let length = (pair[1] - pair[0]) / count;
             for i in 0..count as usize {
-                nodes.extend(GAUSS.map(|(node, weight)| (pair[0] + (i as f64 + node) * length, weight * length)));
+                let at = |(node, weight)| (pair[0] + (i as f64 + 0.5 + 0.5 * node) * length, 0.5 * weight * length);
+                nodes.extend(quadrature::THREE.map(at));
             }
         }
         let samples = nodes.iter().map(|(time, _)| path.sample(*time)).collect();

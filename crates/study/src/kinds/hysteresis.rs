@@ -28,6 +28,7 @@ use stickslip::dimension::Dimension;
 use stickslip::law::MOST_DIRECTIONS;
 use stickslip::model::{Axis as Along, Model};
 use stickslip::orbit::{Orbit, Sample};
+use stickslip_numerics::quadrature::FIVE;
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
@@ -79,7 +80,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     };
     let rows = points * loops * costing.instants();
     let keys = costing.varied + costing.several();
-    let read = costing.instants() + loops * (QUADRATURE * GAUSS.len()) as f64;
+    let read = costing.instants() + loops * (QUADRATURE * FIVE.len()) as f64;
     Cost {
         tables: vec![
             Shape { rows, numbers: keys + 3.0, words: 1.0 },
@@ -282,15 +283,6 @@ struct First {
 
 /// Panels of the quadrature per period; they end at the switches, so that exact laws are smooth within each.
 const QUADRATURE: usize = 256;
-/// Nodes and weights of the 5-point Gauss-Legendre rule on [-1, 1]. Abramowitz and Stegun, Table 25.4.
-const GAUSS: [(f64, f64); 5] = [
-    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
-    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.0, 0.568_888_888_888_888_9),
-    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
-];
-
 impl First {
     /// `F₁ = (keq + jω ceq) U₁` with the first harmonics of force and displacement; loss `∮ F du`.
     fn new(orbit: &Orbit, source: &Source) -> Self {
@@ -300,7 +292,7 @@ impl First {
         let mut corners = Vec::with_capacity(times.len());
         for pair in times.windows(2) {
             let (middle, half) = (0.5 * (pair[0] + pair[1]), 0.5 * (pair[1] - pair[0]));
-            for (node, weight) in GAUSS {
+            for (node, weight) in FIVE {
                 let time = middle + node * half;
                 let (u, force) = source.read(&orbit.sample(time));
                 let (sin, cos) = (omega * time).sin_cos();
