@@ -20,9 +20,10 @@
 mod unknowns;
 mod yardsticks;
 
-use super::coupled::{Coupled, Linear, Near, by_products, dot};
+use super::coupled::{Coupled, Near, by_products, dot};
 use super::ease::Ease;
 use super::hold::CLEAR;
+use super::linear::Linear;
 use super::ports::{Alternation, Beginning, Member, Port, Ports, REPEATS, block, blocks};
 use super::receptance::{Modal, Receptance};
 use super::rest::Rest;
@@ -151,7 +152,7 @@ impl Level {
     pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, sparse: Option<Sparse>) -> Self {
         let mut level = Level::unassembled(Alternation::new(harmonics, samples), ports, sparse);
         let size = level.residual.len();
-        level.coupled = (level.sparse.is_none() && by_products(size, ports.count())).then(Coupled::default);
+        level.coupled = (level.sparse.is_none() && by_products(size, ports)).then(Coupled::default);
         if level.coupled.is_some() && !ports.has_forces() {
             level.keep_sketch();
         }
@@ -210,7 +211,7 @@ impl Level {
             twice: None,
             linearised: false,
             moved: vec![ZERO; nh * axes],
-            product: vec![0.0; (2 * nh * widest).pow(2)],
+            product: Vec::new(),
         }
     }
 
@@ -662,104 +663,18 @@ impl Level {
     /// The Jacobian from the tangents: rows and columns in units. False where receptances are no matrices.
     pub(super) fn assemble(&mut self, ports: &Ports, omega: f64, ease: Ease, length: f64) -> bool {
         let Receptance::Formed(receptance) = &self.receptance else { return false };
-        let nh = self.harmonics().len();
-        let pair = 2 * nh;
-        let size = pair * ports.count();
-        self.jacobian.clear();
-        self.jacobian.resize(size * size, 0.0);
-        for (p, column) in ports.iter().enumerate() {
-            let (high, wide) = (pair, pair * column.axes);
-            let other = &self.tangents[block(&self.blocks, p, column, nh)];
-            for (q, row) in ports.iter().enumerate() {
-                let own = &self.tangents[block(&self.blocks, q, row, nh)];
-                let tall = pair * row.axes;
-                if row.is_force() && self.penalty[q].is_infinite() {
-                    continue;
-                }
-                // R f_y, f_y = K or 1: the harmonics of R stand alone
-                let product = &mut self.product[..tall * wide];
-                product.fill(0.0);
-                for a in 0..row.axes {
-                    for b in 0..column.axes {
-                        for k in 0..nh {
-                            let r = receptance[k][(row.first + a, column.first + b)];
-                            let at = (a * high + 2 * k) * wide;
-                            let (first, second) = product[at..at + 2 * wide].split_at_mut(wide);
-                            if column.is_force() {
-                                let at = b * pair + 2 * k;
-                                (first[at], first[at + 1]) = (r.re, -r.im);
-                                (second[at], second[at + 1]) = (r.im, r.re);
-                                continue;
-                            }
-                            let at = (b * pair + 2 * k) * wide;
-                            let (re, im) = other[at..at + 2 * wide].split_at(wide);
-                            for i in 0..wide {
-                                first[i] += r.re * re[i] - r.im * im[i];
-                                second[i] += r.re * im[i] + r.im * re[i];
-                            }
-                        }
-                    }
-                }
-                // -r_u = 1, or T ε d/dt
-                let penalty = self.penalty[q];
-                for i in 0..tall {
-                    let start = (row.first * pair + i) * size + column.first * pair;
-                    let out = &mut self.jacobian[start..start + wide];
-                    if !row.is_force() {
-                        out.copy_from_slice(&product[i * wide..(i + 1) * wide]);
-                        continue;
-                    }
-                    for a in 0..row.axes {
-                        for (k, &h) in self.alternation.harmonics.iter().enumerate() {
-                            let rate = penalty * h as f64 * omega;
-                            let at = a * high + 2 * k;
-                            let (re, im) = (own[i * tall + at] * rate, own[i * tall + at + 1] * rate);
-                            if re == 0.0 && im == 0.0 {
-                                continue;
-                            }
-                            // j times (x, y) is (-y, x)
-                            if column.is_force() {
-                                for b in 0..column.axes {
-                                    let i = b * pair + 2 * k;
-                                    for i in i..i + 2 {
-                                        out[i] += im * product[at * wide + i] - re * product[(at + 1) * wide + i];
-                                    }
-                                }
-                                continue;
-                            }
-                            let (x, y) = product[at * wide..(at + 2) * wide].split_at(wide);
-                            for ((out, x), y) in out.iter_mut().zip(x).zip(y) {
-                                *out += im * x - re * y;
-                            }
-                        }
-                    }
-                }
-            }
-        }
-        // r_y, and units
-        for (q, row) in ports.iter().enumerate() {
-            let own = &self.tangents[block(&self.blocks, q, row, nh)];
-            let tall = pair * row.axes;
-            for i in 0..tall {
-                let at = row.first * pair + i;
-                let line = &mut self.jacobian[at * size..(at + 1) * size];
-                line[at] += 1.0;
-                if row.is_force() {
-                    line[at] += ease.stay(self.alternation.harmonics[i % pair / 2]);
-                    for (j, t) in line[row.first * pair..].iter_mut().zip(&own[i * tall..(i + 1) * tall]) {
-                        *j -= t;
-                    }
-                }
-                let unit_of_row = self.units[at];
-                for column in ports.iter() {
-                    let scale = column.unit(length) / unit_of_row;
-                    if scale != 1.0 {
-                        let columns = column.first * pair..(column.first + column.axes) * pair;
-                        line[columns].iter_mut().for_each(|j| *j *= scale);
-                    }
-                }
-            }
-        }
+        let linear = Linear {
+            ports,
+            harmonics: &self.alternation.harmonics,
+            omega,
+            ease,
+            length,
+            penalty: &self.penalty,
+            tangents: &self.tangents,
+            blocks: &self.blocks,
+            units: &self.units,
+        };
+        linear.matrix(receptance, linear.harmonics.len(), (&mut self.product, &mut self.jacobian));
         true
     }
 

@@ -4,6 +4,7 @@
 //! - `rest`: the receptance of the linear rest, in closed form from its modes;
 //! - `closed`: the mean of bodies that nothing but contacts holds;
 //! - `equations`: those along the joints, and their derivative;
+//! - `linear`: their derivative as a matrix; `coupled`: steps by its products;
 //! - `solve`: Newton's method on them; `estimate`: the error by a finer solution; `sampling`: what samples leave out; `proximal`: the way to forces that nothing decides;
 //! - `path`: the orbit's numbers from its harmonics.
 //!
@@ -21,6 +22,7 @@ mod equations;
 mod estimate;
 mod hold;
 mod kept;
+mod linear;
 mod mode;
 mod path;
 mod ports;
@@ -402,7 +404,7 @@ impl Balance<'_> {
         let axes = self.ports.count();
         let products = (harmonics * axes * axes) as f64;
         let size = 2 * axes * harmonics;
-        let multiplied = coupled::by_products(size, axes) && products <= ESTIMATED;
+        let multiplied = coupled::by_products(size, &self.ports) && products <= ESTIMATED;
         let few = size <= LARGEST || self.banded.is_some() || multiplied;
         few && level_memory(self.banded.as_ref(), &self.ports, &self.rest, harmonics) <= MEMORY
     }

@@ -1,7 +1,7 @@
 //! The search for a solution: Newton's method with the exact derivative, of many contacts by fewer samples first; where it fails, proximal points, and
 //! then slip limits that are lowered from where everything sticks.
 
-use super::coupled::{FORMED, Near};
+use super::coupled::{FORMED, Near, product_work};
 use super::ease::{Ease, GIVEN, SOLVED};
 use super::equations::{Level, Motion, Slopes};
 use super::ports::Ports;
@@ -264,7 +264,9 @@ impl Level {
             // blocks of all harmonics of a coordinate and its neighbours
             Some(_) => (self.assembled, size * (4 * self.harmonics().len()).pow(2) as f64, FEWEST),
             // steps have the products that they take, and shortening them takes none
-            None if self.coupled.is_some() => (self.products, 2.0 * size * ports.count() as f64, FEWEST * PRODUCTS),
+            None if self.coupled.is_some() => {
+                (self.products, product_work(ports, self.harmonics().len()), FEWEST * PRODUCTS)
+            }
             None => (self.assembled, size * size * size / 3.0, FEWEST),
         };
         let marched = EVALUATIONS * PERIODS * self.all_samples().min(SAMPLES) * ports.len();
