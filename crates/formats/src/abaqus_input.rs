@@ -10,7 +10,7 @@ use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
 use crate::names::direction;
-use crate::text::{Line, Lines, integer, real, shown};
+use crate::text::{Line, Lines, integer, must_end_its_lines, real, shown};
 
 pub(crate) const FORMAT: Format = Format {
     name: "abaqus-matrix-input",
@@ -77,6 +77,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         let problem = "the file has no entry, lines `node, dof, node, dof, value` were expected".into();
         return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
     }
+    must_end_its_lines(bytes)?;
     let mut rows: Vec<Row> = places.keys().copied().collect();
     rows.sort_unstable();
     for (at, row) in rows.iter().enumerate() {

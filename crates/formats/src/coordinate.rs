@@ -7,7 +7,7 @@
 use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::text::{Line, Lines, integer, real};
+use crate::text::{Line, Lines, integer, must_end_its_lines, real};
 
 pub(crate) const FORMAT: Format = Format {
     name: "coordinate",
@@ -42,6 +42,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         let problem = "the file has no entry, lines `row column value` were expected".into();
         return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
     }
+    must_end_its_lines(bytes)?;
     Ok(vec![Item::new("", size, size, move || read(bytes, size, count))])
 }
 
@@ -80,6 +81,7 @@ mod tests {
         check("", Kind::Truncated, Location::File);
         check("1 1 1\n2 2\n", Kind::Malformed, Location::Line(2));
         check("1 1 1\n2 x 1\n", Kind::Malformed, Location::Line(2));
+        check("1 1 1\n2 2 1.2", Kind::Truncated, Location::Line(2));
         check("1 1 inf\n", Kind::NotFinite, Location::Line(1));
         check("1 4000000000 1\n", Kind::TooLarge, Location::File);
         check("1 1 1\n\n0 1 1\n", Kind::Malformed, Location::Line(3));

@@ -39,12 +39,12 @@ impl<'a> Item<'a> {
     /// Something that is no real matrix: `note` says what it is instead.
     pub fn other(name: impl Into<String>, note: impl Into<String>) -> Self {
         let (name, note) = (name.into(), note.into());
-        let error = Error::new(
-            if note == COMPLEX { Kind::Complex } else { Kind::Unsupported },
-            if name.is_empty() { Location::File } else { Location::Variable(name.clone()) },
-            format!("a real matrix was expected, this is {note}"),
-            "name another one",
-        );
+        let (kind, remedy) = match note == COMPLEX {
+            true => (Kind::Complex, "save its real part, or name another one"),
+            false => (Kind::Unsupported, "name another one"),
+        };
+        let location = if name.is_empty() { Location::File } else { Location::Variable(name.clone()) };
+        let error = Error::new(kind, location, format!("a real matrix was expected, this is {note}"), remedy);
         let variable = Variable { name, rows: 0, columns: 0, note: Some(note) };
         Self { variable, read: Box::new(move || Err(error.clone())) }
     }
@@ -67,6 +67,7 @@ impl fmt::Display for Variable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, rows, columns, note } = self;
         match note {
+            Some(note) if name.is_empty() => f.write_str(note),
             Some(note) => write!(f, "{name} ({note})"),
             None if name.is_empty() => write!(f, "{rows} x {columns}"),
             None => write!(f, "{name} ({rows} x {columns})"),

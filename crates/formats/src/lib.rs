@@ -144,6 +144,9 @@ fn find(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
         let found = TABLE.iter().find(|format| format.name == name);
         return found.ok_or_else(|| fault(format!("no format is called `{name}`"), format!("there are {}", names())));
     }
+    if bytes.is_empty() {
+        return Err(fault("the file is empty".into(), "export or copy it again".into()));
+    }
     if bytes.starts_with(&[0x1f, 0x8b]) {
         return Err(fault("the file is compressed by gzip".into(), "unpack it first: gunzip FILE".into()));
     }
@@ -177,6 +180,7 @@ fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> R
         (None, [one]) => Ok(one),
         // Its own error says more than that there is no matrix.
         (None, []) if items.len() == 1 => Ok(&items[0]),
+        (None, []) if items.is_empty() => fault("the file holds nothing".into(), "export the matrix again"),
         (None, []) => fault(format!("the file holds no real matrix, but {}", there()), "export the matrix again"),
         (None, _) => fault(format!("the file holds {}", there()), "say which one by its name"),
     }

@@ -154,6 +154,12 @@ impl Names {
                 "give the file of names that was written with the matrix",
             ));
         }
+        let mut order: Vec<usize> = (0..self.names.len()).filter(|row| !self.names[*row].is_empty()).collect();
+        order.sort_by(|a, b| self.names[*a].cmp(&self.names[*b]));
+        if let Some(&[a, b]) = order.array_windows().find(|[a, b]| self.names[*a] == self.names[*b]) {
+            let problem = format!("rows {} and {} are both called `{}`", a + 1, b + 1, self.names[a]);
+            return Err(Error::new(Kind::Names, Location::File, problem, "give every row a name of its own"));
+        }
         self.names.resize(self.rows, String::new());
         Ok(self.names)
     }
@@ -234,6 +240,7 @@ mod tests {
         check("10.1\n10.10\n7.4\n", 3, Ok(&["10.x", "10.10", "7.rx"]));
         check("10.1\n10.2\n", 3, Err((Kind::Names, Location::File)));
         check("10.1\n10.2\n", 1, Err((Kind::Names, Location::Line(2))));
+        check("10.1\n10.2\n10.1\n", 3, Err((Kind::Names, Location::File)));
         check("10.1\nx\n", 2, Err((Kind::Malformed, Location::Line(2))));
     }
 

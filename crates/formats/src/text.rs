@@ -121,10 +121,20 @@ impl<'a> Line<'a> {
         Error::new(
             Kind::Malformed,
             self.location(),
-            format!("{expected} was expected, {found} is there"),
+            format!("expected {expected}, found {found}"),
             "the file is damaged or of another format: export it again, or state its format",
         )
     }
+}
+
+/// Refuses a file of lines, whose number it does not state, that ends within one: its last number may lack digits.
+pub(crate) fn must_end_its_lines(bytes: &[u8]) -> Result<(), Error> {
+    if bytes.last().is_none_or(|last| *last == b'\n') {
+        return Ok(());
+    }
+    let remedy = "it is not complete: export or copy it again; if it is, end its last line";
+    let location = Location::Line(Lines::new(bytes).count());
+    Err(Error::new(Kind::Truncated, location, "the file ends within a line".into(), remedy))
 }
 
 /// A file that ends before `what`.

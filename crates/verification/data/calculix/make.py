@@ -117,7 +117,7 @@ def blade(folder):
 
 
 def sector(folder):
-    count, nr, nc, nz, nb = 12, 6, 6, 2, 8
+    count, nr, nc, nz, nb = 12, 9, 9, 4, 12
     inner, rim, height = 40.0, 90.0, 12.0
     mesh = Mesh()
     def place(i, j, k):
@@ -127,9 +127,9 @@ def sector(folder):
             r = inner + (rim - inner) * i / nr
             return r * math.cos(angle), r * math.sin(angle), z
         # the blade is straight
-        return rim * math.cos(angle) + 60 * (i - nr) / nb, rim * math.sin(angle) + 0.05 * (i - nr) * k, z
+        return rim * math.cos(angle) + 60 * (i - nr) / nb, rim * math.sin(angle) + 0.8 * (i - nr) / nb * k / nz, z
     mesh.box(((0, nr), (0, nc), (0, nz)), place)
-    mesh.box(((nr, nr + nb), (2, 4), (0, nz)), place)
+    mesh.box(((nr, nr + nb), (nc // 3, 2 * nc // 3), (0, nz)), place)
     at = mesh.number
     pick = lambda test: [n for key, n in sorted(at.items()) if test(*key)]
     bore = pick(lambda i, j, k: i == 0)
