@@ -1,7 +1,8 @@
 //! Panels of many draws: what the panels of one case show, of all draws at once.
 //!
 //! Curves over an abscissa become their median and band, point by point. Where that has no meaning, because a curve turns back (a loop, a branch around
-//! a fold) or draws do not show the same curves (one has an unstable stretch), every draw has its own curve, pale. Pictures of a plane, and
+//! a fold), draws do not show the same curves (one has an unstable stretch) or each has an abscissa of its own (a branch that steps as it bends),
+//! every draw has its own curve, pale. Pictures of a plane, and
 //! marks and bars that stand elsewhere in each draw, are left to the tables.
 
 use crate::dataset::{Emphasis, Panel, Series, Style};
@@ -37,7 +38,8 @@ fn together(draws: &[&Panel]) -> Option<Panel> {
         one.len() == lines[0].len() && one.iter().zip(&lines[0]).all(same)
     };
     let rises = |line: &&Series| line.x.is_sorted();
-    let bands = lines.iter().all(|one| alike(one) && one.iter().all(rises));
+    let common = |one: &[&Series]| one.iter().zip(&lines[0]).all(|(line, first)| resolves(&first.x, &line.x));
+    let bands = lines.iter().all(|one| alike(one) && one.iter().all(rises) && common(one));
     let mut series: Vec<Series> =
         first.series.iter().filter(|series| series.emphasis == Emphasis::Reference).cloned().collect();
     if bands {
@@ -57,6 +59,16 @@ fn together(draws: &[&Panel]) -> Option<Panel> {
     let mut panel = Panel { series, ..(*first).clone() };
     panel.y.range = ends.flatten();
     Some(panel)
+}
+
+/// Most points of a curve between two neighbours of another abscissa over which it is a common one: points that are evenly spaced in both.
+const BETWEEN: usize = 2;
+
+/// Whether the points of an abscissa stand as close as those of another one: a curve over that one loses nothing there. What is stepped as each curve
+/// bends has many points where others have few.
+fn resolves(grid: &[f64], x: &[f64]) -> bool {
+    let mut cells = x.chunk_by(|a, b| grid.partition_point(|at| at < a) == grid.partition_point(|at| at < b));
+    cells.all(|cell| cell.len() <= BETWEEN)
 }
 
 fn is_line(style: Style) -> bool {
@@ -140,12 +152,17 @@ mod tests {
         assert_eq!((median.style, marks.style), (Style::Dashed, Style::Marks));
     }
 
-    /// What turns back has no value at an abscissa, and what only some draws have none in the others: each draw has its curve.
+    /// What turns back has no value at an abscissa, what only some draws have none in the others, and what is stepped as it bends is not seen between
+    /// the steps of others: each draw has its curve.
     #[test]
     fn what_has_no_band_is_drawn_draw_by_draw() {
         let around = |y: f64| panel(vec![Series::line("joint", vec![0.0, 1.0, 0.5], vec![y, 1.0, 2.0], 0)]);
         let straight = |label: &str| panel(vec![Series::line(label, vec![0.0, 1.0], vec![1.0, 2.0], 0)]);
-        for draws in [[around(1.0), around(2.0)], [straight("stable"), straight("unstable")]] {
+        // many points where the other has none between
+        let bent = panel(vec![Series::line("stable", vec![0.0, 0.4, 0.5, 0.6, 1.0], vec![1.0; 5], 0)]);
+        for draws in
+            [[around(1.0), around(2.0)], [straight("stable"), straight("unstable")], [straight("stable"), bent]]
+        {
             let made = together(&[&draws[0], &draws[1]]).unwrap();
             assert_eq!(made.series.len(), 2);
             assert!(made.series.iter().all(|line| line.emphasis == Emphasis::Pale && line.style == Style::Solid));

@@ -6,8 +6,8 @@ use stickslip::orbit::{Accuracy, Orbit};
 /// How a note begins that is a warning.
 pub(crate) const WARNING: &str = "warning: ";
 
-/// Cases that are named one by one because a joint sticks in them; of the others the points are counted together.
-const MOST_STUCK: usize = 100;
+/// Cases that are named one by one because a joint sticks in them: as many as are read. Of the others the points are counted together.
+const MOST_STUCK: usize = 4;
 
 /// A note.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -203,5 +203,32 @@ fn advice_on_reduction(model: &Model) -> Option<String> {
     let component = &substructure.component;
     let lowest = component.frequencies(LOWEST).ok()?;
     let listed: Vec<String> = lowest.iter().map(|omega| displayed(*omega, Some(Dimension::FREQUENCY))).collect();
-    Some(format!("its lowest frequencies are {}: are the units right, and `up_to`?", listed.join(", ")))
+    let absurd = lowest.iter().all(|omega| *omega < SLOWEST);
+    let (mass, _, stiffness) = component.matrices();
+    let exchanged = || Component::new(component.rows().to_vec(), stiffness.clone(), None, mass.clone()).ok();
+    let advice = match absurd.then(exchanged).flatten().as_ref().and_then(sensible) {
+        Some(frequencies) => exchange(&frequencies),
+        None => "are the units right, and `up_to`?".to_owned(),
+    };
+    Some(format!("its lowest frequencies are {}: {advice}", listed.join(", ")))
+}
+
+/// Frequencies of structures of which somebody has matrices, rad/s: below the first stand oceans, beyond the second crystals.
+const SLOWEST: f64 = 1e-3 * std::f64::consts::TAU;
+const FASTEST: f64 = 1e8 * std::f64::consts::TAU;
+
+/// The lowest frequencies of a component (rad/s) if they are such as structures have: at least one, and none beyond them.
+pub(crate) fn sensible(component: &Component) -> Option<Vec<f64>> {
+    let lowest = component.frequencies(LOWEST.min(component.dofs())).ok()?;
+    let elastic = |omega: &&f64| (SLOWEST..=FASTEST).contains(*omega);
+    (lowest.iter().any(|omega| elastic(&omega)) && lowest.iter().all(|omega| *omega <= FASTEST)).then_some(lowest)
+}
+
+/// What to say where matrices of stiffness and mass are a structure of these frequencies if the other one is taken for each.
+pub(crate) fn exchange(frequencies: &[f64]) -> String {
+    let listed: Vec<String> = frequencies.iter().map(|omega| displayed(*omega, Some(Dimension::FREQUENCY))).collect();
+    format!(
+        "are the files of `stiffness` and `mass` exchanged? The other way round its lowest frequencies are {}",
+        listed.join(", ")
+    )
 }

@@ -5,6 +5,7 @@ use crate::survey::{Surveyed, range};
 use crate::values::{Frequencies, Values};
 use crate::words::{quantity, significant};
 use std::f64::consts::TAU;
+use stickslip::curve::modes::unit;
 use stickslip::model::{LinearMode, Modes};
 
 /// Of a kind that needs something to drive the motion.
@@ -171,7 +172,7 @@ fn sticks(cases: &[Surveyed]) -> Option<String> {
         let number = values.count("mode").unwrap_or(1) as usize - 1;
         let to = values.table("amplitude")?.quantity("to")?;
         // the range is of the place that moves most in the mode of the structure without its joints
-        let slip = one.survey.slip_amplitude(number)? / one.survey.system().modal_unit(number)?;
+        let slip = one.survey.slip_amplitude(number)? / unit(one.survey.system(), number).ok()??;
         if slip * STICKS <= to {
             return None;
         }

@@ -12,7 +12,7 @@
 //! The equations are those of the extended periodic motion concept, Krack (2015).
 
 use crate::method::MethodError;
-use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState};
+use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState, ModeStep as Step};
 use crate::model::System;
 use num_complex::Complex64;
 use stickslip_numerics::leading::leading;
@@ -65,6 +65,8 @@ pub struct Mode {
     pub missing: Vec<f64>,
     /// Where and why it ended above the smallest amplitude, if it did.
     pub lost: Option<Lost>,
+    /// Whether it is one of the two waves of a pair of equal modes.
+    pub travels: bool,
 }
 
 /// A part of the curve that turns back: the values below `at` are not those that end at `at`.
@@ -102,6 +104,11 @@ pub enum Reason {
     /// No shorter step converged.
     #[error("no neighbouring motion was found; try more harmonics")]
     Stalled,
+    /// The damping ratio is above one for many steps.
+    #[error(
+        "its damping ratio is above one there: nothing vibrates, and it is not followed further; ask for larger amplitudes"
+    )]
+    Overdamped,
     /// All steps are used up.
     #[error("it was not followed to the end within 4000 steps; try fewer harmonics")]
     Steps,
@@ -133,6 +140,10 @@ const OTHERS: [f64; 7] = [1.0, 0.1, 0.01, 1e-3, 10.0, 100.0, 1e4];
 const MOST_STEPS: usize = 4000;
 /// Steps without an amplitude below all before, after which the curve is left: it runs in a loop, or to another mode.
 const PATIENCE: usize = 1000;
+/// Damping ratio from which nothing vibrates.
+const OVERDAMPED: f64 = 1.0;
+/// Steps that are spent on such motions. A mass on rigid friction takes some hundred for all that is asked of it.
+const CREEPING: usize = 500;
 /// Arc lengths, see [`ModeEquations::step`]: the longest step changes the amplitude by up to a half, or a fifth of the shape.
 const LONGEST: f64 = 0.2;
 /// The first step, and that after a leap.
@@ -162,6 +173,8 @@ const MERGING: f64 = 1.0 / 3.0;
 const PARTS: u32 = 16;
 /// Relative amplitude up to which a turn is one of the sampled force and not of the mode, and is not told.
 const TREMOR: f64 = 1e-3;
+/// Share of a mode's largest coordinate up to which what places see of it is rounding.
+const UNSEEN: f64 = 1e-12;
 /// Relative amplitude to which the largest damping is located: its value is then right to the square of this.
 const LOCATED: f64 = 1e-3;
 
@@ -206,7 +219,7 @@ fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEq
 pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
     let (low, high) = request.range;
-    let path = Path::follow(&mut equations, request.mode, low);
+    let path = Path::follow(&mut equations, request.mode, request.range);
     let last = request.points.max(2) - 1;
     let largest = path.largest(&mut equations, (low, high));
     let mut mode = Mode {
@@ -216,6 +229,7 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
         turns: path.turns().into_iter().filter(|turn| turn.at < high).collect(),
         missing: Vec::new(),
         lost: path.lost,
+        travels: path.travels(),
     };
     for i in 0..=last {
         let amplitude = if i == last { high } else { low * (high / low).powf(i as f64 / last as f64) };
@@ -228,13 +242,28 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
     Ok(mode)
 }
 
+/// Modal amplitude (m √kg) of mode `index` of the structure without its joints where the place that moves most in it has an amplitude of one
+/// metre; `None` if there is no such mode, or if it moves no place.
+///
+/// # Errors
+/// As [`mode()`].
+pub fn unit(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
+    let equations = equations(system, 1, 8)?;
+    let size = |x: &[Complex64]| x.iter().fold(0.0, |most: f64, x| most.max(x.norm()));
+    Ok(equations.linear_modes().get(index).and_then(|linear| {
+        let shape = linear.shape.as_slice();
+        let largest = size(&equations.at_places(shape));
+        (largest > UNSEEN * size(shape)).then(|| 1.0 / largest)
+    }))
+}
+
 /// Self-excited orbits along a mode: the amplitudes at which its damping changes its sign. Stable ones have rising damping there.
 ///
 /// # Errors
 /// As [`mode()`].
 pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoint>, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
-    let path = Path::follow(&mut equations, request.mode, request.range.0);
+    let path = Path::follow(&mut equations, request.mode, request.range);
     let mut orbits = Vec::new();
     for pair in path.within(&mut equations, request.range).windows(2) {
         let [(i, above, upper), (k, below, lower)] = pair else { continue };
@@ -267,8 +296,8 @@ pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoi
 }
 
 impl Path {
-    /// Follows mode `index` until it is below the modal amplitude `low`.
-    fn follow(equations: &mut ModeEquations<'_>, index: usize, low: f64) -> Self {
+    /// Follows mode `index` until it is below the modal amplitude `low`; where forces grow with amplitude, up to `high` as well.
+    fn follow(equations: &mut ModeEquations<'_>, index: usize, (low, high): (f64, f64)) -> Self {
         let modes = equations.linear_modes();
         let none = |linear| {
             let lost = Lost { at: f64::INFINITY, reason: Reason::NoBeginning };
@@ -278,17 +307,25 @@ impl Path {
         let faint = equations.faint(&modes, index, FAINT, APART);
         // without friction any amplitude will do
         let faint = if faint > 0.0 { faint } else { low };
-        let start = OTHERS.iter().find_map(|factor| {
-            let amplitude = factor * faint;
-            let guess = equations.linear(&linear, amplitude)?;
-            let state = equations.solve(&guess, amplitude, amplitude)?;
-            (equations.assurance(&guess, &state) >= SHAPE).then(|| equations.begin(&state, amplitude))?
+        // of a pair whose joints are not alike no wave is a motion
+        let shapes = [Some(linear.clone()), linear.standing()];
+        let start = shapes.into_iter().flatten().find_map(|linear| {
+            equations.mixes = linear.stands.is_some();
+            let start = OTHERS.iter().find_map(|factor| {
+                let amplitude = factor * faint;
+                let guess = equations.linear(&linear, amplitude)?;
+                let state = equations.solve(&guess, amplitude, amplitude)?;
+                (equations.assurance(&guess, &state) >= SHAPE).then(|| equations.begin(&state, amplitude))?
+            });
+            Some((linear, start?))
         });
-        let Some(start) = start else { return none(Some(linear)) };
+        let Some((linear, start)) = start else { return none(Some(linear)) };
         let top = start.amplitude;
-        let mut path = Path { linear: Some(linear), arcs: vec![start], sticks: false, lost: None };
+        let mut arcs = if equations.is_unbounded() { risen(equations, &start, high) } else { Vec::new() };
+        arcs.push(start);
+        let (mut lowest, mut since, mut creeping) = (arcs.len() - 1, 0, 0);
+        let mut path = Path { linear: Some(linear), arcs, sticks: false, lost: None };
         let mut length = FIRST;
-        let (mut lowest, mut since) = (0, 0);
         for _ in 0..MOST_STEPS {
             let now = &path.arcs[path.arcs.len() - 1];
             let at = now.amplitude;
@@ -300,13 +337,14 @@ impl Path {
                 path.sticks = true;
                 return path;
             }
-            let step = equations.step(now, length, length < CORNER).filter(|step| {
-                let smooth = step.off <= OFF * length && step.straight >= STRAIGHT && step.to.side == now.side;
-                (smooth || (length < CORNER && step.off <= BENT * length + GAP))
-                    && equations.assurance(&now.state, &step.to.state) >= SHAPE
-            });
+            let step = taken(equations, now, length);
             since += 1;
+            creeping += usize::from(now.state.damping > OVERDAMPED);
             let reason = match step {
+                _ if creeping > CREEPING => {
+                    path.lost = Some(Lost { at: path.end(), reason: Reason::Overdamped });
+                    return path;
+                }
                 _ if at > top => Reason::Merged,
                 _ if since > PATIENCE => Reason::Turned,
                 Some(step) => {
@@ -335,6 +373,11 @@ impl Path {
         }
         path.lost = Some(Lost { at: path.end(), reason: Reason::Steps });
         path
+    }
+
+    /// Whether it is one of the two waves of a pair.
+    fn travels(&self) -> bool {
+        self.linear.as_ref().is_some_and(|linear| linear.stands.is_some())
     }
 
     /// The smallest amplitude that was reached.
@@ -441,6 +484,10 @@ impl Path {
     /// Amplitudes of the followed states at which the shape is least rigid, of every stretch of the curve where it is [`MERGING`].
     fn merges(&self, equations: &ModeEquations<'_>) -> Vec<f64> {
         let mut merges = Vec::new();
+        // a wave is orthogonal to itself all along: its partner is the wave that runs the other way
+        if self.travels() {
+            return merges;
+        }
         let mut least: Option<(f64, f64)> = None;
         for arc in &self.arcs {
             let rigidity = equations.rigidity(&arc.state);
@@ -472,6 +519,38 @@ impl Path {
     }
 }
 
+/// A step of the curve, if it stays with it.
+fn taken(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Option<Step> {
+    let step = equations.step(now, length, length < CORNER)?;
+    let smooth = step.off <= OFF * length && step.straight >= STRAIGHT && step.to.side * now.side >= 0.0;
+    let corner = length < CORNER && step.off <= BENT * length + GAP;
+    ((smooth || corner) && equations.assurance(&now.state, &step.to.state) >= SHAPE).then_some(step)
+}
+
+/// What the curve is above its beginning, by falling amplitude, up to `high` or to where no step goes on: the linear mode is no guess where
+/// forces grow with amplitude.
+fn risen(equations: &mut ModeEquations<'_>, start: &ModeArc, high: f64) -> Vec<ModeArc> {
+    let mut arcs = Vec::new();
+    let (mut now, mut length) = (start.reversed(), FIRST);
+    for _ in 0..MOST_STEPS {
+        if now.amplitude > high || length <= SHORTEST {
+            break;
+        }
+        match taken(equations, &now, length) {
+            Some(step) => {
+                if step.iterations <= FEW {
+                    length = (1.5 * length).min(LONGEST);
+                }
+                now = step.to;
+                arcs.push(now.clone());
+            }
+            None => length *= 0.5,
+        }
+    }
+    arcs.reverse();
+    arcs
+}
+
 /// Over a kink that no step passes, or off a curve that does not come back, by solving at a smaller amplitude for the same shape.
 fn leap(equations: &mut ModeEquations<'_>, now: &ModeArc) -> Option<ModeArc> {
     LEAPS.iter().find_map(|part| {
@@ -494,7 +573,7 @@ fn point(equations: &ModeEquations<'_>, amplitude: f64, state: &ModeState) -> Mo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Coulomb, Jenkins};
+    use crate::law::{Coulomb, Cubic, Jenkins, Stribeck};
     use crate::method::{Method, event_driven::EventDriven};
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
     use std::f64::consts::PI;
@@ -508,15 +587,7 @@ mod tests {
     #[test]
     fn the_modes_of_a_tuned_ring_go_down_to_where_all_sticks() {
         let (blades, k, kt) = (6, 4.0, 0.8);
-        let mut model = Model::default();
-        let name = |i: usize| format!("b{}", i % blades);
-        for i in 0..blades {
-            model.masses.push(Mass::new(name(i), 1.0));
-            model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness: k, damping: 0.01 });
-            let law = std::sync::Arc::new(Jenkins { stiffness: kt, limit: 0.2 });
-            model.joints.push(Joint { name: format!("j{i}"), between: [name(i), name(i + 1)], law });
-        }
-        let system = model.assemble().unwrap();
+        let system = ring(blades);
         let request = ModeRequest { mode: 1, range: (1e-6, 1e-2), points: 5, harmonics: 3, samples: 128 };
         let mode = mode(&system, request).unwrap();
         assert_eq!((mode.points.len(), mode.lost, &mode.missing[..]), (5, None, &[][..]));
@@ -525,6 +596,138 @@ mod tests {
             assert!((point.omega / stuck - 1.0).abs() < 1e-10, "{} instead of {stuck}", point.omega);
             assert!((point.damping * 2.0 * stuck / 0.01 - 1.0).abs() < 1e-9, "{}", point.damping);
         }
+    }
+
+    /// Blades (1 kg, 4 N/m and 0.01 kg/s to the ground) in a ring, each joined to the next by 0.8 N/m that slips at 0.2 N.
+    fn ring(blades: usize) -> System {
+        let mut model = Model::default();
+        let name = |i: usize| format!("b{}", i % blades);
+        for i in 0..blades {
+            model.masses.push(Mass::new(name(i), 1.0));
+            model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness: 4.0, damping: 0.01 });
+            let law = std::sync::Arc::new(Jenkins { stiffness: 0.8, limit: 0.2 });
+            model.joints.push(Joint { name: format!("j{i}"), between: [name(i), name(i + 1)], law });
+        }
+        model.assemble().unwrap()
+    }
+
+    /// Of two equal modes of a ring the waves are followed, `ω² m = k + 4 sin²(θ/2) Re K`, `2 ζ ω² m = ω c + 4 sin²(θ/2) Im K`, with the dynamic
+    /// stiffness K of a Jenkins element at the relative amplitude `D = 2 a sin(θ/2)`: for `D > d = limit/kt` and `cos ψ = 1 - 2 d/D`,
+    /// `Re K = kt (ψ - sin ψ cos ψ)/π`, `Im K = 4 limit (1 - d/D)/(π D)`. With a quarter of the blades as nodal diameters the phase between every
+    /// other joint is open, and the wave is one of a continuum.
+    #[test]
+    fn the_waves_of_a_tuned_ring_have_the_closed_form_at_every_diameter() {
+        for blades in [4, 8] {
+            let system = ring(blades);
+            for diameter in 1..blades / 2 {
+                let sine = (PI * diameter as f64 / blades as f64).sin();
+                for index in [2 * diameter - 1, 2 * diameter] {
+                    let unit = unit(&system, index).unwrap().unwrap();
+                    // blades that no spring joins are told apart by the trace of the joints, 1e-9, which rounding blurs
+                    assert!(
+                        (unit / (blades as f64).sqrt() - 1.0).abs() < 1e-6,
+                        "a wave moves all blades alike: {unit}"
+                    );
+                    let request = ModeRequest {
+                        mode: index,
+                        range: (1e-3 * unit, 1e2 * unit),
+                        points: 11,
+                        harmonics: 1,
+                        samples: 1024,
+                    };
+                    let mode = mode(&system, request).unwrap();
+                    assert_eq!((mode.lost, mode.points.len(), mode.travels), (None, 11, true), "{blades} {diameter}");
+                    for point in &mode.points {
+                        let (kt, limit) = (0.8, 0.2);
+                        let (d, slips) = (2.0 * sine * point.amplitude / unit, limit / kt);
+                        let psi = (1.0 - 2.0 * slips / d).max(-1.0).acos();
+                        let (re, im) = if d > slips {
+                            (kt * (psi - psi.sin() * psi.cos()) / PI, 4.0 * limit * (1.0 - slips / d) / (PI * d))
+                        } else {
+                            (kt, 0.0)
+                        };
+                        let square = 4.0 + 4.0 * sine * sine * re;
+                        let damping = (0.01 * square.sqrt() + 4.0 * sine * sine * im) / (2.0 * square);
+                        let words = format!("{blades} {diameter} {}: {point:?}, {damping}", point.amplitude);
+                        assert!((point.omega * point.omega / square - 1.0).abs() < SAMPLED, "{words}");
+                        assert!((point.damping / damping - 1.0).abs() < SAMPLED, "{words}");
+                        let turned = (point.places[1] / point.places[0]).arg().abs();
+                        assert!((turned - 2.0 * PI * diameter as f64 / blades as f64).abs() < 1e-6, "{words}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// What 1024 samples of a period leave of a turning force.
+    const SAMPLED: f64 = 1e-4;
+
+    /// `x'' + k x + b x³ = 0` at amplitude A: `x = A cn(Ω t, m)`, `Ω² = k + b A²`, `m = b A²/(2 Ω²)`, of period `4 K(m)/Ω` and with the first
+    /// harmonic `A 2π √q/(√m K (1 + q))`, `q = exp(-π K(1-m)/K(m))`; K by the arithmetic-geometric mean. A spring that is a million times as stiff
+    /// as the linear one is no neighbour of the linear mode.
+    #[test]
+    fn a_cubic_spring_is_followed_to_where_it_is_all_there_is() {
+        let (k, b) = (1e4, 1e9);
+        let quarter = |m: f64| {
+            let (mut x, mut y) = (1.0, (1.0 - m).sqrt());
+            for _ in 0..40 {
+                (x, y) = (0.5 * (x + y), (x * y).sqrt());
+            }
+            0.5 * PI / x
+        };
+        let exact = |largest: f64| {
+            let square = k + b * largest * largest;
+            let m = b * largest * largest / (2.0 * square);
+            let q = (-PI * quarter(1.0 - m) / quarter(m)).exp();
+            let first = largest * 2.0 * PI * q.sqrt() / (m.sqrt() * quarter(m) * (1.0 + q));
+            (0.5 * PI * square.sqrt() / quarter(m), first)
+        };
+        let mut model = Model::default();
+        let between = || ["m".to_owned(), GROUND.to_owned()];
+        model.masses.push(Mass::new("m", 1.0));
+        model.springs.push(Spring { between: between(), stiffness: k, damping: 0.0 });
+        let law = std::sync::Arc::new(Cubic { stiffness: b });
+        model.joints.push(Joint { name: "j".into(), between: between(), law });
+        let system = model.assemble().unwrap();
+        for harmonics in [3, 15, 31] {
+            let request = ModeRequest { mode: 0, range: (1e-9, 1.0), points: 15, harmonics, samples: 1024 };
+            let mode = mode(&system, request).unwrap();
+            assert_eq!((mode.lost, &mode.missing[..], mode.points.len()), (None, &[][..], 15), "{harmonics}");
+            for point in mode.points.iter().filter(|point| harmonics > 3 && point.amplitude > 1e-5) {
+                // the largest displacement that has this first harmonic, by bisection: it grows with it
+                let (mut low, mut high) = (0.5 * point.amplitude, 2.0 * point.amplitude);
+                for _ in 0..100 {
+                    let middle = 0.5 * (low + high);
+                    if exact(middle).1 < point.amplitude { low = middle } else { high = middle }
+                }
+                let omega = exact(low).0;
+                assert!(
+                    (point.omega / omega - 1.0).abs() < 1e-8,
+                    "{harmonics} {}: {}, {omega}",
+                    point.amplitude,
+                    point.omega
+                );
+            }
+        }
+    }
+
+    /// A mass on rigid friction that falls with velocity does not vibrate where friction is thousands of times its spring: the curve ends there,
+    /// after some hundred steps.
+    #[test]
+    fn a_mode_is_left_where_nothing_vibrates() {
+        let mut model = Model::default();
+        let between = || ["m".to_owned(), GROUND.to_owned()];
+        model.masses.push(Mass::new("m", 1.0));
+        model.springs.push(Spring { between: between(), stiffness: 1e4, damping: 2.0 });
+        let law = std::sync::Arc::new(Stribeck { limit: 1.0, static_limit: 1.5, velocity: 0.01 });
+        model.joints.push(Joint { name: "j".into(), between: between(), law });
+        let system = model.assemble().unwrap();
+        let request = ModeRequest { mode: 0, range: (1e-9, 1e-2), points: 5, harmonics: 15, samples: 1024 };
+        let mode = mode(&system, request).unwrap();
+        let lost = mode.lost.unwrap();
+        assert_eq!(lost.reason, Reason::Overdamped);
+        // 4/π 1 N against 2 · 1e4 N/m · a: a damping ratio of one at 0.06 mm
+        assert!(lost.at < 6.4e-5 && mode.points.last().unwrap().damping < 0.1, "{lost:?}");
     }
 
     /// A mode is the forced vibration under the forces `2 ζ ω M x'`, all harmonics of them. The exact method, which knows nothing of modes,
@@ -538,7 +741,7 @@ mod tests {
         let mut equations = ModeEquations::new(&system, 31, 1024).unwrap();
         let mut slipping = 0;
         for index in [0, 1] {
-            let path = Path::follow(&mut equations, index, 1e-4);
+            let path = Path::follow(&mut equations, index, (1e-4, 2e-2));
             for amplitude in [2e-2, 8e-3, 1e-3, 3.5e-4] {
                 let state = path.at(&mut equations, amplitude).unwrap();
                 let n = system.dofs();

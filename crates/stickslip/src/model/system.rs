@@ -2,16 +2,13 @@
 
 use super::ReductionEvidence;
 use crate::law::{LawError, SharedLaw};
-use crate::structure::{Matrices, ReducedComponent, Sector, Structure, turn};
-use nalgebra::{DMatrix, DVector};
+use crate::structure::{ReducedComponent, Sector, Structure, turn};
+use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use stickslip_numerics::eigen;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
-/// Share of a mode's largest coordinate up to which what places see of it is rounding.
-const UNSEEN: f64 = 1e-12;
 
 /// A checked, assembled model.
 ///
@@ -561,21 +558,6 @@ impl System {
             (Some(first), Some(then)) => Some(first.then(then)),
             (one, other) => one.or(other),
         }
-    }
-
-    /// `√(φᵀMφ)` of mode `index` without the joints, scaled to a largest displacement of one: the modal amplitude (m √kg) of a metre at the
-    /// place that moves most. Modes count by rising frequency from 0; `None` if there is no such mode, or if no place moves in it.
-    pub fn modal_unit(&self, index: usize) -> Option<f64> {
-        let Matrices { mass, stiffness, .. } = &**self.structure.full();
-        let n = self.dofs();
-        let inverse = mass.clone().cholesky()?.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
-        let eigen = eigen::symmetric(&inverse * stiffness * inverse.transpose())?;
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-        // an M-normalised shape has φᵀMφ = 1
-        let shape = inverse.transpose() * eigen.eigenvectors.column(*order.get(index)?);
-        let largest = self.at_places(shape.as_slice()).iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        (largest > UNSEEN * shape.amax()).then(|| 1.0 / largest)
     }
 
     /// Displacements, velocities or accelerations of the degrees of freedom (length n), at the places.

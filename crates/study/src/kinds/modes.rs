@@ -17,7 +17,7 @@ use crate::values::{Values, hertz};
 use crate::warnings::mode_sticks;
 use crate::words::{display_unit, significant};
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
-use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode};
+use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode, unit};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
 use stickslip::model::Model;
@@ -104,7 +104,8 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
 fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
     let mut part = Part::default();
-    let Some(unit) = prepared.system.modal_unit(number(prepared)) else {
+    let unit = unit(&prepared.system, number(prepared)).map_err(|error| (prepared.case.index, error))?;
+    let Some(unit) = unit else {
         (work.context.finished)();
         part.count(|| location_of(prepared), "failed", Some(UNSEEN.to_owned()));
         part.tables = vec![Rows::default(), Rows::default()];
@@ -226,6 +227,13 @@ fn remarks(prepared: &Prepared, unit: f64, mode: &Mode) -> Vec<String> {
             )
         })
         .collect();
+    if mode.travels {
+        remarks.push(format!(
+            "{place}: two modes have this frequency, and every mixture of both is a motion while the joints stick; the wave that travels is followed, \
+             in which places of equal sectors move one after the other by equal amplitudes. The other mode is the wave that runs the other way. \
+             Mixtures that stand slip otherwise."
+        ));
+    }
     let joints = mode.points.iter().chain(&mode.largest).map(|point| (point.damping - point.viscous).abs());
     if !mode.points.is_empty() && joints.fold(0.0, f64::max) < SLIPS {
         remarks.push(format!("{place}: no joint slips between these amplitudes; the joints add no damping."));

@@ -6,7 +6,7 @@ use super::reader::Reader;
 use crate::document::Table;
 use crate::error::Problem;
 use crate::schema::STRUCTURE;
-use crate::stated::Matrices;
+use crate::stated::{Matrices, exchange, sensible};
 use crate::statement::{Stated, StatedTable};
 use crate::stiffened::Stiffened;
 use crate::unit_sets;
@@ -104,8 +104,8 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     let units = units.ok_or_else(|| problem("units", "the units are missing".to_owned()))?;
     let mut new = vec![usize::MAX; rows];
     kept.iter().enumerate().for_each(|(at, row)| new[*row] = at);
-    let matrix = |(key, matrix): &Read| {
-        let unit = match *key {
+    let matrix = |key: &'static str, matrix: &formats::Matrix| {
+        let unit = match key {
             "stiffness" | "stiffened" => units.stiffness(),
             "mass" => units.mass,
             _ => units.damping(),
@@ -116,7 +116,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
         let made = Matrix::from_triplets(kept.len(), inside.map(|(row, column, value)| (row, column, value * unit)));
         made.map_err(|error| problem(key, error.to_string()))
     };
-    let mut made = all.iter().map(matrix);
+    let mut made = all.iter().map(|(key, read)| matrix(key, read));
     let mut next = || made.next().transpose();
     let (stiffness, mass) = (next()?, next()?);
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else { return Err(missing("mass")) };
@@ -126,8 +126,19 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     let stiffened = stiffened.transpose().map_err(|error| problem("stiffened", error.to_string()))?;
     let names = kept.iter().map(|row| names[*row].clone()).collect();
     let component = Component::new(names, mass, damping, stiffness).map_err(|error| match &error {
-        StructureError::NegativeMass => problem("mass", error.to_string())
-            .help("a mass matrix has no negative eigenvalue: is it the stiffness that is named here, or a matrix cut short?"),
+        StructureError::NegativeMass => {
+            // the other way round they may be a structure: then that is what is wrong
+            let exchanged = match (matrix("mass", &all[0].1), matrix("stiffness", &all[1].1)) {
+                (Ok(mass), Ok(stiffness)) => Component::new(vec![String::new(); kept.len()], mass, None, stiffness).ok(),
+                _ => None,
+            };
+            let help = match exchanged.as_ref().and_then(sensible) {
+                Some(frequencies) => exchange(&frequencies),
+                None => "a mass matrix has no negative eigenvalue: is it the stiffness that is named here, or a matrix cut short?"
+                    .to_owned(),
+            };
+            problem("mass", error.to_string()).help(help)
+        }
         StructureError::NotSymmetric { matrix, row, column, value, mirrored } => {
             let name = |at: usize| kept.get(at - 1).map_or(at, |row| row + 1);
             let (row, column) = (name(*row), name(*column));

@@ -5,6 +5,7 @@
 //! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods" (2003), Ch. 6.
 
 use super::mode::{ITERATIONS, ModeEquations, ModeState, ROUNDED, SOLVED};
+use super::open::{open, shorten};
 use super::solve::{GROWS, HALVINGS, SHORTENS};
 use num_complex::Complex64;
 use stickslip_numerics::dense;
@@ -23,11 +24,17 @@ pub(crate) struct ModeArc {
     /// Unit tangent: by shape, forces, ω, ζ and `ln a`.
     pub tangent: Vec<f64>,
     /// Sign of the determinant of the derivative above the tangent. It stays along a smooth curve; where it changes, another curve has been
-    /// crossed, or the step has led to another one.
+    /// crossed, or the step has led to another one. Zero where the equations leave a direction open and the determinant is rounding.
     pub side: f64,
 }
 
 impl ModeArc {
+    /// The same point on the way back.
+    pub fn reversed(&self) -> ModeArc {
+        let tangent = self.tangent.iter().map(|t| -t).collect();
+        ModeArc { tangent, side: -self.side, ..self.clone() }
+    }
+
     /// The point a length further along the tangent; the tangent stays.
     fn predicted(&self, length: f64) -> ModeArc {
         let mut next = self.clone();
@@ -119,7 +126,12 @@ impl ModeEquations<'_> {
 
     /// Length of a direction at a point.
     fn length(&self, at: &ModeArc, direction: &[f64]) -> f64 {
-        dot(&self.weigh(at, direction), direction).max(0.0).sqrt()
+        self.inner(at, direction, direction).max(0.0).sqrt()
+    }
+
+    /// The inner product of two directions at a point, that of the arc length.
+    pub(super) fn inner(&self, at: &ModeArc, one: &[f64], other: &[f64]) -> f64 {
+        dot(&self.weigh(at, one), other)
     }
 
     /// The metric of the arc length times a direction. It measures the shape by the kinetic energy of its change, forces by the slip limits,
@@ -198,7 +210,12 @@ impl ModeEquations<'_> {
                 }
                 right[size] = 0.0;
             }
-            let sign = dense::solve_signed(&mut bordered, size + 1, &mut right)?;
+            let open = if self.mixes { open(&bordered, size + 1) } else { Vec::new() };
+            let mut sign = dense::solve_signed(&mut bordered, size + 1, &mut right)?;
+            if !open.is_empty() {
+                sign = 0.0;
+                shorten(&mut right, open, &|one, other| self.inner(&point, one, other));
+            }
             if solved {
                 let length = self.length(&point, &right);
                 if !(length > 0.0 && length.is_finite()) {

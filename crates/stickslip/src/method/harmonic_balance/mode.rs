@@ -9,6 +9,7 @@
 
 use super::equations::penalty;
 use super::hold::{CLEAR, stay};
+use super::open::{open, shorten};
 use super::ports::{Alternation, Port, Ports};
 use super::solve::{HALVINGS, SHORTENS};
 use crate::method::MethodError;
@@ -48,6 +49,8 @@ pub(crate) struct ModeEquations<'a> {
     pub(super) alternation: Alternation,
     /// Where the first harmonic is in the list.
     first: usize,
+    /// Whether motions may be mixtures of two equal modes, so that the equations may leave some of them open.
+    pub mixes: bool,
 }
 
 /// A port with the directions of its axes in the structure.
@@ -71,13 +74,45 @@ const TRACE: f64 = 1e-9;
 /// Distance of the squares of two frequencies, relative, up to which modes count as equal: well above [`TRACE`].
 const EQUAL: f64 = 1e-7;
 
+/// Rounding of the squares of frequencies relative to the largest of them, per degree of freedom.
+const SQUARE: f64 = 64.0 * f64::EPSILON;
+/// Share of the size of a mode below which nothing is read off it.
+const FAINT_PLACE: f64 = 1e-6;
+
 /// A linear mode of the structure without its joints.
 #[derive(Debug, Clone)]
 pub(crate) struct LinearMode {
     /// Square of the frequency, (rad/s)².
     pub square: f64,
-    /// Shape φ with φᵀ M φ = 1, 1/√kg.
-    pub shape: DVector<f64>,
+    /// Shape φ with φᴴ M φ = 1, 1/√kg: real, or of a pair that neither the structure nor its joints tell apart one of the two waves
+    /// `(φ₁ ± jφ₂)/√2`, which are the same whatever mixtures of the pair φ₁ and φ₂ are.
+    pub shape: DVector<Complex64>,
+    /// Of such a wave, the member of the pair that it takes the number of: a motion that stands.
+    pub stands: Option<DVector<f64>>,
+}
+
+impl LinearMode {
+    /// In place of a wave, the motion of the pair that stands; `None` if it is no wave.
+    pub fn standing(&self) -> Option<LinearMode> {
+        let shape = real(self.stands.as_ref()?);
+        Some(LinearMode { square: self.square, shape, stands: None })
+    }
+}
+
+fn real(shape: &DVector<f64>) -> DVector<Complex64> {
+    shape.map(|x| Complex64::new(x, 0.0))
+}
+
+/// The waves of a pair of real modes. In the first a place leads those before it, as it does under a positive engine order where places
+/// stand sector by sector: the first of the places that tells decides.
+fn waves(one: &DVector<f64>, other: &DVector<f64>) -> [DVector<Complex64>; 2] {
+    let size = one.amax().max(other.amax());
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let wave = one.zip_map(other, |re, im| Complex64::new(half * re, half * im));
+    let from = wave.iter().find(|x| x.norm() > FAINT_PLACE * size).copied().unwrap_or(ZERO);
+    let leads = wave.iter().map(|x| (from.conj() * x).im).find(|leads| leads.abs() > FAINT_PLACE * size * from.norm());
+    let back = wave.map(|x| x.conj());
+    if leads.is_some_and(|leads| leads < 0.0) { [back, wave] } else { [wave, back] }
 }
 
 impl<'a> ModeEquations<'a> {
@@ -111,7 +146,7 @@ impl<'a> ModeEquations<'a> {
         let list: Vec<usize> = if odd { (1..=harmonics).step_by(2).collect() } else { (0..=harmonics).collect() };
         let mut alternation = Alternation::new(list, samples);
         alternation.by_frequency = Some(Vec::new());
-        Ok(ModeEquations { system, elastic, contacts, alternation, first: usize::from(!odd) })
+        Ok(ModeEquations { system, elastic, contacts, alternation, first: usize::from(!odd), mixes: false })
     }
 
     /// Axes of the force ports.
@@ -142,11 +177,30 @@ impl<'a> ModeEquations<'a> {
         let Some(inverse) = lower.solve_lower_triangular(&DMatrix::identity(n, n)) else { return Vec::new() };
         let Some(eigen) = eigen::symmetric(&inverse * stiffness * inverse.transpose()) else { return Vec::new() };
         let shapes = inverse.transpose() * eigen.eigenvectors;
-        let mut modes: Vec<LinearMode> = (0..n)
-            .map(|k| LinearMode { square: eigen.eigenvalues[k].max(0.0), shape: shapes.column(k).into_owned() })
-            .collect();
-        modes.sort_by(|a, b| a.square.total_cmp(&b.square));
-        modes
+        let mut modes: Vec<(f64, DVector<f64>)> =
+            (0..n).map(|k| (eigen.eigenvalues[k].max(0.0), shapes.column(k).into_owned())).collect();
+        modes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let rounding = SQUARE * n as f64 * modes.last().map_or(0.0, |mode| mode.0);
+        let equal = |a: &(f64, DVector<f64>), b: &(f64, DVector<f64>)| b.0 - a.0 <= rounding;
+        let mut found = Vec::with_capacity(n);
+        for group in modes.chunk_by(equal) {
+            match group {
+                [(square, one), (_, other)] => {
+                    let made = |(shape, stands): (_, &DVector<f64>)| LinearMode {
+                        square: *square,
+                        shape,
+                        stands: Some(stands.clone()),
+                    };
+                    found.extend(waves(one, other).into_iter().zip([one, other]).map(made));
+                }
+                _ => found.extend(group.iter().map(|(square, shape)| LinearMode {
+                    square: *square,
+                    shape: real(shape),
+                    stands: None,
+                })),
+            }
+        }
+        found
     }
 
     /// A linear mode at amplitude `a`; forces along laws of velocity are zero. `None` if it has no frequency.
@@ -155,9 +209,10 @@ impl<'a> ModeEquations<'a> {
         let omega = mode.square.sqrt();
         let mut x = vec![ZERO; nh * n];
         for i in 0..n {
-            x[self.first * n + i].re = a * mode.shape[i];
+            x[self.first * n + i] = a * mode.shape[i];
         }
-        let lost = mode.shape.dot(&(self.system.structure().damping() * &mode.shape));
+        let damping = self.system.structure().damping().map(|c| Complex64::new(c, 0.0));
+        let lost = mode.shape.dotc(&(damping * &mode.shape)).re;
         let force = vec![ZERO; nh * self.forces()];
         (omega > 0.0).then(|| ModeState { x, force, omega, damping: lost / (2.0 * omega) })
     }
@@ -178,6 +233,20 @@ impl<'a> ModeEquations<'a> {
         cross.norm_sqr() / (squares[0] * squares[1])
     }
 
+    /// The inner product of two changes of motion in the masses, all harmonics together.
+    fn kinetic(&self, one: &[f64], other: &[f64]) -> f64 {
+        let (n, mass) = (self.system.dofs(), self.system.structure().mass());
+        let mut sum = 0.0;
+        for (one, other) in one.chunks_exact(2 * n).zip(other.chunks_exact(2 * n)) {
+            for i in 0..n {
+                for l in 0..n {
+                    sum += mass[(i, l)] * (one[2 * i] * other[2 * l] + one[2 * i + 1] * other[2 * l + 1]);
+                }
+            }
+        }
+        sum
+    }
+
     /// The share of the viscous dampers in the damping ratio: what they lose in a cycle, against what `2 ζ ω M` puts in for ζ = 1.
     pub fn viscous(&self, state: &ModeState) -> f64 {
         let (n, mut lost, mut whole) = (self.system.dofs(), 0.0, 0.0);
@@ -195,7 +264,11 @@ impl<'a> ModeEquations<'a> {
 
     /// First harmonic of every place, m.
     pub fn places(&self, state: &ModeState) -> Vec<Complex64> {
-        let x = self.first(state);
+        self.at_places(self.first(state))
+    }
+
+    /// What the places see of a motion of all degrees of freedom.
+    pub fn at_places(&self, x: &[Complex64]) -> Vec<Complex64> {
         let at = |place: &Axis| place.rows().iter().map(|(row, weight)| x[*row] * *weight).sum();
         self.system.seen().iter().map(at).collect()
     }
@@ -224,13 +297,23 @@ impl<'a> ModeEquations<'a> {
         let bounded = self.elastic.iter().chain(&self.contacts).filter(|placed| placed.port.scale.is_finite());
         let forces: Vec<(&DVector<f64>, f64)> =
             bounded.flat_map(|placed| placed.w.iter().map(|w| (w, placed.port.scale))).collect();
-        let onto = |shape: &DVector<f64>| -> f64 { forces.iter().map(|(w, limit)| limit * w.dot(shape).abs()).sum() };
+        let along = |w: &DVector<f64>, shape: &DVector<Complex64>| -> Complex64 {
+            w.iter().zip(shape.iter()).map(|(w, x)| x * *w).sum()
+        };
+        let onto = |shape: &DVector<Complex64>| -> f64 {
+            forces.iter().map(|(w, limit)| limit * along(w, shape).norm()).sum()
+        };
         let own = onto(&mode.shape) / (share * mode.square);
         let others = modes.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, other)| {
             let gap = (other.square - mode.square).abs();
             if gap <= EQUAL * mode.square { 0.0 } else { onto(&other.shape) / (apart * gap) }
         });
         4.0 / std::f64::consts::PI * others.fold(own, f64::max)
+    }
+
+    /// Whether the forces of some law are bounded by no limit, so that they do not become faint at large amplitudes.
+    pub fn is_unbounded(&self) -> bool {
+        self.elastic.iter().chain(&self.contacts).any(|placed| !placed.port.scale.is_finite())
     }
 
     /// Unknowns: real and imaginary parts of motions and forces, ω and ζ.
@@ -497,10 +580,15 @@ impl<'a> ModeEquations<'a> {
                 residual[row] /= scale;
                 jacobian[row * size..(row + 1) * size].iter_mut().for_each(|x| *x /= scale);
             }
+            let open = if self.mixes { open(&jacobian, size) } else { Vec::new() };
             if !dense::solve(&mut jacobian, size, &mut residual) {
                 return None;
             }
-            let step = residual.clone();
+            let mut step = residual.clone();
+            if !open.is_empty() {
+                let motions = 2 * state.x.len();
+                shorten(&mut step, open, &|one, other| self.kinetic(&one[..motions], &other[..motions]));
+            }
             let mut fraction = 1.0;
             for halving in 0..=HALVINGS + 1 {
                 if halving > HALVINGS {

@@ -26,6 +26,8 @@ const HALVINGS: usize = 40;
 const LOCATED: f64 = 1e-5;
 /// Compliance of a rigid joint, as a share of that of the structure: joints that hold in a ring share the load by it.
 const COMPLIANCE: f64 = 1e-10;
+/// Relative distance of frequencies up to which two modes are a pair.
+const EQUAL: f64 = 1e-9;
 
 /// Degrees of freedom and joints up to which borders are refined.
 const REFINED: usize = 40;
@@ -48,9 +50,25 @@ impl Survey {
         (0..self.joints.len()).map(|joint| self.onset_of(joint, &omegas, &shares)).collect()
     }
 
-    /// The modal amplitude (m √kg) at which the first joint slips in mode `index` (from 0) of the stuck structure;
-    /// `None` if it has no such mode or no joint is loaded in it.
+    /// The modal amplitude (m √kg) at which the first joint slips in mode `index` (from 0) of the stuck structure, of two modes of one
+    /// frequency in their waves, `(φ₁ ± jφ₂)/√2`; `None` if it has no such mode or no joint is loaded in it.
     pub fn slip_amplitude(&self, index: usize) -> Option<f64> {
+        let modes = &self.stuck.modes.elastic;
+        let omega = modes.get(index)?.omega;
+        let equal: Vec<usize> = (0..modes.len()).filter(|&k| (modes[k].omega / omega - 1.0).abs() <= EQUAL).collect();
+        let members = if equal.len() == 2 { equal } else { vec![index] };
+        let mut squares = vec![0.0; self.joints.len()];
+        for &member in &members {
+            for (square, share) in squares.iter_mut().zip(self.mode_shares(member)?) {
+                *square += share * share / members.len() as f64;
+            }
+        }
+        let largest = squares.into_iter().fold(0.0, f64::max).sqrt();
+        (largest > 0.0).then(|| 1.0 / largest)
+    }
+
+    /// The loads of all joints in mode `index` of a modal amplitude of one, as shares of what they stick up to.
+    fn mode_shares(&self, index: usize) -> Option<Vec<f64>> {
         let shapes = self.stuck.shapes.as_ref()?;
         let omega = self.stuck.modes.elastic.get(index)?.omega;
         let shape = shapes.column(index).into_owned();
@@ -78,8 +96,7 @@ impl Survey {
                 rigid.iter().position(|r| *r == index).map_or(0.0, |column| forces[column].abs() / limit)
             }
         };
-        let largest = self.joints.iter().enumerate().map(share).fold(0.0, f64::max);
-        (largest > 0.0).then(|| 1.0 / largest)
+        Some(self.joints.iter().enumerate().map(share).collect())
     }
 
     fn rigid(&self) -> Vec<usize> {
