@@ -3,22 +3,60 @@
 use crate::{Ending, print};
 use std::f64::consts::TAU;
 use std::fmt::Write;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use stickslip::structure::Component;
-use stickslip_formats::{self as formats, Error, Kind, Matrix, Report, names};
+use stickslip_formats::{self as formats, Entry, Error, Kind, Matrix, Report, names};
 use stickslip_numerics::definite::sparse_definite;
 use stickslip_numerics::sparse;
+use stickslip_study::unit_sets;
 
 /// Frequencies that are shown of a pair of matrices.
 const LOWEST: usize = 6;
 
+/// Masses of what usually vibrates with dry friction, kg: a blade or a bracket, held or free.
+const USUAL: RangeInclusive<f64> = 0.01..=100.0;
+
 /// A matrix with its name for people.
 struct Named {
     name: String,
+    role: Option<Role>,
     matrix: Matrix,
 }
 
-/// Shows every matrix in the files, and of a pair of stiffness and mass the lowest frequencies.
+/// What a matrix is of a structure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Role {
+    Stiffness,
+    Mass,
+    Damping,
+}
+
+/// Beginnings of words that say what a matrix is: `STIF1`, `sti`, `mass`, `mas`, `damping`.
+const WORDS: [(&str, Role); 3] = [("sti", Role::Stiffness), ("mas", Role::Mass), ("dam", Role::Damping)];
+/// Letters that say it where they begin a short name: `K`, `KAAX`, `Mff`.
+const LETTERS: [(char, Role); 4] =
+    [('k', Role::Stiffness), ('m', Role::Mass), ('c', Role::Damping), ('d', Role::Damping)];
+/// Letters of such a name at most.
+const SHORT: usize = 4;
+
+impl Role {
+    /// What the name of a matrix says it is, or without one that of its file.
+    fn of(file: &Path, name: Option<&str>) -> Option<Role> {
+        let text = |part: Option<&std::ffi::OsStr>| part.map(|part| part.to_string_lossy().to_lowercase());
+        let (short, all) = match name {
+            Some(name) => (name.to_lowercase(), name.to_lowercase()),
+            None => (text(file.file_stem())?, text(file.file_name())?),
+        };
+        let words = || all.split(|letter: char| !letter.is_alphabetic());
+        let said = WORDS.iter().find(|(word, _)| words().any(|of| of.starts_with(word)));
+        let letter = short.chars().next().filter(|_| short.chars().count() <= SHORT);
+        let begun = || LETTERS.iter().find(|(begins, _)| Some(*begins) == letter).map(|(_, role)| *role);
+        said.map(|(_, role)| *role).or_else(begun)
+    }
+}
+
+/// Shows every matrix in the files, and of stiffness and mass the lowest frequencies.
 pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
     let (mut text, mut wrong) = (String::new(), false);
     let mut square: Vec<Named> = Vec::new();
@@ -51,10 +89,11 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
             }
         }
     }
-    if let [a, b] = &square[..]
-        && a.matrix.rows() == b.matrix.rows()
-    {
-        text += &pair(a, b, beside.as_deref());
+    if square.len() > 1 {
+        match chosen(&square) {
+            Ok((stiffness, mass, why)) => text += &pair(stiffness, mass, why, beside.as_deref()),
+            Err(why) => text += &format!("no frequencies: {why}\n"),
+        }
     }
     match (wrong, print(&text)) {
         (true, _) => Ending::WrongInput,
@@ -94,11 +133,12 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<Vec<Named
             {
                 let _ = writeln!(text, "  {}", definite(&sparse));
             }
+            let role = Role::of(file, name);
             let name = match name {
                 Some(name) => format!("{}, {name}", file.display()),
                 None => file.display().to_string(),
             };
-            found.push(Named { name, matrix });
+            found.push(Named { name, role, matrix });
         }
     }
     text.push('\n');
@@ -121,11 +161,39 @@ fn definite(matrix: &sparse::Matrix) -> &'static str {
     }
 }
 
-/// Lowest frequencies of two matrices, of which that with the larger entries is the stiffness, and what the units may be, if their rows have names, of
-/// their own or `beside` them.
-fn pair(a: &Named, b: &Named, beside: Option<&[String]>) -> String {
-    let (stiffness, mass) = if a.matrix.largest() >= b.matrix.largest() { (a, b) } else { (b, a) };
-    let mut text = format!("{} as stiffness, {} as mass\n", stiffness.name, mass.name);
+/// Stiffness and mass among several matrices, and what tells them: their names, else of two the size of their entries.
+fn chosen(square: &[Named]) -> Result<(&Named, &Named, &'static str), String> {
+    let of = |role: Role| square.iter().filter(|named| named.role == Some(role)).collect::<Vec<_>>();
+    let (stiffness, mass, why) = match (&of(Role::Stiffness)[..], &of(Role::Mass)[..], square) {
+        ([stiffness], [mass], _) => (*stiffness, *mass, "by their names"),
+        ([stiffness], [], [a, b]) => (*stiffness, if a.role.is_none() { a } else { b }, "by the name of the stiffness"),
+        ([], [mass], [a, b]) => (if a.role.is_none() { a } else { b }, *mass, "by the name of the mass"),
+        ([], [], [a, b]) => {
+            let larger = a.matrix.largest() >= b.matrix.largest();
+            let (stiffness, mass) = if larger { (a, b) } else { (b, a) };
+            (stiffness, mass, "by its larger entries: their names do not say")
+        }
+        _ => {
+            return Err("which matrix is the stiffness and which the mass is not told by their names (K and M, or stiffness and mass): \
+                        name the two files alone"
+                .to_owned());
+        }
+    };
+    match stiffness.matrix.rows() == mass.matrix.rows() {
+        true => Ok((stiffness, mass, why)),
+        false => Err(format!(
+            "{} as stiffness has {} rows, and {} as mass {}",
+            stiffness.name,
+            stiffness.matrix.rows(),
+            mass.name,
+            mass.matrix.rows()
+        )),
+    }
+}
+
+/// Lowest frequencies of stiffness and mass, and of every set of units the mass, where rows have names, of their own or `beside` them.
+fn pair(stiffness: &Named, mass: &Named, why: &str, beside: Option<&[String]>) -> String {
+    let mut text = format!("{} as stiffness, {} as mass, {why}\n", stiffness.name, mass.name);
     let rows = stiffness.matrix.rows();
     let names = stiffness.matrix.names().or(mass.matrix.names()).or(beside.filter(|names| names.len() == rows));
     let names = names.map_or_else(|| vec![String::new(); rows], <[String]>::to_vec);
@@ -145,20 +213,34 @@ fn pair(a: &Named, b: &Named, beside: Option<&[String]>) -> String {
             let _ = writeln!(text, "  no frequencies: {error}");
         }
     }
-    let along: Vec<usize> = (0..rows).filter(|row| names[*row].ends_with(".x")).collect();
-    if !along.is_empty() {
-        let total: f64 = mass
-            .matrix
-            .both_triangles()
-            .filter(|entry| [entry.row, entry.column].iter().all(|at| along.binary_search(&(*at as usize)).is_ok()))
-            .map(|entry| entry.value)
-            .sum();
-        let _ = writeln!(
-            text,
-            "  mass along x, of what is free: {total:.6e}, which is {:.4e} kg in tonnes and {:.4e} kg in grams",
-            1e3 * total,
-            1e-3 * total
-        );
+    let along: Vec<(&str, f64)> = ["x", "y", "z"]
+        .into_iter()
+        .filter_map(|along| Some((along, mass_along(&mass.matrix, &names, along)?)))
+        .collect();
+    let Some(&(_, first)) = along.first() else {
+        text += "  mass: no row is called by a direction (449.x), so that nobody can tell it, nor the units\n";
+        return text;
+    };
+    let each: Vec<String> = along.iter().map(|(along, total)| format!("along {along} {total:.6e}")).collect();
+    let _ = writeln!(text, "  mass of what is free, in its units: {}", each.join(", "));
+    for set in unit_sets::TABLE {
+        let kilograms = set.mass * first;
+        let usual = if USUAL.contains(&kilograms) { ", as a blade may have" } else { "" };
+        let _ = writeln!(text, "    {kilograms:.4e} kg if units = \"{}\"{usual}", set.name);
     }
+    let (from, to) = (USUAL.start(), USUAL.end());
+    let _ = writeln!(
+        text,
+        "  the files do not say their units: take those with which it weighs what it does; blades have {from} kg to {to} kg. Frequencies tell seconds \
+         from milliseconds only"
+    );
     text
+}
+
+/// The mass that moves where all rows of one direction move by one, in the units of the matrix; `None` where no row is called by it.
+fn mass_along(mass: &Matrix, names: &[String], along: &str) -> Option<f64> {
+    let is = |name: &String| name.rsplit_once('.').is_some_and(|(_, direction)| direction == along);
+    let rows: Vec<bool> = names.iter().map(is).collect();
+    let moved = |entry: &Entry| rows[entry.row as usize] && rows[entry.column as usize];
+    rows.contains(&true).then(|| mass.both_triangles().filter(moved).map(|entry| entry.value).sum())
 }

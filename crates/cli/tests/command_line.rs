@@ -665,11 +665,46 @@ fn inspect_tells_frequencies_and_mass() {
     for words in [
         "names of 30 rows",
         "bricks.sti as stiffness, bricks.mas as mass",
-        "mass along x, of what is free: 1.354889e-8",
+        "by their names",
+        "mass of what is free, in its units: along x 1.354889e-8",
+        // millimetre, tonne, second: 1000 kg; inch: 4.4482216152605 N by 0.0254 m
+        "1.3549e-5 kg if units = \"mm-t-s\"",
+        "1.3549e-8 kg if units = \"mm-kg-s\"",
+        "2.3728e-6 kg if units = \"in-lbf-s\"",
     ] {
         assert!(said.contains(words), "{words}: {said}");
     }
     // without names there are no directions
     let unnamed = inspect(&["bricks.sti", "bricks.mas"]);
-    assert!(unnamed.contains("lowest frequencies") && !unnamed.contains("mass along x"), "{unnamed}");
+    assert!(unnamed.contains("lowest frequencies") && unnamed.contains("mass: no row"), "{unnamed}");
+}
+
+/// Names tell stiffness from mass before sizes do: a heavy mass on a soft spring, and three matrices, of which one is the damping. 4 N/m and 100 kg
+/// are 0.2 rad/s.
+#[test]
+fn inspect_goes_by_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, value: f64| {
+        let text = format!("%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 {value:e}\n2 2 {value:e}\n");
+        fs::write(folder.path().join(name), text).unwrap();
+    };
+    for (name, value) in
+        [("K.mtx", 4.0), ("M.mtx", 100.0), ("C.mtx", 1.0), ("a.mtx", 400.0), ("b.mtx", 1e4), ("e.mtx", 1.0)]
+    {
+        write(name, value);
+    }
+    let inspect = |files: &[&str]| {
+        let inspected = stickslip(folder.path(), &[&["inspect"], files].concat());
+        assert_eq!(code(&inspected), 0, "{}", stderr(&inspected));
+        String::from_utf8_lossy(&inspected.stdout).into_owned()
+    };
+    for files in [&["K.mtx", "M.mtx"][..], &["M.mtx", "K.mtx"], &["C.mtx", "K.mtx", "M.mtx"]] {
+        let said = inspect(files);
+        assert!(said.contains("K.mtx as stiffness, M.mtx as mass, by their names"), "{said}");
+        assert!(said.contains(&format!("{:.6e}", 0.2 / std::f64::consts::TAU)), "{said}");
+    }
+    let said = inspect(&["a.mtx", "b.mtx"]);
+    assert!(said.contains("b.mtx as stiffness, a.mtx as mass, by its larger entries"), "{said}");
+    let said = inspect(&["a.mtx", "b.mtx", "e.mtx"]);
+    assert!(said.contains("no frequencies: which matrix"), "{said}");
 }

@@ -176,7 +176,7 @@ pub const STRUCTURE: &[Key] = &[
 pub(crate) const FILE_KEYS: &[Key] = &[
     required("file", Takes::Text, "its path", "\"blade.mat\""),
     optional("name", Takes::Text, "which matrix in it, if it has several", "\"K\""),
-    optional("format", Takes::Choice(format_names), "its format, if that is not seen from its content", "\"mat5\""),
+    optional("format", Takes::Choice(format_names), "its format, if that is not seen from its content", "\"matlab\""),
 ];
 
 const STIFFENED: &[Key] = &[

@@ -67,6 +67,39 @@ fn a_sector_becomes_a_ring() {
     }
 }
 
+/// Bars and wheel of a mistuned disk stand at the peak, which lies between the points of the curve: as high as it, and blade by blade what a study of
+/// that one frequency finds. The points beside it have another blade as the largest.
+#[test]
+fn bars_stand_at_the_peak() {
+    let mistuned = "mistuning = { of = \"k\", deviation = \"3 %\", seed = 7 }";
+    let method = "[figure]\ny_unit = \"m\"\n[method]\nkind = \"harmonic-balance\"\nharmonics = 1\ntolerance = 0.9\n";
+    let result = |study: &str| {
+        let study = read("engine_order = 1", mistuned, &format!("[study]\nkind = \"response\"\n{study}\n{method}"));
+        run(&study.unwrap(), &Context::unwatched(1)).unwrap()
+    };
+    for more in ["", "peak_of = \"all\""] {
+        let found = result(&format!("frequency = {{ from = \"100 Hz\", to = \"150 Hz\", points = 5 }}\n{more}"));
+        let peaks = found.tables.iter().find(|table| table.name == "peaks").unwrap();
+        let inside = peaks.flags("at_range_end").unwrap().iter().map(|end| *end == Some(false));
+        let of = |column: &str| peaks.numbers(column).unwrap().to_vec();
+        let all = of("amplitude_m").into_iter().zip(of("frequency_Hz")).zip(inside);
+        let (highest, hertz) =
+            all.filter(|(_, inside)| *inside).map(|(peak, _)| peak).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        let bars = &found.figure.panels[1].series[0];
+        let largest = bars.y.iter().copied().fold(0.0, f64::max);
+        assert!((largest / highest - 1.0).abs() < 1e-9, "{more}: {largest} {highest}");
+        let grid = |blade: usize| found.tables[0].numbers(&format!("blade_{blade}_amplitude_m")).unwrap().to_vec();
+        let missed = (0..6).flat_map(grid).fold(0.0, f64::max);
+        assert!(missed < 0.9 * highest, "the points miss the peak: {missed} {highest} at {hertz} Hz");
+        let alone = result(&format!("frequency = [\"{hertz:.17} Hz\"]\npeaks = false"));
+        for blade in 0..6 {
+            let expected = alone.tables[0].numbers(&format!("blade_{blade}_amplitude_m")).unwrap()[0];
+            let bar = bars.y[blade];
+            assert!((bar / expected - 1.0).abs() < 1e-6, "{more} blade {blade}: {bar} {expected}");
+        }
+    }
+}
+
 /// k (1 + deviation), whatever the name; what follows from a parameter follows.
 #[test]
 fn mistuning_by_parameter_mass_and_spring() {

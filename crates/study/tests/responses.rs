@@ -323,6 +323,61 @@ frequency = { from = "1 Hz", to = "2 Hz", points = 41 }
     assert!(found.figure.panels[0].title.contains("worst is b1"), "{}", found.figure.panels[0].title);
 }
 
+/// The band of many places is that of the exact curves at every one of its abscissae: linear oscillators, whose draws resonate between the
+/// points of the curve, each somewhere else.
+#[test]
+fn bands_of_the_largest_of_many_places_are_exact() {
+    let (count, damping) = (48, 0.05);
+    let found = dataset(&format!(
+        r#"
+schema = 1
+[parameters]
+k = "100 N/m"
+[sample]
+count = {count}
+of = {{ k = {{ uniform = ["95 N/m", "105 N/m"] }} }}
+[[mass]]
+repeat = {{ i = 9 }}
+name = "b{{i}}"
+mass = "1 kg"
+[[spring]]
+repeat = {{ i = 9 }}
+between = ["b{{i}}", "ground"]
+stiffness = "k * (1 + 0.02*i)"
+damping = "{damping} N s/m"
+[[force]]
+repeat = {{ i = 9 }}
+on = "b{{i}}"
+amplitude = "1 N"
+[study]
+kind = "response"
+frequency = {{ from = "1.4 Hz", to = "1.9 Hz", points = 11 }}
+"#
+    ));
+    let drawn = numbers(&found, "curve", "k_N_per_m").to_vec();
+    let stiffness: Vec<f64> = drawn.chunks(11).map(|rows| rows[0]).collect();
+    assert_eq!(stiffness.len(), count);
+    let series = &found.figure.panels[0].series;
+    assert_eq!(series[0].x.len(), 11, "no draw's own peak is an abscissa of all");
+    for (at, f) in series[0].x.iter().enumerate() {
+        let omega = TAU * f;
+        let amplitude = |k: f64| 1.0 / (k - omega * omega).hypot(damping * omega);
+        let largest = |k: &f64| (1..=9).map(|i| amplitude(k * (1.0 + 0.02 * f64::from(i)))).fold(0.0, f64::max);
+        let mut values: Vec<f64> = stiffness.iter().map(largest).collect();
+        values.sort_by(f64::total_cmp);
+        let quantile = |share: f64| {
+            let at = share * (count - 1) as f64;
+            let below = values[at as usize];
+            below + (values[at.ceil() as usize] - below) * at.fract()
+        };
+        let unit = if found.figure.panels[0].y.unit == "mm" { 1e3 } else { 1.0 };
+        for (found, share) in [(series[0].base[at], 0.05), (series[0].y[at], 0.95), (series[1].y[at], 0.5)] {
+            let expected = unit * quantile(share);
+            assert!((found / expected - 1.0).abs() < 1e-9, "{f} Hz, {share}: {found} {expected}");
+        }
+    }
+}
+
 #[test]
 fn axes_take_every_unit_of_their_quantity() {
     for (unit, shown) in [("rad/s", TAU), ("kHz", 1e-3), ("Hz", 1.0)] {

@@ -198,6 +198,55 @@ fn errors_are_those_of_the_studys_frequencies() {
     assert!(close.0 <= 1e-5, "{close:?}");
 }
 
+/// What the blade weighs without its held face, which tells wrong units where frequencies cannot. Along x the mass of 8 elements whose first face
+/// does not move is `ρ V (1 - (2/3)/8)`: the square of a line from 0 to 1 leaves a third.
+#[test]
+fn a_structure_says_what_it_weighs() {
+    let brick = blade();
+    let (node, folder) = (tip(&brick, 0, 1), tempfile::tempdir().unwrap());
+    // written in tonnes and newtons per millimetre
+    write_pair(folder.path(), &brick, "npz", (1e3, 1e3));
+    let expected = 7850.0 * 0.08 * 0.02 * 0.004 * (1.0 - 2.0 / 3.0 / 8.0);
+    for (units, factor) in [("mm-t-s", 1.0), ("m-kg-s", 1e-3), ("mm-kg-s", 1e-3), ("cm-g-s", 1e-6)] {
+        let text = structure("npz", "rows.csv", units, DAMPED) + &place("tip", &node) + FORCED;
+        let file = folder.path().join("study.toml");
+        std::fs::write(&file, text).unwrap();
+        let checked = check(&read_file(&file, &[]).unwrap()).unwrap();
+        let found = checked.summary().structure.as_ref().unwrap().mass;
+        for along in found {
+            let ratio = along.unwrap() / (factor * expected);
+            assert!((ratio - 1.0).abs() < 1e-12, "{units}: {found:?} {}", factor * expected);
+        }
+        assert!(checked.summary().to_string().contains("kg along x, y, z"), "{}", checked.summary());
+    }
+}
+
+/// Of two sizes that differ the file with the fewer rows is the one that was cut short.
+#[test]
+fn a_stiffness_cut_short_is_named() {
+    let brick = blade();
+    let (node, folder) = (tip(&brick, 0, 1), tempfile::tempdir().unwrap());
+    write_pair(folder.path(), &brick, "sti", (1.0, 1.0));
+    for (short, other) in [("k.sti", "stiffness"), ("m.sti", "mass")] {
+        let path = folder.path().join(short);
+        let whole = std::fs::read_to_string(&path).unwrap();
+        // entries among the first rows alone, as of a file that ends too early
+        let cut: String = whole.lines().filter(|line| early(line)).map(|line| format!("{line}\n")).collect();
+        std::fs::write(&path, cut).unwrap();
+        let text = structure("sti", "rows.csv", "m-kg-s", DAMPED) + &place("tip", &node) + FORCED;
+        let file = folder.path().join("study.toml");
+        std::fs::write(&file, text).unwrap();
+        let said = read_file(&file, &[]).unwrap_err().to_string();
+        assert!(said.contains(&format!("the {other} matrix has 60 rows")) && said.contains("144"), "{said}");
+        std::fs::write(&path, whole).unwrap();
+    }
+}
+
+/// Whether a line `row column value` is of the first 60 rows.
+fn early(line: &str) -> bool {
+    line.split_whitespace().take(2).all(|index| index.parse::<usize>().unwrap() <= 60)
+}
+
 /// Where no drive tells how far a reduction must reach, the message asks for it.
 #[test]
 fn modes_of_a_structure_need_an_end() {

@@ -13,8 +13,8 @@ pub use tables::{Curve, MassCurve, curves};
 
 use super::keys::{FREQUENCY, OUTPUT, anything, check_output};
 use super::orbits;
-use super::peak_of::{PEAK_OF, check_peak_of, named_places};
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE};
+use super::peak_of::{PEAK_OF, check_peak_of};
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, amplitude_of, phase_of};
 use crate::cost::{Cost, Costing, Shape};
 use crate::drawing::{MOST_CURVES, MOST_PANELS};
 use crate::info::KindInfo;
@@ -28,7 +28,7 @@ use crate::values::{Frequencies, hertz};
 use crate::warnings::sampled;
 use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use drawn::SINGLE;
-use peaks::{amplitudes, peaks_of, point};
+use peaks::{Found, Sought, peaks_of};
 use references::{REFERENCE_POINTS, references};
 use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::peak::Point;
@@ -65,7 +65,7 @@ pub(super) const KIND: Kind = Kind {
         uses_method: true,
         needs: anything,
         adapts: true,
-        tables: &[tables::CURVE, tables::PEAKS, tables::REFERENCES, tables::AMPLIFICATION],
+        tables: &[tables::CURVE, tables::PEAKS, tables::REFERENCES, tables::AMPLIFICATION, tables::SHAPES],
     },
     // an amplification is that of a whole curve
     grain: |study| match study.is_adaptive() || study.wants(amplification::KEY.name) {
@@ -81,6 +81,8 @@ pub(super) const KIND: Kind = Kind {
 /// Peaks of a mass: some have two. Orbits that refine one, and those at the border of a unit that two units compute.
 const PEAKS: f64 = 1.3;
 const REFINING: f64 = 6.0;
+/// Peaks of the largest amplitude of a disk: of twelve blades that differ by 2 % three or so.
+const LEADING: f64 = 3.0;
 
 fn cost(costing: &Costing<'_>) -> Cost {
     let (points, values) = (costing.points(), &costing.case.values);
@@ -93,6 +95,11 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let linear = if costing.study.wants_references() { costing.frequencies * REFERENCE_POINTS as f64 } else { 0.0 };
     // a tuned disk takes a sector's time, and its curve the frequencies of the other
     let tuned = if values.flag(amplification::KEY.name) == Some(true) { costing.cases } else { 0.0 };
+    let shapes = match costing.case.model.ring {
+        Some(_) if values.names("peak_of").is_none() => peaks.min(LEADING * costing.cases),
+        Some(_) => peaks,
+        None => 0.0,
+    };
     let curves = costing.cases.min(MOST_CURVES as f64) * costing.places.min(MOST_PANELS as f64 + SINGLE as f64);
     Cost {
         tables: vec![
@@ -100,6 +107,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
             Shape { rows: peaks, numbers: costing.varied + 3.0, words: 1.0 },
             Shape { rows: linear, numbers: 1.0 + 2.0 * costing.places, words: 0.0 },
             Shape { rows: tuned, numbers: costing.varied + 5.0, words: 1.0 },
+            Shape { rows: shapes, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
         ],
         drawn: curves * costing.frequencies,
         unit: costing.orbit_bytes(),
@@ -140,7 +148,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let of = part.points.values().sum::<u64>() as usize;
     part.notes.push(Note::Stuck { case: case.label(), points: stretch.stuck, of });
     part.tables = vec![stretch.rows];
-    let mut amplified = Rows::default();
+    let (mut amplified, mut shapes) = (Rows::default(), Rows::default());
     if !points.is_empty() && !work.context.stopped() {
         let mut peaks = Rows::default();
         let all = peaks_of(work, points).map_err(|error| (case.index, error))?;
@@ -161,6 +169,7 @@ fn compute(work: &Work<'_>) -> Computed {
             peaks.end();
         }
         part.tables.push(peaks);
+        all.iter().filter(|found| found.leads()).for_each(|found| shape(prepared, found, &mut shapes));
         if work.study.wants(amplification::KEY.name)
             && let Err(why) = amplification::row(work, &all, &mut amplified)
         {
@@ -176,8 +185,19 @@ fn compute(work: &Work<'_>) -> Computed {
     } else {
         part.tables.push(Rows::default());
     }
-    part.tables.push(amplified);
+    part.tables.extend([amplified, shapes]);
     Ok(part)
+}
+
+/// The row of a peak of a disk, with every place.
+fn shape(prepared: &Prepared, found: &Found, rows: &mut Rows) {
+    rows.varied(&prepared.case);
+    rows.number(DRIVE, hertz(found.peak.omega));
+    for (place, of) in prepared.system.places().iter().zip(found.shape.chunks_exact(2)) {
+        rows.number(&amplitude_of(place), of[0]);
+        rows.number(&phase_of(place), of[1]);
+    }
+    rows.end();
 }
 
 /// A stretch of a curve under way.
@@ -222,12 +242,13 @@ fn kept(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> (Summary, 
 fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Vec<Point>, MethodError> {
     let prepared = work.case();
     let wanted = wants_peaks(work);
-    let places = named_places(prepared);
+    let sought = Sought::new(prepared);
+    let point = |orbit: &Orbit| Point::new(orbit, &|orbit| sought.quantities(orbit));
     let mut points = Vec::new();
     orbits::sweep(work, &mut |omega, outcome| {
         stretch.add(omega, outcome.map(|outcome| kept(prepared, outcome)));
         if let Some(outcome) = outcome.filter(|_| wanted) {
-            points.push(outcome.map_or_else(|_| Point::failed(omega), |orbit| point(orbit, &places)));
+            points.push(outcome.map_or_else(|_| Point::failed(omega), point));
         }
     })?;
     if !wanted || points.is_empty() {
@@ -237,7 +258,7 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Vec<Point>, Me
     let count = prepared.case.frequencies.as_ref().map_or(0, |f| f.len());
     let mut solver = prepared.method.solver(&prepared.system)?;
     let mut near = |index: usize, start: Option<&[f64]>| match solver.orbit(work.omega(index), start) {
-        Ok(orbit) => point(&orbit, &places),
+        Ok(orbit) => point(&orbit),
         Err(_) => Point::failed(work.omega(index)),
     };
     if work.points.start > 0 {
@@ -254,11 +275,12 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Vec<Point>, Me
 /// The points that the curve needs.
 fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) -> Result<Vec<Point>, MethodError> {
     let prepared = work.case();
-    let places = named_places(prepared);
-    let quantities = |orbit: &Orbit| amplitudes(orbit, &places);
+    let sought = Sought::new(prepared);
+    // the shape has no say in where points are
+    let quantities = |orbit: &Orbit| sought.amplitudes(orbit);
     let keep = |outcome: Result<&Orbit, &OrbitError>| {
         (work.context.finished)();
-        kept(prepared, outcome)
+        (kept(prepared, outcome), outcome.map_or_else(|_| Vec::new(), |orbit| sought.shape(orbit)))
     };
     let stop = || work.context.stopped();
     let curve = adaptive.curve(&*prepared.method, &prepared.system, &quantities, &keep, &stop)?;
@@ -266,8 +288,9 @@ fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) 
         stretch.add(adaptive.range.1, None);
     }
     let mut points = Vec::with_capacity(curve.len());
-    for (point, kept) in curve {
+    for (mut point, (kept, shape)) in curve {
         stretch.add(point.omega, Some(kept));
+        point.values.extend(shape);
         points.push(point);
     }
     Ok(if prepared.case.values.flag("peaks").unwrap_or(true) { points } else { Vec::new() })

@@ -79,8 +79,12 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     let rows = stiffness.1.rows();
     for (key, matrix) in [Some(&mass), damping.as_ref(), stiffened.as_ref()].into_iter().flatten() {
         if matrix.rows() != rows {
-            let message = format!("the {key} matrix has {} rows, and the stiffness matrix {rows}", matrix.rows());
-            return Err(problem(key, message).help("export both from the same model, with the same constraints"));
+            // a file that was cut short has the fewer rows
+            let (short, long) = if matrix.rows() < rows { (*key, "stiffness") } else { ("stiffness", *key) };
+            let (fewer, more) = (rows.min(matrix.rows()), rows.max(matrix.rows()));
+            let message = format!("the {short} matrix has {fewer} rows, and the {long} matrix {more}");
+            let help = "a file cut short? export both from the same model, with the same constraints";
+            return Err(problem(short, message).help(help));
         }
     }
     if stiffness.1.entries() == mass.1.entries() {

@@ -6,9 +6,15 @@ use crate::words::{plural, significant};
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
 use stickslip::model::{ReductionEvidence, Substructure};
+use stickslip::structure::Component;
 
 /// Frequencies that are listed.
 const LISTED: usize = 6;
+
+/// Directions along which a mass is told.
+const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
+/// Masses along several directions that differ by less than this share are told as one: of a held structure they differ by what is held.
+const SAME: f64 = 1e-3;
 
 /// A structure by its matrices.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +25,8 @@ pub struct StructureSummary {
     pub left_out: usize,
     /// Entries of stiffness and mass that are not zero.
     pub entries: [usize; 2],
+    /// What it weighs along x, y and z without its constrained rows, kg: `None` along a direction that no row is called by.
+    pub mass: [Option<f64>; 3],
     /// What a reduction left out that made the files.
     pub earlier: Option<ReductionEvidence>,
     /// What it was reduced to; none where all its rows are degrees of freedom.
@@ -58,6 +66,7 @@ impl StructureSummary {
             rows: component.dofs(),
             left_out: study.structure.matrices.as_ref().map_or(0, |matrices| matrices.left_out),
             entries: [stiffness.len(), mass.len()],
+            mass: DIRECTIONS.map(|along| mass_along(component, along)),
             earlier: *earlier,
             reduced,
         })
@@ -72,7 +81,7 @@ impl StructureSummary {
         if *left_out > 0 {
             text += &format!("; {left_out} constrained row{} left out", plural(*left_out));
         }
-        let mut lines = vec![("structure", text)];
+        let mut lines = vec![("structure", text), ("mass", self.mass_words())];
         let hertz = |omega: f64| significant(omega / TAU, 6);
         let within =
             |error: f64, up_to: f64| format!("error {} % up to {} Hz", significant(100.0 * error, 2), hertz(up_to));
@@ -96,6 +105,27 @@ impl StructureSummary {
         lines
     }
 
+    /// What it weighs, which tells wrong `units` where frequencies cannot: mass and stiffness are wrong by the same factor then.
+    fn mass_words(&self) -> String {
+        let known: Vec<(&str, f64)> =
+            DIRECTIONS.iter().zip(self.mass).filter_map(|(along, mass)| Some((*along, mass?))).collect();
+        let Some(&(_, first)) = known.first() else {
+            return "no row is called by a direction (449.x), so that nobody can tell it, nor whether `units` are right"
+                .to_owned();
+        };
+        let kilograms = |mass: f64| format!("{} kg", significant(mass, 4));
+        let alike = known.iter().all(|(_, mass)| (mass - first).abs() <= SAME * first.abs());
+        let text = if alike {
+            let along: Vec<&str> = known.iter().map(|(along, _)| *along).collect();
+            format!("{} along {}", kilograms(first), along.join(", "))
+        } else {
+            let each: Vec<String> =
+                known.iter().map(|(along, mass)| format!("{} along {along}", kilograms(*mass))).collect();
+            each.join(", ")
+        };
+        format!("{text}, of what is not held; if that is not what it weighs, `units` are wrong")
+    }
+
     /// For the record of a run, SI but for the frequencies in Hz.
     pub(super) fn to_json(&self) -> Json {
         let reduced = self.reduced.as_ref().map(|reduced| {
@@ -113,10 +143,19 @@ impl StructureSummary {
             "constrained_rows": self.left_out,
             "entries_of_stiffness": self.entries[0],
             "entries_of_mass": self.entries[1],
+            "mass_kg": self.mass,
             "reduced_before": self.earlier.map(|earlier| {
                 json!({ "reduction_error": earlier.error, "up_to_Hz": earlier.up_to / TAU })
             }),
             "reduced": reduced,
         })
     }
+}
+
+/// The mass that moves where all rows of one direction move by one, kg.
+fn mass_along(component: &Component, along: &str) -> Option<f64> {
+    let moves = |name: &String| f64::from(name.rsplit_once('.').is_some_and(|(_, direction)| direction == along));
+    let motion: Vec<f64> = component.rows().iter().map(moves).collect();
+    let moved = motion.contains(&1.0);
+    moved.then(|| component.matrices().0.times(&motion).iter().zip(&motion).map(|(force, motion)| force * motion).sum())
 }

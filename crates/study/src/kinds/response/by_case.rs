@@ -3,7 +3,7 @@
 use super::super::shares;
 use super::super::wheel::{self, Around};
 use super::drawn::Drawn;
-use crate::columns::{FREQUENCY as DRIVE, phase_of};
+use crate::columns::FREQUENCY as DRIVE;
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::drawing::{MOST_PANELS, Stretch, join, numbers};
 use crate::words::significant;
@@ -111,13 +111,7 @@ impl Drawn<'_> {
     /// that move most, each in one colour in both.
     fn sectors_of(&self, stretch: &Stretch, first: usize) -> Option<[Option<Panel>; 2]> {
         let ring = self.drawing.study.case(0).ok()?.model.ring?;
-        let columns: Vec<(&str, Vec<f64>)> =
-            self.shown.iter().map(|(name, _)| (name.as_str(), self.amplitudes(name, stretch.rows.clone()))).collect();
-        let highest = |row: usize| columns.iter().map(|(_, values)| values[row]).fold(f64::NEG_INFINITY, f64::max);
-        let row = (0..stretch.rows.len()).max_by(|a, b| highest(*a).total_cmp(&highest(*b)))?;
-        let at = stretch.rows.start + row;
-        let phase = |name: &str| numbers(self.curve, &phase_of(name), at..at + 1)[0];
-        let shape = columns.iter().map(|(name, values)| (*name, values[row], phase(name)));
+        let (frequency, shape) = self.at_the_highest(stretch)?;
         let all = Around::of_ring(shape)?;
         let places = all.len();
         let shape: Vec<Around> =
@@ -132,8 +126,7 @@ impl Drawn<'_> {
         if series.iter().all(|bars| bars.x.len() < 2) {
             return None;
         }
-        let frequency = format!("{} Hz", significant(numbers(self.curve, DRIVE, stretch.rows.clone())[row], 6));
-        let title = join([stretch.label(), format!("at {frequency}")]);
+        let title = join([stretch.label(), format!("at {} Hz", significant(frequency, 6))]);
         let (x, y) = (Axis::new("sector", "").whole(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
         let of = wheel::left_out(shape.len(), places);
         let wheel = wheel::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone(), of]), first);

@@ -65,10 +65,8 @@ impl Drawn<'_> {
             }
         } else {
             let name = format!("largest of {} places", self.shown.len());
-            panels.push(panel(self.panel(String::new()), &name, &|stretch| {
-                let (x, y, _) = self.envelope(stretch);
-                (x, y)
-            }));
+            // without peaks, which stand elsewhere in every draw: between its points a curve of a draw is lower than its own peak
+            panels.push(panel(self.panel(String::new()), &name, &|stretch| self.largest(stretch)));
         }
         for (name, joints) in self.pulling() {
             panels.push(panel(self.force_panel(String::new()), &name, &|stretch| self.force_line(stretch, &joints)));

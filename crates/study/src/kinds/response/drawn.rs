@@ -3,7 +3,7 @@
 use super::super::shares::{self, State};
 use super::super::wheel::{self, of_sector};
 use super::tables;
-use crate::columns::{FREQUENCY as DRIVE, amplitude_of};
+use crate::columns::{FREQUENCY as DRIVE, amplitude_of, phase_of};
 use crate::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
 use crate::drawing::{Drawing, Stretch, join, numbers};
 use std::collections::{BTreeSet, HashMap};
@@ -17,6 +17,9 @@ pub(super) const SINGLE: usize = 7;
 /// Colours that the curves of many masses take: the single ones and the largest of them.
 const MANY: usize = 2;
 
+/// Names of places with amplitude (m) and phase (degrees) of each.
+pub(super) type Shape<'a> = Vec<(&'a str, f64, f64)>;
+
 /// What is drawn.
 pub(super) struct Drawn<'a> {
     pub(super) drawing: &'a Drawing<'a>,
@@ -27,6 +30,8 @@ pub(super) struct Drawn<'a> {
     pub(super) shown: Vec<(String, usize)>,
     /// Case, and mass, frequency (Hz), amplitude (m) of the peaks inside the range.
     pub(super) peaks: Vec<(usize, (String, f64, f64))>,
+    /// What a disk does at its peaks, and the rows of each case.
+    pub(super) shapes: Option<(&'a Table, Vec<Stretch>)>,
     /// Names of the joints whose forces are shown.
     pub(super) joints: Vec<String>,
     /// Names of the joints whose shares of stick and slip are shown.
@@ -56,11 +61,14 @@ impl Drawn<'_> {
         self.with_peaks(stretch, x.into_iter().zip(y).collect(), &|mass, _| mass == name)
     }
 
-    /// The largest amplitude over the shown masses, and which mass has the largest of all in words.
+    /// The largest amplitude over the shown masses at the frequencies of the curve.
+    pub(super) fn largest(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>) {
+        self.scaled(self.largest_at(stretch, &self.all(stretch)))
+    }
+
+    /// The same with its peaks among the points, and which mass has the largest of all in words.
     pub(super) fn envelope(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>, String) {
-        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
-        let all: Vec<Vec<f64>> =
-            self.shown.iter().map(|(name, _)| self.amplitudes(name, stretch.rows.clone())).collect();
+        let all = self.all(stretch);
         let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut heights: Vec<f64> = all.iter().map(|values| highest(values)).collect();
         let alike = leading(heights.iter().copied())
@@ -72,16 +80,59 @@ impl Drawn<'_> {
             }
         }
         let worst = leading(heights.into_iter()).filter(|_| !alike);
-        let y: Vec<f64> = (0..x.len()).map(|i| all.iter().map(|values| values[i]).fold(f64::NAN, f64::max)).collect();
+        let points = self.largest_at(stretch, &all);
         let below = |omega: f64| {
-            let at = x.partition_point(|x| *x < omega).clamp(1, x.len().max(2) - 1);
-            let share = (omega - x[at - 1]) / (x[at] - x[at - 1]);
-            y[at - 1] + share * (y[at] - y[at - 1])
+            let at = points.partition_point(|point| point.0 < omega).clamp(1, points.len().max(2) - 1);
+            let ((x0, y0), (x1, y1)) = (points[at - 1], points[at]);
+            y0 + (omega - x0) / (x1 - x0) * (y1 - y0)
         };
-        let points: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).collect();
         // a peak of one mass below another one is none of the envelope
-        let (x, y) = self.with_peaks(stretch, points, &|_, peak| x.len() > 1 && peak.1 > below(peak.0));
+        let (x, y) = self.with_peaks(stretch, points.clone(), &|_, peak| points.len() > 1 && peak.1 > below(peak.0));
         (x, y, worst.map_or_else(|| "all are alike".to_owned(), |worst| format!("worst is {}", self.shown[worst].0)))
+    }
+
+    /// Amplitudes of every shown mass.
+    fn all(&self, stretch: &Stretch) -> Vec<Vec<f64>> {
+        self.shown.iter().map(|(name, _)| self.amplitudes(name, stretch.rows.clone())).collect()
+    }
+
+    /// The largest of several amplitudes over the frequency.
+    fn largest_at(&self, stretch: &Stretch, all: &[Vec<f64>]) -> Vec<(f64, f64)> {
+        let largest = |i: usize| all.iter().map(|values| values[i]).fold(f64::NAN, f64::max);
+        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
+        x.into_iter().enumerate().map(|(i, x)| (x, largest(i))).collect()
+    }
+
+    /// Points as they stand on the axes.
+    fn scaled(&self, points: Vec<(f64, f64)>) -> (Vec<f64>, Vec<f64>) {
+        points.into_iter().map(|(x, y)| (x * self.factor.0, y * self.factor.1)).unzip()
+    }
+
+    /// Where the largest of all amplitudes is, Hz, and amplitude (m) and phase (degrees) of every shown place there: at a peak, which lies between the
+    /// points of the curve, or where there is none at a point.
+    pub(super) fn at_the_highest(&self, stretch: &Stretch) -> Option<(f64, Shape<'_>)> {
+        let peaks = self.shapes.as_ref().and_then(|(table, stretches)| {
+            Some((*table, stretches.iter().find(|of| of.case == stretch.case)?.rows.clone()))
+        });
+        let highest = |(table, rows): (&Table, Range<usize>)| {
+            let index = table.index();
+            let number = |column: String, row: usize| {
+                let column = index.get(&*column_name(&column)).and_then(|column| column.as_numbers());
+                column.map_or(f64::NAN, |values| values[row])
+            };
+            let shape = |row: usize| -> Shape<'_> {
+                let names = self.shown.iter().map(|(name, _)| name.as_str());
+                names.map(|name| (name, number(amplitude_of(name), row), number(phase_of(name), row))).collect()
+            };
+            let height = |row: usize| {
+                let amplitudes = self.shown.iter().map(|(name, _)| number(amplitude_of(name), row));
+                amplitudes.fold(f64::NEG_INFINITY, f64::max)
+            };
+            let row = rows.max_by(|a, b| height(*a).total_cmp(&height(*b)))?;
+            Some((height(row), number(DRIVE.to_owned(), row), shape(row)))
+        };
+        let both = [Some((self.curve, stretch.rows.clone())), peaks].into_iter().flatten().filter_map(highest);
+        both.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, frequency, shape)| (frequency, shape))
     }
 
     fn with_peaks(
@@ -93,7 +144,7 @@ impl Drawn<'_> {
         let of_case = self.peaks.iter().filter(|peak| peak.0 == stretch.case).map(|peak| &peak.1);
         points.extend(of_case.filter(|(mass, x, y)| counts(mass, (*x, *y))).map(|(_, x, y)| (*x, *y)));
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        points.into_iter().map(|(x, y)| (x * self.factor.0, y * self.factor.1)).unzip()
+        self.scaled(points)
     }
 
     /// Marks at the peaks of one mass.

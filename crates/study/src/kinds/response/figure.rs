@@ -35,6 +35,7 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
         curve,
         index: curve.index(),
         peaks: peaks_by_case(drawing),
+        shapes: drawing.table(tables::SHAPES).map(|table| (table, drawing.stretches(table))),
         factor: (x_factor, y_factor),
         force_factor,
         axes: (x, y),

@@ -1,7 +1,7 @@
 //! The peaks of a stretch of a response curve.
 
 use super::super::peak_of::{named_places, worst};
-use crate::work::Work;
+use crate::work::{Prepared, Work};
 use stickslip::curve::peak::{self, Peak, Point};
 use stickslip::method::MethodError;
 use stickslip::orbit::Orbit;
@@ -13,45 +13,90 @@ const ROUNDING: f64 = 1e-10;
 /// than a resonance falls between two points of any curve that can be drawn.
 const LEVEL: f64 = 1e-8;
 
-/// The amplitudes whose peaks are sought: of every mass, or the largest of the named ones and then each of these.
-pub(super) fn amplitudes(orbit: &Orbit, named: &[usize]) -> Vec<f64> {
-    if named.is_empty() {
-        return orbit.places.iter().map(|place| place.amplitude()).collect();
-    }
-    std::iter::once(worst(orbit, named)).chain(named.iter().map(|place| orbit.places[*place].amplitude())).collect()
+/// What is read off an orbit where peaks are sought.
+pub(super) struct Sought {
+    /// The places of which the worst counts; none if each does.
+    named: Vec<usize>,
+    places: usize,
+    /// Whether the shape at the peaks is kept: that of a disk.
+    shapes: bool,
 }
 
-pub(super) fn point(orbit: &Orbit, named: &[usize]) -> Point {
-    Point::new(orbit, &|orbit| amplitudes(orbit, named))
+impl Sought {
+    pub(super) fn new(prepared: &Prepared) -> Self {
+        let shapes = prepared.case.model.ring.is_some();
+        Sought { named: named_places(prepared), places: prepared.system.places().len(), shapes }
+    }
+
+    /// The amplitudes whose peaks are sought: of every mass, or the largest of the named ones and then each of these.
+    pub(super) fn amplitudes(&self, orbit: &Orbit) -> Vec<f64> {
+        let Self { named, .. } = self;
+        if named.is_empty() {
+            return orbit.places.iter().map(|place| place.amplitude()).collect();
+        }
+        std::iter::once(worst(orbit, named)).chain(named.iter().map(|place| orbit.places[*place].amplitude())).collect()
+    }
+
+    /// Amplitude and phase (degrees) of every place; none where no shape is kept.
+    pub(super) fn shape(&self, orbit: &Orbit) -> Vec<f64> {
+        let places = orbit.places.iter().filter(|_| self.shapes);
+        places.flat_map(|place| [place.amplitude(), place.phase_deg()]).collect()
+    }
+
+    /// These amplitudes and then the shape.
+    pub(super) fn quantities(&self, orbit: &Orbit) -> Vec<f64> {
+        let mut quantities = self.amplitudes(orbit);
+        quantities.extend(self.shape(orbit));
+        quantities
+    }
+
+    /// How many amplitudes there are.
+    fn amplitudes_count(&self) -> usize {
+        if self.named.is_empty() { self.places } else { 1 + self.named.len() }
+    }
+
+    /// The mass that has the peak of a quantity.
+    fn mass(&self, quantity: usize, values: &[f64]) -> usize {
+        let amplitudes = &values[..self.amplitudes_count()];
+        let worst = || leading(amplitudes.iter().skip(1).copied()).unwrap_or(0);
+        if self.named.is_empty() { quantity } else { self.named[worst()] }
+    }
 }
 
 /// A peak and the mass that has it.
 pub(super) struct Found {
     pub(super) mass: usize,
     pub(super) peak: Peak,
+    /// Amplitude (m) and phase (degrees) of every place, of a disk at a refined peak.
+    pub(super) shape: Vec<f64>,
+}
+
+impl Found {
+    /// Whether no place moves more there; of those that move alike the first does.
+    pub(super) fn leads(&self) -> bool {
+        leading(self.shape.iter().copied().step_by(2)) == Some(self.mass)
+    }
 }
 
 /// The peaks of a stretch of a curve, by frequency. The ends of the whole curve count as peaks at the end of the range if it falls away
 /// from them.
 pub(super) fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodError> {
     let prepared = work.case();
-    let named = named_places(prepared);
+    let sought = Sought::new(prepared);
+    let count = sought.amplitudes_count();
     let omegas = prepared
         .case
         .frequencies
         .as_ref()
         .map_or((0.0, 0.0), |f| (f.get(0).unwrap_or(0.0), f.get(f.len() - 1).unwrap_or(0.0)));
-    let wanted = if named.is_empty() { prepared.system.places().len() } else { 1 };
-    let found = |quantity: usize, peak: Peak, values: &[f64]| {
-        let worst = || leading(values.iter().skip(1).copied()).unwrap_or(0);
-        Found { mass: if named.is_empty() { quantity } else { named[worst()] }, peak }
-    };
+    let wanted = if sought.named.is_empty() { count } else { 1 };
     let at_end = |end: &Point, neighbour: &Point| -> Vec<Found> {
         let falls = |q: &usize| neighbour.values.get(*q).is_some_and(|value| end.values[*q] > *value);
         (0..wanted.min(end.values.len()))
             .filter(falls)
             .map(|q| {
-                found(q, Peak { omega: end.omega, value: end.values[q], at_end: true, unsettled: false }, &end.values)
+                let peak = Peak { omega: end.omega, value: end.values[q], at_end: true, unsettled: false };
+                Found { mass: sought.mass(q, &end.values), peak, shape: Vec::new() }
             })
             .collect()
     };
@@ -66,12 +111,15 @@ pub(super) fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>
     {
         last = at_end(end, neighbour);
     }
-    let quantities = |orbit: &Orbit| amplitudes(orbit, &named);
+    let quantities = |orbit: &Orbit| sought.quantities(orbit);
     // a place that friction holds moves by rounding only
-    let largest = points.iter().flat_map(|point| &point.values).fold(0.0f64, |a, b| a.max(*b));
+    let largest = points.iter().flat_map(|point| point.values.iter().take(count)).fold(0.0f64, |a, b| a.max(*b));
     let mut inner = peak::all(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
     inner.retain(|peak| peak.peak.value > ROUNDING * largest && !ends_a_level(&points, peak.quantity, &peak.peak));
-    let inner = inner.into_iter().map(|peak| found(peak.quantity, peak.peak, &peak.values));
+    let inner = inner.into_iter().map(|found| {
+        let mass = sought.mass(found.quantity, &found.values);
+        Found { mass, peak: found.peak, shape: found.values[count..].to_vec() }
+    });
     Ok(first.into_iter().chain(inner).chain(last).collect())
 }
 

@@ -15,6 +15,8 @@ pub(super) const PEAKS: &str = "peaks";
 pub(super) const REFERENCES: &str = "references";
 /// One row per case of a mistuned disk.
 pub(super) const AMPLIFICATION: &str = "amplification";
+/// One row per peak of a disk at which no place moves more, with the shape there.
+pub(super) const SHAPES: &str = "peak_shapes";
 /// The peak of the tuned disk.
 pub(super) const TUNED_FREQUENCY: &str = "tuned_frequency_Hz";
 /// Its height.
