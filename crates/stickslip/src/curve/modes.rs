@@ -104,9 +104,9 @@ pub enum Reason {
     /// No shorter step converged.
     #[error("no neighbouring motion was found; try more harmonics")]
     Stalled,
-    /// The damping ratio is above one for many steps.
+    /// The damping ratio is above ten for many steps.
     #[error(
-        "its damping ratio is above one there: nothing vibrates, and it is not followed further; ask for larger amplitudes"
+        "its damping ratio is above ten there: nothing vibrates, and it is not followed further; ask for larger amplitudes"
     )]
     Overdamped,
     /// All steps are used up.
@@ -140,10 +140,11 @@ const OTHERS: [f64; 7] = [1.0, 0.1, 0.01, 1e-3, 10.0, 100.0, 1e4];
 const MOST_STEPS: usize = 4000;
 /// Steps without an amplitude below all before, after which the curve is left: it runs in a loop, or to another mode.
 const PATIENCE: usize = 1000;
-/// Damping ratio from which nothing vibrates.
-const OVERDAMPED: f64 = 1.0;
-/// Steps that are spent on such motions. A mass on rigid friction takes some hundred for all that is asked of it.
-const CREEPING: usize = 500;
+/// Damping ratio, a tenth of which is critical, from which nothing has vibrated for long.
+const OVERDAMPED: f64 = 10.0;
+/// Harmonics times samples of all steps that are spent on such motions: two seconds or so. Rigid friction that is followed to a nanometre takes
+/// thousands of steps, of which nobody has anything where each is dear.
+const CREEPING: usize = 8_000_000;
 /// Arc lengths, see [`ModeEquations::step`]: the longest step changes the amplitude by up to a half, or a fifth of the shape.
 const LONGEST: f64 = 0.2;
 /// The first step, and that after a leap.
@@ -339,7 +340,9 @@ impl Path {
             }
             let step = taken(equations, now, length);
             since += 1;
-            creeping += usize::from(now.state.damping > OVERDAMPED);
+            if now.state.damping > OVERDAMPED {
+                creeping += equations.resolution();
+            }
             let reason = match step {
                 _ if creeping > CREEPING => {
                     path.lost = Some(Lost { at: path.end(), reason: Reason::Overdamped });

@@ -118,7 +118,7 @@ mod tests {
             vec![1.0]
         }
         fn is_odd(&self) -> bool {
-            true
+            !matches!(self, Sample::Coupled)
         }
         fn directions(&self) -> usize {
             if matches!(self, Sample::Relaxing) { 1 } else { 2 }

@@ -27,7 +27,7 @@ const HOLDS: f64 = 1e3;
 
 /// A slider behind a spring in a flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Spring {
+pub(super) struct ElasticSlider {
     pub joint: usize,
     /// Index of its force in the state of the flow.
     pub state: usize,
@@ -40,7 +40,7 @@ pub(super) struct Spring {
 /// A slider that is held for the whole period, and where its spring is relaxed.
 #[derive(Debug, Clone)]
 struct Pin {
-    spring: Spring,
+    spring: ElasticSlider,
     /// Of the displacements onto the joint.
     direction: DVector<f64>,
     /// Displacement at which the spring is relaxed, less what is imposed at t = 0, m.
@@ -89,9 +89,9 @@ impl ReturnMap for Pinned<'_> {
 /// A return map that can make orbits of closed states.
 pub(super) trait Closing: ReturnMap {
     /// Its sliders behind springs.
-    fn springs(&self) -> Vec<Spring>;
+    fn springs(&self) -> Vec<ElasticSlider>;
     /// Gives these, which are all of [`Closing::springs`], the limits that they state.
-    fn limit(&mut self, springs: &[Spring]);
+    fn limit(&mut self, springs: &[ElasticSlider]);
     /// The orbit of a state that was closed last.
     fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError>;
 }
@@ -108,7 +108,13 @@ pub(super) fn relaxed(map: &mut dyn Closing, system: &System, first: Orbit, aim:
     found.unwrap_or(first)
 }
 
-fn iterate(map: &mut dyn Closing, system: &System, first: &Orbit, springs: &[Spring], aim: Aim) -> Option<Orbit> {
+fn iterate(
+    map: &mut dyn Closing,
+    system: &System,
+    first: &Orbit,
+    springs: &[ElasticSlider],
+    aim: Aim,
+) -> Option<Orbit> {
     let (mut orbit, mut rounds) = (first.clone(), Rounds::default());
     for _ in 0..ROUNDS {
         let held = held(system, &orbit, springs);
@@ -147,7 +153,7 @@ fn iterate(map: &mut dyn Closing, system: &System, first: &Orbit, springs: &[Spr
 
 /// A slider that is held in an orbit.
 struct Held {
-    spring: Spring,
+    spring: ElasticSlider,
     /// Relative displacement at t = 0, m.
     begin: f64,
     /// Where its spring is relaxed, and where it ought to be, m.
@@ -161,7 +167,7 @@ impl Held {
     }
 }
 
-fn held(system: &System, orbit: &Orbit, springs: &[Spring]) -> Vec<Held> {
+fn held(system: &System, orbit: &Orbit, springs: &[ElasticSlider]) -> Vec<Held> {
     let begin = orbit.sample(0.0);
     let means = means(system, orbit);
     springs

@@ -11,7 +11,7 @@ use super::followed::Kind;
 use super::guess::Guess;
 use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
 use super::periodic::{Aim, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm};
-use super::relaxed::{Closing, Spring, relaxed};
+use super::relaxed::{Closing, ElasticSlider, relaxed};
 use super::repeated::Afresh;
 use super::smooth::flow::{Lengths, SmoothFlow};
 use super::stepped::SteppedPath;
@@ -190,13 +190,13 @@ impl ReturnMap for Shooter<'_> {
 }
 
 impl Closing for Shooter<'_> {
-    fn springs(&self) -> Vec<Spring> {
+    fn springs(&self) -> Vec<ElasticSlider> {
         match &self.stepping {
             Stepping::Smooth(_) => Vec::new(),
             Stepping::Incremental(flow) => flow.springs(),
         }
     }
-    fn limit(&mut self, springs: &[Spring]) {
+    fn limit(&mut self, springs: &[ElasticSlider]) {
         if let Stepping::Incremental(flow) = &mut self.stepping {
             flow.limit(springs);
         }

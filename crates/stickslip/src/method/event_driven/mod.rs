@@ -25,7 +25,7 @@ pub(crate) use path::ExactPath;
 use super::drive::Drive;
 use super::guess::Guess;
 use super::periodic::{Aim, Closed, ReturnMap, Search, approached, norm};
-use super::relaxed::{Closing, Spring, relaxed};
+use super::relaxed::{Closing, ElasticSlider, relaxed};
 use super::repeated::Afresh;
 use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, PERIOD, Solver, periods};
 use crate::model::System;
@@ -141,17 +141,17 @@ impl ReturnMap for Exact<'_> {
 }
 
 impl Closing for Exact<'_> {
-    fn springs(&self) -> Vec<Spring> {
+    fn springs(&self) -> Vec<ElasticSlider> {
         let mechanics = &self.flow.mechanics;
         let springs = mechanics.parts.iter().filter_map(|part| match part.kind {
             Kind::Elastic { stiffness, limit, state } => {
-                Some(Spring { joint: part.joint, state: 2 * mechanics.n + state, stiffness, limit })
+                Some(ElasticSlider { joint: part.joint, state: 2 * mechanics.n + state, stiffness, limit })
             }
             _ => None,
         });
         springs.collect()
     }
-    fn limit(&mut self, springs: &[Spring]) {
+    fn limit(&mut self, springs: &[ElasticSlider]) {
         let mut springs = springs.iter();
         let mechanics = &mut self.flow.mechanics;
         let mut parts = mechanics.parts.to_vec();

@@ -1,6 +1,6 @@
 //! The equations of harmonic balance with a parameter, for continuation.
 
-use super::equations::{Level, Motion, transfer};
+use super::equations::{Level, Solution, transfer};
 use super::estimate::{Compared, estimate};
 use super::kept::Kept;
 use super::ports::Ports;
@@ -41,7 +41,7 @@ pub(crate) struct BranchEquations<'a> {
     /// Twice the harmonics, which tell the error, unless they are too many.
     finer: Option<Level>,
     tolerance: f64,
-    motion: Motion,
+    motion: Solution,
     /// Unit of motions, m.
     length: f64,
     judge: Judge,
@@ -69,7 +69,7 @@ impl<'a> BranchEquations<'a> {
         super::check_memory(super::memory(&ports, &rest, harmonics, true), &ports, (harmonics, 1))?;
         let few = 2 * ports.count() * kept.up_to(kept.double(top)).len() <= LARGEST;
         let (finer, level) = (few.then(|| level(kept.double(top))), level(top));
-        let motion = Motion::rest(level.linear.len());
+        let motion = Solution::rest(level.linear.len());
         Ok(BranchEquations {
             at,
             rest_of: system.clone(),
@@ -161,7 +161,7 @@ impl<'a> BranchEquations<'a> {
             let at = (self.kept, self.omega);
             Some(estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &motion, &better)))
         });
-        let context = path::Context {
+        let setting = path::Setting {
             system: &self.system,
             ports: &self.ports,
             around: self.around.as_ref(),
@@ -172,7 +172,7 @@ impl<'a> BranchEquations<'a> {
             tolerance: self.tolerance,
             judge: Some(&mut self.judge),
         };
-        path::orbit(context, &mut self.level, &self.motion, places).filter(|orbit| path::balances(&self.system, orbit))
+        path::orbit(setting, &mut self.level, &self.motion, places).filter(|orbit| path::balances(&self.system, orbit))
     }
 
     /// The orbit at `value` that Newton's method finds from the point `x` nearby.

@@ -490,7 +490,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::ease::GIVEN;
-    use super::super::equations::{Level, Motion};
+    use super::super::equations::{Level, Solution};
     use super::super::rest::Rest;
     use super::super::uncoupled::Uncoupled;
     use super::*;
@@ -535,7 +535,7 @@ mod tests {
     }
 
     /// The motion, how many products it took, and how many steps of laws with a memory.
-    fn solve(system: &System, omega: f64, harmonics: &[usize], form: Form) -> (Motion, usize, usize) {
+    fn solve(system: &System, omega: f64, harmonics: &[usize], form: Form) -> (Solution, usize, usize) {
         let ports = Ports::new(system).unwrap();
         let rest = Rest::new(system, &ports);
         let mut level = Level::new(harmonics.to_vec(), 1024, &ports, None);

@@ -89,8 +89,8 @@ pub(super) struct Level {
     pub(super) residual: Vec<f64>,
     /// Units of the residual.
     pub(super) units: Vec<f64>,
-    pub(super) before: Motion,
-    pub(super) best: Motion,
+    pub(super) before: Solution,
+    pub(super) best: Solution,
     /// Forces that those of [`Ease::pull`] are drawn to, [axis][harmonic], N.
     pub(super) anchor: Vec<Complex64>,
     pub(super) step: Vec<f64>,
@@ -114,7 +114,7 @@ pub(super) struct Level {
 
 /// A solution or a start.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Motion {
+pub(super) struct Solution {
     /// Harmonics of the motions along the axes, [axis][harmonic], m.
     pub c: Vec<Complex64>,
     /// Harmonics of the forces along them, N.
@@ -125,13 +125,13 @@ pub(super) struct Motion {
     pub iterations: usize,
 }
 
-impl Motion {
+impl Solution {
     pub fn rest(length: usize) -> Self {
-        Motion { c: vec![ZERO; length], force: vec![ZERO; length], ..Motion::default() }
+        Solution { c: vec![ZERO; length], force: vec![ZERO; length], ..Solution::default() }
     }
 
     /// The same without new memory.
-    pub fn copy(&mut self, other: &Motion) {
+    pub fn copy(&mut self, other: &Solution) {
         self.c.clone_from(&other.c);
         self.force.clone_from(&other.force);
         (self.residual, self.iterations) = (other.residual, other.iterations);
@@ -199,8 +199,8 @@ impl Level {
             sparse,
             residual: vec![0.0; size],
             units: vec![1.0; size],
-            before: Motion::rest(nh * axes),
-            best: Motion::rest(nh * axes),
+            before: Solution::rest(nh * axes),
+            best: Solution::rest(nh * axes),
             anchor: Vec::new(),
             step: vec![0.0; size],
             image: vec![ZERO; nh * widest],
@@ -226,13 +226,13 @@ impl Level {
 
     /// What is measured of a motion of one sector, over all of them: `ports` are those of the ring, and the motion's are earlier by the lead of
     /// their sector. Nothing can be solved on it.
-    pub fn around(&self, cyclic: Cyclic, ports: &Ports, motion: &Motion) -> (Level, Motion) {
+    pub fn around(&self, cyclic: Cyclic, ports: &Ports, motion: &Solution) -> (Level, Solution) {
         let (nh, own) = (self.harmonics().len(), motion.c.len());
         let all = |values: &[Complex64]| -> Vec<Complex64> {
             let lead = |s: usize, i: usize| cyclic.lead(self.harmonics()[i % nh], s);
             (0..cyclic.sectors).flat_map(|s| (0..own).map(move |i| values[i] * lead(s, i))).collect()
         };
-        let motion = Motion { c: all(&motion.c), force: all(&motion.force), ..*motion };
+        let motion = Solution { c: all(&motion.c), force: all(&motion.force), ..*motion };
         let level = Level {
             penalty: (0..ports.len()).map(|p| self.penalty[p % self.penalty.len()]).collect(),
             ..Level::unassembled(self.alternation.clone(), ports, None)
@@ -339,7 +339,7 @@ impl Level {
 
     /// The motion to begin with: that of the describing functions, or without friction; where contacts alone hold, static rest on them, from which
     /// a step leads to the motion that sticks.
-    pub fn begin(&self, system: &System, ports: &Ports, guess: Option<&Guess>, omega: f64) -> Motion {
+    pub fn begin(&self, system: &System, ports: &Ports, guess: Option<&Guess>, omega: f64) -> Solution {
         let nh = self.harmonics().len();
         let mut motion = self.unhindered();
         if self.stands() {
@@ -374,7 +374,7 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        motion: &mut Motion,
+        motion: &mut Solution,
         ease: Ease,
         length: f64,
         slopes: Slopes,
@@ -401,7 +401,7 @@ impl Level {
     }
 
     /// The forces of motion ports, and their derivatives.
-    fn respond(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, ease: Ease, slopes: Slopes) {
+    fn respond(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, ease: Ease, slopes: Slopes) {
         let nh = self.harmonics().len();
         self.alternation.relaxed_at_zero = motion.relaxed_at_zero;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
@@ -423,7 +423,7 @@ impl Level {
     }
 
     /// What the structure does under the forces of a motion: into the residual of motions, and into the motions whose force is unknown.
-    pub(super) fn follow(&mut self, motion: &mut Motion, ease: Ease) {
+    pub(super) fn follow(&mut self, motion: &mut Solution, ease: Ease) {
         let nh = self.harmonics().len();
         let share = self.load(ease);
         self.act(motion, share);
@@ -457,7 +457,7 @@ impl Level {
     }
 
     /// What the forces of force ports must be: into their residual, and its derivatives.
-    fn image(&mut self, ports: &Ports, omega: f64, motion: &Motion, ease: Ease, slopes: Slopes) {
+    fn image(&mut self, ports: &Ports, omega: f64, motion: &Solution, ease: Ease, slopes: Slopes) {
         let nh = self.harmonics().len();
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.is_force()) {
             let range = port.first * nh..(port.first + port.axes) * nh;
@@ -481,7 +481,7 @@ impl Level {
     }
 
     /// The forces of motion ports after the step that was made last, by the derivatives with which it was made, which are those of the laws alone then.
-    pub(super) fn step_forces(&mut self, ports: &Ports, motion: &mut Motion, length: f64) {
+    pub(super) fn step_forces(&mut self, ports: &Ports, motion: &mut Solution, length: f64) {
         let pair = 2 * self.harmonics().len();
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
             self.add_springs(p, port, -OPEN);
@@ -503,7 +503,7 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        motion: &mut Motion,
+        motion: &mut Solution,
         (ease, sketched): (Ease, bool),
     ) -> bool {
         let nh = self.harmonics().len();
@@ -569,9 +569,9 @@ impl Level {
     }
 
     /// Rest on closed contacts under so many times the constant loads.
-    pub fn at_rest(&self, share: f64) -> Motion {
+    pub fn at_rest(&self, share: f64) -> Solution {
         let nh = self.harmonics().len();
-        let mut motion = Motion::rest(self.linear.len());
+        let mut motion = Solution::rest(self.linear.len());
         motion.c.iter_mut().zip(&self.linear).step_by(nh).for_each(|(c, linear)| *c = linear * share);
         motion
     }
@@ -583,7 +583,7 @@ impl Level {
     }
 
     /// The forces less those of the springs that the structure has, into `self.acting`.
-    fn act(&mut self, motion: &Motion, share: f64) {
+    fn act(&mut self, motion: &Solution, share: f64) {
         if !self.stands() {
             return;
         }
@@ -595,7 +595,7 @@ impl Level {
     }
 
     /// What acts on the structure in a motion, [axis][harmonic], N, see [`Level::springs`].
-    pub fn acting<'a>(&'a mut self, motion: &'a Motion) -> &'a [Complex64] {
+    pub fn acting<'a>(&'a mut self, motion: &'a Solution) -> &'a [Complex64] {
         self.act(motion, 1.0);
         if self.stands() { &self.acting } else { &motion.force }
     }
@@ -613,12 +613,12 @@ impl Level {
     }
 
     /// The motion without friction.
-    pub fn unhindered(&self) -> Motion {
-        Motion { c: self.linear.clone(), ..Motion::rest(self.linear.len()) }
+    pub fn unhindered(&self) -> Solution {
+        Solution { c: self.linear.clone(), ..Solution::rest(self.linear.len()) }
     }
 
     /// Samples of the forces of a port, into the alternation.
-    pub fn sample(&mut self, ports: &Ports, p: usize, omega: f64, motion: &Motion) {
+    pub fn sample(&mut self, ports: &Ports, p: usize, omega: f64, motion: &Solution) {
         let nh = self.harmonics().len();
         let port = &ports[p];
         if self.linearised && port.marches() {
@@ -630,7 +630,7 @@ impl Level {
     }
 
     /// Forces along all axes at the harmonics `wanted`, from the samples: they may lie above those that are kept. Per harmonic.
-    pub fn forces_at(&mut self, ports: &Ports, omega: f64, motion: &Motion, wanted: &[usize]) -> Vec<Vec<Complex64>> {
+    pub fn forces_at(&mut self, ports: &Ports, omega: f64, motion: &Solution, wanted: &[usize]) -> Vec<Vec<Complex64>> {
         let mut forces = vec![vec![ZERO; ports.count()]; wanted.len()];
         for (p, port) in ports.iter().enumerate() {
             self.sample(ports, p, omega, motion);
@@ -679,14 +679,14 @@ impl Level {
     }
 
     /// Mean of the joint's motion by the degrees of freedom alone, along an axis, m.
-    pub fn mean(&self, q: usize, motion: &Motion) -> f64 {
+    pub fn mean(&self, q: usize, motion: &Solution) -> f64 {
         let at = q * self.harmonics().len();
         motion.c[at].re + self.series[q] * motion.force[at].re - self.imposed[q]
     }
 }
 
 /// `motion` with other harmonics: those that are new are zero.
-pub(super) fn transfer(motion: &Motion, from: &[usize], to: &[usize]) -> Motion {
+pub(super) fn transfer(motion: &Solution, from: &[usize], to: &[usize]) -> Solution {
     let pick = |values: &[Complex64]| {
         let mut out = Vec::with_capacity(values.len() / from.len().max(1) * to.len());
         for values in values.chunks_exact(from.len()) {
@@ -694,7 +694,7 @@ pub(super) fn transfer(motion: &Motion, from: &[usize], to: &[usize]) -> Motion 
         }
         out
     };
-    Motion { c: pick(&motion.c), force: pick(&motion.force), ..*motion }
+    Solution { c: pick(&motion.c), force: pick(&motion.force), ..*motion }
 }
 
 #[cfg(test)]
@@ -765,7 +765,7 @@ mod tests {
             let case = Case::new(mixed(6, constant), 0.9);
             let mut level = case.level(harmonics, false);
             let size = level.residual.len();
-            let mut motion = Motion::rest(level.linear.len());
+            let mut motion = Solution::rest(level.linear.len());
             // the mean has no imaginary part
             let real = |i: usize| level.harmonics()[(i / 2) % level.harmonics().len()] == 0 && i % 2 == 1;
             let x: Vec<f64> = (0..size).map(|i| if real(i) { 0.0 } else { 0.4 * noise(i) }).collect();

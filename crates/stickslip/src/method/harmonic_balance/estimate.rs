@@ -1,6 +1,6 @@
 //! The error of a motion by a finer one.
 
-use super::equations::{Level, Motion};
+use super::equations::{Level, Solution};
 use super::kept::Kept;
 use super::ports::Ports;
 use super::rest::Rest;
@@ -33,7 +33,7 @@ pub(super) fn estimate(
     rest: &Rest,
     (kept, omega): (Kept, f64),
     coarse: &Compared,
-    (finer, better, places): (&mut Level, &Motion, &[DVector<Complex64>]),
+    (finer, better, places): (&mut Level, &Solution, &[DVector<Complex64>]),
 ) -> f64 {
     let above = above(finer, rest, ports, kept, omega, better);
     let fine = Compared { harmonics: finer.harmonics(), places, along: &better.c };
@@ -78,7 +78,7 @@ fn above(
     ports: &Ports,
     kept: Kept,
     omega: f64,
-    motion: &Motion,
+    motion: &Solution,
 ) -> Vec<DVector<Complex64>> {
     let top = *level.harmonics().last().expect("a series has harmonics");
     let mut wanted = rest.resonances_above(top, omega);

@@ -45,7 +45,7 @@ use crate::model::System;
 use crate::orbit::{Course, JointSample, Orbit, Path};
 pub(crate) use arc::{ModeArc, Step as ModeStep};
 pub(crate) use branch::BranchEquations;
-use equations::{Level, Motion};
+use equations::{Level, Solution};
 use estimate::{Compared, estimate};
 use kept::Kept;
 pub(crate) use mode::{LinearMode, ModeEquations, ModeState};
@@ -337,13 +337,13 @@ struct Balance<'a> {
     judge: Judge,
     levels: BTreeMap<usize, Level>,
     /// The last orbits, the newest first: state at t = 0, highest harmonic and motion.
-    recent: VecDeque<(Vec<f64>, usize, Motion)>,
+    recent: VecDeque<(Vec<f64>, usize, Solution)>,
     /// Frequencies (rad/s) at which the motion was followed and no orbit was found, and what it did.
     followed: Vec<(f64, Course)>,
     /// How often it was followed to find one.
     tried_in_time: usize,
     /// By the highest harmonic, of many contacts the last solution that was compared with one of twice the harmonics, and that.
-    compared: BTreeMap<usize, [Motion; 2]>,
+    compared: BTreeMap<usize, [Solution; 2]>,
 }
 
 impl<'a> Balance<'a> {
@@ -411,7 +411,7 @@ impl Balance<'_> {
     }
 
     /// Solves at `top`, from a motion at another number of harmonics or from the first guess.
-    fn solve(&mut self, top: usize, omega: f64, from: Option<(usize, &Motion)>) -> Result<Motion, Lost> {
+    fn solve(&mut self, top: usize, omega: f64, from: Option<(usize, &Solution)>) -> Result<Solution, Lost> {
         let start = match from {
             Some((other, motion)) => {
                 let harmonics = self.levels[&other].harmonics().to_vec();
@@ -436,7 +436,7 @@ impl Balance<'_> {
     /// A start near a motion that repeats after several periods: the describing functions know none, and Newton's method would never leave those
     /// that repeat after one. So the motion is followed in time for a while, if some flow follows the system; where motions do not separate there is
     /// none to be found.
-    fn approached(&mut self, top: usize, omega: f64, guess: Option<&Guess>) -> Option<Motion> {
+    fn approached(&mut self, top: usize, omega: f64, guess: Option<&Guess>) -> Option<Solution> {
         let start = guess.filter(|_| self.periods > 1 && !self.judge.proves())?.state(self.system.dofs());
         let path = self.judge.approach(&self.system, omega, start)?;
         self.series_of(&*path, top, omega)
@@ -458,10 +458,10 @@ impl Balance<'_> {
     }
 
     /// The harmonics of a motion that was followed over a period.
-    fn series_of(&mut self, path: &dyn Path, top: usize, omega: f64) -> Option<Motion> {
+    fn series_of(&mut self, path: &dyn Path, top: usize, omega: f64) -> Option<Solution> {
         let level = self.levels.get_mut(&top)?;
         let (nh, n) = (level.harmonics().len(), level.alternation.samples());
-        let mut motion = Motion::rest(level.linear.len());
+        let mut motion = Solution::rest(level.linear.len());
         let samples: Vec<_> = (0..n).map(|i| path.sample(TAU / omega * i as f64 / n as f64).joints).collect();
         for port in self.ports.iter() {
             for q in port.range() {
@@ -491,7 +491,7 @@ impl Balance<'_> {
     }
 
     /// Harmonics of the places.
-    fn places(&mut self, top: usize, omega: f64, motion: &Motion) -> Result<Vec<DVector<Complex64>>, Lost> {
+    fn places(&mut self, top: usize, omega: f64, motion: &Solution) -> Result<Vec<DVector<Complex64>>, Lost> {
         path::places(self.levels.get_mut(&top).expect("solved"), &self.rest, omega, motion).map_err(Lost::at)
     }
 
@@ -499,11 +499,11 @@ impl Balance<'_> {
         &mut self,
         top: usize,
         omega: f64,
-        motion: Motion,
+        motion: Solution,
         x: Vec<DVector<Complex64>>,
         truncation: Option<f64>,
     ) -> Result<Orbit, OrbitError> {
-        let context = path::Context {
+        let setting = path::Setting {
             system: &self.system,
             ports: &self.ports,
             around: self.around.as_ref(),
@@ -515,7 +515,7 @@ impl Balance<'_> {
             judge: Some(&mut self.judge),
         };
         let level = self.levels.get_mut(&top).expect("solved");
-        let orbit = path::orbit(context, level, &motion, x).ok_or(OrbitError::drift(NAME, self.drive))?;
+        let orbit = path::orbit(setting, level, &motion, x).ok_or(OrbitError::drift(NAME, self.drive))?;
         if !path::balances(&self.system, &orbit) {
             let lost = Lost::after(motion.iterations, orbit.evidence.energy_gap);
             return Err(self.lost(lost));
@@ -527,13 +527,13 @@ impl Balance<'_> {
 
     /// The solution near another one, without an estimate of its error, and without the long ways of [`Level::solve`]: a search that asks
     /// for it can do without.
-    fn nearby(&mut self, top: usize, omega: f64, near: &Motion) -> Result<Orbit, OrbitError> {
+    fn nearby(&mut self, top: usize, omega: f64, near: &Solution) -> Result<Orbit, OrbitError> {
         self.level(top, omega).map(|_| ()).map_err(|l| self.lost(l))?;
-        let mut motion = Motion { iterations: 0, ..near.clone() };
+        let mut motion = Solution { iterations: 0, ..near.clone() };
         let level = self.levels.get_mut(&top).expect("made above");
         let mut found = level.polish(&self.ports, omega, &mut motion, NEARBY);
         if found.is_err() && self.ports.has_forces() {
-            motion = Motion { iterations: motion.iterations, ..near.clone() };
+            motion = Solution { iterations: motion.iterations, ..near.clone() };
             found = level.by_proximal_points(&self.ports, omega, &mut motion);
         }
         found.map_err(|l| self.lost(l))?;
@@ -542,7 +542,7 @@ impl Balance<'_> {
     }
 
     /// The user's number of harmonics, with an estimate of its error.
-    fn fixed(&mut self, top: usize, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
+    fn fixed(&mut self, top: usize, omega: f64, warm: Option<(usize, Solution)>) -> Result<Orbit, OrbitError> {
         let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
         let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         let truncation = if self.can_compare(top) {
@@ -558,9 +558,9 @@ impl Balance<'_> {
         &mut self,
         top: usize,
         omega: f64,
-        motion: &Motion,
+        motion: &Solution,
         x: &[DVector<Complex64>],
-    ) -> Result<(f64, Motion, Vec<DVector<Complex64>>), Lost> {
+    ) -> Result<(f64, Solution, Vec<DVector<Complex64>>), Lost> {
         let double = self.kept.double(top);
         let start = self.refined(top, motion);
         let (few, many) = (self.kept.up_to(top), self.kept.up_to(double));
@@ -586,7 +586,7 @@ impl Balance<'_> {
     }
 
     /// A start with twice the harmonics: a solution, and what these added to the last one that was compared.
-    fn refined(&self, top: usize, motion: &Motion) -> Motion {
+    fn refined(&self, top: usize, motion: &Solution) -> Solution {
         let harmonics = |top: usize| self.kept.up_to(top);
         let (few, many) = (harmonics(top), harmonics(self.kept.double(top)));
         let mut start = equations::transfer(motion, &few, &many);
@@ -603,7 +603,7 @@ impl Balance<'_> {
 
     /// As many harmonics as the tolerance needs. The solution that is returned is not the finest that was found, but the one whose error
     /// is known from it.
-    fn chosen(&mut self, mut top: usize, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
+    fn chosen(&mut self, mut top: usize, omega: f64, warm: Option<(usize, Solution)>) -> Result<Orbit, OrbitError> {
         let tolerance = self.method.tolerance.unwrap_or(TOLERANCE);
         let first = top;
         let mut motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
@@ -647,7 +647,7 @@ impl Balance<'_> {
 
 impl Balance<'_> {
     /// The user's number of harmonics, or as many as are needed, from `first` on.
-    fn from(&mut self, first: usize, omega: f64, warm: Option<(usize, Motion)>) -> Result<Orbit, OrbitError> {
+    fn from(&mut self, first: usize, omega: f64, warm: Option<(usize, Solution)>) -> Result<Orbit, OrbitError> {
         match self.method.harmonics {
             Some(top) => self.fixed(top, omega, warm),
             None => self.chosen(first, omega, warm),
@@ -682,7 +682,7 @@ impl Balance<'_> {
     }
 
     /// The harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess.
-    fn warm(&self, start: Option<&[f64]>) -> Option<(usize, Motion)> {
+    fn warm(&self, start: Option<&[f64]>) -> Option<(usize, Solution)> {
         let start = start?;
         let same = self.recent.iter().find(|(state, ..)| state == start);
         same.or(self.recent.front()).map(|(_, top, motion)| (*top, motion.clone()))

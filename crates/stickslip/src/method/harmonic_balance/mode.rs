@@ -149,6 +149,11 @@ impl<'a> ModeEquations<'a> {
         Ok(ModeEquations { system, elastic, contacts, alternation, first: usize::from(!odd), mixes: false })
     }
 
+    /// Harmonics times samples.
+    pub fn resolution(&self) -> usize {
+        self.alternation.resolution()
+    }
+
     /// Axes of the force ports.
     pub(super) fn forces(&self) -> usize {
         self.contacts.last().map_or(0, |last| last.port.first + last.port.axes)

@@ -1,6 +1,6 @@
 //! The orbit of a solution of harmonic balance.
 
-use super::equations::{Level, Motion};
+use super::equations::{Level, Solution};
 use super::ports::{Member, Ports};
 use super::rest::Rest;
 use crate::law::{Contact, MOST_DIRECTIONS};
@@ -25,7 +25,7 @@ pub(super) fn places(
     level: &mut Level,
     rest: &Rest,
     omega: f64,
-    motion: &Motion,
+    motion: &Solution,
 ) -> Result<Vec<DVector<Complex64>>, f64> {
     let nh = level.harmonics().len();
     let acting = level.acting(motion).to_vec();
@@ -57,20 +57,20 @@ const UNHELD: f64 = 1e-6;
 const ROUNDING: f64 = 1e3;
 
 /// Whether the mean forces balance without the springs that hold free directions.
-pub(super) fn stays(context: &Context, level: &Level, motion: &Motion, x: &[DVector<Complex64>]) -> bool {
-    let (system, nh) = (context.system, level.harmonics().len());
+pub(super) fn stays(setting: &Setting, level: &Level, motion: &Solution, x: &[DVector<Complex64>]) -> bool {
+    let (system, nh) = (setting.system, level.harmonics().len());
     if level.harmonics()[0] != 0 {
         return true;
     }
-    let excitation = system.excitation(context.omega);
+    let excitation = system.excitation(setting.omega);
     let mut left = excitation
         .iter()
         .find(|(h, _)| *h == 0)
         .map_or_else(|| DVector::from_element(system.dofs(), ZERO), |(_, load)| load.clone());
     let mut size = left.norm();
-    for q in 0..context.ports.count() {
+    for q in 0..setting.ports.count() {
         let force = motion.force[q * nh].re;
-        let direction = context.ports.axis(system, q).dense(system.dofs());
+        let direction = setting.ports.axis(system, q).dense(system.dofs());
         left -= direction.map(|w| Complex64::new(w * force, 0.0));
         size += direction.norm() * force.abs();
     }
@@ -100,7 +100,7 @@ struct Series {
 }
 
 /// What the solver knows beside the motion.
-pub(super) struct Context<'a> {
+pub(super) struct Setting<'a> {
     pub system: &'a System,
     pub ports: &'a Ports,
     /// Those of the whole ring, where one sector of it was solved.
@@ -117,17 +117,22 @@ pub(super) struct Context<'a> {
 
 /// Makes the orbit.
 /// `None` if it does not stay where it is.
-pub(super) fn orbit(context: Context, level: &mut Level, motion: &Motion, x: Vec<DVector<Complex64>>) -> Option<Orbit> {
-    if let (Some(wave), Some(ports)) = (context.ports.wave(), context.around) {
+pub(super) fn orbit(
+    setting: Setting,
+    level: &mut Level,
+    motion: &Solution,
+    x: Vec<DVector<Complex64>>,
+) -> Option<Orbit> {
+    if let (Some(wave), Some(ports)) = (setting.ports.wave(), setting.around) {
         let (mut level, motion) = level.around(wave, ports, motion);
-        return orbit(Context { ports, around: None, ..context }, &mut level, &motion, x);
+        return orbit(Setting { ports, around: None, ..setting }, &mut level, &motion, x);
     }
-    if !stays(&context, level, motion, &x) {
+    if !stays(&setting, level, motion, &x) {
         return None;
     }
     let harmonics = level.harmonics().to_vec();
-    let Samples { force, contact, states } = sampled(&context, level, motion, &x);
-    let Context { system, ports, omega, first, odd, truncation, tolerance, judge, around: _ } = context;
+    let Samples { force, contact, states } = sampled(&setting, level, motion, &x);
+    let Setting { system, ports, omega, first, odd, truncation, tolerance, judge, around: _ } = setting;
     let symmetry = if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod };
     let period = TAU / omega;
     let measuring = Measuring {
@@ -189,8 +194,8 @@ struct Samples {
     states: Vec<f64>,
 }
 
-fn sampled(context: &Context, level: &mut Level, motion: &Motion, x: &[DVector<Complex64>]) -> Samples {
-    let Context { system, ports, omega, .. } = *context;
+fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector<Complex64>]) -> Samples {
+    let Setting { system, ports, omega, .. } = *setting;
     let harmonics = level.harmonics().to_vec();
     let samples = level.alternation.samples();
     let mut force = vec![vec![[0.0; MOST_DIRECTIONS]; samples]; system.joints().len()];
@@ -273,7 +278,7 @@ struct Measuring<'a> {
     axes: Vec<&'a Axis>,
     /// See [`ports_of_axes`].
     ports: Vec<Vec<(usize, Member)>>,
-    motion: &'a Motion,
+    motion: &'a Solution,
     x: &'a [DVector<Complex64>],
     harmonics: &'a [usize],
     /// Per joint and sample of the whole period.

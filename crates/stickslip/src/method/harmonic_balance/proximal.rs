@@ -7,7 +7,7 @@
 //! Source: Rockafellar (1976), "Monotone operators and the proximal point algorithm".
 
 use super::ease::{Ease, GIVEN, SOLVED};
-use super::equations::{Level, Motion, Slopes};
+use super::equations::{Level, Slopes, Solution};
 use super::ports::Ports;
 use super::solve::Lost;
 
@@ -31,10 +31,10 @@ const QUICK: usize = 8;
 
 impl Level {
     /// The solution from `motion`, and if there is none the nearest point that was found.
-    pub(super) fn by_proximal_points(&mut self, ports: &Ports, omega: f64, motion: &mut Motion) -> Result<(), Lost> {
+    pub(super) fn by_proximal_points(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
         self.begin_anew();
         self.anchor.clone_from(&motion.force);
-        let mut good = Motion { residual: f64::INFINITY, ..motion.clone() };
+        let mut good = Solution { residual: f64::INFINITY, ..motion.clone() };
         let (mut pull, mut factor) = (PULL, 1.0f64);
         for _ in 0..MOST {
             let next = pull * factor;

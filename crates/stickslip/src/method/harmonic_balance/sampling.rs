@@ -2,7 +2,7 @@
 
 use super::coupled::Near;
 use super::ease::{GIVEN, SOLVED};
-use super::equations::{Level, Motion, Slopes};
+use super::equations::{Level, Slopes, Solution};
 use super::ports::{Alternation, Port, Ports};
 
 /// Error of a motion by 1024 samples, relative, that laws with a memory were seen to have (hysteresis in a plane, contacts that part): as many more are
@@ -29,9 +29,9 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        start: &Motion,
-        coarse: &Motion,
-    ) -> Option<Motion> {
+        start: &Solution,
+        coarse: &Solution,
+    ) -> Option<Solution> {
         if !ports.iter().any(Port::marches) {
             return None;
         }
@@ -49,9 +49,9 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        near: &Motion,
-        coarse: &Motion,
-    ) -> Option<(Motion, bool)> {
+        near: &Solution,
+        coarse: &Solution,
+    ) -> Option<(Solution, bool)> {
         if !ports.iter().any(Port::marches) {
             return None;
         }
@@ -89,7 +89,7 @@ impl Level {
     }
 
     /// The distance of the unknowns of two motions, without means, relative to their units.
-    fn apart(&self, ports: &Ports, one: &Motion, other: &Motion, length: f64) -> f64 {
+    fn apart(&self, ports: &Ports, one: &Solution, other: &Solution, length: f64) -> f64 {
         let nh = self.harmonics().len();
         let moving = |at: &usize| self.harmonics()[at % nh] > 0;
         let squares = ports.iter().map(|port| {
@@ -111,7 +111,7 @@ impl Level {
 #[cfg(test)]
 mod tests {
     use super::super::HarmonicBalance;
-    use super::super::equations::{Level, Motion, transfer};
+    use super::super::equations::{Level, Solution, transfer};
     use super::super::ports::Ports;
     use super::super::rest::Rest;
     use crate::law::{Dahl, Jenkins2d, SharedLaw, Valanis};
@@ -186,11 +186,11 @@ mod tests {
             let mut near = level(&many, 1024);
             assert_eq!(near.keeps_sketch(), bodies > 20);
             let found = near.approach_by_twice_the_samples(&ports, omega, &coarse, &coarse).unwrap();
-            let apart = |a: &Motion, b: &Motion| near.apart(&ports, a, b, 1.0);
+            let apart = |a: &Solution, b: &Solution| near.apart(&ports, a, b, 1.0);
             let (distance, error) = (apart(&whole, &coarse), apart(&whole, &found));
-            assert!(distance > 1e-5 * apart(&whole, &Motion::rest(whole.c.len())), "{distance:.1e} shows nothing");
+            assert!(distance > 1e-5 * apart(&whole, &Solution::rest(whole.c.len())), "{distance:.1e} shows nothing");
             assert!(error < 0.01 * distance, "{bodies} bodies: {error:.1e} of {distance:.1e}");
-            let forces = |a: &Motion, b: &Motion| -> f64 {
+            let forces = |a: &Solution, b: &Solution| -> f64 {
                 a.force.iter().zip(&b.force).map(|(a, b)| (a - b).norm_sqr()).sum::<f64>().sqrt()
             };
             assert!(forces(&whole, &found) < 0.01 * forces(&whole, &coarse), "{bodies} bodies");

@@ -3,7 +3,7 @@
 
 use super::coupled::{FORMED, Near, product_work};
 use super::ease::{Ease, GIVEN, SOLVED};
-use super::equations::{Level, Motion, Slopes};
+use super::equations::{Level, Slopes, Solution};
 use super::ports::Ports;
 use super::sparse::Along;
 use num_complex::Complex64;
@@ -96,7 +96,7 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        motion: &mut Motion,
+        motion: &mut Solution,
         ease: Ease,
         most: usize,
     ) -> Result<(), Lost> {
@@ -114,7 +114,7 @@ impl Level {
         // once in a search, so that what it took is as much again at most
         (self.assembled, self.products) = taken;
         self.sketches = false;
-        *motion = Motion { iterations: motion.iterations, ..start };
+        *motion = Solution { iterations: motion.iterations, ..start };
         self.search(ports, omega, motion, ease, (most, SOLVED))
     }
 
@@ -124,7 +124,7 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        motion: &mut Motion,
+        motion: &mut Solution,
         ease: Ease,
         (most, solved): (usize, f64),
     ) -> Result<(), Lost> {
@@ -244,14 +244,14 @@ impl Level {
     }
 
     /// How far motion on these contacts goes, m: that at rest, that without friction, and the harmonics of this one.
-    fn extent(&self, motion: &Motion) -> f64 {
+    fn extent(&self, motion: &Solution) -> f64 {
         let nh = self.harmonics().len();
         let swing = motion.c.iter().enumerate().filter(|(i, _)| i % nh > 0).map(|(_, c)| c.norm());
         self.linear.iter().map(|c| c.norm()).chain(swing).fold(0.0, f64::max)
     }
 
     /// Whether the mean of a motion that contacts alone hold has left them.
-    fn is_away(&self, motion: &Motion) -> bool {
+    fn is_away(&self, motion: &Solution) -> bool {
         let nh = self.harmonics().len();
         let mean = motion.c.iter().step_by(nh).fold(0.0, |m: f64, c| m.max(c.norm()));
         self.stands() && mean > AWAY * self.extent(motion)
@@ -306,7 +306,7 @@ impl Level {
     }
 
     /// `self.before` less a fraction of the step, into `motion`.
-    pub(super) fn advance(&self, ports: &Ports, motion: &mut Motion, fraction: f64, length: f64) {
+    pub(super) fn advance(&self, ports: &Ports, motion: &mut Solution, fraction: f64, length: f64) {
         let nh = self.harmonics().len();
         for port in ports.iter() {
             let range = port.first * nh..(port.first + port.axes) * nh;
@@ -320,9 +320,9 @@ impl Level {
     }
 
     /// A motion near the solution that is near `start`, by fewer samples where there are such.
-    pub fn approach(&mut self, ports: &Ports, omega: f64, start: &Motion) -> Option<Motion> {
+    pub fn approach(&mut self, ports: &Ports, omega: f64, start: &Solution) -> Option<Solution> {
         self.begin_anew();
-        let mut motion = Motion { iterations: 0, ..start.clone() };
+        let mut motion = Solution { iterations: 0, ..start.clone() };
         self.exchange_samples();
         let found = self.search(ports, omega, &mut motion, GIVEN, (ITERATIONS, ROUGH));
         self.exchange_samples();
@@ -330,13 +330,13 @@ impl Level {
     }
 
     /// The solution that Newton's method finds from `motion`, which is nearby.
-    pub fn polish(&mut self, ports: &Ports, omega: f64, motion: &mut Motion, most: usize) -> Result<(), Lost> {
+    pub fn polish(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, most: usize) -> Result<(), Lost> {
         self.begin_anew();
         self.newton(ports, omega, motion, GIVEN, most)
     }
 
     /// The solution, from `start`.
-    pub fn solve(&mut self, ports: &Ports, omega: f64, mut start: Motion) -> Result<Motion, Lost> {
+    pub fn solve(&mut self, ports: &Ports, omega: f64, mut start: Solution) -> Result<Solution, Lost> {
         start.iterations = 0;
         self.begin_anew();
         let mut motion = start.clone();
@@ -346,7 +346,7 @@ impl Level {
         let mut nearest = f64::INFINITY;
         if ports.has_forces() {
             let iterations = motion.iterations;
-            motion = Motion { iterations, ..start };
+            motion = Solution { iterations, ..start };
             match self.by_proximal_points(ports, omega, &mut motion) {
                 Ok(()) => return Ok(motion),
                 Err(lost) => nearest = lost.residual,
@@ -354,7 +354,7 @@ impl Level {
         }
         if self.stands() {
             // friction that stuck contacts carry in the mean
-            motion = Motion { iterations: motion.iterations, relaxed_at_zero: true, ..self.at_rest(1.0) };
+            motion = Solution { iterations: motion.iterations, relaxed_at_zero: true, ..self.at_rest(1.0) };
             let found = self.newton(ports, omega, &mut motion, GIVEN, ITERATIONS);
             let away = self.is_away(&motion);
             if found.is_ok() && !away {
@@ -372,9 +372,9 @@ impl Level {
     }
 
     /// From slip limits that hold to those that are given.
-    fn lower_limits(&mut self, ports: &Ports, omega: f64, motion: &mut Motion) -> Result<(), Lost> {
+    fn lower_limits(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
         let relaxed_at_zero = motion.relaxed_at_zero;
-        let mut good = Motion { iterations: motion.iterations, ..self.unhindered() };
+        let mut good = Solution { iterations: motion.iterations, ..self.unhindered() };
         let mut limits: f64 = 1.0;
         // where everything sticks the equations are linear
         let mut held = Err(Lost::after(good.iterations, f64::INFINITY));
@@ -386,8 +386,8 @@ impl Level {
             }
             let iterations = good.iterations;
             good = match self.stands() {
-                true => Motion { iterations, relaxed_at_zero, ..self.at_rest(limits) },
-                false => Motion { iterations, ..self.unhindered() },
+                true => Solution { iterations, relaxed_at_zero, ..self.at_rest(limits) },
+                false => Solution { iterations, ..self.unhindered() },
             };
             let most = if self.stands() { STICKS } else { ITERATIONS };
             held = self.newton(ports, omega, &mut good, Ease { limits, ..GIVEN }, most);

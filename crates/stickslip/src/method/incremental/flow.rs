@@ -7,7 +7,7 @@ use crate::method::assembly::{Assembly, NEAR_REST};
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
 use crate::method::periodic::norm;
-use crate::method::relaxed::Spring;
+use crate::method::relaxed::ElasticSlider;
 use crate::method::stepped::{Instant, Node, SteppedPath, Steps, extrapolate};
 use crate::method::{Breakdown, MethodError};
 use crate::model::System;
@@ -75,18 +75,23 @@ impl IncrementalFlow {
     }
 
     /// The sliders behind springs whose forces are among the states.
-    pub fn springs(&self) -> Vec<Spring> {
+    pub fn springs(&self) -> Vec<ElasticSlider> {
         let mut springs = Vec::new();
         for (joint, placed) in self.assembly.joints.iter().enumerate() {
             let first = 2 * self.assembly.n + placed.first_state;
             let sliders = law::springs(&placed.law).into_iter().enumerate();
-            springs.extend(sliders.map(|(s, (stiffness, limit))| Spring { joint, state: first + s, stiffness, limit }));
+            springs.extend(sliders.map(|(s, (stiffness, limit))| ElasticSlider {
+                joint,
+                state: first + s,
+                stiffness,
+                limit,
+            }));
         }
         springs
     }
 
     /// Gives all of [`IncrementalFlow::springs`] the limits that these state.
-    pub fn limit(&mut self, springs: &[Spring]) {
+    pub fn limit(&mut self, springs: &[ElasticSlider]) {
         let mut limits = springs.iter().map(|spring| spring.limit);
         self.step.laws.iter_mut().for_each(|law| law.limit(&mut limits));
     }

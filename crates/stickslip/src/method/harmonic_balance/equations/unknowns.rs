@@ -2,7 +2,7 @@
 
 use super::super::ease::GIVEN;
 use super::super::ports::Ports;
-use super::{Level, Motion, Slopes};
+use super::{Level, Slopes, Solution};
 use num_complex::Complex64;
 
 impl Level {
@@ -13,7 +13,7 @@ impl Level {
         ports: &Ports,
         omega: f64,
         (unknowns, length): (&[f64], f64),
-        motion: &mut Motion,
+        motion: &mut Solution,
         residual: &mut [f64],
         jacobian: Option<&mut [f64]>,
     ) {
@@ -33,7 +33,7 @@ impl Level {
     }
 
     /// The unknowns of a motion, see [`Level::residual_at`].
-    pub fn pack(&self, ports: &Ports, motion: &Motion, length: f64) -> Vec<f64> {
+    pub fn pack(&self, ports: &Ports, motion: &Solution, length: f64) -> Vec<f64> {
         let nh = self.harmonics().len();
         let mut out = Vec::with_capacity(2 * motion.c.len());
         for port in ports.iter() {
@@ -47,7 +47,7 @@ impl Level {
     }
 
     /// The other way round.
-    pub fn unpack(&self, ports: &Ports, (unknowns, length): (&[f64], f64), motion: &mut Motion) {
+    pub fn unpack(&self, ports: &Ports, (unknowns, length): (&[f64], f64), motion: &mut Solution) {
         let nh = self.harmonics().len();
         for port in ports.iter() {
             let values = if port.is_force() { &mut motion.force } else { &mut motion.c };

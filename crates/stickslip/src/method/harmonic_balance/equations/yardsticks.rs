@@ -1,7 +1,7 @@
 //! What is large and what is small: the length of a motion, the units of residuals, the penalty of contacts, the limits that nothing reaches.
 
 use super::super::ports::{Port, Ports};
-use super::{Level, Motion};
+use super::{Level, Solution};
 use num_complex::Complex64;
 
 /// The penalty ε is the contact's impedance at the highest harmonic times `1 + RIPPLE / highest`. Above that harmonic a series cannot
@@ -18,7 +18,7 @@ const NOTHING: f64 = 1e-150;
 
 impl Level {
     /// The yardstick of motions: their size, or a hundredth of that without friction, as velocities relative to the drive frequency.
-    pub fn length(&self, motion: &Motion) -> f64 {
+    pub fn length(&self, motion: &Solution) -> f64 {
         let nh = self.alternation.harmonics.len();
         // the mean without friction is far away where only laws hold a direction
         let norm = |c: &[Complex64], from: usize| {
@@ -36,7 +36,7 @@ impl Level {
 
     /// Units of the residual: the motion's length, or the law's scale, but no more than the forces that there are: a limit that nothing reaches says
     /// nothing of them. Where only laws hold a direction, the mean of the motion is the small difference of large ones, and its unit the larger of these.
-    pub(super) fn measure(&mut self, ports: &Ports, motion: &Motion, length: f64) {
+    pub(super) fn measure(&mut self, ports: &Ports, motion: &Solution, length: f64) {
         let nh = self.harmonics().len();
         let forces = ports.iter().filter(|port| port.is_force()).flat_map(Port::range);
         let largest =

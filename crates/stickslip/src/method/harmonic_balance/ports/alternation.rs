@@ -70,6 +70,11 @@ impl Beginning {
 }
 
 impl Alternation {
+    /// Harmonics times samples.
+    pub fn resolution(&self) -> usize {
+        self.pairs.len() * self.turns.len()
+    }
+
     pub fn new(harmonics: Vec<usize>, samples: usize) -> Self {
         let zeros = vec![0.0; samples];
         let three = || std::array::from_fn(|_| vec![0.0; samples]);

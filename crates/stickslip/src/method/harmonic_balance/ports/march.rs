@@ -242,7 +242,7 @@ impl Alternation {
         let wide = 2 * nh;
         self.fill_waves(march, &mut memory.waves);
         for b in 0..d {
-            let input = Input::Motion { axis: b };
+            let input = Input::Solution { axis: b };
             self.follow(march, memory, (beginning.as_deref(), &inverse), (input, wide));
             if nh <= FEW {
                 // all at once: [sample][axis][column] times the waves of the harmonics
@@ -474,7 +474,7 @@ fn width(march: &dyn March) -> usize {
 #[derive(Clone, Copy)]
 enum Input {
     /// The harmonics of the motion along an axis.
-    Motion { axis: usize },
+    Solution { axis: usize },
     /// The frequency ω.
     Frequency,
 }
@@ -502,7 +502,7 @@ impl By {
             let before = &row[self.kinds * self.axes..];
             match self.input {
                 // most laws: two inputs and two states, all at once
-                Input::Motion { axis } if self.kinds == 2 && states.len() == 2 * self.wide => {
+                Input::Solution { axis } if self.kinds == 2 && states.len() == 2 * self.wide => {
                     let weights = [row[axis], row[self.axes + axis], before[0], before[1]];
                     if weights == [0.0; 4] {
                         out.fill(0.0);
@@ -516,7 +516,7 @@ impl By {
                     }
                     continue;
                 }
-                Input::Motion { axis } => {
+                Input::Solution { axis } => {
                     out.fill(0.0);
                     for (kind, wave) in waves.chunks_exact(self.wide).enumerate() {
                         add(out, row[kind * self.axes + axis], wave);
