@@ -424,6 +424,11 @@ fn what_is_wrong_is_said() {
     told("\"k.mtx\"", "\"slanted.mtx\"", &["not symmetric", "row 4, column 1"]);
     told("\"m.mtx\"", "\"negative.mtx\"", &["study.toml:4", "negative"]);
     told("\"m.mtx\"", "\"k.mtx\"", &["study.toml:4", "stiffness matrix once more"]);
+    told(
+        "stiffness = \"k.mtx\"\nmass = \"m.mtx\"",
+        "stiffness = \"m.mtx\"\nmass = \"k.mtx\"",
+        &["are the files of `stiffness` and `mass` exchanged?", "Hz"],
+    );
     told("\"rows.csv\"", "\"few.dof\"", &["study.toml:5", "few.dof", "2 names for 144 rows"]);
     told("units = \"m-kg-s\"\n", "", &["`units` is missing", "mm-t-s"]);
     told("\"m-kg-s\"", "\"mm-t\"", &["mm-t-s"]);
