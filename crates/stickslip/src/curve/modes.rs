@@ -15,7 +15,9 @@ use crate::method::MethodError;
 use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState, ModeStep as Step};
 use crate::model::System;
 use num_complex::Complex64;
+use std::convert::Infallible;
 use stickslip_numerics::leading::leading;
+use stickslip_numerics::maximum::maximum;
 
 /// A point of a nonlinear mode.
 #[derive(Debug, Clone, PartialEq)]
@@ -456,11 +458,9 @@ impl Path {
         let best = (0..all.len()).max_by(|&i, &k| all[i].2.damping.total_cmp(&all[k].2.damping))?;
         let (_, amplitude, state) = &all[best];
         let mut top = (*amplitude, state.clone());
-        let golden = 0.5 * (5f64.sqrt() - 1.0);
-        let mut low = all[(best + 1).min(all.len() - 1)].1.ln();
-        let mut high = all[best.saturating_sub(1)].1.ln();
-        // damping ratios at the two inner amplitudes; where there is no motion it is not larger
-        let mut try_at = |at: f64| {
+        let (low, high) = (all[(best + 1).min(all.len() - 1)].1.ln(), all[best.saturating_sub(1)].1.ln());
+        // where there is no motion it is not larger
+        let mut damping = |at: f64| {
             let Some(found) = self.at(equations, at.exp()) else { return f64::NEG_INFINITY };
             let damping = found.damping;
             if damping > top.1.damping {
@@ -468,19 +468,8 @@ impl Path {
             }
             damping
         };
-        let (mut c, mut d) = (high - golden * (high - low), low + golden * (high - low));
-        let (mut fc, mut fd) = (try_at(c), try_at(d));
-        while high - low > LOCATED {
-            if fc > fd {
-                (high, d, fd) = (d, c, fc);
-                c = high - golden * (high - low);
-                fc = try_at(c);
-            } else {
-                (low, c, fc) = (c, d, fd);
-                d = low + golden * (high - low);
-                fd = try_at(d);
-            }
-        }
+        let Ok(_) =
+            maximum((high, low), |above, below| above - below <= LOCATED, |at| Ok::<_, Infallible>(damping(at)));
         Some(top)
     }
 

@@ -222,34 +222,33 @@ impl<'a> ModeEquations<'a> {
         (omega > 0.0).then(|| ModeState { x, force, omega, damping: lost / (2.0 * omega) })
     }
 
-    /// Modal assurance of two motions: how much of one first harmonic is in the other, in the mass inner product, from 0 to 1.
-    pub fn assurance(&self, one: &ModeState, other: &ModeState) -> f64 {
-        let (mut cross, mut squares) = (ZERO, [0.0; 2]);
-        let n = self.system.dofs();
-        let (one, other) = (self.first(one), self.first(other));
+    /// `xᴴ M y` of two shapes.
+    fn in_masses(&self, x: &[Complex64], y: &[Complex64]) -> Complex64 {
+        let (n, mass) = (self.system.dofs(), self.system.structure().mass());
+        let mut sum = ZERO;
         for i in 0..n {
             for l in 0..n {
-                let m = self.system.structure().mass()[(i, l)];
-                cross += one[i].conj() * other[l] * m;
-                squares[0] += (one[i].conj() * one[l]).re * m;
-                squares[1] += (other[i].conj() * other[l]).re * m;
+                sum += x[i].conj() * y[l] * mass[(i, l)];
             }
         }
-        cross.norm_sqr() / (squares[0] * squares[1])
+        sum
+    }
+
+    /// Modal assurance of two motions: how much of one first harmonic is in the other, in the mass inner product, from 0 to 1.
+    pub fn assurance(&self, one: &ModeState, other: &ModeState) -> f64 {
+        let (one, other) = (self.first(one), self.first(other));
+        let squares = [one, other].map(|x| self.in_masses(x, x).re);
+        self.in_masses(one, other).norm_sqr() / (squares[0] * squares[1])
     }
 
     /// The inner product of two changes of motion in the masses, all harmonics together.
     fn kinetic(&self, one: &[f64], other: &[f64]) -> f64 {
-        let (n, mass) = (self.system.dofs(), self.system.structure().mass());
-        let mut sum = 0.0;
-        for (one, other) in one.chunks_exact(2 * n).zip(other.chunks_exact(2 * n)) {
-            for i in 0..n {
-                for l in 0..n {
-                    sum += mass[(i, l)] * (one[2 * i] * other[2 * l] + one[2 * i + 1] * other[2 * l + 1]);
-                }
-            }
-        }
-        sum
+        let n = self.system.dofs();
+        let shape = |parts: &[f64]| -> Vec<Complex64> {
+            parts.chunks_exact(2).map(|part| Complex64::new(part[0], part[1])).collect()
+        };
+        let harmonics = one.chunks_exact(2 * n).zip(other.chunks_exact(2 * n));
+        harmonics.map(|(one, other)| self.in_masses(&shape(one), &shape(other)).re).sum()
     }
 
     /// The share of the viscous dampers in the damping ratio: what they lose in a cycle, against what `2 ζ ω M` puts in for ζ = 1.
@@ -282,16 +281,9 @@ impl<'a> ModeEquations<'a> {
     /// complex eigenvalue problem that the first harmonic solves become one, it is zero: their shape is orthogonal to itself.
     /// Source: Heiss (2012), "The physics of exceptional points".
     pub fn rigidity(&self, state: &ModeState) -> f64 {
-        let (mut transposed, mut adjoint) = (ZERO, 0.0);
         let x = self.first(state);
-        for i in 0..self.system.dofs() {
-            for l in 0..self.system.dofs() {
-                let m = self.system.structure().mass()[(i, l)];
-                transposed += x[i] * x[l] * m;
-                adjoint += (x[i].conj() * x[l]).re * m;
-            }
-        }
-        transposed.norm() / adjoint
+        let conjugate: Vec<Complex64> = x.iter().map(Complex64::conj).collect();
+        self.in_masses(&conjugate, x).norm() / self.in_masses(x, x).re
     }
 
     /// Modal amplitude, m √kg, from which on the first harmonic of friction is at most a share of the forces of inertia of the linear mode
