@@ -6,9 +6,10 @@ use std::fmt::Write;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use stickslip::structure::Component;
-use stickslip_formats::{self as formats, Entry, Error, Kind, Matrix, Report, names};
+use stickslip_formats::{self as formats, Error, Kind, Matrix, Report, names};
 use stickslip_numerics::definite::sparse_definite;
 use stickslip_numerics::sparse;
+use stickslip_study::summary::{DIRECTIONS, mass_along};
 use stickslip_study::unit_sets;
 
 /// Frequencies that are shown of a pair of matrices.
@@ -197,8 +198,12 @@ fn pair(stiffness: &Named, mass: &Named, why: &str, beside: Option<&[String]>) -
     let rows = stiffness.matrix.rows();
     let names = stiffness.matrix.names().or(mass.matrix.names()).or(beside.filter(|names| names.len() == rows));
     let names = names.map_or_else(|| vec![String::new(); rows], <[String]>::to_vec);
-    let found =
-        converted(&stiffness.matrix).zip(converted(&mass.matrix)).ok_or_else(|| "an entry is not finite".to_owned());
+    let found = converted(&stiffness.matrix).zip(converted(&mass.matrix));
+    let weighed = found.as_ref().map(|(_, mass)| {
+        let along = |along| Some((along, mass_along(&names, mass, along)?));
+        DIRECTIONS.into_iter().filter_map(along).collect::<Vec<_>>()
+    });
+    let found = found.ok_or_else(|| "an entry is not finite".to_owned());
     let found = found.and_then(|(k, m)| Component::new(names.clone(), m, None, k).map_err(|error| error.to_string()));
     let frequencies = found.and_then(|component| component.frequencies(LOWEST).map_err(|error| error.to_string()));
     match frequencies {
@@ -213,10 +218,7 @@ fn pair(stiffness: &Named, mass: &Named, why: &str, beside: Option<&[String]>) -
             let _ = writeln!(text, "  no frequencies: {error}");
         }
     }
-    let along: Vec<(&str, f64)> = ["x", "y", "z"]
-        .into_iter()
-        .filter_map(|along| Some((along, mass_along(&mass.matrix, &names, along)?)))
-        .collect();
+    let along = weighed.unwrap_or_default();
     let Some(&(_, first)) = along.first() else {
         text += "  mass: no row is called by a direction (449.x), so that nobody can tell it, nor the units\n";
         return text;
@@ -235,12 +237,4 @@ fn pair(stiffness: &Named, mass: &Named, why: &str, beside: Option<&[String]>) -
          from milliseconds only"
     );
     text
-}
-
-/// The mass that moves where all rows of one direction move by one, in the units of the matrix; `None` where no row is called by it.
-fn mass_along(mass: &Matrix, names: &[String], along: &str) -> Option<f64> {
-    let is = |name: &String| name.rsplit_once('.').is_some_and(|(_, direction)| direction == along);
-    let rows: Vec<bool> = names.iter().map(is).collect();
-    let moved = |entry: &Entry| rows[entry.row as usize] && rows[entry.column as usize];
-    rows.contains(&true).then(|| mass.both_triangles().filter(moved).map(|entry| entry.value).sum())
 }

@@ -7,7 +7,7 @@ mod structure;
 mod text;
 mod warnings;
 
-pub use structure::StructureSummary;
+pub use structure::{DIRECTIONS, StructureSummary, mass_along};
 
 use crate::cost::{Costing, Size};
 use crate::error::StudyError;

@@ -6,13 +6,13 @@ use crate::words::{plural, significant};
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
 use stickslip::model::{ReductionEvidence, Substructure};
-use stickslip::structure::Component;
+use stickslip_numerics::sparse::Matrix;
 
 /// Frequencies that are listed.
 const LISTED: usize = 6;
 
 /// Directions along which a mass is told.
-const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
+pub const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
 /// Masses along several directions that differ by less than this share are told as one: of a held structure they differ by what is held.
 const SAME: f64 = 1e-3;
 
@@ -66,7 +66,7 @@ impl StructureSummary {
             rows: component.dofs(),
             left_out: study.structure.matrices.as_ref().map_or(0, |matrices| matrices.left_out),
             entries: [stiffness.len(), mass.len()],
-            mass: DIRECTIONS.map(|along| mass_along(component, along)),
+            mass: DIRECTIONS.map(|along| mass_along(component.rows(), component.matrices().0, along)),
             earlier: *earlier,
             reduced,
         })
@@ -152,10 +152,10 @@ impl StructureSummary {
     }
 }
 
-/// The mass that moves where all rows of one direction move by one, kg.
-fn mass_along(component: &Component, along: &str) -> Option<f64> {
+/// The mass that moves where all rows of one direction move by one, in the units of the matrix; `None` where no row is called by it (`449.x`).
+pub fn mass_along(rows: &[String], mass: &Matrix, along: &str) -> Option<f64> {
     let moves = |name: &String| f64::from(name.rsplit_once('.').is_some_and(|(_, direction)| direction == along));
-    let motion: Vec<f64> = component.rows().iter().map(moves).collect();
+    let motion: Vec<f64> = rows.iter().map(moves).collect();
     let moved = motion.contains(&1.0);
-    moved.then(|| component.matrices().0.times(&motion).iter().zip(&motion).map(|(force, motion)| force * motion).sum())
+    moved.then(|| mass.times(&motion).iter().zip(&motion).map(|(force, motion)| force * motion).sum())
 }
