@@ -20,7 +20,8 @@ use std::ops::Range;
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
-/// Length of a state up to which an orbit by itself is followed for its return, however it was found: a minute at most.
+/// Length of a state, with those of joints, up to which an orbit by itself is followed for its return, however it was found. Measured: 12 s for a
+/// mistuned ring of 48 blades and joints, whose states are 144.
 const FOLLOWED: usize = 200;
 
 pub(super) const KIND: Kind = Kind {
