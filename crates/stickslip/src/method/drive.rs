@@ -61,13 +61,12 @@ impl Drive {
     }
 
     /// Square root of an energy that the loads can give to a structure with these masses and stiffnesses, √J: the scale of a
-    /// state near rest.
+    /// vibration near rest. Constant forces count where no other acts.
     pub fn energy_scale(&self, mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> f64 {
-        let loads = (0..mass.nrows()).map(|i| {
-            let force = self.constant[i].abs() + self.forces.iter().map(|f| f[i].norm()).sum::<f64>();
-            force / stiffness[(i, i)].max(self.omega * self.omega * mass[(i, i)]).sqrt()
-        });
-        loads.sum()
+        let held = |i: usize| stiffness[(i, i)].max(self.omega * self.omega * mass[(i, i)]).sqrt();
+        let energy = |force: &dyn Fn(usize) -> f64| (0..mass.nrows()).map(|i| force(i) / held(i)).sum::<f64>();
+        let moving = energy(&|i| self.forces.iter().map(|f| f[i].norm()).sum());
+        if moving > 0.0 { moving } else { energy(&|i| self.constant[i].abs()) }
     }
 
     /// The largest velocity among the imposed relative motions, m/s.

@@ -9,6 +9,7 @@ use super::flow::Flow;
 use super::followed::{self, Kind};
 use super::incremental::flow::IncrementalFlow;
 use super::periodic::{APPROACH, norm};
+use super::vibration;
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
@@ -38,7 +39,7 @@ pub(crate) struct Judge {
 pub(crate) struct Judged {
     /// Derivative of the return with respect to the state at t = 0; `None` where stability is proven, or where no flow follows the motion.
     pub derivative: Option<DMatrix<f64>>,
-    /// Distance between the state and its return, relative to the state, in the energy norm.
+    /// Distance between the state and its return, relative to the vibration, in the energy norm.
     pub defect: Option<f64>,
 }
 
@@ -89,32 +90,53 @@ impl Judge {
         Some(flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period))
     }
 
-    /// Follows the return, over the half period if `odd`, from the state at t = 0, which begins with `start`.
-    pub fn judge(&mut self, system: &System, omega: f64, odd: bool, start: &[f64]) -> Judged {
-        self.follow(system, omega, odd, start, !self.proven)
+    /// Follows the return of a path from its state at t = 0, which begins with `start`.
+    pub fn judge(
+        &mut self,
+        system: &System,
+        omega: f64,
+        (path, symmetry): (&dyn Path, Symmetry),
+        start: &[f64],
+    ) -> Judged {
+        self.follow(system, omega, (path, symmetry), start, !self.proven)
     }
 
-    /// How far the motion from `start` is from it after a return, relative to the state, without the derivative that costs most.
-    pub fn defect(&mut self, system: &System, omega: f64, odd: bool, start: &[f64]) -> Option<f64> {
-        self.follow(system, omega, odd, start, false).defect
+    /// How far the motion from `start` is from it after a return, relative to its vibration, without the derivative that costs most.
+    pub fn defect(
+        &mut self,
+        system: &System,
+        omega: f64,
+        (path, symmetry): (&dyn Path, Symmetry),
+        start: &[f64],
+    ) -> Option<f64> {
+        self.follow(system, omega, (path, symmetry), start, false).defect
     }
 
-    fn follow(&mut self, system: &System, omega: f64, odd: bool, start: &[f64], sensitive: bool) -> Judged {
+    fn follow(
+        &mut self,
+        system: &System,
+        omega: f64,
+        (path, symmetry): (&dyn Path, Symmetry),
+        start: &[f64],
+        sensitive: bool,
+    ) -> Judged {
         let Some(flow) = &mut self.flow else { return Judged::default() };
-        let (share, sign) = if odd { (0.5, -1.0) } else { (1.0, 1.0) };
+        let (part, sign) = if symmetry == Symmetry::HalfPeriod { (0.5, -1.0) } else { (1.0, 1.0) };
         flow.set_drive(system, omega);
+        let (weights, rest) = (flow.weights(), NEAR_REST * flow.energy_scale());
+        let share = vibration::share(path, (symmetry, TAU / omega), start, (&weights, rest));
+        flow.set_tolerance(share * TOLERANCE);
         let states = flow.states();
         let mut state = start.to_vec();
         state.resize(states, 0.0);
         let mut derivative = sensitive.then(|| DMatrix::identity(states, states));
-        if flow.run(&mut state, share * TAU / omega, derivative.as_mut()).is_err() {
+        if flow.run(&mut state, part * TAU / omega, derivative.as_mut()).is_err() {
             return Judged::default();
         }
         // states that the method does not know begin wrong, and their return says nothing of the orbit
         let known = start.len() == states;
-        let weights = flow.weights();
         let gap: Vec<f64> = state.iter().zip(start).map(|(end, start)| sign * end - start).collect();
-        let size = norm(&weights, start).max(NEAR_REST * flow.energy_scale()).max(f64::MIN_POSITIVE);
+        let size = share * norm(&weights, start).max(rest).max(f64::MIN_POSITIVE);
         Judged { derivative, defect: known.then(|| norm(&weights, &gap) / size) }
     }
 }
@@ -195,7 +217,8 @@ mod tests {
         let orbit = crate::method::event_driven::EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
         let mut judge = Judge::new(&system);
         assert!(judge.proves());
-        let mut defect = |start: &[f64]| judge.judge(&system, omega, true, start).defect;
+        let mut defect =
+            |start: &[f64]| judge.judge(&system, omega, (orbit.path.as_ref(), orbit.symmetry), start).defect;
         assert!(defect(&orbit.start).unwrap() < 1e-11);
         let wrong: Vec<f64> = orbit.start.iter().map(|z| 1.5 * z).collect();
         // the transient of a structure with Q of some hundreds dies by a hundredth per return, friction takes more

@@ -23,6 +23,7 @@ mod smooth;
 mod stepped;
 pub mod time_history;
 pub mod transient;
+mod vibration;
 mod ways;
 
 use crate::dimension::Dimension;

@@ -72,6 +72,14 @@ impl Search {
         }
     }
 
+    /// The search of a vibration that has this share of the size of its states.
+    pub fn of_share(self, share: f64) -> Search {
+        match self {
+            Search::Newton => Search::Newton,
+            Search::Settle { tolerance, returns } => Search::Settle { tolerance: share * tolerance, returns },
+        }
+    }
+
     /// From the state of a neighbouring orbit if there is one of the right length and it leads anywhere, else from a first guess.
     pub fn find<M: ReturnMap>(
         self,

@@ -16,7 +16,8 @@ use super::repeated::Afresh;
 use super::smooth::flow::{Lengths, SmoothFlow};
 use super::stepped::SteppedPath;
 use super::{
-    Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, WIDTH, periods, width,
+    Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, WIDTH, periods, vibration,
+    width,
 };
 use crate::dimension::Dimension;
 use crate::model::System;
@@ -163,9 +164,14 @@ pub(super) struct Shooter<'a> {
     shared: Arc<System>,
     /// The method that it works for.
     name: &'static str,
+    /// Search, and relative error per step, of the vibration.
+    asked: (Search, f64),
+    /// The vibration's share of the size of its states.
+    share: f64,
+    /// The same search and error relative to the states.
     search: Search,
-    periods: usize,
     tolerance: f64,
+    periods: usize,
     stepping: Stepping,
     weights: Vec<f64>,
     omega: f64,
@@ -226,6 +232,8 @@ impl<'a> Shooter<'a> {
             name,
             search,
             periods: options.period,
+            asked: (search, options.tolerance),
+            share: 1.0,
             tolerance: options.tolerance,
             weights: vec![1.0; stepping.assembly().states()],
             stepping,
@@ -243,6 +251,20 @@ impl<'a> Shooter<'a> {
         state
     }
 
+    /// The orbit of the search.
+    fn found(&mut self, start: Option<&[f64]>, symmetry: Symmetry, aim: Aim) -> Result<Orbit, OrbitError> {
+        let closed = match self.stepping {
+            Stepping::Smooth(_) => self.smooth_orbit(start, aim)?,
+            Stepping::Incremental(_) => self.stepped_orbit(start, aim)?,
+        };
+        Ok(self.orbit_of(aim.omega, symmetry, closed))
+    }
+
+    /// The vibration's share of the size of the state at t = 0; less than `rest` (√J) counts as that.
+    fn share_in(&self, orbit: &Orbit, rest: f64) -> f64 {
+        vibration::share(orbit.path.as_ref(), (orbit.symmetry, orbit.period()), &orbit.start, (&self.weights, rest))
+    }
+
     fn broke(&self, omega: f64) -> impl Fn(Breakdown) -> OrbitError {
         let method = self.name;
         move |cause| OrbitError::Breakdown { method, omega, cause }
@@ -253,8 +275,9 @@ impl<'a> Shooter<'a> {
         let search = self.search;
         self.set_lengths(Lengths::Chosen);
         if let Search::Settle { tolerance, returns } = search {
-            let fine = self.set_tolerance(self.tolerance.max(COARSE));
-            let coarse = Search::Settle { tolerance: tolerance.max(COARSE), returns: returns.min(COARSE_RETURNS) };
+            let fine = self.set_tolerance(self.tolerance.max(COARSE * self.share));
+            let coarse =
+                Search::Settle { tolerance: tolerance.max(COARSE * self.share), returns: returns.min(COARSE_RETURNS) };
             let near = coarse.find(self, start, |shooter| shooter.first_state(aim.omega), aim);
             self.set_tolerance(fine);
             let near = match near {
@@ -311,7 +334,7 @@ impl<'a> Shooter<'a> {
             Some(start) => start.to_vec(),
             None => self.first_state(aim.omega),
         };
-        let fine = self.set_tolerance(self.tolerance.max(LONG_STEPS));
+        let fine = self.set_tolerance(self.tolerance.max(LONG_STEPS * self.share));
         let near = descended(self, &first, Aim { residual: COARSE_RESIDUAL, ..aim }, WILD, iterations);
         self.set_tolerance(fine);
         near.ok()
@@ -365,6 +388,13 @@ impl<'a> Shooter<'a> {
             Stepping::Smooth(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
             Stepping::Incremental(_) => self.tolerance,
         }
+    }
+
+    /// Takes the vibration for this share of the size of its states.
+    fn set_share(&mut self, share: f64) {
+        let (search, tolerance) = self.asked;
+        (self.share, self.search, self.tolerance) = (share, search.of_share(share), share * tolerance);
+        self.set_tolerance(self.tolerance);
     }
 
     fn set_count(&mut self, count: usize) {
@@ -492,15 +522,24 @@ impl Solver for Shooter<'_> {
         } else {
             known
         };
-        let closed = match self.stepping {
-            Stepping::Smooth(_) => self.smooth_orbit(start, aim)?,
-            Stepping::Incremental(_) => self.stepped_orbit(start, aim)?,
-        };
-        let mut orbit = self.orbit_of(omega, symmetry, closed);
+        // neighbours vibrate by much the same share
+        self.set_share(if known.is_some() { self.share } else { 1.0 });
+        let mut orbit = self.found(start, symmetry, aim)?;
+        loop {
+            let share = self.share_in(&orbit, rest);
+            if vibration::is_resolved(self.share, share) {
+                break;
+            }
+            vibration::has_digits(share).map_err(self.broke(omega))?;
+            self.set_share(share);
+            orbit = self.found(Some(&orbit.start), symmetry, aim)?;
+        }
         if self.search == Search::Newton {
             let system = self.system;
             orbit = relaxed(self, system, orbit, Aim { residual: CLOSED_STEPS, ..aim });
         }
+        let share = self.share_in(&orbit, rest);
+        vibration::relate(&mut orbit.evidence, share);
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
             return Err(OrbitError::Evidence { method: self.name, omega, energy_gap: orbit.evidence.energy_gap });

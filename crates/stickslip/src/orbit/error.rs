@@ -78,6 +78,15 @@ pub enum Breakdown {
         /// The error that was allowed.
         tolerance: f64,
     },
+    /// The vibration is lost in the digits of the displacement that it is about.
+    #[error(
+        "the motion vibrates by only {share:.1e} of the displacement that it is about, too little for its digits; \
+         take the constant force that displaces it away and let the structure be as it is under it, or use `harmonic-balance`"
+    )]
+    Offset {
+        /// Size of the vibration, in the energy norm, relative to that of the state.
+        share: f64,
+    },
     /// Numbers leave the range of floating point, or what they need to be solved with.
     #[error("masses, springs and dampers are too far apart to compute with at t = {time:.6e} s; check their units")]
     OutOfRange {
@@ -123,7 +132,7 @@ impl Breakdown {
             | Breakdown::NoNumber { time, .. }
             | Breakdown::OutOfRange { time }
             | Breakdown::Unbounded { time, .. } => Some(time),
-            Breakdown::Unresolved { .. } => None,
+            Breakdown::Unresolved { .. } | Breakdown::Offset { .. } => None,
         }
     }
 }

@@ -166,7 +166,7 @@ fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Sig
     for row in 0..n {
         let parts: Vec<(f64, Complex64)> = excitation
             .iter()
-            .filter(|(_, load)| load[row] != ZERO)
+            .filter(|(h, load)| *h > 0 && load[row] != ZERO) // a constant one does no work over a return
             .map(|(h, load)| (f64::from(*h) * omega, load[row]))
             .collect();
         if !parts.is_empty() {

@@ -144,7 +144,7 @@ impl Accuracy {
 /// The numbers that say how far an orbit may be trusted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
-    /// Distance between the state and its return, relative to the state, in the energy norm.
+    /// Distance between the state and its return, relative to the vibration (the state without its mean), in the energy norm.
     pub residual: f64,
     /// `|work in - viscous - friction| / work in`, from independent integrals.
     pub energy_gap: f64,
@@ -156,7 +156,7 @@ pub struct Evidence {
     pub truncation: Option<f64>,
     /// Whether that is as little as was asked for.
     pub accuracy: Accuracy,
-    /// Distance between the state at t = 0 and where an independent flow brings it after a return, relative to the state, in the energy norm;
+    /// Distance between the state at t = 0 and where an independent flow brings it after a return, relative to the vibration, in the energy norm;
     /// the residual itself where the orbit was found by a flow, `None` where no flow follows the system, or where it is too large to be followed
     /// without being asked ([`Orbit::return_defect`]).
     pub return_defect: Option<f64>,
@@ -249,8 +249,8 @@ pub trait Path: Send + Sync {
     fn return_map(&self, _start: &[f64], _symmetry: Symmetry) -> Option<DMatrix<f64>> {
         None
     }
-    /// How far an independent motion from `start` is from it after a return, relative to the state, of a method that finds its orbits in another way
-    /// than by motion; `None` if nothing follows it.
+    /// How far an independent motion from `start` is from it after a return, relative to the vibration, of a method that finds its orbits in another
+    /// way than by motion; `None` if nothing follows it.
     fn return_defect(&self, _start: &[f64], _symmetry: Symmetry) -> Option<f64> {
         None
     }

@@ -70,7 +70,7 @@ impl Orbit {
         Some(multipliers)
     }
 
-    /// Distance between the state at t = 0 and where an independent flow brings it after a return, relative to the state, in the energy norm
+    /// Distance between the state at t = 0 and where an independent flow brings it after a return, relative to the vibration, in the energy norm
     /// ([`super::Evidence::return_defect`]), of an orbit of any size: where its method did not follow the motion, it is followed now, over one period.
     /// `None` where no flow takes the laws of the system.
     pub fn return_defect(&self) -> Option<f64> {

@@ -24,10 +24,10 @@ pub(crate) use path::ExactPath;
 
 use super::drive::Drive;
 use super::guess::Guess;
-use super::periodic::{Aim, Closed, ReturnMap, Search, approached, norm};
+use super::periodic::{Aim, Closed, ReturnMap, Search, approached};
 use super::relaxed::{Closing, ElasticSlider, relaxed};
 use super::repeated::Afresh;
-use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, PERIOD, Solver, periods};
+use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, PERIOD, Solver, periods, vibration};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
 use nalgebra::DMatrix;
@@ -167,9 +167,8 @@ impl Closing for Exact<'_> {
     /// The last run of the iteration was that of the closed state: its segments are the orbit.
     fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError> {
         let omega = self.flow.drive.omega;
-        let size = norm(&self.weights, &closed.state);
         let symmetry = self.search.symmetry(self.system, self.periods);
-        let (at, closed) = ((omega, self.periods), (closed, size * size));
+        let (at, closed) = ((omega, self.periods), (closed, self.weights.as_slice()));
         let orbit = path::orbit(&self.shared, self.contracts, &self.flow, at, symmetry, closed)
             .map_err(|cause| OrbitError::Breakdown { method: self.name, omega, cause })?;
         Ok(Orbit { method: self.name, ..orbit })
@@ -207,6 +206,18 @@ impl<'a> Exact<'a> {
         at_rest.is_some_and(|x| (force - &mechanics.stiffness * x).amax() > UNHELD * force.amax())
     }
 
+    /// The orbit that a search finds.
+    fn found(&mut self, start: Option<&[f64]>, search: Search, aim: Aim) -> Result<Orbit, OrbitError> {
+        let Aim { method, omega, .. } = aim;
+        let closed = search.find(self, start, |exact| exact.first_state(omega), aim).map_err(|error| match error {
+            OrbitError::NotConverged { .. } | OrbitError::Unsettled { .. } if self.drifts() => {
+                OrbitError::drift(method, omega)
+            }
+            error => error,
+        })?;
+        self.finish(closed)
+    }
+
     fn first_state(&self, omega: f64) -> Vec<f64> {
         let mechanics = &self.flow.mechanics;
         let guess = Guess::new(self.system, omega);
@@ -238,16 +249,23 @@ impl Solver for Exact<'_> {
         } else {
             known
         };
-        let closed = search.find(self, start, |exact| exact.first_state(omega), aim).map_err(|error| match error {
-            OrbitError::NotConverged { .. } | OrbitError::Unsettled { .. } if self.drifts() => {
-                OrbitError::drift(name, omega)
-            }
-            error => error,
-        })?;
-        let mut orbit = self.finish(closed)?;
+        let mut orbit = self.found(start, search, aim)?;
         if search == Search::Newton {
             let system = self.system;
             orbit = relaxed(self, system, orbit, aim);
+        } else {
+            // closed forms have all digits of a vibration, and only whoever waits must know how large it is
+            let mut taken = 1.0;
+            loop {
+                let at = (symmetry, orbit.period());
+                let share = vibration::share(orbit.path.as_ref(), at, &orbit.start, (&self.weights, aim.rest));
+                if vibration::is_resolved(taken, share) {
+                    break;
+                }
+                vibration::has_digits(share).map_err(|cause| OrbitError::Breakdown { method: name, omega, cause })?;
+                taken = share;
+                orbit = self.found(Some(&orbit.start), search.of_share(share), aim)?;
+            }
         }
         // a motion that has settled but for an estimated rest is out of balance by that rest
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);

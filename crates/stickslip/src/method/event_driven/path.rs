@@ -5,7 +5,8 @@ use super::flow::{Flow, Segment};
 use super::mechanics::{Part, Share};
 use crate::law::Contact;
 use crate::method::Breakdown;
-use crate::method::periodic::Closed;
+use crate::method::periodic::{Closed, norm};
+use crate::method::vibration;
 use crate::model::{Axis, System};
 use crate::orbit::measure::{Faces, NO_WORK, Shares, Signals, measure};
 use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
@@ -43,20 +44,22 @@ struct Piece {
     at_end: Vec<Complex64>,
 }
 
-/// Makes the orbit of the flow's last run, which began at the state `closed` with the energy `stored`, J.
+/// Makes the orbit of the flow's last run, which began at the state `closed`; states are measured by `weights`.
 pub(super) fn orbit(
     system: &Arc<System>,
     contracts: bool,
     flow: &Flow,
     (omega, periods): (f64, usize),
     symmetry: Symmetry,
-    (closed, stored): (Closed, f64),
+    (closed, weights): (Closed, &[f64]),
 ) -> Result<Orbit, Breakdown> {
     let period = periods as f64 * std::f64::consts::TAU / omega;
     let path = ExactPath::new(system.clone(), flow, symmetry, period);
     let measured = measure(system, &Measuring::new(&path), omega, (symmetry, period))?;
     let rest = super::NEAR_REST * flow.energy_scale;
-    Ok(Orbit {
+    let share = vibration::share(&path, (symmetry, period), &closed.state, (weights, rest));
+    let stored = share * norm(weights, &closed.state).powi(2);
+    let mut orbit = Orbit {
         method: NAME,
         omega,
         periods,
@@ -79,7 +82,9 @@ pub(super) fn orbit(
         return_map: closed.derivative,
         contracts,
         path: Arc::new(path),
-    })
+    };
+    vibration::relate(&mut orbit.evidence, share);
+    Ok(orbit)
 }
 
 impl ExactPath {

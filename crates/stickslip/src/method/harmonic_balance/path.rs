@@ -155,8 +155,9 @@ pub(super) fn orbit(
     start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
     start.extend(states);
     let contracts = judge.as_ref().is_some_and(|judge| judge.proves());
+    let path = Series { system: system.clone(), omega, harmonics, x, force, contact };
     let Judged { derivative, defect } =
-        judge.map_or_else(Judged::default, |judge| judge.judge(system, omega, odd, &start));
+        judge.map_or_else(Judged::default, |judge| judge.judge(system, omega, (&path, symmetry), &start));
     Some(Orbit {
         method: super::NAME,
         omega,
@@ -183,7 +184,7 @@ pub(super) fn orbit(
         energy: measured.energy,
         return_map: derivative.unwrap_or_else(|| DMatrix::zeros(0, 0)),
         contracts,
-        path: Arc::new(Series { system: system.clone(), omega, harmonics, x, force, contact }),
+        path: Arc::new(path),
     })
 }
 
@@ -543,12 +544,10 @@ impl Path for Series {
     }
 
     fn return_map(&self, start: &[f64], symmetry: Symmetry) -> Option<DMatrix<f64>> {
-        let odd = symmetry == Symmetry::HalfPeriod;
-        Judge::of_any_size(&self.system).judge(&self.system, self.omega, odd, start).derivative
+        Judge::of_any_size(&self.system).judge(&self.system, self.omega, (self, symmetry), start).derivative
     }
 
     fn return_defect(&self, start: &[f64], symmetry: Symmetry) -> Option<f64> {
-        let odd = symmetry == Symmetry::HalfPeriod;
-        Judge::of_any_size(&self.system).defect(&self.system, self.omega, odd, start)
+        Judge::of_any_size(&self.system).defect(&self.system, self.omega, (self, symmetry), start)
     }
 }

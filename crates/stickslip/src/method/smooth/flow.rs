@@ -396,6 +396,10 @@ impl Flow for SmoothFlow {
         self.assembly.energy_scale(&self.drive)
     }
 
+    fn set_tolerance(&mut self, tolerance: f64) {
+        self.tolerance = tolerance;
+    }
+
     fn run(
         &mut self,
         state: &mut [f64],
