@@ -1,4 +1,4 @@
-//! Speed of harmonic balance, on one core: the massless couple of the paper by number of harmonics, its hard neighbour whole, chains.
+//! Speed of harmonic balance, on one core: the massless couple of the paper by number of harmonics, its hard neighbour whole, chains, mistuned rings.
 
 #![allow(clippy::print_stdout)] // a bench prints its result
 
@@ -13,22 +13,25 @@ use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, exampl
 
 /// Blades of the chains.
 const CHAINS: [usize; 4] = [10, 30, 100, 300];
+/// Blades of the rings.
+const RINGS: [usize; 6] = [30, 48, 60, 120, 240, 480];
 
 fn main() {
     divan::main();
     // cargo test --benches passes --test, and a filter asks for something else
     if std::env::args().skip(1).all(|argument| argument == "--bench") {
-        println!("time of a point of a chain ~ blades^{:.2}", growth());
+        println!("time of a point of a chain ~ blades^{:.2}", growth(&CHAINS, &|blades| chain(blades), 5));
+        println!("time of a point of a mistuned ring ~ blades^{:.2}", growth(&RINGS, &|blades| ring(blades), 7));
     }
 }
 
 /// Exponent of the time per point over the number of blades, by least squares in the logarithms.
-fn growth() -> f64 {
-    let points: Vec<(f64, f64)> = CHAINS
+fn growth(sizes: &[usize], made: &dyn Fn(usize) -> System, harmonics: usize) -> f64 {
+    let points: Vec<(f64, f64)> = sizes
         .iter()
         .map(|&blades| {
-            let system = chain(blades);
-            let mut series = ChainPoints::new(&system);
+            let system = made(blades);
+            let mut series = Neighbours::new(&system, harmonics);
             let mut seconds: Vec<f64> = (0..11)
                 .map(|_| {
                     let begin = Instant::now();
@@ -46,18 +49,18 @@ fn growth() -> f64 {
         / points.iter().map(|p| (p.0 - x) * (p.0 - x)).sum::<f64>()
 }
 
-/// Neighbouring points of a chain at 121 Hz, each started from the one before.
-struct ChainPoints<'a> {
+/// Neighbouring points at 121 Hz, each started from the one before.
+struct Neighbours<'a> {
     solver: Box<dyn Solver + Send + 'a>,
     start: Vec<f64>,
     count: u32,
 }
 
-impl<'a> ChainPoints<'a> {
-    fn new(system: &'a System) -> Self {
-        let mut solver = balance(5).solver(system).unwrap();
+impl<'a> Neighbours<'a> {
+    fn new(system: &'a System, harmonics: usize) -> Self {
+        let mut solver = balance(harmonics).solver(system).unwrap();
         let start = solver.orbit(TAU * 121.0, None).unwrap().start;
-        ChainPoints { solver, start, count: 0 }
+        Neighbours { solver, start, count: 0 }
     }
 
     fn next(&mut self) {
@@ -105,27 +108,50 @@ fn couple(limit: f64) -> Model {
     couple
 }
 
-fn chain(blades: usize) -> System {
+/// Blades under engine order 3 with a joint between neighbours, and one between the last and the first if it is closed. Stiffnesses are spread
+/// evenly by `mistuning`, in an order that does not repeat.
+fn row(blades: usize, closed: bool, mistuning: f64) -> System {
     let name = |i: usize| format!("b{i}");
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
     let mut model = Model::default();
     for i in 0..blades {
+        let spread = 2.0 * (i as f64 * golden).fract() - 1.0;
+        let stiffness = 105_103.0 * (1.0 + mistuning * spread);
         model.masses.push(Mass::new(name(i), 0.182));
-        model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness: 105_103.0, damping: 0.2 });
+        model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness, damping: 0.2 });
         let phase = TAU * 3.0 * i as f64 / blades as f64;
         model.forces.push(Force { on: name(i), amplitude: 10.0, phase, harmonic: 1 });
-        if i > 0 {
+        if i > 0 || closed {
             let law = Arc::new(Jenkins { stiffness: 1e4, limit: 2.0 });
-            model.joints.push(Joint { name: format!("j{i}"), between: [name(i - 1), name(i)], law });
+            let before = name((i + blades - 1) % blades);
+            model.joints.push(Joint { name: format!("j{i}"), between: [before, name(i)], law });
         }
     }
     model.assemble().unwrap()
+}
+
+fn chain(blades: usize) -> System {
+    row(blades, false, 0.0)
+}
+
+/// Mistuned by one percent.
+fn ring(blades: usize) -> System {
+    row(blades, true, 0.01)
 }
 
 /// One point of a chain of blades with a joint between neighbours, five harmonics, started from the point 0.02 Hz below.
 #[divan::bench(args = CHAINS, sample_count = 5)]
 fn chain_point(bencher: Bencher, blades: usize) {
     let system = chain(blades);
-    let mut series = ChainPoints::new(&system);
+    let mut series = Neighbours::new(&system, 5);
+    bencher.bench_local(|| series.next());
+}
+
+/// One point of a mistuned ring, seven harmonics, with its estimate, started from the point 0.02 Hz below.
+#[divan::bench(args = RINGS, sample_count = 5)]
+fn ring_point(bencher: Bencher, blades: usize) {
+    let system = ring(blades);
+    let mut series = Neighbours::new(&system, 7);
     bencher.bench_local(|| series.next());
 }
 

@@ -7,16 +7,21 @@
 //! spring `k`: rigid friction is not smoothed, and a contact that sticks is a constraint.
 //! Source: Krack (2015), "Nonlinear modal analysis of nonconservative systems: extension of the periodic motion concept".
 
+mod linear;
+mod readings;
+
+pub(crate) use linear::LinearMode;
+
 use super::equations::penalty;
 use super::hold::{CLEAR, stay};
 use super::open::{open, shorten};
 use super::ports::{Alternation, Port, Ports};
 use super::solve::{HALVINGS, SHORTENS};
 use crate::method::MethodError;
-use crate::model::{Axis, System};
-use nalgebra::{DMatrix, DVector};
+use crate::model::System;
+use nalgebra::DVector;
 use num_complex::Complex64;
-use stickslip_numerics::{dense, eigen};
+use stickslip_numerics::dense;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Newton iterations at one amplitude; 2 to 10 are usual.
@@ -69,52 +74,6 @@ impl Placed {
     }
 }
 
-/// Share of the joints' stiffness that tells the equal modes of a structure without joints apart.
-const TRACE: f64 = 1e-9;
-/// Distance of the squares of two frequencies, relative, up to which modes count as equal: well above [`TRACE`].
-const EQUAL: f64 = 1e-7;
-
-/// Rounding of the squares of frequencies relative to the largest of them, per degree of freedom.
-const SQUARE: f64 = 64.0 * f64::EPSILON;
-/// Share of the size of a mode below which nothing is read off it.
-const FAINT_PLACE: f64 = 1e-6;
-
-/// A linear mode of the structure without its joints.
-#[derive(Debug, Clone)]
-pub(crate) struct LinearMode {
-    /// Square of the frequency, (rad/s)².
-    pub square: f64,
-    /// Shape φ with φᴴ M φ = 1, 1/√kg: real, or of a pair that neither the structure nor its joints tell apart one of the two waves
-    /// `(φ₁ ± jφ₂)/√2`, which are the same whatever mixtures of the pair φ₁ and φ₂ are.
-    pub shape: DVector<Complex64>,
-    /// Of such a wave, the member of the pair that it takes the number of: a motion that stands.
-    pub stands: Option<DVector<f64>>,
-}
-
-impl LinearMode {
-    /// In place of a wave, the motion of the pair that stands; `None` if it is no wave.
-    pub fn standing(&self) -> Option<LinearMode> {
-        let shape = real(self.stands.as_ref()?);
-        Some(LinearMode { square: self.square, shape, stands: None })
-    }
-}
-
-fn real(shape: &DVector<f64>) -> DVector<Complex64> {
-    shape.map(|x| Complex64::new(x, 0.0))
-}
-
-/// The waves of a pair of real modes. In the first a place leads those before it, as it does under a positive engine order where places
-/// stand sector by sector: the first of the places that tells decides.
-fn waves(one: &DVector<f64>, other: &DVector<f64>) -> [DVector<Complex64>; 2] {
-    let size = one.amax().max(other.amax());
-    let half = std::f64::consts::FRAC_1_SQRT_2;
-    let wave = one.zip_map(other, |re, im| Complex64::new(half * re, half * im));
-    let from = wave.iter().find(|x| x.norm() > FAINT_PLACE * size).copied().unwrap_or(ZERO);
-    let leads = wave.iter().map(|x| (from.conj() * x).im).find(|leads| leads.abs() > FAINT_PLACE * size * from.norm());
-    let back = wave.map(|x| x.conj());
-    if leads.is_some_and(|leads| leads < 0.0) { [back, wave] } else { [wave, back] }
-}
-
 impl<'a> ModeEquations<'a> {
     /// # Errors
     /// A law with several directions, a place without mass, a mass matrix that is not positive definite.
@@ -163,149 +122,6 @@ impl<'a> ModeEquations<'a> {
     fn first<'s>(&self, state: &'s ModeState) -> &'s [Complex64] {
         let n = self.system.dofs();
         &state.x[self.first * n..(self.first + 1) * n]
-    }
-
-    /// The linear modes of the structure without its joints, by rising frequency.
-    pub fn linear_modes(&self) -> Vec<LinearMode> {
-        let n = self.system.dofs();
-        let mut stiffness = self.system.structure().stiffness().clone();
-        // a trace of the joints stays, so that equal blades move with or against each other as the joints make them
-        for Placed { port, w } in self.elastic.iter().chain(&self.contacts) {
-            let kt = port.stiffness();
-            let kt = if kt > 0.0 { kt } else { self.system.structure().stiffness().amax() };
-            for w in w {
-                stiffness += w * w.transpose() * (TRACE * kt);
-            }
-        }
-        let Some(factor) = self.system.structure().mass().clone().cholesky() else { return Vec::new() };
-        let lower = factor.l();
-        let Some(inverse) = lower.solve_lower_triangular(&DMatrix::identity(n, n)) else { return Vec::new() };
-        let Some(eigen) = eigen::symmetric(&inverse * stiffness * inverse.transpose()) else { return Vec::new() };
-        let shapes = inverse.transpose() * eigen.eigenvectors;
-        let mut modes: Vec<(f64, DVector<f64>)> =
-            (0..n).map(|k| (eigen.eigenvalues[k].max(0.0), shapes.column(k).into_owned())).collect();
-        modes.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let rounding = SQUARE * n as f64 * modes.last().map_or(0.0, |mode| mode.0);
-        let equal = |a: &(f64, DVector<f64>), b: &(f64, DVector<f64>)| b.0 - a.0 <= rounding;
-        let mut found = Vec::with_capacity(n);
-        for group in modes.chunk_by(equal) {
-            match group {
-                [(square, one), (_, other)] => {
-                    let made = |(shape, stands): (_, &DVector<f64>)| LinearMode {
-                        square: *square,
-                        shape,
-                        stands: Some(stands.clone()),
-                    };
-                    found.extend(waves(one, other).into_iter().zip([one, other]).map(made));
-                }
-                _ => found.extend(group.iter().map(|(square, shape)| LinearMode {
-                    square: *square,
-                    shape: real(shape),
-                    stands: None,
-                })),
-            }
-        }
-        found
-    }
-
-    /// A linear mode at amplitude `a`; forces along laws of velocity are zero. `None` if it has no frequency.
-    pub fn linear(&self, mode: &LinearMode, a: f64) -> Option<ModeState> {
-        let (n, nh) = (self.system.dofs(), self.alternation.harmonics.len());
-        let omega = mode.square.sqrt();
-        let mut x = vec![ZERO; nh * n];
-        for i in 0..n {
-            x[self.first * n + i] = a * mode.shape[i];
-        }
-        let damping = self.system.structure().damping().map(|c| Complex64::new(c, 0.0));
-        let lost = mode.shape.dotc(&(damping * &mode.shape)).re;
-        let force = vec![ZERO; nh * self.forces()];
-        (omega > 0.0).then(|| ModeState { x, force, omega, damping: lost / (2.0 * omega) })
-    }
-
-    /// `xᴴ M y` of two shapes.
-    fn in_masses(&self, x: &[Complex64], y: &[Complex64]) -> Complex64 {
-        let (n, mass) = (self.system.dofs(), self.system.structure().mass());
-        let mut sum = ZERO;
-        for i in 0..n {
-            for l in 0..n {
-                sum += x[i].conj() * y[l] * mass[(i, l)];
-            }
-        }
-        sum
-    }
-
-    /// Modal assurance of two motions: how much of one first harmonic is in the other, in the mass inner product, from 0 to 1.
-    pub fn assurance(&self, one: &ModeState, other: &ModeState) -> f64 {
-        let (one, other) = (self.first(one), self.first(other));
-        let squares = [one, other].map(|x| self.in_masses(x, x).re);
-        self.in_masses(one, other).norm_sqr() / (squares[0] * squares[1])
-    }
-
-    /// The inner product of two changes of motion in the masses, all harmonics together.
-    fn kinetic(&self, one: &[f64], other: &[f64]) -> f64 {
-        let n = self.system.dofs();
-        let shape = |parts: &[f64]| -> Vec<Complex64> {
-            parts.chunks_exact(2).map(|part| Complex64::new(part[0], part[1])).collect()
-        };
-        let harmonics = one.chunks_exact(2 * n).zip(other.chunks_exact(2 * n));
-        harmonics.map(|(one, other)| self.in_masses(&shape(one), &shape(other)).re).sum()
-    }
-
-    /// The share of the viscous dampers in the damping ratio: what they lose in a cycle, against what `2 ζ ω M` puts in for ζ = 1.
-    pub fn viscous(&self, state: &ModeState) -> f64 {
-        let (n, mut lost, mut whole) = (self.system.dofs(), 0.0, 0.0);
-        for (k, &h) in self.alternation.harmonics.iter().enumerate() {
-            for i in 0..n {
-                for l in 0..n {
-                    let pair = (state.x[k * n + i].conj() * state.x[k * n + l]).re * (h * h) as f64;
-                    lost += pair * self.system.structure().damping()[(i, l)];
-                    whole += pair * self.system.structure().mass()[(i, l)];
-                }
-            }
-        }
-        lost / (2.0 * state.omega * whole)
-    }
-
-    /// First harmonic of every place, m.
-    pub fn places(&self, state: &ModeState) -> Vec<Complex64> {
-        self.at_places(self.first(state))
-    }
-
-    /// What the places see of a motion of all degrees of freedom.
-    pub fn at_places(&self, x: &[Complex64]) -> Vec<Complex64> {
-        let at = |place: &Axis| place.rows().iter().map(|(row, weight)| x[*row] * *weight).sum();
-        self.system.seen().iter().map(at).collect()
-    }
-
-    /// How real the shape is: `|X₁ᵀ M X₁| / X₁ᴴ M X₁`, one if all places move in phase or against each other. Where two modes of the symmetric
-    /// complex eigenvalue problem that the first harmonic solves become one, it is zero: their shape is orthogonal to itself.
-    /// Source: Heiss (2012), "The physics of exceptional points".
-    pub fn rigidity(&self, state: &ModeState) -> f64 {
-        let x = self.first(state);
-        let conjugate: Vec<Complex64> = x.iter().map(Complex64::conj).collect();
-        self.in_masses(&conjugate, x).norm() / self.in_masses(x, x).re
-    }
-
-    /// Modal amplitude, m √kg, from which on the first harmonic of friction is at most a share of the forces of inertia of the linear mode
-    /// `index`, and of what distinguishes it from every other mode.
-    pub fn faint(&self, modes: &[LinearMode], index: usize, share: f64, apart: f64) -> f64 {
-        let Some(mode) = modes.get(index) else { return 0.0 };
-        // a law that bounds no force is faint at small amplitudes, if at all
-        let bounded = self.elastic.iter().chain(&self.contacts).filter(|placed| placed.port.scale.is_finite());
-        let forces: Vec<(&DVector<f64>, f64)> =
-            bounded.flat_map(|placed| placed.w.iter().map(|w| (w, placed.port.scale))).collect();
-        let along = |w: &DVector<f64>, shape: &DVector<Complex64>| -> Complex64 {
-            w.iter().zip(shape.iter()).map(|(w, x)| x * *w).sum()
-        };
-        let onto = |shape: &DVector<Complex64>| -> f64 {
-            forces.iter().map(|(w, limit)| limit * along(w, shape).norm()).sum()
-        };
-        let own = onto(&mode.shape) / (share * mode.square);
-        let others = modes.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, other)| {
-            let gap = (other.square - mode.square).abs();
-            if gap <= EQUAL * mode.square { 0.0 } else { onto(&other.shape) / (apart * gap) }
-        });
-        4.0 / std::f64::consts::PI * others.fold(own, f64::max)
     }
 
     /// Whether the forces of some law are bounded by no limit, so that they do not become faint at large amplitudes.
@@ -540,7 +356,7 @@ impl<'a> ModeEquations<'a> {
             let (smaller, a) = (self.scaled(state, *factor), a * factor);
             let units = self.units(&smaller, a);
             self.evaluate(&smaller, (&smaller, a), &mut residual, None);
-            residual.iter().zip(&units).map(|(r, s)| (r / s) * (r / s)).sum::<f64>().sqrt() <= SOLVED
+            size_in(&units, &residual) <= SOLVED
         })
     }
 
@@ -566,7 +382,7 @@ impl<'a> ModeEquations<'a> {
         let mut state = start.clone();
         let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * size]);
         let scale = self.units(&start, a);
-        let norm = |r: &[f64]| r.iter().zip(&scale).map(|(r, s)| (r / s) * (r / s)).sum::<f64>().sqrt();
+        let norm = |residual: &[f64]| size_in(&scale, residual);
         self.evaluate(&state, (&start, a), &mut residual, Some(&mut jacobian));
         let mut now = norm(&residual);
         for _ in 0..ITERATIONS {
@@ -618,6 +434,11 @@ impl<'a> ModeEquations<'a> {
         }
         (now <= ROUNDED).then_some(state)
     }
+}
+
+/// Length of a residual whose entries have these units.
+fn size_in(units: &[f64], residual: &[f64]) -> f64 {
+    residual.iter().zip(units).map(|(r, unit)| (r / unit) * (r / unit)).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]
@@ -688,7 +509,7 @@ mod tests {
             let mut norms = Vec::new();
             for _ in 0..5 {
                 equations.evaluate(&state, (&start, 1.0), &mut residual, Some(&mut jacobian));
-                norms.push(residual.iter().zip(&scale).map(|(r, s)| (r / s) * (r / s)).sum::<f64>().sqrt());
+                norms.push(size_in(&scale, &residual));
                 assert!(dense::solve(&mut jacobian, size, &mut residual));
                 for (value, d) in state.x.iter_mut().chain(&mut state.force).zip(residual.chunks_exact(2)) {
                     *value -= Complex64::new(d[0], d[1]);

@@ -1,0 +1,132 @@
+//! The linear modes of the structure without its joints: where nonlinear modes begin.
+
+use super::{ModeEquations, ModeState, Placed, ZERO};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use stickslip_numerics::eigen;
+
+/// Share of the joints' stiffness that tells the equal modes of a structure without joints apart.
+const TRACE: f64 = 1e-9;
+/// Distance of the squares of two frequencies, relative, up to which modes count as equal: well above [`TRACE`].
+const EQUAL: f64 = 1e-7;
+/// Rounding of the squares of frequencies relative to the largest of them, per degree of freedom.
+const SQUARE: f64 = 64.0 * f64::EPSILON;
+/// Share of the size of a mode below which nothing is read off it.
+const FAINT_PLACE: f64 = 1e-6;
+
+/// A linear mode of the structure without its joints.
+#[derive(Debug, Clone)]
+pub(crate) struct LinearMode {
+    /// Square of the frequency, (rad/s)².
+    pub square: f64,
+    /// Shape φ with φᴴ M φ = 1, 1/√kg: real, or of a pair that neither the structure nor its joints tell apart one of the two waves
+    /// `(φ₁ ± jφ₂)/√2`, which are the same whatever mixtures of the pair φ₁ and φ₂ are.
+    pub shape: DVector<Complex64>,
+    /// Of such a wave, the member of the pair that it takes the number of: a motion that stands.
+    pub stands: Option<DVector<f64>>,
+}
+
+impl LinearMode {
+    /// In place of a wave, the motion of the pair that stands; `None` if it is no wave.
+    pub fn standing(&self) -> Option<LinearMode> {
+        let shape = real(self.stands.as_ref()?);
+        Some(LinearMode { square: self.square, shape, stands: None })
+    }
+}
+
+fn real(shape: &DVector<f64>) -> DVector<Complex64> {
+    shape.map(|x| Complex64::new(x, 0.0))
+}
+
+/// The waves of a pair of real modes. In the first a place leads those before it, as it does under a positive engine order where places
+/// stand sector by sector: the first of the places that tells decides.
+fn waves(one: &DVector<f64>, other: &DVector<f64>) -> [DVector<Complex64>; 2] {
+    let size = one.amax().max(other.amax());
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let wave = one.zip_map(other, |re, im| Complex64::new(half * re, half * im));
+    let from = wave.iter().find(|x| x.norm() > FAINT_PLACE * size).copied().unwrap_or(ZERO);
+    let leads = wave.iter().map(|x| (from.conj() * x).im).find(|leads| leads.abs() > FAINT_PLACE * size * from.norm());
+    let back = wave.map(|x| x.conj());
+    if leads.is_some_and(|leads| leads < 0.0) { [back, wave] } else { [wave, back] }
+}
+
+impl ModeEquations<'_> {
+    /// The linear modes of the structure without its joints, by rising frequency.
+    pub fn linear_modes(&self) -> Vec<LinearMode> {
+        let n = self.system.dofs();
+        let mut stiffness = self.system.structure().stiffness().clone();
+        // a trace of the joints stays, so that equal blades move with or against each other as the joints make them
+        for Placed { port, w } in self.elastic.iter().chain(&self.contacts) {
+            let kt = port.stiffness();
+            let kt = if kt > 0.0 { kt } else { self.system.structure().stiffness().amax() };
+            for w in w {
+                stiffness += w * w.transpose() * (TRACE * kt);
+            }
+        }
+        let Some(factor) = self.system.structure().mass().clone().cholesky() else { return Vec::new() };
+        let lower = factor.l();
+        let Some(inverse) = lower.solve_lower_triangular(&DMatrix::identity(n, n)) else { return Vec::new() };
+        let Some(eigen) = eigen::symmetric(&inverse * stiffness * inverse.transpose()) else { return Vec::new() };
+        let shapes = inverse.transpose() * eigen.eigenvectors;
+        let mut modes: Vec<(f64, DVector<f64>)> =
+            (0..n).map(|k| (eigen.eigenvalues[k].max(0.0), shapes.column(k).into_owned())).collect();
+        modes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let rounding = SQUARE * n as f64 * modes.last().map_or(0.0, |mode| mode.0);
+        let equal = |a: &(f64, DVector<f64>), b: &(f64, DVector<f64>)| b.0 - a.0 <= rounding;
+        let mut found = Vec::with_capacity(n);
+        for group in modes.chunk_by(equal) {
+            match group {
+                [(square, one), (_, other)] => {
+                    let made = |(shape, stands): (_, &DVector<f64>)| LinearMode {
+                        square: *square,
+                        shape,
+                        stands: Some(stands.clone()),
+                    };
+                    found.extend(waves(one, other).into_iter().zip([one, other]).map(made));
+                }
+                _ => found.extend(group.iter().map(|(square, shape)| LinearMode {
+                    square: *square,
+                    shape: real(shape),
+                    stands: None,
+                })),
+            }
+        }
+        found
+    }
+
+    /// A linear mode at amplitude `a`; forces along laws of velocity are zero. `None` if it has no frequency.
+    pub fn linear(&self, mode: &LinearMode, a: f64) -> Option<ModeState> {
+        let (n, nh) = (self.system.dofs(), self.alternation.harmonics.len());
+        let omega = mode.square.sqrt();
+        let mut x = vec![ZERO; nh * n];
+        for i in 0..n {
+            x[self.first * n + i] = a * mode.shape[i];
+        }
+        let damping = self.system.structure().damping().map(|c| Complex64::new(c, 0.0));
+        let lost = mode.shape.dotc(&(damping * &mode.shape)).re;
+        let force = vec![ZERO; nh * self.forces()];
+        (omega > 0.0).then(|| ModeState { x, force, omega, damping: lost / (2.0 * omega) })
+    }
+
+    /// Modal amplitude, m √kg, from which on the first harmonic of friction is at most a share of the forces of inertia of the linear mode
+    /// `index`, and of what distinguishes it from every other mode.
+    pub fn faint(&self, modes: &[LinearMode], index: usize, share: f64, apart: f64) -> f64 {
+        let Some(mode) = modes.get(index) else { return 0.0 };
+        // a law that bounds no force is faint at small amplitudes, if at all
+        let bounded = self.elastic.iter().chain(&self.contacts).filter(|placed| placed.port.scale.is_finite());
+        let forces: Vec<(&DVector<f64>, f64)> =
+            bounded.flat_map(|placed| placed.w.iter().map(|w| (w, placed.port.scale))).collect();
+        let along = |w: &DVector<f64>, shape: &DVector<Complex64>| -> Complex64 {
+            w.iter().zip(shape.iter()).map(|(w, x)| x * *w).sum()
+        };
+        let onto = |shape: &DVector<Complex64>| -> f64 {
+            forces.iter().map(|(w, limit)| limit * along(w, shape).norm()).sum()
+        };
+        let own = onto(&mode.shape) / (share * mode.square);
+        let others = modes.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, other)| {
+            let gap = (other.square - mode.square).abs();
+            if gap <= EQUAL * mode.square { 0.0 } else { onto(&other.shape) / (apart * gap) }
+        });
+        4.0 / std::f64::consts::PI * others.fold(own, f64::max)
+    }
+}
