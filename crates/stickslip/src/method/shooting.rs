@@ -22,7 +22,7 @@ use super::{
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::measure::measure;
-use crate::orbit::{Accuracy, Evidence, Orbit, Symmetry, history};
+use crate::orbit::{Accuracy, Evidence, Orbit, Path, Symmetry, history};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -60,6 +60,8 @@ const COARSE_RETURNS: usize = 1024;
 /// Orbits in steps of twice the length differ by less than this share of the motion where they are the same one: 256 steps of a period err by 1e-3
 /// at a Q of ten, and in proportion to it.
 const NEIGHBOUR: f64 = 0.1;
+/// Instants of a return at which such orbits are compared.
+const INSTANTS: usize = 8;
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -422,7 +424,7 @@ impl<'a> Shooter<'a> {
                 found => break found?,
             }
         };
-        let mut earlier = None;
+        let (mut earlier, mut motion) = (None, self.instants(&coarse)?);
         loop {
             count *= 2;
             self.set_count(count);
@@ -431,21 +433,33 @@ impl<'a> Shooter<'a> {
                 Some(fine) => fine,
                 None => search.find(self, Some(&state), |shooter| shooter.first_state(aim.omega), aim)?,
             };
-            let last = self.apart(&fine.state, &coarse.state, aim);
+            let finer = self.instants(&fine)?;
+            let apart = motion.iter().zip(&finer).map(|(before, now)| self.apart(now, before, aim));
+            let last = apart.fold(self.apart(&fine.state, &coarse.state, aim), f64::max);
             let error = estimate(earlier, last);
             let iterations = coarse.iterations + fine.iterations;
             if error <= tolerance {
                 let missing = Some(error.max(fine.missing.unwrap_or(0.0)));
-                let closed = Closed { iterations, missing, ..fine };
-                self.record(&closed)?;
-                return Ok(closed);
+                return Ok(Closed { iterations, missing, ..fine });
             }
             if count >= MOST {
                 let cause = Breakdown::Unresolved { steps: count, estimate: error, tolerance };
                 return Err(OrbitError::Breakdown { method: self.name, omega: aim.omega, cause });
             }
-            (earlier, coarse) = (Some(last), Closed { iterations, ..fine });
+            (earlier, motion, coarse) = (Some(last), finer, Closed { iterations, ..fine });
         }
+    }
+
+    /// Displacements and velocities of a closed motion, which is kept, at instants of its return: where a contact that sticks leaves an offset open,
+    /// two motions may begin alike and differ.
+    fn instants(&mut self, closed: &Closed) -> Result<Vec<Vec<f64>>, OrbitError> {
+        self.record(closed)?;
+        let path = self.stepping.path(&self.shared, Symmetry::FullPeriod, self.duration);
+        let at = |k: usize| {
+            let sample = path.sample(self.duration * k as f64 / INSTANTS as f64);
+            sample.displacement.into_iter().chain(sample.velocity).collect()
+        };
+        Ok((0..INSTANTS).map(at).collect())
     }
 
     /// The orbit to which a motion has settled, in finer steps: Newton's method takes it there, and not to another one.
@@ -457,7 +471,7 @@ impl<'a> Shooter<'a> {
         (self.apart(&fine.state, &settled.state, aim) <= NEIGHBOUR).then_some(fine)
     }
 
-    /// Distance of two states, relative to the first.
+    /// Distance of two states, or of their displacements and velocities, relative to the first.
     fn apart(&self, state: &[f64], other: &[f64], aim: Aim) -> f64 {
         let change: Vec<f64> = state.iter().zip(other).map(|(a, b)| a - b).collect();
         norm(&self.weights, &change) / self.size(state, aim)
