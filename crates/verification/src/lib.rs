@@ -107,6 +107,53 @@ pub fn random_system_of(seed: u64, among: &[&'static LawInfo]) -> (System, f64) 
     (builder.build().unwrap(), natural * random.between(0.4, 1.6))
 }
 
+/// A row of 6 to 20 bodies, or a ring of them, mistuned and held by the ground and by each other, with joints of any laws of the table between about
+/// every other pair of neighbours, each body driven with a phase of its own, and a drive frequency near its band, rad/s.
+pub fn random_row(seed: u64) -> (System, f64) {
+    // numbers of neighbouring seeds are those of one sequence, one apart
+    let mut random = Random::new(seed << 20);
+    let (count, closed) = (6 + random.below(15), random.unit() < 0.5);
+    let pairs = if closed { count } else { count - 1 };
+    let natural: f64 = 100.0;
+    let (mut mass, mut stiffness) = (DMatrix::zeros(count, count), DMatrix::zeros(count, count));
+    for i in 0..count {
+        mass[(i, i)] = random.between(0.95, 1.05);
+        stiffness[(i, i)] += natural * natural * random.between(0.95, 1.05);
+    }
+    let between = natural * natural * random.between(0.0, 0.2);
+    for (i, j) in (0..pairs).map(|i| (i, (i + 1) % count)) {
+        stiffness[(i, i)] += between;
+        stiffness[(j, j)] += between;
+        stiffness[(i, j)] -= between;
+        stiffness[(j, i)] -= between;
+    }
+    // damping ratios of some percent, so that transients die
+    let damping = &mass * (0.08 * natural);
+    let places = (0..count).map(|i| format!("p{i}")).collect();
+    let mut builder = System::builder(Structure::new(places, mass, damping, stiffness).unwrap());
+    for i in 0..pairs {
+        if random.unit() < 0.5 {
+            continue;
+        }
+        let law = random_law(&mut random, TABLE);
+        // a law of several directions has its first between the pair, and the others to the ground
+        let axis = |d: usize| match d {
+            0 => Axis::new(vec![(i, 1.0), ((i + 1) % count, -1.0)]),
+            d => Axis::new(vec![((i + d) % count, 1.0)]),
+        };
+        let axes = (0..law.directions()).map(axis).collect();
+        builder = builder.joint(format!("j{i}"), law, axes);
+    }
+    for i in 0..count {
+        let force = Complex64::from_polar(random.between(2.0, 10.0), random.between(0.0, 6.0));
+        builder = builder.force(i, 1, force);
+    }
+    if random.unit() < 0.3 {
+        builder = builder.force(count - 1, 0, Complex64::new(random.between(-5.0, 5.0), 0.0));
+    }
+    (builder.build().unwrap(), natural * random.between(0.8, 1.3))
+}
+
 /// A random structure and a drive frequency (rad/s): 1 to 4 masses, 1 to 3 joints of exact laws between any two places, light
 /// damping, one or two harmonics of force on some masses, driven anywhere between a third and three times a natural frequency,
 /// every third one at a natural frequency of the structure without joints.
