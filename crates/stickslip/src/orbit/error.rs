@@ -142,8 +142,9 @@ impl Breakdown {
 pub enum OrbitError {
     /// The iteration did not converge.
     #[error(
-        "{method} stopped at Ω = {omega:.4} rad/s after {iterations} iterations, residual {residual:.1e}; \
-         start from a neighbouring orbit, or check that a periodic motion exists (undamped resonance has none){instead}"
+        "{method} stopped at Ω = {omega:.4} rad/s after {iterations} iterations, residual {residual:.1e}{}; \
+         start from a neighbouring orbit, or check that a periodic motion exists (undamped resonance has none){instead}",
+        if *spent { ", with all the work that one point may take" } else { "" }
     )]
     NotConverged {
         /// The method.
@@ -154,6 +155,8 @@ pub enum OrbitError {
         iterations: usize,
         /// Smallest residual reached.
         residual: f64,
+        /// Whether the search ended because it had taken all the work that one point may take.
+        spent: bool,
         /// What may find it instead, as words behind a comma; empty where nobody has asked or nothing does.
         instead: String,
     },
@@ -371,7 +374,7 @@ fn unsettled(repeats: Option<usize>, instead: &str) -> String {
 impl OrbitError {
     /// The search of `method` at `omega` ended after so many iterations, with this least residual.
     pub(crate) fn not_converged(method: &'static str, omega: f64, iterations: usize, residual: f64) -> Self {
-        OrbitError::NotConverged { method, omega, iterations, residual, instead: String::new() }
+        OrbitError::NotConverged { method, omega, iterations, residual, spent: false, instead: String::new() }
     }
 
     /// No motion that `method` finds at `omega` stays where it is.

@@ -135,6 +135,7 @@ impl<'a> BranchEquations<'a> {
         // as in a point: the guess solves the whole structure, and large ones begin without friction
         let guess = (self.system.dofs() < GUESSED).then(|| Guess::new(&self.system, self.omega));
         let start = self.level.begin(&self.system, &self.ports, guess.as_ref(), self.omega);
+        self.level.begin_point();
         let solved = self.level.solve(&self.ports, self.omega, start);
         self.motion = solved.map_err(|lost| self.lost(lost.iterations, lost.residual))?;
         let norm = |c: &[Complex64]| c.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
@@ -149,12 +150,14 @@ impl<'a> BranchEquations<'a> {
             return None;
         }
         self.level.unpack(&self.ports, (x, self.length), &mut self.motion);
+        self.level.begin_point();
         self.level.polish(&self.ports, self.omega, &mut self.motion, 10).ok()?;
         let places = path::places(&mut self.level, &self.rest, self.omega, &self.motion).ok()?;
         let truncation = self.finer.as_mut().and_then(|finer| {
             finer.drive(&self.system, &self.ports, &self.rest, self.omega).ok()?;
             let mut motion = transfer(&self.motion, self.level.harmonics(), finer.harmonics());
             // Newton's method alone: a search would find another branch where this one turns
+            finer.begin_point();
             finer.polish(&self.ports, self.omega, &mut motion, CHECK).ok()?;
             let better = path::places(finer, &self.rest, self.omega, &motion).ok()?;
             let coarse = Compared { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
@@ -218,6 +221,7 @@ impl Equations for BranchEquations<'_> {
         }
         let mut start = self.motion.clone();
         self.level.unpack(&self.ports, (x, self.length), &mut start);
+        self.level.begin_point();
         let Ok(motion) = self.level.solve(&self.ports, self.omega, start) else { return false };
         self.motion = motion;
         x.copy_from_slice(&self.level.pack(&self.ports, &self.motion, self.length));

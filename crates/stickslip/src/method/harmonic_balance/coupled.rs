@@ -492,6 +492,7 @@ mod tests {
     use super::super::ease::GIVEN;
     use super::super::equations::{Level, Solution};
     use super::super::rest::Rest;
+    use super::super::solve::{POINT, Work};
     use super::super::uncoupled::Uncoupled;
     use super::*;
     use crate::law::{Coulomb, Dahl, Jenkins, Jenkins2d, SharedLaw};
@@ -601,7 +602,7 @@ mod tests {
         }
     }
 
-    /// Steps that are shortened again and again take no products, and end no search; products do.
+    /// Steps that are shortened again and again take no products, and end no search; products do. The next point has as many again.
     #[test]
     fn products_are_the_work_of_a_search() {
         let contacts: Vec<(SharedLaw, usize)> =
@@ -609,12 +610,31 @@ mod tests {
         let system = system(&contacts);
         let ports = Ports::new(&system).unwrap();
         let mut level = Level::new(vec![1], 64, &ports, None);
-        level.begin_anew();
+        level.begin_anew(&ports);
         level.assembled = 10_000;
         assert!(level.coupled.is_some() && !level.is_exhausted(&ports));
         level.products = 1_000_000;
         assert!(level.is_exhausted(&ports));
-        level.begin_anew();
+        level.begin_point();
+        assert!(!level.is_exhausted(&ports));
+    }
+
+    /// What searches of a point took before, here or at other levels, is missing from what the next one may take.
+    #[test]
+    fn searches_of_a_point_share_what_it_may_take() {
+        let joints: Vec<_> = (0..3).map(|_| (Arc::new(Coulomb { limit: 0.3 }) as SharedLaw, 1)).collect();
+        let ports = Ports::new(&system(&joints)).unwrap();
+        let mut level = Level::new(vec![1, 3], 64, &ports, None);
+        level.alternation.marched = usize::MAX / 2;
+        assert!(level.is_exhausted(&ports));
+        level.begin_anew(&ports);
+        assert!(level.spent.is_beyond(POINT) && level.is_exhausted(&ports), "the point has nothing left");
+        let share = |share: f64| Work { eliminated: share * POINT.eliminated, marched: share * POINT.marched };
+        (level.spent, level.elsewhere) = (share(0.6), share(0.3));
+        assert!(!level.is_exhausted(&ports));
+        level.elsewhere = share(0.5);
+        assert!(level.is_exhausted(&ports));
+        level.begin_point();
         assert!(!level.is_exhausted(&ports));
     }
 
@@ -647,7 +667,7 @@ mod tests {
         let system = system(&joints);
         let ports = Ports::new(&system).unwrap();
         let mut level = Level::new((1..512).step_by(2).collect(), 8192, &ports, None);
-        level.begin_anew();
+        level.begin_anew(&ports);
         level.products = 2_000;
         assert!(level.coupled.is_some() && !level.is_exhausted(&ports));
         level.products = 5_000;

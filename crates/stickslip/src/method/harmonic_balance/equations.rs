@@ -27,6 +27,7 @@ use super::linear::Linear;
 use super::ports::{Alternation, Beginning, Member, Port, Ports, REPEATS, block, blocks};
 use super::receptance::{Modal, Receptance};
 use super::rest::Rest;
+use super::solve::Work;
 use super::sparse::Sparse;
 use crate::method::guess::Guess;
 use crate::model::{Cyclic, System};
@@ -47,12 +48,15 @@ const SKETCHED: usize = 16;
 /// Distance of the states from those a period later, relative to their size, at which sketched derivatives are taken: what fewer samples leave out.
 const ALMOST: f64 = 1e-3;
 /// The share of the springs of closed contacts that a law's derivative has beside a structure that has them.
-const OPEN: f64 = -1.0;
+pub(super) const OPEN: f64 = -1.0;
 /// All that belongs to one number of harmonics.
 #[derive(Debug, Clone)]
 pub(super) struct Level {
     /// How often the derivative was assembled in the present search, where it is a matrix.
     pub assembled: usize,
+    /// What searches before it took of the present point, here and at other levels, see [`Level::taken`].
+    pub spent: Work,
+    pub elsewhere: Work,
     pub alternation: Alternation,
     /// Of the axes; empty in the banded form.
     pub(super) receptance: Receptance,
@@ -94,7 +98,7 @@ pub(super) struct Level {
     /// Forces that those of [`Ease::pull`] are drawn to, [axis][harmonic], N.
     pub(super) anchor: Vec<Complex64>,
     pub(super) step: Vec<f64>,
-    image: Vec<Complex64>,
+    pub(super) image: Vec<Complex64>,
     /// Of ports with a memory, the states at t = 0 in the motion that was evaluated last, and what is forgotten of them.
     states: Vec<Beginning>,
     /// Whether those that forget where they began do so there in the next motion: the same states as from rest, in fewer periods.
@@ -179,6 +183,8 @@ impl Level {
         let widest = ports.iter().map(|port| port.axes).max().unwrap_or(0);
         Level {
             assembled: 0,
+            spent: Work::default(),
+            elsewhere: Work::default(),
             alternation,
             receptance: Receptance::Formed(Vec::new()),
             penalty: vec![0.0; ports.len()],
@@ -401,7 +407,7 @@ impl Level {
     }
 
     /// The forces of motion ports, and their derivatives.
-    fn respond(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, ease: Ease, slopes: Slopes) {
+    pub(super) fn respond(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, ease: Ease, slopes: Slopes) {
         let nh = self.harmonics().len();
         self.alternation.relaxed_at_zero = motion.relaxed_at_zero;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
@@ -458,25 +464,37 @@ impl Level {
 
     /// What the forces of force ports must be: into their residual, and its derivatives.
     fn image(&mut self, ports: &Ports, omega: f64, motion: &Solution, ease: Ease, slopes: Slopes) {
-        let nh = self.harmonics().len();
-        for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.is_force()) {
-            let range = port.first * nh..(port.first + port.axes) * nh;
-            let penalty = self.penalty[p];
-            let (c, force) = (&motion.c[range.clone()], &motion.force[range.clone()]);
-            let slot = &mut self.tangents[block(&self.blocks, p, port, nh)];
-            let image = &mut self.image[..range.len()];
-            let slot = (slopes != Slopes::None).then(|| {
-                slot.fill(0.0);
-                slot
-            });
-            self.alternation.image(port, (omega, penalty, ease.limits), (c, force), image, slot);
-            for (at, (force, image)) in range.zip(force.iter().zip(&*image)) {
-                let mut r = force - image;
-                if ease.pull > 0.0 {
-                    r += (force - self.anchor[at]) * ease.pull;
-                }
-                (self.residual[2 * at], self.residual[2 * at + 1]) = (r.re, r.im);
+        for p in (0..ports.len()).filter(|p| ports[*p].is_force()) {
+            self.image_of(ports, p, omega, motion, (ease, slopes));
+        }
+    }
+
+    /// The same of one of them.
+    pub(super) fn image_of(
+        &mut self,
+        ports: &Ports,
+        p: usize,
+        omega: f64,
+        motion: &Solution,
+        (ease, slopes): (Ease, Slopes),
+    ) {
+        let (port, nh) = (&ports[p], self.harmonics().len());
+        let range = port.first * nh..(port.first + port.axes) * nh;
+        let penalty = self.penalty[p];
+        let (c, force) = (&motion.c[range.clone()], &motion.force[range.clone()]);
+        let slot = &mut self.tangents[block(&self.blocks, p, port, nh)];
+        let image = &mut self.image[..range.len()];
+        let slot = (slopes != Slopes::None).then(|| {
+            slot.fill(0.0);
+            slot
+        });
+        self.alternation.image(port, (omega, penalty, ease.limits), (c, force), image, slot);
+        for (at, (force, image)) in range.zip(force.iter().zip(&*image)) {
+            let mut r = force - image;
+            if ease.pull > 0.0 {
+                r += (force - self.anchor[at]) * ease.pull;
             }
+            (self.residual[2 * at], self.residual[2 * at + 1]) = (r.re, r.im);
         }
     }
 
@@ -539,8 +557,15 @@ impl Level {
         any
     }
 
-    /// Forgets what a search has seen of the laws' memories.
-    pub fn begin_anew(&mut self) {
+    /// Begins a point: what its searches may take is theirs together.
+    pub fn begin_point(&mut self) {
+        (self.assembled, self.products, self.alternation.marched) = (0, 0, 0);
+        (self.spent, self.elsewhere) = (Work::default(), Work::default());
+    }
+
+    /// Begins a search, which knows nothing of the laws' memories.
+    pub fn begin_anew(&mut self, ports: &Ports) {
+        self.spent = self.taken_of_point(ports);
         (self.assembled, self.products, self.alternation.marched) = (0, 0, 0);
         (self.nearby, self.linearised, self.sketches) = (false, false, self.sketch.is_some());
         self.states.iter_mut().for_each(|known| *known = Beginning::default());

@@ -5,7 +5,8 @@
 //! - `closed`: the mean of bodies that nothing but contacts holds;
 //! - `equations`: those along the joints, and their derivative;
 //! - `linear`: their derivative as a matrix; `coupled`: steps by its products;
-//! - `solve`: Newton's method on them; `estimate`: the error by a finer solution; `sampling`: what samples leave out; `proximal`: the way to forces that nothing decides;
+//! - `solve`: Newton's method on them; `estimate`: the error by a finer solution; `sampling`: what samples leave out; `interior`: all rigid joints at once;
+//!   `proximal`: the way to forces that nothing decides;
 //! - `path`: the orbit's numbers from its harmonics.
 //!
 //! The unknowns are the harmonics of the joints' relative motions, or of their forces where the velocity alone decides them: the cost
@@ -21,6 +22,7 @@ mod ease;
 mod equations;
 mod estimate;
 mod hold;
+mod interior;
 mod kept;
 mod linear;
 mod mode;
@@ -54,7 +56,7 @@ use num_complex::Complex64;
 use ports::{Port, Ports};
 use rest::Rest;
 use sampling::samples_for;
-use solve::Lost;
+use solve::{Lost, POINT, Work};
 use sparse::Sparse;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
@@ -396,7 +398,24 @@ impl Balance<'_> {
             Level::new(harmonics, samples, ports, sparse)
         });
         level.drive(&self.system, &self.ports, &self.rest, omega).map_err(Lost::at)?;
+        let others = self.levels.iter().filter(|(other, _)| **other != top);
+        let taken = others.map(|(_, level)| level.taken_of_point(&self.ports));
+        let elsewhere = taken.fold(Work::default(), Work::and);
+        let level = self.levels.get_mut(&top).expect("made above");
+        level.elsewhere = elsewhere;
         Ok(level)
+    }
+
+    /// Begins a point.
+    fn begin_point(&mut self, drive: f64) {
+        self.drive = drive;
+        self.levels.values_mut().for_each(Level::begin_point);
+    }
+
+    /// Whether the searches of the point have taken all that they may.
+    fn is_spent(&self) -> bool {
+        let taken = self.levels.values().map(|level| level.taken_of_point(&self.ports));
+        taken.fold(Work::default(), Work::and).is_beyond(POINT)
     }
 
     /// Whether a solution with twice the harmonics takes no more than seconds.
@@ -487,7 +506,14 @@ impl Balance<'_> {
         if lost.away {
             return OrbitError::drift(NAME, self.drive);
         }
-        OrbitError::not_converged(NAME, self.drive, lost.iterations, lost.residual)
+        OrbitError::NotConverged {
+            method: NAME,
+            omega: self.drive,
+            iterations: lost.iterations,
+            residual: lost.residual,
+            spent: self.is_spent(),
+            instead: String::new(),
+        }
     }
 
     /// Harmonics of the places.
@@ -534,7 +560,11 @@ impl Balance<'_> {
         let mut found = level.polish(&self.ports, omega, &mut motion, NEARBY);
         if found.is_err() && self.ports.has_forces() {
             motion = Solution { iterations: motion.iterations, ..near.clone() };
-            found = level.by_proximal_points(&self.ports, omega, &mut motion);
+            found = level.by_interior_points(&self.ports, omega, &mut motion);
+            if found.is_err() {
+                motion = Solution { iterations: motion.iterations, ..near.clone() };
+                found = level.by_proximal_points(&self.ports, omega, &mut motion);
+            }
         }
         found.map_err(|l| self.lost(l))?;
         let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
@@ -614,7 +644,7 @@ impl Balance<'_> {
             let (mut error, finer, y) = match self.compare(top, omega, &motion, &x) {
                 Ok(compared) => compared,
                 // what was found has an error that is known
-                Err(_) if top > first => break,
+                Err(_) if top > first && !self.is_spent() => break,
                 Err(lost) => return Err(self.lost(lost)),
             };
             if (self.ports.has_forces() || self.ports.has_steep()) && top > first {
@@ -694,7 +724,7 @@ impl Solver for Balance<'_> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
-        self.drive = omega;
+        self.begin_point(omega);
         let omega = omega / self.periods as f64;
         let warm = self.warm(start);
         match self.from(self.first, omega, warm) {
@@ -710,7 +740,7 @@ impl Solver for Balance<'_> {
         match self.warm(start) {
             // the harmonics that the neighbour needed are enough
             Some((top, motion)) if omega.is_finite() && omega > 0.0 => {
-                self.drive = omega;
+                self.begin_point(omega);
                 self.nearby(top, omega / self.periods as f64, &motion)
             }
             _ => self.orbit(omega, start),

@@ -32,7 +32,7 @@ const QUICK: usize = 8;
 impl Level {
     /// The solution from `motion`, and if there is none the nearest point that was found.
     pub(super) fn by_proximal_points(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
-        self.begin_anew();
+        self.begin_anew(ports);
         self.anchor.clone_from(&motion.force);
         let mut good = Solution { residual: f64::INFINITY, ..motion.clone() };
         let (mut pull, mut factor) = (PULL, 1.0f64);

@@ -230,8 +230,8 @@ impl Sparse {
             .collect()
     }
 
-    /// Replaces the residual by the Newton step; `tangents` holds K or T, one block per port. False if it is singular.
-    pub fn step(&mut self, ports: &Ports, along: &Along, tangents: &[f64], residual: &mut [f64]) -> bool {
+    /// Factors the equations of the Newton step; `tangents` holds K or T, one block per port. False if they are singular.
+    pub fn linearise(&mut self, ports: &Ports, along: &Along, tangents: &[f64]) -> bool {
         let nh = self.harmonics.len();
         let size = 2 * nh;
         let (blocks, _) = super::ports::blocks(ports, nh);
@@ -252,19 +252,15 @@ impl Sparse {
             self.tangent.add(row * size, column * size, stiffness);
             self.tangent.add(row * size + 1, column * size + 1, stiffness);
         }
-        self.whole.fill(0.0);
         for (p, port) in ports.iter().enumerate() {
             let tangent = &tangents[super::ports::block(&blocks, p, port, nh)];
             let wide = size * port.axes;
-            let r = &residual[port.first * size..port.first * size + wide];
             let penalty = along.penalty[p];
             for (a, row) in tangent.chunks_exact(wide).enumerate() {
                 let own = port.first + a / size;
                 let Some(force) = self.forces[own] else {
-                    let pull: f64 = row.iter().zip(r).map(|(k, r)| k * r).sum();
                     for &(i, w) in &self.ends[own] {
                         let at = self.position[i] * size + a % size;
-                        self.whole[at] += w * pull;
                         for (other, row) in port.range().zip(row.chunks_exact(size)) {
                             for &(l, v) in &self.ends[other] {
                                 let column = self.position[l] * size;
@@ -277,7 +273,6 @@ impl Sparse {
                     continue;
                 };
                 let at = self.position[force] * size + a % size;
-                self.whole[at] = r[a];
                 self.tangent.add(at, at, 1.0 + along.ease.stay(self.harmonics[a % size / 2] as usize));
                 for &(i, w) in &self.ends[own] {
                     self.tangent.add(self.position[i] * size + a % size, at, -w);
@@ -303,8 +298,30 @@ impl Sparse {
                 }
             }
         }
-        if !self.tangent.factor() {
-            return false;
+        self.tangent.factor()
+    }
+
+    /// Replaces the residual by the Newton step, with the factors of the equations. False if it is none.
+    pub fn step(&mut self, ports: &Ports, tangents: &[f64], residual: &mut [f64]) -> bool {
+        let nh = self.harmonics.len();
+        let size = 2 * nh;
+        let (blocks, _) = super::ports::blocks(ports, nh);
+        self.whole.fill(0.0);
+        for (p, port) in ports.iter().enumerate() {
+            let tangent = &tangents[super::ports::block(&blocks, p, port, nh)];
+            let wide = size * port.axes;
+            let r = &residual[port.first * size..port.first * size + wide];
+            for (a, row) in tangent.chunks_exact(wide).enumerate() {
+                let own = port.first + a / size;
+                if let Some(force) = self.forces[own] {
+                    self.whole[self.position[force] * size + a % size] = r[a];
+                    continue;
+                }
+                let pull: f64 = row.iter().zip(r).map(|(k, r)| k * r).sum();
+                for &(i, w) in &self.ends[own] {
+                    self.whole[self.position[i] * size + a % size] += w * pull;
+                }
+            }
         }
         self.tangent.solve(&mut self.whole);
         for (q, ends) in self.ends.iter().enumerate() {

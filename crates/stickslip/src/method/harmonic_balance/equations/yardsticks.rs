@@ -36,7 +36,7 @@ impl Level {
 
     /// Units of the residual: the motion's length, or the law's scale, but no more than the forces that there are: a limit that nothing reaches says
     /// nothing of them. Where only laws hold a direction, the mean of the motion is the small difference of large ones, and its unit the larger of these.
-    pub(super) fn measure(&mut self, ports: &Ports, motion: &Solution, length: f64) {
+    pub(in super::super) fn measure(&mut self, ports: &Ports, motion: &Solution, length: f64) {
         let nh = self.harmonics().len();
         let forces = ports.iter().filter(|port| port.is_force()).flat_map(Port::range);
         let largest =

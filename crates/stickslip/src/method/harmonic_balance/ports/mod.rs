@@ -9,6 +9,7 @@
 //! Joints that move alike may have one force port together, see [`gathered`].
 
 mod alternation;
+mod barrier;
 mod events;
 mod gathered;
 mod march;
@@ -21,6 +22,7 @@ mod step;
 mod tests;
 
 pub(super) use alternation::{Alternation, Beginning};
+pub(super) use barrier::Barrier;
 use gathered::Gathered;
 pub(super) use march::REPEATS;
 use prox::{Rigid, Times};
@@ -107,6 +109,14 @@ impl Port {
             Kernel::Rigid(_) => true,
             Kernel::Prox(times) => times.at_velocity(0.0).is_none(),
             _ => false,
+        }
+    }
+
+    /// The limit of rigid friction along one axis, N.
+    pub fn limit(&self) -> Option<f64> {
+        match &self.kernel {
+            Kernel::Rigid(rigid) => Some(rigid.limit),
+            _ => None,
         }
     }
 

@@ -1,0 +1,268 @@
+//! Interior points: rigid friction of all joints at once, from forces well inside their limits to those that are there.
+//!
+//! Newton's method takes one length of step for all, and where hundreds of instants of many joints change between stick and slip some joint always
+//! asks for a short one: its steps grow in number with the joints. The equations are a variational inequality, though: the forces of a structure that
+//! only dissipates are monotone in the motions. Such are solved along a path on which no instant has decided yet: what decides it, a force off
+//! its limit times what holds it there, is μ > 0 everywhere, see `ports::barrier`. A step looks ahead how far it would come without μ, and takes as
+//! much of it as that asks for. The number of steps hardly knows how many joints there are. From the end of the path Newton's method takes a few
+//! steps to the solution.
+//! Source: Mehrotra (1992), "On the implementation of a primal-dual interior point method"; Wright, "Primal-Dual Interior-Point Methods" (1997).
+
+use super::coupled::Near;
+use super::ease::GIVEN;
+use super::equations::{Level, OPEN, Slopes, Solution};
+use super::ports::{Alternation, Barrier, Port, Ports, block};
+use super::solve::Lost;
+use num_complex::Complex64;
+
+/// Samples of a period for the wave of the highest harmonic: Newton's method goes on with all of them.
+const SAMPLED: usize = 16;
+/// Products, in units of the square of the limit, at which the path ends: nearly all instants have decided.
+const DECIDED: f64 = 1e-4;
+/// Steps at most; 5 to 30 are usual.
+const MOST: usize = 60;
+/// Steps without half of the products after which the path leads nowhere: elastic friction beside the rigid one may turn it round, since it has corners that
+/// no products round off.
+const PATIENCE: usize = 8;
+/// Newton iterations from its end; 1 to 5 are usual.
+const ITERATIONS: usize = 30;
+
+/// Where a path is.
+struct Along {
+    /// Of the ports with rigid friction along one axis.
+    barriers: Vec<Option<Barrier>>,
+    alternation: Alternation,
+    /// Harmonics of the argument of one of them.
+    y: Vec<Complex64>,
+}
+
+impl Along {
+    fn each(&self) -> impl Iterator<Item = &Barrier> {
+        self.barriers.iter().flatten()
+    }
+
+    /// The mean of all products after a share of the step.
+    fn gap(&self, share: f64) -> f64 {
+        self.each().map(|barrier| barrier.gap(share)).sum::<f64>() / self.each().count() as f64
+    }
+}
+
+impl Level {
+    /// The solution by way of interior points, from `motion`, whose forces of rigid friction do not count.
+    pub(super) fn by_interior_points(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
+        self.begin_anew(ports);
+        if !self.follow_interior(ports, omega, motion) {
+            return Err(Lost::after(motion.iterations, f64::INFINITY));
+        }
+        self.newton(ports, omega, motion, GIVEN, ITERATIONS)
+    }
+
+    /// To the end of the path; whether it was reached.
+    fn follow_interior(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> bool {
+        let Some(mut along) = self.begin_interior(ports, omega, motion) else { return false };
+        let (mut mark, mut waited) = (f64::INFINITY, 0);
+        for _ in 0..MOST {
+            let left = along.each().map(Barrier::left).fold(0.0, f64::max);
+            if left <= DECIDED {
+                return true;
+            }
+            (mark, waited) = if left < 0.5 * mark { (left, 0) } else { (mark, waited + 1) };
+            if !left.is_finite() || waited > PATIENCE || self.is_exhausted(ports) {
+                return false;
+            }
+            self.assembled += 1;
+            self.respond(ports, omega, motion, GIVEN, Slopes::All);
+            self.follow(motion, GIVEN);
+            let length = self.length(motion);
+            self.measure(ports, motion, length);
+            for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.is_force()) {
+                let tangent = block(&self.blocks, p, port, self.harmonics().len());
+                argument((self, p, port), omega, motion, &mut along.y);
+                match &mut along.barriers[p] {
+                    Some(barrier) => {
+                        barrier.linearise(&mut along.alternation, &along.y, &mut self.tangents[tangent]);
+                    }
+                    None => self.image_of(ports, p, omega, motion, (GIVEN, Slopes::All)),
+                }
+            }
+            self.before.copy(motion);
+            let near = Near { length, residual: 1.0, sketched: false };
+            let Some(ahead) = self.interior_step(ports, omega, motion, &mut along, (0.0, near)) else { return false };
+            let gap = along.gap(0.0) * (along.gap(ahead) / along.gap(0.0)).powi(3);
+            motion.copy(&self.before);
+            self.follow(motion, GIVEN);
+            let Some(share) = self.interior_step(ports, omega, motion, &mut along, (gap, near)) else { return false };
+            motion.iterations += 1;
+            self.advance(ports, motion, share, length);
+            along.barriers.iter_mut().flatten().for_each(|barrier| barrier.advance(share));
+        }
+        false
+    }
+
+    /// Where a path begins: without rigid friction.
+    fn begin_interior(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Option<Along> {
+        let nh = self.harmonics().len();
+        let top = self.harmonics().last().copied().unwrap_or(0);
+        let samples = (SAMPLED * (top + 1)).next_power_of_two();
+        let mut along = Along {
+            barriers: Vec::with_capacity(ports.len()),
+            alternation: Alternation::new(self.harmonics().to_vec(), samples),
+            y: vec![Complex64::default(); nh],
+        };
+        let limits: Vec<Option<f64>> =
+            ports.iter().zip(&self.penalty).map(|(port, e)| port.limit().filter(|_| e.is_finite())).collect();
+        if limits.iter().all(Option::is_none) {
+            return None;
+        }
+        for (port, _) in ports.iter().zip(&limits).filter(|(_, limit)| limit.is_some()) {
+            motion.force[port.first * nh..][..nh].fill(Complex64::default());
+        }
+        self.respond(ports, omega, motion, GIVEN, Slopes::None);
+        self.follow(motion, GIVEN);
+        for (p, (port, limit)) in ports.iter().zip(limits).enumerate() {
+            argument((self, p, port), omega, motion, &mut along.y);
+            along.barriers.push(limit.map(|limit| Barrier::new(limit, &mut along.alternation, &along.y)));
+        }
+        Some(along)
+    }
+
+    /// The whole step to products of `gap`, with what the last one leaves of them unless that is zero, from the residual of the other equations; `motion`
+    /// goes with it. How much of it stays inside, `None` if there is none.
+    fn interior_step(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        motion: &mut Solution,
+        along: &mut Along,
+        (gap, near): (f64, Near),
+    ) -> Option<f64> {
+        let nh = self.harmonics().len();
+        let corrected = gap > 0.0;
+        for (p, port) in ports.iter().enumerate() {
+            let Some(barrier) = &mut along.barriers[p] else { continue };
+            barrier.aim((gap, corrected), &mut along.alternation, &mut self.image[..nh]);
+            let range = port.first * nh..(port.first + 1) * nh;
+            for (at, (force, image)) in range.clone().zip(motion.force[range].iter().zip(&self.image)) {
+                let r = force - image;
+                (self.residual[2 * at], self.residual[2 * at + 1]) = (r.re, r.im);
+            }
+        }
+        let found = match corrected {
+            true => self.newton_step_again(ports, omega, GIVEN, near),
+            false => self.newton_step(ports, omega, GIVEN, near),
+        };
+        if !found {
+            return None;
+        }
+        self.advance(ports, motion, 1.0, near.length);
+        self.step_forces(ports, motion, near.length);
+        for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
+            self.add_springs(p, port, OPEN);
+        }
+        self.follow(motion, GIVEN);
+        let mut share = 1.0f64;
+        for (p, port) in ports.iter().enumerate() {
+            if let Some(barrier) = &mut along.barriers[p] {
+                argument((self, p, port), omega, motion, &mut along.y);
+                share = share.min(barrier.step(&mut along.alternation, &along.y));
+            }
+        }
+        Some(share)
+    }
+}
+
+/// The harmonics of `λ + ε u'` along the axis of a port of one.
+fn argument((level, p, port): (&Level, usize, &Port), omega: f64, motion: &Solution, y: &mut [Complex64]) {
+    let at = port.first * y.len();
+    let own = motion.c[at..].iter().zip(&motion.force[at..]).zip(level.harmonics());
+    for (y, ((c, force), h)) in y.iter_mut().zip(own) {
+        *y = force + c * Complex64::new(0.0, level.penalty[p] * *h as f64 * omega);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ease::SOLVED;
+    use super::super::rest::Rest;
+    use super::super::sparse::Sparse;
+    use super::*;
+    use crate::law::{Coulomb, Jenkins};
+    use crate::model::{Around, Disk, Force, GROUND, Joint, Mass, Model, Spring, System, normal_pattern};
+    use std::f64::consts::TAU;
+    use std::sync::Arc;
+
+    /// Hertz, near the resonances of the blades.
+    const NEAR: f64 = 16.2;
+
+    /// A ring of blades of 16 Hz, 1 % mistuned, with rigid friction between neighbours.
+    fn ring(blades: usize, limit: f64) -> System {
+        let deviations = normal_pattern(blades, 0.01, 7);
+        let disk = Disk { sectors: blades, forces: vec![Around::EngineOrder(3)], motions: vec![] };
+        let ring = disk.ring(|s| {
+            let between = |other: &str| ["b".to_owned(), other.to_owned()];
+            let own = 1e4 * (1.0 + deviations[s]);
+            Model {
+                masses: vec![Mass::new("b", 1.0)],
+                springs: vec![
+                    Spring { between: between(GROUND), stiffness: own, damping: 0.5 },
+                    Spring { between: between("next.b"), stiffness: 300.0, damping: 0.0 },
+                ],
+                joints: vec![Joint { name: "j".into(), between: between("next.b"), law: Arc::new(Coulomb { limit }) }],
+                forces: vec![Force { on: "b".into(), amplitude: 1.0, phase: 0.0, harmonic: 1 }],
+                ..Model::default()
+            }
+        });
+        ring.unwrap().assemble().unwrap()
+    }
+
+    /// The level of a ring at a frequency, banded where the ring is large.
+    fn level(system: &System, hertz: f64) -> (Level, Ports) {
+        let ports = Ports::new(system).unwrap();
+        let harmonics: Vec<usize> = (1..=15).step_by(2).collect();
+        let mut level = Level::new(harmonics.clone(), 1024, &ports, Sparse::new(system, &ports, &harmonics));
+        level.drive(system, &ports, &Rest::new(system, &ports), TAU * hertz).unwrap();
+        (level, ports)
+    }
+
+    /// The motion is the one that proximal points lead to, another way to it.
+    #[test]
+    fn interior_points_lead_to_the_motion_that_proximal_points_find() {
+        let system = ring(12, 0.5);
+        let (mut level, ports) = level(&system, NEAR);
+        let start = level.unhindered();
+        let (mut one, mut other) = (start.clone(), start);
+        level.by_interior_points(&ports, TAU * NEAR, &mut one).unwrap();
+        level.by_proximal_points(&ports, TAU * NEAR, &mut other).unwrap();
+        let size = other.c.iter().map(|c| c.norm()).fold(0.0, f64::max);
+        let apart = one.c.iter().zip(&other.c).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(apart < 1e-6 * size, "{apart:.1e} of {size:.1e}");
+    }
+
+    /// Eight times the blades take no more than twice the steps, on and beside the resonances, from much slip to much stick.
+    #[test]
+    fn steps_hardly_grow_with_the_blades() {
+        for hertz in [15.5, NEAR, 17.0] {
+            for limit in [0.1, 0.5, 1.5] {
+                let steps = [12, 96].map(|blades| {
+                    let system = ring(blades, limit);
+                    let (mut level, ports) = level(&system, hertz);
+                    let mut motion = level.unhindered();
+                    level.by_interior_points(&ports, TAU * hertz, &mut motion).unwrap();
+                    assert!(motion.residual <= SOLVED);
+                    motion.iterations
+                });
+                assert!(steps[1] <= 2 * steps[0].max(20), "{hertz} Hz, {limit} N: {steps:?}");
+            }
+        }
+    }
+
+    /// Where there is no rigid friction there is no path.
+    #[test]
+    fn elastic_friction_has_no_interior() {
+        let mut couple = crate::model::example::blade_couple_massless();
+        couple.joints[0].law = Arc::new(Jenkins { stiffness: 1e4, limit: 2.0 });
+        let (mut level, ports) = level(&couple.assemble().unwrap(), 121.0);
+        let mut motion = level.unhindered();
+        assert!(level.by_interior_points(&ports, TAU * 121.0, &mut motion).is_err());
+    }
+}

@@ -1,0 +1,168 @@
+//! Rigid friction along one axis between barriers: samples of a force that stays inside its limits, on the way to those that it has.
+//!
+//! With `y = λ + ε v` the force of a sample is `f = Π(y)`, which is the same as `y - f = ξ - η` with `ξ, η ≥ 0`, `ξ (L - f) = 0` and
+//! `η (L + f) = 0`. On the way both products are μ, the same at all instants, and everything that is zero at the end is positive: a force that is held
+//! at its limit in one step may leave it in the next.
+
+use super::Alternation;
+use num_complex::Complex64;
+
+/// The products in units of the limit and the largest `y`, at which a force begins: half of its limit where `y` is largest.
+const BEGINS: f64 = 0.5;
+/// Share of the way to the nearest bound that a step may go.
+const INSIDE: f64 = 0.99;
+
+/// The samples of one port.
+#[derive(Debug, Clone)]
+pub(in super::super) struct Barrier {
+    /// N.
+    limit: f64,
+    /// Unit of the products, N²: the limit times the largest `y`, or the limit.
+    unit: f64,
+    /// What it is made of, and its step: see [`Sample`].
+    samples: Vec<Sample>,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Sample {
+    force: f64,
+    upper: f64,
+    lower: f64,
+    /// `y`, and how `f` follows it.
+    argument: f64,
+    slope: f64,
+    /// What the products are to be.
+    aims: [f64; 2],
+    /// Steps of `f`, ξ and η.
+    step: [f64; 3],
+}
+
+impl Sample {
+    /// How far the force may rise and fall.
+    fn room(&self, limit: f64) -> [f64; 2] {
+        [limit - self.force, limit + self.force]
+    }
+
+    /// The step of `f` is `slope (δy + lack)`: what is left once ξ and η follow from it and from their products.
+    fn lack(&self, limit: f64) -> f64 {
+        let [above, below] = self.room(limit);
+        self.argument - self.force - self.aims[0] / above + self.aims[1] / below
+    }
+}
+
+impl Barrier {
+    /// Where the way begins, from the harmonics of `y` without the force.
+    pub fn new(limit: f64, alternation: &mut Alternation, y: &[Complex64]) -> Self {
+        alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
+        let largest = alternation.signal.iter().fold(limit, |most, y| most.max(y.abs()));
+        let begin = |y: &f64| {
+            let force = BEGINS * limit * (y / (BEGINS * largest)).tanh();
+            let held = y - force;
+            // ξ - η = y - f, ξ η = the square of the largest
+            let more = 0.5 * (held.abs() + held.hypot(2.0 * largest));
+            let less = largest * (largest / more);
+            let (upper, lower) = if held > 0.0 { (more, less) } else { (less, more) };
+            Sample { force, upper, lower, ..Sample::default() }
+        };
+        let samples = alternation.signal.iter().map(begin).collect();
+        Barrier { limit, unit: limit * largest, samples }
+    }
+
+    /// The mean of the products after a share of the step, in units of [`Barrier::unit`].
+    pub fn gap(&self, share: f64) -> f64 {
+        let products = |s: &Sample| {
+            let [force, upper, lower] = s.step.map(|step| share * step);
+            (s.upper + upper) * (self.limit - s.force - force) + (s.lower + lower) * (self.limit + s.force + force)
+        };
+        self.samples.iter().map(products).sum::<f64>() / (2.0 * self.samples.len() as f64 * self.unit)
+    }
+
+    /// The same as it is, in units of the square of the limit.
+    pub fn left(&self) -> f64 {
+        self.gap(0.0) * self.unit / (self.limit * self.limit)
+    }
+
+    /// The derivative of the harmonics of `f` by those of the argument, which are `y`, into `tangent`.
+    pub fn linearise(&mut self, alternation: &mut Alternation, y: &[Complex64], tangent: &mut [f64]) {
+        alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
+        alternation.reserve_slopes(1);
+        for (i, s) in self.samples.iter_mut().enumerate() {
+            let [above, below] = s.room(self.limit);
+            s.argument = alternation.signal[i];
+            s.slope = 1.0 / (1.0 + s.upper / above + s.lower / below);
+            alternation.slopes[0][i] = s.slope;
+        }
+        tangent.fill(0.0);
+        if alternation.slope_spectrum(0, 0) {
+            alternation.add_slope(tangent, (0, 0), 1, |_| Complex64::new(1.0, 0.0));
+        }
+    }
+
+    /// The harmonics of the force into `image`, as far as the argument is what it is, after a step to products of `gap`; if it is `corrected` with
+    /// those of the last step in them.
+    pub fn aim(&mut self, (gap, corrected): (f64, bool), alternation: &mut Alternation, image: &mut [Complex64]) {
+        let product = gap * self.unit;
+        for (s, force) in self.samples.iter_mut().zip(&mut alternation.force[0]) {
+            let [step, upper, lower] = if corrected { s.step } else { [0.0; 3] };
+            s.aims = [product + upper * step, product - lower * step];
+            *force = s.force + s.slope * s.lack(self.limit);
+        }
+        image.fill(Complex64::default());
+        alternation.add_force(0, image);
+    }
+
+    /// The step to the argument with the harmonics `y`, and how much of it stays inside all bounds, at most all.
+    pub fn step(&mut self, alternation: &mut Alternation, y: &[Complex64]) -> f64 {
+        alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
+        let mut most = 1.0 / INSIDE;
+        for (s, y) in self.samples.iter_mut().zip(&alternation.signal) {
+            let [above, below] = s.room(self.limit);
+            let force = s.slope * (y - s.argument + s.lack(self.limit));
+            let upper = (s.aims[0] + s.upper * force) / above - s.upper;
+            let lower = (s.aims[1] - s.lower * force) / below - s.lower;
+            s.step = [force, upper, lower];
+            for (room, step) in [(above, -force), (below, force), (s.upper, upper), (s.lower, lower)] {
+                if step < 0.0 {
+                    most = most.min(-room / step);
+                }
+            }
+        }
+        INSIDE * most
+    }
+
+    /// So much of the step.
+    pub fn advance(&mut self, share: f64) {
+        for s in &mut self.samples {
+            s.force += share * s.step[0];
+            s.upper += share * s.step[1];
+            s.lower += share * s.step[2];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where nothing moves the argument the path leads to the projection of it: held at a limit, or free between them.
+    #[test]
+    fn the_path_ends_at_the_projection() {
+        let limit = 0.7;
+        for y in [-30.0, -0.71, -0.2, 0.0, 0.69, 5.0f64] {
+            let mut alternation = Alternation::new(vec![0], 16);
+            let (argument, mut image, mut tangent) = ([Complex64::new(y, 0.0)], [Complex64::default()], [0.0; 4]);
+            let mut barrier = Barrier::new(limit, &mut alternation, &argument);
+            while barrier.left() > 1e-10 {
+                let gap = barrier.gap(0.0);
+                barrier.linearise(&mut alternation, &argument, &mut tangent);
+                barrier.aim((0.1 * gap, false), &mut alternation, &mut image);
+                let share = barrier.step(&mut alternation, &argument);
+                assert!(share > 0.0 && share <= 1.0);
+                barrier.advance(share);
+            }
+            let found = barrier.samples[0].force;
+            // as far as the products let it be off
+            assert!((found - y.clamp(-limit, limit)).abs() < 1e-8, "{y}: {found}");
+        }
+    }
+}
