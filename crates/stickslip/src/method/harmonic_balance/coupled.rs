@@ -356,6 +356,12 @@ pub(super) fn product_work(ports: &Ports, harmonics: usize) -> f64 {
     4.0 * harmonics as f64 * (ports.count() as f64).powi(2) + ports.iter().map(of_law).sum::<f64>()
 }
 
+/// Multiplications in a step by products, with the lowest harmonics of unknown forces eliminated together.
+pub(super) fn step_products(ports: &Ports, harmonics: usize) -> f64 {
+    let together = if ports.has_forces() { LOWEST.min(2 * harmonics * ports.count()) } else { 0 };
+    VECTORS as f64 * product_work(ports, harmonics) + (together as f64).powi(3) / 3.0
+}
+
 /// `1 + R K` with one real K for all harmonics, of a structure in modes.
 #[derive(Debug, Clone)]
 struct Split {

@@ -36,6 +36,7 @@ mod sampling;
 mod solve;
 mod sparse;
 mod uncoupled;
+mod work;
 
 use super::guess::Guess;
 use super::{Method, MethodError, MethodInfo, MethodOption, Options, OrbitError, PERIOD, Solver, periods};
@@ -61,6 +62,7 @@ use sparse::Sparse;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::f64::consts::TAU;
+pub use work::step_work;
 
 /// Its name in study files.
 pub const NAME: &str = "harmonic-balance";

@@ -115,6 +115,12 @@ impl Sparse {
         harmonics as f64 * Banded::bytes(factor.0, factor.1) + Banded::bytes(tangent.0, tangent.1)
     }
 
+    /// Multiplications in the elimination of a step with so many harmonics.
+    pub fn work(&self, harmonics: usize) -> f64 {
+        let (_, (rows, band)) = Sparse::sizes(self.right.len() / 2, self.band, harmonics);
+        rows as f64 * (band as f64).powi(2)
+    }
+
     /// Rows and band of the factor of a harmonic, and of the tangent, of so many places and unknown forces with such a band.
     fn sizes(whole: usize, band: usize, harmonics: usize) -> ((usize, usize), (usize, usize)) {
         ((2 * whole, 2 * band + 1), (2 * whole * harmonics, (band + 1) * 2 * harmonics - 1))
