@@ -1,6 +1,8 @@
-//! Contact nodes of three directions on a block of steel, all coupled through it: time per point of a resonance curve by their number.
+//! Contact nodes of three directions on a block of steel, all coupled through it: a resonance curve by their number.
 //!
-//! `cargo bench -p stickslip --bench contacts [-- NODES[:DOFS]…]`; without a number of degrees of freedom the block is 12 elements long.
+//! `cargo bench -p stickslip --bench contacts [-- NODES[,NODES…][:DOFS]…]`; without a number of degrees of freedom the block is 12 elements long. Its
+//! cross-section has room for the most nodes that stand together, so that all of them are on the same block. At the end stands the exponent
+//! with which the time of a point grows with the nodes.
 
 #![allow(clippy::print_stdout)] // a bench prints its result
 
@@ -9,54 +11,66 @@ mod brick;
 
 use brick::Brick;
 use num_complex::Complex64;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip::law::FrictionContact;
 use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Axis, System};
+use stickslip::orbit::{JointMotion, Orbit};
 use stickslip::structure::Structure;
 use stickslip::structure::reduction::{Damping, Free, Whole};
 
 /// Modes that are kept, beside the residual vectors of the contacts.
 const MODES: usize = 20;
 const HARMONICS: usize = 5;
-const POINTS: usize = 25;
+const POINTS: usize = 21;
+/// To this error five harmonics know such a motion.
+const TOLERANCE: f64 = 0.01;
+/// Force that presses all contacts together, N, and that on the first node across and along the normal, which slides the face and tilts it.
+const PRELOAD: f64 = 100.0;
+const FORCE: [f64; 3] = [120.0, 30.0, 15.0];
+/// The curve, in multiples of the first frequency of the block without contacts. At the resonance all contacts slip, and many separate.
+const RANGE: [f64; 2] = [0.9, 1.7];
 
 fn main() {
     let number = |a: &str| a.parse::<usize>().ok();
-    let asked = |a: String| match a.split_once(':') {
-        Some((nodes, dofs)) => Some((number(nodes)?, number(dofs)?)),
-        None => Some((number(&a)?, 0)),
+    let asked = |a: String| {
+        let (nodes, dofs) = a.split_once(':').unwrap_or((&a, "0"));
+        Some((nodes.split(',').map(number).collect::<Option<Vec<_>>>()?, number(dofs)?))
     };
-    let rows: Vec<_> = std::env::args().skip(1).filter_map(asked).collect();
-    let rows = if rows.is_empty() { vec![(10, 0), (30, 0), (100, 0)] } else { rows };
-    rows.into_iter().for_each(|(nodes, dofs)| row(nodes, dofs));
+    let blocks: Vec<_> = std::env::args().skip(1).filter_map(asked).collect();
+    let blocks = if blocks.is_empty() { vec![(vec![10, 30, 100], 0)] } else { blocks };
+    blocks.into_iter().for_each(|(nodes, dofs)| block(&nodes, dofs));
 }
 
-fn row(nodes: usize, dofs: usize) {
-    let edge = ((nodes as f64).sqrt().ceil() as usize).max(6);
+/// The curves of one block with each of these numbers of nodes.
+fn block(nodes: &[usize], dofs: usize) {
+    let most = nodes.iter().copied().max().unwrap_or(1);
+    let edge = ((most as f64).sqrt().ceil() as usize).max(6);
     let long = dofs.div_ceil(3 * edge * edge).max(12);
-    let begin = seconds();
     let brick = Brick::new([long, edge - 1, edge - 1], [0.2, 0.08, 0.06], true);
+    println!("{} degrees of freedom, {HARMONICS} harmonics, {POINTS} points", brick.dofs());
+    let points: Vec<_> = nodes.iter().map(|&nodes| (nodes as f64, curve(&brick, nodes))).collect();
+    if points.len() > 1 {
+        println!("time of a point grows with the nodes to the power of {:.2}", exponent(&points));
+    }
+}
+
+/// The block in few coordinates with so many nodes, and its first frequency without them, rad/s.
+fn system(brick: &Brick, nodes: usize) -> (System, f64) {
+    forget_memory();
+    let begin = seconds();
     let ports = brick.face(nodes);
     let axes = ports.len();
     let damping = Damping::Ratio { ratio: 0.005, up_to: 4e4 };
     let whole = Whole::new(brick.mass.clone(), damping, brick.stiffness.clone(), ports).unwrap();
     let modes = whole.modes(8e4).unwrap();
-    println!("{nodes} nodes: matrices and modes in {:.1} s, {}", seconds() - begin, memory());
+    println!("{nodes} nodes: modes in {:.1} s, {}", seconds() - begin, memory());
     let first = modes.values[0].sqrt();
     let begin = seconds();
     let free = Free::new(&whole, &modes, 0.0, 1).unwrap();
     let reduced = free.reduced(MODES.min(free.modes()), 1).unwrap();
-    println!(
-        "  {} dofs, {} modes, first {:.0} rad/s, reduced to {} in {:.1} s, {}",
-        brick.dofs(),
-        free.modes(),
-        first,
-        reduced.dofs(),
-        seconds() - begin,
-        memory()
-    );
-    let begin = seconds();
+    println!("  first mode {first:.0} rad/s, {}, in {:.1} s, {}", reduced.kind, seconds() - begin, memory());
     let names = (0..reduced.dofs()).map(|i| format!("q{i}")).collect();
     let structure =
         Structure::new(names, reduced.mass.clone(), reduced.damping.clone(), reduced.stiffness.clone()).unwrap();
@@ -66,48 +80,112 @@ fn row(nodes: usize, dofs: usize) {
         / (reduced.ports[(0, 0)].abs().max(reduced.ports[(1, 0)].abs()).max(reduced.ports[(2, 0)].abs()).powi(2)
             * nodes as f64);
     let mut builder = System::builder(structure);
-    let load = 100.0;
     for node in 0..axes / 3 {
         let [x, y, z] = [0, 1, 2].map(|d| 3 * node + d);
         let law = FrictionContact {
             tangential: stiffness,
             normal: stiffness,
             friction: 0.3,
-            preload: load / nodes as f64,
+            preload: PRELOAD / nodes as f64,
             tangents: 2,
         };
         builder = builder.joint(format!("c{node}"), Arc::new(law), vec![row(y), row(z), row(x)]);
     }
     for k in 0..reduced.dofs() {
-        let f = 8.0 * (reduced.ports[(1, k)] + 0.5 * reduced.ports[(2, k)]);
+        let f = (0..3).map(|d| FORCE[d] * reduced.ports[(d, k)]).sum();
         builder = builder.force(k, 1, Complex64::new(f, 0.0));
     }
-    let system = builder.build().unwrap();
-    println!("  system in {:.1} s, {}", seconds() - begin, memory());
-    let method = HarmonicBalance { harmonics: Some(HARMONICS), ..HarmonicBalance::default() };
-    let begin = seconds();
+    (builder.build().unwrap(), first)
+}
+
+/// Seconds for a point of the curve with so many nodes, on the average.
+fn curve(brick: &Brick, nodes: usize) -> f64 {
+    let (system, first) = system(brick, nodes);
+    forget_memory();
+    let method =
+        HarmonicBalance { harmonics: Some(HARMONICS), tolerance: Some(TOLERANCE), ..HarmonicBalance::default() };
     let mut solver = method.solver(&system).unwrap();
-    println!("  solver in {:.2} s, {}", seconds() - begin, memory());
-    let mut start: Option<Vec<f64>> = None;
+    let (mut start, mut found, mut peak) = (None::<Vec<f64>>, Tally::default(), String::new());
+    let mut largest = 0.0;
+    let whole_curve = seconds();
     for i in 0..POINTS {
-        let omega = first * (0.8 + 1.2 * i as f64 / (POINTS - 1) as f64);
+        let along = i as f64 / (POINTS - 1) as f64;
+        let omega = first * (RANGE[0] * (1.0 - along) + RANGE[1] * along);
         let begin = seconds();
-        match solver.orbit(omega, start.as_deref()) {
-            Ok(orbit) => {
-                let slip = orbit.joints.iter().map(|j| j.slip_fraction).sum::<f64>() / nodes as f64;
-                println!(
-                    "  {:8.1} rad/s: {:8.4} s, {} iterations, slip {:.2}, truncation {:?}",
-                    omega,
-                    seconds() - begin,
-                    orbit.evidence.iterations,
-                    slip,
-                    orbit.evidence.truncation
-                );
-                start = Some(orbit.start);
+        let orbit = match solver.orbit(omega, start.as_deref()) {
+            Ok(orbit) => orbit,
+            Err(error) => {
+                println!("  {omega:8.1} rad/s: {:.3} s, {error}", seconds() - begin);
+                continue;
             }
-            Err(error) => println!("  {omega:8.1} rad/s: {:.4} s, {error}", seconds() - begin),
+        };
+        found.add(&orbit, seconds() - begin);
+        let driven = orbit.joints[0].displacement[0];
+        let amplitude = 0.5 * (driven.1 - driven.0);
+        if amplitude > largest {
+            let share = |of: fn(&JointMotion) -> f64| 100.0 * orbit.joints.iter().map(of).sum::<f64>() / nodes as f64;
+            let separate = orbit.joints.iter().filter(|joint| joint.open_fraction > 0.0).count();
+            largest = amplitude;
+            peak = format!(
+                "{:.2} um at {omega:.0} rad/s, where {:.0} % slip, {:.0} % are apart, and {separate} separate at times",
+                1e6 * amplitude,
+                share(|joint| joint.slip_fraction),
+                share(|joint| joint.open_fraction),
+            );
         }
+        start = Some(orbit.start);
     }
+    let point = (seconds() - whole_curve) / POINTS as f64;
+    println!("  {point:.3} s a point, {}; {}", found.text(), memory());
+    println!("  largest {peak}");
+    point
+}
+
+/// What the points of a curve have in common.
+#[derive(Default)]
+struct Tally {
+    status: BTreeMap<&'static str, usize>,
+    iterations: Vec<usize>,
+    longest: f64,
+    error: Option<f64>,
+}
+
+impl Tally {
+    fn add(&mut self, orbit: &Orbit, seconds: f64) {
+        *self.status.entry(orbit.evidence.accuracy.status()).or_default() += 1;
+        self.iterations.push(orbit.evidence.iterations);
+        self.longest = self.longest.max(seconds);
+        self.error = orbit.evidence.truncation.map_or(self.error, |error| Some(self.error.unwrap_or(0.0).max(error)));
+    }
+
+    fn text(&self) -> String {
+        let of = self.iterations.len().max(1) as f64;
+        let status: Vec<_> = self.status.iter().map(|(status, count)| format!("{count} {status}")).collect();
+        let error = self.error.map_or(String::new(), |error| format!(", error {error:.1e} at most"));
+        format!(
+            "{:.3} s at most; {:.1} iterations, {} at most; {}{error}",
+            self.longest,
+            self.iterations.iter().sum::<usize>() as f64 / of,
+            self.iterations.iter().max().unwrap_or(&0),
+            status.join(", "),
+        )
+    }
+}
+
+/// The slope of the line through the logarithms that has the least squares.
+fn exponent(points: &[(f64, f64)]) -> f64 {
+    let logarithms: Vec<_> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
+    let mean = |of: fn(&(f64, f64)) -> f64| logarithms.iter().map(of).sum::<f64>() / logarithms.len() as f64;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    let (above, below) =
+        logarithms.iter().fold((0.0, 0.0), |(a, b), p| (a + (p.0 - x) * (p.1 - y), b + (p.0 - x).powi(2)));
+    above / below
+}
+
+/// The most memory that is held from here on counts.
+fn forget_memory() {
+    // where the system cannot, it is the most of all
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
 /// The most memory that was held.

@@ -156,6 +156,7 @@ impl ModelSummary {
         let kind = kinds::of(study);
         let slow = Costing::new(study, &cases[0]);
         let (usual, cost) = (slow.usual(), (kind.cost)(&slow));
+        let usual_seconds = usual.seconds(&(kind.cost)(&usual));
         Ok(ModelSummary {
             case: shown.case.label(),
             cases: study.cases(),
@@ -169,8 +170,8 @@ impl ModelSummary {
             range,
             warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
             size: slow.size(&cost, Units::of(study, (kind.grain)(study)).len()),
-            usual_seconds: usual.seconds(&(kind.cost)(&usual)),
-            seconds: slow.seconds(&cost),
+            usual_seconds,
+            seconds: slow.seconds(&cost).max(usual_seconds),
         })
     }
 

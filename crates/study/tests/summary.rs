@@ -430,6 +430,51 @@ harmonics = 15
     assert!((1.5..3.0).contains(&growth), "{growth}");
 }
 
+/// A place has a peak to refine where a resonance lifts one of the inner frequencies above its neighbours: none if all are nearest to the ends.
+#[test]
+fn peaks_are_refined_where_resonances_are() {
+    let seconds = |range: &str, peaks: &str| {
+        let range = format!("frequency = {{ {range}, points = 3 }}\npeaks = {peaks}");
+        let given = r#"frequency = { from = "119.5 Hz", to = "122.5 Hz", points = 241 }"#;
+        let cases = r#"vary = { Ft = { from = "1 N", to = "10 N", points = 1000 } }"#;
+        let vary = r#"vary = { Ft = ["2 N", "4 N", "6 N", "8 N"] }"#;
+        summary(&template("blade-couple", &[(given, &range), (vary, cases)])).seconds
+    };
+    // at 121 Hz and below the contact's own resonance: nearest to the middle of the one range, to an end of the other
+    for (range, peak) in [(r#"from = "61 Hz", to = "181 Hz""#, true), (r#"from = "110 Hz", to = "300 Hz""#, false)] {
+        let (with, without) = (seconds(range, "true"), seconds(range, "false"));
+        assert_eq!(with > 1.2 * without, peak, "{range}: {with} s, {without} s without");
+    }
+}
+
+/// Wedges under the platforms of 12 and 36 blades, one preload, on one thread, and of 12 mistuned ones: processor time of the command, with its files.
+/// The three points of the last are far from each other, and every orbit of its peak is sought anew; it was ended after 36 s.
+#[test]
+fn the_usual_time_of_wedges_is_that_which_was_measured() {
+    let vary = r#"vary = { speed = ["2000 rpm", "2600 rpm", "4000 rpm", "8000 rpm"] }"#;
+    let mistuned = "sectors = \"N\"\nmistuning = { of = \"kx\", deviation = \"2 %\", seed = 7 }";
+    let tuned = "sectors = \"N\"";
+    for (blades, points, disk, measured) in [
+        (12, 3, tuned, 0.4),
+        (12, 61, tuned, 1.6),
+        (36, 3, tuned, 0.6),
+        (36, 61, tuned, 2.6),
+        (12, 3, mistuned, 40.0),
+        (12, 61, mistuned, 32.0),
+    ] {
+        let [blades, points] = [format!("N = {blades} "), format!("points = {points} ")];
+        let edits = [("N = 12 ", &*blades), ("points = 71 ", &points), (vary, ""), (tuned, disk)];
+        let text = template("under-platform-wedge", &edits);
+        let summary = summary(&text);
+        let usual = summary.usual_seconds;
+        assert!(usual <= summary.seconds, "{blades}, {points}: {usual} s, up to {} s", summary.seconds);
+        assert!(
+            (measured / 3.0..3.0 * measured).contains(&usual),
+            "{blades}, {points}: {usual} s, measured {measured} s"
+        );
+    }
+}
+
 /// Transients of 13 points were measured: 0.4 s with the exact law, 26 s with the smooth one. The free contact has nearly no damping of its own, but the drive
 /// does not move it, and friction does not leave it alone: only the longest time counts with it.
 #[test]

@@ -92,6 +92,12 @@ fn cost(costing: &Costing<'_>) -> Cost {
         Some(_) => costing.cases,
         None => (costing.cases * costing.places * PEAKS).floor(),
     };
+    // a place at an end of the range has its peak there, and no orbit refines it; a structure by its matrices has resonances one after the other
+    let refined = match (costing.resonances(), &costing.case.model.substructure) {
+        (Some(resonances), Some(_)) if costing.case.model.ring.is_none() => peaks / PEAKS * resonances,
+        (Some(resonances), _) => peaks / PEAKS * resonances.min(PEAKS),
+        (None, _) => peaks,
+    };
     let linear = if costing.study.wants_references() { costing.frequencies * REFERENCE_POINTS as f64 } else { 0.0 };
     // a tuned disk takes a sector's time, and its curve the frequencies of the other
     let tuned = if values.flag(amplification::KEY.name) == Some(true) { costing.cases } else { 0.0 };
@@ -112,7 +118,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
         drawn: curves * costing.frequencies,
         unit: costing.orbit_bytes(),
         work: points * costing.extra()
-            + (points + REFINING * peaks + 2.0 * linear + tuned * costing.frequencies) * costing.orbit(),
+            + (points + REFINING * refined + tuned * costing.frequencies) * costing.orbit()
+            + 2.0 * linear * costing.reference(),
     }
 }
 
