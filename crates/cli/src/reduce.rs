@@ -37,7 +37,7 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
             "a sector of a disk is reduced for all of its waves by every study of it, and has no files of its own",
         );
     }
-    if substructure.reduction == Reduction::None {
+    if let Reduction::None { .. } = substructure.reduction {
         return wrong(
             "its [structure] says reduce = false: nothing is to be saved; say how far the reduction is to reach",
         );
@@ -94,7 +94,8 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports)
     let (component, damping) = (few.component, SubstructureDamping::Own);
     let earlier = ReductionEvidence { error: few.error, up_to: few.up_to };
     let earlier = substructure.earlier.map_or(earlier, |first| first.then(earlier));
-    let whole = Substructure { component, damping, reduction: Reduction::None, earlier: Some(earlier), disk: None };
+    let reduction = Reduction::None { up_to: 0.0 };
+    let whole = Substructure { component, damping, reduction, earlier: Some(earlier), disk: None };
     let model = Model { substructure: Some(whole), places, ..Model::default() };
     let system = model.assemble().map_err(|error| error.to_string())?;
     let what = format!(
@@ -119,8 +120,11 @@ fn damping_keys(substructure: &Substructure) -> Vec<String> {
             format!("reduce = {{ up_to = \"{:e} rad/s\", tolerance = {tolerance:e}{} }}", up_to, named(kind))
         }
         // what its error is measured up to is the study's
+        Reduction::Modes { modes, kind: ReductionKind::Rubin, orders, .. } if orders > 1 => {
+            format!("reduce = {{ modes = {modes}, orders = {orders} }}")
+        }
         Reduction::Modes { modes, kind, .. } => format!("reduce = {{ modes = {modes}{} }}", named(Some(kind))),
-        Reduction::None => "reduce = false".to_owned(),
+        Reduction::None { .. } => "reduce = false".to_owned(),
     };
     match substructure.damping {
         SubstructureDamping::Own => vec!["reduce = false".to_owned()],
