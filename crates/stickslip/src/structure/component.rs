@@ -12,7 +12,7 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use stickslip_numerics::definite::sparse_definite;
-use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted};
+use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, columns};
 
 /// Matrices of a structure and the names of their rows. A copy is a reference to the same matrices, and to the reductions made of them.
 ///
@@ -171,6 +171,23 @@ pub struct BetweenComponent {
     pub up_to: f64,
 }
 
+/// A sector of a ring in few coordinates, itself a sector: its rows are the coordinates, and once more those of the next sector.
+#[derive(Debug, Clone)]
+pub struct SectorComponent {
+    /// Its rows are called `number.q`.
+    pub component: Component,
+    /// The numbers of its low and its high side.
+    pub pairs: Vec<(String, String)>,
+    /// What is seen, over its rows.
+    pub seen: Vec<Row>,
+    /// How it was made, in words.
+    pub kind: String,
+    /// The largest relative error of what is seen.
+    pub error: f64,
+    /// The error holds up to there, rad/s.
+    pub up_to: f64,
+}
+
 /// Small matrices.
 #[derive(Debug, Clone)]
 pub(crate) enum Form {
@@ -303,11 +320,6 @@ impl Component {
         };
         let reduce = |whole: &Whole| in_few(whole, how).map(|few| (few.reduced, few.up_to));
         let few = self.0.whole.seen_at(seen.to_vec())?.between(there, reduce, tolerance)?;
-        let sparse = |dense: &DMatrix<f64>| {
-            let all = (0..dense.ncols()).flat_map(|k| (0..dense.nrows()).map(move |i| (i, k)));
-            let entries = all.map(|at| (at.0, at.1, dense[at])).filter(|entry| entry.2 != 0.0);
-            Matrix::from_triplets(dense.nrows(), entries).map_err(|_| ReductionError::OutOfRange)
-        };
         let Reduced { mass, damping, stiffness, ports, kind, .. } = few.rest;
         let damping = if self.matrices().1.is_some() { Some(sparse(&damping)?) } else { None };
         let component = Component::new(vec![String::new(); mass.nrows()], sparse(&mass)?, damping, sparse(&stiffness)?);
@@ -319,6 +331,47 @@ impl Component {
             kind,
             error: few.deviation.error,
             up_to: few.up_to,
+        })
+    }
+
+    /// As one of `sectors` sectors of a ring in few coordinates, as a sector of such a ring again: `Tᵀ M T` over its own coordinates and those of the
+    /// next sector, which its high side follows. So matrices stay positive semidefinite, and the ring is that of the reduction.
+    ///
+    /// # Errors
+    /// As [`Component::reduced`].
+    pub fn reduced_sector(
+        &self,
+        boundary: &Boundary,
+        sectors: usize,
+        seen: &[Row],
+        how: &Reduction,
+    ) -> Result<SectorComponent, ReductionError> {
+        let kept = self.sector(boundary, sectors);
+        let few = kept.reduced(seen, how)?;
+        let Form::Sector(reduced) = few.form() else { return Err(ReductionError::NoPorts) };
+        let r = reduced.dofs();
+        let columns = kept.sector.whole_columns(&reduced.basis);
+        let (mass, damping, stiffness) = self.matrices();
+        let project = |matrix: &Matrix| columns::products(self.dofs(), &columns, &matrix.times_columns(&columns));
+        // rounding apart they are symmetric
+        let symmetric = |matrix: &Matrix| {
+            let product = project(matrix);
+            sparse(&((&product + product.transpose()) * 0.5))
+        };
+        let damping = damping.map(|damping| sparse(&project(damping))).transpose()?;
+        let rows = (1..=2 * r).map(|number| format!("{number}.q")).collect();
+        let component = Component::new(rows, symmetric(mass)?, damping, symmetric(stiffness)?);
+        let mut places = vec![Row::new(); seen.len()];
+        for &(port, at, shift, weight) in &reduced.ports {
+            places[port].push((at + if shift == 0 { 0 } else { r }, weight));
+        }
+        Ok(SectorComponent {
+            component: component.map_err(|_| ReductionError::OutOfRange)?,
+            pairs: (1..=r).map(|low| (low.to_string(), (low + r).to_string())).collect(),
+            seen: places,
+            kind: few.kind().to_owned(),
+            error: few.error(),
+            up_to: few.up_to(),
         })
     }
 
@@ -341,6 +394,13 @@ impl Component {
         known.push((boundary.clone(), sectors, kept.clone()));
         kept
     }
+}
+
+/// The entries of a small matrix.
+fn sparse(dense: &DMatrix<f64>) -> Result<Matrix, ReductionError> {
+    let all = (0..dense.ncols()).flat_map(|k| (0..dense.nrows()).map(move |i| (i, k)));
+    let entries = all.map(|at| (at.0, at.1, dense[at])).filter(|entry| entry.2 != 0.0);
+    Matrix::from_triplets(dense.nrows(), entries).map_err(|_| ReductionError::OutOfRange)
 }
 
 /// An answer that is computed once: whoever asks the same at the same time waits for the one who computes.

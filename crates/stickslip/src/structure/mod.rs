@@ -9,7 +9,7 @@ pub mod reduction;
 mod sector;
 mod uncoupled;
 
-pub use component::{BetweenComponent, Component, ReducedComponent, Reduction, ReductionKind};
+pub use component::{BetweenComponent, Component, ReducedComponent, Reduction, ReductionKind, SectorComponent};
 pub(crate) use component::{Form as ReducedForm, KeptSector, SectorBlade};
 pub use cyclic::{Axis, BladeError, Boundary, BoundaryError};
 pub(crate) use cyclic::{CyclicSector, RingEntry, RingRow};
