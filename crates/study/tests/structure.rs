@@ -756,3 +756,65 @@ fn orders_of_residual_vectors() {
     // (900 Hz / 3 kHz of the first mode left out)⁴ for each; what rounding leaves of the third
     assert!(two < 0.1 * one && three <= two.max(1e-9), "{one:e} {two:e} {three:e}");
 }
+
+/// The error of the reduction stands in every row of every kind that has an orbit or a frequency: in all tables but those of samples over time.
+#[test]
+fn the_error_of_the_reduction_stands_beside_every_result() {
+    let brick = blade();
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "npz", (1.0, 1.0));
+    let range = "frequency = { from = \"450 Hz\", to = \"560 Hz\", points = 5 }";
+    let mut met = Vec::new();
+    for (kind, method) in [
+        ("hysteresis\"\nfrequency = \"500 Hz\"", true),
+        ("orbit\"\nfrequency = \"500 Hz\"\nmultipliers = true", true),
+        (&format!("response\"\n{range}\n[figure]\nreferences = true"), true),
+        (&format!("performance\"\n{range}\nvary = {{ Ft = [\"1 mN\", \"4 mN\", \"20 mN\"] }}"), true),
+        (&format!("branch\"\n{}\nharmonics = 1\nsamples = 64", range.replace(", points = 5", "")), false),
+        ("transient\"\nduration = \"20 ms\"\ntime_step = \"0.05 ms\"\nstart = { hung = \"1 mm\" }", false),
+        ("modes\"\namplitude = { from = \"0.01 mm\", to = \"1 mm\", points = 4 }", false),
+        ("campbell\"\nspeed = { from = \"100 Hz\", to = \"600 Hz\", points = 3 }", false),
+    ] {
+        let free = kind.starts_with("transient");
+        let text =
+            "[parameters]\nFt = \"4 mN\"\n".to_owned()
+                + &structure("npz", "rows.csv", "m-kg-s", "modal_damping = 0.01\nreduce = { up_to = \"3 kHz\" }")
+                    .replacen("schema = 1\n", "", 1)
+                + &place("tip", &tip(&brick, 0, 1))
+                + "[[mass]]\nname = \"hung\"\nmass = \"1 g\"\n\
+               [[spring]]\nbetween = [\"hung\", \"tip.z\"]\nstiffness = \"100 N/mm\"\ndamping = \"0.1 kg/s\"\n\
+               [[joint]]\nname = \"pad\"\nbetween = [\"tip.z\", \"ground\"]\n\
+               law = { kind = \"jenkins\", limit = \"Ft\", stiffness = \"2 N/mm\" }\n"
+                + if free { "" } else { "[[force]]\non = \"tip.z\"\namplitude = \"1 N\"\n" }
+                + &format!("[study]\nkind = \"{kind}\n")
+                + if method { "[method]\nkind = \"harmonic-balance\"\nharmonics = 3\n" } else { "" };
+        let data = results(folder.path(), &format!("schema = 1\n{text}"));
+        for table in data.tables.iter().filter(|table| table.rows() > 0) {
+            let has = |name: &str| table.columns.iter().any(|column| column.name == name);
+            let sampled = has("time_s") && !has("mass");
+            let errors = table.numbers("reduction_error");
+            assert_eq!(errors.is_none(), sampled, "{kind}: {} {:?}", table.name, table.columns);
+            assert!(errors.unwrap_or_default().iter().all(|error| *error > 0.0 && *error < 1e-4), "{kind}");
+            met.push(table.name.clone());
+        }
+    }
+    // of some studies there may be no rows; of these there are
+    for name in [
+        "loops_summary",
+        "orbits",
+        "multipliers",
+        "curve",
+        "peaks",
+        "references",
+        "performance",
+        "optimum",
+        "branch",
+        "motion_summary",
+        "modes",
+        "modes_summary",
+        "campbell",
+        "crossings",
+    ] {
+        assert!(met.iter().any(|met| met == name), "{name}: {met:?}");
+    }
+}
