@@ -65,7 +65,10 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
     let mut beside = None;
     for file in files {
         match one(file, format, &mut text) {
-            Ok(matrices) => square.extend(matrices),
+            Ok((matrices, whole)) => {
+                square.extend(matrices);
+                wrong |= !whole;
+            }
             // names of rows stand in files of their own
             Err(error) if error.kind == Kind::Format && format.is_none() => rows.push((file, error)),
             Err(error) => {
@@ -75,8 +78,8 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
         }
     }
     for (file, error) in rows {
-        let count = square.first().map_or(0, |named| named.matrix.rows());
-        match names::read(file, count) {
+        let count = square.first().map(|named| named.matrix.rows());
+        match names::read(file, count.unwrap_or(0)) {
             Ok(names) => {
                 let shown: Vec<&str> =
                     names.iter().filter(|name| !name.is_empty()).take(LOWEST).map(String::as_str).collect();
@@ -85,7 +88,15 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
                 beside = Some(names);
             }
             Err(other) => {
-                complain!("error: {}", if other.kind == Kind::Names { other } else { error });
+                match (other.kind, count) {
+                    (Kind::Names, None) => complain!(
+                        "error: {}: names of rows, which are looked at beside the square matrix whose rows they name; write stickslip inspect MATRIX {}",
+                        file.display(),
+                        file.display()
+                    ),
+                    (Kind::Names, Some(_)) => complain!("error: {other}"),
+                    _ => complain!("error: {error}"),
+                }
                 wrong = true;
             }
         }
@@ -102,22 +113,23 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
     }
 }
 
-/// The matrices of one file, described in `text`.
-fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<Vec<Named>, Error> {
+/// The square matrices of one file, described in `text`, and whether none is damaged.
+fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Named>, bool), Error> {
     let variables = formats::list(file, format)?;
+    let several = variables.len() > 1;
+    if variables.is_empty() {
+        formats::read(file, format, None)?;
+    }
     let _ = writeln!(text, "{}", file.display());
-    let mut found = Vec::new();
+    let (mut found, mut whole) = (Vec::new(), true);
     for variable in &variables {
-        let several = variables.len() > 1;
-        if let Some(note) = &variable.note {
-            let _ = writeln!(text, "  {variable}: {note}");
-            continue;
-        }
         let name = Some(variable.name.as_str()).filter(|name| !name.is_empty());
         let matrix = match formats::read(file, format, name) {
             Ok(matrix) => matrix,
             Err(error) if several => {
                 let _ = writeln!(text, "  {variable}: {error}");
+                // what stands beside matrices is no fault
+                whole &= matches!(error.kind, Kind::Complex | Kind::Unsupported);
                 continue;
             }
             Err(error) => return Err(error),
@@ -143,7 +155,7 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<Vec<Named
         }
     }
     text.push('\n');
-    Ok(found)
+    Ok((found, whole))
 }
 
 /// Difference across the diagonal, relative to the largest entry, of a matrix that was written with ten digits.

@@ -4,15 +4,18 @@ use crate::{Ending, print, run, speak};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use stickslip::model::{Axis, Model, Place, ReductionEvidence, Substructure, SubstructureDamping, System};
+use stickslip::model::{Axis, DiskPart, Model, Place, ReductionEvidence, Substructure, SubstructureDamping, System};
 use stickslip::structure::reduction::Row;
-use stickslip::structure::{Reduction, ReductionKind};
-use stickslip_formats::{Matrix, Symmetry};
+use stickslip::structure::{Component, Reduction, ReductionKind};
+use stickslip_formats::{Matrix, Symmetry, names};
 use stickslip_numerics::sparse;
 use stickslip_study::Exports;
 
 /// Name of the file with `[structure]` and `[[place]]`.
 const TABLES: &str = "structure.toml";
+/// Names of the rows of the sector of a disk, and its sides.
+const ROWS: &str = "rows.csv";
+const BOUNDARY: &str = "boundary.csv";
 
 /// Reduces the structure of the first case and writes it into the folder `out`.
 pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
@@ -32,28 +35,37 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
     let Some(substructure) = &model.substructure else {
         return wrong("there is no [structure] that could be reduced");
     };
-    if model.ring.is_some() {
-        return wrong(
-            "a sector of a disk is reduced for all of its waves by every study of it, and has no files of its own",
-        );
-    }
-    if substructure.reduction == Reduction::None {
+    if let Reduction::None { .. } = substructure.reduction {
         return wrong(
             "its [structure] says reduce = false: nothing is to be saved; say how far the reduction is to reach",
         );
     }
-    let few = match exports {
-        Some(exports) => over_speeds(substructure, &model.places, &exports),
-        None => at_rest(substructure, &model.places),
+    if let Some(disk) = &substructure.disk {
+        if exports.is_some() {
+            return wrong(
+                "the sector of a disk is saved at one speed: leave out `stiffened`, and name the file of that speed under `stiffness`",
+            );
+        }
+        if !disk.blade.is_empty() || disk.deviations.iter().any(|deviation| *deviation != 0.0) {
+            return wrong(
+                "the blades of this disk differ, and what is left out of a sector is chosen for blades that do not: leave out `blade` and `mistuning`",
+            );
+        }
+    }
+    let few = match (exports, model.ring.map(|ring| ring.sectors).zip(substructure.disk.as_ref())) {
+        (Some(exports), _) => over_speeds(substructure, &model.places, &exports),
+        (None, Some((sectors, disk))) => sector(substructure, &model.places, (sectors, disk)),
+        (None, None) => at_rest(substructure, &model.places),
     };
     match few.and_then(|few| save(&few, out).map(|()| few)) {
         Ok(few) => print(&format!(
-            "{}: {} rows, {}\n  written to {}; put {} in the place of [structure] and [[place]]\n",
+            "{}: {} rows, {}\n  written to {}; put {} in the place of {}\n",
             file.display(),
             substructure.component.dofs(),
             few.what,
             out.display(),
             out.join(TABLES).display(),
+            if few.sector.is_some() { "[structure], [[place]] and [disk]" } else { "[structure] and [[place]]" },
         )),
         Err(message) => failed(&message),
     }
@@ -68,6 +80,17 @@ struct Few {
     keys: Vec<String>,
     /// The stiffness at a speed.
     there: Option<sparse::Matrix>,
+    /// Of the sector of a disk.
+    sector: Option<Sector>,
+}
+
+/// How a sector goes on.
+struct Sector {
+    sectors: usize,
+    /// Names of its rows, which are coordinates.
+    rows: Vec<String>,
+    /// Of its low and its high side.
+    pairs: Vec<(String, String)>,
 }
 
 /// Row, column, value.
@@ -77,7 +100,7 @@ fn at_rest(substructure: &Substructure, places: &[Place]) -> Result<Few, String>
     let alone = Model { substructure: Some(substructure.clone()), places: places.to_vec(), ..Model::default() };
     let system = alone.assemble().map_err(|error| error.to_string())?;
     let what = system.reduced().map(ToString::to_string).unwrap_or_default();
-    Ok(Few { system, what, keys: vec!["reduce = false".to_owned()], there: None })
+    Ok(Few { system, what, keys: vec!["reduce = false".to_owned()], there: None, sector: None })
 }
 
 /// In coordinates that serve all speeds up to that of the second export.
@@ -91,12 +114,9 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports)
     let rows = places.iter_mut().filter(|place| place.of.is_none()).flat_map(|place| &mut place.rows);
     rows.zip(&mut seen).for_each(|(row, seen)| *row = seen);
     let n = few.component.dofs();
-    let (component, damping) = (few.component, SubstructureDamping::Own);
     let earlier = ReductionEvidence { error: few.error, up_to: few.up_to };
     let earlier = substructure.earlier.map_or(earlier, |first| first.then(earlier));
-    let whole = Substructure { component, damping, reduction: Reduction::None, earlier: Some(earlier), disk: None };
-    let model = Model { substructure: Some(whole), places, ..Model::default() };
-    let system = model.assemble().map_err(|error| error.to_string())?;
+    let system = whole(few.component, earlier, places)?;
     let what = format!(
         "{n} coordinates ({}), error {:.1e} up to {:.6} Hz, at all speeds up to {:.6} rpm",
         few.kind,
@@ -109,7 +129,37 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports)
         exports.at, exports.speed
     );
     let keys = [vec![speed], damping_keys(substructure)].concat();
-    Ok(Few { system, what, keys, there: Some(few.there) })
+    Ok(Few { system, what, keys, there: Some(few.there), sector: None })
+}
+
+/// The sector of a disk, in coordinates that serve all of its waves.
+fn sector(substructure: &Substructure, places: &[Place], (sectors, disk): (usize, &DiskPart)) -> Result<Few, String> {
+    let stated = &places[..places.len() / sectors];
+    let seen: Vec<Row> = stated.iter().flat_map(|place| place.rows.clone()).collect();
+    let few = substructure.component.reduced_sector(&disk.boundary, sectors, &seen, &substructure.reduction);
+    let few = few.map_err(|error| error.to_string())?;
+    let mut seen = few.seen.into_iter();
+    let mut places = stated.to_vec();
+    for place in &mut places {
+        // as the file calls it, without the number of the sector
+        place.name = place.name.strip_suffix("_0").unwrap_or(&place.name).to_owned();
+        place.rows.iter_mut().zip(&mut seen).for_each(|(row, seen)| *row = seen);
+    }
+    let n = few.pairs.len();
+    let earlier = ReductionEvidence { error: few.error, up_to: few.up_to };
+    let earlier = substructure.earlier.map_or(earlier, |first| first.then(earlier));
+    let sector = Sector { sectors, rows: few.component.rows().to_vec(), pairs: few.pairs };
+    let system = whole(few.component, earlier, places)?;
+    let what = format!("{n} coordinates ({}), error {:.1e} up to {:.6} Hz", few.kind, few.error, few.up_to / TAU);
+    Ok(Few { system, what, keys: damping_keys(substructure), there: None, sector: Some(sector) })
+}
+
+/// A reduction as a structure of its own.
+fn whole(component: Component, earlier: ReductionEvidence, places: Vec<Place>) -> Result<System, String> {
+    let (damping, reduction) = (SubstructureDamping::Own, Reduction::None { up_to: 0.0 });
+    let whole = Substructure { component, damping, reduction, earlier: Some(earlier), disk: None };
+    let model = Model { substructure: Some(whole), places, ..Model::default() };
+    model.assemble().map_err(|error| error.to_string())
 }
 
 /// Damping that follows the stiffness at every speed; of modes that of those that a reduction at that speed has.
@@ -119,8 +169,11 @@ fn damping_keys(substructure: &Substructure) -> Vec<String> {
             format!("reduce = {{ up_to = \"{:e} rad/s\", tolerance = {tolerance:e}{} }}", up_to, named(kind))
         }
         // what its error is measured up to is the study's
+        Reduction::Modes { modes, kind: ReductionKind::Rubin, orders, .. } if orders > 1 => {
+            format!("reduce = {{ modes = {modes}, orders = {orders} }}")
+        }
         Reduction::Modes { modes, kind, .. } => format!("reduce = {{ modes = {modes}{} }}", named(Some(kind))),
-        Reduction::None => "reduce = false".to_owned(),
+        Reduction::None { .. } => "reduce = false".to_owned(),
     };
     match substructure.damping {
         SubstructureDamping::Own => vec!["reduce = false".to_owned()],
@@ -156,13 +209,24 @@ fn save(few: &Few, out: &Path) -> Result<(), String> {
     }
     for (key, entries) in files {
         let path: PathBuf = out.join(format!("{key}.mtx"));
-        let made =
-            Matrix::new(n, n, Symmetry::General, entries).and_then(|matrix| stickslip_formats::write(&path, &matrix));
-        made.map_err(|error| error.to_string())?;
+        let made = Matrix::new(n, n, Symmetry::General, entries).map_err(|error| error.to_string())?;
+        stickslip_formats::write(&path, &made).map_err(|error| error.to_string())?;
+        if let (Some(sector), "mass") = (&few.sector, key) {
+            let made = made.with_names(sector.rows.clone());
+            let made = made.and_then(|named| names::write(out.join(ROWS), &named));
+            made.map_err(|error| error.to_string())?;
+            let _ = writeln!(text, "dofs = \"{ROWS}\"");
+        }
         // its key has a speed beside the file
         if key != "stiffened" {
             let _ = writeln!(text, "{key} = \"{key}.mtx\"");
         }
+    }
+    if let Some(Sector { sectors, pairs, .. }) = &few.sector {
+        let lines: String = pairs.iter().map(|(low, high)| format!("{low},{high}\n")).collect();
+        let path = out.join(BOUNDARY);
+        std::fs::write(&path, format!("low,high\n{lines}")).map_err(|error| format!("{}: {error}", path.display()))?;
+        let _ = writeln!(text, "\n[disk]\nsectors = {sectors}\nboundary = \"{BOUNDARY}\"");
     }
     let mut nodes: Vec<(&str, Vec<(&str, &Axis)>)> = Vec::new();
     for (place, axis) in system.places().iter().zip(system.seen()) {
@@ -178,16 +242,17 @@ fn save(few: &Few, out: &Path) -> Result<(), String> {
         if axes.iter().any(|(along, _)| !along.is_empty()) {
             let _ = writeln!(text, "directions = [{}]", directions.join(", "));
         }
-        let sums: Vec<String> = axes.iter().map(|(_, axis)| sum(axis)).collect();
+        let sums: Vec<String> = axes.iter().map(|(_, axis)| sum(axis, few.sector.as_ref())).collect();
         let _ = writeln!(text, "sum = [\n  {},\n]", sums.join(",\n  "));
     }
     let path = out.join(TABLES);
     std::fs::write(&path, text).map_err(|error| format!("{}: {error}", path.display()))
 }
 
-/// The weights of the coordinates, which count from 1, to the last bit.
-fn sum(axis: &Axis) -> String {
+/// The weights of the coordinates, which count from 1, to the last bit; those of a sector have names.
+fn sum(axis: &Axis, sector: Option<&Sector>) -> String {
+    let name = |row: usize| sector.map_or_else(|| (row + 1).to_string(), |sector| sector.rows[row].clone());
     let weights: Vec<String> =
-        axis.rows().iter().map(|(row, weight)| format!("\"{}\" = {weight:e}", row + 1)).collect();
+        axis.rows().iter().map(|(row, weight)| format!("\"{}\" = {weight:e}", name(*row))).collect();
     format!("{{ {} }}", weights.join(", "))
 }

@@ -505,8 +505,6 @@ fn a_run_that_needs_too_much_memory_is_refused_in_advance() {
     assert_eq!(code(&stickslip(folder.path(), &["check", "study.toml", "--memory", "lots"])), 2);
 }
 
-/// One set of coordinates serves all speeds of a structure that rotation stiffens: saved, it has the frequencies of the whole from rest to the speed of the
-/// second export, within the error that is said, and its damping follows them.
 /// A rod of equal masses, held at one end and driven at the other: `x/F` of the tip by eliminating mass after mass,
 /// `d₁ = 2k - mω²`, `dᵢ = 2k - mω² - k²/dᵢ₋₁`, at the tip with one k. What is saved errs from it by no more than its results say, reduced on
 /// the spot, read again, or reduced once more, when the errors add.
@@ -587,6 +585,105 @@ fn a_reduction_that_is_saved_keeps_its_error() {
     assert!(twice > read, "{twice:e} {read:e}");
 }
 
+/// The sector of a disk saved in few coordinates is a sector again, whose rows stand for its own coordinates and those of the next sector: the study of
+/// the saved one has the results of the one that reduces on the spot, and both err from that of all rows by no more than they say. Its nodes turn about
+/// z, and one that is looked at stands on the high side.
+#[test]
+fn the_sector_of_a_disk_is_saved_and_read_again() {
+    let folder = TempDir::new().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    // node 1 on the low side, 2 on the high one, and a blade from 3 to 14 on the first
+    let nodes = 14;
+    let springs =
+        std::iter::once((1, 2, 3e6)).chain((3..=nodes).map(|node| (if node == 3 { 1 } else { node - 1 }, node, 2e6)));
+    let mut entries = std::collections::BTreeMap::<(usize, usize), f64>::new();
+    let mut add = |row: usize, column: usize, value: f64| {
+        *entries.entry((row.max(column), row.min(column))).or_default() += value;
+    };
+    for (a, b, k) in springs {
+        for along in 1..=3 {
+            // another stiffness along each axis, and x and y coupled, so that it matters how the sides turn
+            let (a, b, k) = (3 * a - 3 + along, 3 * b - 3 + along, k / along as f64);
+            [(a, a, k), (b, b, k), (a, b, -k)].into_iter().for_each(|(row, column, k)| add(row, column, k));
+        }
+    }
+    (1..=3).for_each(|row| add(row, row, 4e6));
+    add(1, 2, 5e5);
+    let lines: String = entries.iter().map(|((row, column), value)| format!("{row} {column} {value:e}\n")).collect();
+    let head = |count: usize| format!("%%MatrixMarket matrix coordinate real symmetric\n{0} {0} {count}\n", 3 * nodes);
+    write("k.mtx", &(head(entries.len()) + &lines));
+    let masses: String = (1..=3 * nodes).map(|row| format!("{row} {row} 0.01\n")).collect();
+    write("m.mtx", &(head(3 * nodes) + &masses));
+    let named = |row: usize| format!("{row},{}.{}\n", row.div_ceil(3), ["x", "y", "z"][(row - 1) % 3]);
+    write("rows.csv", &("row,name\n".to_owned() + &(1..=3 * nodes).map(named).collect::<String>()));
+    write("sides.csv", "low,high\n1,2\n");
+    let tables = |damping: &str, reduce: &str| {
+        format!(
+            "[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\ndofs = \"rows.csv\"\nunits = \"m-kg-s\"\n{damping}\n{reduce}\n\
+             [disk]\nsectors = 7\naxis = \"z\"\nboundary = \"sides.csv\"\n\
+             [[place]]\nname = \"tip\"\ndof = \"14.y\"\n[[place]]\nname = \"rim\"\ndofs = [\"2.x\", \"2.y\"]\n"
+        )
+    };
+    let response = "[[force]]\non = \"tip\"\namplitude = \"1 N\"\nengine_order = 2\n\
+                    [[joint]]\nname = \"shroud\"\nbetween = [\"tip\", \"next.tip\"]\n\
+                    law = { kind = \"jenkins\", stiffness = \"1e5 N/m\", limit = \"0.3 N\" }\n\
+                    [study]\nkind = \"response\"\nfrequency = [\"100 Hz\", \"260 Hz\", \"400 Hz\"]\n\
+                    [method]\nkind = \"harmonic-balance\"\nharmonics = 7\ntolerance = 0.1\n";
+    let columns = ["tip_0_amplitude_m", "tip_3_phase_deg", "rim_0_x_amplitude_m", "rim_6_y_amplitude_m"];
+    let found = |study: &str| -> Vec<Vec<f64>> {
+        let out = format!("{}-out", study.replace('/', "-"));
+        let stem = Path::new(study).file_stem().unwrap();
+        let run = stickslip(folder.path(), &["run", study, "--out", &out]);
+        assert_eq!(code(&run), 0, "{study}: {}", stderr(&run));
+        let mut table = csv::Reader::from_path(folder.path().join(&out).join(stem).join("curve.csv")).unwrap();
+        let names = table.headers().unwrap().clone();
+        let at =
+            columns.map(|name| names.iter().position(|own| own == name).unwrap_or_else(|| panic!("{name}: {names:?}")));
+        let error = names.iter().position(|name| name == "reduction_error");
+        let row = |row: csv::StringRecord| -> Vec<f64> {
+            at.iter().copied().chain(error).map(|at| row[at].parse().unwrap()).collect()
+        };
+        table.records().map(|record| row(record.unwrap())).collect()
+    };
+    for (damping, bound) in [("rayleigh = { stiffness = \"1e-5 s\" }", 1e-9), ("modal_damping = \"1 %\"", 3e-4)] {
+        let spot = tables(damping, "reduce = { up_to = \"1200 Hz\" }");
+        write("study.toml", &format!("schema = 1\n{spot}{response}"));
+        let saved = stickslip(folder.path(), &["reduce", "study.toml", "--out", "few"]);
+        assert_eq!(code(&saved), 0, "{}", stderr(&saved));
+        let said = String::from_utf8_lossy(&saved.stdout).into_owned();
+        assert!(said.contains("in the place of [structure], [[place]] and [disk]"), "{said}");
+        let few = fs::read_to_string(folder.path().join("few/structure.toml")).unwrap();
+        assert!(few.contains("sectors = 7\nboundary = \"boundary.csv\"") && few.contains("name = \"rim\""), "{few}");
+        write("few/study.toml", &format!("schema = 1\n{few}{response}"));
+        let (spot, read) = (found("study.toml"), found("few/study.toml"));
+        let whole = (bound < 1e-5).then(|| {
+            write("whole.toml", &format!("schema = 1\n{}{response}", tables(damping, "reduce = false")));
+            found("whole.toml")
+        });
+        for (point, (a, b)) in spot.iter().zip(&read).enumerate() {
+            let error = b[columns.len()];
+            assert!(error > 0.0 && error >= a[columns.len()] * (1.0 - 1e-9), "{damping}: {a:?} {b:?}");
+            for k in 0..columns.len() {
+                assert!((a[k] - b[k]).abs() <= bound * a[k].abs(), "{damping}: {}: {a:?} {b:?}", columns[k]);
+                // beside the resonances, of which the damping makes a small shift of frequency fifty times as large
+                let exact = whole.as_ref().map_or(b[k], |whole| whole[point][k]);
+                assert!((b[k] - exact).abs() <= 50.0 * error * exact.abs(), "{}: {b:?} {exact}", columns[k]);
+            }
+        }
+    }
+    // what cannot be saved is refused with what to do
+    write("blade.csv", &("node\n".to_owned() + &(4..=nodes).map(|node| format!("{node}\n")).collect::<String>()));
+    let mistuned = "[disk]\nblade = \"blade.csv\"\nmistuning = { of = \"blade.stiffness\", deviation = \"1 %\" }\n";
+    let tables = tables("", "reduce = { up_to = \"1200 Hz\" }").replace("[disk]\n", mistuned);
+    write("study.toml", &format!("schema = 1\n{tables}{response}"));
+    let saved = stickslip(folder.path(), &["reduce", "study.toml", "--out", "none"]);
+    assert_eq!(code(&saved), 2);
+    assert!(stderr(&saved).contains("leave out `blade` and `mistuning`"), "{}", stderr(&saved));
+    assert!(!folder.path().join("none").exists());
+}
+
+/// One set of coordinates serves all speeds of a structure that rotation stiffens: saved, it has the frequencies of the whole from rest to the speed of the
+/// second export, within the error that is said, and its damping follows them.
 #[test]
 fn a_structure_that_rotation_stiffens_is_saved_for_all_speeds() {
     let folder = TempDir::new().unwrap();
@@ -707,4 +804,111 @@ fn inspect_goes_by_names() {
     assert!(said.contains("b.mtx as stiffness, a.mtx as mass, by its larger entries"), "{said}");
     let said = inspect(&["a.mtx", "b.mtx", "e.mtx"]);
     assert!(said.contains("no frequencies: which matrix"), "{said}");
+}
+
+/// What is no matrix, or none any more, is said with its file, the line where there are lines, what was expected, and what to do, by `inspect` and by
+/// `check`; nothing of it looks like a good file.
+#[test]
+fn wrong_files_of_matrices_say_what_to_do() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/data");
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str| fs::read(data.join(name)).unwrap();
+    let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
+    let changed = |name: &str, from: &str, to: &str| {
+        let text = String::from_utf8(read(name)).unwrap();
+        assert!(text.contains(from), "{name}: {from}");
+        text.replacen(from, to, 1).into_bytes()
+    };
+    let cut = |name: &str| {
+        let bytes = read(name);
+        bytes[..bytes.len() * 6 / 10].to_vec()
+    };
+    for name in ["bricks.sti", "bricks.mas", "bricks.dof", "hbmat.mapping", "general.mtx", "v5.mat"] {
+        write(name, &read(name));
+    }
+    // an end of a zip that lists nothing
+    write("empty.npz", &[b"PK\x05\x06".to_vec(), vec![0; 18]].concat());
+    write("coordinate.mtx", &cut("abaqus_coordinate.mtx"));
+    write("input.mtx", &cut("abaqus_input.mtx"));
+    write("cut.op4", &cut("bigmat_little.op4"));
+    write("cut.full", &cut("by_the_letter.full"));
+    write("cut.matrix", &cut("hbmat.matrix"));
+    write("cut73.mat", &cut("v73.mat"));
+    write("complex.pch", &changed("punch.pch", "0       6       2 ", "0       6       3 "));
+    write("complex.rua", &changed("general.rua", "RUA", "CUA"));
+    write("pointers.rua", &changed("general.rua", " 1 3 3 5", " 1 3 9 5"));
+    write("beyond.op4", &changed("dense_text.op4", "6       6       6       2KAA", "6       4       2       2KAA"));
+    let inspect = |files: &[&str]| {
+        let inspected = stickslip(folder.path(), &[&["inspect"], files].concat());
+        (code(&inspected), stderr(&inspected) + &String::from_utf8_lossy(&inspected.stdout))
+    };
+    for (file, words) in [
+        ("empty.npz", &["empty.npz: the file holds nothing", "export"][..]),
+        ("bricks.dof", &["bricks.dof: names of rows", "stickslip inspect MATRIX bricks.dof"]),
+        ("hbmat.mapping", &["hbmat.mapping: names of rows"]),
+        ("coordinate.mtx", &["coordinate.mtx, line 11: the file ends within a line", "copy it again"]),
+        ("input.mtx", &["input.mtx, line 8: the file ends within a line"]),
+        ("cut.op4", &["cut.op4, byte", "the file ends after", "not complete"]),
+        ("cut.full", &["cut.full, byte", "the file ends after", "not complete"]),
+        ("cut.matrix", &["cut.matrix, line 8", "of them in this line, found"]),
+        ("cut73.mat", &["cut73.mat: the HDF5 file cannot be read", "unexpected EOF", "copy it again"]),
+        ("complex.pch", &["complex.pch, `KAAX`: a real matrix was expected, this is complex", "real part"]),
+        ("complex.rua", &["complex.rua: a real matrix was expected, this is complex"]),
+        ("pointers.rua", &["pointers.rua: pointers from 0 to 4 for 4 entries, ascending ones from 0 were expected"]),
+        ("beyond.op4", &["KAA", "beyond.op4, line 4: an entry in row 5", "export it again"]),
+    ] {
+        let (status, said) = inspect(&[file]);
+        assert!(status == 2 && words.iter().all(|words| said.contains(words)), "{file}: {status}, {said}");
+    }
+    // names beside a matrix that has not their rows, and beside one that is not square
+    let (status, said) = inspect(&["bricks.sti", "hbmat.mapping"]);
+    assert!(status == 2 && said.contains("hbmat.mapping: 6 names for 30 rows"), "{said}");
+    let (status, said) = inspect(&["general.mtx", "bricks.dof"]);
+    assert!(
+        status == 2 && said.contains("beside the square matrix whose rows they name") && said.contains("4 x 3"),
+        "{said}"
+    );
+    // a text and complex numbers beside matrices are no fault
+    let (status, said) = inspect(&["v5.mat"]);
+    assert!(status == 0 && said.contains("a real matrix was expected, this is"), "{said}");
+    let check = |stiffness: &str, mass: &str, more: &str| {
+        let text = format!(
+            "schema = 1\n[structure]\nstiffness = \"{stiffness}\"\nmass = \"{mass}\"\n{more}\n[[place]]\nname = \"tip\"\ndof = 1\n\
+             [[force]]\non = \"tip\"\namplitude = \"1 N\"\n[study]\nkind = \"response\"\nfrequency = \"100 Hz\"\n"
+        );
+        fs::write(folder.path().join("study.toml"), text).unwrap();
+        let checked = stickslip(folder.path(), &["check", "study.toml"]);
+        // the lines of a box are as wide as a terminal
+        let said = stderr(&checked);
+        (code(&checked), said.split(['\n', '│', ' ']).filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" "))
+    };
+    let rows = String::from_utf8(read("abaqus_input.mtx")).unwrap();
+    let own = |node: &str| -> String {
+        let lines = rows.lines().map(|line| line.split(',').map(str::trim).collect::<Vec<_>>());
+        let own = lines.filter(|fields| fields[..2] == fields[2..4]);
+        own.map(|f| format!("{0},{1}, {0},{1}, 1e-6\n", f[0].replace("10", node), f[1])).collect()
+    };
+    write("k.mtx", rows.as_bytes());
+    write("other.mtx", own("11").as_bytes());
+    write("negative.mtx", own("10").replacen("1e-6", "-1e-6", 1).as_bytes());
+    let units = "units = \"mm-t-s\"";
+    for (stiffness, mass, more, words) in [
+        ("k.mtx", "other.mtx", units, &["other.mtx", "row `11.z`", "same export"][..]),
+        ("k.mtx", "negative.mtx", units, &["negative kinetic energy", "a matrix cut short?"]),
+        ("k.mtx", "negative.mtx", "", &["`units` is missing", "mm-t-s"]),
+        ("complex.pch", "k.mtx", units, &["complex.pch", "KAAX", "real part"]),
+        ("general.mtx", "k.mtx", units, &["general.mtx", "4 rows and 3 columns"]),
+        ("empty.npz", "k.mtx", units, &["empty.npz: the file holds nothing", "export the matrix again"]),
+        ("cut73.mat", "k.mtx", units, &["cut73.mat: the HDF5 file cannot be read"]),
+        (
+            "bricks.sti",
+            "bricks.mas",
+            "units = \"mm-t-s\"\ndofs = \"bricks.mas\"",
+            &["bricks.mas, line 1: names of rows were expected"],
+        ),
+        ("bricks.sti", "bricks.mas", "units = \"mm-t-s\"\ndofs = \"hbmat.mapping\"", &["6 names for 30 rows"]),
+    ] {
+        let (status, said) = check(stiffness, mass, more);
+        assert!(status == 2 && words.iter().all(|words| said.contains(words)), "{stiffness} {mass}: {status} {said}");
+    }
 }

@@ -91,10 +91,15 @@ struct Prefix<'a>(Option<&'a Path>, &'a Location);
 impl fmt::Display for Prefix<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(path, location) = self;
+        // the root of a file has no name of its own
+        let location = match location {
+            Location::Variable(name) if name.is_empty() => &Location::File,
+            other => other,
+        };
         if let Some(path) = path {
             write!(f, "{}", path.display())?;
         }
-        if path.is_some() && **location != Location::File {
+        if path.is_some() && *location != Location::File {
             f.write_str(", ")?;
         }
         match location {
@@ -103,7 +108,7 @@ impl fmt::Display for Prefix<'_> {
             Location::Byte(byte) => write!(f, "byte {byte}")?,
             Location::Variable(name) => write!(f, "`{name}`")?,
         }
-        if path.is_some() || **location != Location::File { f.write_str(": ") } else { Ok(()) }
+        if path.is_some() || *location != Location::File { f.write_str(": ") } else { Ok(()) }
     }
 }
 

@@ -75,10 +75,11 @@ impl Fixed {
         let mut found = Vec::with_capacity(count.min(lines.left() / 2 + 1));
         while found.len() < count {
             let line = lines.expect(what)?;
-            for at in 0..self.count.min(count - found.len()) {
+            let here = self.count.min(count - found.len());
+            for at in 0..here {
                 let field = line.columns(at * self.width, (at + 1) * self.width);
                 if field.is_empty() {
-                    return Err(line.malformed(what, "less"));
+                    return Err(line.malformed(&format!("{what}, {here} of them in this line"), &at.to_string()));
                 }
                 found.push(read(&line, field)?);
             }

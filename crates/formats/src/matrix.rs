@@ -519,9 +519,12 @@ pub(crate) fn compressed(
     }
     let stored = inner.len().min(values.len());
     let sorted = pointers.first() == Some(&0) && pointers.is_sorted();
-    match pointers.last() {
-        Some(&last) if sorted && last <= stored => {}
-        last => return fault(format!("pointers up to {last:?} for {stored} entries, ascending ones were expected")),
+    let last = pointers.last().copied().unwrap_or(0);
+    if !sorted || last > stored {
+        let first = pointers.first().copied().unwrap_or(0);
+        return fault(format!(
+            "pointers from {first} to {last} for {stored} entries, ascending ones from 0 were expected, none beyond their number"
+        ));
     }
     for (outer, pair) in pointers.windows(2).enumerate() {
         for at in pair[0]..pair[1] {

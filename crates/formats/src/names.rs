@@ -195,7 +195,8 @@ fn dof_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
 fn mapping(line: &Line) -> Option<(usize, i64, String)> {
     let [equation, node, label] = line.exactly("").ok()?;
     let equation = usize::try_from(integer(equation)?.checked_sub(1)?).ok()?;
-    let label = std::str::from_utf8(label).ok()?.to_uppercase();
+    // else a matrix by its entries is such a line, too
+    let label = std::str::from_utf8(label).ok().filter(|label| label.starts_with(char::is_alphabetic))?.to_uppercase();
     let label = match label.strip_prefix("ROT") {
         Some(axis) => format!("r{}", axis.to_lowercase()),
         None => match label.as_str() {

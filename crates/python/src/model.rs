@@ -237,7 +237,7 @@ impl PyModel {
             (Some(_), Some(_)) => return Err(error::model(py, "give `damping` or `damping_ratio`, not both")),
         };
         let reduction = match reduce {
-            None => Reduction::None,
+            None => Reduction::None { up_to: 0.0 },
             Some(reduce) => Reduction::up_to(quantity::si(&reduce, Dimension::FREQUENCY, "reduce")?),
         };
         let substructure = Some(Substructure { component, damping, reduction, earlier: None, disk: None });

@@ -58,7 +58,7 @@ pub(crate) fn ring_of(
             let message = format!("{sectors} sectors of {} masses; the limit is {MOST_MASSES}", first.masses.len());
             return Err(vec![Problem::new(disk.table.location_of("sectors", None), "sectors", message)]);
         }
-        let rows = first.substructure.as_ref().filter(|own| matches!(own.reduction, Reduction::None));
+        let rows = first.substructure.as_ref().filter(|own| matches!(own.reduction, Reduction::None { .. }));
         let rows = rows.map_or(0, |own| own.component.dofs());
         if rows * sectors > MOST_ROWS {
             let message = format!("{sectors} sectors of {rows} rows; the limit without a reduction is {MOST_ROWS}");

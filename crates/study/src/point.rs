@@ -106,9 +106,7 @@ impl Summary {
         if !prepared.method.closes_motions(&prepared.system) {
             rows.number("return_defect", self.return_defect);
         }
-        if let Some(reduction) = system.reduction_evidence() {
-            rows.number(columns::REDUCTION_ERROR, reduction.error);
-        }
+        rows.reduced(system.reduction_evidence());
         rows.integer("iterations", self.iterations);
         rows.text("status", &self.status);
     }

@@ -1,7 +1,9 @@
 //! Tables that grow row by row.
 
+use crate::columns::REDUCTION_ERROR;
 use crate::dataset::{Column, Table, Values as Cells, column_name};
 use crate::study::Case;
+use stickslip::model::ReductionEvidence;
 
 /// Columns that grow row by row, in a fixed order.
 #[derive(Debug, Default)]
@@ -55,6 +57,13 @@ impl Rows {
         for varied in &case.varied {
             let (name, value) = varied.column();
             self.number(&name, value);
+        }
+    }
+
+    /// How far what the places see is from the whole structure, in a row that has an orbit or a frequency; nothing where no structure was reduced.
+    pub fn reduced(&mut self, reduction: Option<ReductionEvidence>) {
+        if let Some(ReductionEvidence { error, .. }) = reduction {
+            self.number(REDUCTION_ERROR, error);
         }
     }
 

@@ -62,7 +62,7 @@ pub const FILE: &[Key] = &[
     ),
     optional("force", Takes::List(FORCE), "forces amplitude * cos(harmonic * Omega * t + phase); they add up", "[]"),
     optional("motion", Takes::List(MOTION), "imposed motions of a place; they add up", "[]"),
-    required("study", Takes::Study, "what is asked for", "{ kind = \"response\" }"),
+    required("study", Takes::Study, "what is asked for", "{ kind = \"response\", frequency = \"121 Hz\" }"),
     optional(
         "sample",
         Takes::Sample,
@@ -148,7 +148,7 @@ pub const STRUCTURE: &[Key] = &[
     optional(
         "modal_damping",
         Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
-        "share of critical damping of every mode",
+        "share of critical damping of every mode up to the largest frequency of interest, see `reduce`; beyond, damping grows with the stiffness",
         "\"0.5 %\"",
     ),
     optional(
@@ -218,6 +218,12 @@ const REDUCE: &[Key] = &[
         "\"5 kHz\"",
     ),
     optional("modes", Takes::Count(1, 600), "so many modes instead", "50"),
+    optional(
+        "orders",
+        Takes::Count(1, 3),
+        "orders of residual vectors beside these modes: the residual series, two terms of it for each order; absent: 1, the residual flexibility",
+        "2",
+    ),
     default(
         "tolerance",
         Takes::Quantity(Dimension::NONE, Within::Positive),

@@ -147,7 +147,8 @@ pub(crate) fn problem_of(structure: &Structure, error: &ModelError, model: &Mode
             let table =
                 matrices.map(|matrices| &matrices.table).or_else(|| structure.lists.get(list).get(index.unwrap_or(0)));
             let location = table.map_or(&whole, |table| table.location_of(error.key, error.wrong_name.as_deref()));
-            let message = if error.key == "reduce" && has_no_end(model) { NO_END } else { &error.message };
+            let end = without_end(model).filter(|_| error.key == "reduce");
+            let message = end.map_or(&error.message[..], |(message, _)| message);
             (location, table.map_or_else(|| message.to_owned(), |table| table.with_turn(message)))
         }
         Some(template) => {
@@ -179,21 +180,27 @@ pub(crate) fn problem_of(structure: &Structure, error: &ModelError, model: &Mode
 /// Lowest frequencies that are shown where a structure cannot be reduced.
 const LOWEST: usize = 3;
 
-/// Why a structure is not reduced of which nobody knows how far.
-const NO_END: &str = "the structure is to be brought into few coordinates, and this study has no drive frequency that tells up to which frequency \
-                      these must be good";
-
-/// Whether nothing tells up to which frequency a reduction must be good.
-fn has_no_end(model: &Model) -> bool {
-    let reduction = model.substructure.as_ref().map(|substructure| substructure.reduction);
-    matches!(reduction, Some(Reduction::UpTo { up_to, .. }) if up_to <= 0.0)
+/// What is wrong with a structure of which nothing tells up to which frequency it must be good, and what to do.
+fn without_end(model: &Model) -> Option<(&'static str, &'static str)> {
+    match model.substructure.as_ref()?.reduction {
+        Reduction::UpTo { up_to, .. } if up_to <= 0.0 => Some((
+            "the structure is to be brought into few coordinates, and this study has no drive frequency that tells up to which frequency \
+             these must be good",
+            "add to [structure] reduce = { up_to = \"5 kHz\" }, the highest frequency of interest",
+        )),
+        Reduction::None { up_to } if up_to <= 0.0 => Some((
+            "this study has no drive frequency that tells up to which frequency modes are damped by `modal_damping`",
+            "say reduce = { kind = \"none\", up_to = \"5 kHz\" }, the highest frequency of interest",
+        )),
+        _ => None,
+    }
 }
 
 /// What to do where a structure cannot be reduced: units that were mistaken move its frequencies by powers of ten.
 fn advice_on_reduction(model: &Model) -> Option<String> {
     let substructure = model.substructure.as_ref()?;
-    if has_no_end(model) {
-        return Some("add to [structure] reduce = { up_to = \"5 kHz\" }, the highest frequency of interest".to_owned());
+    if let Some((_, help)) = without_end(model) {
+        return Some(help.to_owned());
     }
     if matches!(substructure.reduction, Reduction::UpTo { kind: Some(ReductionKind::CraigBampton), .. }) {
         return Some(

@@ -19,10 +19,22 @@ const IN_FRAME: [&str; 3] = ["t1", "t2", "n"];
 const CARTESIAN: [&str; 3] = ["x", "y", "z"];
 
 /// The kinds of reduction: name, summary.
-pub(crate) const REDUCTIONS: [(&str, &str, ReductionKind); 2] = [
-    ("rubin", "free modes and residual flexibility", ReductionKind::Rubin),
-    ("craig-bampton", "modes with the places held, and what static forces at them do", ReductionKind::CraigBampton),
+pub(crate) const REDUCTIONS: [(&str, &str, Option<ReductionKind>); 3] = [
+    ("rubin", "free modes and residual flexibility", Some(ReductionKind::Rubin)),
+    (
+        "craig-bampton",
+        "modes with the places held, and what static forces at them do",
+        Some(ReductionKind::CraigBampton),
+    ),
+    (
+        "none",
+        "all rows, as with reduce = false; `up_to` then says of which modes `modal_damping` is the share, and nothing else",
+        None,
+    ),
 ];
+
+/// All rows; [`settle`] decides up to where modes are damped.
+const WHOLE: Reduction = Reduction::None { up_to: 0.0 };
 
 /// The structure of `[structure]`. Where nothing is said of its reduction, [`settle`] decides.
 pub(crate) fn of(
@@ -54,9 +66,9 @@ pub(crate) fn of(
     let reduction = match (values.table("reduce"), values.flag("reduce")) {
         (Some(reduce), _) => stated_reduction(reduce).unwrap_or_else(|(key, message, help)| {
             problems.push(Problem::new(table.location_of("reduce", None), key, message).help(help));
-            Reduction::None
+            WHOLE
         }),
-        (None, Some(false)) => Reduction::None,
+        (None, Some(false)) => WHOLE,
         _ => Reduction::up_to(0.0),
     };
     let earlier = values.table("reduced").and_then(|reduced| {
@@ -67,7 +79,16 @@ pub(crate) fn of(
 
 fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'static str, &'static str)> {
     let named = |name: &str| REDUCTIONS.iter().find(|(known, _, _)| *known == name);
-    let kind = reduce.text("kind").and_then(named).map(|(_, _, kind)| *kind);
+    let named = reduce.text("kind").and_then(named);
+    if let Some((_, _, None)) = named {
+        return match reduce.count("modes") {
+            Some(_) => {
+                Err(("modes", "`modes` of a structure that is not reduced", "leave out one of `kind` and `modes`"))
+            }
+            None => Ok(Reduction::None { up_to: reduce.quantity("up_to").unwrap_or(0.0) }),
+        };
+    }
+    let kind = named.and_then(|(_, _, kind)| *kind);
     let tolerance = reduce.quantity("tolerance").unwrap_or(Reduction::TOLERANCE);
     match (reduce.quantity("up_to"), reduce.count("modes")) {
         (Some(_), Some(_)) => Err((
@@ -76,8 +97,21 @@ fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'stati
             "leave out one: `up_to` takes as many modes as the error asks for",
         )),
         (None, Some(modes)) => {
-            Ok(Reduction::Modes { modes: modes as usize, kind: kind.unwrap_or(ReductionKind::Rubin), up_to: 0.0 })
+            let (kind, orders) = (kind.unwrap_or(ReductionKind::Rubin), reduce.count("orders"));
+            if let (ReductionKind::CraigBampton, Some(_)) = (kind, orders) {
+                return Err((
+                    "orders",
+                    "Craig-Bampton has no residual vectors, and `orders` of them are stated",
+                    "leave out `orders`, or say kind = \"rubin\"",
+                ));
+            }
+            Ok(Reduction::Modes { modes: modes as usize, kind, orders: orders.unwrap_or(1) as usize, up_to: 0.0 })
         }
+        (_, None) if reduce.count("orders").is_some() => Err((
+            "orders",
+            "`orders` of residual vectors belong to `modes`",
+            "add `modes`: with `up_to` they are as many as the error asks for",
+        )),
         (up_to, None) => Ok(Reduction::UpTo { up_to: up_to.unwrap_or(0.0), tolerance, kind }),
     }
 }
@@ -93,7 +127,9 @@ pub(crate) fn settle(model: &mut Model, values: &Values) {
     let drive = values.frequencies("frequency").into_iter().filter_map(|frequencies| frequencies.highest());
     let excited = most * ends.chain(drive).fold(0.0, f64::max);
     match model.substructure.as_mut().map(|substructure| &mut substructure.reduction) {
-        Some(Reduction::UpTo { up_to, .. }) if *up_to <= 0.0 => *up_to = HARMONICS * excited,
+        Some(Reduction::UpTo { up_to, .. } | Reduction::None { up_to }) if *up_to <= 0.0 => {
+            *up_to = HARMONICS * excited;
+        }
         Some(Reduction::Modes { up_to, .. }) => *up_to = excited,
         _ => {}
     }

@@ -465,6 +465,9 @@ fn coordinates_tell_a_wrong_sector() {
     let study = "[study]\nkind = \"nodal-diameter\"\nmodes = 2\n";
     let frequencies = |disk: &str| {
         let data = run(&in_space(disk, study).unwrap(), &Context::unwatched(1)).unwrap();
+        // how far six modes are from the whole, in every row
+        let errors = data.tables[0].numbers("reduction_error").unwrap();
+        assert!(errors.iter().all(|error| *error == errors[0] && *error >= 0.0));
         data.tables[0].numbers("frequency_Hz").unwrap().to_vec()
     };
     let named = frequencies("sectors = 6\naxis = \"z\"\nboundary = \"right.csv\"");

@@ -434,7 +434,10 @@ fn what_is_wrong_is_said() {
     told("\"m-kg-s\"", "\"mm-t\"", &["mm-t-s"]);
     told(&format!("\"{node}.z\""), "\"7.z\"", &["no row `7.z`"]);
     told(&format!("\"{node}.z\"]"), &format!("\"{node}.w\"]"), &["no row", "its rows of this node are"]);
-    told(DAMPED, "modal_damping = 0.01\nreduce = false", &["modes", "rayleigh"]);
+    told(DAMPED, &format!("{DAMPED}\nreduce = {{ kind = \"none\", modes = 3 }}"), &["leave out one"]);
+    told(DAMPED, &format!("{DAMPED}\nreduce = {{ orders = 2 }}"), &["`orders`", "add `modes`"]);
+    let held = "reduce = { modes = 3, orders = 2, kind = \"craig-bampton\" }";
+    told(DAMPED, &format!("{DAMPED}\n{held}"), &["no residual vectors", "kind = \"rubin\""]);
     told(DAMPED, &format!("{DAMPED}\nmodal_damping = 0.01"), &["one damping"]);
     told(DAMPED, "reduce = { modes = 3, up_to = \"1 kHz\" }", &["leave out one"]);
     told("dofs = [", "normal = [0, 0, 0]\ndofs = [", &["normal"]);
@@ -641,5 +644,177 @@ fn a_free_body_with_modal_damping_and_a_sprung_mass() {
             let off = numbers(&data, column)[i] / expected.norm() - 1.0;
             assert!(off.abs() < 1e-9, "{column} {hertz}: {off:e}");
         }
+    }
+}
+
+/// λ and shapes of unit mass, by Cholesky's factor of M.
+fn modes(brick: &Brick) -> (Vec<f64>, DMatrix<f64>) {
+    let factor = full(&brick.mass).cholesky().unwrap().l();
+    let inverse = factor.solve_lower_triangular(&DMatrix::identity(brick.dofs(), brick.dofs())).unwrap();
+    let eigen = (&inverse * full(&brick.stiffness) * inverse.transpose()).symmetric_eigen();
+    (eigen.eigenvalues.as_slice().to_vec(), inverse.transpose() * eigen.eigenvectors)
+}
+
+/// Modal damping of all rows: the ratio of every mode up to five times the highest drive frequency, or up to the frequency that is said, and
+/// growing with the frequency beyond; beside a mass, a spring and an imposed motion, and by methods that need full matrices.
+#[test]
+fn modal_damping_without_a_reduction() {
+    let brick = blade();
+    let (node, z) = (tip(&brick, 0, 1), brick.row([8, 0, 1], 2).unwrap());
+    let (other, moved) = (tip(&brick, 2, 0), brick.row([8, 2, 0], 2).unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "npz", (1.0, 1.0));
+    let (values, shapes) = modes(&brick);
+    let (ratio, mass, spring) = (0.01, 0.002, 3e3);
+    let shapes = full(&brick.mass) * shapes;
+    for (reduce, up_to, motion, method) in [
+        ("false", 4500.0, 0.0, "harmonic-balance"),
+        ("{ kind = \"none\", up_to = \"2 kHz\" }", 2000.0, 1e-5, "harmonic-balance"),
+        ("false", 4500.0, 1e-5, "event-driven"),
+    ] {
+        let more = format!("modal_damping = {ratio}\nreduce = {reduce}");
+        let motions = format!("[[motion]]\non = \"foot.z\"\namplitude = \"{motion} m\"\n");
+        let text = structure("npz", "rows.csv", "m-kg-s", &more)
+            + &place("tip", &node)
+            + &place("foot", &other)
+            + if motion > 0.0 { &motions } else { "" }
+            + "[[mass]]\nname = \"weight\"\nmass = \"2 g\"\n\
+               [[spring]]\nbetween = [\"weight\", \"tip.z\"]\nstiffness = \"3 N/mm\"\n"
+            + FORCED
+            + &format!("[method]\nkind = \"{method}\"\n");
+        let data = results(folder.path(), &text);
+        let n = brick.dofs();
+        let up_to = up_to * TAU;
+        let modal = |omega: f64| 2.0 * ratio * if omega < up_to { omega } else { omega * omega / up_to };
+        let rates = DVector::from_fn(n, |k, _| modal(values[k].sqrt()));
+        let damping = &shapes * DMatrix::from_diagonal(&rates) * shapes.transpose();
+        for (i, hertz) in HERTZ.iter().enumerate() {
+            let omega = hertz * TAU;
+            let own = full(&brick.stiffness) - full(&brick.mass) * (omega * omega);
+            let mut stiffness = DMatrix::zeros(n + 1, n + 1);
+            stiffness.view_mut((0, 0), (n, n)).copy_from(&own.zip_map(&damping, |k, c| Complex64::new(k, omega * c)));
+            for (row, column, k) in [(z, z, spring), (n, n, spring), (z, n, -spring), (n, z, -spring)] {
+                stiffness[(row, column)] += k;
+            }
+            stiffness[(n, n)] -= mass * omega * omega;
+            let mut load = DVector::zeros(n + 1);
+            load[z] = Complex64::new(1.0, 0.0);
+            if motion > 0.0 {
+                load -= stiffness.column(moved) * Complex64::new(motion, 0.0);
+                stiffness.row_mut(moved).fill(Complex64::ZERO);
+                stiffness[(moved, moved)] = Complex64::new(1.0, 0.0);
+                load[moved] = Complex64::new(motion, 0.0);
+                (0..=n).filter(|row| *row != moved).for_each(|row| stiffness[(row, moved)] = Complex64::ZERO);
+            }
+            let x = stiffness.lu().solve(&load).unwrap();
+            for (column, expected) in [("tip_z_amplitude_m", x[z]), ("weight_amplitude_m", x[n])] {
+                let off = numbers(&data, column)[i] / expected.norm() - 1.0;
+                // a dense solution of 1e9 N/m beside 1e3
+                assert!(off.abs() < 1e-8, "{reduce} {method} {column} {hertz}: {off:e}");
+            }
+        }
+    }
+}
+
+/// With friction the damping of modes is that of a reduction with the same last frequency, and the energies balance: the work of the forces is what
+/// the joint and the modes take.
+#[test]
+fn modal_damping_with_friction_without_a_reduction() {
+    let brick = blade();
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "npz", (1.0, 1.0));
+    let run = |reduce: &str| {
+        let text = structure("npz", "rows.csv", "m-kg-s", &format!("modal_damping = 0.002\nreduce = {reduce}"))
+            + &place("tip", &tip(&brick, 0, 1))
+            + "[[joint]]\nname = \"pad\"\nbetween = [\"tip.z\", \"ground\"]\n\
+               law = { kind = \"jenkins\", limit = \"0.004 N\", stiffness = \"2 N/mm\" }\n"
+            + FORCED
+            + "[method]\nkind = \"harmonic-balance\"\nharmonics = 9\n";
+        results(folder.path(), &text)
+    };
+    let (whole, few) = (run("{ kind = \"none\", up_to = \"9 kHz\" }"), run("{ up_to = \"9 kHz\", tolerance = 1e-8 }"));
+    for column in ["tip_z_amplitude_m", "pad_dissipation_J"] {
+        for (a, b) in numbers(&whole, column).iter().zip(numbers(&few, column)) {
+            assert!((a / b - 1.0).abs() < 1e-5 && *b > 0.0, "{column}: {a:e} {b:e}");
+        }
+    }
+}
+
+/// So many modes with more orders of residual vectors come nearer: each order makes two more terms of the residual series exact.
+#[test]
+fn orders_of_residual_vectors() {
+    let brick = blade();
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "npz", (1.0, 1.0));
+    let error = |orders: &str| {
+        let more = format!("{DAMPED}\nreduce = {{ modes = 4{orders} }}");
+        let text = structure("npz", "rows.csv", "m-kg-s", &more) + &place("tip", &tip(&brick, 0, 1)) + FORCED;
+        numbers(&results(folder.path(), &text), "reduction_error")[0]
+    };
+    let [one, two, three] = ["", ", orders = 2", ", orders = 3"].map(error);
+    assert_eq!(one.to_bits(), error(", orders = 1, kind = \"rubin\"").to_bits());
+    // (900 Hz / 3 kHz of the first mode left out)⁴ for each; what rounding leaves of the third
+    assert!(two < 0.1 * one && three <= two.max(1e-9), "{one:e} {two:e} {three:e}");
+}
+
+/// The error of the reduction stands in every row of every kind that has an orbit or a frequency: in all tables but those of samples over time.
+#[test]
+fn the_error_of_the_reduction_stands_beside_every_result() {
+    let brick = blade();
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "npz", (1.0, 1.0));
+    let range = "frequency = { from = \"450 Hz\", to = \"560 Hz\", points = 5 }";
+    let mut met = Vec::new();
+    for (kind, method) in [
+        ("hysteresis\"\nfrequency = \"500 Hz\"", true),
+        ("orbit\"\nfrequency = \"500 Hz\"\nmultipliers = true", true),
+        (&format!("response\"\n{range}\n[figure]\nreferences = true"), true),
+        (&format!("performance\"\n{range}\nvary = {{ Ft = [\"1 mN\", \"4 mN\", \"20 mN\"] }}"), true),
+        (&format!("branch\"\n{}\nharmonics = 1\nsamples = 64", range.replace(", points = 5", "")), false),
+        ("transient\"\nduration = \"20 ms\"\ntime_step = \"0.05 ms\"\nstart = { hung = \"1 mm\" }", false),
+        ("modes\"\namplitude = { from = \"0.01 mm\", to = \"1 mm\", points = 4 }", false),
+        ("campbell\"\nspeed = { from = \"100 Hz\", to = \"600 Hz\", points = 3 }", false),
+    ] {
+        let free = kind.starts_with("transient");
+        let text =
+            "[parameters]\nFt = \"4 mN\"\n".to_owned()
+                + &structure("npz", "rows.csv", "m-kg-s", "modal_damping = 0.01\nreduce = { up_to = \"3 kHz\" }")
+                    .replacen("schema = 1\n", "", 1)
+                + &place("tip", &tip(&brick, 0, 1))
+                + "[[mass]]\nname = \"hung\"\nmass = \"1 g\"\n\
+               [[spring]]\nbetween = [\"hung\", \"tip.z\"]\nstiffness = \"100 N/mm\"\ndamping = \"0.1 kg/s\"\n\
+               [[joint]]\nname = \"pad\"\nbetween = [\"tip.z\", \"ground\"]\n\
+               law = { kind = \"jenkins\", limit = \"Ft\", stiffness = \"2 N/mm\" }\n"
+                + if free { "" } else { "[[force]]\non = \"tip.z\"\namplitude = \"1 N\"\n" }
+                + &format!("[study]\nkind = \"{kind}\n")
+                + if method { "[method]\nkind = \"harmonic-balance\"\nharmonics = 3\n" } else { "" };
+        let data = results(folder.path(), &format!("schema = 1\n{text}"));
+        for table in data.tables.iter().filter(|table| table.rows() > 0) {
+            let has = |name: &str| table.columns.iter().any(|column| column.name == name);
+            let sampled = has("time_s") && !has("mass");
+            let errors = table.numbers("reduction_error");
+            assert_eq!(errors.is_none(), sampled, "{kind}: {} {:?}", table.name, table.columns);
+            assert!(errors.unwrap_or_default().iter().all(|error| *error > 0.0 && *error < 1e-4), "{kind}");
+            met.push(table.name.clone());
+        }
+    }
+    // of some studies there may be no rows; of these there are
+    for name in [
+        "loops_summary",
+        "orbits",
+        "multipliers",
+        "curve",
+        "peaks",
+        "references",
+        "performance",
+        "optimum",
+        "branch",
+        "motion_summary",
+        "modes",
+        "modes_summary",
+        "campbell",
+        "crossings",
+    ] {
+        assert!(met.iter().any(|met| met == name), "{name}: {met:?}");
     }
 }

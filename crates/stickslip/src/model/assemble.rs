@@ -6,12 +6,13 @@ use super::place::places_of;
 use super::places::{End, Of, Places};
 use super::system::{Axis, MovedPlace, System, SystemBuilder};
 use super::{GROUND, Joint, Model, Ring};
-use crate::structure::Structure;
 use crate::structure::reduction::Row;
+use crate::structure::{DampedModes, Structure};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
+use std::sync::Arc;
 use stickslip_numerics::sparse::Matrix;
 
 impl Model {
@@ -102,7 +103,16 @@ struct Assembler<'a> {
 struct Matrices {
     mass: Matrix,
     damping: Matrix,
+    /// What the damping has beside that.
+    modes: Option<DampedModes>,
     stiffness: Matrix,
+}
+
+impl Matrices {
+    /// An entry of all damping.
+    fn damping(&self, row: usize, column: usize) -> f64 {
+        self.damping.get(row, column) + self.modes.as_ref().map_or(0.0, |modes| modes.get(row, column))
+    }
 }
 
 /// Harmonics of an imposed motion.
@@ -147,7 +157,8 @@ impl Assembler<'_> {
             add_along(&mut damping, &along, spring.damping);
         }
         let sum = |entries| Matrix::from_triplets(total, entries).map_err(|error| whole(&error));
-        Ok(Matrices { mass: sum(mass)?, damping: sum(damping)?, stiffness: sum(stiffness)? })
+        let modes = self.coordinates.modes.clone();
+        Ok(Matrices { mass: sum(mass)?, damping: sum(damping)?, modes, stiffness: sum(stiffness)? })
     }
 
     /// What of the matrices belongs to free coordinates.
@@ -161,7 +172,16 @@ impl Assembler<'_> {
             Matrix::from_triplets(*n, free).map_err(|error| whole(&error))
         };
         let (mass, damping) = (block(&matrices.mass)?, block(&matrices.damping)?);
-        Structure::sparse(names.clone(), mass, damping, block(&matrices.stiffness)?).map_err(|error| whole(&error))
+        let structure = Structure::sparse(names.clone(), mass, damping, block(&matrices.stiffness)?);
+        let structure = structure.map_err(|error| whole(&error))?;
+        Ok(match &matrices.modes {
+            None => structure,
+            Some(modes) if *moved == 0 => structure.with_damped_modes(modes),
+            Some(modes) => {
+                let free: Vec<f64> = modes.iter().flat_map(|column| &column[..*n]).copied().collect();
+                structure.with_damped_modes(&DampedModes::new(*n, Arc::new(free)))
+            }
+        })
     }
 
     /// The places that are free to move, at which results are given.
@@ -231,8 +251,13 @@ impl Assembler<'_> {
         for (k, motion) in motions.iter().enumerate() {
             for (&harmonic, &amplitude) in motion {
                 for row in 0..n {
-                    let parts = [&matrices.stiffness, &matrices.damping, &matrices.mass];
-                    let parts = parts.map(|matrix| zero - amplitude * matrix.get(row, n + k));
+                    let at = (row, n + k);
+                    let parts = [
+                        matrices.stiffness.get(at.0, at.1),
+                        matrices.damping(at.0, at.1),
+                        matrices.mass.get(at.0, at.1),
+                    ];
+                    let parts = parts.map(|value| zero - amplitude * value);
                     builder = builder.load(row, harmonic, parts);
                 }
             }
@@ -281,20 +306,17 @@ impl Assembler<'_> {
         let Coordinates { free: n, moved, .. } = self.coordinates;
         let names = self.places.stated.iter().filter(|place| place.moved).map(|place| &place.name);
         for (k, name) in names.enumerate() {
-            let row = |matrix: &Matrix| {
-                (
-                    DVector::from_fn(n, |i, _| matrix.get(n + k, i)),
-                    (0..moved).map(|i| matrix.get(n + k, n + i)).collect(),
-                )
+            let row = |entry: &dyn Fn(usize, usize) -> f64| {
+                (DVector::from_fn(n, |i, _| entry(n + k, i)), (0..moved).map(|i| entry(n + k, n + i)).collect())
             };
             let list = |harmonics: &Harmonics| harmonics.iter().map(|(h, a)| (*h, *a)).collect();
             builder = builder.moved(MovedPlace {
                 name: name.clone(),
                 motion: list(&motions[k]),
                 force: list(&forces[k]),
-                mass: row(&matrices.mass),
-                stiffness: row(&matrices.stiffness),
-                damping: row(&matrices.damping),
+                mass: row(&|i, l| matrices.mass.get(i, l)),
+                stiffness: row(&|i, l| matrices.stiffness.get(i, l)),
+                damping: row(&|i, l| matrices.damping(i, l)),
                 joints: signs[k].clone(),
             });
         }

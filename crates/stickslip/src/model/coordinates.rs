@@ -9,8 +9,8 @@ use super::error::{Element, ModelError};
 use super::part::{Entries, Part};
 use super::place::Place;
 use super::places::{Of, Places};
-use crate::structure::ReducedComponent;
 use crate::structure::reduction::Row;
+use crate::structure::{DampedModes, ReducedComponent};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -28,6 +28,8 @@ pub(super) struct Coordinates {
     pub places: Vec<Row>,
     /// Mass, damping and stiffness of the substructure.
     pub entries: [Entries; 3],
+    /// Damping of its modes beside that, over free and then moved coordinates.
+    pub modes: Option<DampedModes>,
     pub reduced: Option<Arc<ReducedComponent>>,
 }
 
@@ -78,6 +80,13 @@ impl Coordinates {
             entries.into_iter().map(|(row, column, v)| (order.of_part(row), order.of_part(column), v)).collect()
         };
         let entries = part.entries.map(of_part);
+        let modes = part.modes.map(|modes| {
+            let mut columns = vec![0.0; modes.iter().count() * names.len()];
+            for (column, own) in columns.chunks_exact_mut(names.len().max(1)).zip(modes.iter()) {
+                own.iter().enumerate().for_each(|(at, value)| column[order.of_part(at)] = *value);
+            }
+            DampedModes::new(names.len(), Arc::new(columns))
+        });
         let moved: Vec<(&str, &Row)> = places
             .stated
             .iter()
@@ -96,6 +105,7 @@ impl Coordinates {
             names: names.into_iter().zip(&turned.pivot).filter(|(_, pivot)| !**pivot).map(|(name, _)| name).collect(),
             places: placed,
             entries: entries.map(|entries| turned.entries(entries)),
+            modes: modes.map(|modes| turned.modes(&modes, moved.len())),
             reduced: part.reduced,
         })
     }
@@ -255,6 +265,18 @@ impl Turned {
             }
         }
         out
+    }
+
+    /// `Tᵀ U`.
+    fn modes(&self, modes: &DampedModes, moved: usize) -> DampedModes {
+        let n = self.free + moved;
+        let mut columns = vec![0.0; modes.iter().count() * n];
+        for (column, own) in columns.chunks_exact_mut(n.max(1)).zip(modes.iter()) {
+            for (row, value) in self.rows.iter().zip(own) {
+                row.iter().for_each(|(to, weight)| column[*to] += weight * value);
+            }
+        }
+        DampedModes::new(n, Arc::new(columns))
     }
 }
 

@@ -3,7 +3,9 @@
 use super::error::{Element, ModelError};
 use super::{DiskPart, Model, Substructure, SubstructureDamping};
 use crate::structure::reduction::{Damping, Reduced, ReductionError, Row};
-use crate::structure::{KeptSector, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorBlade};
+use crate::structure::{
+    DampedModes, KeptSector, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorBlade,
+};
 use std::sync::Arc;
 
 /// Row, column, value.
@@ -17,6 +19,8 @@ pub(super) struct Part {
     pub places: Vec<Vec<Row>>,
     /// Of mass, damping and stiffness.
     pub entries: [Entries; 3],
+    /// Damping of modes beside that, over its coordinates.
+    pub modes: Option<DampedModes>,
     pub reduced: Option<Arc<ReducedComponent>>,
 }
 
@@ -38,31 +42,37 @@ impl Part {
             return Part::ring(substructure, of, ring.sectors, model);
         }
         match substructure.reduction {
-            Reduction::None => Part::whole(substructure, model),
+            Reduction::None { up_to } => Part::whole(substructure, up_to, model),
             _ => Part::reduced(substructure, model),
         }
     }
 
-    fn whole(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
+    fn whole(substructure: &Substructure, up_to: f64, model: &Model) -> Result<Self, ModelError> {
         let (mass, own, stiffness) = substructure.component.matrices();
         let entries: Entries = mass.entries().collect();
         let springs: Entries = stiffness.entries().collect();
+        let times = |entries: &Entries, factor: f64| -> Entries {
+            let all = entries.iter().filter(|_| factor != 0.0);
+            all.map(|(row, column, value)| (*row, *column, factor * value)).collect()
+        };
+        let mut modes = None;
         let damping = match substructure.damping {
             SubstructureDamping::Own => own.map_or_else(Vec::new, |own| own.entries().collect()),
             SubstructureDamping::Rayleigh { mass, stiffness } => {
-                let times = |entries: &Entries, factor: f64| -> Entries {
-                    let all = entries.iter().filter(|_| factor != 0.0);
-                    all.map(|(row, column, value)| (*row, *column, factor * value)).collect()
-                };
                 [times(&entries, mass), times(&springs, stiffness)].concat()
             }
-            SubstructureDamping::Ratio(_) => return Err(no_modes()),
+            SubstructureDamping::Ratio(ratio) => {
+                let (stiffness, damped) = substructure.component.modal_damping(ratio, up_to).map_err(failed)?;
+                modes = Some(damped).filter(|damped| !damped.is_empty());
+                times(&springs, stiffness)
+            }
         };
         let named = |(at, name): (usize, &String)| row_name(at, name);
         Ok(Part {
             names: substructure.component.rows().iter().enumerate().map(named).collect(),
             places: model.places.iter().map(|place| place.displacements(&place.rows)).collect(),
             entries: [entries, damping, springs],
+            modes,
             reduced: None,
         })
     }
@@ -93,6 +103,7 @@ impl Part {
             names: (1..=reduced.dofs()).map(|number| format!("coordinate {number}")).collect(),
             places: model.places.iter().map(of_place).collect(),
             entries: [entries(mass), entries(damping), entries(stiffness)],
+            modes: None,
             reduced: Some(component),
         })
     }
@@ -123,7 +134,7 @@ impl Part {
         let blade = blade.transpose();
         let blade = blade.map_err(|error| ModelError::new(Element::Substructure, "blade", error.to_string()))?;
         let one = match (reduction, &blade) {
-            (Reduction::None, _) => OneSector::whole(substructure, &kept, &seen, blade.as_deref())?,
+            (Reduction::None { .. }, _) => OneSector::whole(substructure, &kept, &seen, blade.as_deref())?,
             (_, None) => OneSector::reduced(substructure, &kept, &seen, sectors)?,
             (_, Some(blade)) => {
                 let component = kept.mistuned(blade, &disk.deviations, &seen, reduction).map_err(failed)?;
@@ -159,7 +170,13 @@ impl Part {
             places.push(place.displacements(&rows.collect::<Vec<Row>>()));
         }
         let names = (0..sectors).flat_map(|s| one.names.iter().map(move |name| format!("{name}, sector {s}")));
-        Ok(Part { names: names.collect(), places, entries: [mass, damping, stiffness], reduced: one.reduced })
+        Ok(Part {
+            names: names.collect(),
+            places,
+            entries: [mass, damping, stiffness],
+            modes: None,
+            reduced: one.reduced,
+        })
     }
 
     /// A ring in modes of its own.
@@ -182,6 +199,7 @@ impl Part {
             names: (1..=modes.own.len()).map(|number| format!("mode {number}")).collect(),
             places: model.places.iter().map(of_place).collect(),
             entries: [own(0), damping, own(1)],
+            modes: None,
             reduced: Some(component),
         })
     }
@@ -271,8 +289,8 @@ fn damping_law(substructure: &Substructure, component: &ReducedComponent) -> Opt
 }
 
 fn no_modes() -> ModelError {
-    let message = "a damping ratio belongs to modes, and without a reduction there are none; state `rayleigh`, a damping matrix, or leave \
-                   out `reduce = false`";
+    let message = "a damping ratio belongs to the modes of a ring, and without a reduction of its sectors these are not sought; state `rayleigh`, a \
+                   damping matrix, or leave out `reduce = false`";
     ModelError::new(Element::Substructure, "modal_damping", message)
 }
 
@@ -334,7 +352,7 @@ mod tests {
     #[test]
     fn a_ring_of_matrices_is_that_of_its_masses() {
         for deviations in [&[][..], &DEVIATIONS] {
-            let own = |d| by_matrices(d, Reduction::None, SubstructureDamping::Own);
+            let own = |d| by_matrices(d, Reduction::None { up_to: 0.0 }, SubstructureDamping::Own);
             let wave = Around::EngineOrder(2);
             let (matrices, masses) = (ring(own, wave, deviations), ring(by_masses, wave, deviations));
             assert_eq!(matrices.ring, masses.ring);
@@ -359,7 +377,7 @@ mod tests {
     /// As many modes as a sector has rows leave nothing out; a damping ratio is that of every mode of the ring.
     #[test]
     fn all_coordinates_are_the_whole_ring() {
-        let how = Reduction::Modes { modes: 3, kind: crate::structure::ReductionKind::Rubin, up_to: 0.0 };
+        let how = Reduction::Modes { modes: 3, kind: crate::structure::ReductionKind::Rubin, orders: 1, up_to: 0.0 };
         let damped = |d| by_matrices(d, how, SubstructureDamping::Ratio(0.01));
         for deviations in [&[][..], &[1e-12; 5], &DEVIATIONS] {
             let few = ring(damped, Around::Sector(1), deviations);
@@ -378,7 +396,7 @@ mod tests {
 
     #[test]
     fn wrong_sectors_are_refused() {
-        let mut model = by_matrices(0.1, Reduction::None, SubstructureDamping::Own);
+        let mut model = by_matrices(0.1, Reduction::None { up_to: 0.0 }, SubstructureDamping::Own);
         let assembled = |model: &Model| ring(|_| model.clone(), Around::EngineOrder(1), &[]).assemble();
         model.substructure.as_mut().unwrap().disk.as_mut().unwrap().blade = vec![1];
         assert!(assembled(&model).unwrap_err().message.contains("boundary of the sector"));

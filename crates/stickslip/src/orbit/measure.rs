@@ -6,6 +6,7 @@
 use super::{Energy, JointMotion, PlaceMotion, Symmetry};
 use crate::law::Contact;
 use crate::model::{Axis, System};
+use crate::structure::DampedModes;
 use num_complex::Complex64;
 use stickslip_numerics::radau::quintic;
 
@@ -180,6 +181,11 @@ fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Sig
         if damping != 0.0 {
             viscous += damping * signals.product(&velocity[row], &velocity[column]);
         }
+    }
+    for shape in system.structure().damped_modes().into_iter().flat_map(DampedModes::iter) {
+        let mut along = signals.harmonics(&[]);
+        shape.iter().zip(&velocity).for_each(|(share, velocity)| signals.add(&mut along, velocity, *share));
+        viscous += signals.product(&along, &along);
     }
     let moved: Vec<[S::Signal; 3]> = system
         .moved()

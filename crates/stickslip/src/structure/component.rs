@@ -6,13 +6,13 @@ use super::reduction::{
     Damping, Deviation, EXTENTS, Free, Lacking, Mixed, NominalRing, Reduce, Reduced, ReducedSector, ReductionError,
     Reference, RingModes, Row, STEPS, Whole,
 };
-use super::{StructureError, symmetric};
+use super::{DampedModes, StructureError, symmetric};
 use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use stickslip_numerics::definite::sparse_definite;
-use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted};
+use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, columns};
 
 /// Matrices of a structure and the names of their rows. A copy is a reference to the same matrices, and to the reductions made of them.
 ///
@@ -44,6 +44,8 @@ struct Kept {
     whole: Whole,
     /// What was asked for, and what came of it: cases of a study ask the same.
     reductions: Known<Asked, Answer>,
+    /// The damping of its modes, by ratio and largest frequency.
+    damped: Known<(f64, f64), Damped>,
     /// As one of so many sectors of a ring.
     sectors: Mutex<Vec<(Boundary, usize, Arc<KeptSector>)>>,
 }
@@ -84,12 +86,17 @@ struct InFew {
 type Known<K, V> = Mutex<Vec<(K, V)>>;
 type Asked = (Vec<Row>, Reduction);
 type Answer = Result<Arc<ReducedComponent>, ReductionError>;
+/// In proportion to the stiffness, s, and what the modes have beside that.
+type Damped = Result<(f64, DampedModes), ReductionError>;
 
 /// How a component is brought into few coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reduction {
     /// Not at all: all its rows are degrees of freedom, and its dynamic stiffness is factored at every frequency.
-    None,
+    None {
+        /// The largest frequency of interest, rad/s: a damping ratio is that of every mode up to there. Nothing else asks for it.
+        up_to: f64,
+    },
     /// With as many modes as the error asks for.
     UpTo {
         /// The largest frequency of interest, rad/s: of the drive with all harmonics that count.
@@ -105,6 +112,8 @@ pub enum Reduction {
         modes: usize,
         /// Of which kind.
         kind: ReductionKind,
+        /// Orders of residual vectors beside free modes, from 1 on: each makes two more terms of their series exact.
+        orders: usize,
         /// The largest frequency of interest, rad/s, up to which the error is measured; zero: as far as so many modes serve, which is up to the
         /// last of them over 1.5.
         up_to: f64,
@@ -162,6 +171,23 @@ pub struct BetweenComponent {
     pub up_to: f64,
 }
 
+/// A sector of a ring in few coordinates, itself a sector: its rows are the coordinates, and once more those of the next sector.
+#[derive(Debug, Clone)]
+pub struct SectorComponent {
+    /// Its rows are called `number.q`.
+    pub component: Component,
+    /// The numbers of its low and its high side.
+    pub pairs: Vec<(String, String)>,
+    /// What is seen, over its rows.
+    pub seen: Vec<Row>,
+    /// How it was made, in words.
+    pub kind: String,
+    /// The largest relative error of what is seen.
+    pub error: f64,
+    /// The error holds up to there, rad/s.
+    pub up_to: f64,
+}
+
 /// Small matrices.
 #[derive(Debug, Clone)]
 pub(crate) enum Form {
@@ -209,8 +235,9 @@ impl Component {
         let damping = damping.map_or(Damping::Rayleigh { mass: 0.0, stiffness: 0.0 }, Damping::Matrix);
         // sizes and symmetry were looked at
         let whole = Whole::unseen(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
-        let (index, reductions, sectors) = (OnceLock::new(), Mutex::default(), Mutex::default());
-        Ok(Component(Arc::new(Kept { rows, index, whole, reductions, sectors })))
+        let (index, reductions) = (OnceLock::new(), Mutex::default());
+        let (damped, sectors) = (Mutex::default(), Mutex::default());
+        Ok(Component(Arc::new(Kept { rows, index, whole, reductions, damped, sectors })))
     }
 
     /// Rows of the matrices.
@@ -276,7 +303,7 @@ impl Component {
     /// let rod = |k: f64| Matrix::from_triplets(3, [(0, 0, 2.0 * k), (0, 1, -k), (1, 0, -k), (1, 1, 2.0 * k), (1, 2, -k), (2, 1, -k), (2, 2, k)]);
     /// let mass = Matrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0)))?;
     /// let rest = Component::new(vec![String::new(); 3], mass, None, rod(1e4)?)?;
-    /// let how = Reduction::Modes { modes: 1, kind: ReductionKind::Rubin, up_to: 0.0 };
+    /// let how = Reduction::Modes { modes: 1, kind: ReductionKind::Rubin, orders: 1, up_to: 0.0 };
     /// let few = rest.reduced_between(&rod(1.5e4)?, &[vec![(2, 1.0)]], &how)?;
     /// assert_eq!(few.component.dofs(), few.there.n());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -293,11 +320,6 @@ impl Component {
         };
         let reduce = |whole: &Whole| in_few(whole, how).map(|few| (few.reduced, few.up_to));
         let few = self.0.whole.seen_at(seen.to_vec())?.between(there, reduce, tolerance)?;
-        let sparse = |dense: &DMatrix<f64>| {
-            let all = (0..dense.ncols()).flat_map(|k| (0..dense.nrows()).map(move |i| (i, k)));
-            let entries = all.map(|at| (at.0, at.1, dense[at])).filter(|entry| entry.2 != 0.0);
-            Matrix::from_triplets(dense.nrows(), entries).map_err(|_| ReductionError::OutOfRange)
-        };
         let Reduced { mass, damping, stiffness, ports, kind, .. } = few.rest;
         let damping = if self.matrices().1.is_some() { Some(sparse(&damping)?) } else { None };
         let component = Component::new(vec![String::new(); mass.nrows()], sparse(&mass)?, damping, sparse(&stiffness)?);
@@ -312,6 +334,55 @@ impl Component {
         })
     }
 
+    /// As one of `sectors` sectors of a ring in few coordinates, as a sector of such a ring again: `Tᵀ M T` over its own coordinates and those of the
+    /// next sector, which its high side follows. So matrices stay positive semidefinite, and the ring is that of the reduction.
+    ///
+    /// # Errors
+    /// As [`Component::reduced`].
+    pub fn reduced_sector(
+        &self,
+        boundary: &Boundary,
+        sectors: usize,
+        seen: &[Row],
+        how: &Reduction,
+    ) -> Result<SectorComponent, ReductionError> {
+        let kept = self.sector(boundary, sectors);
+        let few = kept.reduced(seen, how)?;
+        let Form::Sector(reduced) = few.form() else { return Err(ReductionError::NoPorts) };
+        let r = reduced.dofs();
+        let columns = kept.sector.whole_columns(&reduced.basis);
+        let (mass, damping, stiffness) = self.matrices();
+        let project = |matrix: &Matrix| columns::products(self.dofs(), &columns, &matrix.times_columns(&columns));
+        // rounding apart they are symmetric
+        let symmetric = |matrix: &Matrix| {
+            let product = project(matrix);
+            sparse(&((&product + product.transpose()) * 0.5))
+        };
+        let damping = damping.map(|damping| sparse(&project(damping))).transpose()?;
+        let rows = (1..=2 * r).map(|number| format!("{number}.q")).collect();
+        let component = Component::new(rows, symmetric(mass)?, damping, symmetric(stiffness)?);
+        let mut places = vec![Row::new(); seen.len()];
+        for &(port, at, shift, weight) in &reduced.ports {
+            places[port].push((at + if shift == 0 { 0 } else { r }, weight));
+        }
+        Ok(SectorComponent {
+            component: component.map_err(|_| ReductionError::OutOfRange)?,
+            pairs: (1..=r).map(|low| (low.to_string(), (low + r).to_string())).collect(),
+            seen: places,
+            kind: few.kind().to_owned(),
+            error: few.error(),
+            up_to: few.up_to(),
+        })
+    }
+
+    /// The damping of all its modes up to a frequency (rad/s) by one ratio, and of what lies above in proportion to its stiffness; computed once.
+    pub(crate) fn modal_damping(&self, ratio: f64, up_to: f64) -> Damped {
+        once(&self.0.damped, &(ratio, up_to), || {
+            let (beta, columns) = self.0.whole.modal_damping(ratio, up_to)?;
+            Ok((beta, DampedModes::new(self.dofs(), Arc::new(columns))))
+        })
+    }
+
     /// The component as one of `sectors` sectors of a ring.
     pub(crate) fn sector(&self, boundary: &Boundary, sectors: usize) -> Arc<KeptSector> {
         let mut known = self.0.sectors.lock().unwrap_or_else(PoisonError::into_inner);
@@ -323,6 +394,13 @@ impl Component {
         known.push((boundary.clone(), sectors, kept.clone()));
         kept
     }
+}
+
+/// The entries of a small matrix.
+fn sparse(dense: &DMatrix<f64>) -> Result<Matrix, ReductionError> {
+    let all = (0..dense.ncols()).flat_map(|k| (0..dense.nrows()).map(move |i| (i, k)));
+    let entries = all.map(|at| (at.0, at.1, dense[at])).filter(|entry| entry.2 != 0.0);
+    Matrix::from_triplets(dense.nrows(), entries).map_err(|_| ReductionError::OutOfRange)
 }
 
 /// An answer that is computed once: whoever asks the same at the same time waits for the one who computes.
@@ -484,18 +562,18 @@ struct Fewer {
 
 fn in_few(whole: &Whole, how: &Reduction) -> Result<Fewer, ReductionError> {
     Ok(match *how {
-        Reduction::None => return Err(ReductionError::NoPorts),
+        Reduction::None { .. } => return Err(ReductionError::NoPorts),
         Reduction::UpTo { up_to, tolerance, kind } => {
             let chosen = Reduce { up_to, tolerance, kind }.of(whole)?;
             let (reduced, deviation, modes) = (chosen.reduced, chosen.deviation, chosen.modes);
             Fewer { reduced, deviation, modes, up_to, serves: up_to }
         }
-        Reduction::Modes { modes: count, kind, up_to } => {
+        Reduction::Modes { modes: count, kind, orders, up_to } => {
             let modes = whole.lowest_modes(count)?;
             let serves = natural(&modes).last().map_or(0.0, |last| last / BEYOND);
             let up_to = if up_to > 0.0 { up_to } else { serves };
             let reduced = match kind {
-                ReductionKind::Rubin => Free::new(whole, &modes, 0.0, 1)?.reduced(modes.count(), 1)?,
+                ReductionKind::Rubin => Free::new(whole, &modes, 0.0, orders)?.reduced(modes.count(), orders)?,
                 ReductionKind::CraigBampton => whole.held(Wanted::Lowest(count))?,
             };
             let deviation = Reference::new(whole, &modes, up_to)?.deviation(&reduced);

@@ -284,6 +284,22 @@ impl CyclicSector {
         parts.collect()
     }
 
+    /// All rows of the component, by columns: first over coordinates of the rows that are left, then over the same of the next sector.
+    pub fn whole_columns(&self, basis: &[f64]) -> Vec<f64> {
+        let (n, all) = (self.dofs.max(1), self.rows.len());
+        let half = basis.len() / n * all;
+        let mut columns = vec![0.0; 2 * half];
+        for (k, column) in basis.chunks_exact(n).enumerate() {
+            for (row, parts) in self.rows.iter().enumerate() {
+                for &(at, shift, weight) in parts {
+                    let next = if shift == 0 { 0 } else { half };
+                    columns[next + k * all + row] += weight * column[at];
+                }
+            }
+        }
+        columns
+    }
+
     /// The structure of a wave, seen at these weighted sums of the component's rows: along the real and, if the wave has one, the
     /// imaginary part.
     pub fn wave(&self, diameter: usize, seen: &[Row]) -> Result<Whole, ReductionError> {

@@ -1,5 +1,6 @@
 //! What a structure answers to harmonic forces: `(s² M + s C + K) x = F` at `s = jhΩ`.
 
+use super::modal::WithModes;
 use super::{Form, Structure};
 use num_complex::Complex64;
 use stickslip_numerics::dense::ComplexLu;
@@ -15,6 +16,7 @@ pub struct DynamicStiffness {
 enum Factor {
     Full(ComplexLu),
     Sparse(ComplexFactor),
+    Modal(Box<WithModes>),
 }
 
 impl Structure {
@@ -36,10 +38,14 @@ impl Structure {
                 let sum = entries.map(|((m, c), k)| of_mass * m + s * c + k).collect();
                 Factor::Full(ComplexLu::new(sum, n).map_err(|row| Singular { row })?)
             }
-            Form::Sparse { mass, damping, stiffness, analysis, .. } => {
+            Form::Sparse { mass, damping, stiffness, modes, analysis, .. } => {
                 let analysis = analysis.get_or_init(|| Analysis::new(&[mass, damping, stiffness]));
                 let one = Complex64::new(1.0, 0.0);
-                Factor::Sparse(analysis.factor_complex(&[(of_mass, mass), (s, damping), (one, stiffness)])?)
+                let factor = analysis.factor_complex(&[(of_mass, mass), (s, damping), (one, stiffness)])?;
+                match modes {
+                    Some(modes) if s != Complex64::ZERO => Factor::Modal(Box::new(WithModes::new(factor, modes, s)?)),
+                    _ => Factor::Sparse(factor),
+                }
             }
         };
         Ok(DynamicStiffness { factor })
@@ -52,6 +58,7 @@ impl DynamicStiffness {
         match &self.factor {
             Factor::Full(factor) => factor.bytes(),
             Factor::Sparse(factor) => factor.bytes(),
+            Factor::Modal(factor) => factor.bytes(),
         }
     }
 
@@ -63,6 +70,7 @@ impl DynamicStiffness {
         match &self.factor {
             Factor::Full(factor) => factor.solve(loads),
             Factor::Sparse(factor) => factor.solve(loads),
+            Factor::Modal(factor) => factor.solve(loads),
         }
     }
 }

@@ -4,16 +4,18 @@ mod component;
 mod cyclic;
 mod dynamic;
 mod faces;
+mod modal;
 pub mod reduction;
 mod sector;
 mod uncoupled;
 
-pub use component::{BetweenComponent, Component, ReducedComponent, Reduction, ReductionKind};
+pub use component::{BetweenComponent, Component, ReducedComponent, Reduction, ReductionKind, SectorComponent};
 pub(crate) use component::{Form as ReducedForm, KeptSector, SectorBlade};
 pub use cyclic::{Axis, BladeError, Boundary, BoundaryError};
 pub(crate) use cyclic::{CyclicSector, RingEntry, RingRow};
 pub use dynamic::DynamicStiffness;
 pub use faces::{Faces, FacesError, Node};
+pub use modal::DampedModes;
 pub(crate) use sector::turn;
 pub use sector::{Sector, Wave, WaveStiffness};
 pub(crate) use uncoupled::UncoupledModes;
@@ -49,6 +51,8 @@ enum Form {
         mass: Matrix,
         damping: Matrix,
         stiffness: Matrix,
+        /// What the damping has beside its matrix.
+        modes: Option<DampedModes>,
         analysis: OnceLock<Analysis>,
         /// Written out when a method first asks for it.
         full: OnceLock<Arc<Matrices>>,
@@ -214,7 +218,7 @@ impl Structure {
             Form::Full(Arc::new(written_out(&mass, &damping, &stiffness)))
         } else {
             let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
-            Form::Sparse { mass, damping, stiffness, analysis, full }
+            Form::Sparse { mass, damping, stiffness, modes: None, analysis, full }
         };
         Structure::checked(places, form)
     }
@@ -230,10 +234,10 @@ impl Structure {
                 added.for_each(|(i, l, k)| full.stiffness[(i, l)] += k);
                 Form::Full(Arc::new(full))
             }
-            Form::Sparse { mass, damping, stiffness, .. } => {
+            Form::Sparse { mass, damping, stiffness, modes, .. } => {
                 let stiffness = Matrix::from_triplets(self.dofs(), stiffness.entries().chain(added)).ok()?;
-                let (mass, damping) = (mass.clone(), damping.clone());
-                Form::Sparse { mass, damping, stiffness, analysis: OnceLock::new(), full: OnceLock::new() }
+                let (mass, damping, modes) = (mass.clone(), damping.clone(), modes.clone());
+                Form::Sparse { mass, damping, stiffness, modes, analysis: OnceLock::new(), full: OnceLock::new() }
             }
         };
         let largest = match &form {
@@ -243,6 +247,33 @@ impl Structure {
         let [mass, damping, _] = self.0.largest;
         let (places, largest) = (self.0.places.clone(), [mass, damping, largest]);
         largest[2].is_finite().then(|| Structure::kept(places, form, largest))
+    }
+
+    /// The same with the damping of modes.
+    ///
+    /// # Panics
+    /// If the columns are not as long as the structure.
+    #[must_use]
+    pub fn with_damped_modes(&self, of: &DampedModes) -> Structure {
+        let n = self.dofs();
+        assert_eq!(of.n(), n, "columns of another length");
+        let [mass, mut most, stiffness] = self.0.largest;
+        let form = match &self.0.form {
+            Form::Full(full) => {
+                let mut full = Matrices::clone(full);
+                of.add_to(&mut full.damping);
+                most = full.damping.amax();
+                Form::Full(Arc::new(full))
+            }
+            Form::Sparse { mass, damping, stiffness, .. } => {
+                let (mass, damping, stiffness) = (mass.clone(), damping.clone(), stiffness.clone());
+                // of a sum of squares the largest entry is on the diagonal
+                most = (0..n).fold(most, |most, i| most.max((damping.get(i, i) + of.get(i, i)).abs()));
+                let (modes, analysis, full) = (Some(of.clone()), OnceLock::new(), OnceLock::new());
+                Form::Sparse { mass, damping, stiffness, modes, analysis, full }
+            }
+        };
+        Structure::kept(self.0.places.clone(), form, [mass, most, stiffness])
     }
 
     fn checked(places: Vec<String>, form: Form) -> Result<Self, StructureError> {
@@ -294,9 +325,11 @@ impl Structure {
     pub fn full(&self) -> &Arc<Matrices> {
         match &self.0.form {
             Form::Full(full) => full,
-            Form::Sparse { mass, damping, stiffness, full, .. } => {
-                full.get_or_init(|| Arc::new(written_out(mass, damping, stiffness)))
-            }
+            Form::Sparse { mass, damping, stiffness, modes, full, .. } => full.get_or_init(|| {
+                let mut full = written_out(mass, damping, stiffness);
+                modes.iter().for_each(|modes| modes.add_to(&mut full.damping));
+                Arc::new(full)
+            }),
         }
     }
 
@@ -328,7 +361,16 @@ impl Structure {
         self.0.largest
     }
 
+    /// What its damping has beside [`Structure::entries`]: of full matrices nothing.
+    pub fn damped_modes(&self) -> Option<&DampedModes> {
+        match &self.0.form {
+            Form::Full(_) => None,
+            Form::Sparse { modes, .. } => modes.as_ref(),
+        }
+    }
+
     /// The entries of (mass, damping, stiffness) that are not all zero: row, column, values. Full matrices row by row, others column by column.
+    /// The damping has [`Structure::damped_modes`] as well.
     pub fn entries(&self) -> Box<dyn Iterator<Item = (usize, usize, [f64; 3])> + '_> {
         let n = self.dofs();
         match &self.0.form {
@@ -366,6 +408,7 @@ impl Structure {
                 // a part of the damping that only turns velocities takes no power
                 let halves = damping.entries().flat_map(|(i, k, c)| [(i, k, 0.5 * c), (k, i, 0.5 * c)]);
                 let Ok(damping) = Matrix::from_triplets(n, halves) else { return false };
+                // that of modes takes power, and only from what has a mass
                 let matrices = [mass, &damping, stiffness];
                 let [Some(definite), Some(_), Some(_)] = matrices.map(sparse_definite) else { return false };
                 definite || {
@@ -387,9 +430,9 @@ impl PartialEq for Structure {
                 && match (&self.0.form, &other.0.form) {
                     (Form::Full(a), Form::Full(b)) => a == b,
                     (
-                        Form::Sparse { mass: a, damping: b, stiffness: c, .. },
-                        Form::Sparse { mass: d, damping: e, stiffness: f, .. },
-                    ) => a == d && b == e && c == f,
+                        Form::Sparse { mass: a, damping: b, stiffness: c, modes, .. },
+                        Form::Sparse { mass: d, damping: e, stiffness: f, modes: others, .. },
+                    ) => a == d && b == e && c == f && modes == others,
                     _ => false,
                 })
     }

@@ -79,10 +79,11 @@ pub(super) fn in_wave(
 }
 
 impl Sector {
-    /// The first of `sectors` equal ones, whose degrees of freedom stand sector by sector in `ring`. `None` if they are not equal.
+    /// The first of `sectors` equal ones, whose degrees of freedom stand sector by sector in `ring`. `None` if they are not equal, or if the damping of
+    /// modes couples each with all.
     pub fn of(ring: &Structure, sectors: usize) -> Option<Sector> {
         let all = ring.dofs();
-        if sectors == 0 || !all.is_multiple_of(sectors) {
+        if sectors == 0 || !all.is_multiple_of(sectors) || ring.damped_modes().is_some() {
             return None;
         }
         let n = all / sectors;

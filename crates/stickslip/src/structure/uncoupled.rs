@@ -40,6 +40,9 @@ impl Structure {
 
     /// Mass, damping and stiffness of coordinates that do not move each other, as those of a reduction by free modes are.
     pub(crate) fn diagonals(&self) -> Option<Vec<[f64; 3]>> {
+        if self.damped_modes().is_some() {
+            return None;
+        }
         let mut own = vec![[0.0; 3]; self.dofs()];
         for (i, k, values) in self.entries() {
             if i != k {

@@ -79,7 +79,7 @@ fn resonances(system: &System) -> Vec<f64> {
 /// within a factor of two; and with a tolerance as many vectors are taken as it asks for.
 #[test]
 fn the_error_of_blades_that_differ_is_that_against_the_whole_ring() {
-    let whole = ring(Reduction::None, &BLADES);
+    let whole = ring(Reduction::None { up_to: 0.0 }, &BLADES);
     let all = resonances(&whole);
     let mut exact: BTreeMap<usize, DVector<Complex<f64>>> = BTreeMap::new();
     let mut error = |few: &System, up_to: f64| {
@@ -91,7 +91,7 @@ fn the_error_of_blades_that_differ_is_that_against_the_whole_ring() {
         errors.fold(0.0, f64::max)
     };
     for modes in [3, 5] {
-        let few = ring(Reduction::Modes { modes, kind: ReductionKind::Rubin, up_to: 0.0 }, &BLADES);
+        let few = ring(Reduction::Modes { modes, kind: ReductionKind::Rubin, orders: 1, up_to: 0.0 }, &BLADES);
         let said = few.reduced().unwrap();
         let error = error(&few, said.up_to());
         assert!(error > 0.01, "a reduction without an error tests nothing: {error:e}, {said}");
@@ -137,7 +137,7 @@ fn answers_of_many(system: &System, frequencies: &[f64]) -> Vec<Vec<Complex<f64>
 #[test]
 fn sixty_blades_have_the_frequencies_and_answers_of_all_rows() {
     let blades: Vec<f64> = (0..60).map(|s| 0.04 * (2.3 * f64::from(s * s)).sin()).collect();
-    let whole = ring(Reduction::None, &blades);
+    let whole = ring(Reduction::None { up_to: 0.0 }, &blades);
     let [mass, stiffness] = matrices(&whole);
     let all = Component::new(vec![String::new(); mass.n()], mass, None, stiffness).unwrap();
     let exact = all.frequencies(blades.len()).unwrap();
@@ -162,7 +162,7 @@ fn sixty_blades_have_the_frequencies_and_answers_of_all_rows() {
     assert!(few.dofs() < blades.len() * 20, "{}", few.dofs());
     let (said, error_of_few) = (few.reduced().unwrap(), error(&few));
     assert!(said.error() <= 1e-4 && error_of_few < 2.0 * said.error(), "{error_of_few:e}, {said}");
-    let coarse = ring(Reduction::Modes { modes: 3, kind: ReductionKind::Rubin, up_to }, &blades);
+    let coarse = ring(Reduction::Modes { modes: 3, kind: ReductionKind::Rubin, orders: 1, up_to }, &blades);
     let (said, error) = (coarse.reduced().unwrap(), error(&coarse));
     assert!(error > 1e-3, "a reduction without an error tests nothing: {error:e}, {said}");
     assert!((0.5..2.0).contains(&(said.error() / error)), "{error:e}, {said}");

@@ -182,11 +182,13 @@ fn compute(work: &Work<'_>) -> Computed {
     for (value, height) in &branch.peaks {
         begin(&mut peaks, *value);
         peaks.number("amplitude_m", *height);
+        peaks.reduced(prepared.system.reduction_evidence());
         peaks.end();
     }
     for point in branch.turns.iter().map(|turn| &branch.points[*turn]) {
         begin(&mut turns, point.value);
         turns.number("amplitude_m", worst(&point.orbit, &places));
+        turns.reduced(prepared.system.reduction_evidence());
         turns.end();
     }
     let reason = match branch.end {

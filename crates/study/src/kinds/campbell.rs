@@ -20,7 +20,7 @@ use crate::values::{Values, hertz};
 use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
-use stickslip::model::Model;
+use stickslip::model::{Model, ReductionEvidence};
 
 const TABLE: &str = "campbell";
 const CROSSINGS: &str = "crossings";
@@ -111,6 +111,8 @@ struct Natural {
     diameter: Option<usize>,
     mode: usize,
     omega: f64,
+    /// Of the structure at that speed.
+    reduction: Option<ReductionEvidence>,
 }
 
 impl Natural {
@@ -122,22 +124,24 @@ impl Natural {
 /// The natural frequencies of a model.
 fn naturals(model: &Model, most: usize) -> Result<Vec<Natural>, String> {
     let mut found = Vec::new();
-    let mut add = |state: usize, diameter: Option<usize>, modes: &stickslip::model::Modes| {
+    let mut add = |state: usize, diameter: Option<usize>, modes: &stickslip::model::Modes, reduction| {
         let all = modes.elastic.iter().take(most).enumerate();
-        found.extend(all.map(|(mode, one)| Natural { state, diameter, mode, omega: one.omega }));
+        found.extend(all.map(|(mode, one)| Natural { state, diameter, mode, omega: one.omega, reduction }));
     };
     if model.ring.is_some_and(|ring| ring.equal) {
+        let reduction = model.assemble().map_err(|error| error.to_string())?.reduction_evidence();
         for wave in waves(model, most)? {
-            add(0, Some(wave.diameter), &wave.free);
-            add(1, Some(wave.diameter), &wave.stuck);
+            add(0, Some(wave.diameter), &wave.free, reduction);
+            add(1, Some(wave.diameter), &wave.stuck, reduction);
         }
     } else {
         let survey = model.survey().map_err(|error| error.to_string())?;
         if survey.is_too_large() {
             return Err("the model is too large for all of its modes".to_owned());
         }
-        add(0, None, survey.free());
-        add(1, None, survey.stuck());
+        let reduction = survey.system().reduction_evidence();
+        add(0, None, survey.free(), reduction);
+        add(1, None, survey.stuck(), reduction);
     }
     Ok(found)
 }
@@ -300,6 +304,7 @@ fn write(prepared: &Prepared, speed: f64, natural: &Natural, rows: &mut Rows) {
     rows.integer(MODE, natural.mode as u64 + 1);
     rows.number(SPEED, speed / TAU);
     rows.number(FREQUENCY, hertz(natural.omega));
+    rows.reduced(natural.reduction);
 }
 
 /// A panel for every case: the frequencies, of a tuned disk those that an engine order meets, the lines of the engine orders, the crossings.

@@ -202,6 +202,7 @@ fn compute(work: &Work<'_>) -> Computed {
             summary.number(DAMPING, first.damping);
             summary.number(RESIDUAL, orbit.evidence.residual);
             summary.number(ENERGY_GAP, orbit.evidence.energy_gap);
+            summary.reduced(prepared.system.reduction_evidence());
             summary.text("status", orbit.evidence.accuracy.status());
             summary.end();
         }

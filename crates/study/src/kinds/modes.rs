@@ -118,6 +118,7 @@ fn compute(work: &Work<'_>) -> Computed {
     part.notes.extend(remarks(prepared, unit, &mode).into_iter().map(Note::Said));
     let (mut rows, mut summary) = (Rows::default(), Rows::default());
     let (mut stretch, mut before) = (1, f64::INFINITY);
+    let reduction = prepared.system.reduction_evidence();
     for point in &mode.points {
         // the values jump where the curve turns
         stretch += u64::from(mode.turns.iter().any(|turn| before < turn.at && turn.at <= point.amplitude));
@@ -132,6 +133,7 @@ fn compute(work: &Work<'_>) -> Computed {
             rows.number(&phase_of(place), phase.to_degrees());
         }
         rows.integer("stretch", stretch);
+        rows.reduced(reduction);
         rows.end();
     }
     summary.varied(&prepared.case);
@@ -142,6 +144,7 @@ fn compute(work: &Work<'_>) -> Computed {
     summary.number("largest_damping_ratio", largest.map_or(f64::NAN, |point| point.damping));
     summary.number("amplitude_there_m", largest.map_or(f64::NAN, |point| point.amplitude / unit));
     summary.number("frequency_there_Hz", end(largest));
+    summary.reduced(reduction);
     summary.end();
     part.tables = vec![rows, summary];
     Ok(part)

@@ -182,6 +182,7 @@ fn write(prepared: &Prepared, waves: &[WaveModes], rows: &mut Rows) {
                     rows.number(&shape_of(place), at.map_or(f64::NAN, |(size, _)| size));
                     rows.number(&phase_of(place), at.map_or(f64::NAN, |(_, phase)| phase.to_degrees()));
                 }
+                rows.reduced(prepared.system.reduction_evidence());
                 rows.end();
             }
         }

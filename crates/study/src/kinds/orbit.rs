@@ -108,6 +108,7 @@ fn compute(work: &Work<'_>) -> Computed {
             multipliers.number("real", multiplier.re);
             multipliers.number("imaginary", multiplier.im);
             multipliers.number("modulus", multiplier.norm());
+            multipliers.reduced(prepared.system.reduction_evidence());
             multipliers.end();
         }
         for time in orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize) {

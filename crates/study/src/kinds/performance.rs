@@ -101,6 +101,7 @@ fn compute(work: &Work<'_>) -> Computed {
         rows.number(AMPLITUDE, row.peak.map_or(f64::NAN, |peak| peak.value));
         rows.flag(AT_RANGE_END, row.peak.map(|peak| peak.at_end));
         rows.integer(tables::FAILED, row.failed as u64);
+        rows.reduced(prepared.system.reduction_evidence());
         rows.text("status", status);
         rows.end();
     }
@@ -112,6 +113,7 @@ fn compute(work: &Work<'_>) -> Computed {
         optima.number(&inner.column().0, at_best.map_or(f64::NAN, |value| value.column().1));
         optima.number(DRIVE, peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
         optima.number(AMPLITUDE, peak.map_or(f64::NAN, |peak| peak.value));
+        optima.reduced(work.case().system.reduction_evidence());
         optima.text("status", best.as_ref().map_or("none", status));
         optima.end();
         if best.is_none() {

@@ -173,6 +173,7 @@ fn compute(work: &Work<'_>) -> Computed {
             peaks.number(DRIVE, hertz(found.peak.omega));
             peaks.number(AMPLITUDE, found.peak.value);
             peaks.flag(AT_RANGE_END, Some(found.peak.at_end));
+            peaks.reduced(prepared.system.reduction_evidence());
             peaks.end();
         }
         part.tables.push(peaks);
@@ -204,6 +205,7 @@ fn shape(prepared: &Prepared, found: &Found, rows: &mut Rows) {
         rows.number(&amplitude_of(place), of[0]);
         rows.number(&phase_of(place), of[1]);
     }
+    rows.reduced(prepared.system.reduction_evidence());
     rows.end();
 }
 

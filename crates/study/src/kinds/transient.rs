@@ -273,6 +273,7 @@ fn compute(work: &Work<'_>) -> Computed {
             extremes.text("mass", place);
             extremes.number("largest_displacement_m", displacement);
             extremes.number(TIME, time);
+            extremes.reduced(prepared.system.reduction_evidence());
             extremes.end();
         }
         if excitation == Excitation::Free {
@@ -310,6 +311,7 @@ fn read_off(prepared: &Prepared, decays: &[Decay], step: f64, rows: &mut Rows, s
         rows.number("amplitude_m", cycle.amplitude);
         rows.number("frequency_Hz", cycle.frequency);
         rows.number("damping_ratio", cycle.damping_ratio);
+        rows.reduced(prepared.system.reduction_evidence());
         rows.end();
     }
     let highest = cycles.iter().max_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
@@ -321,6 +323,7 @@ fn read_off(prepared: &Prepared, decays: &[Decay], step: f64, rows: &mut Rows, s
     named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_damping_ratio"), cycle.damping_ratio));
     named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_amplitude_m"), cycle.amplitude));
     named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_frequency_Hz"), cycle.frequency));
+    summary.reduced(prepared.system.reduction_evidence());
     summary.end();
     None
 }

@@ -68,7 +68,8 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     // rows without an entry are not written by some programs: those of the stiffness count
     let ordered = |(key, matrix): Read| match (stiffness.1.names(), matrix.names()) {
         (Some(names), Some(own)) if names != own => {
-            let ordered = matrix.in_order_of(names).map_err(|error| said(error, Path::new("")));
+            let path = file(stated, key).map_or_else(PathBuf::new, |file| folder.join(file.path));
+            let ordered = matrix.in_order_of(names).map_err(|error| said(error, &path));
             ordered.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
         }
         _ => Ok((key, matrix)),

@@ -36,10 +36,10 @@ class Mesh:
                     corners += [(a, b, c + 1) for a, b, c in corners]
                     self.elements.append([self.node(at, place(*at)) for at in corners])
 
-    def deck(self, sets, held):
+    def deck(self, sets, held, element="C3D8"):
         text = "*NODE, NSET=NALL\n"
         text += "".join(f"{n}, {x:.15g}, {y:.15g}, {z:.15g}\n" for n, (x, y, z) in self.nodes.items())
-        text += "*ELEMENT, TYPE=C3D8, ELSET=ALL\n"
+        text += f"*ELEMENT, TYPE={element}, ELSET=ALL\n"
         text += "".join(f"{e + 1}, " + ", ".join(map(str, nodes)) + "\n" for e, nodes in enumerate(self.elements))
         for name, nodes in sets.items():
             text += f"*NSET, NSET={name}\n" + lines(nodes)
@@ -152,7 +152,20 @@ def sector(folder):
     keep("sector_frequencies.csv", table)
 
 
+def incompatible(folder):
+    """A strip of elements with incompatible modes, whose inner rows stand behind those of the mesh."""
+    mesh = Mesh()
+    mesh.box(((0, 6), (0, 2), (0, 1)), lambda i, j, k: (5.0 * i, 3.0 * j, 1.0 * k))
+    root = [n for (i, _, _), n in mesh.number.items() if i == 0]
+    deck = mesh.deck({"ROOT": root}, "ROOT", "C3D8I")
+    run(folder, "incompatible", deck + MATRICES)
+    keep_matrices(folder, "incompatible")
+    own = frequencies(run(folder, "frequencies", deck + "*STEP\n*FREQUENCY\n6\n*END STEP\n"))
+    keep("incompatible_frequencies_Hz.txt", "".join(f"{f:.9g}\n" for f in own[:6]))
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
+        incompatible(folder)
         blade(folder)
         sector(folder)

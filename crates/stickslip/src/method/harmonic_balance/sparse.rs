@@ -52,12 +52,15 @@ pub(super) struct Sparse {
 }
 
 impl Sparse {
-    /// `None` if the system is small, has joints with inner motions, is solved on one sector, or if its joints are so few, or coupled all over, that a full matrix
+    /// `None` if the system is small, has joints with inner motions or a damping of modes, is solved on one sector, or if its joints are so few, or coupled all over, that a full matrix
     /// over them is eliminated faster.
     pub fn new(system: &System, ports: &Ports, harmonics: &[usize]) -> Option<Self> {
         let n = system.dofs();
         if n < LARGE || ports.wave().is_some() || ports.iter().any(|port| port.series > 0.0) {
             return None;
+        }
+        if system.structure().damped_modes().is_some() {
+            return None; // it couples all
         }
         let entries: Vec<(usize, usize, [f64; 3])> = system.structure().entries().collect();
         let ends: Vec<Vec<(usize, f64)>> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();

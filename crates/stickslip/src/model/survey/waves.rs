@@ -325,6 +325,7 @@ fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(Matr
     let mode = |k: usize| {
         let (omega, shape) = (found.values[k].max(0.0).sqrt(), found.shape(k));
         let power: f64 = damping.times(shape).iter().zip(shape).map(|(c, x)| c * x).sum();
+        let power = power + structure.damped_modes().map_or(0.0, |modes| modes.power(shape));
         LinearMode { omega, damping: power / (2.0 * omega) }
     };
     let shapes = DMatrix::from_fn(n, found.count() - free, |row, k| found.shape(free + k)[row]);

@@ -8,7 +8,8 @@
 //! | Rubin, MacNeal | free modes, and what the others add to the static answer at the ports | `free` |
 //! | Craig-Bampton | modes with the ports held, and static answers to unit motions of the ports | `craig_bampton` |
 //!
-//! and harmonic balance, which wants receptances only, may take modes and a series of residuals (`series`). Every reduction can be held against the
+//! and harmonic balance, which wants receptances only, may take modes and a series of residuals (`series`), of which residual vectors of J orders make the
+//! first 2 J terms exact in any method. Every reduction can be held against the
 //! whole structure (`evidence`; `mistuned` for a ring whose blades differ), and [`Reduce`] takes as many modes as a given error asks for. A sector of a ring is reduced for all its waves at once
 //! (`ring`). One basis may serve two
 //! stiffnesses and all between (`between`). A ring whose blades differ is brought into its own modes (`nominal`).
@@ -320,6 +321,28 @@ impl Whole {
             return Err(ReductionError::Number { what: "the number of modes", value: count as f64, must });
         }
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, Wanted::Lowest(count))?)
+    }
+
+    /// The damping of every mode up to `up_to` (rad/s) by one share of the critical one, as in [`Damping::Ratio`], over all degrees of freedom: `β K + U Uᵀ`.
+    /// β in s, and the columns of U.
+    ///
+    /// # Errors
+    /// [`ReductionError`]: numbers that no damping has, modes that cannot be had.
+    pub(super) fn modal_damping(&self, ratio: f64, up_to: f64) -> Result<(f64, Vec<f64>), ReductionError> {
+        let law = Damping::Ratio { ratio, up_to };
+        law.check()?;
+        let beta = law.proportional().map_or(0.0, |(_, beta)| beta);
+        let modes = self.modes(up_to)?;
+        let mut columns = Vec::new();
+        for (k, value) in modes.values.iter().enumerate() {
+            let omega = value.max(0.0).sqrt();
+            // none of a free motion, of which rounding would make some
+            let more = law.of_mode(omega).filter(|_| k >= modes.free()).map_or(0.0, |c| c - beta * omega * omega);
+            if more > 0.0 {
+                columns.extend(self.mass.times(modes.shape(k)).iter().map(|u| more.sqrt() * u));
+            }
+        }
+        Ok((beta, columns))
     }
 
     /// The ports' displacements over columns as long as the structure.

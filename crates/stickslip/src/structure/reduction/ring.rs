@@ -73,6 +73,11 @@ struct Computed {
     reference: Reference,
 }
 
+/// The first share that is tried with so many orders.
+fn share(orders: usize) -> f64 {
+    SIZES.iter().find(|(order, _)| *order >= orders).map_or(SIZES[SIZES.len() - 1].1, |(_, share)| *share)
+}
+
 /// The waves of a sector, as they are asked for.
 struct Waves<'a> {
     sector: &'a CyclicSector,
@@ -96,12 +101,12 @@ impl CyclicSector {
         }
         let mut waves = Waves { sector: self, seen, blade: None, met: Vec::new() };
         match *how {
-            Reduction::None => Err(ReductionError::NoPorts),
+            Reduction::None { .. } => Err(ReductionError::NoPorts),
             Reduction::UpTo { up_to, tolerance, kind } => {
                 waves.blade = blade.map(|(blade, _)| (blade, up_to));
                 waves.up_to(up_to, tolerance, kind, blade.map_or(0, |(_, step)| STEPS[step]))
             }
-            Reduction::Modes { modes, kind, up_to } => waves.with_modes(modes, kind, up_to),
+            Reduction::Modes { modes, kind, orders, up_to } => waves.with_modes(modes, (kind, orders), up_to),
         }
     }
 
@@ -177,7 +182,12 @@ impl Waves<'_> {
     }
 
     /// With so many modes of every wave.
-    fn with_modes(&mut self, count: usize, kind: ReductionKind, up_to: f64) -> Result<ChosenSector, ReductionError> {
+    fn with_modes(
+        &mut self,
+        count: usize,
+        (kind, orders): (ReductionKind, usize),
+        up_to: f64,
+    ) -> Result<ChosenSector, ReductionError> {
         let level = 1;
         let (taken, between) = (self.sector.diameters(level), self.sector.diameters(level + 1));
         let mut serves = f64::INFINITY;
@@ -196,7 +206,7 @@ impl Waves<'_> {
             let reference = Reference::few(&whole, &modes, up_to, SAMPLES)?;
             self.met.push(Computed { diameter, whole, modes, extent: BEYOND, reference });
         }
-        let reduced = self.basis(&taken, SIZES[0], kind)?;
+        let reduced = self.basis(&taken, (orders, share(orders)), kind)?;
         let deviation = self.deviation(&reduced, &between, up_to)?;
         Ok(self.chosen(reduced, deviation, (up_to, serves)))
     }

@@ -68,6 +68,7 @@ pub(super) fn row(work: &Work<'_>, found: &[Found], rows: &mut Rows) -> Result<(
     rows.number(tables::TUNED_AMPLITUDE, tuned.value);
     rows.number(tables::RATIO, highest.peak.value / tuned.value);
     rows.flag(AT_RANGE_END, Some(highest.peak.at_end || tuned.at_end));
+    rows.reduced(prepared.system.reduction_evidence());
     rows.end();
     Ok(())
 }

@@ -50,6 +50,7 @@ pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>)
                 rows.number(&amplitude_of(&format!("{name}_{what}")), amplitude);
             }
         }
+        rows.reduced(prepared.system.reduction_evidence());
         rows.end();
     }
     (rows, absent)

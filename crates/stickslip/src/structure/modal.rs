@@ -1,0 +1,151 @@
+//! Damping of modes, `U Uᵀ` with a column `√(2 ζ ω) M φ` for each: it couples all rows, so that beside sparse matrices it is kept as these columns.
+//!
+//! What it does to a dynamic stiffness follows from as many answers of that as there are columns:
+//! `(Z + s U Uᵀ)⁻¹ = Z⁻¹ - s Z⁻¹ U (1 + s Uᵀ Z⁻¹ U)⁻¹ Uᵀ Z⁻¹`.
+//!
+//! Source: Woodbury (1950), "Inverting modified matrices", Memorandum Rept. 42, Statistical Research Group, Princeton; the damping: Wilson and
+//! Penzien (1972), "Evaluation of orthogonal damping matrices", Int. J. Numer. Meth. Engng 4, 5-10.
+
+use nalgebra::{DMatrix, DMatrixView};
+use num_complex::Complex64;
+use std::sync::Arc;
+use stickslip_numerics::dense::ComplexLu;
+use stickslip_numerics::sparse::{ComplexFactor, Singular};
+
+/// Columns of U as long as the structure, one after the other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DampedModes {
+    n: usize,
+    columns: Arc<Vec<f64>>,
+}
+
+impl DampedModes {
+    /// Of columns of length n.
+    ///
+    /// # Panics
+    /// If the length of `columns` is no multiple of n.
+    pub fn new(n: usize, columns: Arc<Vec<f64>>) -> Self {
+        assert!(columns.len().is_multiple_of(n.max(1)), "{} numbers are no columns of {n}", columns.len());
+        DampedModes { n, columns }
+    }
+
+    /// Length of the columns, n.
+    pub fn n(&self) -> usize {
+        self.n
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// The columns.
+    pub fn iter(&self) -> impl Iterator<Item = &[f64]> {
+        self.columns.chunks_exact(self.n.max(1))
+    }
+
+    /// An entry of `U Uᵀ`, kg/s.
+    pub fn get(&self, row: usize, column: usize) -> f64 {
+        self.iter().map(|u| u[row] * u[column]).sum()
+    }
+
+    /// `C += U Uᵀ`.
+    pub(super) fn add_to(&self, damping: &mut DMatrix<f64>) {
+        let columns = DMatrixView::from_slice(&self.columns, self.n, self.columns.len() / self.n.max(1));
+        damping.gemm(1.0, &columns, &columns.transpose(), 1.0);
+    }
+
+    /// `vᵀ U Uᵀ v`: the power that velocities lose, W.
+    pub fn power(&self, v: &[f64]) -> f64 {
+        self.iter().map(|u| dot(u, v).powi(2)).sum()
+    }
+}
+
+fn dot(u: &[f64], v: &[f64]) -> f64 {
+    u.iter().zip(v).map(|(u, v)| u * v).sum()
+}
+
+/// A factored dynamic stiffness with the damping of modes.
+#[derive(Debug, Clone)]
+pub(super) struct WithModes {
+    without: ComplexFactor,
+    modes: DampedModes,
+    /// `s Z⁻¹ U`.
+    answers: Vec<Complex64>,
+    /// `1 + s Uᵀ Z⁻¹ U`.
+    small: ComplexLu,
+}
+
+impl WithModes {
+    /// Of the factor at the rate s.
+    pub fn new(without: ComplexFactor, modes: &DampedModes, s: Complex64) -> Result<Self, Singular> {
+        let mut answers: Vec<Complex64> = modes.columns.iter().map(|u| s * u).collect();
+        without.solve(&mut answers);
+        let count = modes.iter().count();
+        let mut small = along(modes, &answers);
+        (0..count).for_each(|k| small[k * count + k] += 1.0);
+        // a sum of modes has no row of its own
+        let small = ComplexLu::new(small, count).map_err(|_| Singular { row: 0 })?;
+        Ok(WithModes { without, modes: modes.clone(), answers, small })
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.without.bytes() + self.small.bytes() + size_of_val(&self.answers[..])
+    }
+
+    pub fn solve(&self, loads: &mut [Complex64]) {
+        self.without.solve(loads);
+        let mut shares = along(&self.modes, loads);
+        self.small.solve(&mut shares);
+        let n = self.modes.n;
+        for (x, shares) in loads.chunks_exact_mut(n).zip(shares.chunks_exact(self.answers.len() / n)) {
+            for (answer, share) in self.answers.chunks_exact(n).zip(shares) {
+                x.iter_mut().zip(answer).for_each(|(x, a)| *x -= a * share);
+            }
+        }
+    }
+}
+
+/// `Uᵀ X`, column by column.
+fn along(modes: &DampedModes, x: &[Complex64]) -> Vec<Complex64> {
+    let each = |x: &[Complex64], u: &[f64]| -> Complex64 { x.iter().zip(u).map(|(x, u)| x * u).sum() };
+    x.chunks_exact(modes.n).flat_map(|x| modes.iter().map(move |u| each(x, u))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::structure::{SPARSE, Structure};
+    use nalgebra::DVector;
+
+    /// Beside sparse matrices and in full ones the damping of modes is the same: that of the dense product.
+    #[test]
+    fn the_form_does_not_matter() {
+        let n = SPARSE + 5;
+        let beside = |own: f64, next: f64| DMatrix::from_fn(n, n, |i, k| [own, next, 0.0][i.abs_diff(k).min(2)]);
+        let (m, c, k) = (beside(1.0, 0.2), beside(0.01, 0.0), beside(2.0, -1.0));
+        let u = DMatrix::from_fn(n, 3, |i, mode| 0.3 * (0.7 * (i * (mode + 1)) as f64).sin());
+        let modes = DampedModes::new(n, Arc::new(u.as_slice().to_vec()));
+        let all = &c + &u * u.transpose();
+        let places: Vec<String> = (0..n).map(|i| i.to_string()).collect();
+        let sparse = Structure::new(places.clone(), m.clone(), c, k.clone()).unwrap().with_damped_modes(&modes);
+        let full = Structure::new(places, m.clone(), all.clone(), k.clone()).unwrap();
+        assert!(sparse.is_sparse() && !full.is_sparse() && sparse.dissipates());
+        assert!((sparse.damping() - &all).amax() < 1e-15);
+        assert!((sparse.largest()[1] - all.amax()).abs() < 1e-15);
+        assert_ne!(sparse, Structure::new(sparse.places().to_vec(), m.clone(), beside(0.01, 0.0), k.clone()).unwrap());
+        // full matrices take it in
+        let twice = full.with_damped_modes(&modes);
+        assert!(twice.damped_modes().is_none() && (twice.damping() - (&all + &u * u.transpose())).amax() < 1e-15);
+        let v: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
+        let lost = (u.transpose() * DVector::from_vec(v.clone())).norm_squared();
+        assert!((modes.power(&v) / lost - 1.0).abs() < 1e-14);
+        for s in [Complex64::ZERO, Complex64::new(0.0, 0.7), Complex64::new(0.4, 0.1)] {
+            let [mut a, mut b] = [(); 2].map(|()| vec![Complex64::new(1.0, -0.5); 2 * n]);
+            sparse.dynamic_stiffness(s).unwrap().solve(&mut a);
+            full.dynamic_stiffness(s).unwrap().solve(&mut b);
+            let size = b.iter().fold(0.0f64, |size, b| size.max(b.norm()));
+            assert!(a.iter().zip(&b).all(|(a, b)| (a - b).norm() < 1e-11 * size), "{s}");
+        }
+    }
+}
