@@ -426,7 +426,7 @@ harmonics = 15
     assert!((0.4..4.0).contains(&large.seconds), "{} s", large.seconds);
     assert!(large.usual_seconds < large.seconds);
     // in bands the time goes with the blades, beside what every run takes
-    let growth = (ring(192).seconds - 0.2) / (large.seconds - 0.2);
+    let growth = (ring(192).seconds - large.seconds) / (large.seconds - ring(48).seconds);
     assert!((1.5..3.0).contains(&growth), "{growth}");
 }
 

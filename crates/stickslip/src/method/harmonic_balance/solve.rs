@@ -65,7 +65,7 @@ const PERIODS: usize = 4;
 const SAMPLES: usize = 1024;
 /// What one search may take, and what all searches of a point may take, from the first to those of the estimate: Newton's method, interior points, and
 /// proximal points with the limits that are lowered after them, eliminate as much as one each; laws with a memory are followed as far as for one search in
-/// all. Measured: of 170 random points with two such laws those that were found took a third of either at most.
+/// all. Measured: of 173 random points those that were found took 1.01 of the three at most, all but one 0.4.
 const SEARCH: Work = Work { eliminated: 1.0, marched: 1.0 };
 pub(super) const POINT: Work = Work { eliminated: 3.0, marched: 1.0 };
 /// Products with the derivative that a step takes, roughly.
@@ -287,8 +287,7 @@ impl Level {
     pub(super) fn taken(&self, ports: &Ports) -> Work {
         let size = self.residual.len() as f64;
         let (taken, one, fewest) = match self.sparse {
-            // blocks of all harmonics of a coordinate and its neighbours
-            Some(_) => (self.assembled, size * (4 * self.harmonics().len()).pow(2) as f64, FEWEST),
+            Some(ref sparse) => (self.assembled, sparse.work(self.harmonics().len()), FEWEST),
             // steps have the products that they take, and shortening them takes none
             None if self.coupled.is_some() => {
                 (self.products, product_work(ports, self.harmonics().len()), FEWEST * PRODUCTS)
