@@ -119,8 +119,8 @@ const MOST_DOFS_IN_TIME: usize = 60;
 const RECENT: usize = 8;
 /// Unknowns beyond which no error is estimated by elimination: one would take seconds, and a search takes ten and more.
 const LARGEST: usize = 2600;
-/// Multiplications of an elimination in banded form beyond which none is: it would take more than a second, and a search dozens of them.
-const DEAREST: f64 = 5e9;
+/// Multiplications of an elimination in banded form beyond which none is: it would take four seconds.
+const DEAREST: f64 = 1.2e10;
 /// Memory of the equations, bytes, beyond which nothing is begun: 1000 nodes of three directions with five harmonics need half of it without modes.
 const MEMORY: f64 = 4e9;
 /// Harmonics times axes squared up to which products with all of them take a tenth of a second, so that an error is estimated.
@@ -429,8 +429,10 @@ impl Balance<'_> {
         let products = (harmonics * axes * axes) as f64;
         let size = 2 * axes * harmonics;
         let multiplied = coupled::by_products(size, &self.ports) && products <= ESTIMATED;
-        let banded = self.banded.as_ref().is_some_and(|banded| banded.work(harmonics) <= DEAREST);
-        let few = size <= LARGEST || banded || multiplied;
+        let few = match &self.banded {
+            Some(banded) => banded.work(harmonics) <= DEAREST,
+            None => size <= LARGEST || multiplied,
+        };
         few && level_memory(self.banded.as_ref(), &self.ports, &self.rest, harmonics) <= MEMORY
     }
 
