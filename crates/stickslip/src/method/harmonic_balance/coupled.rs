@@ -495,10 +495,10 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::budget::{POINT, Work};
     use super::super::ease::GIVEN;
     use super::super::equations::{Level, Solution};
     use super::super::rest::Rest;
-    use super::super::solve::{POINT, Work};
     use super::super::uncoupled::Uncoupled;
     use super::*;
     use crate::law::{Coulomb, Dahl, Jenkins, Jenkins2d, SharedLaw};

@@ -20,6 +20,7 @@
 mod unknowns;
 mod yardsticks;
 
+use super::budget::Work;
 use super::coupled::{Coupled, Near, by_products, dot};
 use super::ease::Ease;
 use super::hold::CLEAR;
@@ -27,7 +28,6 @@ use super::linear::Linear;
 use super::ports::{Alternation, Beginning, Member, Port, Ports, REPEATS, block, blocks};
 use super::receptance::{Modal, Receptance};
 use super::rest::Rest;
-use super::solve::Work;
 use super::sparse::Sparse;
 use crate::method::guess::Guess;
 use crate::model::{Cyclic, System};

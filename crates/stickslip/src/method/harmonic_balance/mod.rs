@@ -16,6 +16,7 @@
 
 mod arc;
 mod branch;
+mod budget;
 mod closed;
 mod coupled;
 mod ease;
@@ -48,6 +49,7 @@ use crate::model::System;
 use crate::orbit::{Course, JointSample, Orbit, Path};
 pub(crate) use arc::{ModeArc, Step as ModeStep};
 pub(crate) use branch::BranchEquations;
+use budget::{POINT, Work};
 use equations::{Level, Solution};
 use estimate::{Compared, estimate};
 use kept::Kept;
@@ -57,7 +59,7 @@ use num_complex::Complex64;
 use ports::{Port, Ports};
 use rest::Rest;
 use sampling::samples_for;
-use solve::{Lost, POINT, Work};
+use solve::Lost;
 use sparse::Sparse;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};

@@ -1,0 +1,26 @@
+//! What searches may take: the work that ends a search, and that which ends a point.
+
+/// What one search may take, and what all searches of a point may take, from the first to those of the estimate: Newton's method, interior points, and
+/// proximal points with the limits that are lowered after them, eliminate as much as one each; laws with a memory are followed as far as for one search in
+/// all. Measured: of 173 random points those that were found took 1.01 of the three at most, all but one 0.4.
+pub(super) const SEARCH: Work = Work { eliminated: 1.0, marched: 1.0 };
+pub(super) const POINT: Work = Work { eliminated: 3.0, marched: 1.0 };
+
+/// Work, relative to that of one search: eliminations, and steps of laws with a memory.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Work {
+    pub eliminated: f64,
+    pub marched: f64,
+}
+
+impl Work {
+    /// Both together.
+    pub fn and(self, other: Work) -> Work {
+        Work { eliminated: self.eliminated + other.eliminated, marched: self.marched + other.marched }
+    }
+
+    /// Whether there is more of one or the other than so much.
+    pub fn is_beyond(self, limit: Work) -> bool {
+        self.eliminated > limit.eliminated || self.marched > limit.marched
+    }
+}
