@@ -104,8 +104,8 @@ fn response_to_five_digits() {
     }
 }
 
-/// Elements with incompatible modes bring rows of their own, called by nodes behind those of the mesh, here 42: they have stiffness and no mass. The
-/// frequencies are those of CalculiX all the same, and the first is that of a slender beam but for what a plate is stiffer; in few coordinates the
+/// Elements with incompatible modes bring rows of their own, called by nodes behind those of the mesh, here 42, with stiffness and mass. The frequencies
+/// are those of CalculiX all the same, and the first is that of a slender beam but for what a plate is stiffer; in few coordinates the
 /// response is that of all rows.
 #[test]
 fn inner_rows_of_incompatible_modes() {
@@ -130,11 +130,9 @@ fn inner_rows_of_incompatible_modes() {
     let (study, few, error) = found("{ up_to = \"10 kHz\" }");
     let model = study.case(0).unwrap().model;
     let component = &model.substructure.as_ref().unwrap().component;
-    let (mass, _, _) = component.matrices();
     let node = |row: usize| component.rows()[row].split('.').next().unwrap().parse::<u32>().unwrap();
     let inner = |row: usize| node(row) > 42;
     assert_eq!((0..component.dofs()).filter(|row| inner(*row)).count(), 12 * 9, "nine for every element");
-    assert!(mass.entries().all(|(row, column, value)| value == 0.0 || !(inner(row) || inner(column))));
     let expected: Vec<f64> =
         text("incompatible_frequencies_Hz.txt").lines().map(|line| line.parse().unwrap()).collect();
     for (own, expected) in component.frequencies(expected.len()).unwrap().iter().zip(&expected) {
