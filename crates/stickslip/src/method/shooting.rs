@@ -539,12 +539,7 @@ impl Solver for Shooter<'_> {
         // neighbours vibrate by much the same share
         self.set_share(if known.is_some() { self.share } else { 1.0 });
         let mut orbit = self.found(start, symmetry, aim)?;
-        loop {
-            let share = self.share_in(&orbit, rest);
-            if vibration::is_resolved(self.share, share) {
-                break;
-            }
-            vibration::has_digits(share).map_err(self.broke(omega))?;
+        while let Some(share) = vibration::next(self.share, self.share_in(&orbit, rest)).map_err(self.broke(omega))? {
             self.set_share(share);
             orbit = self.found(Some(&orbit.start), symmetry, aim)?;
         }

@@ -42,15 +42,16 @@ pub(super) fn share(
     if vibration < state { vibration / state } else { 1.0 }
 }
 
-/// Whether a search that took the vibration for `taken` of the state need not go on, now that it is known to be `found`.
-pub(super) fn is_resolved(taken: f64, found: f64) -> bool {
-    taken <= NEARLY * found
-}
-
+/// The share with which a search goes on that took the vibration for `taken` of the state where it is `found` to be; `None` if it need not.
+///
 /// # Errors
 /// A vibration that has too few of the digits of its state.
-pub(super) fn has_digits(share: f64) -> Result<(), Breakdown> {
-    if share < LEAST { Err(Breakdown::Offset { share }) } else { Ok(()) }
+pub(super) fn next(taken: f64, found: f64) -> Result<Option<f64>, Breakdown> {
+    match taken <= NEARLY * found {
+        true => Ok(None),
+        false if found < LEAST => Err(Breakdown::Offset { share: found }),
+        false => Ok(Some(found)),
+    }
 }
 
 /// Evidence relative to the state becomes relative to the vibration.

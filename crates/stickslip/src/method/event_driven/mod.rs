@@ -255,14 +255,12 @@ impl Solver for Exact<'_> {
             orbit = relaxed(self, system, orbit, aim);
         } else {
             // closed forms have all digits of a vibration, and only whoever waits must know how large it is
-            let mut taken = 1.0;
-            loop {
-                let at = (symmetry, orbit.period());
-                let share = vibration::share(orbit.path.as_ref(), at, &orbit.start, (&self.weights, aim.rest));
-                if vibration::is_resolved(taken, share) {
-                    break;
-                }
-                vibration::has_digits(share).map_err(|cause| OrbitError::Breakdown { method: name, omega, cause })?;
+            let broke = |cause| OrbitError::Breakdown { method: name, omega, cause };
+            let (mut taken, at) = (1.0, (symmetry, orbit.period()));
+            let share = |exact: &Self, orbit: &Orbit| {
+                vibration::share(orbit.path.as_ref(), at, &orbit.start, (&exact.weights, aim.rest))
+            };
+            while let Some(share) = vibration::next(taken, share(self, &orbit)).map_err(broke)? {
                 taken = share;
                 orbit = self.found(Some(&orbit.start), search.of_share(share), aim)?;
             }

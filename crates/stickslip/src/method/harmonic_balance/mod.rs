@@ -404,9 +404,7 @@ impl Balance<'_> {
             Level::new(harmonics, samples, ports, sparse)
         });
         level.drive(&self.system, &self.ports, &self.rest, omega).map_err(Lost::at)?;
-        let others = self.levels.iter().filter(|(other, _)| **other != top);
-        let taken = others.map(|(_, level)| level.taken_of_point(&self.ports));
-        let elsewhere = taken.fold(Work::default(), Work::and);
+        let elsewhere = self.taken(Some(top));
         let level = self.levels.get_mut(&top).expect("made above");
         level.elsewhere = elsewhere;
         Ok(level)
@@ -418,10 +416,15 @@ impl Balance<'_> {
         self.levels.values_mut().for_each(Level::begin_point);
     }
 
-    /// Whether the searches of the point have taken all that they may.
+    /// What the searches of the point have taken, but those with harmonics up to one number.
+    fn taken(&self, but: Option<usize>) -> Work {
+        let counted = self.levels.iter().filter(|(top, _)| but != Some(**top));
+        counted.map(|(_, level)| level.taken_of_point(&self.ports)).fold(Work::default(), Work::and)
+    }
+
+    /// Whether they have taken all that they may.
     fn is_spent(&self) -> bool {
-        let taken = self.levels.values().map(|level| level.taken_of_point(&self.ports));
-        taken.fold(Work::default(), Work::and).is_beyond(POINT)
+        self.taken(None).is_beyond(POINT)
     }
 
     /// Whether a solution with twice the harmonics takes no more than seconds.
