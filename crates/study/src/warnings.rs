@@ -159,9 +159,19 @@ const STICKS: f64 = 0.99;
 /// that leaves its joints alone loads them by the last digits of its shape.
 const UNLOADED: f64 = 1e6;
 
-/// Of a nonlinear mode whose amplitudes end before any joint slips.
-pub(crate) fn mode_sticks(cases: &[Surveyed]) -> Vec<String> {
-    sticks(cases).into_iter().collect()
+/// Of a nonlinear mode whose amplitudes end before any joint slips, or which is asked of a structure that a constant force displaces.
+pub(crate) fn of_mode(cases: &[Surveyed]) -> Vec<String> {
+    sticks(cases).into_iter().chain(displaced(cases)).collect()
+}
+
+/// A mode is a motion without forces, constant ones included.
+fn displaced(cases: &[Surveyed]) -> Option<String> {
+    let mut forces = cases.iter().flat_map(|one| &one.case.model.forces);
+    let force = forces.find(|force| force.harmonic == 0 && force.amplitude != 0.0)?;
+    Some(format!(
+        "modes leave all forces out, also the constant one on `{}`: what it closes, opens or brings to its limit is as it is without it",
+        force.on
+    ))
 }
 
 fn sticks(cases: &[Surveyed]) -> Option<String> {

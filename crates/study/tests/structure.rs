@@ -11,6 +11,7 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
+use stickslip::structure::Reduction;
 use stickslip_formats::{Matrix, Symmetry, names, write};
 use stickslip_study::dataset::Dataset;
 use stickslip_study::read_file;
@@ -362,7 +363,7 @@ fn a_turned_frame_has_the_same_orbit() {
             + &place("tip", &far)
             + "[[joint]]\nname = \"rub\"\nbetween = [\"pad\", \"ground\"]\n\
                law = { kind = \"friction-contact\", tangential = \"2e5 N/m\", normal = \"3e5 N/m\", friction = 0.3, preload = \"20 N\" }\n\
-               [[force]]\non = \"tip.y\"\namplitude = \"60 N\"\n[[force]]\non = \"tip.z\"\namplitude = \"2 N\"\nphase = \"50 deg\"\n\
+               [[force]]\non = \"tip.y\"\namplitude = \"150 N\"\n[[force]]\non = \"tip.z\"\namplitude = \"2 N\"\nphase = \"50 deg\"\n\
                [study]\nkind = \"response\"\nfrequency = [\"600 Hz\", \"700 Hz\"]\n\
                [method]\nkind = \"harmonic-balance\"\nharmonics = 7\n";
         results(folder.path(), &text)
@@ -816,5 +817,40 @@ fn the_error_of_the_reduction_stands_beside_every_result() {
         "crossings",
     ] {
         assert!(met.iter().any(|met| met == name), "{name}: {met:?}");
+    }
+}
+
+/// Harmonics that a joint makes meet modes far above the drive, the seventh one here: so many coordinates as the program takes by itself know them.
+#[test]
+fn few_coordinates_know_the_modes_that_harmonics_of_a_joint_meet() {
+    const MASSES: usize = 60;
+    let folder = tempfile::tempdir().unwrap();
+    let spring = 2e7;
+    let mass = (0..MASSES).map(|i| (i, i, 0.05 + 0.01 * (i as f64).sin()));
+    // held at one end, free at the other
+    let own = (0..MASSES).map(|i| (i, i, if i + 1 == MASSES { spring } else { 2.0 * spring }));
+    let stiffness = own.chain((1..MASSES).flat_map(|i| [(i, i - 1, -spring), (i - 1, i, -spring)]));
+    for (name, entries) in [("k", stiffness.collect::<Vec<_>>()), ("m", mass.collect())] {
+        let made = Matrix::new(MASSES, MASSES, Symmetry::General, entries).unwrap();
+        write(folder.path().join(format!("{name}.mtx")), &made).unwrap();
+    }
+    let of = |reduce: &str| {
+        let text = format!(
+            "schema = 1\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\nunits = \"m-kg-s\"\n\
+             rayleigh = {{ mass = \"1 /s\", stiffness = \"2e-6 s\" }}\n{reduce}\n\
+             [[place]]\nname = \"tip\"\ndof = \"60\"\n[[place]]\nname = \"mid\"\ndof = \"35\"\n\
+             [[joint]]\nname = \"j\"\nbetween = [\"mid\", \"ground\"]\n\
+             law = {{ kind = \"jenkins\", stiffness = \"200 N/mm\", limit = \"4 N\" }}\n\
+             [[force]]\non = \"tip\"\namplitude = \"6 N\"\n\
+             [study]\nkind = \"response\"\nfrequency = [\"82 Hz\", \"84 Hz\"]\n[method]\nkind = \"event-driven\"\n"
+        );
+        results(folder.path(), &text)
+    };
+    let (few, all) = (of(""), of("reduce = false"));
+    assert!(numbers(&few, "j_slip_fraction").iter().all(|share| *share > 0.1), "no harmonics without slip");
+    for column in ["tip_amplitude_m", "mid_amplitude_m"] {
+        for (few, all) in numbers(&few, column).iter().zip(numbers(&all, column)) {
+            assert!((few / all - 1.0).abs() < Reduction::TOLERANCE, "{column}: {few} {all}");
+        }
     }
 }

@@ -87,6 +87,11 @@ fn a_model_that_nothing_drives() {
     // a mode is free vibration
     let modes = "kind = \"modes\"\namplitude = { from = \"10 um\", to = \"10 cm\" }";
     silent(&template("blade-couple", &[("F0 = \"10 N\"", "F0 = \"0 N\""), (drive, modes)]));
+    let constant = ("amplitude = \"F0\"", "amplitude = \"F0\"\nharmonic = 0");
+    warns(
+        &template("blade-couple", &[constant, (drive, modes)]),
+        &["modes leave all forces out", "constant one on `blade1`"],
+    );
 }
 
 #[test]

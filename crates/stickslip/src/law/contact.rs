@@ -21,6 +21,8 @@ pub enum Contact {
 
 /// A smooth law never quite sticks: it counts as slipping while its force is above this fraction of its limit.
 pub(crate) const SLIPS_ABOVE: f64 = 0.95;
+/// Any other is at its limit while it slips, but for the rounding of what it has summed up to there.
+const AT: f64 = 1.0 - 1e-9;
 
 impl Contact {
     /// The slip direction along one direction: +1, -1, or 0.
@@ -50,10 +52,19 @@ impl Contact {
         if sign > 0.0 { Contact::SlipForward } else { Contact::SlipBackward }
     }
 
-    /// By the force against a limit, along all directions. A limit of zero holds nothing: the faces slide as they move.
+    /// By the force of a smooth law against its limit, along all directions. A limit of zero holds nothing: the faces slide as they move.
     pub fn by_limit(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
+        Contact::above(SLIPS_ABOVE, limit, velocity, force)
+    }
+
+    /// The same of a law that sticks below its limit.
+    pub fn at_limit(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
+        Contact::above(AT, limit, velocity, force)
+    }
+
+    fn above(fraction: f64, limit: f64, velocity: &[f64], force: &[f64]) -> Self {
         let size = force.iter().map(|f| f * f).sum::<f64>().sqrt();
-        if limit.is_infinite() || size < SLIPS_ABOVE * limit {
+        if limit.is_infinite() || size < fraction * limit {
             return Contact::Stick;
         }
         match (force, velocity) {

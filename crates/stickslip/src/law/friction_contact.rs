@@ -111,7 +111,7 @@ impl Law for FrictionContact {
         if normal <= 0.0 {
             return Contact::Open;
         }
-        Contact::by_limit(self.friction * normal, &velocity[..self.tangents], &force[..self.tangents])
+        Contact::at_limit(self.friction * normal, &velocity[..self.tangents], &force[..self.tangents])
     }
 }
 

@@ -204,7 +204,10 @@ pub trait Law: Debug + Send + Sync {
     }
     /// What the faces do at this velocity (m/s) under this force (N), along the law's directions.
     fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
-        Contact::by_limit(self.scale(), velocity, force)
+        match self.rate() {
+            Some(_) => Contact::by_limit(self.scale(), velocity, force),
+            None => Contact::at_limit(self.scale(), velocity, force),
+        }
     }
     /// Complex stiffness of the first harmonic under `u = amplitude cos Ωt` along the first direction (N/m): where methods begin to search.
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {

@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::dimension::Dimension;
     use crate::law::{
-        Coulomb, FrictionContact, Gap, Jenkins, Law, LawInfo, Parameter, Rate, RateLaw, Relative, StepLaw,
+        Coulomb, FrictionContact, Gap, Jenkins, Jenkins2d, Law, LawInfo, Parameter, Rate, RateLaw, Relative, StepLaw,
     };
     use crate::method::harmonic_balance::{self, HarmonicBalance};
     use crate::method::shooting::Shooting;
@@ -333,6 +333,31 @@ mod tests {
         for (low, high) in &orbit.joints[0].displacement {
             near(*high, a, 1e-5);
             near(*low, -a, 1e-5);
+        }
+    }
+
+    /// Led round a circle that is a little smaller than its slider holds a contact sticks, however near its limit it is; round one that is a little
+    /// larger it slips all the time. The first cycle leaves a smaller one beside the middle, where it touches the limit at one instant.
+    #[test]
+    fn what_stays_below_its_limit_sticks() {
+        let (stiffness, limit, preload) = (4.0, 0.3, 1.0);
+        let contact =
+            FrictionContact { tangential: stiffness, normal: 1.0, friction: limit / preload, preload, tangents: 2 };
+        let laws: [SharedLaw; 2] = [Arc::new(Jenkins2d { stiffness, limit }), Arc::new(contact)];
+        let methods: [&dyn Method; 3] = [&Transient::default(), &Shooting::default(), &HarmonicBalance::default()];
+        for (law, (part, slips)) in laws.iter().flat_map(|law| [(0.99, 0.0), (1.01, 1.0)].map(|case| (law, case))) {
+            let a = part * limit / stiffness;
+            let still = Axis::new(Vec::new());
+            let circle = [Complex64::new(a, 0.0), Complex64::new(0.0, -a)].map(|g| still.clone().moved([(1, g)]));
+            let axes = circle.into_iter().chain([still]).take(law.directions()).collect();
+            let nothing = DMatrix::zeros(0, 0);
+            let empty = Structure::new(Vec::new(), nothing.clone(), nothing.clone(), nothing).unwrap();
+            let system = System::builder(empty).joint("led", law.clone(), axes).build().unwrap();
+            for method in methods {
+                let orbit = method.solver(&system).unwrap().orbit(2.0, None).unwrap();
+                let told = orbit.joints[0].slip_fraction;
+                assert!((told - slips).abs() < 1e-2, "{law:?} at {part} of its limit by {}: {told}", orbit.method);
+            }
         }
     }
 

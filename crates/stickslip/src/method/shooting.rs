@@ -272,6 +272,11 @@ impl<'a> Shooter<'a> {
         move |cause| OrbitError::Breakdown { method, omega, cause }
     }
 
+    /// The vibration is so small a share of its state that the digits are missing.
+    fn lost(&self, omega: f64, share: f64) -> OrbitError {
+        self.broke(omega)(Breakdown::Offset { share })
+    }
+
     /// The orbit of the stiff integration: searched, brought near, and closed on the steps of one run.
     fn smooth_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
         let search = self.search;
@@ -538,10 +543,18 @@ impl Solver for Shooter<'_> {
         };
         // neighbours vibrate by much the same share
         self.set_share(if known.is_some() { self.share } else { 1.0 });
-        let mut orbit = self.found(start, symmetry, aim)?;
+        let mut orbit = match self.found(start, symmetry, aim) {
+            // the neighbour's share may be too small for this one
+            Err(_) if self.share < 1.0 => {
+                self.set_share(1.0);
+                self.found(start, symmetry, aim)?
+            }
+            found => found?,
+        };
         while let Some(share) = vibration::next(self.share, self.share_in(&orbit, rest)).map_err(self.broke(omega))? {
             self.set_share(share);
-            orbit = self.found(Some(&orbit.start), symmetry, aim)?;
+            // what is found as a state and not as a vibration lacks the digits of that
+            orbit = self.found(Some(&orbit.start), symmetry, aim).map_err(|_| self.lost(omega, share))?;
         }
         if self.search == Search::Newton {
             let system = self.system;
@@ -551,6 +564,9 @@ impl Solver for Shooter<'_> {
         vibration::relate(&mut orbit.evidence, share);
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
+            if share < vibration::SMALL {
+                return Err(self.lost(omega, share));
+            }
             return Err(OrbitError::Evidence { method: self.name, omega, energy_gap: orbit.evidence.energy_gap });
         }
         Ok(orbit)

@@ -14,6 +14,8 @@ const INSTANTS: usize = 32;
 const NEARLY: f64 = 2.0;
 /// The least share that leaves a vibration the nine digits that its search asks for at least, of the sixteen of its state.
 const LEAST: f64 = 1e-6;
+/// Share below which work that does not balance is that of lost digits.
+pub(super) const SMALL: f64 = 1e-3;
 
 /// The vibration's share of the size of a state `start`, in the energy norm of `weights` (displacements, velocities, states of the joints); what is
 /// smaller than `rest` counts as that (√J).

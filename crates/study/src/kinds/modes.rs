@@ -14,7 +14,7 @@ use crate::kind::Kind;
 use crate::note::Note;
 use crate::rows::Rows;
 use crate::values::{Values, hertz};
-use crate::warnings::mode_sticks;
+use crate::warnings::of_mode;
 use crate::words::{display_unit, significant};
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode, unit};
@@ -58,7 +58,7 @@ pub(super) const KIND: Kind = Kind {
     },
     grain: |_| Grain::Case,
     cost,
-    warnings: mode_sticks,
+    warnings: of_mode,
     compute,
     draw,
 };
