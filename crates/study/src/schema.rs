@@ -160,8 +160,8 @@ pub const STRUCTURE: &[Key] = &[
     optional(
         "reduce",
         Takes::TableOrNone(REDUCE),
-        "how the structure is brought into few coordinates; absent: as far as its error asks for, up to fifteen times the highest drive \
-         frequency, or five times without joints; false: not at all",
+        "how the structure is brought into few coordinates; absent: as far as its error asks for, up to five times the highest drive \
+         frequency, and with joints up to fifteen times if at most 60 modes lie there; false: not at all",
         "{ up_to = \"5 kHz\" }",
     ),
     optional(

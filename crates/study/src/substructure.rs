@@ -10,10 +10,12 @@ use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 
 /// So many harmonics of the highest drive frequency count where the file does not say how far a reduction must reach: of forces alone, with some room.
-const HARMONICS: f64 = 5.0;
+const HARMONICS: u32 = 5;
 /// The same where joints are. Those of friction fall with the square of their number, and a mode that one of them meets lifts it again by its
 /// amplification: on a chain of 60 masses the seventh met one, and a reach of 5, 9, 15 and 31 harmonics left errors of 9e-3, 1e-3, 5e-5 and 5e-6.
-const HARMONICS_OF_JOINTS: f64 = 15.0;
+const HARMONICS_OF_JOINTS: u32 = 15;
+/// Modes that a reach beyond that of forces may take: with more of them methods that follow motions in time are slow, and the mesh seldom knows the last.
+const MODES_OF_HARMONICS: usize = 60;
 /// Damping ratio from which a mode creeps.
 const CRITICAL: f64 = 1.0;
 /// Names of the directions of a node with a normal.
@@ -129,14 +131,23 @@ pub(crate) fn settle(model: &mut Model, values: &Values) {
     let ends = run_up.into_iter().flat_map(|table| ["from", "to"].map(|key| table.quantity(key).unwrap_or(0.0)));
     let drive = values.frequencies("frequency").into_iter().filter_map(|frequencies| frequencies.highest());
     let excited = most * ends.chain(drive).fold(0.0, f64::max);
-    let harmonics = if model.joints.is_empty() { HARMONICS } else { HARMONICS_OF_JOINTS };
-    match model.substructure.as_mut().map(|substructure| &mut substructure.reduction) {
-        Some(Reduction::UpTo { up_to, .. } | Reduction::None { up_to }) if *up_to <= 0.0 => {
-            *up_to = harmonics * excited;
+    let joints = !model.joints.is_empty() && excited > 0.0;
+    let Some(Substructure { component, reduction, .. }) = model.substructure.as_mut() else { return };
+    match reduction {
+        Reduction::UpTo { up_to, .. } | Reduction::None { up_to } if *up_to <= 0.0 => {
+            *up_to = if joints { reach(component, excited) } else { f64::from(HARMONICS) * excited };
         }
-        Some(Reduction::Modes { up_to, .. }) => *up_to = excited,
+        Reduction::Modes { up_to, .. } => *up_to = excited,
         _ => {}
     }
+}
+
+/// Where the odd harmonics end that joints make of a drive up to `excited` and that few coordinates can know, all rad/s.
+fn reach(component: &Component, excited: f64) -> f64 {
+    let few = |omega: &f64| component.modes_below(*omega).is_some_and(|count| count <= MODES_OF_HARMONICS);
+    let mut beyond =
+        (HARMONICS + 1..=HARMONICS_OF_JOINTS).rev().step_by(2).map(|harmonic| f64::from(harmonic) * excited);
+    beyond.find(few).unwrap_or(f64::from(HARMONICS) * excited)
 }
 
 /// A `[[place]]`.

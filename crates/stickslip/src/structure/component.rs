@@ -46,6 +46,8 @@ struct Kept {
     reductions: Known<Asked, Answer>,
     /// The damping of its modes, by ratio and largest frequency.
     damped: Known<(f64, f64), Damped>,
+    /// Its modes below a frequency.
+    counts: Known<f64, Option<usize>>,
     /// As one of so many sectors of a ring.
     sectors: Mutex<Vec<(Boundary, usize, Arc<KeptSector>)>>,
 }
@@ -236,8 +238,8 @@ impl Component {
         // sizes and symmetry were looked at
         let whole = Whole::unseen(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
         let (index, reductions) = (OnceLock::new(), Mutex::default());
-        let (damped, sectors) = (Mutex::default(), Mutex::default());
-        Ok(Component(Arc::new(Kept { rows, index, whole, reductions, damped, sectors })))
+        let (damped, counts, sectors) = (Mutex::default(), Mutex::default(), Mutex::default());
+        Ok(Component(Arc::new(Kept { rows, index, whole, reductions, damped, counts, sectors })))
     }
 
     /// Rows of the matrices.
@@ -277,6 +279,25 @@ impl Component {
         let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
         let modes = NaturalModes::new(analysis, stiffness, mass, Wanted::Lowest(count))?;
         Ok(natural(&modes))
+    }
+
+    /// How many natural modes it has below `omega` (rad/s), by one factorisation, which is made once for all that ask the same; `None` if that is
+    /// singular to rounding.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip::structure::Component;
+    /// use stickslip_numerics::sparse::Matrix;
+    /// let diagonal = |values: [f64; 3]| Matrix::from_triplets(3, values.into_iter().enumerate().map(|(i, v)| (i, i, v)));
+    /// let three = Component::new(vec![String::new(); 3], diagonal([1.0; 3])?, None, diagonal([1.0, 4.0, 9.0])?)?;
+    /// assert_eq!(three.modes_below(2.5), Some(2));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn modes_below(&self, omega: f64) -> Option<usize> {
+        let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
+        once(&self.0.counts, &omega, || {
+            analysis.factor(&[(1.0, stiffness), (-omega * omega, mass)]).ok().map(|factor| factor.negative())
+        })
     }
 
     /// The component in few coordinates, seen at these weighted sums of its rows; computed once for all that ask the same.
