@@ -1,16 +1,33 @@
 //! Masses that cannot move: so stiffly held that their inertia makes no difference.
 //!
 //! In `k - m Ω²` the second term is lost in the rounding of the first where `m Ω² < ε k`, with ε = 2.2e-16: the result is the same for a mass of
-//! zero. Such a stiffness stands for "rigid", costs the exact method `√(k/m)/Ω` > 7e7 oscillations per period, and is refused.
+//! zero. Such a stiffness stands for "rigid", costs the exact method `√(k/m)/Ω` > 7e7 oscillations per period, and is refused. Where it is so of every
+//! mass, no stiffness stands out, and the drive is too slow.
 
 use crate::expression::displayed;
+use crate::info::Complaint;
 use std::collections::HashMap;
+use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 use stickslip::law::Law;
-use stickslip::model::{Element, GROUND, Model, ModelError};
+use stickslip::model::{Element, GROUND, Mass, Model, ModelError};
 
-/// The element that holds a mass so that it does not move at the drive frequency `omega`, rad/s; `None` if there is none.
-pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
+/// A mass beside what is stiffest of all that holds it.
+struct Held<'a> {
+    mass: &'a Mass,
+    stiffness: f64,
+    by: Element,
+}
+
+impl Held<'_> {
+    /// Drive frequency below which its inertia is lost, rad/s.
+    fn slowest(&self) -> f64 {
+        (f64::EPSILON * self.stiffness / self.mass.mass).sqrt()
+    }
+}
+
+/// The masses that anything holds. A place without mass is no mistake of its stiffness, a moved one moves.
+fn held(model: &Model) -> impl Iterator<Item = Held<'_>> {
     let mut stiffest: HashMap<&str, (f64, Element)> = HashMap::new();
     let springs = model.springs.iter().enumerate().map(|(i, s)| (&s.between, s.stiffness, Element::Spring(i)));
     let joints = model.joints.iter().enumerate().map(|(i, j)| (&j.between, stiffness(&*j.law), Element::Joint(i)));
@@ -22,24 +39,58 @@ pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
             }
         }
     }
-    // a place without mass is no mistake of its stiffness, a moved one moves
     let free = |name: &str| model.motions.iter().all(|motion| motion.on != name);
-    model.masses.iter().filter(|mass| mass.mass > 0.0 && free(&mass.name)).find_map(|mass| {
-        let &(stiffness, element) = stiffest.get(mass.name.as_str())?;
-        if mass.mass * omega * omega >= f64::EPSILON * stiffness {
+    model.masses.iter().filter(move |mass| mass.mass > 0.0 && free(&mass.name)).filter_map(move |mass| {
+        let &(stiffness, by) = stiffest.get(mass.name.as_str())?;
+        (stiffness > 0.0).then_some(Held { mass, stiffness, by })
+    })
+}
+
+/// The element that holds a mass so that it does not move at the drive frequency `omega`, rad/s; `None` if there is none.
+pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
+    let Held { mass, stiffness, by } = held(model).find(|held| omega < held.slowest())?;
+    let message = format!(
+        "{} is so stiff for {} that `{}` does not move at {}: the inertia is lost in the rounding of the stiffness. Connect its \
+         neighbours to `ground`, make one mass of two, or take `coulomb` for rigid friction",
+        displayed(stiffness, Some(Dimension::STIFFNESS)),
+        displayed(mass.mass, Some(Dimension::MASS)),
+        mass.name,
+        displayed(omega, Some(Dimension::FREQUENCY)),
+    );
+    let key = if matches!(by, Element::Joint(_)) { "law" } else { "stiffness" };
+    Some(ModelError { element: by, key, message, wrong_name: None })
+}
+
+/// By how much more than rounding inertia is there at the frequency that is named instead: so slow a motion is that of rest all the same.
+const SEEN: f64 = 100.0;
+
+/// What is wrong with a drive frequency `omega`, rad/s, that is too slow for every mass.
+pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<Complaint> {
+    let mut slowest = 0.0f64;
+    let mut softest: Option<(f64, &str)> = None;
+    for held in held(model) {
+        if omega >= held.slowest() {
             return None;
         }
-        let message = format!(
-            "{} is so stiff for {} that `{}` does not move at {}: the inertia is lost in the rounding of the stiffness. Connect its \
-             neighbours to `ground`, make one mass of two, or take `coulomb` for rigid friction",
-            displayed(stiffness, Some(Dimension::STIFFNESS)),
-            displayed(mass.mass, Some(Dimension::MASS)),
-            mass.name,
-            displayed(omega, Some(Dimension::FREQUENCY)),
-        );
-        let key = if matches!(element, Element::Joint(_)) { "law" } else { "stiffness" };
-        Some(ModelError { element, key, message, wrong_name: None })
-    })
+        slowest = slowest.max(held.slowest());
+        let own = held.slowest() / f64::EPSILON.sqrt();
+        if softest.is_none_or(|(known, _)| own < known) {
+            softest = Some((own, held.mass.name.as_str()));
+        }
+    }
+    let (own, name) = softest?;
+    let shown = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
+    let enough = TAU * 10f64.powf((SEEN.sqrt() * slowest / TAU).log10().ceil());
+    let message = format!(
+        "{} is so slow that no inertia counts: it is lost in the rounding of the stiffness, of which `{name}` has {} by itself",
+        shown(omega),
+        shown(own)
+    );
+    let help = format!(
+        "from {} on it is solved, and inertia is as good as nothing there too; if stiffnesses only stand for something rigid, lower them",
+        shown(enough)
+    );
+    Some(Complaint::new("frequency", message, help))
 }
 
 /// Stiffness of a law while it sticks, N/m; zero of a rigid one, and of one that holds nothing.

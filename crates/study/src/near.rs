@@ -2,8 +2,8 @@
 
 /// The candidate nearest to `word`, if one is near enough to be worth a question.
 pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // words from a file can be megabytes long, and the distance costs the product of the lengths
-    if word.len() > 64 {
+    // words from a file can be megabytes long, and the distance costs the product of the lengths; of numbers none is near another
+    if word.len() > 64 || word.starts_with(|first: char| first.is_ascii_digit()) {
         return None;
     }
     let lower = word.to_lowercase();
@@ -54,6 +54,7 @@ mod tests {
         assert_eq!(nearest("Damping", keys), Some("damping"));
         assert_eq!(nearest("damp", keys), Some("damping"));
         assert_eq!(nearest("colour", keys), None);
+        assert_eq!((nearest("61", ["6", "1"]), nearest("61.x", ["6.x"])), (None, None));
         assert_eq!(nearest(&"x".repeat(100_000), keys), None);
         assert_eq!(one_of(keys), "`between`, `stiffness` or `damping`");
     }

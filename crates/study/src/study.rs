@@ -4,7 +4,7 @@ use crate::disk::{self, Again};
 use crate::error::{Location, Problem, Source, StudyError};
 use crate::expression::{Value, displayed};
 use crate::figure;
-use crate::immovable::immovable;
+use crate::immovable::{immovable, too_slow};
 use crate::info::{Complaint, KindInfo};
 use crate::key::VERSION;
 use crate::memory;
@@ -630,6 +630,10 @@ impl Study {
             return None;
         }
         let lowest = values.frequencies("frequency").and_then(Frequencies::lowest);
+        if let Some(complaint) = lowest.and_then(|omega| too_slow(&model, omega)) {
+            problems.push(self.complaint(complaint));
+            return None;
+        }
         if let Some(error) = lowest.and_then(|omega| immovable(&model, omega)) {
             problems.push(self.model_problem(&error, &model));
             return None;

@@ -401,7 +401,10 @@ fn near(component: &Component, name: &str) -> String {
         Some(near) => format!("did you mean `{near}`?"),
         None => {
             let first = rows.iter().take(LISTED).map(|row| format!("`{row}`")).collect::<Vec<_>>().join(", ");
-            format!("its {} rows are {first}, …", rows.len())
+            match rows.last() {
+                Some(last) if rows.len() > LISTED => format!("its {} rows are {first}, … `{last}`", rows.len()),
+                _ => format!("its rows are {first}"),
+            }
         }
     }
 }

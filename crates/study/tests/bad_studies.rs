@@ -287,6 +287,36 @@ fn masses_that_cannot_move_are_refused() {
     assert!(read_study("a.toml", &text, &[]).is_ok());
 }
 
+/// A drive so slow that no mass has inertia is a matter of the frequency, and what is named instead is taken.
+#[test]
+fn drives_without_inertia_are_refused() {
+    let text = |frequency: &str| {
+        format!(
+            r#"
+schema = 1
+[[mass]]
+name = "b"
+mass = "0.2 kg"
+[[spring]]
+between = ["b", "ground"]
+stiffness = "100 N/mm"
+[[force]]
+on = "b"
+amplitude = "8 N"
+[study]
+kind = "orbit"
+frequency = "{frequency}"
+"#
+        )
+    };
+    let error = read_study("a.toml", &text("1e-6 Hz"), &[]).unwrap_err();
+    assert_eq!((error.line(), error.key()), (Some(14), Some("frequency")), "{error}");
+    // the frequency of the mass by itself is √(100 N/mm / 0.2 kg) / 2π
+    assert!(error.message().contains("1e-6 Hz") && error.message().contains("112.5"), "{error}");
+    assert!(error.help_text().unwrap().starts_with("from 0.0001 Hz on"), "{error:?}");
+    assert!(read_study("a.toml", &text("1e-4 Hz"), &[]).is_ok());
+}
+
 /// An error that every case has is no matter of the first.
 #[test]
 fn an_error_of_all_cases_names_none() {

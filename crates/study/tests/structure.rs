@@ -435,6 +435,8 @@ fn what_is_wrong_is_said() {
     told("\"m-kg-s\"", "\"mm-t\"", &["mm-t-s"]);
     told(&format!("\"{node}.z\""), "\"7.z\"", &["no row `7.z`"]);
     told(&format!("\"{node}.z\"]"), &format!("\"{node}.w\"]"), &["no row", "its rows of this node are"]);
+    // a number is near no other: the first and the last say which there are
+    told(&format!("\"{node}.z\""), "\"9999.z\"", &["no row", "its 144 rows are", ", … `"]);
     told(DAMPED, &format!("{DAMPED}\nreduce = {{ kind = \"none\", modes = 3 }}"), &["leave out one"]);
     told(DAMPED, &format!("{DAMPED}\nreduce = {{ orders = 2 }}"), &["`orders`", "add `modes`"]);
     let held = "reduce = { modes = 3, orders = 2, kind = \"craig-bampton\" }";
