@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 use std::f64::consts::{LN_10, TAU};
 use stickslip::curve::sweep::BLOCK;
 use stickslip::law::SharedLaw;
-use stickslip::method::{Method, auto::Auto, harmonic_balance};
+use stickslip::method::{Method, auto::Auto, event_driven, harmonic_balance};
 
 /// What a study will hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -362,15 +362,10 @@ const OVERHEAD: f64 = 0.2;
 const CELL: f64 = 3e-7;
 /// Work on a point of a figure, s. Measured: 1 s for 800,000 in HTML, as much for SVG.
 const POINT: f64 = 3e-6;
-/// Event-driven: a closed form per segment, and a decomposition for each new pattern of stick and slip, whose number
-/// grows with the joints. Measured: 3 ms at 8 masses and joints, 40 ms at 16, 0.23 s at 24; 0.8 ms at 32 masses without a joint.
-const EVENT_DRIVEN: (f64, f64) = (2e-4, 3e-3);
-/// The first number where the neighbour's orbit is near. Measured: 19 to 49 µs for the couple.
-const EVENT_DRIVEN_USUAL: f64 = 3e-5;
-/// A decomposition without joints, per cube of the degrees of freedom, s. Measured: 13 s and more a point for 900 of them.
-const EVENT_DRIVEN_ALONE: f64 = 2e-8;
-/// Masses and joints together, and joints, of the second number.
-const EVENT_DRIVEN_SIZE: (f64, f64) = (16.0, 8.0);
+/// Event-driven: a closed form per segment where the neighbour's orbit is near, and where it is not. Measured: 19 to 49 µs for the couple.
+const EVENT_DRIVEN: (f64, f64) = (3e-5, 2e-4);
+/// How many times as much an orbit takes that Newton's method finds only after waiting.
+const EVENTS_WAITED: f64 = 3.0;
 /// The tolerance of harmonic balance for which its time was measured.
 const SERIES_TOLERANCE: f64 = 1e-3;
 /// Harmonic balance per mass and joint at 15 harmonics. Measured with springs before the sliders: 54 µs for the massless couple, 3 ms for a
@@ -379,9 +374,9 @@ const SERIES: f64 = 5e-4;
 /// The same where they are found.
 const SERIES_USUAL: f64 = 1.5e-5;
 /// Rigid sliders and smooth laws need more harmonics and more steps: measured 20 ms at 4 blades, 0.9 s at 32. Where
-/// the harmonics are given they need more steps only.
+/// the harmonics are given they need more steps only, as a rule from a neighbour and where none is near: 0.8 and 2.1 s for rings of 100 and 300 with five.
 const HARD: f64 = 40.0;
-const HARD_RIGID: f64 = 3.0;
+const HARD_RIGID: (f64, f64) = (3.0, 80.0);
 const HARD_SMOOTH: f64 = 10.0;
 /// Friction that falls with velocity needs the most of both. Measured: 0.16 to 0.4 s for two masses and a joint.
 const HARD_FALLING: f64 = 120.0;
@@ -397,8 +392,7 @@ const RIGID_EACH: (f64, f64) = (3.0, 8.0);
 /// falls with an order between 1 and 3/2. Measured: 14 trees of 8 to 30 masses took 0.02 to 2 s a point, with 15 to 255.
 const RIGID_HARMONICS: (f64, f64) = (31.0, 255.0);
 const RIGID_ORDER: f64 = 2.0 / 3.0;
-/// Where harmonic balance begins, and ends.
-const RIGID_FIRST: f64 = 7.0;
+/// Where harmonic balance ends.
 const RIGID_MOST: f64 = 511.0;
 /// What contacts that the structure couples all with all add, per square of their directions, as a smooth law. Measured with five harmonics on a
 /// block, where many slip: 0.05, 0.29 and 1.1 s for 10, 100 and 300 nodes of three directions; a fifth of that where they stick.
@@ -414,12 +408,12 @@ const SERIES_HARMONICS: f64 = 15.0;
 const SHOOTING: (f64, f64) = (1e-3, 1.5e-2);
 /// The same in a sweep. Measured for two masses and a joint: 0.7 ms with `coulomb-arctan` and `cubic`, 1.5 to 3.5 ms with laws that have states.
 const SHOOTING_USUAL: (f64, f64) = (5e-5, 3e-4);
-/// Shooting in equal steps, times the square of masses and joints. Measured: 0.8 s for four masses and a joint of 32 sliders at a tolerance
-/// of 1e-9.
-const STEPPED: f64 = 5e-2;
+/// Shooting in equal steps: as many periods of a transient does an orbit take. Measured: 0.29 s a point for a body on a contact of two directions, 0.33 s for
+/// three with two of them.
+const STEPPED: f64 = 40.0;
 /// Method `transient`: the periods in which a mode with the least damping loses a digit. Measured at a damping ratio of 7e-4: exact laws
-/// 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses; smooth laws 0.9 s and 8 s for 2 and 4. At 1.6 % a ring took 80 periods.
-const SETTLING_PERIODS: (f64, f64) = (80.0, 50_000.0);
+/// 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses; smooth laws 0.9 s and 8 s for 2 and 4. At 1.6 % a ring took 80 periods. The shortest windows of two decays take 16.
+const SETTLING_PERIODS: (f64, f64) = (30.0, 50_000.0);
 /// Highest drive frequencies up to which the drive moves a mode.
 const DRIVEN: f64 = 2.0;
 /// Periods after which it ends where nothing settles, which a force without a bound (a gap, a cubic spring) may make of some points; twice, as
@@ -442,8 +436,12 @@ const RINGING: f64 = 9.0;
 /// Periods of the drive that an integration takes as long for as for one oscillation of what rings, at the lowest. Measured: 1000 oscillations at
 /// 18 kHz in 8 periods at 151 Hz, 0.8 s for four masses.
 const RUNG: f64 = 0.2;
-/// A period in equal steps, times the square of masses and joints. Measured: 0.2 s for two masses and a joint of 32 sliders.
-const PERIOD_STEPPED: f64 = 3e-2;
+/// Steps of a period in equal steps, usually and at worst: the solutions with two and four times as many, too. Measured: 0.7 to 2 ms a period for a body on
+/// a joint where little slips, 10 to 24 ms where much does.
+const STEPS: (f64, f64) = (2500.0, 25_000.0);
+/// Such a step, s: per direction of a joint, per pair of them, and per pair of masses. Measured, little and much slip: 3 and 20 ms a period for five
+/// directions, 12 and 107 for eight that friction couples, 35 and 296 for 16 of these; as much for one joint of one mass and of eight.
+const STEP: (f64, f64, f64) = (7.5e-7, 5e-8, 4e-9);
 /// Resolving and assembling a case, s.
 const PREPARING: f64 = 2e-4;
 /// Its modes, times the cube of its masses, s. Measured: 0.35 s for 500.
@@ -462,10 +460,6 @@ impl Costing<'_> {
     pub fn orbit(&self) -> f64 {
         let case = self.case;
         let size = self.masses + self.joints;
-        let patterns = self.joints / EVENT_DRIVEN_SIZE.1;
-        let events = self.pace.of(EVENT_DRIVEN_USUAL, EVENT_DRIVEN.0)
-            + EVENT_DRIVEN_ALONE * self.masses.powi(3)
-            + EVENT_DRIVEN.1 * patterns * (size / EVENT_DRIVEN_SIZE.0).powi(3);
         let shooting = self.pace.of(SHOOTING_USUAL, SHOOTING);
         let shooting = size * size * self.ringing() * if self.has_states { shooting.1 } else { shooting.0 };
         let series = self.series(case.method.options.get("harmonics").copied());
@@ -481,13 +475,30 @@ impl Costing<'_> {
             "transient" => {
                 let digit = LN_10 / (TAU * self.least_damping());
                 let most = case.method.options.get("periods").copied().unwrap_or(SETTLING_PERIODS.1);
-                let restless = if self.unbounded { UNSETTLED * UNSETTLED_PERIODS } else { 0.0 };
+                let share = self.pace.of(0.0, UNSETTLED);
+                let restless = if self.unbounded { share * UNSETTLED_PERIODS } else { 0.0 };
                 (digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1) + restless).min(most) * self.period()
             }
-            "shooting" if self.stepped => size * size * STEPPED,
+            "shooting" if self.stepped => STEPPED * self.period(),
             _ if self.smooth => shooting,
-            _ => events,
+            _ => self.events(),
         }
+    }
+
+    /// Time of one orbit from event to event, s.
+    fn events(&self) -> f64 {
+        let counted = ELIMINATED * event_driven::orbit_work(self.surveyed.survey.system()).unwrap_or(0.0);
+        let far = event_driven::ALONE * counted;
+        let usual = if self.is_dense(FAR) { counted } else { far };
+        self.pace.of(EVENT_DRIVEN.0 + usual, EVENT_DRIVEN.1 + EVENTS_WAITED * far)
+    }
+
+    /// Whether there are neighbouring frequencies, no farther apart than so many widths of a resonance.
+    fn is_dense(&self, widths: f64) -> bool {
+        self.range().is_some_and(|(lowest, highest)| {
+            self.frequencies > 1.0
+                && (highest - lowest) <= (self.frequencies - 1.0) * widths * 2.0 * self.least_damping() * lowest
+        })
     }
 
     /// Time of one orbit of a linear reference, s: with no joint that slips or opens nothing is hard to find.
@@ -502,10 +513,7 @@ impl Costing<'_> {
         if !contacts || survey.free().rigid == 0 || survey.system().cyclic().is_some() {
             return 1.0;
         }
-        let near = self.range().is_some_and(|(lowest, highest)| {
-            (highest - lowest) <= (self.frequencies - 1.0) * FAR * 2.0 * self.least_damping() * lowest
-        });
-        self.pace.of(if near { UNHELD.0 } else { UNHELD.1 }, 1.0)
+        self.pace.of(if self.is_dense(FAR) { UNHELD.0 } else { UNHELD.1 }, 1.0)
     }
 
     /// Steps of a curve, of what it usually takes and what it takes where it is hard to follow.
@@ -520,7 +528,8 @@ impl Costing<'_> {
             (false, false, _) => 1.0,
             (_, _, None) => HARD,
             (true, _, Some(_)) => HARD_SMOOTH,
-            (false, true, Some(_)) => HARD_RIGID,
+            (false, true, Some(_)) if self.is_dense(FAR) => HARD_RIGID.0,
+            (false, true, Some(_)) => self.pace.of(HARD_RIGID.1, HARD_RIGID.0),
         };
         // the error of a series with corners falls with the square of its length
         let asked = self.case.method.options.get("tolerance").copied().unwrap_or(SERIES_TOLERANCE);
@@ -555,8 +564,7 @@ impl Costing<'_> {
         let longest = self.pace.of(RIGID_HARMONICS.0, RIGID_HARMONICS.1) * (SERIES_TOLERANCE / asked).powf(RIGID_ORDER);
         let longest = longest.min(RIGID_MOST);
         let each = self.pace.of(RIGID_EACH.0, RIGID_EACH.1);
-        let tops = std::iter::successors(Some(RIGID_FIRST), |top| (*top < longest).then_some(2.0 * top));
-        each * tops.map(|top| step(top) + step(2.0 * top)).sum::<f64>()
+        each * ELIMINATED * harmonic_balance::doubling_work(system, longest)
     }
 
     /// Whether friction is rigid somewhere.
@@ -572,13 +580,20 @@ impl Costing<'_> {
         let exact = self.masses + self.sliders;
         // a width makes sliders integrate that no smooth law replaces
         if self.stepped && (self.smooth || self.case.method.options.contains_key("width")) {
-            return PERIOD_STEPPED * size * size;
+            return self.pace.of(STEPS.0, STEPS.1) * self.step();
         }
         match (self.smooth, self.has_states) {
             (false, _) => PERIOD_EVENTS.0 * exact + PERIOD_EVENTS.1 * exact.powi(3),
             (true, false) => PERIOD.0 * size * size * self.ringing(),
             (true, true) => PERIOD.1 * size * size * self.ringing(),
         }
+    }
+
+    /// Time of one of equal steps, s.
+    fn step(&self) -> f64 {
+        let joints = self.surveyed.survey.system().joints();
+        let directions = joints.iter().map(|joint| joint.law().directions()).sum::<usize>() as f64;
+        STEP.0 * directions + STEP.1 * directions.powi(2) + STEP.2 * self.masses.powi(2)
     }
 
     /// Time to decompose the patterns of stick and slip of a motion of so many periods that does not repeat, s.

@@ -435,6 +435,122 @@ harmonics = 15
     assert!((1.5..3.0).contains(&growth), "{growth}");
 }
 
+/// Two contacts of two directions on three bodies, followed for sixty periods, twice; 36 mistuned sectors of two masses from event to event at nine frequencies, far
+/// from each other; a ring of 300 rigid joints with five harmonics, of which no neighbour is known: wall time of the command, with its files.
+#[test]
+fn the_usual_time_is_that_which_was_measured() {
+    let contacts = r#"
+schema = 1
+[parameters]
+r = 0.1
+[[mass]]
+repeat = { i = 3 }
+name = "n{i}"
+mass = "0.1 kg*i"
+directions = ["x", "z"]
+[[spring]]
+repeat = { i = 3 }
+between = ["n{i}.x", "ground"]
+stiffness = "60 N/mm"
+damping = "1 kg/s"
+[[spring]]
+repeat = { i = 3 }
+between = ["n{i}.z", "ground"]
+stiffness = "90 N/mm"
+damping = "1 kg/s"
+[[joint]]
+name = "c1"
+between = ["n1", "ground"]
+law = { kind = "friction-contact", tangential = "50 N/mm", normal = "80 N/mm", friction = 0.3, preload = "20 N" }
+[[joint]]
+name = "c3"
+between = ["n3", "n2"]
+law = { kind = "friction-contact", tangential = "30 N/mm", normal = "50 N/mm", friction = 0.2, preload = "5 N" }
+[[force]]
+on = "n1.x"
+amplitude = "r*10 N"
+[study]
+kind = "transient"
+frequency = "110 Hz"
+cycles = 60
+vary = { r = [0.1, 1e-7] }
+"#;
+    let sectors = r#"
+schema = 1
+[disk]
+sectors = 36
+mistuning = { of = "b", deviation = "1 %", seed = 3 }
+[[mass]]
+name = "b"
+mass = "0.2 kg"
+[[mass]]
+name = "d"
+mass = "1 kg"
+[[spring]]
+between = ["b", "d"]
+stiffness = "100 N/mm"
+damping = "2 kg/s"
+[[spring]]
+between = ["d", "ground"]
+stiffness = "900 N/mm"
+damping = "2 kg/s"
+[[spring]]
+between = ["d", "next.d"]
+stiffness = "300 N/mm"
+[[joint]]
+name = "s"
+between = ["b", "next.b"]
+law = { kind = "coulomb", limit = "1 N" }
+[[force]]
+on = "b"
+amplitude = "5 N"
+engine_order = 4
+[study]
+kind = "response"
+frequency = { from = "85 Hz", to = "125 Hz", points = 9 }
+peaks = false
+"#;
+    let ring = r#"
+schema = 1
+[[mass]]
+repeat = { i = 300 }
+name = "b{i}"
+mass = "0.2 kg"
+[[spring]]
+repeat = { i = 300 }
+between = ["b{i}", "ground"]
+stiffness = "100 N/mm*(1+0.01*sin(3*i))"
+damping = "0.5 kg/s"
+[[spring]]
+repeat = { i = 300, wrap = true }
+between = ["b{i}", "b{i+1}"]
+stiffness = "7 N/mm"
+[[joint]]
+repeat = { i = 300, wrap = true }
+name = "s{i}"
+between = ["b{i}", "b{i+1}"]
+law = { kind = "coulomb", limit = "1.5 N*(1+0.2*sin(i))" }
+[[force]]
+repeat = { i = 300 }
+on = "b{i}"
+amplitude = "5 N"
+phase = "-3*i*360 deg/300"
+[study]
+kind = "response"
+frequency = "112 Hz"
+peaks = false
+[method]
+kind = "harmonic-balance"
+harmonics = 5
+"#;
+    for (name, text, measured) in [("contacts", contacts, 1.07), ("sectors", sectors, 16.2), ("ring", ring, 2.1)] {
+        let summary = summary(text);
+        let usual = summary.usual_seconds;
+        assert!(usual <= summary.seconds, "{name}: {usual} s, up to {} s", summary.seconds);
+        assert!((measured / 3.0..3.0 * measured).contains(&usual), "{name}: {usual} s, measured {measured} s");
+    }
+}
+
 /// A place has a peak to refine where a resonance lifts one of the inner frequencies above its neighbours: none if all are nearest to the ends.
 #[test]
 fn peaks_are_refined_where_resonances_are() {

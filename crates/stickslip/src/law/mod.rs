@@ -264,7 +264,7 @@ impl Piece {
     }
 
     /// Whether it never carries a force.
-    fn is_nothing(&self) -> bool {
+    pub(crate) fn is_nothing(&self) -> bool {
         match self {
             Piece::Slider(slider) => slider.static_limit == 0.0,
             Piece::Stop { stiffness, .. } => *stiffness == 0.0,

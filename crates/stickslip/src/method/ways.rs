@@ -96,9 +96,12 @@ impl Solver for Advised<'_> {
     }
 }
 
-/// An error with what to use instead. Systems of more than [`auto::DOFS`] have no other method that is fast enough to be named.
+/// Degrees of freedom beyond which no other method is fast enough to be named, and to ask all of them takes a tenth of a second.
+const ASKED: usize = 200;
+
+/// An error with what to use instead.
 fn advised(mut error: OrbitError, system: &System) -> OrbitError {
-    if system.dofs() > auto::DOFS {
+    if system.dofs() > ASKED {
         return error;
     }
     let words = |asked: &dyn Fn(&str) -> bool| {

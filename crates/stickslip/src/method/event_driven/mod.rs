@@ -5,7 +5,8 @@
 //! - `memory`: the patterns that were met, up to a number of bytes;
 //! - `decide`: which pattern begins at an instant;
 //! - `flow`: segments joined at the switches, with the exact derivative of the motion;
-//! - `path`: the orbit's numbers from its segments.
+//! - `path`: the orbit's numbers from its segments;
+//! - `work`: what an orbit costs, by counting.
 //!
 //! The periodic orbit is found by Newton's method on the return map. If the excitation has only odd harmonics the half period
 //! `x(t + T/2) = -x(t)` is solved: half the work, and regular also where a joint sticks for the whole period.
@@ -16,11 +17,13 @@ mod mechanics;
 mod memory;
 mod path;
 mod pattern;
+mod work;
 
 pub(crate) use flow::Flow;
 use mechanics::Kind;
 pub(crate) use mechanics::{Mechanics, takes};
 pub(crate) use path::ExactPath;
+pub use work::{ALONE, orbit_work};
 
 use super::drive::Drive;
 use super::guess::Guess;
