@@ -1,6 +1,8 @@
 //! What a reader of the results must know, in sentences. Notes of one sort from several units become one sentence.
 
 use serde::{Deserialize, Serialize};
+use stickslip::law::Piece;
+use stickslip::model::{Joint, Model};
 use stickslip::orbit::{Accuracy, Orbit};
 
 /// How a note begins that is a warning.
@@ -24,6 +26,15 @@ pub enum Note {
     Unstable(usize, usize),
     /// Points at which something sticks all the time in a motion that is not its own mirror image.
     History(usize),
+    /// Points at which a rigid joint sticks all the time beside one that knows positions, and the names of both at the first.
+    Several {
+        /// How many.
+        points: usize,
+        /// The one that sticks.
+        stuck: String,
+        /// The one that knows where.
+        knows: String,
+    },
     /// Of one case (its varied parameters in words): points at which a joint sticks for the whole period, of so many.
     Stuck {
         /// The case.
@@ -40,7 +51,7 @@ pub enum Note {
 impl Note {
     /// What an orbit asks for: that it is unstable, if that is known (see [`Orbit::is_stable`]), how accurate its series is, and that it is one of
     /// many.
-    pub(crate) fn of_orbit(orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
+    pub(crate) fn of_orbit(model: &Model, orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
         let early = || usize::from(orbit.periods > 1 && orbit.repeats() < orbit.periods);
         let unstable = (stable == Some(false)).then(|| Note::Unstable(1, early()));
         let accuracy = match orbit.evidence.accuracy {
@@ -49,7 +60,18 @@ impl Note {
             Accuracy::Converged => None,
         };
         let history = (!orbit.evidence.history.is_empty()).then_some(Note::History(1));
-        unstable.into_iter().chain(accuracy).chain(history).collect()
+        unstable.into_iter().chain(accuracy).chain(history).chain(Note::several(model, orbit)).collect()
+    }
+
+    /// That nothing decides where a rigid joint sticks on which another one depends. Behind a spring what sticks is relaxed, and has one place.
+    fn several(model: &Model, orbit: &Orbit) -> Option<Note> {
+        let pieces = |joint: &Joint| joint.law.pieces().unwrap_or_default();
+        let is_rigid = |piece: &Piece| matches!(piece, Piece::Slider(slider) if slider.stiffness.is_none());
+        let holds = |joint: &Joint| orbit.evidence.stuck.contains(&joint.name) && pieces(joint).iter().any(is_rigid);
+        let is_stop = |piece: &Piece| matches!(piece, Piece::Stop { .. });
+        let knows = |joint: &Joint| joint.law.normal().is_some() || pieces(joint).iter().any(is_stop);
+        let first = |of: &dyn Fn(&Joint) -> bool| model.joints.iter().find(|joint| of(joint)).map(|j| j.name.clone());
+        Some(Note::Several { points: 1, stuck: first(&holds)?, knows: first(&knows)? })
     }
 
     /// The same where the orbit is one of a branch.
@@ -105,6 +127,10 @@ impl Note {
                     *points += more;
                     return;
                 }
+                (Note::Several { points, .. }, Note::Several { points: more, .. }) => {
+                    *points += more;
+                    return;
+                }
                 (Note::Unstable(points, early), Note::Unstable(more, other)) => {
                     *points += more;
                     *early += other;
@@ -156,6 +182,12 @@ impl Note {
                  depends on how the motion began, and with it the means, and the amplitudes too if a gap or another law knows positions. \
                  Shown is the motion in which a spring that never slips carries no mean force, as in joints that creep, or no more than \
                  balance needs on bodies that contacts alone hold, and with method `transient` the one that its run led to.",
+                points(*count)
+            )),
+            Note::Several { points: count, stuck, knows } => Some(format!(
+                "warning: at {} more than one orbit may be true: `{stuck}` is rigid and sticks for the whole period, where depends on how the \
+                 motion began, and with it when `{knows}` is closed; another method or another start may give other amplitudes. A spring before \
+                 its slider (`jenkins`) makes the one that is shown unique, kind = \"transient\" follows the one of a given start.",
                 points(*count)
             )),
             Note::StuckElsewhere(count) => Some(format!(

@@ -348,3 +348,61 @@ cycles = 20
     let (_, smoothed) = of(&format!("{text}\n[method]\nkind = \"shooting\"\nwidth = \"0.1 mm/s\"\n"));
     assert_eq!(smoothed.record.points.get("converged"), Some(&1), "{:?}", smoothed.record.points);
 }
+
+/// A rigid joint that sticks for the whole period beside a stop: where it sticks decides when the stop is closed, and a run says so. Behind a spring,
+/// without the stop, or where it slips, it does not.
+#[test]
+fn a_stuck_joint_beside_a_stop_is_told() {
+    let stop = "[[joint]]\nname = \"stop\"\nbetween = [\"b\", \"ground\"]\nlaw = { kind = \"gap\", gap = \"0.05 mm\", stiffness = \"30 N/mm\" }\n";
+    let (rigid, spring) = (r#"kind = "coulomb""#, r#"kind = "jenkins", stiffness = "20 N/mm""#);
+    for (limit, law, stop, told) in [
+        ("100 N", rigid, stop, true),
+        ("100 N", spring, stop, false),
+        ("100 N", rigid, "", false),
+        ("0.1 N", rigid, stop, false),
+    ] {
+        let text = format!(
+            r#"
+schema = 1
+[[mass]]
+name = "a"
+mass = "0.2 kg"
+[[mass]]
+name = "b"
+mass = "0.2 kg"
+[[spring]]
+between = ["a", "ground"]
+stiffness = "100 N/mm"
+damping = "5 kg/s"
+[[spring]]
+between = ["b", "ground"]
+stiffness = "60 N/mm"
+damping = "5 kg/s"
+[[joint]]
+name = "held"
+between = ["a", "b"]
+law = {{ {law}, limit = "{limit}" }}
+{stop}[[force]]
+on = "b"
+amplitude = "8 N"
+[[force]]
+on = "b"
+amplitude = "2 N"
+harmonic = 0
+[study]
+kind = "response"
+frequency = ["80 Hz", "90 Hz"]
+peaks = false
+[method]
+kind = "event-driven"
+"#
+        );
+        let notes = of(&text).1.notes;
+        let found = notes.iter().find(|note| note.contains("more than one orbit may be true"));
+        assert_eq!(found.is_some(), told, "{limit} {law} {stop}: {notes:?}");
+        let right = found.is_none_or(|note| {
+            note.starts_with("warning: at 2 points") && note.contains("`held`") && note.contains("`stop`")
+        });
+        assert!(right, "{found:?}");
+    }
+}

@@ -52,7 +52,7 @@ pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Judged>, (us
 /// Counts an orbit and notes what its stability and its accuracy ask for, in the words of the kind.
 pub(super) fn count(part: &mut Part, case: &Case, orbit: &Orbit, (stable, words): (Option<bool>, fn(Note) -> Note)) {
     part.count(|| location_of(case, orbit.omega), orbit.evidence.accuracy.status(), None);
-    Note::of_orbit(orbit, stable).into_iter().map(words).for_each(|note| note.join(&mut part.notes));
+    Note::of_orbit(&case.model, orbit, stable).into_iter().map(words).for_each(|note| note.join(&mut part.notes));
 }
 
 /// Counts a point that has no orbit.

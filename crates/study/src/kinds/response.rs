@@ -243,7 +243,8 @@ impl<'a> Computing<'a> {
 /// What is kept of a point.
 fn kept(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> (Summary, Vec<Note>) {
     let summary = Summary::new(prepared, outcome);
-    let notes = outcome.map_or_else(|_| Vec::new(), |orbit| Note::of_orbit(orbit, summary.stable));
+    let notes =
+        outcome.map_or_else(|_| Vec::new(), |orbit| Note::of_orbit(&prepared.case.model, orbit, summary.stable));
     (summary, notes)
 }
 
