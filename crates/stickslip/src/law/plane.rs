@@ -19,17 +19,22 @@ fn beyond<S: Real>(a: [S; 2], s: S, b: [S; 2]) -> [S; 2] {
     [a[0] + b[0] * s, a[1] + b[1] * s]
 }
 
-/// Relative change of the limit below which the logarithm is a series; its fifth term is then below rounding.
-const FLAT: f64 = 1e-3;
+/// Difference of the limits relative to their sum below which the logarithm is a series; its ninth term is then below rounding.
+const FLAT: f64 = 0.1;
+/// Relative change of the limit below which the derivative of that is one; its fifth term is then below rounding.
+const FLATTER: f64 = 1e-3;
 
 /// `ln(to / from) / (to - from)`: one over the logarithmic mean.
 #[inline]
 fn inverse_mean<S: Real>(from: S, to: S) -> S {
-    let change = to / from - 1.0;
+    let sum = to + from;
+    let change = (to - from) / sum;
     if change.re().abs() < FLAT {
-        // ln(1 + x) / x
-        let series = (((change * 0.2 - 0.25) * change + 1.0 / 3.0) * change - 0.5) * change + 1.0;
-        return series / from;
+        // ln((1 + x) / (1 - x)) / 2x
+        let square = change * change;
+        let high = ((square * (1.0 / 15.0) + 1.0 / 13.0) * square + 1.0 / 11.0) * square + 1.0 / 9.0;
+        let series = (((high * square + 1.0 / 7.0) * square + 0.2) * square + 1.0 / 3.0) * square + 1.0;
+        return series * 2.0 / sum;
     }
     (to / from).ln() / (to - from)
 }
@@ -230,7 +235,7 @@ pub(super) fn step_with_slopes(force: [f64; 2], way: [f64; 2], stiffness: f64, l
 fn inverse_mean_with_slope(from: f64, to: f64) -> (f64, f64) {
     let change = to / from - 1.0;
     let mean = inverse_mean(from, to);
-    let slope = if change.abs() < FLAT {
+    let slope = if change.abs() < FLATTER {
         (((change * 0.8 - 0.75) * change + 2.0 / 3.0) * change - 0.5) / (from * from)
     } else {
         (1.0 / to - mean) / (to - from)
