@@ -99,13 +99,15 @@ impl Receptance {
         match self {
             Receptance::Formed(matrices) => {
                 let nh = matrices.len();
-                moved.fill(ZERO);
+                let mut sum = vec![ZERO; moved.len() / nh.max(1)];
                 for (k, matrix) in matrices.iter().enumerate() {
                     // column by column, as the matrix lies in memory
-                    for (p, column) in matrix.column_iter().enumerate() {
-                        let f = force[p * nh + k];
-                        column.iter().enumerate().for_each(|(q, r)| moved[q * nh + k] += r * f);
+                    sum.fill(ZERO);
+                    let forces = force[k..].iter().step_by(nh);
+                    for (column, f) in matrix.as_slice().chunks_exact(sum.len().max(1)).zip(forces) {
+                        sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += r * f);
                     }
+                    moved[k..].iter_mut().step_by(nh).zip(&*sum).for_each(|(moved, sum)| *moved = *sum);
                 }
             }
             Receptance::Modal(modal) => modal.apply(force, moved),

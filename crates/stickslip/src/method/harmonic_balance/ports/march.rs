@@ -240,13 +240,19 @@ impl Alternation {
             None
         };
         let wide = 2 * nh;
-        self.fill_waves(march, &mut memory.waves);
+        self.fill_waves(march, memory);
+        let few = nh <= FEW;
+        if few {
+            self.fill_projection(&mut memory.projection);
+            memory.of_states.resize(wide * d * m, 0.0);
+            let sizes = (d * m, n, wide);
+            multiply_in_blocks(&memory.by_state, &memory.projection, &mut memory.of_states, sizes, true);
+        }
         for b in 0..d {
             let input = Input::Solution { axis: b };
             self.follow(march, memory, (beginning.as_deref(), &inverse), (input, wide));
-            if nh <= FEW {
+            if few {
                 // all at once: [sample][axis][column] times the waves of the harmonics
-                self.fill_projection(&mut memory.projection);
                 memory.spectrum.resize(d * wide * wide, 0.0);
                 let sizes = (d * wide, n, wide);
                 multiply_in_blocks(&memory.columns, &memory.projection, &mut memory.spectrum, sizes, true);
@@ -254,10 +260,13 @@ impl Alternation {
                     for (a, values) in values.chunks_exact(wide).enumerate() {
                         let row = &mut tangent[(a * wide + to) * size + b * wide..][..wide];
                         row.iter_mut().zip(values).for_each(|(t, value)| *t += value);
+                        let by_state = memory.of_states[(to * d + a) * m..][..m].iter();
+                        by_state.zip(memory.shift.chunks_exact(wide)).for_each(|(by, shift)| add(row, *by, shift));
                     }
                 }
                 continue;
             }
+            memory.shift_columns(m, wide);
             memory.signal.resize(n, 0.0);
             for (a, column) in (0..d).flat_map(|a| (0..wide).map(move |column| (a, column))) {
                 for i in 0..n {
@@ -276,6 +285,7 @@ impl Alternation {
         }
         if march.knows_frequency() {
             self.follow(march, memory, (beginning.as_deref(), &inverse), (Input::Frequency, 1));
+            memory.shift_columns(m, 1);
             memory.signal.resize(n, 0.0);
             for a in 0..d {
                 for i in 0..n {
@@ -303,11 +313,15 @@ impl Alternation {
     }
 
     /// What the parts of the harmonics of a motion make of the inputs: [sample][kind][part], and behind the samples for the first movement.
-    fn fill_waves(&self, march: &dyn March, waves: &mut Vec<f64>) {
+    fn fill_waves(&self, march: &dyn March, Memory { waves, steps, .. }: &mut Memory) {
         let (n, kinds) = (self.samples(), march.inputs());
         // steps are alike but for where they are on the circle
         let one = Complex64::new(1.0, 0.0);
-        let fixed: Vec<[Complex64; 4]> = self.harmonics.iter().map(|&h| march.waves(h, TAU / n as f64, one)).collect();
+        let each = self.harmonics.iter().map(|&h| march.waves(h, TAU / n as f64, one));
+        let fixed: Vec<[Complex64; 4]> = each.chain(self.harmonics.iter().map(|&h| march.first_waves(h))).collect();
+        if waves.len() == 2 * (n + 1) * kinds * self.harmonics.len() && *steps == fixed {
+            return;
+        }
         waves.clear();
         let mut at = vec![0; self.harmonics.len()];
         for _ in 0..n {
@@ -321,13 +335,15 @@ impl Alternation {
             }
         }
         for kind in 0..kinds {
-            waves.extend(self.harmonics.iter().flat_map(|&h| <[f64; 2]>::from(parts(march.first_waves(h)[kind], h))));
+            let first = fixed[self.harmonics.len()..].iter().zip(&self.harmonics);
+            waves.extend(first.flat_map(|(first, &h)| <[f64; 2]>::from(parts(first[kind], h))));
         }
+        *steps = fixed;
     }
 
-    /// The derivative of the sampled forces by inputs, with states that follow them so that they repeat, into `memory.columns`: [sample][axis][column].
-    /// The columns are the parts of the harmonics of a motion along an axis, or the frequency. `beginning`: the steps of the first period, if something
-    /// is never forgotten.
+    /// The derivative of the sampled forces by inputs, with states at t = 0 as they were, into `memory.columns`: [sample][axis][column]; the changes of
+    /// these that repeat into `memory.shift`. The columns are the parts of the harmonics of a motion along an axis, or the frequency. `beginning`: the
+    /// steps of the first period, if something is never forgotten.
     fn follow(
         &self,
         march: &dyn March,
@@ -369,21 +385,14 @@ impl Alternation {
             by.advance(&forces[same * width..], waves(i), &s, other);
             std::mem::swap(&mut s, &mut next);
         }
-        if m == 0 {
-            return;
-        }
         // the states at t = 0 follow so that they repeat
-        let mut shift = vec![0.0; m * wide];
-        for (r, shift) in shift.chunks_exact_mut(wide).enumerate() {
+        memory.shift.clear();
+        memory.shift.resize(m * wide, 0.0);
+        for (r, shift) in memory.shift.chunks_exact_mut(wide).enumerate() {
             for t in 0..m {
                 let weight = inverse[(r, t)];
                 let gap = s[t * wide..].iter().zip(&start[t * wide..]);
                 shift.iter_mut().zip(gap).for_each(|(shift, (s, start))| *shift += (s - start) * weight);
-            }
-        }
-        for (column, by_state) in memory.columns.chunks_exact_mut(wide).zip(memory.by_state.chunks_exact(m)) {
-            for (weight, shift) in by_state.iter().zip(shift.chunks_exact(wide)) {
-                add(column, *weight, shift);
             }
         }
     }
@@ -402,6 +411,18 @@ impl Alternation {
         let run = self.period(march, &z, Some(&mut rows));
         self.force = forces;
         run.map(|_| rows)
+    }
+}
+
+impl Memory {
+    /// Adds to the columns what the changes of the states at t = 0 do to the forces.
+    fn shift_columns(&mut self, states: usize, wide: usize) {
+        if states == 0 {
+            return;
+        }
+        for (column, by_state) in self.columns.chunks_exact_mut(wide).zip(self.by_state.chunks_exact(states)) {
+            by_state.iter().zip(self.shift.chunks_exact(wide)).for_each(|(by, shift)| add(column, *by, shift));
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 //! Memory that a march through the samples needs again and again.
 
+use num_complex::Complex64;
+
 /// Memory of a march.
 #[derive(Debug, Clone, Default)]
 pub(in super::super) struct Memory {
@@ -11,11 +13,17 @@ pub(in super::super) struct Memory {
     pub(super) by_state: Vec<f64>,
     /// What the harmonics of a motion make of the inputs.
     pub(super) waves: Vec<f64>,
+    /// Of which steps these are.
+    pub(super) steps: Vec<[Complex64; 4]>,
     /// Forces by inputs: [sample][axis][column].
     pub(super) columns: Vec<f64>,
-    /// One of them over the samples.
+    /// Changes of the states at t = 0 that go with these columns, [state][column].
+    pub(super) shift: Vec<f64>,
+    /// One of the columns over the samples.
     pub(super) signal: Vec<f64>,
     /// From samples to harmonics, and these.
     pub(super) projection: Vec<f64>,
     pub(super) spectrum: Vec<f64>,
+    /// Harmonics of the forces by the states at t = 0.
+    pub(super) of_states: Vec<f64>,
 }
