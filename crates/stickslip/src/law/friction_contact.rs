@@ -340,6 +340,31 @@ mod tests {
         assert!(met.iter().all(|count| *count > 100), "{met:?}");
     }
 
+    /// A contact that separates forgets where it began: the rest of the period is what it was, and is not followed again.
+    #[test]
+    fn a_way_that_meets_its_trail_is_followed_no_farther() {
+        let law = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.4, preload: 1.0, tangents: 2 };
+        let n = 64;
+        let angle = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
+        let signal = |of: fn(f64) -> f64| (0..n).map(|i| of(angle(i))).collect::<Vec<f64>>();
+        let way = [signal(f64::cos), signal(|t| (2.0 * t).sin()), signal(|t| 0.8 * (t - 1.0).sin())];
+        let around = |z: &mut [f64], trail: &mut [f64], force: &mut [Vec<f64>; 3]| {
+            Step::around(&law, 3, &way, (z, trail), force, None);
+        };
+        let fresh = || (vec![f64::NAN; 2 * n], [(); 3].map(|()| vec![0.0; n]));
+        let (mut trail, mut force) = fresh();
+        let mut z = [0.0; 2];
+        around(&mut z, &mut trail, &mut force);
+        let (mut whole_trail, mut whole) = fresh();
+        let mut end = z;
+        around(&mut end, &mut whole_trail, &mut whole);
+        let last = std::mem::replace(&mut force[0][n - 1], f64::INFINITY);
+        around(&mut z, &mut trail, &mut force);
+        assert!(force[0][n - 1].is_infinite(), "followed to its end");
+        force[0][n - 1] = last;
+        assert_eq!((z, force, trail), (end, whole, whole_trail));
+    }
+
     #[test]
     fn faces_say_what_they_do() {
         let law = FrictionContact { tangential: 1.0, normal: 1.0, friction: 0.5, preload: 1.0, tangents: 2 };

@@ -34,6 +34,8 @@ pub(in super::super) struct Alternation {
     pub by_frequency: Option<Vec<Complex64>>,
     /// Internal states at t = 0 of the port evaluated last.
     pub state: Vec<f64>,
+    /// States at the samples, for ports that use them.
+    pub(super) trail: Vec<f64>,
     /// Where the next port with a memory begins, if that is known; used up by it.
     pub begin: Beginning,
     /// `(1 - Π)⁻¹` of the port with a memory that was evaluated last with its derivative, see [`Beginning`].
@@ -92,6 +94,7 @@ impl Alternation {
             slips: vec![false; samples],
             by_frequency: None,
             state: Vec::new(),
+            trail: Vec::new(),
             begin: Beginning::default(),
             forgets: Vec::new(),
             turns: (0..samples).map(|i| Complex64::cis(i as f64 * TAU / samples as f64)).collect(),

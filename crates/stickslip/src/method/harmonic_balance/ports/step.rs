@@ -80,8 +80,12 @@ impl Alternation {
         let displacement = std::mem::take(&mut self.displacement);
         let follows_mean = !self.relaxed_at_zero;
         let point = StepPoint::new(axes, step.states());
-        let mut march = StepMarch { step, axes, at: &displacement, relaxed, follows_mean, point };
+        let mut trail = std::mem::take(&mut self.trail);
+        trail.clear();
+        trail.resize(self.samples() * step.states(), f64::NAN);
+        let mut march = StepMarch { step, axes, at: &displacement, relaxed, follows_mean, point, trail };
         self.march(&mut march, force, tangent);
+        self.trail = march.trail;
         self.displacement = displacement;
     }
 }
@@ -95,6 +99,8 @@ struct StepMarch<'a> {
     relaxed: [f64; MOST_DIRECTIONS],
     follows_mean: bool,
     point: StepPoint,
+    /// States at the samples of the last period, see [`Step::around`].
+    trail: Vec<f64>,
 }
 
 impl StepMarch<'_> {
@@ -150,7 +156,7 @@ impl March for StepMarch<'_> {
         [if h == 0 && self.follows_mean { 1.0 } else { 0.0 }, 1.0, 0.0, 0.0].map(|x| Complex64::new(x, 0.0))
     }
     fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
-        self.step.around(self.axes, self.at, z, force, rows);
+        self.step.around(self.axes, self.at, (&mut *z, &mut self.trail), force, rows);
         z.iter().all(|z| z.is_finite())
     }
     fn first(
