@@ -63,6 +63,8 @@ type Above = (f64, Arc<Vec<f64>>);
 #[derive(Debug, Clone, Default)]
 pub(super) struct Coupled {
     gmres: Gmres,
+    /// Of receptances that are matrices, by the derivatives that there are.
+    harmonics: Option<Harmonics>,
     split: Option<Split>,
     above: Option<Above>,
     /// Unknowns as forces, and what they move.
@@ -77,8 +79,10 @@ pub(super) struct Near {
     pub length: f64,
     /// The size of the residual.
     pub residual: f64,
-    /// Whether derivatives are by fewer samples, see `Level::follow_slopes`.
+    /// Whether derivatives, or all that is solved, are by fewer samples, see `Level::follow_slopes`.
     pub sketched: bool,
+    /// Whether they are those of the last step, whose preconditioner is theirs too.
+    pub kept: bool,
 }
 
 impl Coupled {
@@ -97,9 +101,12 @@ impl Coupled {
         let limits = Limits { tolerance: wanted, vectors: VECTORS, products: PRODUCTS };
         let right = step.to_vec();
         let (mut fresh, mut products) = (false, 0);
-        let Coupled { gmres, split, above, force, moved } = self;
+        let Coupled { gmres, harmonics, split, above, force, moved } = self;
+        harmonics.take_if(|_| !near.kept);
         let found = loop {
-            let Some(preconditioner) = linear.preconditioner(receptance, (&mut *split, &mut *above), &mut fresh) else {
+            let Some(preconditioner) =
+                linear.preconditioner(receptance, (&mut *harmonics, &mut *split, &mut *above), &mut fresh)
+            else {
                 break false;
             };
             let most = if fresh { limits } else { Limits { products: STALE, vectors: STALE, ..limits } };
@@ -200,16 +207,19 @@ impl Linear<'_> {
     fn preconditioner<'b>(
         &self,
         receptance: &Receptance,
-        (kept, above): (&'b mut Option<Split>, &mut Option<Above>),
+        (harmonics, kept, above): (&'b mut Option<Harmonics>, &'b mut Option<Split>, &mut Option<Above>),
         fresh: &mut bool,
     ) -> Option<Preconditioner<'b>> {
         match receptance {
             Receptance::Formed(matrices) => {
                 *fresh = true;
-                let lowest = self.lowest(matrices)?;
-                let rest = matrices.iter().enumerate().skip(lowest.count);
-                let factors = rest.map(|(k, matrix)| self.of_harmonic(k, matrix)).collect::<Option<_>>()?;
-                Some(Preconditioner::Harmonics(lowest, factors))
+                if harmonics.is_none() {
+                    let lowest = self.lowest(matrices)?;
+                    let rest = matrices.iter().enumerate().skip(lowest.count);
+                    let others = rest.map(|(k, matrix)| self.of_harmonic(k, matrix)).collect::<Option<_>>()?;
+                    *harmonics = Some(Harmonics { lowest, others });
+                }
+                harmonics.as_ref().map(Preconditioner::Harmonics)
             }
             Receptance::Modal(modal) => {
                 let (bound, usable) = (Split::bound(modal), kept.take());
@@ -294,6 +304,7 @@ impl Linear<'_> {
 }
 
 /// The first harmonics together.
+#[derive(Debug, Clone)]
 struct Lowest {
     count: usize,
     /// In units.
@@ -309,9 +320,15 @@ impl Lowest {
     }
 }
 
+/// The lowest harmonics together, the others one by one.
+#[derive(Debug, Clone)]
+struct Harmonics {
+    lowest: Lowest,
+    others: Vec<ComplexLu>,
+}
+
 enum Preconditioner<'a> {
-    /// The lowest together, the others one by one.
-    Harmonics(Lowest, Vec<ComplexLu>),
+    Harmonics(&'a Harmonics),
     Split(&'a mut Split),
 }
 
@@ -320,14 +337,14 @@ impl Preconditioner<'_> {
     fn apply(&self, linear: &Linear, v: &mut [f64]) {
         let nh = linear.harmonics.len();
         let together = match self {
-            Preconditioner::Harmonics(lowest, _) => lowest.apply(v, 2 * nh),
+            Preconditioner::Harmonics(harmonics) => harmonics.lowest.apply(v, 2 * nh),
             Preconditioner::Split(_) => Vec::new(),
         };
         v.iter_mut().zip(linear.units).for_each(|(v, unit)| *v *= unit);
         match self {
-            Preconditioner::Harmonics(lowest, factors) => {
+            Preconditioner::Harmonics(Harmonics { lowest, others }) => {
                 let mut column = vec![ZERO; v.len() / (2 * nh)];
-                for (k, factor) in (lowest.count..).zip(factors) {
+                for (k, factor) in (lowest.count..).zip(others) {
                     for (c, v) in column.iter_mut().zip(v.chunks_exact(2 * nh)) {
                         *c = Complex64::new(v[2 * k], v[2 * k + 1]);
                     }
@@ -343,7 +360,7 @@ impl Preconditioner<'_> {
             let unit = port.unit(linear.length);
             v[2 * nh * port.first..2 * nh * (port.first + port.axes)].iter_mut().for_each(|v| *v /= unit);
         }
-        if let Preconditioner::Harmonics(Lowest { count: count @ 1.., .. }, _) = self {
+        if let Preconditioner::Harmonics(Harmonics { lowest: Lowest { count: count @ 1.., .. }, .. }) = self {
             let steps = v.chunks_exact_mut(2 * nh).zip(together.chunks_exact(2 * count));
             steps.for_each(|(v, own)| v[..2 * count].copy_from_slice(own));
         }

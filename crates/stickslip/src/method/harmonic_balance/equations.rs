@@ -41,9 +41,9 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// The receptance below which motion counts as imposed, relative to that of the excited structure.
 const RIGID: f64 = 1e-14;
 
-/// All samples for one of a sketch, and how many a sketch has at least for the wave of the highest harmonic: as many as sliders need to tell their turning
-/// points apart.
-const FEWER: usize = 4;
+/// All samples for one of a sketch, the first that leaves enough, and how many a sketch has at least for the wave of the highest harmonic: as many as
+/// sliders need to tell their turning points apart.
+const FEWER: [usize; 2] = [4, 2];
 const SKETCHED: usize = 16;
 /// Distance of the states from those a period later, relative to their size, at which sketched derivatives are taken: what fewer samples leave out.
 const ALMOST: f64 = 1e-3;
@@ -87,6 +87,9 @@ pub(super) struct Level {
     /// K or T of every port, one after the other, see [`blocks`].
     pub(super) tangents: Vec<f64>,
     pub(super) blocks: Vec<usize>,
+    /// Whether they were those of some motion, and whether they are those of a shorter series in part, see [`super::sampling`].
+    pub(super) derived: bool,
+    pub(super) adopted: bool,
     /// Per axis: its unknown is a force.
     forces: Vec<bool>,
     pub(super) jacobian: Vec<f64>,
@@ -100,7 +103,7 @@ pub(super) struct Level {
     pub(super) step: Vec<f64>,
     pub(super) image: Vec<Complex64>,
     /// Of ports with a memory, the states at t = 0 in the motion that was evaluated last, and what is forgotten of them.
-    states: Vec<Beginning>,
+    pub(super) states: Vec<Beginning>,
     /// Whether those that forget where they began do so there in the next motion: the same states as from rest, in fewer periods.
     pub(super) nearby: bool,
     /// The same period by a quarter of the samples, for derivatives of many contacts: see [`Level::follow_slopes`].
@@ -165,9 +168,10 @@ impl Level {
 
     /// Keeps fewer samples beside all, if that is enough for a sketch.
     pub(super) fn keep_sketch(&mut self) {
-        let few = self.alternation.samples() / FEWER;
         let top = self.harmonics().last().copied().unwrap_or(0);
-        self.sketch = (few >= SKETCHED * (top + 1)).then(|| Alternation::new(self.harmonics().to_vec(), few));
+        let few = FEWER.map(|share| self.alternation.samples() / share);
+        let few = few.into_iter().find(|few| *few >= SKETCHED * (top + 1));
+        self.sketch = few.map(|few| Alternation::new(self.harmonics().to_vec(), few));
     }
 
     /// The same with a derivative that is a matrix, whatever its size.
@@ -197,6 +201,8 @@ impl Level {
             free: Vec::new(),
             tangents: vec![0.0; tangents],
             blocks,
+            derived: false,
+            adopted: false,
             forces: ports.iter().flat_map(|port| vec![port.is_force(); port.axes]).collect(),
             jacobian: Vec::new(),
             coupled: None,
@@ -553,7 +559,7 @@ impl Level {
             self.states[p].forgets.clone_from(&alternation.forgets);
             self.add_springs(p, port, OPEN);
         }
-        self.linearised = true;
+        (self.linearised, self.derived) = (true, true);
         any
     }
 
@@ -568,6 +574,7 @@ impl Level {
         self.spent = self.taken_of_point(ports);
         (self.assembled, self.products, self.alternation.marched) = (0, 0, 0);
         (self.nearby, self.linearised, self.sketches) = (false, false, self.sketch.is_some());
+        self.adopted = false;
         self.states.iter_mut().for_each(|known| *known = Beginning::default());
     }
 

@@ -86,7 +86,7 @@ impl Level {
                 }
             }
             self.before.copy(motion);
-            let near = Near { length, residual: 1.0, sketched: false };
+            let near = Near { length, residual: 1.0, sketched: false, kept: false };
             let Some(ahead) = self.interior_step(ports, omega, motion, &mut along, (0.0, near)) else { return false };
             let gap = along.gap(0.0) * (along.gap(ahead) / along.gap(0.0)).powi(3);
             motion.copy(&self.before);

@@ -58,7 +58,7 @@ use nalgebra::DVector;
 use num_complex::Complex64;
 use ports::{Port, Ports};
 use rest::Rest;
-use sampling::samples_for;
+use sampling::{samples_for, samples_of_steps};
 use solve::Lost;
 use sparse::Sparse;
 use std::borrow::Cow;
@@ -85,7 +85,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             dimension: Dimension::NONE,
             count: true,
             doc: "samples per period, even, at least 4 (harmonics + 1), and 16 per harmonic if `harmonics` is absent; absent: 16 per \
-                  harmonic, at least 1024, and 128 per harmonic for steep laws and for friction in a plane",
+                  harmonic, at least 1024, and 128 per harmonic for steep laws and for friction in a plane; fewer for laws in steps, such as contacts \
+                  that part, where `tolerance` is above 0.001",
         },
         MethodOption {
             key: "tolerance",
@@ -119,6 +120,8 @@ const MOST_FOLLOWED: usize = 8;
 const MOST_DOFS_IN_TIME: usize = 60;
 /// Orbits whose harmonics are kept as starts for their neighbours: those between which a peak is refined.
 const RECENT: usize = 8;
+/// Distance from the last frequency, relative to that between the last two, up to which many contacts begin on the line through both motions.
+const AHEAD: f64 = 1.5;
 /// Unknowns beyond which no error is estimated by elimination: one would take seconds, and a search takes ten and more.
 const LARGEST: usize = 2600;
 /// Multiplications of an elimination in banded form beyond which none is: it would take four seconds.
@@ -185,13 +188,19 @@ impl HarmonicBalance {
     fn samples_at(&self, top: usize, ports: &Ports) -> usize {
         let each = if ports.has_steep() { SAMPLES_OF_STEEP } else { SAMPLES_PER_HARMONIC };
         let remembered = ports.iter().any(Port::marches);
-        let few = if remembered { samples_for(self.tolerance.unwrap_or(TOLERANCE)) } else { 0 };
+        let tolerance = self.tolerance.unwrap_or(TOLERANCE);
+        let steps = !ports.is_empty() && ports.iter().all(Port::steps);
+        let (few, least) = match remembered {
+            true if steps => (samples_of_steps(tolerance), 0),
+            true => (samples_for(tolerance), SAMPLES),
+            false => (0, SAMPLES),
+        };
         let needed = (each * (top + 1)).max(few).next_power_of_two();
         match (self.samples, self.harmonics) {
             (Some(samples), Some(harmonics)) if top <= harmonics => samples,
-            (Some(samples), Some(_)) => samples.max(needed).max(SAMPLES),
+            (Some(samples), Some(_)) => samples.max(needed).max(least),
             (Some(samples), None) => samples.max(needed),
-            (None, _) => needed.max(SAMPLES),
+            (None, _) => needed.max(least),
         }
     }
 
@@ -326,6 +335,32 @@ impl Method for Subharmonic {
     }
 }
 
+/// An orbit that was found.
+struct Recent {
+    /// Its state at t = 0.
+    start: Vec<f64>,
+    omega: f64,
+    /// Its highest harmonic.
+    top: usize,
+    motion: Solution,
+}
+
+impl Recent {
+    /// The motion at a frequency on the line through this one and the one before, up to [`AHEAD`] times as far.
+    fn towards(&self, before: &Recent, omega: f64) -> Solution {
+        let share = (omega - self.omega) / (self.omega - before.omega);
+        let mut motion = self.motion.clone();
+        if share.abs() <= AHEAD {
+            let line = |now: &mut [Complex64], before: &[Complex64]| {
+                now.iter_mut().zip(before).for_each(|(now, before)| *now += (*now - before) * share);
+            };
+            line(&mut motion.c, &before.motion.c);
+            line(&mut motion.force, &before.motion.force);
+        }
+        motion
+    }
+}
+
 struct Balance<'a> {
     system: Cow<'a, System>,
     method: HarmonicBalance,
@@ -344,8 +379,8 @@ struct Balance<'a> {
     first: usize,
     judge: Judge,
     levels: BTreeMap<usize, Level>,
-    /// The last orbits, the newest first: state at t = 0, highest harmonic and motion.
-    recent: VecDeque<(Vec<f64>, usize, Solution)>,
+    /// The last orbits, the newest first.
+    recent: VecDeque<Recent>,
     /// Frequencies (rad/s) at which the motion was followed and no orbit was found, and what it did.
     followed: Vec<(f64, Course)>,
     /// How often it was followed to find one.
@@ -559,7 +594,7 @@ impl Balance<'_> {
             return Err(self.lost(lost));
         }
         self.recent.truncate(RECENT - 1);
-        self.recent.push_front((orbit.start.clone(), top, motion));
+        self.recent.push_front(Recent { start: orbit.start.clone(), omega, top, motion });
         Ok(Orbit { omega: self.drive, periods: self.periods, ..orbit })
     }
 
@@ -607,9 +642,10 @@ impl Balance<'_> {
         let start = self.refined(top, motion);
         let (few, many) = (self.kept.up_to(top), self.kept.up_to(double));
         let coarse = equations::transfer(motion, &few, &many);
+        let shorter = self.levels.get(&top).and_then(|level| level.derivatives(&self.ports));
         self.level(double, omega)?;
         let finer = self.levels.get_mut(&double).expect("made above");
-        let better = match finer.approach_by_twice_the_samples(&self.ports, omega, &start, &coarse) {
+        let better = match finer.approach_by_twice_the_samples(&self.ports, omega, &start, &coarse, shorter.as_ref()) {
             Some(better) => better,
             None => {
                 let solved = finer.solve(&self.ports, omega, start)?;
@@ -724,10 +760,16 @@ impl Balance<'_> {
     }
 
     /// The harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess.
-    fn warm(&self, start: Option<&[f64]>) -> Option<(usize, Solution)> {
+    fn warm(&self, start: Option<&[f64]>, omega: f64) -> Option<(usize, Solution)> {
         let start = start?;
-        let same = self.recent.iter().find(|(state, ..)| state == start);
-        same.or(self.recent.front()).map(|(_, top, motion)| (*top, motion.clone()))
+        let same = self.recent.iter().position(|recent| recent.start == start);
+        let near = self.recent.get(same.unwrap_or(0))?;
+        let before = self.recent.iter().skip(same.unwrap_or(0) + 1).find(|recent| recent.top == near.top);
+        let motion = match before {
+            Some(before) if self.levels.get(&near.top).is_some_and(Level::is_coupled) => near.towards(before, omega),
+            _ => near.motion.clone(),
+        };
+        Some((near.top, motion))
     }
 }
 
@@ -738,7 +780,7 @@ impl Solver for Balance<'_> {
         }
         self.begin_point(omega);
         let omega = omega / self.periods as f64;
-        let warm = self.warm(start);
+        let warm = self.warm(start, omega);
         match self.from(self.first, omega, warm) {
             Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
                 let by_time = |balance: &mut Self| balance.by_time(omega).ok_or(error);
@@ -749,7 +791,7 @@ impl Solver for Balance<'_> {
     }
 
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        match self.warm(start) {
+        match self.warm(start, omega / self.periods as f64) {
             // the harmonics that the neighbour needed are enough
             Some((top, motion)) if omega.is_finite() && omega > 0.0 => {
                 self.begin_point(omega);

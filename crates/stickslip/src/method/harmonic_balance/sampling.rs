@@ -3,7 +3,7 @@
 use super::coupled::Near;
 use super::ease::{GIVEN, SOLVED};
 use super::equations::{Level, Slopes, Solution};
-use super::ports::{Alternation, Port, Ports};
+use super::ports::{Alternation, Beginning, Port, Ports, block};
 
 /// Error of a motion by 1024 samples, relative, that laws with a memory were seen to have (hysteresis in a plane, contacts that part): as many more are
 /// taken as the tolerance asks for, and the estimate says whether they were enough.
@@ -11,6 +11,8 @@ const SEEN: f64 = 2e-5;
 /// Samples from which that is reckoned, and at most as many.
 const AT: f64 = 1024.0;
 const MOST: f64 = 65536.0;
+/// The share of the tolerance that they are to leave, where fewer than that do: beside the harmonics that are missing it is not seen.
+const LEFT: f64 = 0.05;
 /// The last step by twice the samples, at most, as a share of the distance that is to be known: steps leave some hundredths of themselves.
 const SHARE: f64 = 0.1;
 /// Steps, and what each is to leave of the one before.
@@ -22,6 +24,20 @@ pub(super) fn samples_for(tolerance: f64) -> usize {
     (AT * (SEEN / tolerance).sqrt().max(1.0)).min(MOST) as usize
 }
 
+/// The same of laws in steps, which are exact on a straight way however long it is: fewer where the tolerance is larger.
+pub(super) fn samples_of_steps(tolerance: f64) -> usize {
+    let fewer = (SEEN / (LEFT * tolerance)).sqrt().min(1.0);
+    (samples_for(tolerance) as f64 * fewer) as usize
+}
+
+/// The derivatives of all laws at a motion, with the states that repeat there.
+pub(super) struct Derivatives {
+    harmonics: Vec<usize>,
+    tangents: Vec<f64>,
+    blocks: Vec<usize>,
+    states: Vec<Beginning>,
+}
+
 impl Level {
     /// The motion near `start` by twice the samples, as exactly as its distance from `coarse` is to be known. `None` where no law is followed through the
     /// period, and where it was not found.
@@ -31,9 +47,17 @@ impl Level {
         omega: f64,
         start: &Solution,
         coarse: &Solution,
+        shorter: Option<&Derivatives>,
     ) -> Option<Solution> {
         if !ports.iter().any(Port::marches) {
             return None;
+        }
+        self.begin_anew(ports);
+        if let Some(shorter) = shorter {
+            self.adopt(ports, shorter);
+        }
+        if let Some((motion, true)) = self.by_twice_the_samples(ports, omega, start, coarse) {
+            return Some(motion);
         }
         let near = self.approach(ports, omega, start)?;
         let (motion, found) = self.by_twice_the_samples(ports, omega, &near, coarse)?;
@@ -58,9 +82,9 @@ impl Level {
         let mut motion = near.clone();
         let length = self.length(&motion);
         if !self.linearised {
-            self.evaluate(ports, omega, &mut motion, GIVEN, length, Slopes::Cheap);
-            self.follow_slopes(ports, omega, &mut motion, (GIVEN, self.keeps_sketch()));
+            self.linearise_at(ports, omega, &mut motion, length);
         }
+        let near = |residual, kept| Near { length, residual, sketched: true, kept };
         let (mut last, mut found, mut left) = (f64::INFINITY, false, MOST_STEPS);
         loop {
             self.exchange_for_twice();
@@ -71,12 +95,19 @@ impl Level {
             if residual <= SOLVED {
                 return Some((motion, true));
             }
-            if !self.newton_step(ports, omega, GIVEN, Near { length, residual, sketched: true }) {
+            if !self.newton_step(ports, omega, GIVEN, near(residual, last.is_finite())) {
                 return None;
             }
             self.before.copy(&motion);
             self.advance(ports, &mut motion, 1.0, length);
             let step = self.apart(ports, &motion, &self.before, length);
+            if self.adopted && step > CLOSER * last {
+                // those of a motion that is too far away
+                motion.copy(&self.before);
+                self.linearise_at(ports, omega, &mut motion, length);
+                last = f64::INFINITY;
+                continue;
+            }
             found |= step <= SHARE * self.apart(ports, &motion, coarse, length);
             left -= 1;
             if found || left == 0 || step > CLOSER * last {
@@ -86,6 +117,48 @@ impl Level {
             }
             last = step;
         }
+    }
+
+    /// The derivatives of all laws at a motion, from where it is known that they repeat.
+    fn linearise_at(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, length: f64) {
+        self.evaluate(ports, omega, motion, GIVEN, length, Slopes::Cheap);
+        self.follow_slopes(ports, omega, motion, (GIVEN, self.keeps_sketch()));
+        self.adopted = false;
+    }
+
+    /// The derivatives of the last search, where those of all laws are its own.
+    pub(super) fn derivatives(&self, ports: &Ports) -> Option<Derivatives> {
+        let own = self.is_coupled() && self.linearised && ports.iter().all(Port::marches);
+        own.then(|| Derivatives {
+            harmonics: self.harmonics().to_vec(),
+            tangents: self.tangents.clone(),
+            blocks: self.blocks.clone(),
+            states: self.states.clone(),
+        })
+    }
+
+    /// Takes the derivatives of a shorter series among those that the point before has left: what is old is what the harmonics above do.
+    fn adopt(&mut self, ports: &Ports, shorter: &Derivatives) {
+        let place = |h: &usize| self.harmonics().binary_search(h).ok();
+        let Some(places) = shorter.harmonics.iter().map(place).collect::<Option<Vec<_>>>() else { return };
+        if !self.derived {
+            return;
+        }
+        let (few, many) = (2 * places.len(), 2 * self.harmonics().len());
+        for (p, port) in ports.iter().enumerate() {
+            let own = &mut self.tangents[block(&self.blocks, p, port, many / 2)];
+            let other = &shorter.tangents[block(&shorter.blocks, p, port, few / 2)];
+            // rows as columns: axis by axis the parts of the harmonics
+            let at: Vec<usize> = (0..port.axes)
+                .flat_map(|a| places.iter().flat_map(move |k| [a * many + 2 * k, a * many + 2 * k + 1]))
+                .collect();
+            for (row, values) in at.iter().zip(other.chunks_exact(at.len())) {
+                let own = &mut own[row * many * port.axes..][..many * port.axes];
+                at.iter().zip(values).for_each(|(column, value)| own[*column] = *value);
+            }
+        }
+        self.states.clone_from(&shorter.states);
+        (self.linearised, self.adopted) = (true, true);
     }
 
     /// The distance of the unknowns of two motions, without means, relative to their units.
@@ -110,14 +183,16 @@ impl Level {
 
 #[cfg(test)]
 mod tests {
-    use super::super::HarmonicBalance;
     use super::super::equations::{Level, Solution, transfer};
     use super::super::ports::Ports;
     use super::super::rest::Rest;
-    use crate::law::{Dahl, Jenkins2d, SharedLaw, Valanis};
+    use super::super::{HarmonicBalance, TOLERANCE};
+    use super::{LEFT, samples_for, samples_of_steps};
+    use crate::law::{Dahl, FrictionContact, Jenkins2d, SharedLaw, Valanis};
     use crate::method::Method;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
     use crate::orbit::Orbit;
+    use num_complex::Complex64;
     use std::f64::consts::TAU;
     use std::sync::Arc;
 
@@ -185,7 +260,7 @@ mod tests {
             let whole = solve(level(&many, 2048));
             let mut near = level(&many, 1024);
             assert_eq!(near.keeps_sketch(), bodies > 20);
-            let found = near.approach_by_twice_the_samples(&ports, omega, &coarse, &coarse).unwrap();
+            let found = near.approach_by_twice_the_samples(&ports, omega, &coarse, &coarse, None).unwrap();
             let apart = |a: &Solution, b: &Solution| near.apart(&ports, a, b, 1.0);
             let (distance, error) = (apart(&whole, &coarse), apart(&whole, &found));
             assert!(distance > 1e-5 * apart(&whole, &Solution::rest(whole.c.len())), "{distance:.1e} shows nothing");
@@ -194,6 +269,40 @@ mod tests {
                 a.force.iter().zip(&b.force).map(|(a, b)| (a - b).norm_sqr()).sum::<f64>().sqrt()
             };
             assert!(forces(&whole, &found) < 0.01 * forces(&whole, &coarse), "{bodies} bodies");
+        }
+    }
+
+    /// Derivatives of the shorter series, with those that a neighbouring point left of the harmonics above, lead to the same distance.
+    #[test]
+    fn a_neighbour_leaves_derivatives_of_the_longer_series() {
+        let system = row(22);
+        let ports = Ports::new(&system).unwrap();
+        let rest = Rest::new(&system, &ports);
+        let harmonics = |top: usize| -> Vec<usize> { (1..=top).step_by(2).collect() };
+        let (few, many) = (harmonics(9), harmonics(19));
+        let [mut short, mut long, mut whole] =
+            [(&few, 1024), (&many, 1024), (&many, 2048)].map(|(h, n)| Level::new(h.clone(), n, &ports, None));
+        let mut added = vec![Complex64::new(0.0, 0.0); ports.count() * many.len()];
+        for (omega, adopts) in [(110.0, false), (110.2, true)] {
+            for level in [&mut short, &mut long, &mut whole] {
+                level.drive(&system, &ports, &rest, omega).unwrap();
+            }
+            let solve = |level: &mut Level| {
+                let start = level.begin(&system, &ports, None, omega);
+                level.solve(&ports, omega, start).unwrap()
+            };
+            let coarse = transfer(&solve(&mut short), &few, &many);
+            let whole = solve(&mut whole);
+            let shorter = short.derivatives(&ports);
+            assert!(shorter.is_some());
+            let mut start = coarse.clone();
+            start.c.iter_mut().zip(&added).for_each(|(c, added)| *c += added);
+            let found = long.approach_by_twice_the_samples(&ports, omega, &start, &coarse, shorter.as_ref()).unwrap();
+            assert_eq!(long.adopted, adopts);
+            let apart = |a: &Solution, b: &Solution| long.apart(&ports, a, b, 1.0);
+            let (distance, error) = (apart(&whole, &coarse), apart(&whole, &found));
+            assert!(error < 0.1 * distance, "{omega}: {error:.1e} of {distance:.1e}");
+            added = found.c.iter().zip(&coarse.c).map(|(found, coarse)| found - coarse).collect();
         }
     }
 
@@ -227,6 +336,24 @@ mod tests {
             let (error, estimate) = (distance(&found, &truth), found.evidence.truncation.unwrap());
             assert!(error > 1e-8, "{}: {error:.1e} shows nothing", law.name());
             assert!((0.5..3.0).contains(&(estimate / error)), "{}: {error:.1e}, said {estimate:.1e}", law.name());
+        }
+    }
+
+    /// Laws in steps take fewer samples at a larger tolerance, and leave their share of it.
+    #[test]
+    fn steps_take_few_samples_at_a_large_tolerance() {
+        assert_eq!((samples_of_steps(TOLERANCE), samples_of_steps(1e-6)), (647, samples_for(1e-6)));
+        let tolerance = 0.01;
+        assert!(samples_of_steps(tolerance) <= 256);
+        let contact = FrictionContact { tangential: 5e3, normal: 5e3, friction: 0.3, preload: 5.0, tangents: 1 };
+        for law in [laws()[0].clone(), Arc::new(contact)] {
+            let system = system(law.clone());
+            let orbit = |samples| {
+                let method = HarmonicBalance { harmonics: Some(15), samples, tolerance: Some(tolerance) };
+                method.solver(&system).unwrap().orbit(TAU * 17.0, None).unwrap()
+            };
+            let error = distance(&orbit(None), &orbit(Some(16_384)));
+            assert!(error > 1e-7 && error < LEFT * tolerance, "{}: {error:.1e}", law.name());
         }
     }
 

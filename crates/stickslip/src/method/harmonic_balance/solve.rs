@@ -107,7 +107,7 @@ impl Level {
         let start = motion.clone();
         let taken = (self.assembled, self.products);
         self.exchange_samples();
-        let rough = self.search(ports, omega, motion, ease, (most, ROUGH));
+        let rough = self.search(ports, omega, motion, ease, (most, self.rough()));
         self.exchange_samples();
         if rough.is_ok() && self.search(ports, omega, motion, ease, (most, SOLVED)).is_ok() {
             return Ok(());
@@ -119,6 +119,11 @@ impl Level {
         self.sketches = false;
         *motion = Solution { iterations: motion.iterations, ..start };
         self.search(ports, omega, motion, ease, (most, SOLVED))
+    }
+
+    /// See [`ROUGH`].
+    fn rough(&self) -> f64 {
+        ROUGH * (SAMPLES as f64 / self.all_samples() as f64).powi(2).max(1.0)
     }
 
     /// Newton's method to a residual: the longest of the halved steps that comes closer, and where none does the whole one, which may lead out of a
@@ -152,7 +157,7 @@ impl Level {
             if !kept {
                 rough_slopes = self.follow_slopes(ports, omega, motion, (ease, sketched));
             }
-            let near = Near { length, residual, sketched: rough_slopes };
+            let near = Near { length, residual, sketched: rough_slopes || rough, kept };
             let Some(held) = self.bounded_step(ports, omega, ease, near, reach) else { break };
             motion.iterations += 1;
             self.before.copy(motion);
@@ -231,7 +236,7 @@ impl Level {
                 }
                 self.linearised = false;
                 held = share;
-                if !self.newton_step(ports, omega, ease, at) {
+                if !self.newton_step(ports, omega, ease, Near { kept: false, ..at }) {
                     return None;
                 }
             }
@@ -349,7 +354,7 @@ impl Level {
         self.begin_anew(ports);
         let mut motion = Solution { iterations: 0, ..start.clone() };
         self.exchange_samples();
-        let found = self.search(ports, omega, &mut motion, GIVEN, (ITERATIONS, ROUGH));
+        let found = self.search(ports, omega, &mut motion, GIVEN, (ITERATIONS, self.rough()));
         self.exchange_samples();
         (found.is_ok() && !self.is_away(&motion)).then_some(motion)
     }
