@@ -97,14 +97,16 @@ impl Receptance {
     /// Motions along all axes at all harmonics, [axis][harmonic], under the forces along them.
     pub fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
         match self {
+            // without joints
+            Receptance::Formed(_) if moved.is_empty() => {}
             Receptance::Formed(matrices) => {
                 let nh = matrices.len();
-                let mut sum = vec![ZERO; moved.len() / nh.max(1)];
+                let mut sum = vec![ZERO; moved.len() / nh];
                 for (k, matrix) in matrices.iter().enumerate() {
                     // column by column, as the matrix lies in memory
                     sum.fill(ZERO);
                     let forces = force[k..].iter().step_by(nh);
-                    for (column, f) in matrix.as_slice().chunks_exact(sum.len().max(1)).zip(forces) {
+                    for (column, f) in matrix.as_slice().chunks_exact(sum.len()).zip(forces) {
                         sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += r * f);
                     }
                     moved[k..].iter_mut().step_by(nh).zip(&*sum).for_each(|(moved, sum)| *moved = *sum);
