@@ -1,9 +1,12 @@
 //! What a reader of the results must know, in sentences. Notes of one sort from several units become one sentence.
 
+use crate::expression::displayed;
 use serde::{Deserialize, Serialize};
+use stickslip::dimension::Dimension;
 use stickslip::law::Piece;
 use stickslip::model::{Joint, Model};
 use stickslip::orbit::{Accuracy, Orbit};
+use stickslip::structure::Reduction;
 
 /// How a note begins that is a warning.
 pub(crate) const WARNING: &str = "warning: ";
@@ -35,6 +38,8 @@ pub enum Note {
         /// The one that knows where.
         knows: String,
     },
+    /// Points at which joints slip on a structure in few coordinates, and the lowest frequency up to which the error of these is known, rad/s.
+    Beyond(usize, f64),
     /// Of one case (its varied parameters in words): points at which a joint sticks for the whole period, of so many.
     Stuck {
         /// The case.
@@ -49,8 +54,8 @@ pub enum Note {
 }
 
 impl Note {
-    /// What an orbit asks for: that it is unstable, if that is known (see [`Orbit::is_stable`]), how accurate its series is, and that it is one of
-    /// many.
+    /// What an orbit asks for: that it is unstable, if that is known (see [`Orbit::is_stable`]), how accurate its series is, that it is one of
+    /// many, and what its `reduction_error` leaves out.
     pub(crate) fn of_orbit(model: &Model, orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
         let early = || usize::from(orbit.periods > 1 && orbit.repeats() < orbit.periods);
         let unstable = (stable == Some(false)).then(|| Note::Unstable(1, early()));
@@ -60,7 +65,17 @@ impl Note {
             Accuracy::Converged => None,
         };
         let history = (!orbit.evidence.history.is_empty()).then_some(Note::History(1));
-        unstable.into_iter().chain(accuracy).chain(history).chain(Note::several(model, orbit)).collect()
+        let said = unstable.into_iter().chain(accuracy).chain(history);
+        said.chain(Note::several(model, orbit)).chain(Note::beyond(model, orbit)).collect()
+    }
+
+    /// That friction makes harmonics above those that the coordinates were chosen for.
+    fn beyond(model: &Model, orbit: &Orbit) -> Option<Note> {
+        let up_to = match model.substructure.as_ref()?.reduction {
+            Reduction::UpTo { up_to, .. } | Reduction::Modes { up_to, .. } => up_to,
+            Reduction::None { .. } => return None,
+        };
+        orbit.joints.iter().any(|joint| joint.slip_fraction > 0.0).then_some(Note::Beyond(1, up_to))
     }
 
     /// That nothing decides where a rigid joint sticks on which another one depends. Behind a spring what sticks is relaxed, and has one place.
@@ -131,6 +146,11 @@ impl Note {
                     *points += more;
                     return;
                 }
+                (Note::Beyond(points, up_to), Note::Beyond(more, other)) => {
+                    *points += more;
+                    *up_to = up_to.min(*other);
+                    return;
+                }
                 (Note::Unstable(points, early), Note::Unstable(more, other)) => {
                     *points += more;
                     *early += other;
@@ -190,6 +210,15 @@ impl Note {
                  its slider (`jenkins`) makes the one that is shown unique, kind = \"transient\" follows the one of a given start.",
                 points(*count)
             )),
+            Note::Beyond(count, up_to) => {
+                let [known, twice] = [1.0, 2.0].map(|times| displayed(times * up_to, Some(Dimension::FREQUENCY)));
+                Some(format!(
+                    "At {} joints slip: `reduction_error` is that of forces up to {known}, and not of the harmonics that friction makes above. \
+                     Where one of them meets a mode that is hardly damped, a joint is rigid or stiff, or at the driven place, amplitudes may be \
+                     wrong by percent: compare with reduce = {{ up_to = \"{twice}\" }}, or with reduce = false.",
+                    points(*count)
+                ))
+            }
             Note::StuckElsewhere(count) => Some(format!(
                 "In further cases a joint sticks for the whole period at {}; the same holds there.",
                 points(*count)

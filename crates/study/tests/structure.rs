@@ -850,6 +850,8 @@ fn few_coordinates_know_the_modes_that_harmonics_of_a_joint_meet() {
     };
     let (few, all) = (of(""), of("reduce = false"));
     assert!(numbers(&few, "j_slip_fraction").iter().all(|share| *share > 0.1), "no harmonics without slip");
+    let said = |data: &Dataset| data.notes.iter().any(|note| note.contains("up_to = \"2520 Hz\""));
+    assert!(said(&few) && !said(&all), "15 times 84 Hz, and twice of that: {:?}", few.notes);
     for column in ["tip_amplitude_m", "mid_amplitude_m"] {
         for (few, all) in numbers(&few, column).iter().zip(numbers(&all, column)) {
             assert!((few / all - 1.0).abs() < Reduction::TOLERANCE, "{column}: {few} {all}");
