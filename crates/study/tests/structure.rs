@@ -407,6 +407,8 @@ fn what_is_wrong_is_said() {
         .entries()
         .map(|(row, column, value)| (row, column, if row == 3 && column == 0 { 2.0 * value } else { value }));
     write(path.join("slanted.mtx"), &Matrix::new(rows, rows, Symmetry::General, slanted).unwrap()).unwrap();
+    let pulled = brick.stiffness.entries().map(|(row, column, value)| (row, column, -value));
+    write(path.join("pulled.mtx"), &Matrix::new(rows, rows, Symmetry::General, pulled).unwrap()).unwrap();
     let good = structure("mtx", "rows.csv", "m-kg-s", DAMPED) + &place("tip", &node) + FORCED;
     let wrong = |from: &str, to: &str| {
         assert!(good.contains(from), "{from}");
@@ -423,6 +425,7 @@ fn what_is_wrong_is_said() {
     told("\"k.mtx\"", "\"complex.mtx\"", &["complex.mtx", "complex"]);
     told("\"k.mtx\"", "\"cut.mtx\"", &["cut.mtx"]);
     told("\"k.mtx\"", "\"slanted.mtx\"", &["not symmetric", "row 4, column 1"]);
+    told("\"k.mtx\"", "\"pulled.mtx\"", &["study.toml:3", "not positive semidefinite", "signs"]);
     told("\"m.mtx\"", "\"negative.mtx\"", &["study.toml:4", "negative"]);
     told("\"m.mtx\"", "\"k.mtx\"", &["study.toml:4", "stiffness matrix once more"]);
     told(

@@ -7,6 +7,7 @@ use crate::structure::{
     DampedModes, KeptSector, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorBlade,
 };
 use std::sync::Arc;
+use stickslip_numerics::sparse::ModesError;
 
 /// Row, column, value.
 pub(super) type Entries = Vec<(usize, usize, f64)>;
@@ -276,7 +277,12 @@ fn scaled(entries: &[RingEntry], factor: f64) -> Vec<RingEntry> {
 }
 
 fn failed(error: ReductionError) -> ModelError {
-    ModelError::new(Element::Substructure, "reduce", error.to_string())
+    let key = match &error {
+        ReductionError::Modes(ModesError::Negative { .. }) => "stiffness",
+        ReductionError::Modes(ModesError::NegativeMass) => "mass",
+        _ => "reduce",
+    };
+    ModelError::new(Element::Substructure, key, error.to_string())
 }
 
 /// The damping of a reduced component, if it is none by a matrix.

@@ -108,7 +108,8 @@ pub enum ModesError {
     Massless(Singular),
     /// The stiffness is not positive semidefinite.
     #[error(
-        "{count} eigenvalues lie below {below:.3e} rad²/s²: the stiffness is not positive semidefinite; check its signs, or a state beyond buckling"
+        "{} below {below:.3e} rad²/s²: the stiffness is not positive semidefinite; check its signs, or a state beyond buckling",
+        if *count == 1 { "1 eigenvalue lies".to_owned() } else { format!("{count} eigenvalues lie") }
     )]
     Negative {
         /// How many.
