@@ -11,7 +11,11 @@
 //! A frame counts if it is whole and its check holds. What follows the last such frame was torn by the end of the program and is cut off when
 //! the run goes on. A block counts as kept when the file system says that it is on the disk, and the file is still where it was.
 
+mod bytes;
+mod frame;
+
 use crate::json::Shape;
+use frame::{LONGEST, PREFIX, check, frame};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -21,7 +25,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stickslip_study::StudyError;
 use stickslip_study::block::{Block, Tally};
-use stickslip_study::dataset::{Column, Dataset, Table, Values};
+use stickslip_study::dataset::Dataset;
 use stickslip_study::run::Checked;
 
 /// Name of the file in its folder.
@@ -31,8 +35,6 @@ const MAGIC: &[u8; 8] = b"STICKJ01";
 const CELLS: usize = 131_072;
 /// After so long a block is written and brought to the disk whatever its size: what is lost to an end without warning.
 const EVERY: Duration = Duration::from_secs(1);
-/// No frame is longer: a length beyond it is none.
-const LONGEST: u32 = 1 << 31;
 /// Tags of payloads.
 const HEAD: u8 = 0;
 const BLOCK: u8 = 1;
@@ -288,7 +290,7 @@ impl Journal {
         {
             match payload.first() {
                 Some(&BLOCK) => {
-                    let Some((block, time)) = read_block(&payload[1..]) else { break };
+                    let Some((block, time)) = bytes::read(&payload[1..]) else { break };
                     if block.units.start != journal.units.end {
                         break;
                     }
@@ -364,7 +366,7 @@ impl Journal {
         let Some(block) = self.waiting.take() else { return Ok(()) };
         self.time = self.before + self.begun.elapsed().as_secs_f64();
         let mut payload = vec![BLOCK];
-        write_block(&block, self.time, &mut payload);
+        bytes::write(&block, self.time, &mut payload);
         let at = self.end;
         self.frame(&payload)?;
         self.frames.push((at, payload.len() as u32));
@@ -454,7 +456,7 @@ impl Journal {
             let mut file = File::open(&self.path).map_err(reading)?;
             file.seek(SeekFrom::Start(*at)).map_err(reading)?;
             let payload = frame(&mut file, PREFIX + u64::from(*length)).map_err(reading)?.ok_or_else(not)?;
-            Ok(read_block(payload.get(1..).unwrap_or_default()).ok_or_else(not)?.0)
+            Ok(bytes::read(payload.get(1..).unwrap_or_default()).ok_or_else(not)?.0)
         })
     }
 }
@@ -476,153 +478,6 @@ fn is_same(a: &std::fs::Metadata, b: &std::fs::Metadata) -> bool {
 #[cfg(not(unix))]
 fn is_same(a: &std::fs::Metadata, b: &std::fs::Metadata) -> bool {
     a.len() == b.len()
-}
-
-/// Bytes before the payload of a frame.
-const PREFIX: u64 = 8;
-
-fn check(length: u32, payload: &[u8]) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    hasher.update(&length.to_le_bytes());
-    hasher.update(payload);
-    hasher.finalize()
-}
-
-/// The payload of the next frame, of which so many bytes are left in the file; `None` if there is no whole one.
-fn frame(reader: &mut impl Read, left: u64) -> std::io::Result<Option<Vec<u8>>> {
-    if left < PREFIX {
-        return Ok(None);
-    }
-    let (mut length, mut sum) = ([0; 4], [0; 4]);
-    reader.read_exact(&mut length)?;
-    reader.read_exact(&mut sum)?;
-    let length = u32::from_le_bytes(length);
-    if length >= LONGEST || PREFIX + u64::from(length) > left {
-        return Ok(None);
-    }
-    let mut payload = vec![0; length as usize];
-    reader.read_exact(&mut payload)?;
-    Ok((check(length, &payload) == u32::from_le_bytes(sum)).then_some(payload))
-}
-
-// ------------------------------------------------------------------------------------------ blocks as bytes
-
-fn write_block(block: &Block, time: f64, out: &mut Vec<u8>) {
-    let number = |out: &mut Vec<u8>, value: usize| out.extend((value as u64).to_le_bytes());
-    let text = |out: &mut Vec<u8>, text: &str| {
-        number(out, text.len());
-        out.extend(text.as_bytes());
-    };
-    number(out, block.units.start);
-    number(out, block.units.end);
-    out.extend(time.to_le_bytes());
-    // maps of texts and numbers are JSON always
-    text(out, &serde_json::to_string(&block.tally).unwrap_or_default());
-    number(out, block.tables.len());
-    for table in &block.tables {
-        text(out, &table.name);
-        number(out, table.columns.len());
-        number(out, table.rows());
-        for column in &table.columns {
-            text(out, &column.name);
-            match &column.values {
-                Values::Number(values) => {
-                    out.push(0);
-                    values.iter().for_each(|value| out.extend(value.to_le_bytes()));
-                }
-                Values::Integer(values) => {
-                    out.push(1);
-                    values.iter().for_each(|value| out.extend(value.to_le_bytes()));
-                }
-                Values::Flag(values) => {
-                    out.push(2);
-                    out.extend(values.iter().map(|value| value.map_or(2, u8::from)));
-                }
-                Values::Text(values) => {
-                    out.push(3);
-                    // the same word follows itself for most of a table
-                    for run in values.chunk_by(|a, b| a == b) {
-                        number(out, run.len());
-                        text(out, &run[0]);
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// A block and its time; `None` if the bytes are none.
-fn read_block(mut bytes: &[u8]) -> Option<(Block, f64)> {
-    let from = &mut bytes;
-    let units = number(from)?..number(from)?;
-    let time = f64::from_le_bytes(eight(from)?);
-    let tally = serde_json::from_str(text(from)?).ok()?;
-    let count = number(from)?;
-    let mut tables = Vec::new();
-    for _ in 0..count {
-        let name = text(from)?.to_owned();
-        let (count, rows) = (number(from)?, number(from)?);
-        let mut columns = Vec::new();
-        for _ in 0..count {
-            columns.push(Column { name: text(from)?.to_owned(), values: values(from, rows)? });
-        }
-        tables.push(Table { name, columns });
-    }
-    Some((Block { units, tables, tally }, time))
-}
-
-fn values(from: &mut &[u8], rows: usize) -> Option<Values> {
-    Some(match take(from, 1)? {
-        [0] => Values::Number(
-            take(from, rows.checked_mul(8)?)?
-                .chunks_exact(8)
-                .filter_map(|b| Some(f64::from_le_bytes(b.try_into().ok()?)))
-                .collect(),
-        ),
-        [1] => Values::Integer(
-            take(from, rows.checked_mul(8)?)?
-                .chunks_exact(8)
-                .filter_map(|b| Some(u64::from_le_bytes(b.try_into().ok()?)))
-                .collect(),
-        ),
-        [2] => Values::Flag(
-            take(from, rows)?
-                .iter()
-                .map(|b| [Some(false), Some(true)].get(usize::from(*b)).copied().flatten())
-                .collect(),
-        ),
-        [3] => {
-            let mut values: Vec<String> = Vec::new();
-            while values.len() < rows {
-                let (count, word) = (number(from)?, text(from)?);
-                if count == 0 || count > rows - values.len() {
-                    return None;
-                }
-                values.extend(std::iter::repeat_n(word.to_owned(), count));
-            }
-            Values::Text(values)
-        }
-        _ => return None,
-    })
-}
-
-fn take<'a>(from: &mut &'a [u8], count: usize) -> Option<&'a [u8]> {
-    let (taken, rest) = from.split_at_checked(count)?;
-    *from = rest;
-    Some(taken)
-}
-
-fn eight(from: &mut &[u8]) -> Option<[u8; 8]> {
-    take(from, 8)?.try_into().ok()
-}
-
-fn number(from: &mut &[u8]) -> Option<usize> {
-    usize::try_from(u64::from_le_bytes(eight(from)?)).ok()
-}
-
-fn text<'a>(from: &mut &'a [u8]) -> Option<&'a str> {
-    let length = number(from)?;
-    std::str::from_utf8(take(from, length)?).ok()
 }
 
 #[cfg(test)]

@@ -1,0 +1,123 @@
+//! A block of results as bytes, and back: numbers by their bits, words once for each run of them.
+
+use stickslip_study::block::Block;
+use stickslip_study::dataset::{Column, Table, Values};
+
+/// Adds a block and the time until it was finished, s.
+pub(super) fn write(block: &Block, time: f64, out: &mut Vec<u8>) {
+    let number = |out: &mut Vec<u8>, value: usize| out.extend((value as u64).to_le_bytes());
+    let text = |out: &mut Vec<u8>, text: &str| {
+        number(out, text.len());
+        out.extend(text.as_bytes());
+    };
+    number(out, block.units.start);
+    number(out, block.units.end);
+    out.extend(time.to_le_bytes());
+    // maps of texts and numbers are JSON always
+    text(out, &serde_json::to_string(&block.tally).unwrap_or_default());
+    number(out, block.tables.len());
+    for table in &block.tables {
+        text(out, &table.name);
+        number(out, table.columns.len());
+        number(out, table.rows());
+        for column in &table.columns {
+            text(out, &column.name);
+            match &column.values {
+                Values::Number(values) => {
+                    out.push(0);
+                    values.iter().for_each(|value| out.extend(value.to_le_bytes()));
+                }
+                Values::Integer(values) => {
+                    out.push(1);
+                    values.iter().for_each(|value| out.extend(value.to_le_bytes()));
+                }
+                Values::Flag(values) => {
+                    out.push(2);
+                    out.extend(values.iter().map(|value| value.map_or(2, u8::from)));
+                }
+                Values::Text(values) => {
+                    out.push(3);
+                    // the same word follows itself for most of a table
+                    for run in values.chunk_by(|a, b| a == b) {
+                        number(out, run.len());
+                        text(out, &run[0]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A block and its time; `None` if the bytes are none.
+pub(super) fn read(mut bytes: &[u8]) -> Option<(Block, f64)> {
+    let from = &mut bytes;
+    let units = number(from)?..number(from)?;
+    let time = f64::from_le_bytes(eight(from)?);
+    let tally = serde_json::from_str(text(from)?).ok()?;
+    let count = number(from)?;
+    let mut tables = Vec::new();
+    for _ in 0..count {
+        let name = text(from)?.to_owned();
+        let (count, rows) = (number(from)?, number(from)?);
+        let mut columns = Vec::new();
+        for _ in 0..count {
+            columns.push(Column { name: text(from)?.to_owned(), values: values(from, rows)? });
+        }
+        tables.push(Table { name, columns });
+    }
+    Some((Block { units, tables, tally }, time))
+}
+
+fn values(from: &mut &[u8], rows: usize) -> Option<Values> {
+    Some(match take(from, 1)? {
+        [0] => Values::Number(
+            take(from, rows.checked_mul(8)?)?
+                .chunks_exact(8)
+                .filter_map(|b| Some(f64::from_le_bytes(b.try_into().ok()?)))
+                .collect(),
+        ),
+        [1] => Values::Integer(
+            take(from, rows.checked_mul(8)?)?
+                .chunks_exact(8)
+                .filter_map(|b| Some(u64::from_le_bytes(b.try_into().ok()?)))
+                .collect(),
+        ),
+        [2] => Values::Flag(
+            take(from, rows)?
+                .iter()
+                .map(|b| [Some(false), Some(true)].get(usize::from(*b)).copied().flatten())
+                .collect(),
+        ),
+        [3] => {
+            let mut values: Vec<String> = Vec::new();
+            while values.len() < rows {
+                let (count, word) = (number(from)?, text(from)?);
+                if count == 0 || count > rows - values.len() {
+                    return None;
+                }
+                values.extend(std::iter::repeat_n(word.to_owned(), count));
+            }
+            Values::Text(values)
+        }
+        _ => return None,
+    })
+}
+
+fn take<'a>(from: &mut &'a [u8], count: usize) -> Option<&'a [u8]> {
+    let (taken, rest) = from.split_at_checked(count)?;
+    *from = rest;
+    Some(taken)
+}
+
+fn eight(from: &mut &[u8]) -> Option<[u8; 8]> {
+    take(from, 8)?.try_into().ok()
+}
+
+fn number(from: &mut &[u8]) -> Option<usize> {
+    usize::try_from(u64::from_le_bytes(eight(from)?)).ok()
+}
+
+fn text<'a>(from: &mut &'a [u8]) -> Option<&'a str> {
+    let length = number(from)?;
+    std::str::from_utf8(take(from, length)?).ok()
+}
