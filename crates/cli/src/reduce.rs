@@ -37,7 +37,8 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
     };
     if let Reduction::None { .. } = substructure.reduction {
         return wrong(
-            "its [structure] says reduce = false: nothing is to be saved; say how far the reduction is to reach",
+            "all rows of its [structure] are kept, since there are few or reduce = false says so: nothing is to be saved; say how far the reduction is to \
+             reach, as in reduce = { up_to = \"5 kHz\" }",
         );
     }
     if let Some(disk) = &substructure.disk {
@@ -181,7 +182,9 @@ fn damping_keys(substructure: &Substructure) -> Vec<String> {
             "reduce = false".to_owned(),
             format!("rayleigh = {{ mass = \"{mass:e} /s\", stiffness = \"{stiffness:e} s\" }}"),
         ],
-        SubstructureDamping::Ratio(ratio) => vec![reduce, format!("modal_damping = {ratio:e}")],
+        SubstructureDamping::Ratio(ratio) | SubstructureDamping::RatioUpTo { ratio, .. } => {
+            vec![reduce, format!("modal_damping = {ratio:e}")]
+        }
     }
 }
 

@@ -16,6 +16,7 @@ mod draws;
 mod error;
 pub mod expression;
 mod extra;
+mod farther;
 mod figure;
 mod histogram;
 mod immovable;

@@ -1,8 +1,7 @@
 //! What a reader of the results must know, in sentences. Notes of one sort from several units become one sentence.
 
-use crate::expression::displayed;
+use crate::farther::Slipping;
 use serde::{Deserialize, Serialize};
-use stickslip::dimension::Dimension;
 use stickslip::law::Piece;
 use stickslip::model::{Joint, Model};
 use stickslip::orbit::{Accuracy, Orbit};
@@ -38,8 +37,8 @@ pub enum Note {
         /// The one that knows where.
         knows: String,
     },
-    /// Points at which joints slip on a structure in few coordinates, and the lowest frequency up to which the error of these is known, rad/s.
-    Beyond(usize, f64),
+    /// Points at which joints slip on a structure in few coordinates.
+    Slipping(Slipping),
     /// Of one case (its varied parameters in words): points at which a joint sticks for the whole period, of so many.
     Stuck {
         /// The case.
@@ -66,16 +65,16 @@ impl Note {
         };
         let history = (!orbit.evidence.history.is_empty()).then_some(Note::History(1));
         let said = unstable.into_iter().chain(accuracy).chain(history);
-        said.chain(Note::several(model, orbit)).chain(Note::beyond(model, orbit)).collect()
+        said.chain(Note::several(model, orbit)).chain(Note::slipping(model, orbit)).collect()
     }
 
     /// That friction makes harmonics above those that the coordinates were chosen for.
-    fn beyond(model: &Model, orbit: &Orbit) -> Option<Note> {
+    fn slipping(model: &Model, orbit: &Orbit) -> Option<Note> {
         let up_to = match model.substructure.as_ref()?.reduction {
             Reduction::UpTo { up_to, .. } | Reduction::Modes { up_to, .. } => up_to,
             Reduction::None { .. } => return None,
         };
-        orbit.joints.iter().any(|joint| joint.slip_fraction > 0.0).then_some(Note::Beyond(1, up_to))
+        Slipping::of(orbit, up_to).map(Note::Slipping)
     }
 
     /// That nothing decides where a rigid joint sticks on which another one depends. Behind a spring what sticks is relaxed, and has one place.
@@ -146,9 +145,8 @@ impl Note {
                     *points += more;
                     return;
                 }
-                (Note::Beyond(points, up_to), Note::Beyond(more, other)) => {
-                    *points += more;
-                    *up_to = up_to.min(*other);
+                (Note::Slipping(slipping), Note::Slipping(more)) => {
+                    slipping.join(more);
                     return;
                 }
                 (Note::Unstable(points, early), Note::Unstable(more, other)) => {
@@ -210,15 +208,7 @@ impl Note {
                  its slider (`jenkins`) makes the one that is shown unique, kind = \"transient\" follows the one of a given start.",
                 points(*count)
             )),
-            Note::Beyond(count, up_to) => {
-                let [known, twice] = [1.0, 2.0].map(|times| displayed(times * up_to, Some(Dimension::FREQUENCY)));
-                Some(format!(
-                    "At {} joints slip: `reduction_error` is that of forces up to {known}, and not of the harmonics that friction makes above. \
-                     Where one of them meets a mode that is hardly damped, a joint is rigid or stiff, or at the driven place, amplitudes may be \
-                     wrong by percent: compare with reduce = {{ up_to = \"{twice}\" }}, or with reduce = false.",
-                    points(*count)
-                ))
-            }
+            Note::Slipping(slipping) => Some(slipping.text(WARNING)),
             Note::StuckElsewhere(count) => Some(format!(
                 "In further cases a joint sticks for the whole period at {}; the same holds there.",
                 points(*count)

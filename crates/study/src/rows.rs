@@ -10,9 +10,16 @@ use stickslip::model::ReductionEvidence;
 pub struct Rows {
     columns: Vec<Column>,
     next: usize,
+    /// Whether they are of linear motions, which have no harmonics of joints.
+    linear: bool,
 }
 
 impl Rows {
+    /// Rows of motions in which no joint slips.
+    pub fn linear() -> Self {
+        Rows { linear: true, ..Rows::default() }
+    }
+
     fn cells(&mut self, name: &str, empty: Cells) -> &mut Cells {
         let name = column_name(name);
         if self.next == self.columns.len() {
@@ -64,6 +71,16 @@ impl Rows {
     pub fn reduced(&mut self, reduction: Option<ReductionEvidence>) {
         if let Some(ReductionEvidence { error, .. }) = reduction {
             self.number(REDUCTION_ERROR, error);
+        }
+    }
+
+    /// Their reduction errs by no less than this, unless they are linear.
+    pub fn err(&mut self, error: f64) {
+        let known = self.columns.iter_mut().filter(|column| column.name == REDUCTION_ERROR && !self.linear);
+        for column in known {
+            if let Cells::Number(errors) = &mut column.values {
+                errors.iter_mut().for_each(|known| *known = known.max(error));
+            }
         }
     }
 

@@ -5,7 +5,10 @@ use crate::block::{Block, Tally};
 use crate::dataset::{Dataset, Figure, Record, Table};
 use crate::drawing::Drawing;
 use crate::error::StudyError;
+use crate::farther::has_turn;
 use crate::kinds;
+use crate::note::Note;
+use crate::point::location_of;
 use crate::study::Study;
 use crate::summary::ModelSummary;
 use crate::thinning::Thinning;
@@ -335,7 +338,12 @@ fn compute(study: &Study, first: &Arc<Prepared>, index: usize, context: &Context
     };
     let cases = unit.cases.clone().map(prepared).collect::<Result<Vec<_>, _>>()?;
     let work = Work { study, cases, points: unit.points, context };
-    let part = (kinds::of(study).compute)(&work);
+    let mut part = (kinds::of(study).compute)(&work);
+    if let Ok(part) = &mut part
+        && !context.stopped()
+    {
+        solve_again(&work, index, part);
+    }
     // kinds look in many places whether they are to stop
     part.map(|part| Part { cut: context.stopped(), ..part }).map_err(|(index, error)| {
         match work.cases.iter().find(|prepared| prepared.case.index == index) {
@@ -343,4 +351,21 @@ fn compute(study: &Study, first: &Arc<Prepared>, index: usize, context: &Context
             None => study.error_at("study", 0, "kind", error.to_string(), None),
         }
     })
+}
+
+/// Where joints slip on a structure in few coordinates: what these leave out of the harmonics that they make.
+fn solve_again(work: &Work<'_>, index: usize, part: &mut Part) {
+    let (study, prepared) = (work.study, work.case());
+    let points = part.points.values().sum::<u64>() as usize;
+    let slipping = part.notes.iter_mut().find_map(|note| match note {
+        Note::Slipping(slipping) => Some(slipping),
+        _ => None,
+    });
+    let Some(slipping) = slipping else { return };
+    let Prepared { case, system, method } = prepared;
+    let turn = study.kind().uses_method && has_turn(index, points);
+    let at = |omega: f64| location_of(case, omega);
+    if let Some(error) = slipping.solve_again(turn, (&case.model, system, &**method), &at) {
+        part.tables.iter_mut().for_each(|rows| rows.err(error));
+    }
 }

@@ -618,8 +618,8 @@ impl Study {
         };
         let mut model = model_of(&self.structure, &environment, &again, problems);
         let values = self.study.values(&environment, problems);
-        substructure::settle(&mut model, &values);
         let method = self.method.values(&environment, problems);
+        substructure::settle(&mut model, &values, &method);
         if !problems.is_empty() {
             return None;
         }

@@ -499,6 +499,7 @@ impl<'a> Shooter<'a> {
                 energy_gap: measured.energy_gap(0.0),
                 switches: measured.joints.iter().map(|joint| joint.switches).sum(),
                 iterations: closed.iterations,
+                harmonics: None,
                 truncation: closed.missing,
                 accuracy: Accuracy::Converged,
                 return_defect: Some(closed.residual),

@@ -24,7 +24,7 @@ pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey, Unpressed, 
 pub use system::{Axis, Cyclic, Load, MovedPlace, System, SystemBuilder, SystemError, SystemJoint};
 
 use crate::law::SharedLaw;
-use crate::structure::{Boundary, Component, Reduction};
+use crate::structure::{Boundary, Component, ReducedComponent, Reduction};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -70,6 +70,23 @@ pub struct Substructure {
     pub disk: Option<DiskPart>,
 }
 
+impl Substructure {
+    /// The same structure, with the same damping, in as many coordinates as it takes to reach `times` as far as `few` of it do.
+    #[must_use]
+    pub fn farther(&self, few: &ReducedComponent, times: f64) -> Substructure {
+        let (tolerance, kind) = match self.reduction {
+            Reduction::UpTo { tolerance, kind, .. } => (tolerance, kind),
+            Reduction::Modes { .. } | Reduction::None { .. } => (Reduction::TOLERANCE, None),
+        };
+        let damping = match self.damping {
+            SubstructureDamping::Ratio(ratio) => SubstructureDamping::RatioUpTo { ratio, up_to: few.serves() },
+            damping => damping,
+        };
+        let reduction = Reduction::UpTo { up_to: times * few.serves(), tolerance, kind };
+        Substructure { damping, reduction, ..self.clone() }
+    }
+}
+
 /// How far a structure in few coordinates is from the whole.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ReductionEvidence {
@@ -106,6 +123,13 @@ pub enum SubstructureDamping {
     /// Every mode up to the frequency of interest has this share of critical damping; what lies above is damped in proportion to its
     /// stiffness.
     Ratio(f64),
+    /// The same up to a frequency that is stated, whatever the reduction reaches.
+    RatioUpTo {
+        /// Share of critical damping.
+        ratio: f64,
+        /// rad/s.
+        up_to: f64,
+    },
     /// `C = mass M + stiffness K`, 1/s and s.
     Rayleigh {
         /// 1/s.

@@ -57,16 +57,18 @@ impl Part {
             all.map(|(row, column, value)| (*row, *column, factor * value)).collect()
         };
         let mut modes = None;
+        let mut modal = |ratio: f64, up_to: f64| {
+            let (stiffness, damped) = substructure.component.modal_damping(ratio, up_to).map_err(failed)?;
+            modes = Some(damped).filter(|damped| !damped.is_empty());
+            Ok::<_, ModelError>(times(&springs, stiffness))
+        };
         let damping = match substructure.damping {
             SubstructureDamping::Own => own.map_or_else(Vec::new, |own| own.entries().collect()),
             SubstructureDamping::Rayleigh { mass, stiffness } => {
                 [times(&entries, mass), times(&springs, stiffness)].concat()
             }
-            SubstructureDamping::Ratio(ratio) => {
-                let (stiffness, damped) = substructure.component.modal_damping(ratio, up_to).map_err(failed)?;
-                modes = Some(damped).filter(|damped| !damped.is_empty());
-                times(&springs, stiffness)
-            }
+            SubstructureDamping::Ratio(ratio) => modal(ratio, up_to)?,
+            SubstructureDamping::RatioUpTo { ratio, up_to } => modal(ratio, up_to)?,
         };
         let named = |(at, name): (usize, &String)| row_name(at, name);
         Ok(Part {
@@ -230,7 +232,7 @@ impl OneSector {
             SubstructureDamping::Rayleigh { mass, stiffness } => {
                 [scaled(&sector.mass, mass), scaled(&sector.stiffness, stiffness)].concat()
             }
-            SubstructureDamping::Ratio(_) => return Err(no_modes()),
+            SubstructureDamping::Ratio(_) | SubstructureDamping::RatioUpTo { .. } => return Err(no_modes()),
         };
         let rows = substructure.component.rows();
         Ok(OneSector {
@@ -290,6 +292,7 @@ fn damping_law(substructure: &Substructure, component: &ReducedComponent) -> Opt
     match substructure.damping {
         SubstructureDamping::Own => None,
         SubstructureDamping::Ratio(ratio) => Some(Damping::Ratio { ratio, up_to: component.serves() }),
+        SubstructureDamping::RatioUpTo { ratio, up_to } => Some(Damping::Ratio { ratio, up_to }),
         SubstructureDamping::Rayleigh { mass, stiffness } => Some(Damping::Rayleigh { mass, stiffness }),
     }
 }

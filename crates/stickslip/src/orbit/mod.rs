@@ -152,6 +152,8 @@ pub struct Evidence {
     pub switches: usize,
     /// Iterations of the method.
     pub iterations: usize,
+    /// The highest harmonic of the motion's own frequency in it, if it is a series.
+    pub harmonics: Option<usize>,
     /// Estimated relative error of the amplitudes from discretisation; `None` for a method that has none.
     pub truncation: Option<f64>,
     /// Whether that is as little as was asked for.
@@ -386,6 +388,7 @@ impl Orbit {
                 energy_gap,
                 switches: measured.joints.iter().map(|joint| joint.switches).sum(),
                 iterations,
+                harmonics: None,
                 truncation,
                 accuracy,
                 return_defect: None,

@@ -42,6 +42,8 @@ struct Kept {
     rows: Vec<String>,
     index: OnceLock<HashMap<String, usize>>,
     whole: Whole,
+    /// Whether every motion has kinetic energy.
+    definite_mass: bool,
     /// What was asked for, and what came of it: cases of a study ask the same.
     reductions: Known<Asked, Answer>,
     /// The damping of its modes, by ratio and largest frequency.
@@ -231,15 +233,15 @@ impl Component {
         }
         let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
         let negative = mass.entries().any(|(row, column, value)| row == column && value < 0.0);
-        if negative || sparse_definite(&mass).is_none() {
+        let Some(definite_mass) = sparse_definite(&mass).filter(|_| !negative) else {
             return Err(StructureError::NegativeMass);
-        }
+        };
         let damping = damping.map_or(Damping::Rayleigh { mass: 0.0, stiffness: 0.0 }, Damping::Matrix);
         // sizes and symmetry were looked at
         let whole = Whole::unseen(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
         let (index, reductions) = (OnceLock::new(), Mutex::default());
         let (damped, counts, sectors) = (Mutex::default(), Mutex::default(), Mutex::default());
-        Ok(Component(Arc::new(Kept { rows, index, whole, reductions, damped, counts, sectors })))
+        Ok(Component(Arc::new(Kept { rows, index, whole, definite_mass, reductions, damped, counts, sectors })))
     }
 
     /// Rows of the matrices.
@@ -269,6 +271,11 @@ impl Component {
             _ => None,
         };
         (mass, own, stiffness)
+    }
+
+    /// Whether every motion of it has kinetic energy, as methods that follow motions in time ask for.
+    pub fn has_definite_mass(&self) -> bool {
+        self.0.definite_mass
     }
 
     /// Its lowest natural frequencies, rad/s, rising; free motions have none to rounding.

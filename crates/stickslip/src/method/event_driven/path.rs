@@ -70,6 +70,7 @@ pub(super) fn orbit(
             energy_gap: measured.energy_gap(f64::max(NO_WORK * rest * rest, STORED * stored)),
             switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
+            harmonics: None,
             truncation: closed.missing,
             return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,

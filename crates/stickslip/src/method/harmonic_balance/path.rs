@@ -155,6 +155,7 @@ pub(super) fn orbit(
     start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
     start.extend(states);
     let contracts = judge.as_ref().is_some_and(|judge| judge.proves());
+    let top = harmonics.last().copied();
     let path = Series { system: system.clone(), omega, harmonics, x, force, contact };
     let Judged { derivative, defect } =
         judge.map_or_else(Judged::default, |judge| judge.judge(system, omega, (&path, symmetry), &start));
@@ -169,6 +170,7 @@ pub(super) fn orbit(
             energy_gap: measured.energy_gap(0.0),
             switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: motion.iterations,
+            harmonics: top,
             truncation,
             return_defect: defect,
             accuracy: match truncation {

@@ -40,7 +40,7 @@ pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>)
         found.map_err(|why| absent.push(format!("{WARNING}{}", reference.missing(&why)))).ok()
     };
     let curves = Reference::ALL.map(|reference| (reference.name(), follow(reference)));
-    let mut rows = Rows::default();
+    let mut rows = Rows::linear();
     for (i, omega) in omegas.iter().enumerate() {
         rows.number(DRIVE, hertz(*omega));
         for (what, curve) in &curves {
