@@ -2,7 +2,7 @@
 //! farther.
 //!
 //! The error of a reduction is that of harmonic forces up to a frequency. Friction makes harmonics above it, and a mode that one of them meets is missing.
-//! So the same orbit is sought once more, by the same method and from rest, in coordinates that know the modes far above.
+//! So such an orbit is sought once more, by the same method and from rest, in coordinates that know the modes far above.
 
 use crate::expression::displayed;
 use serde::{Deserialize, Serialize};
@@ -21,7 +21,7 @@ const TIMES: [f64; 2] = [8.0, 4.0];
 /// Points of a unit of work that are solved again: the largest, and others from end to end, as the error goes with which mode a harmonic meets. Measured on
 /// 300 masses: 0.8 % at the largest of 21 points, 9 % at the worst.
 const POINTS: usize = 4;
-/// Modes up to there of which there may be so many: methods that follow motions in time are slow with more, see `bench`.
+/// Modes up to there of which there may be so many: methods that follow motions in time are slow with more.
 const MODES: usize = 60;
 /// Rows beyond which nothing is solved again: to reduce so many takes ten seconds.
 pub(crate) const ROWS: usize = 30_000;
@@ -68,7 +68,7 @@ pub(crate) fn has_turn(unit: usize, points: usize) -> bool {
     unit.is_multiple_of((BLOCK / points.max(1)).max(1))
 }
 
-/// How many are solved again of so many points of one case or many, where joints slip at all of them.
+/// How many of so many points are solved again where joints slip at all of them.
 pub(crate) fn count(points: f64) -> f64 {
     POINTS as f64 * (points / BLOCK as f64).ceil()
 }

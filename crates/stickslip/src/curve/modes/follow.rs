@@ -236,7 +236,11 @@ impl Path {
 
     /// Followed states within a range, where the curve passes an amplitude first, and those at its ends, by falling amplitude; with the
     /// number of the followed state before them.
-    pub(super) fn within(&self, equations: &mut ModeEquations<'_>, (low, high): (f64, f64)) -> Vec<(usize, f64, ModeState)> {
+    pub(super) fn within(
+        &self,
+        equations: &mut ModeEquations<'_>,
+        (low, high): (f64, f64),
+    ) -> Vec<(usize, f64, ModeState)> {
         let low = low.max(self.end());
         let before = |a: f64| self.arcs.windows(2).position(|pair| pair[0].amplitude >= a && pair[1].amplitude < a);
         let mut all = Vec::new();
