@@ -125,9 +125,14 @@ struct Missing {
 }
 
 impl Missing {
+    /// Whether another start may lead to an orbit: a series that is too short is so from every side.
+    fn is_sought_again(&self) -> bool {
+        self.outcome.as_ref().is_err_and(|error| !matches!(error, OrbitError::Truncation { .. }))
+    }
+
     /// What its neighbours lead away from may be found without them.
     fn seek_alone(&mut self, solver: &mut dyn Solver, watch: Watch<'_>) {
-        if self.led && self.outcome.is_err() && !watch.stop.load(Ordering::Relaxed) {
+        if self.led && self.is_sought_again() && !watch.stop.load(Ordering::Relaxed) {
             self.outcome = solver.orbit(self.omega, None).or(self.outcome.clone());
         }
     }
@@ -136,7 +141,7 @@ impl Missing {
 /// Seeks the missing points from the orbit behind them, the last one first, until one is not found from there either.
 fn from_behind(solver: &mut dyn Solver, behind: &[f64], missing: &mut [Missing], watch: Watch<'_>) {
     let mut start = behind.to_vec();
-    for Missing { omega, outcome, .. } in missing.iter_mut().rev() {
+    for Missing { omega, outcome, led } in missing.iter_mut().rev().take_while(|point| point.is_sought_again()) {
         if watch.stop.load(Ordering::Relaxed) {
             return;
         }
@@ -145,7 +150,11 @@ fn from_behind(solver: &mut dyn Solver, behind: &[f64], missing: &mut [Missing],
                 start.clone_from(&orbit.start);
                 *outcome = Ok(orbit);
             }
-            Err(_) => return,
+            Err(error) => {
+                // a search that took all that a point may is not made a third time
+                *led &= !matches!(error, OrbitError::NotConverged { spent: true, .. });
+                return;
+            }
         }
     }
 }

@@ -6,13 +6,15 @@ use super::{
     harmonic_balance, shooting::Shooting, transient,
 };
 use crate::model::System;
+use crate::orbit::{Orbit, OrbitError};
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: "auto",
     summary: "event-driven where all laws are exact, shooting where all are smooth; harmonic balance where neither holds (friction in a plane or with \
               a normal force, mixtures), where a place has no mass, where fewer multiplications are counted for it than from event to event, beyond 12 smooth \
-              joints or 60 degrees of freedom with them, and for waves around a tuned disk; what it does not take goes to the method that does",
+              joints or 60 degrees of freedom with them, and for waves around a tuned disk; what it does not take goes to the method that does, \
+              and a point that it does not find to the next one that takes it within seconds",
     options: &[],
     build: |_| Ok(Box::new(Auto)),
 };
@@ -25,6 +27,8 @@ const FOLLOWED: usize = 12;
 const DOFS: usize = 60;
 /// Multiplications for an orbit beyond which nothing is followed from event to event, whatever the other way costs: a minute.
 const DEAREST: f64 = 3e11;
+/// The same of a point that another method did not find: seconds. Measured: a chain of 40 masses 1.2 s a point, of 80, which are above it, ten and more.
+const SECOND: f64 = 1e10;
 /// How far apart orbits are is not known: between near and alone.
 const APART: f64 = 2.0;
 
@@ -99,7 +103,78 @@ impl Method for Auto {
         Auto::chosen(system).0.closes_motions(system)
     }
     fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Auto::chosen(system).0.prepare(system)
+        let (method, _) = Auto::chosen(system);
+        let first = method.prepare(system)?;
+        Ok(Box::new(WithSecond { first, chosen: method.name(), system, second: None, last: None }))
+    }
+}
+
+/// The method that was chosen, and where it finds nothing the next one that takes the system within seconds.
+struct WithSecond<'a> {
+    first: Box<dyn Solver + Send + 'a>,
+    chosen: &'static str,
+    system: &'a System,
+    /// Once it was needed, `None` inside if there is none.
+    second: Option<Option<Box<dyn Solver + Send + 'a>>>,
+    /// The start of the last orbit that the second one found, which says nothing to the first.
+    last: Option<Vec<f64>>,
+}
+
+impl<'a> WithSecond<'a> {
+    /// The method to ask next. Waiting for a transient takes minutes.
+    fn next(&self) -> Option<Box<dyn Solver + Send + 'a>> {
+        let (system, joints) = (self.system, self.system.joints().len());
+        let cheap = |name: &str| match name {
+            harmonic_balance::NAME => true,
+            name if name == event_driven::INFO.name => {
+                event_driven::orbit_work(system).is_some_and(|work| event_driven::ALONE * work <= SECOND)
+            }
+            name => name != transient::INFO.name && system.dofs() <= DOFS && joints <= FOLLOWED,
+        };
+        let methods = Ways::of(system).methods;
+        let name = methods.into_iter().find(|name| *name != self.chosen && cheap(name))?;
+        super::find(name).and_then(|row| (row.build)(&Options::new()).ok())?.prepare(system).ok()
+    }
+
+    /// By the first method, and by the second one where that finds nothing that it may have missed.
+    fn seek(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
+        let by = |solver: &mut (dyn Solver + Send + 'a), start| match between {
+            true => solver.between(omega, start),
+            false => solver.orbit(omega, start),
+        };
+        let own = start.filter(|start| self.last.as_deref() != Some(*start));
+        let error = match by(&mut *self.first, own) {
+            Err(error) if misses(&error) => error,
+            outcome => return outcome,
+        };
+        if self.second.is_none() {
+            self.second = Some(self.next());
+        }
+        let Some(second) = self.second.as_mut().and_then(Option::as_mut) else { return Err(error) };
+        let near = start.filter(|start| self.last.as_deref() == Some(*start));
+        let orbit = by(&mut **second, near).map_err(|_| error)?;
+        self.last = Some(orbit.start.clone());
+        Ok(orbit)
+    }
+}
+
+/// Whether another method may find what this one says that it did not.
+fn misses(error: &OrbitError) -> bool {
+    matches!(
+        error,
+        OrbitError::NotConverged { .. }
+            | OrbitError::Breakdown { .. }
+            | OrbitError::Evidence { .. }
+            | OrbitError::Truncation { .. }
+    )
+}
+
+impl Solver for WithSecond<'_> {
+    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.seek(omega, start, false)
+    }
+    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.seek(omega, start, true)
     }
 }
 
@@ -107,7 +182,8 @@ impl Method for Auto {
 mod tests {
     use super::*;
     use crate::law::{Coulomb, Iwan, Jenkins, SharedLaw, Stribeck};
-    use crate::model::{GROUND, Joint, Mass, Model, Spring, example};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
+    use std::f64::consts::TAU;
     use std::sync::Arc;
 
     #[test]
@@ -164,5 +240,40 @@ mod tests {
             assert_eq!(Auto.choice(&system).method, method);
             assert!(Auto.prepare(&system).is_ok(), "{}", Auto.choice(&system));
         }
+    }
+
+    /// Finds nothing, and has to be asked without the start that another method left.
+    struct Nothing;
+
+    impl Solver for Nothing {
+        fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+            assert!(start.is_none());
+            Err(OrbitError::not_converged("nothing", omega, 1, 1.0))
+        }
+    }
+
+    #[test]
+    fn what_the_first_choice_does_not_find_the_next_one_may() {
+        let system = example::blade_couple().assemble().unwrap();
+        for (chosen, next) in [("event-driven", "harmonic-balance"), ("harmonic-balance", "event-driven")] {
+            let first = Box::new(Nothing);
+            let mut solver = WithSecond { first, chosen, system: &system, second: None, last: None };
+            let orbit = solver.orbit(TAU * 121.0, None).unwrap();
+            let neighbour = solver.orbit(TAU * 121.1, Some(&orbit.start)).unwrap();
+            assert_eq!((orbit.method, neighbour.method), (next, next));
+        }
+    }
+
+    /// A tolerance that no series which a point can pay for reaches is refused after a few short ones, with how many harmonics it would take.
+    #[test]
+    fn rigid_friction_that_needs_too_many_harmonics_is_refused_early() {
+        let mut model = ring(36, &(Arc::new(Coulomb { limit: 0.3 }) as SharedLaw));
+        model.forces.push(Force { on: "b0".to_owned(), amplitude: 5.0, phase: 0.0, harmonic: 1 });
+        let system = model.assemble().unwrap();
+        let method = HarmonicBalance { tolerance: Some(1e-6), ..HarmonicBalance::default() };
+        let error = method.solver(&system).unwrap().orbit(TAU * 112.0, None).unwrap_err();
+        let OrbitError::Truncation { harmonics, needed: Some(needed), .. } = error else { panic!("{error}") };
+        assert!(harmonics < 100 && needed > 500, "{harmonics} {needed}");
+        assert!(error.to_string().contains("jenkins"), "{error}");
     }
 }

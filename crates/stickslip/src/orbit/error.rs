@@ -103,6 +103,19 @@ pub enum Breakdown {
     },
 }
 
+/// What to do about a series that is too short.
+fn beyond(needed: Option<usize>) -> String {
+    let raise = "raise `tolerance`";
+    needed.map_or_else(
+        || format!("; {raise}"),
+        |needed| {
+            format!(
+                ": rigid friction may take {needed} and more, and with them more work than one point may; {raise}, or give friction a stiffness (law `jenkins`)"
+            )
+        },
+    )
+}
+
 fn by(time: f64) -> String {
     if time.is_finite() { format!(" by t = {time:.6e} s") } else { String::new() }
 }
@@ -201,8 +214,8 @@ pub enum OrbitError {
     },
     /// The series that the method may take is too short for the tolerance.
     #[error(
-        "{method} reaches an estimated error of {estimate:.1e} at Ω = {omega:.4} rad/s with {harmonics} harmonics, not {tolerance:.1e}; \
-         raise `tolerance`{instead}"
+        "{method} reaches an estimated error of {estimate:.1e} at Ω = {omega:.4} rad/s with {harmonics} harmonics, not {tolerance:.1e}{}{instead}",
+        beyond(*.needed)
     )]
     Truncation {
         /// The method.
@@ -211,6 +224,8 @@ pub enum OrbitError {
         omega: f64,
         /// Highest harmonic tried.
         harmonics: usize,
+        /// Of rigid friction, how many may be enough: more than one point may take.
+        needed: Option<usize>,
         /// Error of the motion relative to its amplitude, estimated.
         estimate: f64,
         /// The error that was allowed.

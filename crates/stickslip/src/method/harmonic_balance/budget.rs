@@ -2,9 +2,20 @@
 
 /// What one search may take, and what all searches of a point may take, from the first to those of the estimate: Newton's method, interior points, and
 /// proximal points with the limits that are lowered after them, eliminate as much as one each; laws with a memory are followed as far as for one search in
-/// all. Measured: of 173 random points those that were found took 1.01 of the three at most, all but one 0.4.
+/// all. Measured: of 173 random points, with half of [`WORK`], those that were found took 1.01 of the
+/// three at most, all but one 0.4.
 pub(super) const SEARCH: Work = Work { eliminated: 1.0, marched: 1.0 };
 pub(super) const POINT: Work = Work { eliminated: 3.0, marched: 1.0 };
+
+/// Multiplications of one search, about four seconds of one core.
+pub(super) const WORK: f64 = 2e10;
+/// Steps for which a point must have work left where a longer series is begun: from a shorter one it takes 6 to 25.
+const BEGUN: f64 = 8.0;
+
+/// Whether a series whose steps take so many multiplications is begun by a point that has taken so much.
+pub(super) fn is_affordable(step: f64, taken: Work) -> bool {
+    BEGUN * step <= WORK * (POINT.eliminated - taken.eliminated)
+}
 
 /// Work, relative to that of one search: eliminations, and steps of laws with a memory.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -367,9 +367,17 @@ impl Preconditioner<'_> {
     }
 }
 
+/// Harmonics beyond which derivatives of laws do not stay in the cache.
+const COUNTED: usize = 64;
+/// How many times as long a multiplication with the derivatives of unknown forces takes, whose series are long: they are read from memory in every
+/// product. Measured: 21 ms a product of 11 joints with 512 harmonics.
+const READ: f64 = 8.0;
+
 /// Multiplications in a product with the derivative: of the structure over the axes, and of the laws over the harmonics.
 pub(super) fn product_work(ports: &Ports, harmonics: usize) -> f64 {
-    let of_law = |port: &Port| (2 * harmonics * port.axes).pow(2) as f64;
+    let of_law = |port: &Port| {
+        (2 * harmonics * port.axes).pow(2) as f64 * if port.is_force() && harmonics > COUNTED { READ } else { 1.0 }
+    };
     4.0 * harmonics as f64 * (ports.count() as f64).powi(2) + ports.iter().map(of_law).sum::<f64>()
 }
 
@@ -691,9 +699,9 @@ mod tests {
         let ports = Ports::new(&system).unwrap();
         let mut level = Level::new((1..512).step_by(2).collect(), 8192, &ports, None);
         level.begin_anew(&ports);
-        level.products = 2_000;
+        level.products = 1_000;
         assert!(level.coupled.is_some() && !level.is_exhausted(&ports));
-        level.products = 5_000;
+        level.products = 2_000;
         assert!(level.is_exhausted(&ports));
     }
 

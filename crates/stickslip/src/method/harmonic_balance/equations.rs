@@ -52,8 +52,11 @@ pub(super) const OPEN: f64 = -1.0;
 /// All that belongs to one number of harmonics.
 #[derive(Debug, Clone)]
 pub(super) struct Level {
-    /// How often the derivative was assembled in the present search, where it is a matrix.
+    /// How often laws were evaluated in the present search, and how often the derivative was eliminated, where it is a matrix.
     pub assembled: usize,
+    pub eliminated: usize,
+    /// Whether it is begun from the solution of a shorter series, which is there whatever becomes of it: it takes no more than its share then.
+    pub prolongs: bool,
     /// What searches before it took of the present point, here and at other levels, see [`Level::taken`].
     pub spent: Work,
     pub elsewhere: Work,
@@ -187,6 +190,8 @@ impl Level {
         let widest = ports.iter().map(|port| port.axes).max().unwrap_or(0);
         Level {
             assembled: 0,
+            eliminated: 0,
+            prolongs: false,
             spent: Work::default(),
             elsewhere: Work::default(),
             alternation,
@@ -565,14 +570,15 @@ impl Level {
 
     /// Begins a point: what its searches may take is theirs together.
     pub fn begin_point(&mut self) {
-        (self.assembled, self.products, self.alternation.marched) = (0, 0, 0);
+        (self.assembled, self.eliminated, self.products, self.alternation.marched) = (0, 0, 0, 0);
         (self.spent, self.elsewhere) = (Work::default(), Work::default());
+        self.prolongs = false;
     }
 
     /// Begins a search, which knows nothing of the laws' memories.
     pub fn begin_anew(&mut self, ports: &Ports) {
         self.spent = self.taken_of_point(ports);
-        (self.assembled, self.products, self.alternation.marched) = (0, 0, 0);
+        (self.assembled, self.eliminated, self.products, self.alternation.marched) = (0, 0, 0, 0);
         (self.nearby, self.linearised, self.sketches) = (false, false, self.sketch.is_some());
         self.adopted = false;
         self.states.iter_mut().for_each(|known| *known = Beginning::default());

@@ -49,7 +49,7 @@ use crate::model::System;
 use crate::orbit::{Course, JointSample, Orbit, Path};
 pub(crate) use arc::{ModeArc, Step as ModeStep};
 pub(crate) use branch::BranchEquations;
-use budget::{POINT, Work};
+use budget::{POINT, Work, is_affordable};
 use equations::{Level, Solution};
 use estimate::{Compared, estimate};
 use kept::Kept;
@@ -124,8 +124,6 @@ const RECENT: usize = 8;
 const AHEAD: f64 = 1.5;
 /// Unknowns beyond which no error is estimated by elimination: one would take seconds, and a search takes ten and more.
 const LARGEST: usize = 2600;
-/// Multiplications of an elimination in banded form beyond which none is: it would take four seconds.
-const DEAREST: f64 = 1.2e10;
 /// Memory of the equations, bytes, beyond which nothing is begun: 1000 nodes of three directions with five harmonics need half of it without modes.
 const MEMORY: f64 = 4e9;
 /// Harmonics times axes squared up to which products with all of them take a tenth of a second, so that an error is estimated.
@@ -133,6 +131,9 @@ const ESTIMATED: f64 = 1e7;
 /// Laws of velocity begin with this many harmonics at most, and double them from there: the sets of slipping samples are then nearly
 /// known.
 const COLD: usize = 15;
+/// Power of the number of harmonics by which the error of rigid friction falls at most: no series is refused that may be long enough. Between 1 and 3/2 are
+/// usual, see [`estimate`]; 80 masses left 3.0e-3 with 31 harmonics and less than 1e-3 with 63.
+const ORDER: f64 = 2.0;
 /// Where friction is rigid or steep, one doubling is not believed to have left less than this share of the distance of the one before: two
 /// motions may be near each other by chance, as 1.3e-3 where the error is 1e-2.
 const CHANCE: f64 = 0.1;
@@ -462,18 +463,20 @@ impl Balance<'_> {
         self.taken(None).is_beyond(POINT)
     }
 
-    /// Whether a solution with twice the harmonics takes no more than seconds.
-    fn can_compare(&self, top: usize) -> bool {
+    /// Whether a solution with twice the harmonics takes no more than seconds, of a point that has taken so much.
+    fn can_compare(&self, top: usize, taken: Work) -> bool {
         let harmonics = self.kept.up_to(self.kept.double(top)).len();
         let axes = self.ports.count();
         let products = (harmonics * axes * axes) as f64;
         let size = 2 * axes * harmonics;
         let multiplied = coupled::by_products(size, &self.ports) && products <= ESTIMATED;
         let few = match &self.banded {
-            Some(banded) => banded.work(harmonics) <= DEAREST,
+            Some(_) => true,
             None => size <= LARGEST || multiplied,
         };
-        few && level_memory(self.banded.as_ref(), &self.ports, &self.rest, harmonics) <= MEMORY
+        let bounded = self.banded.is_some() || self.ports.has_forces();
+        let affordable = !bounded || is_affordable(work::step(self.banded.as_ref(), &self.ports, harmonics), taken);
+        few && affordable && level_memory(self.banded.as_ref(), &self.ports, &self.rest, harmonics) <= MEMORY
     }
 
     /// Solves at `top`, from a motion at another number of harmonics or from the first guess.
@@ -622,7 +625,9 @@ impl Balance<'_> {
     fn fixed(&mut self, top: usize, omega: f64, warm: Option<(usize, Solution)>) -> Result<Orbit, OrbitError> {
         let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
         let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
-        let truncation = if self.can_compare(top) {
+        let truncation = if self.can_compare(top, Work::default()) {
+            // what was asked for is there: its error may take as much again
+            self.levels.values_mut().for_each(Level::begin_point);
             self.compare(top, omega, &motion, &x).ok().map(|(error, ..)| error)
         } else {
             None
@@ -645,6 +650,7 @@ impl Balance<'_> {
         let shorter = self.levels.get(&top).and_then(|level| level.derivatives(&self.ports));
         self.level(double, omega)?;
         let finer = self.levels.get_mut(&double).expect("made above");
+        finer.prolongs = true;
         let better = match finer.approach_by_twice_the_samples(&self.ports, omega, &start, &coarse, shorter.as_ref()) {
             Some(better) => better,
             None => {
@@ -679,6 +685,13 @@ impl Balance<'_> {
         start
     }
 
+    /// The first of the doubled numbers of harmonics that may leave no more than the tolerance of rigid friction, where `top` leave so many times as much.
+    fn needed(&self, top: usize, times: f64) -> usize {
+        let least = top as f64 * times.powf(1.0 / ORDER);
+        let doubled = std::iter::successors(Some(top), |top| Some(self.kept.double(*top)));
+        doubled.skip(1).find(|top| *top as f64 >= least || *top > MOST * self.kept.scale).expect("they grow")
+    }
+
     /// As many harmonics as the tolerance needs. The solution that is returned is not the finest that was found, but the one whose error
     /// is known from it.
     fn chosen(&mut self, mut top: usize, omega: f64, warm: Option<(usize, Solution)>) -> Result<Orbit, OrbitError> {
@@ -688,10 +701,15 @@ impl Balance<'_> {
         let mut x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         // nothing is known of the error until two solutions can be compared
         let (mut checked, mut estimate) = (top, 1.0);
-        while top <= MOST * self.kept.scale && self.can_compare(top) {
+        let mut needed = None;
+        while top <= MOST * self.kept.scale && self.can_compare(top, self.taken(None)) {
             let (mut error, finer, y) = match self.compare(top, omega, &motion, &x) {
                 Ok(compared) => compared,
                 // what was found has an error that is known
+                Err(_) if top > first && self.ports.has_forces() => {
+                    needed = self.is_spent().then(|| self.kept.double(top));
+                    break;
+                }
                 Err(_) if top > first && !self.is_spent() => break,
                 Err(lost) => return Err(self.lost(lost)),
             };
@@ -704,6 +722,13 @@ impl Balance<'_> {
                 return self.finish(top, omega, motion, x, Some(error));
             }
             (checked, estimate) = (top, error);
+            if self.ports.has_forces() && top > first {
+                let enough = self.needed(top, error / tolerance);
+                if !self.can_compare(enough, self.taken(None)) {
+                    needed = Some(enough);
+                    break;
+                }
+            }
             (top, motion, x) = (self.kept.double(top), finer, y);
             if self.ports.iter().any(Port::marches) {
                 // that has other samples
@@ -716,6 +741,7 @@ impl Balance<'_> {
             method: NAME,
             omega: self.drive,
             harmonics,
+            needed: needed.map(|needed| needed / self.periods),
             estimate,
             tolerance,
             instead: String::new(),

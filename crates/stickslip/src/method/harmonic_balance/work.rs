@@ -22,10 +22,15 @@ use num_complex::Complex64;
 pub fn step_work(system: &System, top: usize) -> f64 {
     let Ok((ports, _)) = Ports::of_sector(system) else { return 0.0 };
     let harmonics = Kept::new(system, |z| z != Complex64::new(0.0, 0.0)).up_to(top).len();
+    step(Sparse::new(system, &ports, &[1]).as_ref(), &ports, harmonics)
+}
+
+/// The same of so many harmonics, in banded form if one of them is given.
+pub(super) fn step(banded: Option<&Sparse>, ports: &Ports, harmonics: usize) -> f64 {
     let size = 2 * harmonics * ports.count();
-    match Sparse::new(system, &ports, &[1]) {
-        Some(sparse) => sparse.work(harmonics),
-        None if by_products(size, &ports) => step_products(&ports, harmonics),
+    match banded {
+        Some(banded) => banded.work(harmonics),
+        None if by_products(size, ports) => step_products(ports, harmonics),
         None => (size as f64).powi(3) / 3.0,
     }
 }
