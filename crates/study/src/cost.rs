@@ -581,7 +581,8 @@ impl Costing<'_> {
         let longest = self.pace.of(RIGID_HARMONICS.0, RIGID_HARMONICS.1) * (SERIES_TOLERANCE / asked).powf(RIGID_ORDER);
         let longest = longest.min(RIGID_MOST);
         let each = self.pace.of(RIGID_EACH.0, RIGID_EACH.1);
-        each * ELIMINATED * harmonic_balance::doubling_work(system, longest)
+        let sought = each * harmonic_balance::doubling_work(system, longest);
+        ELIMINATED * sought.min(harmonic_balance::most_work(system))
     }
 
     /// Whether friction is rigid somewhere.

@@ -37,6 +37,15 @@ pub enum Note {
         /// The one that knows where.
         knows: String,
     },
+    /// Points at which the method that `auto` had chosen found no orbit and another one did.
+    Instead {
+        /// How many.
+        points: usize,
+        /// The one that was chosen.
+        chosen: String,
+        /// The one that found them.
+        found: String,
+    },
     /// Points at which joints slip on a structure in few coordinates.
     Slipping(Slipping),
     /// Of one case (its varied parameters in words): points at which a joint sticks for the whole period, of so many.
@@ -53,7 +62,7 @@ pub enum Note {
 }
 
 impl Note {
-    /// What an orbit asks for: that it is unstable, if that is known (see [`Orbit::is_stable`]), how accurate its series is, that it is one of
+    /// What an orbit asks for: which method found it instead of the chosen one, that it is unstable, if that is known (see [`Orbit::is_stable`]), how accurate its series is, that it is one of
     /// many, and what its `reduction_error` leaves out.
     pub(crate) fn of_orbit(model: &Model, orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
         let early = || usize::from(orbit.periods > 1 && orbit.repeats() < orbit.periods);
@@ -64,7 +73,12 @@ impl Note {
             Accuracy::Converged => None,
         };
         let history = (!orbit.evidence.history.is_empty()).then_some(Note::History(1));
-        let said = unstable.into_iter().chain(accuracy).chain(history);
+        let instead = orbit.evidence.instead_of.map(|chosen| Note::Instead {
+            points: 1,
+            chosen: chosen.to_owned(),
+            found: orbit.method.to_owned(),
+        });
+        let said = instead.into_iter().chain(unstable).chain(accuracy).chain(history);
         said.chain(Note::several(model, orbit)).chain(Note::slipping(model, orbit)).collect()
     }
 
@@ -145,6 +159,13 @@ impl Note {
                     *points += more;
                     return;
                 }
+                (
+                    Note::Instead { points, chosen, found },
+                    Note::Instead { points: more, chosen: first, found: second },
+                ) if (&*chosen, &*found) == (first, second) => {
+                    *points += more;
+                    return;
+                }
                 (Note::Slipping(slipping), Note::Slipping(more)) => {
                     slipping.join(more);
                     return;
@@ -208,6 +229,10 @@ impl Note {
                  its slider (`jenkins`) makes the one that is shown unique, kind = \"transient\" follows the one of a given start.",
                 points(*count)
             )),
+            Note::Instead { points: count, chosen, found } => Some(format!(
+                "At {} `{chosen}`, which `auto` had chosen, found no orbit and `{found}` did.",
+                points(*count)
+            )),
             Note::Slipping(slipping) => Some(slipping.text(WARNING)),
             Note::StuckElsewhere(count) => Some(format!(
                 "In further cases a joint sticks for the whole period at {}; the same holds there.",
@@ -233,6 +258,8 @@ mod tests {
     #[test]
     fn notes_of_one_sort_become_one() {
         let stuck = |case: &str, points| Note::Stuck { case: case.to_owned(), points, of: 10 };
+        let instead =
+            |chosen: &str| Note::Instead { points: 1, chosen: chosen.to_owned(), found: "harmonic-balance".to_owned() };
         let mut notes = Vec::new();
         for note in [
             stuck("Ft = 1 N", 0),
@@ -245,11 +272,14 @@ mod tests {
             Note::History(1),
             stuck("Ft = 2 N", 0),
             Note::Said("It is so.".to_owned()),
+            instead("shooting"),
+            instead("event-driven"),
+            instead("shooting"),
         ] {
             note.join(&mut notes);
         }
         let texts: Vec<String> = notes.iter().filter_map(Note::text).collect();
-        assert_eq!(texts.len(), 5, "{texts:?}");
+        assert_eq!(texts.len(), 7, "{texts:?}");
         assert!(texts[0].starts_with("Ft = 1 N: at 3 of 20 points a joint sticks"), "{}", texts[0]);
         assert!(texts[1].starts_with("At 3 points") && texts[1].contains("5.0e-2"), "{}", texts[1]);
         assert!(texts[2].starts_with("At 2 points a joint or a part of one sticks"), "{}", texts[2]);
@@ -259,6 +289,8 @@ mod tests {
             texts[3]
         );
         assert_eq!(texts[4], "It is so.");
+        assert!(texts[5].starts_with("At 2 points `shooting`") && texts[5].contains("`harmonic-balance` did"));
+        assert!(texts[6].starts_with("At 1 point `event-driven`"), "{}", texts[6]);
     }
 
     /// A branch takes no other method: its note names its own keys alone.

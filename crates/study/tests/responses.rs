@@ -101,6 +101,45 @@ output = ["velocity", "acceleration", "harmonics", "receptance", "joint_force", 
     }
 }
 
+/// So slowly that nothing but springs and friction counts: the joint slips at 2 N of the 5 N, and presses the other blade by as much.
+#[test]
+fn a_method_that_finds_nothing_is_followed_by_another_and_both_are_named() {
+    let found = dataset(
+        r#"
+schema = 1
+[[mass]]
+repeat = { i = 2 }
+name = "blade{i}"
+mass = "0.18 kg"
+[[spring]]
+repeat = { i = 2 }
+between = ["blade{i}", "ground"]
+stiffness = "99 N/mm + 6 N/mm * i"
+damping = "0.6 kg/s"
+[[joint]]
+name = "shroud"
+between = ["blade1", "blade2"]
+law = { kind = "coulomb", limit = "2 N" }
+[[force]]
+on = "blade1"
+amplitude = "5 N"
+[study]
+kind = "response"
+frequency = { from = "0.0001 Hz", to = "0.001 Hz", points = 3 }
+peaks = false
+"#,
+    );
+    assert_eq!(found.record.points["converged"], 3);
+    let expected = "At 3 points `event-driven`, which `auto` had chosen, found no orbit and `harmonic-balance` did.";
+    assert!(found.notes.iter().any(|note| note == expected), "{:?}", found.notes);
+    let (first, second) = (3.0 / 105e3, 2.0 / 111e3);
+    for (column, expected) in [("blade1_amplitude_m", first), ("blade2_amplitude_m", second)] {
+        let amplitudes = numbers(&found, "curve", column);
+        // the tolerance of harmonic balance, of the largest vibration
+        assert!(amplitudes.iter().all(|x| (x - expected).abs() < 1e-3 * first), "{column} {amplitudes:?}");
+    }
+}
+
 #[test]
 fn a_slipping_joint_carries_its_limit() {
     let study = "[study]\nkind = \"response\"\nfrequency = [\"1.7 Hz\"]\noutput = \"joint_force\"";

@@ -152,7 +152,8 @@ impl<'a> WithSecond<'a> {
         }
         let Some(second) = self.second.as_mut().and_then(Option::as_mut) else { return Err(error) };
         let near = start.filter(|start| self.last.as_deref() == Some(*start));
-        let orbit = by(&mut **second, near).map_err(|_| error)?;
+        let mut orbit = by(&mut **second, near).map_err(|_| error)?;
+        orbit.evidence.instead_of = Some(self.chosen);
         self.last = Some(orbit.start.clone());
         Ok(orbit)
     }
@@ -261,6 +262,7 @@ mod tests {
             let orbit = solver.orbit(TAU * 121.0, None).unwrap();
             let neighbour = solver.orbit(TAU * 121.1, Some(&orbit.start)).unwrap();
             assert_eq!((orbit.method, neighbour.method), (next, next));
+            assert_eq!(orbit.evidence.instead_of, Some(chosen));
         }
     }
 

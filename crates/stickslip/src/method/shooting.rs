@@ -505,6 +505,7 @@ impl<'a> Shooter<'a> {
                 return_defect: Some(closed.residual),
                 history: history(laws, &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
+                instead_of: None,
             },
             places: measured.places,
             joints: measured.joints,

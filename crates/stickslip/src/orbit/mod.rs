@@ -170,6 +170,8 @@ pub struct Evidence {
     /// is then the one in which what sticks behind a spring carries no mean force, as it is where joints creep; with method `transient`
     /// the one that its motion led to.
     pub history: Vec<String>,
+    /// The method that was to find it and did not, where another one did: see [`Auto`](crate::method::auto::Auto).
+    pub instead_of: Option<&'static str>,
 }
 
 /// The laws of a system's joints.
@@ -394,6 +396,7 @@ impl Orbit {
                 return_defect: None,
                 history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
+                instead_of: None,
             },
             places: measured.places,
             joints: measured.joints,

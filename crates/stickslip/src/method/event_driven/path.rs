@@ -76,6 +76,7 @@ pub(super) fn orbit(
             accuracy: Accuracy::Converged,
             history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
+            instead_of: None,
         },
         places: measured.places,
         joints: measured.joints,

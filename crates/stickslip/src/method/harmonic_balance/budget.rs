@@ -2,13 +2,14 @@
 
 /// What one search may take, and what all searches of a point may take, from the first to those of the estimate: Newton's method, interior points, and
 /// proximal points with the limits that are lowered after them, eliminate as much as one each; laws with a memory are followed as far as for one search in
-/// all. Measured: of 173 random points, with half of [`WORK`], those that were found took 1.01 of the
-/// three at most, all but one 0.4.
+/// all. Measured: of 173 random points, with half of [`WORK`], those that were found took 1.01 of the three at most, all but one 0.4.
 pub(super) const SEARCH: Work = Work { eliminated: 1.0, marched: 1.0 };
 pub(super) const POINT: Work = Work { eliminated: 3.0, marched: 1.0 };
 
 /// Multiplications of one search, about four seconds of one core.
 pub(super) const WORK: f64 = 2e10;
+/// Eliminations of a search in any case, where nothing shorter was solved before or where laws are smooth: one that is to end takes a few of them.
+pub(super) const FEWEST: f64 = 40.0;
 /// Steps for which a point must have work left where a longer series is begun. From a shorter one it takes 6 to 25 in banded form, and by products, whose
 /// steps are then short, as much as three counted ones: `coulomb-2d` at 4 contacts has its 1023 harmonics within 0.3 s.
 const BEGUN: f64 = 3.0;

@@ -180,6 +180,7 @@ pub(super) fn orbit(
             },
             history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
+            instead_of: None,
         },
         places: measured.places,
         joints: measured.joints,

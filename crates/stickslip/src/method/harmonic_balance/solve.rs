@@ -1,7 +1,7 @@
 //! The search for a solution: Newton's method with the exact derivative, of many contacts by fewer samples first; where it fails, interior points, then
 //! proximal points, and then slip limits that are lowered from where everything sticks.
 
-use super::budget::{POINT, SEARCH, WORK, Work};
+use super::budget::{FEWEST, POINT, SEARCH, WORK, Work};
 use super::coupled::{FORMED, Near, product_work};
 use super::ease::{Ease, GIVEN, SOLVED};
 use super::equations::{Level, Slopes, Solution};
@@ -51,8 +51,6 @@ const HELD: [f64; 5] = [1e-3, 1e-2, 0.1, 1.0, 10.0];
 const SHRINK: f64 = 0.25;
 /// Steps that have to be held back, at most, where springs carry no mean.
 const MOST_FLAT: usize = 8;
-/// Eliminations of a search in any case, where nothing shorter was solved before or where laws are smooth: one that is to end takes a few of them.
-const FEWEST: f64 = 40.0;
 /// Multiplications of an evaluation, per sample and axis: transforms to and fro, and the law. Measured: 15 µs for 2048 samples.
 const EVALUATED: f64 = 40.0;
 /// Steps of laws with a memory in one search, but for [`EVALUATIONS`] in any case. A search of one joint that is to end takes a few hundred
