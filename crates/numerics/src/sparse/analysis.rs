@@ -49,6 +49,14 @@ impl Analysis {
         if self.pattern.n == 0 { 0 } else { self.pattern.real().cholesky.len_val() }
     }
 
+    /// Memory of the factor of a symmetric complex sum, bytes: real and imaginary parts stand in blocks of two rows and columns.
+    pub fn complex_bytes(&self) -> usize {
+        if self.pattern.n == 0 {
+            return 0;
+        }
+        size_of::<f64>() * (self.pattern.complex().cholesky.len_val() + 2 * self.pattern.n)
+    }
+
     /// Factors the sum of symmetric matrices with real factors, `L D Lᵀ`; of every matrix the lower triangle counts.
     ///
     /// # Errors

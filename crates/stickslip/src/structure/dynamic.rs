@@ -52,6 +52,19 @@ impl Structure {
     }
 }
 
+impl Structure {
+    /// Memory of a [`DynamicStiffness`] of a sparse structure, bytes, from where its entries stand: nothing is factored. Zero of any other.
+    pub(crate) fn factor_bytes(&self) -> usize {
+        match &self.0.form {
+            Form::Full(_) => 0,
+            Form::Sparse { mass, damping, stiffness, analysis, .. } => {
+                let analysis = analysis.get_or_init(|| Analysis::new(&[mass, damping, stiffness]));
+                analysis.complex_bytes()
+            }
+        }
+    }
+}
+
 impl DynamicStiffness {
     /// Memory of it, bytes.
     pub(crate) fn bytes(&self) -> usize {

@@ -88,6 +88,6 @@ fn above(
     }
     let forces = level.forces_at(ports, omega, motion, &wanted);
     let infinite = || DVector::from_element(level.free[0].len(), Complex64::new(f64::INFINITY, 0.0));
-    let respond = |h: usize, forces: &[Complex64]| rest.respond(h, omega, &rest.spread(h, |q| forces[q]));
+    let respond = |h: usize, forces: &[Complex64]| rest.respond_along(h, omega, |q| forces[q]);
     wanted.iter().zip(&forces).map(|(h, forces)| respond(*h, forces).unwrap_or_else(|_| infinite())).collect()
 }

@@ -64,7 +64,7 @@ use sparse::Sparse;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::f64::consts::TAU;
-pub use work::{doubling_work, most_work, orbit_work, step_work};
+pub use work::{doubling_work, factor_bytes, most_work, orbit_work, step_work};
 
 /// Its name in study files.
 pub const NAME: &str = "harmonic-balance";

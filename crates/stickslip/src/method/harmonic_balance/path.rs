@@ -32,15 +32,16 @@ pub(super) fn places(
     (0..nh)
         .map(|k| {
             let h = level.harmonics()[k];
-            let forces = rest.spread(h, |q| acting[q * nh + k]);
+            let along = |q: usize| acting[q * nh + k];
             let Some(sparse) = &mut level.sparse else {
                 let singular = |_| h as f64 * omega;
-                let mut x = &level.free[k] - rest.respond(h, omega, &forces).map_err(singular)?;
+                let mut x = &level.free[k] - rest.respond_along(h, omega, along).map_err(singular)?;
                 if h == 0 {
                     rest.settle(omega, &mut x, |q| level.mean(q, motion)).map_err(singular)?;
                 }
                 return Ok(x);
             };
+            let forces = rest.spread(h, along);
             let mut x = level.free[k].clone();
             let mut moved = x.clone();
             sparse.respond(k, |i| forces[i], moved.as_mut_slice());

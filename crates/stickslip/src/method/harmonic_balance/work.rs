@@ -36,6 +36,14 @@ pub(super) fn step(banded: Option<&Sparse>, ports: &Ports, harmonics: usize) -> 
     }
 }
 
+/// Memory of the dynamic stiffness at one rate, bytes, where it is factored for every harmonic at every frequency: of a sparse structure in all of its
+/// rows. Zero of any other.
+pub fn factor_bytes(system: &System) -> usize {
+    let Ok((ports, _)) = Ports::of_sector(system) else { return 0 };
+    let is_banded = || Sparse::new(system, &ports, &[1]).is_some();
+    if ports.wave().is_some() || is_banded() { 0 } else { system.structure().factor_bytes() }
+}
+
 /// Multiplications of one step at each number of harmonics from the first to `longest`, each twice the one before, and of one at twice each, for its error.
 pub fn doubling_work(system: &System, longest: f64) -> f64 {
     let tops = std::iter::successors(Some(FIRST), |top| ((*top as f64) < longest).then_some(2 * top));
