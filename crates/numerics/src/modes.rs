@@ -113,6 +113,10 @@ impl Modes {
             if real {
                 lambda.im = 0.0;
             }
+            // no more vectors belong to one value than there are coordinates
+            if members.len() > r {
+                return Err(Defective { lambda });
+            }
             // φ and ψ
             let vectors = |lambda: Complex64| {
                 let matrix = quadratic(&cc, k, lambda);

@@ -334,7 +334,7 @@ impl Costing<'_> {
         if self.joints == 0.0 || within || rows > farther::ROWS || !self.study.kind().uses_method {
             return 0.0;
         }
-        AGAIN.0 * self.matrices() + AGAIN.1 * farther::count(self.points()) * self.orbit()
+        AGAIN.0 * self.matrices() + AGAIN.1 * farther::count(self.points(), self.cases) * self.orbit()
     }
 }
 

@@ -1,7 +1,9 @@
 //! What a reader of the results must know, in sentences. Notes of one sort from several units become one sentence.
 
+use crate::expression::displayed;
 use crate::farther::Slipping;
 use serde::{Deserialize, Serialize};
+use stickslip::dimension::Dimension;
 use stickslip::law::Piece;
 use stickslip::model::{Joint, Model};
 use stickslip::orbit::{Accuracy, Orbit};
@@ -46,6 +48,10 @@ pub enum Note {
         /// The one that found them.
         found: String,
     },
+    /// Points at which nothing is known of the stability of an orbit with friction that falls with velocity.
+    Unjudged(usize),
+    /// Motions in time in few coordinates, whose error is known of harmonic forces up to this frequency, rad/s.
+    InTime(f64),
     /// Points at which joints slip on a structure in few coordinates.
     Slipping(Slipping),
     /// Of one case (its varied parameters in words): points at which a joint sticks for the whole period, of so many.
@@ -78,7 +84,9 @@ impl Note {
             chosen: chosen.to_owned(),
             found: orbit.method.to_owned(),
         });
-        let said = instead.into_iter().chain(unstable).chain(accuracy).chain(history);
+        let falls = |joint: &Joint| joint.law.prox().is_some() && !joint.law.is_incrementally_passive();
+        let unjudged = (stable.is_none() && model.joints.iter().any(falls)).then_some(Note::Unjudged(1));
+        let said = instead.into_iter().chain(unstable).chain(unjudged).chain(accuracy).chain(history);
         said.chain(Note::several(model, orbit)).chain(Note::slipping(model, orbit)).collect()
     }
 
@@ -151,6 +159,7 @@ impl Note {
                 }
                 (Note::Unchecked(points), Note::Unchecked(more))
                 | (Note::History(points), Note::History(more))
+                | (Note::Unjudged(points), Note::Unjudged(more))
                 | (Note::StuckElsewhere(points), Note::StuckElsewhere(more)) => {
                     *points += more;
                     return;
@@ -164,6 +173,10 @@ impl Note {
                     Note::Instead { points: more, chosen: first, found: second },
                 ) if (&*chosen, &*found) == (first, second) => {
                     *points += more;
+                    return;
+                }
+                (Note::InTime(up_to), Note::InTime(more)) => {
+                    *up_to = up_to.min(*more);
                     return;
                 }
                 (Note::Slipping(slipping), Note::Slipping(more)) => {
@@ -233,6 +246,20 @@ impl Note {
                 "At {} `{chosen}`, which `auto` had chosen, found no orbit and `{found}` did.",
                 points(*count)
             )),
+            Note::Unjudged(count) => Some(format!(
+                "At {} nothing says whether the orbit is stable, as no flow follows friction that falls with velocity: the real motion may stick \
+                 and slip in jerks, with other amplitudes. Compare with kind = \"transient\" and a `width` (m/s) over which friction changes its sign.",
+                points(*count)
+            )),
+            Note::InTime(up_to) => {
+                let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
+                Some(format!(
+                    "`reduction_error` is that of harmonic forces up to {}: of what a start and joints that slip excite above, it says nothing. Compare \
+                     with reduce = {{ up_to = \"{}\" }}, or with reduce = false.",
+                    hertz(*up_to),
+                    hertz(4.0 * up_to)
+                ))
+            }
             Note::Slipping(slipping) => Some(slipping.text(WARNING)),
             Note::StuckElsewhere(count) => Some(format!(
                 "In further cases a joint sticks for the whole period at {}; the same holds there.",
@@ -268,7 +295,9 @@ mod tests {
             Note::Truncated(2, 5e-2),
             Note::History(1),
             Note::Unstable(1, 0),
+            Note::Unjudged(1),
             Note::Unstable(1, 1),
+            Note::Unjudged(2),
             Note::History(1),
             stuck("Ft = 2 N", 0),
             Note::Said("It is so.".to_owned()),
@@ -279,7 +308,7 @@ mod tests {
             note.join(&mut notes);
         }
         let texts: Vec<String> = notes.iter().filter_map(Note::text).collect();
-        assert_eq!(texts.len(), 7, "{texts:?}");
+        assert_eq!(texts.len(), 8, "{texts:?}");
         assert!(texts[0].starts_with("Ft = 1 N: at 3 of 20 points a joint sticks"), "{}", texts[0]);
         assert!(texts[1].starts_with("At 3 points") && texts[1].contains("5.0e-2"), "{}", texts[1]);
         assert!(texts[2].starts_with("At 2 points a joint or a part of one sticks"), "{}", texts[2]);
@@ -288,9 +317,10 @@ mod tests {
             "{}",
             texts[3]
         );
-        assert_eq!(texts[4], "It is so.");
-        assert!(texts[5].starts_with("At 2 points `shooting`") && texts[5].contains("`harmonic-balance` did"));
-        assert!(texts[6].starts_with("At 1 point `event-driven`"), "{}", texts[6]);
+        assert!(texts[4].starts_with("At 3 points nothing says whether the orbit is stable"), "{}", texts[4]);
+        assert_eq!(texts[5], "It is so.");
+        assert!(texts[6].starts_with("At 2 points `shooting`") && texts[5].contains("`harmonic-balance` did"));
+        assert!(texts[7].starts_with("At 1 point `event-driven`"), "{}", texts[7]);
     }
 
     /// A branch takes no other method: its note names its own keys alone.

@@ -875,17 +875,18 @@ fn what_few_coordinates_leave_out_of_the_harmonics_of_joints_is_measured() {
     const MASSES: usize = 300;
     let folder = tempfile::tempdir().unwrap();
     write_chain(folder.path(), MASSES);
-    let of = |reduce: &str, limit: &str, method: &str| {
+    let varied = |reduce: &str, limit: &str, vary: &str, method: &str| {
         let text = format!(
-            "schema = 1\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\nunits = \"m-kg-s\"\n\
+            "schema = 1\n[parameters]\nFt = \"1 N\"\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\nunits = \"m-kg-s\"\n\
              modal_damping = \"0.03 %\"\n{reduce}\n[[place]]\nname = \"tip\"\ndof = \"{MASSES}\"\n\
              [[joint]]\nname = \"j\"\nbetween = [\"tip\", \"ground\"]\n\
              law = {{ kind = \"jenkins\", stiffness = \"2 N/um\", limit = \"{limit}\" }}\n\
              [[force]]\non = \"tip\"\namplitude = \"6 N\"\n\
-             [study]\nkind = \"response\"\nfrequency = [\"9.25 Hz\", \"9.5 Hz\", \"10 Hz\"]\n[method]\n{method}\n"
+             [study]\nkind = \"response\"\nfrequency = [\"9.25 Hz\", \"9.5 Hz\", \"10 Hz\"]\n{vary}\n[method]\n{method}\n"
         );
         results(folder.path(), &text)
     };
+    let of = |reduce: &str, limit: &str, method: &str| varied(reduce, limit, "", method);
     let exact = "kind = \"event-driven\"";
     let few = of("", "4 N", exact);
     let all = of("reduce = false", "4 N", "kind = \"harmonic-balance\"\ntolerance = 3e-4");
@@ -897,6 +898,10 @@ fn what_few_coordinates_leave_out_of_the_harmonics_of_joints_is_measured() {
     }
     let told = few.notes.iter().find(|note| note.contains("solved again")).unwrap();
     assert!(told.starts_with("warning: ") && told.contains("reduce = { up_to = "), "{told}");
+    // each of several cases is held against more coordinates, so that its rows say what they say alone
+    let several = varied("", "Ft", "vary = { Ft = [\"4 kN\", \"4 N\"] }", exact);
+    let (alone, among) = (numbers(&few, "reduction_error"), numbers(&several, "reduction_error"));
+    assert_eq!(alone, &among[alone.len()..]);
     let stuck = of("", "4 kN", exact);
     assert!(!stuck.notes.iter().any(|note| note.contains("slip")), "{:?}", stuck.notes);
     assert!(numbers(&stuck, "reduction_error").iter().all(|error| *error < Reduction::TOLERANCE));

@@ -149,6 +149,8 @@ impl Prox for Stribeck {
         }
         // the velocity v with g(v) + penalty v = target, by Newton's method within a bracket
         let (mut low, mut high) = (0.0, (target - self.limit) / penalty);
+        // what the force that is sought loses to rounding
+        let rounding = f64::EPSILON * target / penalty;
         let mut v = high;
         for _ in 0..SEARCHED {
             let (friction, fall) = self.sliding(v);
@@ -162,7 +164,7 @@ impl Prox for Stribeck {
             let next = if next >= low && next <= high { next } else { 0.5 * (low + high) };
             let step = (next - v).abs();
             v = next;
-            if step <= f64::EPSILON * v {
+            if step <= rounding {
                 break;
             }
         }

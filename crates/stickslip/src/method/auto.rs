@@ -13,7 +13,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     name: "auto",
     summary: "event-driven where all laws are exact, shooting where all are smooth; harmonic balance where neither holds (friction in a plane or with \
               a normal force, mixtures), where a place has no mass, where fewer multiplications are counted for it than from event to event, beyond 12 smooth \
-              joints or 60 degrees of freedom with them, and for waves around a tuned disk; what it does not take goes to the method that does, \
+              joints or 24 degrees of freedom with them, and for waves around a tuned disk; what it does not take goes to the method that does, \
               and a point that it does not find to the next one that takes it within seconds",
     options: &[],
     build: |_| Ok(Box::new(Auto)),
@@ -23,8 +23,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// of harmonic balance the first power.
 const FOLLOWED: usize = 12;
 /// Degrees of freedom up to which it does. Measured on chains with two joints, seconds a point: 0.014, 0.1, 0.5, 2.3 with 30, 60, 100, 150 of them;
-/// harmonic balance 0.004 to 0.009.
-const DOFS: usize = 60;
+/// harmonic balance 0.004 to 0.009. A chain of 60 by its matrices with a `bouc-wen` took minutes, and 1.3 s as a series.
+const DOFS: usize = 24;
 /// Multiplications for an orbit beyond which nothing is followed from event to event, whatever the other way costs: a minute.
 const DEAREST: f64 = 3e11;
 /// The same of a point that another method did not find: seconds. Measured: a chain of 40 masses 1.2 s a point, of 80, which are above it, ten and more.

@@ -276,6 +276,9 @@ fn compute(work: &Work<'_>) -> Computed {
             extremes.reduced(prepared.system.reduction_evidence());
             extremes.end();
         }
+        if let Some(reduction) = prepared.system.reduction_evidence().filter(|_| !prepared.system.joints().is_empty()) {
+            Note::InTime(reduction.up_to).join(&mut part.notes);
+        }
         if excitation == Excitation::Free {
             part.notes.extend(read_off(prepared, &decays, step, &mut decay, &mut summary));
         }
