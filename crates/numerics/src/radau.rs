@@ -1,28 +1,57 @@
-//! Radau IIA of order 5: the coefficients of the stiff integrator, and interpolation between its steps.
+//! Radau IIA of order 9: the coefficients of the stiff integrator, and interpolation between its steps.
 //!
-//! Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), Sec. IV.5 and IV.8.
+//! Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), Sec. IV.5 and IV.8; with five stages Hairer and Wanner,
+//! "Stiff differential equations solved by Radau methods", J. Comput. Appl. Math. 111 (1999) 93-111.
 
 /// Number of stages.
-pub const STAGES: usize = 3;
+pub const STAGES: usize = 5;
 
-const SQRT6: f64 = 2.449_489_742_783_178;
+/// Nodes within a step, the zeros of `d⁴/dx⁴ (x⁴ (x - 1)⁵)`; the last is the step's end.
+pub const C: [f64; STAGES] =
+    [0.057_104_196_114_517_68, 0.276_843_013_638_123_8, 0.583_590_432_368_916_8, 0.860_240_135_656_219_5, 1.0];
 
-/// Nodes within a step; the last is the step's end.
-pub const C: [f64; STAGES] = [(4.0 - SQRT6) / 10.0, (4.0 + SQRT6) / 10.0, 1.0];
-
-/// Matrix of the method; its last row is also the quadrature of order 5 over the step.
+/// Matrix of the method, `∫₀^cᵢ ℓⱼ` of the Lagrange polynomials of the nodes; its last row is also the quadrature of order 9 over the step.
 pub const A: [[f64; STAGES]; STAGES] = [
-    [(88.0 - 7.0 * SQRT6) / 360.0, (296.0 - 169.0 * SQRT6) / 1800.0, (-2.0 + 3.0 * SQRT6) / 225.0],
-    [(296.0 + 169.0 * SQRT6) / 1800.0, (88.0 + 7.0 * SQRT6) / 360.0, (-2.0 - 3.0 * SQRT6) / 225.0],
-    [(16.0 - SQRT6) / 36.0, (16.0 + SQRT6) / 36.0, 1.0 / 9.0],
+    [
+        0.072_998_864_317_903_33,
+        -0.026_735_331_107_945_57,
+        0.018_676_929_763_984_353,
+        -0.012_879_106_093_306_44,
+        0.005_042_839_233_882_015,
+    ],
+    [
+        0.153_775_231_479_182_46,
+        0.146_214_867_847_493_52,
+        -0.036_444_568_905_128_09,
+        0.021_233_063_119_304_72,
+        -0.007_935_579_902_728_777,
+    ],
+    [
+        0.140_063_045_684_809_87,
+        0.298_967_129_491_283_46,
+        0.167_585_070_135_248_95,
+        -0.033_969_101_686_617_74,
+        0.010_944_288_744_192_253,
+    ],
+    [
+        0.144_894_308_109_534_77,
+        0.276_500_068_760_159_2,
+        0.325_797_922_910_421_03,
+        0.128_756_753_254_909_76,
+        -0.015_708_917_378_805_327,
+    ],
+    [0.143_713_560_791_225_94, 0.281_356_015_149_462_07, 0.311_826_522_975_741_26, 0.223_103_901_083_570_75, 0.04],
 ];
 
-/// Weights of the stage increments in the embedded error estimate of order 3.
-pub const ERROR: [f64; STAGES] = [-(13.0 + 7.0 * SQRT6) / 3.0, (-13.0 + 7.0 * SQRT6) / 3.0, -1.0 / 3.0];
+/// Weights of the stage increments in the embedded error estimate of order 5: of a polynomial of degree 5 they give minus its slope at the start.
+pub const ERROR: [f64; STAGES] =
+    [-27.780_933_944_064_64, 3.641_478_498_049_213, -1.252_547_721_169_118_7, 0.592_003_167_184_542_8, -0.2];
+
+/// Order of what the embedded estimate leaves of a step's length: it vanishes as `h⁶`.
+pub const ESTIMATE: i32 = STAGES as i32 + 1;
 
 /// The real eigenvalue of the inverse of [`A`]; the error estimate is filtered by `(REAL/h - J)⁻¹`.
-/// `30 / (6 + 81^(1/3) - 9^(1/3))`
-pub const REAL: f64 = 3.637_834_252_744_496;
+pub const REAL: f64 = 6.286_704_751_729_276_5;
 
 /// `A²`, for displacements from accelerations.
 pub fn squared() -> [[f64; STAGES]; STAGES] {
@@ -61,19 +90,49 @@ pub fn quintic(s: f64, h: f64, start: [f64; 3], end: [f64; 3]) -> (f64, f64, f64
 mod tests {
     use super::*;
 
-    /// Collocation: `Σ_j a_ij c_j^(k-1) = c_i^k / k` for k = 1, 2, 3, and the quadrature is exact to degree 4.
+    /// The nodes are zeros of `d⁴/dx⁴ (x⁴ (x - 1)⁵)`, that is of `126 x⁵ - 350 x⁴ + 350 x³ - 150 x² + 25 x - 1`.
+    #[test]
+    fn nodes_are_those_of_radau() {
+        for x in C {
+            let value = ((((126.0 * x - 350.0) * x + 350.0) * x - 150.0) * x + 25.0) * x - 1.0;
+            assert!(value.abs() < 350.0 * 4.0 * f64::EPSILON, "{x}: {value}");
+        }
+    }
+
+    /// Collocation: `Σ_j a_ij c_j^(k-1) = c_i^k / k` for k up to the number of stages, and the quadrature is exact to degree 8.
     #[test]
     fn coefficients_satisfy_the_order_conditions() {
         for i in 0..STAGES {
-            for k in 1..=3 {
+            for k in 1..=STAGES as i32 {
                 let sum: f64 = (0..STAGES).map(|j| A[i][j] * C[j].powi(k - 1)).sum();
                 assert!((sum - C[i].powi(k) / f64::from(k)).abs() < 1e-15, "stage {i}, degree {k}");
             }
         }
-        for k in 1..=5 {
-            let sum: f64 = (0..STAGES).map(|j| A[2][j] * C[j].powi(k - 1)).sum();
+        for k in 1..=9 {
+            let sum: f64 = (0..STAGES).map(|j| A[STAGES - 1][j] * C[j].powi(k - 1)).sum();
             assert!((sum - 1.0 / f64::from(k)).abs() < 1e-15, "degree {k}");
         }
-        assert!((REAL - 30.0 / (6.0 + 81f64.cbrt() - 9f64.cbrt())).abs() < 1e-14);
+    }
+
+    /// Of increments of polynomials up to degree 5 the estimate is nothing but minus the slope at the start.
+    #[test]
+    fn the_estimate_vanishes_to_order_five() {
+        for k in 1..=STAGES as i32 {
+            let sum: f64 = ERROR.iter().zip(C).map(|(weight, c)| weight * c.powi(k)).sum();
+            assert!((sum + if k == 1 { 1.0 } else { 0.0 }).abs() < 1e-14, "degree {k}: {sum}");
+        }
+    }
+
+    /// The denominator of the stability function, the (4,5) Padé approximation of the exponential, vanishes at the real eigenvalue.
+    #[test]
+    fn the_real_eigenvalue_is_a_pole() {
+        let mut term = 1.0;
+        let mut sum = 1.0;
+        for j in 1..=STAGES {
+            let (left, of) = ((STAGES + 1 - j) as f64, (2 * STAGES - j) as f64);
+            term *= -REAL * left / (of * j as f64);
+            sum += term;
+        }
+        assert!(sum.abs() < 1e-14, "{sum}");
     }
 }

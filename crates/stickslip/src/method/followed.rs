@@ -3,7 +3,7 @@
 //! | flow | laws | motion |
 //! | --- | --- | --- |
 //! | [`ExactFlow`](super::exact_flow::ExactFlow) | sliders and stops | closed forms between switches |
-//! | [`SmoothFlow`](super::smooth::flow::SmoothFlow) | rate | Radau IIA-5 with controlled steps |
+//! | [`SmoothFlow`](super::smooth::flow::SmoothFlow) | rate | Radau IIA-9 with controlled steps |
 //! | [`IncrementalFlow`](super::incremental::flow::IncrementalFlow) | step and rate side by side | average acceleration on equal steps |
 
 use super::MethodError;

@@ -41,6 +41,8 @@ pub(crate) struct Aim {
 #[derive(Debug)]
 pub(crate) struct Closed {
     pub state: Vec<f64>,
+    /// The state less what returns.
+    pub gap: DVector<f64>,
     /// Derivative of the return map (with its sign as it is, not mirrored).
     pub derivative: DMatrix<f64>,
     pub residual: f64,
@@ -207,7 +209,7 @@ fn settle(
         }
         let residual = norm(map.weights(), gap.as_slice()) / size;
         let missing = if at_rounding { ROUNDING } else { missing };
-        return Ok(Closed { state, derivative, residual, iterations: count, missing: Some(missing) });
+        return Ok(Closed { state, gap, derivative, residual, iterations: count, missing: Some(missing) });
     }
     Err(OrbitError::not_converged(aim.method, aim.omega, returns, smallest))
 }
@@ -268,7 +270,7 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
     let (mut iterations, mut smallest, mut returns) = (0, f64::INFINITY, RETURNS);
     let mut state = start.to_vec();
     for rescue in 0..=RESCUES {
-        let end = descended(map, &state, aim, f64::INFINITY, &mut iterations)?;
+        let end = descended(map, &state, aim, None, &mut iterations)?;
         if end.residual <= aim.residual {
             return Ok(end);
         }
@@ -290,17 +292,18 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
 }
 
 /// Steps of Newton's method, shortened where they do not help, until the orbit is closed, no step leaves less of the residual, a whole one
-/// multiplies it by more than `wild`, or `iterations` have been used up: how far it came.
+/// multiplies it by more than `wild`, or `iterations` have been used up: how far it came. Up to `wild` one whole step may multiply it: beyond a kink
+/// the next one mostly arrives, where shortened ones would creep up to it.
 pub(crate) fn descended(
     map: &mut dyn ReturnMap,
     start: &[f64],
     aim: Aim,
-    wild: f64,
+    wild: Option<f64>,
     iterations: &mut usize,
 ) -> Result<Closed, OrbitError> {
     let n = start.len();
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
-    let mut state = start.to_vec();
+    let (mut state, mut allowed) = (start.to_vec(), wild);
     let mut derivative = DMatrix::identity(n, n);
     let mut gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
     loop {
@@ -325,12 +328,14 @@ pub(crate) fn descended(
                 let mut trial_derivative = DMatrix::identity(n, n);
                 if let Ok(trial_gap) = evaluate(map, &trial, aim, &mut trial_derivative) {
                     let after = norm(map.weights(), trial_gap.as_slice());
-                    if after <= DECREASE * before {
+                    let bold = fraction == 1.0 && allowed.is_some_and(|wild| after <= wild * before);
+                    if after <= DECREASE * before || bold {
+                        allowed = allowed.filter(|_| after <= DECREASE * before);
                         (state, gap, derivative) = (trial, trial_gap, trial_derivative);
                         accepted = true;
                         break;
                     }
-                    if after > wild * before {
+                    if wild.is_some_and(|wild| after > wild * before) {
                         break;
                     }
                 }
@@ -338,7 +343,7 @@ pub(crate) fn descended(
             }
         }
         if !accepted {
-            return Ok(Closed { state, derivative, residual, iterations: *iterations, missing: None });
+            return Ok(Closed { state, gap, derivative, residual, iterations: *iterations, missing: None });
         }
     }
 }

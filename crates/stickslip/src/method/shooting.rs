@@ -34,11 +34,12 @@ const TOLERANCE: f64 = 1e-8;
 const CLOSER: f64 = 0.3;
 /// Residual of the first search, in which every run chooses its steps anew: the map is then smooth only to about their error.
 const NEAR: f64 = 1e-6;
-/// Relative error per step, and residual, of the approach before that search: its runs cost a third of those that are exact enough.
-const LONG_STEPS: f64 = 1e-6;
+/// Relative error per step, and residual, of the approach before that search, for orbits that are asked for in shorter steps. Longer ones jump over
+/// layers, and would take two thirds of the time of these.
+const LONG_STEPS: f64 = 1e-8;
 const COARSE_RESIDUAL: f64 = 1e-5;
 /// Growth of the residual by a whole step of that approach which says that its steps jump over the layers of the law, so that its derivative means
-/// nothing; where steps are shortened with success it grows to less than twice.
+/// nothing. Up to here it may grow once; where steps are shortened with success it grows to less than twice.
 const WILD: f64 = 3.0;
 /// Residual at which the orbit is closed on the steps of the last free run, on which the map is smooth.
 const CLOSED: f64 = 1e-11;
@@ -299,15 +300,15 @@ impl<'a> Shooter<'a> {
         let mut iterations = 0;
         let near = self.coarsely(start, aim, &mut iterations);
         let start = near.as_ref().map(|near| near.state.as_slice()).or(start);
-        let near = match near {
-            Some(near) if near.residual <= COARSE_RESIDUAL => near,
+        let (near, fine) = match near {
+            Some(near) if near.residual <= COARSE_RESIDUAL => (near, self.long_steps() == self.tolerance),
             _ => {
                 let near = search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
                 iterations += near.iterations;
-                near
+                (near, true)
             }
         };
-        let (mut state, mut fits) = match self.brought_near(&near, aim, &mut iterations) {
+        let (mut state, mut fits) = match self.brought_near((&near, fine), aim, &mut iterations) {
             Some(state) => (state, true),
             None => (near.state, false),
         };
@@ -335,27 +336,38 @@ impl<'a> Shooter<'a> {
         }
     }
 
-    /// How near to the orbit one comes in long steps, for a third of the work; `None` where they lead nowhere.
+    /// Relative error per step of the approach.
+    fn long_steps(&self) -> f64 {
+        self.tolerance.max(LONG_STEPS * self.share)
+    }
+
+    /// How near to the orbit one comes in long steps; `None` where they lead nowhere.
     fn coarsely(&mut self, start: Option<&[f64]>, aim: Aim, iterations: &mut usize) -> Option<Closed> {
         let first = match start.filter(|state| state.len() == self.weights.len()) {
             Some(start) => start.to_vec(),
             None => self.first_state(aim.omega),
         };
-        let fine = self.set_tolerance(self.tolerance.max(LONG_STEPS * self.share));
-        let near = descended(self, &first, Aim { residual: COARSE_RESIDUAL, ..aim }, WILD, iterations);
+        let fine = self.set_tolerance(self.long_steps());
+        let near = descended(self, &first, Aim { residual: COARSE_RESIDUAL, ..aim }, Some(WILD), iterations);
         self.set_tolerance(fine);
         near.ok()
     }
 
     /// From the orbit that the search has found to a state for which the steps of the last run were made, with the derivative of the search and
-    /// runs that carry none; `None` if that does not come closer.
-    fn brought_near(&mut self, near: &Closed, aim: Aim, iterations: &mut usize) -> Option<Vec<f64>> {
+    /// runs that carry none; `None` if that does not come closer. If the search was `fine`, its own last run is the first of them.
+    fn brought_near(&mut self, (near, fine): (&Closed, bool), aim: Aim, iterations: &mut usize) -> Option<Vec<f64>> {
         let (mut state, mut before) = (near.state.clone(), f64::INFINITY);
+        let mut known = fine.then(|| near.gap.clone());
         for _ in 0..MESHES {
             *iterations += 1;
-            let mut end = state.clone();
-            self.returned(&mut end, None).ok()?;
-            let gap = DVector::from_fn(state.len(), |i, _| state[i] - aim.sign * end[i]);
+            let gap = match known.take() {
+                Some(gap) => gap,
+                None => {
+                    let mut end = state.clone();
+                    self.returned(&mut end, None).ok()?;
+                    DVector::from_fn(state.len(), |i, _| state[i] - aim.sign * end[i])
+                }
+            };
             let step = newton_step(&near.derivative, &gap, aim.sign, &self.weights);
             state.iter_mut().zip(step.iter()).for_each(|(z, d)| *z += d);
             let moved = norm(&self.weights, step.as_slice()) / self.size(&state, aim);

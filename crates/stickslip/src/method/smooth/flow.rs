@@ -14,7 +14,7 @@ use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
 use std::sync::Arc;
-use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES};
+use stickslip_numerics::radau::{A, C, ERROR, ESTIMATE, REAL, STAGES};
 
 /// A stretch has `2^LEVELS` ticks; the finest layers of the arctan law need about `2^20` of half a period.
 const LEVELS: usize = 44;
@@ -32,8 +32,6 @@ const ESCAPED: f64 = 1e5;
 const SAFETY: f64 = 0.8;
 /// Steps that are only ever halved are chosen anew when they are so many times as many: layers move on and leave short steps behind.
 const GROWN: usize = 2;
-/// Order of the error estimate plus one.
-const ORDER: f64 = 4.0;
 
 /// Where the steps of a run have their lengths from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,9 +57,10 @@ pub(crate) struct SmoothFlow {
     /// Levels of the accepted steps of the last run, in order, and how many they were when they were chosen.
     mesh: Vec<usize>,
     chosen: usize,
-    /// Accepted and rejected steps of the last run.
+    /// Accepted and rejected steps of the last run, and whether the next attempt is the first one or one after a rejected one.
     accepted: usize,
     rejected: usize,
+    again: bool,
     stretch: f64,
     eliminated: Vec<Option<Eliminated>>,
     step: Step,
@@ -96,6 +95,7 @@ impl SmoothFlow {
             chosen: 0,
             accepted: 0,
             rejected: 0,
+            again: false,
             stretch: 0.0,
             eliminated: vec![None; LEVELS + 1],
             step: Step::new(&assembly),
@@ -151,12 +151,11 @@ impl SmoothFlow {
         };
         for (i, c) in C.iter().enumerate() {
             let s = 1.0 + c * h / length;
-            // Lagrange polynomial through the three stages
-            let weights = [
-                (s - C[1]) * (s - C[2]) / ((C[0] - C[1]) * (C[0] - C[2])),
-                (s - C[0]) * (s - C[2]) / ((C[1] - C[0]) * (C[1] - C[2])),
-                (s - C[0]) * (s - C[1]) / ((C[2] - C[0]) * (C[2] - C[1])),
-            ];
+            // Lagrange polynomials of the stages
+            let weights: [f64; STAGES] = std::array::from_fn(|q| {
+                let others = (0..STAGES).filter(|r| *r != q);
+                others.map(|r| (s - C[r]) / (C[q] - C[r])).product()
+            });
             for (offset, count) in [(0, j), (STAGES * j, internal)] {
                 for k in 0..count {
                     let at = |stage: usize| offset + stage * count + k;
@@ -181,27 +180,33 @@ impl SmoothFlow {
         }
     }
 
-    /// Error of the step relative to the tolerance: the embedded estimate, filtered so that stiff components do not dominate it.
+    /// Error of the step relative to the tolerance: the embedded estimate, filtered so that stiff components do not dominate it. A step out of a layer
+    /// or into one is stiff at one of its ends only, where a filter would hide what it jumps over: the larger of both counts.
     fn error(&mut self, state: &[f64], time: f64, scale: (f64, f64)) -> f64 {
         if self.assembly.states() == 0 {
             return self.error_of_work(time, scale.0);
         }
         let Some(eliminated) = &self.eliminated[self.level] else { return f64::INFINITY };
         let assembly = &self.assembly;
+        self.step.raw_error(assembly, eliminated, &self.loads, (state, &self.slope), &mut self.error);
+        self.second.copy_from_slice(&self.error);
+        if !self.step.filter_at_end(assembly, eliminated, &mut self.second) {
+            return f64::INFINITY;
+        }
+        let at_end = self.size(&self.second, state, scale);
         if !self.step.prepare_filter(assembly, eliminated, &self.laws) {
             return f64::INFINITY;
         }
-        self.step.raw_error(assembly, eliminated, &self.loads, (state, &self.slope), &mut self.error);
         // what the second filter begins with
         for ((second, raw), slope) in self.second.iter_mut().zip(&self.error).zip(&self.slope) {
             *second = raw - slope;
         }
         self.step.filter(assembly, eliminated, &self.laws, &mut self.error);
-        let size = self.size(&self.error, state, scale);
-        if size < 1.0 {
+        let size = at_end.max(self.size(&self.error, state, scale));
+        if size < 1.0 || !self.again {
             return size;
         }
-        // Hairer and Wanner's second filter, for steps across a layer
+        // Hairer and Wanner's second filter, for first steps and those after a rejected one
         for (shifted, (z, error)) in self.next.iter_mut().zip(state.iter().zip(&self.error)) {
             *shifted = z + error;
         }
@@ -343,9 +348,12 @@ impl SmoothFlow {
             self.mesh.insert(self.accepted, self.level + 1);
             return true;
         }
-        // an estimate of order 4 in h: how many halvings bring it below one
-        let halvings =
-            if error.is_finite() { ((error / SAFETY).log2() / ORDER).ceil().clamp(1.0, 4.0) as usize } else { 2 };
+        // how many halvings bring it below one
+        let halvings = if error.is_finite() {
+            ((error / SAFETY).log2() / f64::from(ESTIMATE)).ceil().clamp(1.0, 4.0) as usize
+        } else {
+            2
+        };
         self.level += halvings;
         self.level <= LEVELS
     }
@@ -410,7 +418,7 @@ impl Flow for SmoothFlow {
             self.stretch = duration;
             self.eliminated.iter_mut().for_each(|e| *e = None);
         }
-        (self.accepted, self.rejected) = (0, 0);
+        (self.accepted, self.rejected, self.again) = (0, 0, true);
         self.steps.clear();
         let tick = duration / (1u64 << LEVELS) as f64;
         let scale = self.scales(state);
@@ -454,7 +462,8 @@ impl Flow for SmoothFlow {
                 (true, Lengths::Chosen | Lengths::Halved) => self.error(state, time, scale),
                 (false, _) => f64::INFINITY,
             };
-            if !error.is_finite() || error > 1.0 {
+            self.again = !error.is_finite() || error > 1.0;
+            if self.again {
                 if !self.shorten(lengths, error) {
                     return Err(self.stalled(state, (time, h), scale.1));
                 }
@@ -493,7 +502,7 @@ impl Flow for SmoothFlow {
             // a longer step only where it starts at a multiple of itself and its error is expected to pass
             if self.level > COARSEST
                 && position.is_multiple_of(1u64 << (LEVELS - self.level + 1))
-                && error * 2f64.powf(ORDER) < SAFETY
+                && error * 2f64.powi(ESTIMATE) < SAFETY
             {
                 self.level -= 1;
             }

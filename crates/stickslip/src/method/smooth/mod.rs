@@ -1,6 +1,6 @@
 //! Stiff integration of smooth laws with exact sensitivities, for `shooting` and for transients.
 //!
-//! - `step`: one step of Radau IIA-5, the structure eliminated onto the joints' axes;
+//! - `step`: one step of Radau IIA-9, the structure eliminated onto the joints' axes;
 //! - `flow`: steps of controlled length over a stretch of time.
 
 pub(crate) mod flow;
