@@ -868,6 +868,27 @@ fn few_coordinates_know_the_modes_that_harmonics_of_a_joint_meet() {
     assert_eq!(format!("{:?}", of("").tables), format!("{:?}", all.tables), "few rows are all kept");
 }
 
+/// Masses that no spring holds, one of them on a joint that sticks: its spring is all that there is, and the modes of the others are all the same one.
+#[test]
+fn a_structure_without_stiffness() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = "%%MatrixMarket matrix coordinate real symmetric\n5 5";
+    let masses: String = (1..=5).map(|i| format!("{i} {i} 1\n")).collect();
+    std::fs::write(folder.path().join("k.mtx"), format!("{head} 0\n")).unwrap();
+    std::fs::write(folder.path().join("m.mtx"), format!("{head} 5\n{masses}")).unwrap();
+    let found = results(
+        folder.path(),
+        "schema = 1\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\nunits = \"m-kg-s\"\nmodal_damping = \"0.1 %\"\n\
+         [[place]]\nname = \"tip\"\ndof = \"2\"\n[[joint]]\nname = \"j\"\nbetween = [\"tip\", \"ground\"]\n\
+         law = { kind = \"jenkins\", stiffness = \"1e5 N/m\", limit = \"0.5 N\" }\n[[force]]\non = \"tip\"\namplitude = \"1 N\"\n\
+         [study]\nkind = \"response\"\nfrequency = [\"300 Hz\", \"400 Hz\"]\n",
+    );
+    for (hertz, amplitude) in [300.0, 400.0].iter().zip(numbers(&found, "tip_amplitude_m")) {
+        let expected = 1.0 / ((TAU * hertz).powi(2) - 1e5);
+        assert!((amplitude / expected - 1.0).abs() < 1e-9, "{amplitude} {expected}");
+    }
+}
+
 /// A stiff slider at the driven end of a chain with hardly any damping makes harmonics far above what the coordinates know. What a run says of that is the
 /// difference from all rows, here by another method.
 #[test]

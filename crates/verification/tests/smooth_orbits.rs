@@ -81,6 +81,24 @@ fn the_end_of_stick_is_not_jumped_over() {
     assert!(worst < 1e-8, "{worst}");
 }
 
+/// How long a joint slips does not go with where steps end: changes are sought inside of them. Those of much shorter steps are the reference.
+#[test]
+fn slip_fractions_do_not_depend_on_the_steps() {
+    let (mut worst, mut changing) = (0.0f64, 0);
+    for ft in [2.0, 4.0, 8.0] {
+        let system = couple(ft, 25e3);
+        for hertz in [119.7, 120.6, 121.0, 121.9] {
+            let [slips, reference] =
+                [1e-8, 1e-12].map(|tolerance| shoot(&system, TAU * hertz, tolerance).joints[0].slip_fraction);
+            changing += usize::from((0.05..0.999).contains(&reference));
+            worst = worst.max((slips - reference).abs());
+        }
+    }
+    println!("slip fractions within {worst:.1e}, {changing} of them of joints that stick and slip");
+    assert!(changing > 4, "{changing}");
+    assert!(worst < 1e-5, "{worst}");
+}
+
 /// The paper's alpha on every point of Fig. 6, from point to point, without one failure.
 #[test]
 fn figure_6_converges_on_every_point() {

@@ -1,8 +1,8 @@
 //! A motion that was integrated in steps: its record, what it is at any time, and its numbers.
 
-use super::assembly::Assembly;
+use super::assembly::{Assembly, PlacedLaw};
 use super::drive::Drive;
-use crate::law::{Contact, Relative};
+use crate::law::{Contact, MOST_DIRECTIONS, Relative};
 use crate::model::{Axis, System};
 use crate::orbit::measure::{Faces, Shares, Signals, extremes};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
@@ -13,6 +13,9 @@ use stickslip_numerics::radau::quintic;
 
 /// Share of a law's scale by which its forces may pass it by rounding.
 const ROUNDED: f64 = 1e-9;
+
+/// Halvings of the time between two nodes at which a joint does not do the same: a millionth of it is left.
+const HALVED: usize = 20;
 
 /// The record of a run: the state at instants, and values at the nodes of a quadrature between them.
 #[derive(Debug, Clone, Default)]
@@ -161,23 +164,57 @@ impl SteppedPath {
         if largest > scale * (1.0 + ROUNDED) { between } else { between.clamp(-scale, scale) }
     }
 
+    /// Forces of a joint at `s` in [0, 1] of a step, where it moves so.
+    fn forces(&self, joint: &PlacedLaw, (step, s): (usize, f64), motion: &Relative<f64>) -> [f64; MOST_DIRECTIONS] {
+        if let Some(rate) = joint.law.rate().filter(|_| joint.states == 0 && self.steps.nodes.len() > 1) {
+            return rate.value(motion, &[], &mut []);
+        }
+        let mut force = [0.0; MOST_DIRECTIONS];
+        // a limit bounds the force of one direction; of several it bounds their sum of squares or less
+        let scale = if joint.directions == 1 { joint.law.scale() } else { f64::INFINITY };
+        joint.axes().enumerate().for_each(|(d, axis)| force[d] = self.force_between(step, axis, s, scale));
+        force
+    }
+
+    /// What a joint does at `s` in [0, 1] of a step.
+    fn contact(&self, joint: usize, (step, s): (usize, f64)) -> Contact {
+        let (joint, length) = (&self.assembly.joints[joint], self.steps.spans[step].1);
+        let mut motion = Relative::along(0.0, 0.0);
+        for (d, axis) in joint.axes().enumerate() {
+            let [from, to] = self.relative_ends(step, axis);
+            (motion.displacement[d], motion.velocity[d], _) = quintic(s, length, from, to);
+        }
+        let force = self.forces(joint, (step, s), &motion);
+        joint.law.contact(&motion.velocity[..joint.directions], &force[..joint.directions])
+    }
+
+    /// Shares of the time between nodes of a step, of whom the first comes at its start: what a joint does at both is so between them, and where it is
+    /// not the same, up to a change that is sought.
+    fn stretches(&self, joint: usize, step: usize) -> impl Iterator<Item = (Contact, f64)> {
+        let (count, length) = (self.steps.nodes.len(), self.steps.spans[step].1);
+        let mut last = (0.0, self.contact(joint, (step, 0.0)));
+        (0..count).flat_map(move |i| {
+            let next = (self.steps.nodes[i].0, self.steps.values[step * count + i].contact[joint]);
+            let (from, to) = (std::mem::replace(&mut last, next), next);
+            let (mut low, mut high) = (from.0, to.0);
+            for _ in 0..if from.1 == to.1 { 0 } else { HALVED } {
+                let between = 0.5 * (low + high);
+                if self.contact(joint, (step, between)) == from.1 { low = between } else { high = between }
+            }
+            let change = if from.1 == to.1 { to.0 } else { high };
+            [(from.1, (change - from.0) * length), (to.1, (to.0 - change) * length)]
+        })
+    }
+
     /// The joints at `s` in [0, 1] of a step, at `time`, where the structure has this state; mirrored if `sign` is -1.
     fn joints(&self, (step, s): (usize, f64), time: f64, state: &[f64], sign: f64) -> Vec<JointSample> {
         let count = self.steps.nodes.len();
-        let sample = |(q, joint): (usize, &super::assembly::PlacedLaw)| {
+        let sample = |(q, joint): (usize, &PlacedLaw)| {
             let mut motion = Relative::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
                 (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
             }
-            let mut force = [0.0; crate::law::MOST_DIRECTIONS];
-            let smooth = joint.law.rate().filter(|_| joint.states == 0 && count > 1);
-            if let Some(rate) = smooth {
-                force = rate.value(&motion, &[], &mut []);
-            } else {
-                // a limit bounds the force of one direction; of several it bounds their sum of squares or less
-                let scale = if joint.directions == 1 { joint.law.scale() } else { f64::INFINITY };
-                joint.axes().enumerate().for_each(|(d, axis)| force[d] = self.force_between(step, axis, s, scale));
-            }
+            let mut force = self.forces(joint, (step, s), &motion);
             for values in [&mut motion.displacement, &mut motion.velocity, &mut force] {
                 values.iter_mut().for_each(|value| *value *= sign);
             }
@@ -313,9 +350,13 @@ impl Signals for SteppedPath {
         Ok(self.range_of(|step| self.relative_ends(step, axis)))
     }
     fn faces(&self, joint: usize) -> Faces {
-        let nodes = self.steps.values.iter().enumerate();
-        let shares = Shares::of(nodes.map(|(i, node)| (node.contact[joint], self.steps.node(i).1)));
         let count = self.steps.nodes.len();
+        let shares = if count > 1 {
+            Shares::of((0..self.steps.spans.len()).flat_map(|step| self.stretches(joint, step)))
+        } else {
+            let nodes = self.steps.values.iter().enumerate();
+            Shares::of(nodes.map(|(i, node)| (node.contact[joint], self.steps.node(i).1)))
+        };
         let at_end = |step: usize| self.steps.values[(step + 1) * count - 1].contact[joint];
         let steps = self.steps.spans.len();
         let mut switches = (1..steps).filter(|&step| at_end(step - 1) != at_end(step)).count();
