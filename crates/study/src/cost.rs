@@ -568,6 +568,11 @@ impl Costing<'_> {
         (each + self.coupled()) * factor * length * length
     }
 
+    /// Time to eliminate so many unknowns, s.
+    pub fn eliminated(&self, unknowns: f64) -> f64 {
+        ELIMINATED * unknowns.powi(3) / 3.0
+    }
+
     /// What contacts add to a series that a structure in few coordinates couples all with all, s.
     fn coupled(&self) -> f64 {
         let system = self.surveyed.survey.system();

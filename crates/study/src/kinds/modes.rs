@@ -73,6 +73,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let points = values.table("amplitude").and_then(|table| table.count("points")).unwrap_or(61) as f64;
     let rows = costing.cases * points;
     let harmonics = values.count("harmonics").unwrap_or(HARMONICS) as f64;
+    // odd harmonics, two parts of each, of every degree of freedom
+    let elimination = costing.eliminated((harmonics + 1.0) * costing.masses);
     Cost {
         tables: vec![
             Shape { rows, numbers: costing.varied + 4.0 + 2.0 * costing.places, words: 0.0 },
@@ -80,7 +82,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: 2.0 * rows,
         unit: points * costing.series_bytes(harmonics),
-        work: (rows * FOLLOWED + costing.cases * costing.steps(STEPS)) * costing.series(Some(harmonics)),
+        work: (rows * FOLLOWED + costing.cases * costing.steps(STEPS)) * (costing.series(Some(harmonics)) + elimination),
     }
 }
 
