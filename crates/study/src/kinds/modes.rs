@@ -82,7 +82,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: 2.0 * rows,
         unit: points * costing.series_bytes(harmonics),
-        work: (rows * FOLLOWED + costing.cases * costing.steps(STEPS)) * (costing.series(Some(harmonics)) + elimination),
+        work: (rows * FOLLOWED + costing.cases * costing.steps(STEPS))
+            * (costing.series(Some(harmonics)) + elimination),
     }
 }
 
