@@ -319,7 +319,7 @@ mod tests {
         );
         assert!(texts[4].starts_with("At 3 points nothing says whether the orbit is stable"), "{}", texts[4]);
         assert_eq!(texts[5], "It is so.");
-        assert!(texts[6].starts_with("At 2 points `shooting`") && texts[5].contains("`harmonic-balance` did"));
+        assert!(texts[6].starts_with("At 2 points `shooting`") && texts[6].contains("`harmonic-balance` did"));
         assert!(texts[7].starts_with("At 1 point `event-driven`"), "{}", texts[7]);
     }
 
