@@ -215,7 +215,7 @@ fn advice_on_reduction(model: &Model) -> Option<String> {
     let exchanged = || Component::new(component.rows().to_vec(), stiffness.clone(), None, mass.clone()).ok();
     let advice = match absurd.then(exchanged).flatten().as_ref().and_then(sensible) {
         Some(frequencies) => exchange(&frequencies),
-        None => "are the units right, and `up_to`?".to_owned(),
+        None => "are the units right, and `up_to`? A drive far above them needs no modes: reduce = false".to_owned(),
     };
     Some(format!("its lowest frequencies are {}: {advice}", listed.join(", ")))
 }

@@ -180,6 +180,18 @@ pub enum ReductionError {
         /// What it must be.
         must: &'static str,
     },
+    /// Modes far above all that there are: units that were mistaken, or a drive that needs no modes.
+    #[error(
+        "the reduction is to know all modes up to {:.6} Hz, and the structure has none far above {:.6} Hz",
+        omega / std::f64::consts::TAU,
+        highest / std::f64::consts::TAU
+    )]
+    AboveAll {
+        /// Up to which they were asked for, rad/s.
+        omega: f64,
+        /// The highest `√(k_ii/m_ii)`, rad/s.
+        highest: f64,
+    },
     /// No modes.
     #[error(transparent)]
     Modes(#[from] ModesError),
@@ -304,8 +316,7 @@ impl Whole {
             (0..self.dofs()).map(own).filter(|(_, mass)| *mass > 0.0).map(|(stiffness, mass)| stiffness / mass);
         let highest = ratios.fold(0.0, f64::max).sqrt();
         if highest > 0.0 && omega > ABOVE_ALL * highest {
-            let what = "the largest frequency of a reduction (rad/s) with what it takes beyond";
-            return Err(ReductionError::Number { what, value: omega, must: "near those that the structure has" });
+            return Err(ReductionError::AboveAll { omega, highest });
         }
         let wanted = Wanted::UpTo { value: omega * omega, most: MOST_MODES };
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, wanted)?)
