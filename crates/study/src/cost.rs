@@ -14,6 +14,7 @@ use std::f64::consts::{LN_10, TAU};
 use stickslip::curve::sweep::BLOCK;
 use stickslip::law::SharedLaw;
 use stickslip::method::{Method, auto::Auto, event_driven, harmonic_balance};
+use stickslip::model::System;
 
 /// What a study will hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -112,6 +113,8 @@ pub struct Costing<'a> {
     falls: bool,
     /// Whether nothing bounds the force of a law.
     unbounded: bool,
+    /// Memory of a factor of the dynamic stiffness in all rows, bytes; zero where none is made. To know it of a large structure takes seconds.
+    factor_bytes: f64,
     pace: Pace,
 }
 
@@ -133,6 +136,15 @@ impl Pace {
     }
 }
 
+/// Whether the method of a case finds series of harmonics.
+fn finds_series(case: &Case, system: &System) -> bool {
+    match case.method.name.as_str() {
+        "harmonic-balance" => true,
+        "auto" => Auto.choice(system).method == harmonic_balance::NAME,
+        _ => false,
+    }
+}
+
 impl<'a> Costing<'a> {
     /// Of a study whose orbits are hard to find.
     pub(crate) fn new(study: &'a Study, surveyed: &'a Surveyed) -> Self {
@@ -142,6 +154,7 @@ impl<'a> Costing<'a> {
         let followed = |law: &SharedLaw| width.and_then(|width| law.regularised(*width)).unwrap_or_else(|| law.clone());
         let laws: Vec<SharedLaw> = system.joints().iter().map(|joint| followed(joint.law())).collect();
         let given = case.frequencies.as_ref().map_or(1, |f| f.len()) as f64;
+        let factor_bytes = if finds_series(case, system) { harmonic_balance::factor_bytes(system) } else { 0 };
         Costing {
             study,
             case,
@@ -158,6 +171,7 @@ impl<'a> Costing<'a> {
             falls: laws.iter().any(|law| law.prox().is_some() && !law.is_incrementally_passive()),
             unbounded: laws.iter().any(|law| law.scale().is_infinite()),
             has_states: laws.iter().any(|law| law.rate().is_some_and(|rate| rate.states() > 0)),
+            factor_bytes: factor_bytes as f64,
             pace: Pace::Slow,
         }
     }
@@ -251,11 +265,7 @@ impl<'a> Costing<'a> {
 
     /// Whether the method of the study finds series of harmonics.
     pub fn is_series(&self) -> bool {
-        match self.case.method.name.as_str() {
-            "harmonic-balance" => true,
-            "auto" => Auto.choice(self.surveyed.survey.system()).method == harmonic_balance::NAME,
-            _ => false,
-        }
+        finds_series(self.case, self.surveyed.survey.system())
     }
 
     /// Bytes of the motion at the instants of one period.
@@ -294,7 +304,7 @@ impl Costing<'_> {
         let waiting = tables * ((AHEAD * threads) as f64 / units.max(1) as f64).min(1.0);
         let shown = cost.shown(NUMBER + WRITTEN, WORD + WRITTEN);
         let drawn = DRAWN * cost.drawn.min(MOST_ROWS as f64 * (self.places + self.joints));
-        let factor = self.factor_bytes();
+        let factor = self.factor_bytes;
         let factors = factor + (KEPT_FACTORS.0 * factor).min(KEPT_FACTORS.1);
         let working = units.min(threads) as f64 * (cost.unit + factors);
         // a float that is too large for the type becomes its largest value
@@ -602,14 +612,9 @@ impl Costing<'_> {
 
     /// Time to factor the dynamic stiffness for one orbit, s; zero where none is.
     fn factored(&self, harmonics: Option<f64>) -> f64 {
-        let numbers = self.factor_bytes() / NUMBER;
+        let numbers = self.factor_bytes / NUMBER;
         let count = FACTORS.0 * harmonics.unwrap_or(SERIES_HARMONICS) + FACTORS.1;
         count * FACTOR.0 * numbers.powf(FACTOR.1)
-    }
-
-    /// Memory of a factor of the dynamic stiffness in all rows, bytes; zero where none is made.
-    fn factor_bytes(&self) -> f64 {
-        if self.is_series() { harmonic_balance::factor_bytes(self.surveyed.survey.system()) as f64 } else { 0.0 }
     }
 
     /// Whether friction is rigid somewhere.

@@ -188,6 +188,16 @@ impl SteppedPath {
         joint.law.contact(&motion.velocity[..joint.directions], &force[..joint.directions])
     }
 
+    /// Where in a step, in [0, 1], a joint ceases to do what it does `from` there on, at `to` at the latest.
+    fn change(&self, joint: usize, step: usize, from: (f64, Contact), to: f64) -> f64 {
+        let (mut low, mut high) = (from.0, to);
+        for _ in 0..HALVED {
+            let between = 0.5 * (low + high);
+            if self.contact(joint, (step, between)) == from.1 { low = between } else { high = between }
+        }
+        high
+    }
+
     /// Shares of the time between nodes of a step, of whom the first comes at its start: what a joint does at both is so between them, and where it is
     /// not the same, up to a change that is sought.
     fn stretches(&self, joint: usize, step: usize) -> impl Iterator<Item = (Contact, f64)> {
@@ -196,12 +206,7 @@ impl SteppedPath {
         (0..count).flat_map(move |i| {
             let next = (self.steps.nodes[i].0, self.steps.values[step * count + i].contact[joint]);
             let (from, to) = (std::mem::replace(&mut last, next), next);
-            let (mut low, mut high) = (from.0, to.0);
-            for _ in 0..if from.1 == to.1 { 0 } else { HALVED } {
-                let between = 0.5 * (low + high);
-                if self.contact(joint, (step, between)) == from.1 { low = between } else { high = between }
-            }
-            let change = if from.1 == to.1 { to.0 } else { high };
+            let change = if from.1 == to.1 { to.0 } else { self.change(joint, step, from, to.0) };
             [(from.1, (change - from.0) * length), (to.1, (to.0 - change) * length)]
         })
     }

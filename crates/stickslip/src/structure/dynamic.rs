@@ -50,9 +50,7 @@ impl Structure {
         };
         Ok(DynamicStiffness { factor })
     }
-}
 
-impl Structure {
     /// Memory of a [`DynamicStiffness`] of a sparse structure, bytes, from where its entries stand: nothing is factored. Zero of any other.
     pub(crate) fn factor_bytes(&self) -> usize {
         match &self.0.form {

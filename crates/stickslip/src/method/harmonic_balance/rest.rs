@@ -67,7 +67,7 @@ pub(super) struct Rest {
 const KEPT: usize = 2_000_000_000;
 
 /// Memory of the motions under unit forces that are kept, bytes. Measured: 54 MB for each harmonic of a blade of 69,930 rows with 16 contacts of three
-/// directions, whose factors take 1.1 GB.
+/// directions, whose factors take 1.3 GB.
 const KEPT_MOVED: usize = 1_000_000_000;
 
 /// Motions of all places at a rate (1/s), at a drive frequency (rad/s): n × q, a column for a unit force along each axis.
