@@ -7,7 +7,8 @@
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// The largest of the values that the search meets, and where: inside `ends`, which may stand in either order, until `close` says that the
-/// two ends that are left are near enough. Of equal values the first that was met counts. Where there is no value, give negative infinity.
+/// two ends that are left are near enough, or until there is no number left between them to try: a `close` that asks for less than the rounding of
+/// the ends is met by that. Of equal values the first that was met counts. Where there is no value, give negative infinity.
 ///
 /// Of a function with one maximum between the ends it is that one; of another a local one.
 ///
@@ -30,7 +31,10 @@ pub fn maximum<E>(
     let (mut left, mut right) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
     let (mut at_left, mut at_right) = (value(left)?, value(right)?);
     let mut best = if at_right > at_left { (right, at_right) } else { (left, at_left) };
-    while !close(a, b) {
+    let apart = |a: f64, left: f64, right: f64, b: f64| {
+        (a < left && left < right && right < b) || (a > left && left > right && right > b)
+    };
+    while apart(a, left, right, b) && !close(a, b) {
         let met = if at_left >= at_right {
             (b, right, at_right) = (right, left, at_left);
             left = b - GOLDEN * (b - a);
@@ -74,6 +78,25 @@ mod tests {
     fn a_maximum_at_an_end_is_approached() {
         let (at, _) = found((0.0, 1.0), |x| x);
         assert!(1.0 - at < 1e-9, "{at}");
+    }
+
+    #[test]
+    fn ends_a_few_roundings_apart_are_an_end() {
+        for roundings in 0..12u64 {
+            let b = f64::from_bits(100f64.to_bits() + roundings);
+            for ends in [(100.0, b), (b, 100.0), (-b, -100.0)] {
+                let mut values = 0;
+                let counted = |x: f64| {
+                    values += 1;
+                    Ok::<_, ()>(x)
+                };
+                let (at, _) = maximum(ends, |_, _| false, counted).unwrap();
+                let (low, high) = (ends.0.min(ends.1), ends.0.max(ends.1));
+                assert!((low..=high).contains(&at) && values < 12, "{ends:?}: {at} after {values}");
+            }
+        }
+        let (at, _) = maximum((0.0, 3.0), |_, _| false, |x: f64| Ok::<_, ()>(-(x - 2.0).abs())).unwrap();
+        assert!((at - 2.0).abs() < 1e-14, "{at}");
     }
 
     #[test]
