@@ -190,11 +190,21 @@ pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>
                 return Ending::Done;
             }
         }
+        // a file that is being written is empty for a moment
+        loop {
+            let now = contents(request.files);
+            std::thread::sleep(WRITTEN);
+            if contents(request.files) == now {
+                break;
+            }
+        }
     }
 }
 
 /// How often files are looked at.
 const LOOK: Duration = Duration::from_millis(300);
+/// How long files that have changed must stay as they are until they are read.
+const WRITTEN: Duration = Duration::from_millis(50);
 
 /// What stands in the files; editors write them in ways that no date tells.
 fn contents(files: &[PathBuf]) -> Vec<Option<Vec<u8>>> {

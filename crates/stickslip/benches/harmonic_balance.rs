@@ -165,7 +165,7 @@ fn performance_curve_50_slip_limits(bencher: Bencher) {
             method: &EventDriven,
             range: (TAU * 120.0, TAU * 121.5),
             points: 31,
-            quantity: &|orbit| orbit.places[0].amplitude(),
+            quantities: &|orbit| vec![orbit.places[0].amplitude()],
         }
         .curve(&limits)
         .unwrap();

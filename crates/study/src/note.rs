@@ -2,7 +2,9 @@
 
 use crate::expression::displayed;
 use crate::farther::Slipping;
+use crate::words::significant;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 use stickslip::law::Piece;
 use stickslip::model::{Joint, Model};
@@ -38,6 +40,17 @@ pub enum Note {
         stuck: String,
         /// The one that knows where.
         knows: String,
+    },
+    /// Points of a curve at which it has another orbit when it is followed the other way.
+    OtherOrbit {
+        /// How many.
+        points: usize,
+        /// The lowest and the highest drive frequency of these, rad/s.
+        from: f64,
+        /// See `from`.
+        to: f64,
+        /// Largest amplitude of the other orbit over that of the one in the table, where they differ most.
+        ratio: f64,
     },
     /// Points at which the method that `auto` had chosen found no orbit and another one did.
     Instead {
@@ -151,6 +164,17 @@ impl Note {
     fn joined(self, notes: &mut Vec<Note>) {
         for known in notes.iter_mut() {
             match (known, &self) {
+                (
+                    Note::OtherOrbit { points, from, to, ratio },
+                    Note::OtherOrbit { points: more, from: low, to: high, ratio: other },
+                ) => {
+                    *points += more;
+                    (*from, *to) = (from.min(*low), to.max(*high));
+                    if other.ln().abs() > ratio.ln().abs() {
+                        *ratio = *other;
+                    }
+                    return;
+                }
                 (Note::Truncated(points, largest), Note::Truncated(more, other))
                 | (Note::TruncatedOnBranch(points, largest), Note::TruncatedOnBranch(more, other)) => {
                     *points += more;
@@ -242,6 +266,20 @@ impl Note {
                  its slider (`jenkins`) makes the one that is shown unique, kind = \"transient\" follows the one of a given start.",
                 points(*count)
             )),
+            Note::OtherOrbit { points: count, from, to, ratio } => {
+                let hertz = |omega: f64| significant(omega / TAU, 6);
+                let size = match *ratio >= 1.0 {
+                    true => format!("up to {} times as high", significant(*ratio, 3)),
+                    false => format!("down to {} of the height", significant(*ratio, 3)),
+                };
+                Some(format!(
+                    "warning: at {} between {} and {} Hz the curve has another orbit when it is followed the other way, {size}: which one is met depends \
+                     on how the motion began. Kind `branch` follows both and what joins them, with its folds.",
+                    points(*count),
+                    hertz(*from),
+                    hertz(*to)
+                ))
+            }
             Note::Instead { points: count, chosen, found } => Some(format!(
                 "At {} `{chosen}`, which `auto` had chosen, found no orbit and `{found}` did.",
                 points(*count)
@@ -304,11 +342,13 @@ mod tests {
             instead("shooting"),
             instead("event-driven"),
             instead("shooting"),
+            Note::OtherOrbit { points: 2, from: 3.0 * TAU, to: 4.0 * TAU, ratio: 2.0 },
+            Note::OtherOrbit { points: 1, from: 2.0 * TAU, to: 2.0 * TAU, ratio: 0.25 },
         ] {
             note.join(&mut notes);
         }
         let texts: Vec<String> = notes.iter().filter_map(Note::text).collect();
-        assert_eq!(texts.len(), 8, "{texts:?}");
+        assert_eq!(texts.len(), 9, "{texts:?}");
         assert!(texts[0].starts_with("Ft = 1 N: at 3 of 20 points a joint sticks"), "{}", texts[0]);
         assert!(texts[1].starts_with("At 3 points") && texts[1].contains("5.0e-2"), "{}", texts[1]);
         assert!(texts[2].starts_with("At 2 points a joint or a part of one sticks"), "{}", texts[2]);
@@ -321,6 +361,11 @@ mod tests {
         assert_eq!(texts[5], "It is so.");
         assert!(texts[6].starts_with("At 2 points `shooting`") && texts[6].contains("`harmonic-balance` did"));
         assert!(texts[7].starts_with("At 1 point `event-driven`"), "{}", texts[7]);
+        assert!(
+            texts[8].contains("at 3 points between 2 and 4 Hz") && texts[8].contains("down to 0.25"),
+            "{}",
+            texts[8]
+        );
     }
 
     /// A branch takes no other method: its note names its own keys alone.

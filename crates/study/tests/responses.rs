@@ -459,6 +459,46 @@ frequency = { from = "14 Hz", to = "19 Hz", points = 101 }
     assert_eq!(found.record.points.keys().collect::<Vec<_>>(), ["converged"]);
 }
 
+/// A hardening spring bends the resonance over the frequencies behind it, and two motions are stable there: that of the table is told to have another. With
+/// twenty times the damping the bend is a hundredth of the width, and there is one.
+#[test]
+fn a_curve_that_folds_is_followed_both_ways() {
+    let study = |stiffness: &str, damping: f64, points: usize| {
+        let text = format!(
+            r#"
+schema = 1
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "10 kN/m"
+damping = "{damping} N s/m"
+[[joint]]
+name = "bent"
+between = ["m", "ground"]
+law = {{ kind = "cubic", stiffness = "{stiffness} N/m^3" }}
+[[force]]
+on = "m"
+amplitude = "10 N"
+[study]
+kind = "response"
+frequency = {{ from = "13 Hz", to = "20 Hz", points = {points} }}
+"#
+        );
+        let notes = dataset(&text).record.notes;
+        notes.into_iter().filter(|note| note.contains("followed the other way")).collect::<Vec<String>>()
+    };
+    // from the last frequency on, and from the first point of the next stretch
+    for points in [41, 141] {
+        for stiffness in ["2e7", "-1e6"] {
+            let notes = study(stiffness, 1.0, points);
+            assert!(notes.len() == 1 && notes[0].starts_with("warning: at "), "{stiffness} {points}: {notes:?}");
+        }
+        assert_eq!(study("1e6", 20.0, points), Vec::<String>::new());
+    }
+}
+
 /// Theory 11.13: over a stop without a gap, driven at 2.6 times the natural frequency, the motion that repeats with the drive is unstable; with
 /// `period = 2` every method gives the one that repeats after two periods, in the same columns.
 #[test]

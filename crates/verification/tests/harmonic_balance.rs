@@ -90,7 +90,7 @@ fn theory_10_1_and_10_2_griffin() {
         method: &one,
         range: (0.99, 1.1),
         points: 61,
-        quantity: &|orbit| orbit.places[0].amplitude(),
+        quantities: &|orbit| vec![orbit.places[0].amplitude()],
     };
     let free = performance(0.0);
     for (limit, peak) in [(1.0, 23.2989632), (1.2, 17.3660591), (2.0, 16.4663015), (3.0, 20.3196797)] {
@@ -217,7 +217,7 @@ fn theory_6_6_performance_of_the_couple() {
         method: &EventDriven,
         range: (TAU * 120.0, TAU * 121.5),
         points: 31,
-        quantity: &|orbit: &Orbit| orbit.places[0].amplitude(),
+        quantities: &|orbit: &Orbit| vec![orbit.places[0].amplitude()],
     };
     // 6.6 was found with five harmonics at most, which 6.3 says is 5 % off at 6 N, and on a grid of 0.02 Hz: 2 % away from there
     for (limit, cm) in [(0.5, 6.11), (2.0, 4.87), (4.0, 3.24), (5.0, 2.45), (8.0, 2.19), (12.0, 2.78)] {

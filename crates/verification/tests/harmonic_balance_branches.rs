@@ -40,7 +40,7 @@ fn along_frequency_to_the_peak() {
                 method: &method,
                 range: (TAU * 119.5, TAU * 122.5),
                 points: 61,
-                quantity: &|orbit: &Orbit| orbit.places[0].amplitude(),
+                quantities: &|orbit: &Orbit| vec![orbit.places[0].amplitude()],
             };
             let peak = performance.peak(limit).unwrap().peak.unwrap();
             let highest = branch.peaks.iter().map(|p| p.1).fold(0.0, f64::max);

@@ -8,6 +8,7 @@ use crate::method::{Method, MethodError, Solver};
 use crate::model::System;
 use crate::orbit::Orbit;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// A refined peak.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,8 +19,32 @@ pub struct Peak {
     pub value: f64,
     /// True if the largest value stands at an end of the range: the real peak may lie beyond.
     pub at_end: bool,
-    /// True if orbits beside it were not found: the real peak may be higher.
-    pub unsettled: bool,
+    /// Why the real peak may be higher; `None` where the search found it.
+    pub unsettled: Option<Unsettled>,
+}
+
+/// Why a search for a peak left open how high it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unsettled {
+    /// Orbits beside the highest one were not found.
+    Neighbours,
+    /// The curve still rises steeply from both sides where the search ends.
+    Needle,
+}
+
+impl std::fmt::Display for Unsettled {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Unsettled::Neighbours => {
+                "orbits beside this peak were not found, and the real one may be higher: much higher with little or no damping, or where friction \
+                 cannot bound the motion; look closer with a finer range or another method"
+            }
+            Unsettled::Needle => {
+                "this peak is narrower than its search resolves, and the real one is higher, or has no bound: without damping friction bounds a \
+                 resonance only up to a force; add the damping that the structure has, or take a narrower range"
+            }
+        })
+    }
 }
 
 /// A point of a curve on which peaks are sought.
@@ -60,6 +85,8 @@ const RISE: f64 = 1e-10;
 /// sampled series move in steps.
 const NOISE: f64 = 1e-4;
 const MOST_NOISE: f64 = 1e-7;
+/// How often a peak is sought again because the search for another one has met something higher.
+const OVERTAKEN: usize = 3;
 /// Orbits that may fail while the peak of one quantity is refined: what fails costs most.
 const FAILURES: usize = 2;
 /// Share of the first bracket beyond which an orbit that its neighbour does not lead to is sought in every way.
@@ -79,51 +106,73 @@ const TOGETHER: usize = 12;
 const JUMP: usize = 15;
 /// Orbits that the peak of one quantity may take beside those that others have asked for; smooth peaks take 3 to 6, kinks up to 15.
 const ORBITS: usize = 40;
-/// Grid maxima below this share of the highest cannot hide the highest peak between grid points, unless the grid is far too coarse.
+/// Maxima of the given points whose parabola reaches less than this share of the highest cannot hide the highest peak between them, unless these are
+/// far too few; and the same once other quantities have asked for orbits between them.
 const CANDIDATE: f64 = 0.8;
+const LIKELY: f64 = 0.95;
 
-/// The highest peak of `quantity` over a curve whose points are `omegas` (rising, rad/s) with `values` (NaN at failed points),
-/// refined between its neighbours with orbits of `solver`.
+/// The highest peak of the first `wanted` quantities over a curve whose points are `points` (rising), refined between its neighbours with orbits of
+/// `solver`. Each quantity's tops are sought by themselves: the highest of several quantities is the highest of their own peaks, while the largest of
+/// them at every frequency would hide the top of one behind the flank of another.
 ///
 /// Returns `None` if no point converged.
 ///
 /// # Example
 /// ```
-/// use stickslip::curve::peak::highest;
+/// use stickslip::curve::peak::{Point, highest};
 /// use stickslip::method::{Method, event_driven::EventDriven};
+/// use stickslip::orbit::Orbit;
 /// let mut couple = stickslip::model::example::blade_couple();
 /// couple.joints[0].law = std::sync::Arc::new(stickslip::law::Coulomb { limit: 4.0 });
 /// let system = couple.assemble().unwrap();
 /// let mut solver = EventDriven.solver(&system).unwrap();
-/// let omegas: Vec<f64> = (0..9).map(|i| std::f64::consts::TAU * (120.9 + 0.1 * f64::from(i))).collect();
-/// let values: Vec<f64> = omegas.iter().map(|w| solver.orbit(*w, None).unwrap().places[0].amplitude()).collect();
-/// let peak = highest(&mut *solver, &omegas, &values, &|orbit| orbit.places[0].amplitude()).unwrap();
+/// let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
+/// let omegas = (0..9).map(|i| std::f64::consts::TAU * (120.9 + 0.1 * f64::from(i)));
+/// let points: Vec<Point> = omegas.map(|w| Point::new(&solver.orbit(w, None).unwrap(), &amplitude)).collect();
+/// let peak = highest(&mut *solver, &points, 1, &amplitude).unwrap();
 /// assert!((peak.value - 0.032_338).abs() < 1e-6);
 /// ```
 pub fn highest(
     solver: &mut dyn Solver,
-    omegas: &[f64],
-    values: &[f64],
-    quantity: &dyn Fn(&Orbit) -> f64,
+    points: &[Point],
+    wanted: usize,
+    quantities: &dyn Fn(&Orbit) -> Vec<f64>,
 ) -> Option<Peak> {
-    let points: Vec<Point> = omegas
-        .iter()
-        .zip(values)
-        .map(|(omega, value)| Point { omega: *omega, values: vec![*value], start: None, error: 0.0 })
-        .collect();
-    let finite = (0..points.len()).filter(|&i| values[i].is_finite());
-    let best = finite.max_by(|&a, &b| values[a].total_cmp(&values[b]))?;
+    let largest = |point: &Point| (0..wanted).map(|quantity| point.value(quantity)).fold(f64::NEG_INFINITY, f64::max);
+    let finite = (0..points.len()).filter(|&i| largest(&points[i]).is_finite());
+    let best = finite.max_by(|&a, &b| largest(&points[a]).total_cmp(&largest(&points[b])))?;
     let at_end = best == 0 || best + 1 == points.len();
-    let mut peak = Peak { omega: omegas[best], value: values[best], at_end, unsettled: false };
-    for i in (1..points.len().saturating_sub(1)).filter(|&i| values[i] >= CANDIDATE * values[best]) {
-        if is_maximum(&points[i - 1..=i + 1], 0) {
-            let refined = refine(solver, &points[i - 1..=i + 1], &[0], &|orbit| vec![quantity(orbit)])[0].peak;
-            if refined.value > peak.value || (refined.value == peak.value && peak.at_end) {
-                peak = refined;
+    let mut peak = Peak { omega: points[best].omega, value: largest(&points[best]), at_end, unsettled: None };
+    let mut tops: Vec<(f64, usize, Vec<usize>)> = (1..points.len().saturating_sub(1))
+        .filter_map(|i| {
+            let near = &points[i - 1..=i + 1];
+            let mut here: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
+            here.sort_by(|&a, &b| reach(near, b).total_cmp(&reach(near, a)));
+            Some((reach(near, *here.first()?), i, here))
+        })
+        .collect();
+    // the most promising first: what it reaches leaves fewer of the others to look at
+    tops.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (_, i, here) in tops {
+        let mut bracket = Bracket::new(&points[i - 1..=i + 1]);
+        for quantity in here {
+            // what others have asked for tells more of this one than the points of the curve
+            let share = if bracket.points.len() > 3 { LIKELY } else { CANDIDATE };
+            if bracket.reach(quantity) >= share * peak.value {
+                bracket.refine(solver, quantity, quantities);
+                peak = higher(peak, bracket.peak(quantity).peak);
             }
         }
+        bracket.refine_overtaken(solver, quantities);
+        let refined: Vec<usize> = bracket.ended.keys().copied().collect();
+        peak = refined.into_iter().map(|quantity| bracket.peak(quantity).peak).fold(peak, higher);
     }
     Some(peak)
+}
+
+/// The higher one of two peaks; of equal ones the one that is not at an end.
+fn higher(one: Peak, other: Peak) -> Peak {
+    if other.value > one.value || (other.value == one.value && one.at_end) { other } else { one }
 }
 
 /// A peak of one of several quantities.
@@ -190,21 +239,34 @@ fn is_maximum(near: &[Point], quantity: usize) -> bool {
     known && here >= left && here > right && here - left.min(right) > LEVEL * here.abs()
 }
 
-/// The peaks of the `wanted` quantities, each of which is largest at the middle one of three points.
-fn refine(
-    solver: &mut dyn Solver,
-    near: &[Point],
-    wanted: &[usize],
-    quantities: &dyn Fn(&Orbit) -> Vec<f64>,
-) -> Vec<PeakOf> {
-    let mut points = near.to_vec();
-    let closest = CLOSEST * (near[2].omega - near[0].omega);
-    for &quantity in wanted {
+/// Three points of a curve, of which the middle one is a maximum of some quantities, and the orbits between them that were asked for since.
+struct Bracket {
+    points: Vec<Point>,
+    /// Distance of the ends, rad/s.
+    width: f64,
+    /// Where the last search for the peak of a quantity ended (rad/s), and whether it had found it.
+    ended: BTreeMap<usize, (f64, bool)>,
+}
+
+impl Bracket {
+    fn new(near: &[Point]) -> Self {
+        Bracket { points: near.to_vec(), width: near[2].omega - near[0].omega, ended: BTreeMap::new() }
+    }
+
+    /// What the parabola about the highest point of a quantity reaches.
+    fn reach(&self, quantity: usize) -> f64 {
+        let top = best(&self.points, quantity);
+        reach(&self.points[top - 1..=top + 1], quantity)
+    }
+
+    /// Asks for orbits until the peak of a quantity is found.
+    fn refine(&mut self, solver: &mut dyn Solver, quantity: usize, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
+        let points = &mut self.points;
         let mut shrink = Shrink::default();
         let mut failures = 0;
         for _ in 0..ORBITS {
-            let best = best(&points, quantity);
-            let Some(omega) = shrink.next(&points, best, quantity, closest) else { break };
+            let best = best(points, quantity);
+            let Some(omega) = shrink.next(points, best, quantity, CLOSEST * self.width) else { break };
             if failures == FAILURES {
                 break;
             }
@@ -213,9 +275,7 @@ fn refine(
             let error = points[best].error;
             let found = match solver.between(omega, start) {
                 // far from the neighbour it takes more than its help; close to it there is nothing to be gained
-                Err(_) if (omega - points[best].omega).abs() > AWAY * (near[2].omega - near[0].omega) => {
-                    solver.orbit(omega, start)
-                }
+                Err(_) if (omega - points[best].omega).abs() > AWAY * self.width => solver.orbit(omega, start),
                 found => found,
             };
             let point = match found {
@@ -228,21 +288,70 @@ fn refine(
             let at = points.partition_point(|point| point.omega < omega);
             points.insert(at, point);
         }
+        let top = best(points, quantity);
+        self.ended.insert(quantity, (points[top].omega, shrink.found));
     }
-    wanted
-        .iter()
-        .map(|&quantity| {
-            let top = best(&points, quantity);
-            let point = &points[top];
-            let unsettled = is_unsettled(&points[top - 1..=top + 1], quantity);
-            let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false, unsettled };
-            PeakOf { quantity, peak, values: point.values.clone() }
-        })
-        .collect()
+
+    /// Seeks the peaks of quantities again above which others have met a higher point since: between two points of a curve there may be several tops.
+    fn refine_overtaken(&mut self, solver: &mut dyn Solver, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
+        for _ in 0..OVERTAKEN {
+            let moved = |(quantity, (omega, _)): (&usize, &(f64, bool))| {
+                (self.points[best(&self.points, *quantity)].omega != *omega).then_some(*quantity)
+            };
+            let overtaken: Vec<usize> = self.ended.iter().filter_map(moved).collect();
+            if overtaken.is_empty() {
+                break;
+            }
+            overtaken.into_iter().for_each(|quantity| self.refine(solver, quantity, quantities));
+        }
+    }
+
+    /// Whether the highest point of a quantity is a peak that its search has found.
+    fn found(&self, quantity: usize) -> bool {
+        let omega = self.points[best(&self.points, quantity)].omega;
+        self.ended.get(&quantity) == Some(&(omega, true))
+    }
+
+    /// The peak of a quantity, as far as it is refined.
+    fn peak(&self, quantity: usize) -> PeakOf {
+        let top = best(&self.points, quantity);
+        let point = &self.points[top];
+        let near = &self.points[top - 1..=top + 1];
+        let unsettled = if lacks_neighbours(near, quantity) {
+            Some(Unsettled::Neighbours)
+        } else {
+            (!self.found(quantity) && is_needle(near, quantity)).then_some(Unsettled::Needle)
+        };
+        let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false, unsettled };
+        PeakOf { quantity, peak, values: point.values.clone() }
+    }
+}
+
+/// The peaks of the `wanted` quantities, each of which is largest at the middle one of three points.
+fn refine(
+    solver: &mut dyn Solver,
+    near: &[Point],
+    wanted: &[usize],
+    quantities: &dyn Fn(&Orbit) -> Vec<f64>,
+) -> Vec<PeakOf> {
+    let mut bracket = Bracket::new(near);
+    wanted.iter().for_each(|&quantity| bracket.refine(solver, quantity, quantities));
+    bracket.refine_overtaken(solver, quantities);
+    wanted.iter().map(|&quantity| bracket.peak(quantity)).collect()
+}
+
+/// The value at the vertex of the parabola through three points of which the middle one is the highest: a bound where the points are further apart than
+/// the peak is wide, and infinite where they say nothing of its height.
+fn reach(near: &[Point], quantity: usize) -> f64 {
+    let value = near[1].value(quantity);
+    let (rise, _) = parabola(near, 1, quantity);
+    // of 1/a² the relative rise is twice that of a, for small ones: the square says it for all
+    let left = 1.0 - 2.0 * rise;
+    if left > 0.0 { value / left.sqrt() } else { f64::INFINITY }
 }
 
 /// Whether an orbit beside the highest of three points was not found, and the line from the other side through that point rises to there.
-fn is_unsettled(near: &[Point], quantity: usize) -> bool {
+fn lacks_neighbours(near: &[Point], quantity: usize) -> bool {
     let rises = |other: usize, failed: usize| {
         let run = (near[failed].omega - near[1].omega) / (near[1].omega - near[other].omega);
         let here = form(near[1].value(quantity));
@@ -251,6 +360,14 @@ fn is_unsettled(near: &[Point], quantity: usize) -> bool {
         near[failed].values.is_empty() && (near[other].values.is_empty() || rise > SETTLED)
     };
     rises(0, 2) || rises(2, 0)
+}
+
+/// Whether a quantity falls on both sides of the middle one of three points by more than a peak that is found, and the parabola through them rises as
+/// much above it. Beside a kink or a jump it does so on one side at most, by the time that the bracket is closed.
+fn is_needle(near: &[Point], quantity: usize) -> bool {
+    let value = near[1].value(quantity);
+    let falls = |point: &Point| value - point.value(quantity) > SETTLED * value;
+    falls(&near[0]) && falls(&near[2]) && parabola(near, 1, quantity).0 > SETTLED
 }
 
 /// The highest inner point; the first and the last one are not above it.
@@ -269,6 +386,8 @@ struct Shrink {
     broken: usize,
     /// Where the last trial was two lines that cross: the form there, as promised.
     kink: Option<(f64, f64)>,
+    /// Whether the peak is found: there is nothing more to be had.
+    found: bool,
 }
 
 impl Shrink {
@@ -287,7 +406,8 @@ impl Shrink {
             _ => self.broken = 0,
         }
         // a promise that nothing more is to be had counts only from who has kept the last one
-        if (rise <= enough && self.broken == 0) || right - left <= 2.0 * floor || at_kink {
+        self.found = (rise <= enough && self.broken == 0) || at_kink;
+        if self.found || right - left <= 2.0 * floor {
             return None;
         }
         self.promised = Some(value * (1.0 + KEPT * rise));
@@ -356,6 +476,8 @@ fn crossing(points: &[Point], best: usize, quantity: usize) -> Option<(f64, f64)
 mod tests {
     use super::*;
     use crate::method::OrbitError;
+    use crate::method::event_driven::EventDriven;
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
 
     /// A solver for curves that are given: every orbit fails, the value is noted before.
     struct Formula<'a> {
@@ -428,6 +550,52 @@ mod tests {
         let mut formula = Formula { curve: &curve };
         let near = [0.9, 1.01, 1.1].map(|omega| Point { omega, values: vec![curve(omega)], start: None, error: 0.0 });
         let peak = refine(&mut formula, &near, &[0], &|_| Vec::new())[0].peak;
-        assert_eq!((peak.omega, peak.value, peak.unsettled), (1.01, curve(1.01), true));
+        assert_eq!((peak.omega, peak.value, peak.unsettled), (1.01, curve(1.01), Some(Unsettled::Neighbours)));
+    }
+
+    /// Two masses side by side, |x| = F / (c ω) at their resonances: a wide one of 2.5 mm, and a narrow one of 9.1 mm that 13 points five half-widths
+    /// apart show as 1.8 mm, below the wide one.
+    #[test]
+    fn a_narrow_top_between_two_points_counts_beside_a_wide_one() {
+        let mut model = Model::default();
+        for (name, stiffness, damping) in [("wide", 1e4, 4.0), ("narrow", 1.21e4, 1.0)] {
+            model.masses.push(Mass::new(name, 1.0));
+            model.springs.push(Spring { between: [name.to_owned(), GROUND.to_owned()], stiffness, damping });
+            model.forces.push(Force { on: name.to_owned(), amplitude: 1.0, phase: 0.0, harmonic: 1 });
+        }
+        let system = model.assemble().unwrap();
+        let amplitudes = |orbit: &Orbit| orbit.places.iter().map(|place| place.amplitude()).collect::<Vec<f64>>();
+        let mut solver = EventDriven.solver(&system).unwrap();
+        let mut point = |i: i32| Point::new(&solver.orbit(82.5 + 5.0 * f64::from(i), None).unwrap(), &amplitudes);
+        let points: Vec<Point> = (0..13).map(&mut point).collect();
+        let peak = highest(&mut *EventDriven.solver(&system).unwrap(), &points, 2, &amplitudes).unwrap();
+        // F / (c √(k/m - c²/4m²))
+        let expected = 1.0 / f64::sqrt(1.21e4 - 0.25);
+        assert!((peak.value / expected - 1.0).abs() < RISE && peak.unsettled.is_none(), "{peak:?}");
+    }
+
+    /// Without damping a slider of 2 N bounds nothing that 10 N drive: 4/π·2 N < 10 N. With as much damping as bounds it the peak is found.
+    #[test]
+    fn a_peak_without_a_bound_is_open() {
+        let peak = |damping: f64| {
+            let mut model = Model::default();
+            model.masses.push(Mass::new("m", 1.0));
+            model.springs.push(Spring { between: ["m".to_owned(), GROUND.to_owned()], stiffness: 1e4, damping });
+            model.forces.push(Force { on: "m".to_owned(), amplitude: 10.0, phase: 0.0, harmonic: 1 });
+            let law = std::sync::Arc::new(crate::law::Jenkins { stiffness: 1e3, limit: 2.0 });
+            model.joints.push(Joint { name: "j".to_owned(), between: ["m".to_owned(), GROUND.to_owned()], law });
+            let system = model.assemble().unwrap();
+            let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
+            let mut solver = EventDriven.solver(&system).unwrap();
+            let points: Vec<Point> = (0..9)
+                .map(|i| 95.3 + 1.1 * f64::from(i))
+                .map(|omega| {
+                    solver.orbit(omega, None).map_or(Point::failed(omega), |orbit| Point::new(&orbit, &amplitude))
+                })
+                .collect();
+            highest(&mut *solver, &points, 1, &amplitude).unwrap()
+        };
+        assert!(peak(0.0).unsettled.is_some(), "{:?}", peak(0.0));
+        assert_eq!(peak(0.5).unsettled, None);
     }
 }

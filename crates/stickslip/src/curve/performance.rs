@@ -4,7 +4,7 @@
 //! parameter this is the classical curve of friction damping: free at the left, stuck at the right, a minimum between.
 //! Source: Griffin (1980), Fig. 4.
 
-use super::peak::{Peak, highest};
+use super::peak::{Peak, Point, highest};
 use crate::method::{Method, MethodError};
 use crate::model::System;
 use crate::orbit::{Accuracy, Orbit};
@@ -22,8 +22,8 @@ pub struct Performance<'a, E> {
     pub range: (f64, f64),
     /// Grid points over the range, from which the peak is refined; their distance must not exceed the width of the peak.
     pub points: usize,
-    /// What is maximised over frequency, for example an amplitude, m.
-    pub quantity: &'a (dyn Fn(&Orbit) -> f64 + Sync),
+    /// What is maximised over frequency, for example amplitudes, m: of several quantities, always as many, the one with the highest peak counts.
+    pub quantities: &'a (dyn Fn(&Orbit) -> Vec<f64> + Sync),
 }
 
 /// The peak at one value of the parameter.
@@ -101,27 +101,25 @@ impl<E: Send> Performance<'_, E> {
         let last = self.points.max(3) - 1;
         let omegas: Vec<f64> =
             (0..=last).map(|i| self.range.0 + (self.range.1 - self.range.0) * i as f64 / last as f64).collect();
-        let mut start: Option<Vec<f64>> = None;
         let (mut failed, mut inaccurate) = (0, 0);
-        let values: Vec<f64> = omegas
-            .iter()
-            .map(|omega| match solver.orbit(*omega, start.as_deref()) {
+        let mut points: Vec<Point> = Vec::with_capacity(omegas.len());
+        for omega in omegas {
+            let start = points.last().and_then(|point| point.start.as_deref());
+            points.push(match solver.orbit(omega, start) {
                 Ok(orbit) => {
-                    let value = (self.quantity)(&orbit);
                     inaccurate += usize::from(orbit.evidence.accuracy != Accuracy::Converged);
-                    start = Some(orbit.start);
-                    value
+                    Point::new(&orbit, self.quantities)
                 }
                 Err(_) => {
                     failed += 1;
-                    start = None;
-                    f64::NAN
+                    Point::failed(omega)
                 }
-            })
-            .collect();
-        let peak = highest(&mut *solver, &omegas, &values, &|orbit| (self.quantity)(orbit));
-        // orbits that the search did not find beside the peak count too
-        failed += usize::from(peak.is_some_and(|peak| peak.unsettled));
+            });
+        }
+        let wanted = points.iter().map(|point| point.values.len()).max().unwrap_or(0);
+        let peak = highest(&mut *solver, &points, wanted, self.quantities);
+        // a peak that is left open counts as one that was not found
+        failed += usize::from(peak.is_some_and(|peak| peak.unsettled.is_some()));
         Ok(Row { value, peak, failed, inaccurate })
     }
 
@@ -145,7 +143,7 @@ impl<E: Send> Performance<'_, E> {
     ///     method: &EventDriven,
     ///     range: (119.5 * std::f64::consts::TAU, 122.5 * std::f64::consts::TAU),
     ///     points: 31,
-    ///     quantity: &|orbit| orbit.places[0].amplitude(),
+    ///     quantities: &|orbit| vec![orbit.places[0].amplitude()],
     /// }
     /// .curve(&[5.5, 6.5, 7.5])
     /// .unwrap();

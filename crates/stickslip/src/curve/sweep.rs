@@ -116,6 +116,34 @@ pub fn stretch(
     Ok(())
 }
 
+/// Follows a curve the other way: seeks orbits at some frequencies (rad/s), one after the other, the first one from the orbit of `start`, each of the
+/// others from the one before. Where several orbits exist a curve that was found in one direction may have stepped from one branch to another; in
+/// the other direction it steps elsewhere. `see` looks at the orbits that are found; their errors are not estimated. A point that is not found is left
+/// out, and the next one is sought alone.
+///
+/// # Errors
+/// The method cannot take the system.
+pub fn back(
+    method: &dyn Method,
+    system: &System,
+    start: Option<Vec<f64>>,
+    omegas: &mut dyn Iterator<Item = f64>,
+    stop: &AtomicBool,
+    see: &mut dyn FnMut(&Orbit),
+) -> Result<(), MethodError> {
+    let mut solver = method.solver(system)?;
+    let mut start = start;
+    for omega in omegas {
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let found = solver.between(omega, start.as_deref()).ok();
+        found.iter().for_each(&mut *see);
+        start = found.map(|orbit| orbit.start);
+    }
+    Ok(())
+}
+
 /// A point that is not seen yet.
 struct Missing {
     omega: f64,

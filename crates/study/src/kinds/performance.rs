@@ -5,7 +5,7 @@ mod tables;
 pub use tables::{Curve, Optimum, Point, curves};
 
 use super::keys::{FREQUENCY, anything, check_masses};
-use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
+use super::peak_of::{PEAK_OF, check_peak_of, held, peak_places};
 use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series};
@@ -24,7 +24,7 @@ use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
-use stickslip::model::{Model, System};
+use stickslip::model::Model;
 use stickslip::orbit::Accuracy;
 
 pub(super) const KIND: Kind = Kind {
@@ -87,7 +87,10 @@ fn compute(work: &Work<'_>) -> Computed {
     let (mut rows, mut optima) = (Rows::default(), Rows::default());
     for (prepared, row) in work.cases.iter().zip(&curve.rows) {
         let (failed, status) = (row.failed > 0 || row.peak.is_none(), status(row));
-        let reason = || format!("{} of the orbits on the frequency grid did not converge", row.failed);
+        let reason = || match row.peak.and_then(|peak| peak.unsettled) {
+            Some(why) => why.to_string(),
+            None => format!("{} of the orbits on the frequency grid did not converge", row.failed),
+        };
         part.count(|| prepared.case.label(), status, failed.then(reason));
         if row.inaccurate > 0 {
             part.notes.push(Note::Said(format!(
@@ -149,18 +152,6 @@ fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, parameter: &str, at: &s
     }
 }
 
-/// Amplitudes below this share of what the loads would do to a mass by itself are rounding: friction holds it.
-const HELD: f64 = 1e-10;
-
-/// The amplitude (m) below which a place counts as held at a frequency: a share of `F / (k + Ω²m)`, the largest there is.
-fn held(system: &System, omega: f64) -> f64 {
-    let (mass, stiffness) = (system.structure().mass(), system.structure().stiffness());
-    let alone = |i: usize, force: f64| force / (stiffness[(i, i)].abs() + omega * omega * mass[(i, i)]);
-    let loads = system.excitation(omega);
-    let sizes = loads.iter().flat_map(|(_, force)| force.iter().enumerate().map(|(i, f)| alone(i, f.norm())));
-    HELD * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
-}
-
 /// How far the orbits behind a peak may be trusted.
 fn status(row: &Row) -> &'static str {
     match (row.failed > 0 || row.peak.is_none(), row.inaccurate) {
@@ -191,9 +182,10 @@ fn curve(work: &Work<'_>) -> Result<PerformanceCurve, MethodError> {
         method: &*first.method,
         range,
         points: frequencies.len(),
-        quantity: &|orbit| {
-            let amplitude = worst(orbit, &places);
-            if amplitude > held(&first.system, orbit.omega) { amplitude } else { 0.0 }
+        quantities: &|orbit| {
+            let held = held(&first.system, orbit.omega);
+            let amplitudes = places.iter().map(|place| orbit.places[*place].amplitude());
+            amplitudes.map(|amplitude| if amplitude > held { amplitude } else { 0.0 }).collect()
         },
     };
     let values: Vec<f64> = work.cases.iter().map(|p| split(p).map_or(0.0, |(_, inner)| inner.si)).collect();

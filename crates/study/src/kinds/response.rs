@@ -1,6 +1,7 @@
 //! Response curves: amplitude over drive frequency.
 
 mod amplification;
+mod both_ways;
 mod by_case;
 mod by_mass;
 mod drawn;
@@ -27,6 +28,7 @@ use crate::survey::Surveyed;
 use crate::values::{Frequencies, hertz};
 use crate::warnings::sampled;
 use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
+use both_ways::BothWays;
 use drawn::SINGLE;
 use peaks::{Found, Sought, peaks_of};
 use references::{REFERENCE_POINTS, references};
@@ -106,6 +108,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         Some(_) => peaks,
         None => 0.0,
     };
+    let back = if costing.study.is_adaptive() || !both_ways::applies(costing.system()) { 0.0 } else { points };
     let curves = costing.cases.min(MOST_CURVES as f64) * costing.places.min(MOST_PANELS as f64 + SINGLE as f64);
     Cost {
         tables: vec![
@@ -118,7 +121,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         drawn: curves * costing.frequencies,
         unit: costing.orbit_bytes(),
         work: points * costing.extra()
-            + (points + REFINING * refined + tuned * costing.frequencies) * costing.orbit()
+            + (points + back + REFINING * refined + tuned * costing.frequencies) * costing.orbit()
             + 2.0 * linear * costing.reference(),
     }
 }
@@ -160,13 +163,11 @@ fn compute(work: &Work<'_>) -> Computed {
         let mut peaks = Rows::default();
         let all = peaks_of(work, points).map_err(|error| (case.index, error))?;
         for found in &all {
-            if found.peak.unsettled {
+            if let Some(why) = found.peak.unsettled {
                 let at = || {
                     format!("peak of {}, {}", prepared.system.places()[found.mass], location_of(case, found.peak.omega))
                 };
-                let reason = "orbits beside this peak were not found, and the real one may be higher: much higher with little or \
-                              no damping, or where friction cannot bound the motion; look closer with a finer range or another method";
-                part.count(at, "peak-unsettled", Some(reason.to_owned()));
+                part.count(at, "peak-unsettled", Some(why.to_string()));
             }
             peaks.varied(case);
             peaks.text(tables::MASS, &prepared.system.places()[found.mass]);
@@ -255,12 +256,17 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Vec<Point>, Me
     let sought = Sought::new(prepared);
     let point = |orbit: &Orbit| Point::new(orbit, &|orbit| sought.quantities(orbit));
     let mut points = Vec::new();
+    let mut ways = BothWays::new(work);
     orbits::sweep(work, &mut |omega, outcome| {
         stretch.add(omega, outcome.map(|outcome| kept(prepared, outcome)));
+        ways.iter_mut().zip(outcome).for_each(|(ways, outcome)| ways.add(omega, outcome));
         if let Some(outcome) = outcome.filter(|_| wanted) {
             points.push(outcome.map_or_else(|_| Point::failed(omega), point));
         }
     })?;
+    if let Some(ways) = ways {
+        ways.compared(work)?.into_iter().for_each(|note| note.join(&mut stretch.part.notes));
+    }
     if !wanted || points.is_empty() {
         return Ok(Vec::new());
     }

@@ -106,9 +106,8 @@ fn tuned(work: &Work<'_>) -> Result<Option<Peak>, String> {
         }
     };
     let inner = peak::all(method, &system, &points, 1, &quantities).map_err(|error| error.to_string())?;
-    let end = |point: &Point| {
-        Some(Peak { omega: point.omega, value: *point.values.first()?, at_end: true, unsettled: false })
-    };
+    let end =
+        |point: &Point| Some(Peak { omega: point.omega, value: *point.values.first()?, at_end: true, unsettled: None });
     let ends = [points.first(), points.last()].into_iter().flatten().filter_map(end);
     Ok(inner.into_iter().map(|peak| peak.peak).chain(ends).max_by(|a, b| a.value.total_cmp(&b.value)))
 }

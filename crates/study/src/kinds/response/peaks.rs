@@ -1,6 +1,6 @@
 //! The peaks of a stretch of a response curve.
 
-use super::super::peak_of::{named_places, worst};
+use super::super::peak_of::{held, named_places, worst};
 use crate::work::{Prepared, Work};
 use stickslip::curve::peak::{self, Peak, Point};
 use stickslip::method::MethodError;
@@ -95,7 +95,7 @@ pub(super) fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>
         (0..wanted.min(end.values.len()))
             .filter(falls)
             .map(|q| {
-                let peak = Peak { omega: end.omega, value: end.values[q], at_end: true, unsettled: false };
+                let peak = Peak { omega: end.omega, value: end.values[q], at_end: true, unsettled: None };
                 Found { mass: sought.mass(q, &end.values), peak, shape: Vec::new() }
             })
             .collect()
@@ -111,16 +111,17 @@ pub(super) fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>
     {
         last = at_end(end, neighbour);
     }
-    let quantities = |orbit: &Orbit| sought.quantities(orbit);
     // a place that friction holds moves by rounding only
     let largest = points.iter().flat_map(|point| point.values.iter().take(count)).fold(0.0f64, |a, b| a.max(*b));
+    let moves = |peak: &Peak| peak.value > (ROUNDING * largest).max(held(&prepared.system, peak.omega));
+    let quantities = |orbit: &Orbit| sought.quantities(orbit);
     let mut inner = peak::all(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
-    inner.retain(|peak| peak.peak.value > ROUNDING * largest && !ends_a_level(&points, peak.quantity, &peak.peak));
+    inner.retain(|found| !ends_a_level(&points, found.quantity, &found.peak));
     let inner = inner.into_iter().map(|found| {
         let mass = sought.mass(found.quantity, &found.values);
         Found { mass, peak: found.peak, shape: found.values[count..].to_vec() }
     });
-    Ok(first.into_iter().chain(inner).chain(last).collect())
+    Ok(first.into_iter().chain(inner).chain(last).filter(|found| moves(&found.peak)).collect())
 }
 
 /// Whether a peak is only where a level stretch ends: a mass that rides along with what moves it until a joint breaks loose.
