@@ -11,6 +11,7 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::perm::PermRef;
 use faer::traits::ComplexField;
+use faer::traits::math_utils::one;
 use faer::{Accum, Conj, MatMut, MatRef, Par, Spec};
 use num_complex::Complex64;
 
@@ -157,7 +158,7 @@ pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (us
     }
 }
 
-/// `C = A B`, or `A Bᵀ` if `transposed`, of large column-major matrices in blocks that stay in the cache: A is `rows × inner`, B `inner × columns` or
+/// `C = A B`, or `A Bᵀ` if `transposed`, of large real or complex column-major matrices in blocks that stay in the cache: A is `rows × inner`, B `inner × columns` or
 /// `columns × inner`. The same bits every time, but maybe others on another processor.
 ///
 /// # Example
@@ -169,10 +170,10 @@ pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (us
 /// stickslip_numerics::dense::multiply_in_blocks(&a, &b, &mut c, (2, 2, 1), true);
 /// assert_eq!(c, [23.0, 34.0]);
 /// ```
-pub fn multiply_in_blocks(
-    a: &[f64],
-    b: &[f64],
-    c: &mut [f64],
+pub fn multiply_in_blocks<T: Number>(
+    a: &[T],
+    b: &[T],
+    c: &mut [T],
     (rows, inner, columns): (usize, usize, usize),
     transposed: bool,
 ) {
@@ -183,7 +184,7 @@ pub fn multiply_in_blocks(
         false => MatRef::from_column_major_slice(b, inner, columns),
     };
     let c = MatMut::from_column_major_slice_mut(&mut c[..rows * columns], rows, columns);
-    matmul(c, Accum::Replace, a, b, 1.0, Par::Seq);
+    matmul(c, Accum::Replace, a, b, one(), Par::Seq);
 }
 
 /// `A = L Lᵀ` of a symmetric column-major matrix `n × n`, whose lower triangle is read and becomes L, in blocks that stay in the cache. Returns false if it
@@ -225,7 +226,7 @@ pub fn solve_lower_in_blocks(lower: &[f64], n: usize, right: &mut [f64], transpo
     }
 }
 
-/// Numbers that [`Lu`] takes: real and complex ones.
+/// Numbers that matrices here are of: real and complex ones.
 pub trait Number: ComplexField + Copy {
     /// Whether it is a number at all, and not zero.
     fn is_pivot(self) -> bool;

@@ -49,7 +49,7 @@ fn growth(sizes: &[usize], made: &dyn Fn(usize) -> System, harmonics: usize) -> 
         / points.iter().map(|p| (p.0 - x) * (p.0 - x)).sum::<f64>()
 }
 
-/// Neighbouring points at 121 Hz, each started from the one before.
+/// Neighbouring points from 121 Hz upwards, each started from the one before; none twice, which the last two would lead to without a step.
 struct Neighbours<'a> {
     solver: Box<dyn Solver + Send + 'a>,
     start: Vec<f64>,
@@ -65,7 +65,7 @@ impl<'a> Neighbours<'a> {
 
     fn next(&mut self) {
         self.count += 1;
-        let omega = TAU * (121.0 + 0.02 * f64::from(self.count % 2));
+        let omega = TAU * (121.0 + 0.02 * f64::from(self.count));
         self.start = self.solver.orbit(omega, Some(&self.start)).unwrap().start;
     }
 }

@@ -486,7 +486,7 @@ kind = "response"
 frequency = {{ from = "13 Hz", to = "20 Hz", points = {points} }}
 "#
         );
-        let notes = dataset(&text).record.notes;
+        let notes = dataset(&text).notes;
         notes.into_iter().filter(|note| note.contains("followed the other way")).collect::<Vec<String>>()
     };
     // from the last frequency on, and from the first point of the next stretch

@@ -172,18 +172,24 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
             force.iter_mut().zip(now).take(directions).for_each(|(force, now)| force[i] = now);
         };
         let Some(rows) = rows else {
-            let mut from = at(0);
-            for step in 1..=n {
-                let i = step % n;
-                let to = at(i);
-                keep(i, self.advance(&from, &to, z));
-                from = to;
-                let (end, here) = (&trail[..z.len()], &trail[i * z.len()..(i + 1) * z.len()]);
-                if !z.is_empty() && here == z {
-                    z.copy_from_slice(end);
-                    return;
+            match z.len() {
+                1 => values::<1, L>(self, (n, at), (z, trail), keep),
+                2 => values::<2, L>(self, (n, at), (z, trail), keep),
+                _ => {
+                    let mut from = at(0);
+                    for step in 1..=n {
+                        let i = step % n;
+                        let to = at(i);
+                        keep(i, self.advance(&from, &to, z));
+                        from = to;
+                        let (end, here) = (&trail[..z.len()], &trail[i * z.len()..(i + 1) * z.len()]);
+                        if !z.is_empty() && here == z {
+                            z.copy_from_slice(end);
+                            return;
+                        }
+                        trail[i * z.len()..(i + 1) * z.len()].copy_from_slice(z);
+                    }
                 }
-                trail[i * z.len()..(i + 1) * z.len()].copy_from_slice(z);
             }
             return;
         };
@@ -212,6 +218,30 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
     fn holds(&self, mean: &[f64; MOST_DIRECTIONS], reach: &[f64; MOST_DIRECTIONS]) -> bool {
         StepLaw::holds(self, mean, reach)
     }
+}
+
+/// The steps of [`Step::around`] without derivatives, of a law with so many states: most have one or two.
+fn values<const STATES: usize, L: StepLaw>(
+    law: &L,
+    (n, at): (usize, impl Fn(usize) -> [f64; MOST_DIRECTIONS]),
+    (z, trail): (&mut [f64], &mut [f64]),
+    mut keep: impl FnMut(usize, [f64; MOST_DIRECTIONS]),
+) {
+    let mut now: [f64; STATES] = std::array::from_fn(|s| z[s]);
+    let (trail, _) = trail.as_chunks_mut::<STATES>();
+    let mut from = at(0);
+    for step in 1..=n {
+        let i = if step == n { 0 } else { step };
+        let to = at(i);
+        keep(i, law.advance(&from, &to, &mut now));
+        from = to;
+        if trail[i] == now {
+            now = trail[0];
+            break;
+        }
+        trail[i] = now;
+    }
+    z.copy_from_slice(&now);
 }
 
 /// Derivatives by the arguments from `first` on, as many as the dual number has.

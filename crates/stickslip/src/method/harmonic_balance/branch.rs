@@ -13,6 +13,7 @@ use crate::method::{MethodError, OrbitError};
 use crate::model::System;
 use crate::orbit::Orbit;
 use num_complex::Complex64;
+use std::sync::Arc;
 use stickslip_numerics::continuation::Equations;
 
 /// Harmonics when none are given.
@@ -29,14 +30,14 @@ const RESONANCE: f64 = 30.0;
 /// The equations; unknowns are the harmonics of the joints' motions, relative to the size of the first orbit.
 pub(crate) struct BranchEquations<'a> {
     at: &'a dyn Fn(f64) -> (System, f64),
-    system: System,
+    system: Arc<System>,
     omega: f64,
     value: f64,
     span: f64,
     ports: Ports,
     around: Option<Ports>,
     rest: Rest,
-    rest_of: System,
+    rest_of: Arc<System>,
     level: Level,
     /// Twice the harmonics, which tell the error, unless they are too many.
     finer: Option<Level>,
@@ -56,6 +57,7 @@ impl<'a> BranchEquations<'a> {
         range: (f64, f64),
     ) -> Result<Self, MethodError> {
         let (system, omega) = at(range.0);
+        let system = Arc::new(system);
         // a force that is zero at the first value may not be so later
         let kept = Kept::new(&system, |_| true);
         method.check(kept.highest)?;
@@ -97,6 +99,7 @@ impl<'a> BranchEquations<'a> {
             return true;
         }
         let (system, omega) = (self.at)(value);
+        let system = Arc::new(system);
         match Ports::of_sector(&system) {
             Ok((found, around))
                 if omega > 0.0

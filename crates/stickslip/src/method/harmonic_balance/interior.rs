@@ -12,7 +12,7 @@ use super::coupled::Near;
 use super::ease::GIVEN;
 use super::equations::{Level, OPEN, Slopes, Solution};
 use super::ports::{Alternation, Barrier, Port, Ports, block};
-use super::solve::Lost;
+use super::solve::{Goal, Lost};
 use num_complex::Complex64;
 
 /// Samples of a period for the wave of the highest harmonic: Newton's method goes on with all of them.
@@ -54,7 +54,7 @@ impl Level {
         if !self.follow_interior(ports, omega, motion) {
             return Err(Lost::after(motion.iterations, f64::INFINITY));
         }
-        self.newton(ports, omega, motion, GIVEN, ITERATIONS)
+        self.newton(ports, omega, motion, GIVEN, (ITERATIONS, Goal::Solved))
     }
 
     /// To the end of the path; whether it was reached.

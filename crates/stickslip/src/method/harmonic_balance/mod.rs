@@ -59,11 +59,11 @@ use num_complex::Complex64;
 use ports::{Port, Ports};
 use rest::Rest;
 use sampling::{samples_for, samples_of_steps};
-use solve::Lost;
+use solve::{Goal, Lost};
 use sparse::Sparse;
-use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 pub use work::{doubling_work, factor_bytes, most_work, orbit_work, step_work};
 
 /// Its name in study files.
@@ -137,6 +137,9 @@ const ORDER: f64 = 2.0;
 /// Where friction is rigid or steep, one doubling is not believed to have left less than this share of the distance of the one before: two
 /// motions may be near each other by chance, as 1.3e-3 where the error is 1e-2.
 const CHANCE: f64 = 0.1;
+/// Share of the residual that a shorter series leaves in the longer one to which that is solved for an estimate of the error: the estimate is off by about as
+/// much of itself. One step of Newton's method leaves less where friction is elastic, so that the second one is spared.
+const KNOWN: f64 = 1e-3;
 /// Samples per period, at least, and per harmonic. Sliders and stops need them to tell turning points apart only; laws with a memory
 /// need as many as [`samples_for`] the tolerance.
 const SAMPLES: usize = 1024;
@@ -288,7 +291,7 @@ impl Method for HarmonicBalance {
         false
     }
     fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Ok(Box::new(Balance::new(Cow::Borrowed(system), *self, 1)?))
+        Ok(Box::new(Balance::new(system.clone(), *self, 1)?))
     }
 }
 
@@ -332,7 +335,7 @@ impl Method for Subharmonic {
         let HarmonicBalance { harmonics, samples, tolerance } = self.balance;
         let balance = HarmonicBalance { harmonics: harmonics.map(times), samples: samples.map(times), tolerance };
         let slowed = system.slowed(u32::try_from(period).map_err(too_high)?);
-        Ok(Box::new(Afresh(Balance::new(Cow::Owned(slowed), balance, period)?)))
+        Ok(Box::new(Afresh(Balance::new(slowed, balance, period)?)))
     }
 }
 
@@ -362,8 +365,8 @@ impl Recent {
     }
 }
 
-struct Balance<'a> {
-    system: Cow<'a, System>,
+struct Balance {
+    system: Arc<System>,
     method: HarmonicBalance,
     /// Periods of the drive in one of the motion; harmonics count those of the motion.
     periods: usize,
@@ -390,8 +393,8 @@ struct Balance<'a> {
     compared: BTreeMap<usize, [Solution; 2]>,
 }
 
-impl<'a> Balance<'a> {
-    fn new(system: Cow<'a, System>, method: HarmonicBalance, periods: usize) -> Result<Self, MethodError> {
+impl Balance {
+    fn new(system: System, method: HarmonicBalance, periods: usize) -> Result<Self, MethodError> {
         let kept = if periods > 1 {
             Kept::slowed(&system, periods)
         } else {
@@ -416,7 +419,7 @@ impl<'a> Balance<'a> {
             kept,
             first,
             judge: Judge::new(&system),
-            system,
+            system: Arc::new(system),
             levels: BTreeMap::new(),
             recent: VecDeque::new(),
             followed: Vec::new(),
@@ -426,7 +429,7 @@ impl<'a> Balance<'a> {
     }
 }
 
-impl Balance<'_> {
+impl Balance {
     /// The level of highest harmonic `top`, ready for `omega`.
     ///
     /// # Errors
@@ -628,21 +631,21 @@ impl Balance<'_> {
         let truncation = if self.can_compare(top, Work::default()) {
             // what was asked for is there: its error may take as much again
             self.levels.values_mut().for_each(Level::begin_point);
-            self.compare(top, omega, &motion, &x).ok().map(|(error, ..)| error)
+            self.compare(top, omega, &motion, &x).ok().map(|(error, _)| error)
         } else {
             None
         };
         self.finish(top, omega, motion, x, truncation)
     }
 
-    /// Error of `motion` by one with twice the harmonics, and of laws with a memory with twice the samples too, which is returned with its places.
+    /// Error of `motion` by one with twice the harmonics, and of laws with a memory with twice the samples too, which is returned.
     fn compare(
         &mut self,
         top: usize,
         omega: f64,
         motion: &Solution,
         x: &[DVector<Complex64>],
-    ) -> Result<(f64, Solution, Vec<DVector<Complex64>>), Lost> {
+    ) -> Result<(f64, Solution), Lost> {
         let double = self.kept.double(top);
         let start = self.refined(top, motion);
         let (few, many) = (self.kept.up_to(top), self.kept.up_to(double));
@@ -651,10 +654,11 @@ impl Balance<'_> {
         self.level(double, omega)?;
         let finer = self.levels.get_mut(&double).expect("made above");
         finer.prolongs = true;
+        let goal = if self.ports.iter().any(Port::marches) { Goal::Solved } else { Goal::Share(KNOWN) };
         let better = match finer.approach_by_twice_the_samples(&self.ports, omega, &start, &coarse, shorter.as_ref()) {
             Some(better) => better,
             None => {
-                let solved = finer.solve(&self.ports, omega, start)?;
+                let solved = finer.solve_to(&self.ports, omega, start, goal)?;
                 finer.by_twice_the_samples(&self.ports, omega, &solved, &coarse).map_or(solved, |(motion, _)| motion)
             }
         };
@@ -666,7 +670,7 @@ impl Balance<'_> {
         let coarse = Compared { harmonics: &few, places: x, along: &motion.c };
         let at = (self.kept, omega);
         let error = estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &better, &y));
-        Ok((error, better, y))
+        Ok((error, better))
     }
 
     /// A start with twice the harmonics: a solution, and what these added to the last one that was compared.
@@ -703,7 +707,7 @@ impl Balance<'_> {
         let (mut checked, mut estimate) = (top, 1.0);
         let mut needed = None;
         while top <= MOST * self.kept.scale && self.can_compare(top, self.taken(None)) {
-            let (mut error, finer, y) = match self.compare(top, omega, &motion, &x) {
+            let (mut error, finer) = match self.compare(top, omega, &motion, &x) {
                 Ok(compared) => compared,
                 // what was found has an error that is known
                 Err(_) if top > first && self.ports.has_forces() => {
@@ -729,12 +733,10 @@ impl Balance<'_> {
                     break;
                 }
             }
-            (top, motion, x) = (self.kept.double(top), finer, y);
-            if self.ports.iter().any(Port::marches) {
-                // that has other samples
-                motion = self.solve(top, omega, Some((top, &motion))).map_err(|l| self.lost(l))?;
-                x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
-            }
+            top = self.kept.double(top);
+            // the finer one is solved as far as the error asks for, or by other samples
+            motion = self.solve(top, omega, Some((top, &finer))).map_err(|l| self.lost(l))?;
+            x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         }
         let harmonics = checked / self.periods;
         Err(OrbitError::Truncation {
@@ -749,7 +751,7 @@ impl Balance<'_> {
     }
 }
 
-impl Balance<'_> {
+impl Balance {
     /// The user's number of harmonics, or as many as are needed, from `first` on.
     fn from(&mut self, first: usize, omega: f64, warm: Option<(usize, Solution)>) -> Result<Orbit, OrbitError> {
         match self.method.harmonics {
@@ -785,6 +787,13 @@ impl Balance<'_> {
         no_orbit(course)
     }
 
+    /// Whether a search begins on the line through the last two motions: of many contacts, and of elastic ones where motions do not separate, so that whatever
+    /// it begins with leads to the same orbit. Rigid friction jumps from one set of slipping samples to the next.
+    fn goes_ahead(&self, top: usize) -> bool {
+        let unique = self.judge.proves() && !self.ports.has_forces();
+        unique || self.levels.get(&top).is_some_and(Level::is_coupled)
+    }
+
     /// The harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess.
     fn warm(&self, start: Option<&[f64]>, omega: f64) -> Option<(usize, Solution)> {
         let start = start?;
@@ -792,14 +801,14 @@ impl Balance<'_> {
         let near = self.recent.get(same.unwrap_or(0))?;
         let before = self.recent.iter().skip(same.unwrap_or(0) + 1).find(|recent| recent.top == near.top);
         let motion = match before {
-            Some(before) if self.levels.get(&near.top).is_some_and(Level::is_coupled) => near.towards(before, omega),
+            Some(before) if self.goes_ahead(near.top) => near.towards(before, omega),
             _ => near.motion.clone(),
         };
         Some((near.top, motion))
     }
 }
 
-impl Solver for Balance<'_> {
+impl Solver for Balance {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });

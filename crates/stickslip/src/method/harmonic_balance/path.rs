@@ -91,7 +91,7 @@ pub(super) fn stays(setting: &Setting, level: &Level, motion: &Solution, x: &[DV
 
 #[derive(Debug, Clone)]
 struct Series {
-    system: System,
+    system: Arc<System>,
     omega: f64,
     harmonics: Vec<usize>,
     x: Vec<DVector<Complex64>>,
@@ -102,7 +102,7 @@ struct Series {
 
 /// What the solver knows beside the motion.
 pub(super) struct Setting<'a> {
-    pub system: &'a System,
+    pub system: &'a Arc<System>,
     pub ports: &'a Ports,
     /// Those of the whole ring, where one sector of it was solved.
     pub around: Option<&'a Ports>,
@@ -214,12 +214,15 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
             let Some(&Member { share, .. }) = port.member(j) else { continue };
             level.sample(ports, p, omega, motion);
             let alternation = &level.alternation;
-            for (i, force) in force.iter_mut().enumerate() {
-                for (a, force) in force.iter_mut().enumerate().take(port.axes) {
-                    *force += share * alternation.force[a][i];
-                }
-                if port.tells_slip() && alternation.slips[i] {
-                    contact[i] = Contact::slip(share * alternation.force[0][i]);
+            for (a, own) in alternation.force.iter().enumerate().take(port.axes) {
+                force.iter_mut().zip(own).for_each(|(force, own)| force[a] += share * own);
+            }
+            if port.tells_slip() {
+                let slips = alternation.slips.iter().zip(&alternation.force[0]);
+                for (contact, (slips, force)) in contact.iter_mut().zip(slips) {
+                    if *slips {
+                        *contact = Contact::slip(share * force);
+                    }
                 }
             }
             told |= port.tells_slip();
@@ -302,8 +305,7 @@ impl Measuring<'_> {
     }
 
     fn range_of(&self, signal: &[Complex64]) -> (f64, f64) {
-        let series: Vec<(usize, Complex64)> = self.harmonics.iter().copied().zip(signal.iter().copied()).collect();
-        extremes(&series, &mut self.level.borrow_mut())
+        self.level.borrow_mut().alternation.range(signal)
     }
 
     fn derivative(&self, mut signal: Vec<Complex64>) -> Vec<Complex64> {
@@ -377,11 +379,11 @@ impl Signals for Measuring<'_> {
     }
     fn faces(&self, joint: usize) -> Faces {
         let contact = &self.contact[joint];
-        let samples = contact.len();
-        let switches = (0..samples).filter(|&i| contact[i] != contact[(i + 1) % samples]).count();
+        let runs: Vec<_> = contact.chunk_by(PartialEq::eq).map(|run| (run[0], run.len() as f64)).collect();
+        let changes = runs.len() - usize::from(contact.first() == contact.last());
         Faces {
-            shares: Shares::of(contact.iter().map(|contact| (*contact, 1.0))),
-            switches: switches / self.halves,
+            shares: Shares::of(runs.into_iter()),
+            switches: changes / self.halves,
             rests: contact.iter().all(|contact| *contact == Contact::Stick),
         }
     }
@@ -423,54 +425,6 @@ fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVecto
         force += x[i] * (place.stiffness.0[i] + s * place.damping.0[i] + s * s * place.mass.0[i]);
     }
     force
-}
-
-/// Least and largest value of a series: the extremes of its samples, moved to the zero of the slope.
-fn extremes(series: &[(usize, Complex64)], level: &mut Level) -> (f64, f64) {
-    let alternation = &mut level.alternation;
-    alternation.fourier.synthesise(series, &mut alternation.signal);
-    let n = alternation.signal.len();
-    let (mut lowest, mut highest) = (0, 0);
-    for i in 1..n {
-        if alternation.signal[i] < alternation.signal[lowest] {
-            lowest = i;
-        }
-        if alternation.signal[i] > alternation.signal[highest] {
-            highest = i;
-        }
-    }
-    let refined = |start: usize| {
-        let mut theta = start as f64 * TAU / n as f64;
-        let mut best = alternation.signal[start];
-        for _ in 0..3 {
-            // harmonics stand at equal distances
-            let first = series[0].0;
-            let mut turn = Complex64::cis(first as f64 * theta);
-            let next = Complex64::cis(series.get(1).map_or(0, |(h, _)| h - first) as f64 * theta);
-            let (mut value, mut slope, mut bend) = (0.0, 0.0, 0.0);
-            for &(h, c) in series {
-                let z = c * turn;
-                let h = h as f64;
-                value += z.re;
-                slope -= h * z.im;
-                bend -= h * h * z.re;
-                turn *= next;
-            }
-            let step = slope / bend;
-            if !step.is_finite() || step.abs() > TAU / n as f64 {
-                break;
-            }
-            theta -= step;
-            // the vertex of the parabola there: what it leaves out has the third power of the step
-            best = value - 0.5 * slope * step;
-            if step.abs() * step.abs() < f64::EPSILON {
-                break;
-            }
-        }
-        best
-    };
-    let (low, high) = (refined(lowest), refined(highest));
-    (low.min(alternation.signal[lowest]), high.max(alternation.signal[highest]))
 }
 
 impl Path for Series {

@@ -9,7 +9,7 @@
 use super::ease::{Ease, GIVEN, SOLVED};
 use super::equations::{Level, Slopes, Solution};
 use super::ports::Ports;
-use super::solve::Lost;
+use super::solve::{Goal, Lost};
 
 /// Share of their distance from the point before by which forces are drawn to it, at first.
 const PULL: f64 = 1.0;
@@ -39,7 +39,7 @@ impl Level {
         for _ in 0..MOST {
             let next = pull * factor;
             let before = motion.iterations;
-            let found = self.newton(ports, omega, motion, Ease { pull: next, ..GIVEN }, ITERATIONS);
+            let found = self.newton(ports, omega, motion, Ease { pull: next, ..GIVEN }, (ITERATIONS, Goal::Solved));
             if found.is_ok() {
                 let length = self.length(motion);
                 motion.residual = self.evaluate(ports, omega, motion, GIVEN, length, Slopes::None);

@@ -9,6 +9,9 @@ use stickslip_numerics::dense::{Lu, multiply_in_blocks};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
+/// Axes from which products in blocks are the faster ones.
+const BLOCKED: usize = 12;
+
 /// Receptances at the harmonics of a level, m/N.
 #[derive(Debug, Clone)]
 pub(super) enum Receptance {
@@ -101,13 +104,19 @@ impl Receptance {
             Receptance::Formed(_) if moved.is_empty() => {}
             Receptance::Formed(matrices) => {
                 let nh = matrices.len();
-                let mut sum = vec![ZERO; moved.len() / nh];
+                let axes = moved.len() / nh;
+                let mut memory = vec![ZERO; 2 * axes];
+                let (forces, sum) = memory.split_at_mut(axes);
                 for (k, matrix) in matrices.iter().enumerate() {
-                    // column by column, as the matrix lies in memory
-                    sum.fill(ZERO);
-                    let forces = force[k..].iter().step_by(nh);
-                    for (column, f) in matrix.as_slice().chunks_exact(sum.len()).zip(forces) {
-                        sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += r * f);
+                    forces.iter_mut().zip(force[k..].iter().step_by(nh)).for_each(|(own, force)| *own = *force);
+                    if axes >= BLOCKED {
+                        multiply_in_blocks(matrix.as_slice(), forces, sum, (axes, axes, 1), false);
+                    } else {
+                        // column by column, as the matrix lies in memory
+                        sum.fill(ZERO);
+                        for (column, f) in matrix.as_slice().chunks_exact(axes).zip(&*forces) {
+                            sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += r * f);
+                        }
                     }
                     moved[k..].iter_mut().step_by(nh).zip(&*sum).for_each(|(moved, sum)| *moved = *sum);
                 }

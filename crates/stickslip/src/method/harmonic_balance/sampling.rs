@@ -15,6 +15,8 @@ const MOST: f64 = 65536.0;
 const LEFT: f64 = 0.05;
 /// The last step by twice the samples, at most, as a share of the distance that is to be known: steps leave some hundredths of themselves.
 const SHARE: f64 = 0.1;
+/// The same of a step by derivatives that were made anew on the way, near the solution. Measured: of 16 nodes it leaves 0.005 of itself at most.
+const SHARE_ANEW: f64 = 3.0;
 /// Steps, and what each is to leave of the one before.
 const MOST_STEPS: usize = 8;
 const CLOSER: f64 = 0.3;
@@ -86,6 +88,7 @@ impl Level {
         }
         let near = |residual, kept| Near { length, residual, sketched: true, kept };
         let (mut last, mut found, mut left) = (f64::INFINITY, false, MOST_STEPS);
+        let mut share = SHARE;
         loop {
             self.exchange_for_twice();
             self.nearby = true;
@@ -105,10 +108,10 @@ impl Level {
                 // those of a motion that is too far away
                 motion.copy(&self.before);
                 self.linearise_at(ports, omega, &mut motion, length);
-                last = f64::INFINITY;
+                (last, share) = (f64::INFINITY, SHARE_ANEW);
                 continue;
             }
-            found |= step <= SHARE * self.apart(ports, &motion, coarse, length);
+            found |= step <= share * self.apart(ports, &motion, coarse, length);
             left -= 1;
             if found || left == 0 || step > CLOSER * last {
                 self.step_forces(ports, &mut motion, length);

@@ -67,6 +67,17 @@ const SAMPLES: usize = 1024;
 /// Products with the derivative that a step takes, roughly.
 const PRODUCTS: f64 = 30.0;
 
+/// Where a search ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Goal {
+    /// Where the equations count as solved.
+    Solved,
+    /// At a residual, on the way by fewer samples.
+    Rough(f64),
+    /// At this share of the residual that it began with.
+    Share(f64),
+}
+
 /// The search did not end.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lost {
@@ -99,17 +110,17 @@ impl Level {
         omega: f64,
         motion: &mut Solution,
         ease: Ease,
-        most: usize,
+        (most, goal): (usize, Goal),
     ) -> Result<(), Lost> {
         if !self.sketches || self.sketch.is_none() {
-            return self.search(ports, omega, motion, ease, (most, SOLVED));
+            return self.search(ports, omega, motion, ease, (most, goal));
         }
         let start = motion.clone();
         let taken = (self.assembled, self.eliminated, self.products);
         self.exchange_samples();
-        let rough = self.search(ports, omega, motion, ease, (most, self.rough()));
+        let rough = self.search(ports, omega, motion, ease, (most, Goal::Rough(self.rough())));
         self.exchange_samples();
-        if rough.is_ok() && self.search(ports, omega, motion, ease, (most, SOLVED)).is_ok() {
+        if rough.is_ok() && self.search(ports, omega, motion, ease, (most, goal)).is_ok() {
             return Ok(());
         }
         // once in a search, so that what it took is as much again at most
@@ -118,7 +129,7 @@ impl Level {
         self.spent.eliminated += before - self.taken(ports).eliminated;
         self.sketches = false;
         *motion = Solution { iterations: motion.iterations, ..start };
-        self.search(ports, omega, motion, ease, (most, SOLVED))
+        self.search(ports, omega, motion, ease, (most, goal))
     }
 
     /// See [`ROUGH`].
@@ -134,12 +145,17 @@ impl Level {
         omega: f64,
         motion: &mut Solution,
         ease: Ease,
-        (most, solved): (usize, f64),
+        (most, goal): (usize, Goal),
     ) -> Result<(), Lost> {
-        let rough = solved > SOLVED;
+        let rough = matches!(goal, Goal::Rough(_));
         let mut length = self.length(motion);
         self.nearby = self.sketches;
         let mut residual = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
+        let solved = match goal {
+            Goal::Solved => SOLVED,
+            Goal::Rough(solved) => solved,
+            Goal::Share(share) => SOLVED.max(share * residual),
+        };
         let mut sketched = self.sketches && !rough;
         let (mut rough_slopes, mut kept) = (false, false);
         let mut recent = [residual; REMEMBERED];
@@ -357,7 +373,7 @@ impl Level {
         self.begin_anew(ports);
         let mut motion = Solution { iterations: 0, ..start.clone() };
         self.exchange_samples();
-        let found = self.search(ports, omega, &mut motion, GIVEN, (ITERATIONS, self.rough()));
+        let found = self.search(ports, omega, &mut motion, GIVEN, (ITERATIONS, Goal::Rough(self.rough())));
         self.exchange_samples();
         (found.is_ok() && !self.is_away(&motion)).then_some(motion)
     }
@@ -365,15 +381,20 @@ impl Level {
     /// The solution that Newton's method finds from `motion`, which is nearby.
     pub fn polish(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, most: usize) -> Result<(), Lost> {
         self.begin_anew(ports);
-        self.newton(ports, omega, motion, GIVEN, most)
+        self.newton(ports, omega, motion, GIVEN, (most, Goal::Solved))
     }
 
     /// The solution, from `start`.
-    pub fn solve(&mut self, ports: &Ports, omega: f64, mut start: Solution) -> Result<Solution, Lost> {
+    pub fn solve(&mut self, ports: &Ports, omega: f64, start: Solution) -> Result<Solution, Lost> {
+        self.solve_to(ports, omega, start, Goal::Solved)
+    }
+
+    /// The same where Newton's method leads there by itself to a goal.
+    pub fn solve_to(&mut self, ports: &Ports, omega: f64, mut start: Solution, goal: Goal) -> Result<Solution, Lost> {
         start.iterations = 0;
         self.begin_anew(ports);
         let mut motion = start.clone();
-        if self.newton(ports, omega, &mut motion, GIVEN, ITERATIONS).is_ok() && !self.is_away(&motion) {
+        if self.newton(ports, omega, &mut motion, GIVEN, (ITERATIONS, goal)).is_ok() && !self.is_away(&motion) {
             return Ok(motion);
         }
         let mut nearest = f64::INFINITY;
@@ -392,7 +413,7 @@ impl Level {
         if self.stands() {
             // friction that stuck contacts carry in the mean
             motion = Solution { iterations: motion.iterations, relaxed_at_zero: true, ..self.at_rest(1.0) };
-            let found = self.newton(ports, omega, &mut motion, GIVEN, ITERATIONS);
+            let found = self.newton(ports, omega, &mut motion, GIVEN, (ITERATIONS, Goal::Solved));
             let away = self.is_away(&motion);
             if found.is_ok() && !away {
                 return Ok(motion);
@@ -427,7 +448,7 @@ impl Level {
                 false => Solution { iterations, ..self.unhindered() },
             };
             let most = if self.stands() { STICKS } else { ITERATIONS };
-            held = self.newton(ports, omega, &mut good, Ease { limits, ..GIVEN }, most);
+            held = self.newton(ports, omega, &mut good, Ease { limits, ..GIVEN }, (most, Goal::Solved));
             if held.is_ok() || self.is_exhausted(ports) || good.iterations - motion.iterations > MOST_RAISING {
                 break;
             }
@@ -437,7 +458,7 @@ impl Level {
         while limits > 1.0 {
             motion.copy(&good);
             let next = (limits * factor).max(1.0);
-            let done = self.newton(ports, omega, motion, Ease { limits: next, ..GIVEN }, ITERATIONS);
+            let done = self.newton(ports, omega, motion, Ease { limits: next, ..GIVEN }, (ITERATIONS, Goal::Solved));
             good.iterations = motion.iterations;
             match done {
                 Ok(()) => {

@@ -248,34 +248,36 @@ impl Alternation {
             let sizes = (d * m, n, wide);
             multiply_in_blocks(&memory.by_state, &memory.projection, &mut memory.of_states, sizes, true);
         }
-        for b in 0..d {
-            let input = Input::Solution { axis: b };
-            self.follow(march, memory, (beginning.as_deref(), &inverse), (input, wide));
+        // of few harmonics all axes at once; the derivatives of long series by one fill the memory that there is
+        let together = if few { d } else { 1 };
+        for first in (0..d).step_by(together.max(1)) {
+            let tall = together * wide;
+            self.follow(march, memory, (beginning.as_deref(), &inverse), (Input::Solution { first }, together, wide));
             if few {
-                // all at once: [sample][axis][column] times the waves of the harmonics
-                memory.spectrum.resize(d * wide * wide, 0.0);
-                let sizes = (d * wide, n, wide);
+                // [sample][axis][column] times the waves of the harmonics
+                memory.spectrum.resize(d * tall * wide, 0.0);
+                let sizes = (d * tall, n, wide);
                 multiply_in_blocks(&memory.columns, &memory.projection, &mut memory.spectrum, sizes, true);
-                for (to, values) in memory.spectrum.chunks_exact(d * wide).enumerate() {
-                    for (a, values) in values.chunks_exact(wide).enumerate() {
-                        let row = &mut tangent[(a * wide + to) * size + b * wide..][..wide];
+                for (to, values) in memory.spectrum.chunks_exact(d * tall).enumerate() {
+                    for (a, values) in values.chunks_exact(tall).enumerate() {
+                        let row = &mut tangent[(a * wide + to) * size + first * wide..][..tall];
                         row.iter_mut().zip(values).for_each(|(t, value)| *t += value);
                         let by_state = memory.of_states[(to * d + a) * m..][..m].iter();
-                        by_state.zip(memory.shift.chunks_exact(wide)).for_each(|(by, shift)| add(row, *by, shift));
+                        by_state.zip(memory.shift.chunks_exact(tall)).for_each(|(by, shift)| add(row, *by, shift));
                     }
                 }
                 continue;
             }
-            memory.shift_columns(m, wide);
+            memory.shift_columns(m, tall);
             memory.signal.resize(n, 0.0);
-            for (a, column) in (0..d).flat_map(|a| (0..wide).map(move |column| (a, column))) {
+            for (a, column) in (0..d).flat_map(|a| (0..tall).map(move |column| (a, column))) {
                 for i in 0..n {
-                    memory.signal[i] = memory.columns[(i * d + a) * wide + column];
+                    memory.signal[i] = memory.columns[(i * d + a) * tall + column];
                 }
                 let sums = self.fourier.sums(&mut memory.signal);
                 for (l, &to) in self.harmonics.iter().enumerate() {
                     let value = sums[to] * share(to, n);
-                    let at = (a * wide + 2 * l) * size + b * wide + column;
+                    let at = (a * wide + 2 * l) * size + first * wide + column;
                     tangent[at] += value.re;
                     if to > 0 {
                         tangent[at + size] += value.im;
@@ -284,7 +286,7 @@ impl Alternation {
             }
         }
         if march.knows_frequency() {
-            self.follow(march, memory, (beginning.as_deref(), &inverse), (Input::Frequency, 1));
+            self.follow(march, memory, (beginning.as_deref(), &inverse), (Input::Frequency, 1, 1));
             memory.shift_columns(m, 1);
             memory.signal.resize(n, 0.0);
             for a in 0..d {
@@ -342,21 +344,22 @@ impl Alternation {
     }
 
     /// The derivative of the sampled forces by inputs, with states at t = 0 as they were, into `memory.columns`: [sample][axis][column]; the changes of
-    /// these that repeat into `memory.shift`. The columns are the parts of the harmonics of a motion along an axis, or the frequency. `beginning`: the
+    /// these that repeat into `memory.shift`. The columns are the parts of the harmonics of a motion along so many axes, or the frequency. `beginning`: the
     /// steps of the first period, if something is never forgotten.
     fn follow(
         &self,
         march: &dyn March,
         memory: &mut Memory,
         (beginning, inverse): (Option<&[f64]>, &DMatrix<f64>),
-        (input, wide): (Input, usize),
+        (input, count, wide): (Input, usize, usize),
     ) {
         let n = self.samples();
         let (m, d) = (march.states(), march.axes());
         let width = width(march);
         let size = (m + d) * width;
-        let by = By { input, kinds: march.inputs(), axes: d, width, wide };
-        let (mut start, mut next) = (vec![0.0; m * wide], vec![0.0; m * wide]);
+        let by = By { input, kinds: march.inputs(), axes: d, width, wide, tall: count * wide };
+        let tall = by.tall;
+        let (mut start, mut next) = (vec![0.0; m * tall], vec![0.0; m * tall]);
         let table = &memory.waves;
         let at = |i: usize| &table[i * by.kinds * wide..][..by.kinds * wide];
         let none = Vec::new();
@@ -371,27 +374,27 @@ impl Alternation {
             }
         }
         // from states that do not change
-        memory.columns.resize(n * d * wide, 0.0);
+        memory.columns.resize(n * d * tall, 0.0);
         let mut s = start.clone();
         for step in 1..=n {
             let i = step % n;
             let (states, forces) = memory.rows[i * size..(i + 1) * size].split_at(m * width);
             by.advance(states, waves(i), &s, &mut next);
-            let columns = &mut memory.columns[i * d * wide..][..d * wide];
+            let columns = &mut memory.columns[i * d * tall..][..d * tall];
             let same = forces.iter().zip(states).take_while(|(a, b)| a == b).count() / width;
             // forces that are states
-            let (own, other) = columns.split_at_mut(same * wide);
-            own.copy_from_slice(&next[..same * wide]);
+            let (own, other) = columns.split_at_mut(same * tall);
+            own.copy_from_slice(&next[..same * tall]);
             by.advance(&forces[same * width..], waves(i), &s, other);
             std::mem::swap(&mut s, &mut next);
         }
         // the states at t = 0 follow so that they repeat
         memory.shift.clear();
-        memory.shift.resize(m * wide, 0.0);
-        for (r, shift) in memory.shift.chunks_exact_mut(wide).enumerate() {
+        memory.shift.resize(m * tall, 0.0);
+        for (r, shift) in memory.shift.chunks_exact_mut(tall).enumerate() {
             for t in 0..m {
                 let weight = inverse[(r, t)];
-                let gap = s[t * wide..].iter().zip(&start[t * wide..]);
+                let gap = s[t * tall..].iter().zip(&start[t * tall..]);
                 shift.iter_mut().zip(gap).for_each(|(shift, (s, start))| *shift += (s - start) * weight);
             }
         }
@@ -494,8 +497,8 @@ fn width(march: &dyn March) -> usize {
 /// By what a derivative is taken.
 #[derive(Clone, Copy)]
 enum Input {
-    /// The harmonics of the motion along an axis.
-    Solution { axis: usize },
+    /// The harmonics of the motion along an axis and the next ones.
+    Solution { first: usize },
     /// The frequency ω.
     Frequency,
 }
@@ -511,43 +514,54 @@ struct By {
     kinds: usize,
     axes: usize,
     width: usize,
-    /// Columns.
+    /// Columns of an axis, and of all.
     wide: usize,
+    tall: usize,
 }
 
 impl By {
-    /// `rows` times the inputs, [kind][column], and the states, [state][column], into `out`, [row][column].
+    /// `rows` times the inputs, [kind][column of any axis], and the states, [state][column], into `out`, [row][column].
     #[inline]
     fn advance(&self, rows: &[f64], waves: &[f64], states: &[f64], out: &mut [f64]) {
-        for (row, out) in rows.chunks_exact(self.width).zip(out.chunks_exact_mut(self.wide)) {
+        for (row, out) in rows.chunks_exact(self.width).zip(out.chunks_exact_mut(self.tall)) {
             let before = &row[self.kinds * self.axes..];
-            match self.input {
-                // most laws: two inputs and two states, all at once
-                Input::Solution { axis } if self.kinds == 2 && states.len() == 2 * self.wide => {
-                    let weights = [row[axis], row[self.axes + axis], before[0], before[1]];
-                    if weights == [0.0; 4] {
-                        out.fill(0.0);
+            for (number, out) in out.chunks_exact_mut(self.wide).enumerate() {
+                let states = states.chunks_exact(self.tall).map(|state| &state[number * self.wide..][..self.wide]);
+                match self.input {
+                    // most laws: two inputs and two states, all at once
+                    Input::Solution { first } if self.kinds == 2 && states.len() == 2 => {
+                        let weights = [row[first + number], row[self.axes + first + number], before[0], before[1]];
+                        let mut states = states;
+                        let (Some(one), Some(two)) = (states.next(), states.next()) else { continue };
+                        let (from, to) = waves.split_at(self.wide);
+                        mix(weights, [from, to, one, two], out);
                         continue;
                     }
-                    let (from, to) = waves.split_at(self.wide);
-                    let (one, two) = states.split_at(self.wide);
-                    let inputs = from.iter().zip(&to[..self.wide]).zip(one.iter().zip(&two[..self.wide]));
-                    for (out, ((from, to), (one, two))) in out.iter_mut().zip(inputs) {
-                        *out = (weights[0] * from + weights[1] * to) + (weights[2] * one + weights[3] * two);
+                    Input::Solution { first } => {
+                        out.fill(0.0);
+                        for (kind, wave) in waves.chunks_exact(self.wide).enumerate() {
+                            add(out, row[kind * self.axes + first + number], wave);
+                        }
                     }
-                    continue;
+                    Input::Frequency => out.fill(row[self.width - 1]),
                 }
-                Input::Solution { axis } => {
-                    out.fill(0.0);
-                    for (kind, wave) in waves.chunks_exact(self.wide).enumerate() {
-                        add(out, row[kind * self.axes + axis], wave);
-                    }
-                }
-                Input::Frequency => out.fill(row[self.width - 1]),
+                before.iter().zip(states).for_each(|(weight, state)| add(out, *weight, state));
             }
-            for (weight, state) in before.iter().zip(states.chunks_exact(self.wide)) {
-                add(out, *weight, state);
-            }
+        }
+    }
+}
+
+/// The sum of weighted inputs and states. What is apart sees none of them, and what sticks along another axis no inputs.
+#[inline]
+fn mix(weights: [f64; 4], [from, to, one, two]: [&[f64]; 4], out: &mut [f64]) {
+    let states = one.iter().zip(two);
+    if weights == [0.0; 4] {
+        out.fill(0.0);
+    } else if weights[..2] == [0.0; 2] {
+        out.iter_mut().zip(states).for_each(|(out, (one, two))| *out = weights[2] * one + weights[3] * two);
+    } else {
+        for ((out, (from, to)), (one, two)) in out.iter_mut().zip(from.iter().zip(to)).zip(states) {
+            *out = (weights[0] * from + weights[1] * to) + (weights[2] * one + weights[3] * two);
         }
     }
 }

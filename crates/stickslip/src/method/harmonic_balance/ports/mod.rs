@@ -16,6 +16,7 @@ mod march;
 mod memory;
 mod prox;
 mod rate;
+mod series;
 mod sliders;
 mod step;
 #[cfg(test)]

@@ -7,8 +7,9 @@
 //! harmonics: in stick `δf = kt (δu - δu*)`, in slip `δf = 0`, and where they meet the force is continuous. Every stick interval
 //! adds one product of a column and a row to the derivative.
 
-use super::alternation::{Alternation, ZERO, add_block, add_entries, as_block, pair};
+use super::alternation::{Alternation, ZERO, add_block, as_block, pair};
 use super::events::{Anchor, Extreme, Grid, Interval};
+use super::series::{Series, turns};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 
@@ -52,63 +53,8 @@ impl Part {
     }
 }
 
-/// Newton iterations for an event; three are usual, and where they lead astray the middle between bounds is taken.
-const ITERATIONS: usize = 60;
 /// Distance of an event from its last iterate, in samples, that is rounding.
 const PLACED: f64 = 1e-11;
-
-/// Value, slope and curvature of the series at a phase. Harmonics stand at equal distances.
-#[derive(Clone, Copy)]
-struct Series<'a> {
-    harmonics: &'a [usize],
-    c: &'a [Complex64],
-}
-
-impl Series<'_> {
-    fn at(&self, theta: f64) -> (f64, f64, f64) {
-        let (mut turn, step) = turns(self.harmonics, theta);
-        let (mut value, mut slope, mut bend) = (0.0, 0.0, 0.0);
-        for (&h, c) in self.harmonics.iter().zip(self.c) {
-            let h = h as f64;
-            let z = c * turn;
-            value += z.re;
-            slope -= h * z.im;
-            bend -= h * h * z.re;
-            turn *= step;
-        }
-        (value, slope, bend)
-    }
-
-    /// The zero of a function between two phases at whose ends its signs differ, with `sign` its sign at the end: `f` gives it and its slope.
-    fn zero(
-        &self,
-        (mut low, mut high): (f64, f64),
-        start: f64,
-        sign: f64,
-        tolerance: f64,
-        f: impl Fn(&Self, f64) -> (f64, f64),
-    ) -> f64 {
-        let mut at = start.clamp(low, high);
-        for _ in 0..ITERATIONS {
-            let (value, slope) = f(self, at);
-            if value * sign > 0.0 {
-                high = at
-            } else {
-                low = at
-            }
-            let mut next = at - value / slope;
-            if !(next >= low && next <= high) {
-                next = 0.5 * (low + high);
-            }
-            let moved = (next - at).abs();
-            at = next;
-            if moved <= tolerance {
-                break;
-            }
-        }
-        at
-    }
-}
 
 impl Alternation {
     /// Adds the harmonics of the force of the parts in the motion `c` to `force`, and their derivative to `tangent`.
@@ -143,10 +89,15 @@ impl Alternation {
             let before = self.force[0][0];
             for interval in &self.intervals {
                 let sample = |phase: f64| (phase * n as f64 / TAU).ceil() as isize;
-                for i in sample(interval.begin)..sample(interval.end) {
-                    let i = i.rem_euclid(n as isize) as usize;
-                    self.force[0][i] += interval.stiffness * self.signal[i] + interval.offset;
-                    self.slips[i] |= interval.slips;
+                let (from, to) = (sample(interval.begin), sample(interval.end));
+                for turn in from.div_euclid(n as isize)..=to.div_euclid(n as isize) {
+                    let within = |i: isize| (i - turn * n as isize).clamp(0, n as isize) as usize;
+                    let range = within(from)..within(to).max(within(from));
+                    let forces = self.force[0][range.clone()].iter_mut().zip(&self.signal[range.clone()]);
+                    forces.for_each(|(force, u)| *force += interval.stiffness * u + interval.offset);
+                    if interval.slips {
+                        self.slips[range].fill(true);
+                    }
                 }
             }
             if matches!(part, Part::Slider { .. }) {
@@ -178,7 +129,12 @@ impl Alternation {
             });
             extremes.push(Extreme { at, value: series.at(at).0 });
         };
+        // between two points the slope changes by no more
+        let change: f64 = self.harmonics.iter().zip(c).map(|(&h, c)| (h * h) as f64 * c.l1_norm()).sum::<f64>() * angle;
         for i in 0..n {
+            if slope[i].abs() > change {
+                continue;
+            }
             let (u, v) = (value[i], slope[i] * angle);
             let next = if i + 1 == n { 0 } else { i + 1 };
             let (w, z) = (value[next], slope[next] * angle);
@@ -372,13 +328,17 @@ impl Alternation {
                         *value = turn * by;
                         turn *= step;
                     }
+                    if harmonics[0] == 0 {
+                        self.row[0].im = 0.0;
+                    }
                 }
             }
             // δu* = Re(row δU) = row.re x - row.im y
-            for (a, (&h, f)) in harmonics.iter().zip(&self.column).enumerate() {
-                for (b, (&k, r)) in harmonics.iter().zip(&self.row).enumerate() {
-                    let block = [f.re * r.re, -f.re * r.im, f.im * r.re, -f.im * r.im];
-                    add_entries(tangent, size, (a, h), (b, k), block);
+            for ((rows, f), &h) in tangent.chunks_exact_mut(2 * size).zip(&self.column).zip(harmonics) {
+                let (re, im) = rows.split_at_mut(size);
+                add_multiple(re, f.re, &self.row);
+                if h > 0 {
+                    add_multiple(im, f.im, &self.row);
                 }
             }
         }
@@ -396,20 +356,12 @@ impl Alternation {
     }
 }
 
-/// `e^{jhθ}` of the first harmonic, and what leads from each to the next.
+/// Adds `f Re(row δU)` to the derivative by the parts of U.
 #[inline]
-fn turns(harmonics: &[usize], theta: f64) -> (Complex64, Complex64) {
-    let first = harmonics[0];
-    let gap = harmonics.get(1).map_or(0, |h| h - first);
-    let step = Complex64::cis(gap as f64 * theta);
-    // 0, 1, … and 1, 3, … need one rotation alone
-    match (first, gap) {
-        (0, _) => (Complex64::new(1.0, 0.0), step),
-        (1, 2) => {
-            let turn = Complex64::cis(theta);
-            (turn, turn * turn)
-        }
-        _ => (Complex64::cis(first as f64 * theta), step),
+fn add_multiple(to: &mut [f64], f: f64, row: &[Complex64]) {
+    for (to, r) in to.chunks_exact_mut(2).zip(row) {
+        to[0] += f * r.re;
+        to[1] -= f * r.im;
     }
 }
 

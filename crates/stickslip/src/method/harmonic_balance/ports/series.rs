@@ -1,0 +1,131 @@
+//! A motion along an axis at any phase: value, slope and curvature of its series, their zeros, and how far it goes.
+
+use super::alternation::Alternation;
+use super::events::Grid;
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+
+/// Newton iterations for an event; three are usual, and where they lead astray the middle between bounds is taken.
+const ITERATIONS: usize = 60;
+/// The same for a turning point from the next point of the grid: three are usual.
+const REFINED: usize = 8;
+
+/// Value, slope and curvature of the series at a phase. Harmonics stand at equal distances.
+#[derive(Clone, Copy)]
+pub(super) struct Series<'a> {
+    pub(super) harmonics: &'a [usize],
+    pub(super) c: &'a [Complex64],
+}
+
+impl Series<'_> {
+    pub(super) fn at(&self, theta: f64) -> (f64, f64, f64) {
+        let (mut turn, step) = turns(self.harmonics, theta);
+        let (mut value, mut slope, mut bend) = (0.0, 0.0, 0.0);
+        for (&h, c) in self.harmonics.iter().zip(self.c) {
+            let h = h as f64;
+            let z = c * turn;
+            value += z.re;
+            slope -= h * z.im;
+            bend -= h * h * z.re;
+            turn *= step;
+        }
+        (value, slope, bend)
+    }
+
+    /// The zero of a function between two phases at whose ends its signs differ, with `sign` its sign at the end: `f` gives it and its slope.
+    pub(super) fn zero(
+        &self,
+        (mut low, mut high): (f64, f64),
+        start: f64,
+        sign: f64,
+        tolerance: f64,
+        f: impl Fn(&Self, f64) -> (f64, f64),
+    ) -> f64 {
+        let mut at = start.clamp(low, high);
+        for _ in 0..ITERATIONS {
+            let (value, slope) = f(self, at);
+            if value * sign > 0.0 {
+                high = at
+            } else {
+                low = at
+            }
+            let mut next = at - value / slope;
+            if !(next >= low && next <= high) {
+                next = 0.5 * (low + high);
+            }
+            let moved = (next - at).abs();
+            at = next;
+            if moved <= tolerance {
+                break;
+            }
+        }
+        at
+    }
+
+    /// The value at the turning point next to a phase; `None` if it is farther than `reach`.
+    fn turning(&self, mut theta: f64, reach: f64) -> Option<f64> {
+        let (mut best, mut moved) = (0.0, 0.0f64);
+        for _ in 0..REFINED {
+            let (value, slope, bend) = self.at(theta);
+            let step = slope / bend;
+            moved += step.abs();
+            if moved.is_nan() || moved > reach {
+                return None;
+            }
+            theta -= step;
+            // the vertex of the parabola there: what it leaves out has the third power of the step
+            best = value - 0.5 * slope * step;
+            if step * step < f64::EPSILON {
+                break;
+            }
+        }
+        Some(best)
+    }
+}
+
+impl Alternation {
+    /// Least and largest value of the motion with harmonics `c`: between two points of the grid it is above both by no more than its curvature allows, and
+    /// from those that come so near to the largest Newton's method leads to turning points.
+    pub fn range(&mut self, c: &[Complex64]) -> (f64, f64) {
+        let Grid { fourier, pairs, value, .. } = &mut self.grid;
+        pairs.clear();
+        pairs.extend(self.harmonics.iter().copied().zip(c.iter().copied()));
+        fourier.synthesise(pairs, value);
+        let series = Series { harmonics: &self.harmonics, c };
+        let angle = TAU / value.len() as f64;
+        let bend: f64 = self.harmonics.iter().zip(c).map(|(&h, c)| (h * h) as f64 * c.l1_norm()).sum();
+        let above = 0.125 * bend * angle * angle;
+        let (mut low, mut high) = (value[0], value[0]);
+        for &u in &value[1..] {
+            low = if u < low { u } else { low };
+            high = if u > high { u } else { high };
+        }
+        let (mut least, mut most) = (low, high);
+        for (i, &u) in value.iter().enumerate() {
+            if u > low + above && u < high - above {
+                continue;
+            }
+            if let Some(value) = series.turning(i as f64 * angle, angle) {
+                (least, most) = (least.min(value), most.max(value));
+            }
+        }
+        (least, most)
+    }
+}
+
+/// `e^{jhθ}` of the first harmonic, and what leads from each to the next.
+#[inline]
+pub(super) fn turns(harmonics: &[usize], theta: f64) -> (Complex64, Complex64) {
+    let first = harmonics[0];
+    let gap = harmonics.get(1).map_or(0, |h| h - first);
+    let step = Complex64::cis(gap as f64 * theta);
+    // 0, 1, … and 1, 3, … need one rotation alone
+    match (first, gap) {
+        (0, _) => (Complex64::new(1.0, 0.0), step),
+        (1, 2) => {
+            let turn = Complex64::cis(theta);
+            (turn, turn * turn)
+        }
+        _ => (Complex64::cis(first as f64 * theta), step),
+    }
+}
