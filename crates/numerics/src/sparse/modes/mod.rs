@@ -287,21 +287,19 @@ impl Search<'_> {
             Wanted::UpTo { value, .. } if value.is_nan() || value <= 0.0 => return Ok(self.found),
             Wanted::UpTo { value, .. } => (SHIFT_OF_BOUND * value).max(least),
         };
-        let (mut shift, mut factor) = self.first(depth)?;
+        let (mut shift, mut factor) = self.first(depth, None)?;
         let mut counted = 0;
         for _ in 0..RUNS {
             let run = self.around(shift, &factor, counted, depth)?;
             self.found.effort.vectors += run.vectors;
-            // the memory of the old factor is needed for the new one
-            drop(factor);
             if let End::Slender(value) = run.end {
                 depth = value.max(least);
-                (shift, factor) = self.first(depth)?;
+                (shift, factor) = self.first(depth, Some(factor))?;
                 continue;
             }
             let (exhausted, more) = (matches!(run.end, End::Exhausted), run.modes.count());
             self.found.join(self.mass.n(), run.modes);
-            (shift, factor) = self.beside(self.bound(exhausted, depth), depth)?;
+            (shift, factor) = self.beside(self.bound(exhausted, depth), depth, factor)?;
             counted = factor.negative();
             let found = self.found.below(shift);
             let (enough, keep) = match self.wanted {
@@ -322,11 +320,19 @@ impl Search<'_> {
         Err(ModesError::NotConverged { found: self.found.below(shift), counted, below: shift })
     }
 
-    /// The factor at the first, negative shift.
-    fn first(&mut self, depth: f64) -> Result<(f64, Factor), ModesError> {
+    /// The factor at a shift, in the memory of the last one.
+    fn factor(&mut self, shift: f64, last: Option<Factor>) -> Result<Factor, Singular> {
         self.found.effort.factors += 1;
-        let factor =
-            self.analysis.factor(&[(1.0, self.stiffness), (depth, self.mass)]).map_err(ModesError::Massless)?;
+        let sum = [(1.0, self.stiffness), (-shift, self.mass)];
+        match last {
+            Some(last) => last.again(&sum),
+            None => self.analysis.factor(&sum),
+        }
+    }
+
+    /// The factor at the first, negative shift.
+    fn first(&mut self, depth: f64, last: Option<Factor>) -> Result<(f64, Factor), ModesError> {
+        let factor = self.factor(-depth, last).map_err(ModesError::Massless)?;
         match factor.negative() {
             0 => Ok((-depth, factor)),
             count => Err(ModesError::Negative { count, below: -depth }),
@@ -334,17 +340,16 @@ impl Search<'_> {
     }
 
     /// The factor at a shift, or a little further where that is an eigenvalue.
-    fn beside(&mut self, shift: f64, depth: f64) -> Result<(f64, Factor), ModesError> {
-        let mut last = Singular { row: 0 };
+    fn beside(&mut self, shift: f64, depth: f64, last: Factor) -> Result<(f64, Factor), ModesError> {
+        let (mut last, mut failed) = (Some(last), Singular { row: 0 });
         for attempt in 0..ATTEMPTS {
             let shift = shift + attempt as f64 * GAP * (shift.abs() + depth);
-            self.found.effort.factors += 1;
-            match self.analysis.factor(&[(1.0, self.stiffness), (-shift, self.mass)]) {
+            match self.factor(shift, last.take()) {
                 Ok(factor) => return Ok((shift, factor)),
-                Err(singular) => last = singular,
+                Err(singular) => failed = singular,
             }
         }
-        Err(ModesError::Massless(last))
+        Err(ModesError::Massless(failed))
     }
 
     /// Up to where the modes found may be complete, in a gap between them.
