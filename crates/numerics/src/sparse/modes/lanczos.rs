@@ -138,12 +138,11 @@ impl<'a> Lanczos<'a> {
                 columns::add(n, &mut column, -1.0, &self.basis[first * n..], &part);
                 columns::add(n, &mut force, -1.0, &self.heavy[(first - self.expanded) * n..], &part);
                 along += part;
-                let before = left;
-                left = norm(&column, &force)?;
-                if left < FOLLOWED * before {
+                // what cancels to rounding has no sign either
+                if dot(&column, &force) < (FOLLOWED * left).powi(2) {
                     force = self.mass.times_columns(&column);
-                    left = norm(&column, &force)?;
                 }
+                left = norm(&column, &force)?;
             }
             (0..along.nrows()).for_each(|i| components[(i, k)] = along[(i, 0)]);
             if left <= DEPENDENT * size {

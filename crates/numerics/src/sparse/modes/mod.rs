@@ -617,6 +617,22 @@ mod tests {
         assert_eq!(modes(&none, &none, Wanted::Lowest(3)).unwrap().count(), 0);
     }
 
+    /// Two sets of three masses each, all modes of which fill the space: what is left of further vectors is rounding, and no negative mass.
+    #[test]
+    fn all_modes_of_few_rows() {
+        for step in 0..400 {
+            let more = (0.01 * step as f64).powi(2);
+            let masses = [2.0, 0.3, 0.2];
+            let k = [[3.5e5, -5e4, 0.0], [-5e4, 8e4 + 2e3 * more, -3e4], [0.0, -3e4, 3e4 + 5e3 * more]];
+            let both = (0..2).flat_map(|set| (0..9).map(move |at| (set, at / 3, at % 3)));
+            let k = matrix(6, both.map(|(set, i, l)| (3 * set + i, 3 * set + l, k[i][l])));
+            let m = matrix(6, (0..6).map(|i| (i, i, masses[i % 3])));
+            let found = modes(&k, &m, Wanted::Lowest(6)).unwrap();
+            assert_eq!(found.count(), 6, "{step}");
+            assert!(found.values.chunks(2).all(|pair| (pair[1] / pair[0] - 1.0).abs() < 1e-9), "{:?}", found.values);
+        }
+    }
+
     #[test]
     fn same_bits_on_every_thread() {
         let solve = || {
