@@ -121,6 +121,18 @@ fn positive(matrix: &DMatrix<f64>, shift: f64) -> bool {
 /// assert_eq!(definite, [Some(true), Some(false), None]);
 /// ```
 pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
+    definite(matrix, Analysis::new)
+}
+
+/// The same with the rows eliminated in an order that is known already, of matrices that have entries wherever this one has.
+///
+/// # Panics
+/// If the matrix has not the size of those analysed.
+pub fn sparse_definite_in_order(matrix: &Matrix, of: &Analysis) -> Option<bool> {
+    definite(matrix, |matrices| of.in_order(matrices))
+}
+
+fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> Analysis) -> Option<bool> {
     let n = matrix.n();
     // above what a factor takes for rounding of a pivot
     let rounding = ROUNDING * n.max(16) as f64;
@@ -138,7 +150,7 @@ pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
         return None;
     }
     let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).ok()?;
-    let analysis = Analysis::new(&[&scaled, &one]);
+    let analysis = analysis(&[&scaled, &one]);
     let positive =
         |shift: f64| analysis.factor(&[(1.0, &scaled), (shift, &one)]).is_ok_and(|factor| factor.negative() == 0);
     if diagonal.iter().all(|d| *d > 0.0) && positive(-rounding) {
@@ -176,12 +188,37 @@ mod tests {
             let sparse = |ends: [f64; 2]| {
                 let full = chain(n, 0.3, ends);
                 let all = (0..n * n).map(|at| (at / n, at % n, full[(at / n, at % n)]));
-                sparse_definite(&Matrix::from_triplets(n, all).unwrap())
+                let matrix = Matrix::from_triplets(n, all).unwrap();
+                let alone = sparse_definite(&matrix);
+                // no order changes the answer, not even that of a matrix with other entries
+                let [wide, none] = [9, 0].map(|far| (0..far.min(n - 1)).map(|i| (i, n - 1 - i, 1.0)));
+                for other in [wide, none] {
+                    let order = Analysis::new(&[&Matrix::from_triplets(n, other).unwrap()]);
+                    assert_eq!(sparse_definite_in_order(&matrix, &order), alone);
+                }
+                alone
             };
             assert_eq!([sparse([0.7, 0.0]), sparse([0.0, 0.0]), sparse([0.7, -0.7])], [Some(true), Some(false), None]);
         }
         // softer than rounding beside a stiff neighbour
         assert_eq!(semidefinite(&chain(2, 1e9, [1e-3, -2e-3])), None);
+    }
+
+    /// Masses of some rows only, in the order of a structure that links all of them: rows of zeros have no part in the answer.
+    #[test]
+    fn places_without_mass_in_the_order_of_the_structure() {
+        let n = 60;
+        let springs = (1..n).flat_map(|i| [(i, i - 1, -1.0), (i - 1, i, -1.0)]).chain((0..n).map(|i| (i, i, 2.0)));
+        let order = Analysis::new(&[&Matrix::from_triplets(n, springs).unwrap()]);
+        let masses = |last: f64| {
+            let each = (0..n).filter(|i| i % 3 == 0).map(|i| (i, i, 1.0));
+            let far = [(0, 57, 0.5), (57, 0, 0.5), (3, 3, last)];
+            Matrix::from_triplets(n, each.chain(far)).unwrap()
+        };
+        for (last, expected) in [(1.0, Some(false)), (-1.0, Some(false)), (-2.0, None)] {
+            let mass = masses(last);
+            assert_eq!([sparse_definite_in_order(&mass, &order), sparse_definite(&mass)], [expected; 2], "{last}");
+        }
     }
 
     #[test]

@@ -494,8 +494,8 @@ const PREPARING: f64 = 2e-4;
 /// Its modes, times the cube of its masses, s. Measured: 0.35 s for 500.
 const MODES: f64 = 2.8e-9;
 /// Reading a structure by its matrices, its factors, modes and samples of the whole, s, by this power of its rows; and what a place adds per row.
-/// Measured: 0.5 s for 3,200 rows, 9 to 13 s for 31,500, of which 900 places take 7.
-const MATRICES: (f64, f64) = (4e-6, 1.4);
+/// Measured: 0.2 s for 3,200 rows, 3 to 5 s for 28,000, 10 to 15 s for 70,000; 900 places of 31,500 rows take 7.
+const MATRICES: (f64, f64) = (2.4e-6, 1.4);
 const SEEN: f64 = 2e-7;
 /// Solving points again in coordinates that reach farther: their reduction, in multiples of the first, and an orbit from rest in them, in multiples of one.
 /// Measured: twice as long for 3,200 rows; 57 instead of 10 coordinates of a chain of 300 masses, 0.3 s instead of 0.03.

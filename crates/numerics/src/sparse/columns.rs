@@ -68,36 +68,59 @@ impl Matrix {
     /// If the length of `v` is no multiple of n.
     pub fn times_columns(&self, v: &[f64]) -> Vec<f64> {
         let n = self.n();
-        let mut product = vec![0.0; n * count(n, v)];
-        let size = n.max(1) * TOGETHER;
-        let (mut from, mut to) = (Vec::new(), Vec::new());
-        for (w, v) in product.chunks_mut(size).zip(v.chunks(size)) {
-            if v.len() < size {
-                for (w, v) in w.chunks_exact_mut(n).zip(v.chunks_exact(n)) {
-                    for (column, &x) in v.iter().enumerate() {
-                        self.column(column).for_each(|(row, value)| w[row] += value * x);
-                    }
-                }
-                continue;
+        let all = count(n, v);
+        let mut product = vec![0.0; n * all];
+        let at = |column: usize| column * n;
+        let whole = all / TOGETHER * TOGETHER;
+        self.times_side_by_side::<TOGETHER>(&v[..at(whole)], &mut product[..at(whole)]);
+        let rest = (&v[at(whole)..], &mut product[at(whole)..]);
+        match all - whole {
+            0 => {}
+            1 => self.times_side_by_side::<1>(rest.0, rest.1),
+            2 => self.times_side_by_side::<2>(rest.0, rest.1),
+            3 | 4 => self.times_side_by_side::<4>(rest.0, rest.1),
+            _ => self.times_side_by_side::<TOGETHER>(rest.0, rest.1),
+        }
+        product
+    }
+
+    /// The same of `N` columns at once, the last ones filled up with zeros: row by row, so that an entry meets its row of all columns side by side.
+    fn times_side_by_side<const N: usize>(&self, v: &[f64], product: &mut [f64]) {
+        let n = self.n();
+        if v.is_empty() {
+            return;
+        }
+        let (mut from, mut to) = (vec![[0.0; N]; n], vec![[0.0; N]; n]);
+        for (w, v) in product.chunks_mut(n * N).zip(v.chunks(n * N)) {
+            if v.len() < n * N {
+                from.fill([0.0; N]);
             }
-            // row by row, so that an entry meets its row of all columns side by side
-            from.clear();
-            from.resize(n, [0.0; TOGETHER]);
-            to.clear();
-            to.resize(n, [0.0; TOGETHER]);
             for (k, v) in v.chunks_exact(n).enumerate() {
                 from.iter_mut().zip(v).for_each(|(from, x)| from[k] = *x);
             }
+            to.fill([0.0; N]);
             for (column, from) in from.iter().enumerate() {
-                self.column(column).for_each(|(row, value)| {
-                    to[row].iter_mut().zip(from).for_each(|(to, x)| *to += value * x);
-                });
+                let range = self.range(column);
+                add_column(*from, &self.rows[range.clone()], &self.values[range], &mut to);
             }
             for (k, w) in w.chunks_exact_mut(n).enumerate() {
                 w.iter_mut().zip(&to).for_each(|(w, to)| *w = to[k]);
             }
         }
-        product
+    }
+}
+
+/// Adds a column of a matrix, times the numbers of its row of N columns, to N columns side by side.
+#[inline]
+fn add_column<const N: usize>(from: [f64; N], rows: &[u32], values: &[f64], to: &mut [[f64; N]]) {
+    for (&row, &value) in rows.iter().zip(values) {
+        // whole arrays, of which the compiler knows that none is a part of another, go through wide registers
+        let to = &mut to[row as usize];
+        let mut sum = *to;
+        for k in 0..N {
+            sum[k] += value * from[k];
+        }
+        *to = sum;
     }
 }
 
@@ -125,10 +148,12 @@ mod tests {
         let noise = |i: usize| ((i * 7919 + 13) as f64).sin();
         let entries = (0..40).map(|i| ((i * 5) % n, (i * 7 + 3) % n, noise(i)));
         let matrix = Matrix::from_triplets(n, entries).unwrap();
-        let v: Vec<f64> = (0..n * 19).map(|i| noise(i + 100)).collect();
-        let together = matrix.times_columns(&v);
-        for (v, w) in v.chunks_exact(n).zip(together.chunks_exact(n)) {
-            assert_eq!(matrix.times_columns(v), w);
+        for columns in 0..20 {
+            let v: Vec<f64> = (0..n * columns).map(|i| noise(i + 100)).collect();
+            let together = matrix.times_columns(&v);
+            for (v, w) in v.chunks_exact(n).zip(together.chunks_exact(n)) {
+                assert_eq!(matrix.times_columns(v), w);
+            }
         }
         assert!(Matrix::from_triplets(0, []).unwrap().times_columns(&[]).is_empty());
     }

@@ -25,7 +25,7 @@ pub struct Matrix {
     /// Where the columns start in the other two, n + 1.
     pub(super) starts: Vec<u32>,
     pub(super) rows: Vec<u32>,
-    values: Vec<f64>,
+    pub(super) values: Vec<f64>,
 }
 
 /// Why triplets make no matrix. Rows and columns count from 0.
@@ -94,8 +94,11 @@ impl Matrix {
             }
             entries.push((column as u32, row as u32, value));
         }
-        // stable: what is added to one place keeps its order
-        entries.sort_by_key(|&(column, row, _)| (column, row));
+        // in either sort what is added to one place keeps its order
+        if !entries.is_sorted_by_key(|&(column, row, _)| (column, row)) {
+            entries = sorted_by(n, &entries, |entry| entry.1);
+            entries = sorted_by(n, &entries, |entry| entry.0);
+        }
         entries.dedup_by(|next, kept| {
             let same = (next.0, next.1) == (kept.0, kept.1);
             if same {
@@ -161,8 +164,15 @@ impl Matrix {
 
     /// The first two entries across the diagonal that differ by more than `rounding`, in the unit of the entries; `None` if the matrix is symmetric.
     pub fn asymmetry(&self, rounding: f64) -> Option<Asymmetry> {
+        // columns come rising, and so do the rows at which a column meets its mirror images
+        let mut met: Vec<u32> = self.starts[..self.n].to_vec();
         self.entries().find_map(|(row, column, value)| {
-            let mirrored = self.get(column, row);
+            let (at, end) = (&mut met[row], self.starts[row + 1]);
+            while *at < end && (self.rows[*at as usize] as usize) < column {
+                *at += 1;
+            }
+            let found = *at < end && self.rows[*at as usize] as usize == column;
+            let mirrored = if found { self.values[*at as usize] } else { 0.0 };
             ((value - mirrored).abs() > rounding).then_some(Asymmetry { row, column, value, mirrored })
         })
     }
@@ -194,6 +204,24 @@ impl Matrix {
     }
 }
 
+/// Column, row, value.
+type Entry = (u32, u32, f64);
+
+/// Entries by rising `key` below `n`, those of one key in the order in which they are: two such sorts, by row and by column, take the time of reading
+/// the entries a few times, however many there are.
+fn sorted_by(n: usize, entries: &[Entry], key: impl Fn(&Entry) -> u32) -> Vec<Entry> {
+    let mut next = vec![0u32; n + 1];
+    entries.iter().for_each(|entry| next[key(entry) as usize + 1] += 1);
+    (0..n).for_each(|at| next[at + 1] += next[at]);
+    let mut sorted = vec![(0, 0, 0.0); entries.len()];
+    for entry in entries {
+        let to = &mut next[key(entry) as usize];
+        sorted[*to as usize] = *entry;
+        *to += 1;
+    }
+    sorted
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,6 +237,14 @@ mod tests {
         let one_sided = make(&[(0, 1, 2.0), (0, 0, 1.0)]).unwrap();
         assert_eq!(one_sided.asymmetry(1.0), Some(Asymmetry { row: 0, column: 1, value: 2.0, mirrored: 0.0 }));
         assert_eq!(one_sided.asymmetry(2.0), None);
+        // above the diagonal alone, below it alone, and both
+        let sided = |entries: &[(usize, usize, f64)]| {
+            let matrix = Matrix::from_triplets(4, entries.iter().copied()).unwrap();
+            matrix.asymmetry(0.0).map(|pair| (pair.row, pair.column, pair.mirrored))
+        };
+        assert_eq!(sided(&[(0, 3, 1.0), (3, 0, 1.0), (1, 3, 2.0)]), Some((1, 3, 0.0)));
+        assert_eq!(sided(&[(0, 3, 1.0), (3, 0, 1.0), (3, 1, 2.0)]), Some((3, 1, 0.0)));
+        assert_eq!(sided(&[(2, 2, 1.0), (2, 0, 1.0), (0, 2, 1.0), (3, 0, 5.0), (0, 3, 5.0)]), None);
     }
 
     /// Products are those of the dense matrix, and any order of triplets without repetitions makes the same matrix.

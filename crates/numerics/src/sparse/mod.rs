@@ -10,6 +10,7 @@
 
 mod analysis;
 pub mod columns;
+mod compliance;
 mod factor;
 mod matrix;
 mod modes;

@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use stickslip_numerics::definite::sparse_definite;
+use stickslip_numerics::definite::sparse_definite_in_order;
 use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, columns};
 
 /// Matrices of a structure and the names of their rows. A copy is a reference to the same matrices, and to the reductions made of them.
@@ -233,12 +233,11 @@ impl Component {
         }
         let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
         let negative = mass.entries().any(|(row, column, value)| row == column && value < 0.0);
-        let Some(definite_mass) = sparse_definite(&mass).filter(|_| !negative) else {
-            return Err(StructureError::NegativeMass);
-        };
         let damping = damping.map_or(Damping::Rayleigh { mass: 0.0, stiffness: 0.0 }, Damping::Matrix);
         // sizes and symmetry were looked at
         let whole = Whole::unseen(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
+        let definite = sparse_definite_in_order(&whole.mass, &whole.analysis).filter(|_| !negative);
+        let definite_mass = definite.ok_or(StructureError::NegativeMass)?;
         let (index, reductions) = (OnceLock::new(), Mutex::default());
         let (damped, counts, sectors) = (Mutex::default(), Mutex::default(), Mutex::default());
         Ok(Component(Arc::new(Kept { rows, index, whole, definite_mass, reductions, damped, counts, sectors })))

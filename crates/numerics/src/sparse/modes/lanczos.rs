@@ -11,6 +11,8 @@ const ACCURATE: f64 = 1e-8;
 const DEPENDENT: f64 = 1e-14;
 /// Below this share so many digits have cancelled that it is made orthogonal once more; if half of it goes, it was rounding after all.
 const CANCELLED: f64 = 1e-6;
+/// Below this share `M v` is computed anew instead of being followed through the projection: its digits cancel with those of v.
+const FOLLOWED: f64 = 0.1;
 /// A negative `vᵀ M v` is rounding up to this share of `|v| |M v|`.
 const MASSLESS: f64 = 1e-10;
 
@@ -30,6 +32,8 @@ pub(super) struct Lanczos<'a> {
     found: &'a [f64],
     n: usize,
     basis: Vec<f64>,
+    /// M times the vectors of the basis that the operator was not applied to.
+    heavy: Vec<f64>,
     /// Columns of T, each as long as the basis was.
     projected: Vec<Vec<f64>>,
     /// How many vectors of the basis the operator was applied to.
@@ -44,7 +48,18 @@ impl<'a> Lanczos<'a> {
     pub(super) fn new(factor: &'a Factor, mass: &'a Matrix, found: &'a [f64]) -> Self {
         let n = mass.n();
         let beyond = DMatrix::zeros(0, 0);
-        Lanczos { factor, mass, found, n, basis: vec![], projected: vec![], expanded: 0, beyond, seed: 0 }
+        Lanczos {
+            factor,
+            mass,
+            found,
+            n,
+            basis: vec![],
+            heavy: vec![],
+            projected: vec![],
+            expanded: 0,
+            beyond,
+            seed: 0,
+        }
     }
 
     fn size(&self) -> usize {
@@ -60,15 +75,17 @@ impl<'a> Lanczos<'a> {
             }
         }
         let n = self.n;
-        let mut block = self.operator(&self.basis[self.expanded * n..]);
+        let mut block = std::mem::take(&mut self.heavy);
+        self.factor.solve(&mut block);
         let width = block.len() / n;
-        let sizes = self.norms(&block)?;
-        let coefficients = self.clear(&mut block);
+        let mut forces = self.mass.times_columns(&block);
+        let sizes = self.norms(&block, &forces)?;
+        let coefficients = self.clear(&mut block, &mut forces);
         for k in 0..width {
             self.projected.push(coefficients.column(k).iter().copied().collect());
         }
         self.expanded += width;
-        self.beyond = self.append(block, &sizes)?;
+        self.beyond = self.append(block, forces, &sizes)?;
         let added = self.size() - self.expanded;
         if added < BLOCK {
             self.fill(BLOCK - added)?;
@@ -83,68 +100,69 @@ impl<'a> Lanczos<'a> {
         block
     }
 
-    fn norms(&self, block: &[f64]) -> Result<Vec<f64>, ModesError> {
-        let forces = self.mass.times_columns(block);
-        let squares = block.chunks(self.n).zip(forces.chunks(self.n)).map(|(v, f)| (dot(v, f), length(v) * length(f)));
-        squares
-            .map(|(square, size)| match square {
-                square if !square.is_finite() => Err(ModesError::OutOfRange),
-                square if square >= 0.0 => Ok(square.sqrt()),
-                // of a vector without mass rounding may be negative
-                square if square >= -MASSLESS * size => Ok(0.0),
-                _ => Err(ModesError::NegativeMass),
-            })
-            .collect()
+    /// In the norm of M, with M times the block.
+    fn norms(&self, block: &[f64], forces: &[f64]) -> Result<Vec<f64>, ModesError> {
+        block.chunks(self.n).zip(forces.chunks(self.n)).map(|(v, force)| norm(v, force)).collect()
     }
 
-    /// Projects the modes found and the basis out of a block, and returns its components along the basis. Twice is enough.
-    fn clear(&self, block: &mut [f64]) -> DMatrix<f64> {
+    /// Projects the modes found and the basis out of a block and of M times the block, and returns its components along the basis. Twice is enough.
+    fn clear(&self, block: &mut [f64], forces: &mut Vec<f64>) -> DMatrix<f64> {
         let n = self.n;
         let mut coefficients = DMatrix::zeros(self.size(), block.len() / n);
+        if self.found.is_empty() && self.basis.is_empty() {
+            return coefficients;
+        }
         for _ in 0..2 {
-            let forces = self.mass.times_columns(block);
-            let known = columns::products(n, self.found, &forces);
+            let known = columns::products(n, self.found, forces);
             columns::add(n, block, -1.0, self.found, &known);
-            let along = columns::products(n, &self.basis, &forces);
+            let along = columns::products(n, &self.basis, forces);
             columns::add(n, block, -1.0, &self.basis, &along);
             coefficients += along;
+            *forces = self.mass.times_columns(block);
         }
         coefficients
     }
 
-    /// Makes the columns of a cleared block orthonormal, one after the other, and adds those that are not rounding beside their former
-    /// `sizes`. Returns the
-    /// block's components along the new vectors.
-    fn append(&mut self, block: Vec<f64>, sizes: &[f64]) -> Result<DMatrix<f64>, ModesError> {
+    /// Makes the columns of a cleared block orthonormal, one after the other, with M times them, and adds those that are not rounding beside their former
+    /// `sizes`. Returns the block's components along the new vectors.
+    fn append(&mut self, block: Vec<f64>, forces: Vec<f64>, sizes: &[f64]) -> Result<DMatrix<f64>, ModesError> {
         let n = self.n;
         let first = self.size();
         let mut components = DMatrix::zeros(0, sizes.len());
-        for (k, (column, size)) in block.chunks(n).zip(sizes).enumerate() {
-            let mut column = column.to_vec();
+        for (k, ((column, force), size)) in block.chunks(n).zip(forces.chunks(n)).zip(sizes).enumerate() {
+            let (mut column, mut force) = (column.to_vec(), force.to_vec());
             let mut along = DMatrix::zeros(self.size() - first, 1);
+            let mut left = norm(&column, &force)?;
             for _ in 0..2 {
-                let force = self.mass.times_columns(&column);
                 let part = columns::products(n, &self.basis[first * n..], &force);
                 columns::add(n, &mut column, -1.0, &self.basis[first * n..], &part);
+                columns::add(n, &mut force, -1.0, &self.heavy[(first - self.expanded) * n..], &part);
                 along += part;
+                // what cancels to rounding has no sign either
+                if dot(&column, &force) < (FOLLOWED * left).powi(2) {
+                    force = self.mass.times_columns(&column);
+                }
+                left = norm(&column, &force)?;
             }
-            let norm = self.norms(&column)?[0];
             (0..along.nrows()).for_each(|i| components[(i, k)] = along[(i, 0)]);
-            if norm <= DEPENDENT * size {
+            if left <= DEPENDENT * size {
                 continue;
             }
-            scale(&mut column, 1.0 / norm);
-            if norm < CANCELLED * size {
-                self.clear(&mut column);
-                let left = self.norms(&column)?[0];
-                if left < 0.5 {
+            scale(&mut column, 1.0 / left);
+            scale(&mut force, 1.0 / left);
+            if left < CANCELLED * size {
+                self.clear(&mut column, &mut force);
+                let again = norm(&column, &force)?;
+                if again < 0.5 {
                     continue;
                 }
-                scale(&mut column, 1.0 / left);
+                scale(&mut column, 1.0 / again);
+                scale(&mut force, 1.0 / again);
             }
             self.basis.extend(column);
+            self.heavy.extend(force);
             components = components.insert_row(self.size() - first - 1, 0.0);
-            components[(self.size() - first - 1, k)] = norm;
+            components[(self.size() - first - 1, k)] = left;
         }
         Ok(components)
     }
@@ -152,12 +170,15 @@ impl<'a> Lanczos<'a> {
     /// Adds up to `count` vectors that have nothing to do with those before; fewer where the space has no more.
     fn fill(&mut self, count: usize) -> Result<(), ModesError> {
         let mut start: Vec<f64> = (0..count * self.n).map(|_| self.next()).collect();
+        let mut forces = self.mass.times_columns(&start);
         // without what is known before the operator, which would drown the rest in it
-        self.clear(&mut start);
-        start = self.operator(&start);
-        let sizes = self.norms(&start)?;
-        self.clear(&mut start);
-        self.append(start, &sizes)?;
+        self.clear(&mut start, &mut forces);
+        start = forces;
+        self.factor.solve(&mut start);
+        forces = self.mass.times_columns(&start);
+        let sizes = self.norms(&start, &forces)?;
+        self.clear(&mut start, &mut forces);
+        self.append(start, forces, &sizes)?;
         Ok(())
     }
 
@@ -202,10 +223,13 @@ impl<'a> Lanczos<'a> {
         let ritz = columns::combination(n, &self.basis[..self.expanded * n], &coefficients);
         let mut shapes = self.operator(&ritz);
         shapes.chunks_mut(n).zip(pairs).for_each(|(shape, pair)| scale(shape, 1.0 / pair.theta));
-        let forces = self.mass.times_columns(&shapes);
-        let known = columns::products(n, self.found, &forces);
-        columns::add(n, &mut shapes, -1.0, self.found, &known);
-        let m = columns::products(n, &shapes, &self.mass.times_columns(&shapes));
+        let mut forces = self.mass.times_columns(&shapes);
+        if !self.found.is_empty() {
+            let known = columns::products(n, self.found, &forces);
+            columns::add(n, &mut shapes, -1.0, self.found, &known);
+            forces = self.mass.times_columns(&shapes);
+        }
+        let m = columns::products(n, &shapes, &forces);
         let k = columns::products(n, &shapes, &stiffness.times_columns(&shapes));
         let inverse = m
             .clone()
@@ -222,11 +246,11 @@ impl<'a> Lanczos<'a> {
             off.iter_mut().zip(shape).for_each(|(off, x)| *off = x - (value - shift) * *off);
         }
         // inside of the modes' own space K and M are diagonal: what the factor's rounding adds there is no error of theirs
-        for modes in [self.found, &shapes] {
+        for modes in [self.found, &shapes].into_iter().filter(|modes| !modes.is_empty()) {
             let inside = columns::products(n, modes, &self.mass.times_columns(&off));
             columns::add(n, &mut off, -1.0, modes, &inside);
         }
-        let residuals = self.norms(&off)?;
+        let residuals = self.norms(&off, &self.mass.times_columns(&off))?;
         // a free motion that is not found yet may drown others by the factor's rounding; they are found after it
         let good: Vec<usize> = (0..count).filter(|&k| residuals[k] <= ACCURATE).collect();
         if good.is_empty() {
@@ -237,6 +261,17 @@ impl<'a> Lanczos<'a> {
         let mut modes = NaturalModes::none();
         modes.join(n, NaturalModes { values, shapes, residuals, ..NaturalModes::none() });
         Ok(modes)
+    }
+}
+
+/// The norm of a vector by M times it.
+fn norm(v: &[f64], force: &[f64]) -> Result<f64, ModesError> {
+    match dot(v, force) {
+        square if !square.is_finite() => Err(ModesError::OutOfRange),
+        square if square >= 0.0 => Ok(square.sqrt()),
+        // of a vector without mass rounding may be negative
+        square if square >= -MASSLESS * length(v) * length(force) => Ok(0.0),
+        _ => Err(ModesError::NegativeMass),
     }
 }
 

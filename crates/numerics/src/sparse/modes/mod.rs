@@ -287,21 +287,19 @@ impl Search<'_> {
             Wanted::UpTo { value, .. } if value.is_nan() || value <= 0.0 => return Ok(self.found),
             Wanted::UpTo { value, .. } => (SHIFT_OF_BOUND * value).max(least),
         };
-        let (mut shift, mut factor) = self.first(depth)?;
+        let (mut shift, mut factor) = self.first(depth, None)?;
         let mut counted = 0;
         for _ in 0..RUNS {
             let run = self.around(shift, &factor, counted, depth)?;
             self.found.effort.vectors += run.vectors;
-            // the memory of the old factor is needed for the new one
-            drop(factor);
             if let End::Slender(value) = run.end {
                 depth = value.max(least);
-                (shift, factor) = self.first(depth)?;
+                (shift, factor) = self.first(depth, Some(factor))?;
                 continue;
             }
             let (exhausted, more) = (matches!(run.end, End::Exhausted), run.modes.count());
             self.found.join(self.mass.n(), run.modes);
-            (shift, factor) = self.beside(self.bound(exhausted, depth), depth)?;
+            (shift, factor) = self.beside(self.bound(exhausted, depth), depth, factor)?;
             counted = factor.negative();
             let found = self.found.below(shift);
             let (enough, keep) = match self.wanted {
@@ -322,11 +320,19 @@ impl Search<'_> {
         Err(ModesError::NotConverged { found: self.found.below(shift), counted, below: shift })
     }
 
-    /// The factor at the first, negative shift.
-    fn first(&mut self, depth: f64) -> Result<(f64, Factor), ModesError> {
+    /// The factor at a shift, in the memory of the last one.
+    fn factor(&mut self, shift: f64, last: Option<Factor>) -> Result<Factor, Singular> {
         self.found.effort.factors += 1;
-        let factor =
-            self.analysis.factor(&[(1.0, self.stiffness), (depth, self.mass)]).map_err(ModesError::Massless)?;
+        let sum = [(1.0, self.stiffness), (-shift, self.mass)];
+        match last {
+            Some(last) => last.again(&sum),
+            None => self.analysis.factor(&sum),
+        }
+    }
+
+    /// The factor at the first, negative shift.
+    fn first(&mut self, depth: f64, last: Option<Factor>) -> Result<(f64, Factor), ModesError> {
+        let factor = self.factor(-depth, last).map_err(ModesError::Massless)?;
         match factor.negative() {
             0 => Ok((-depth, factor)),
             count => Err(ModesError::Negative { count, below: -depth }),
@@ -334,17 +340,16 @@ impl Search<'_> {
     }
 
     /// The factor at a shift, or a little further where that is an eigenvalue.
-    fn beside(&mut self, shift: f64, depth: f64) -> Result<(f64, Factor), ModesError> {
-        let mut last = Singular { row: 0 };
+    fn beside(&mut self, shift: f64, depth: f64, last: Factor) -> Result<(f64, Factor), ModesError> {
+        let (mut last, mut failed) = (Some(last), Singular { row: 0 });
         for attempt in 0..ATTEMPTS {
             let shift = shift + attempt as f64 * GAP * (shift.abs() + depth);
-            self.found.effort.factors += 1;
-            match self.analysis.factor(&[(1.0, self.stiffness), (-shift, self.mass)]) {
+            match self.factor(shift, last.take()) {
                 Ok(factor) => return Ok((shift, factor)),
-                Err(singular) => last = singular,
+                Err(singular) => failed = singular,
             }
         }
-        Err(ModesError::Massless(last))
+        Err(ModesError::Massless(failed))
     }
 
     /// Up to where the modes found may be complete, in a gap between them.
@@ -610,6 +615,22 @@ mod tests {
         assert!(matches!(wrong, Err(ModesError::NegativeMass | ModesError::Negative { .. })), "{wrong:?}");
         let none = matrix(0, []);
         assert_eq!(modes(&none, &none, Wanted::Lowest(3)).unwrap().count(), 0);
+    }
+
+    /// Two sets of three masses each, all modes of which fill the space: what is left of further vectors is rounding, and no negative mass.
+    #[test]
+    fn all_modes_of_few_rows() {
+        for step in 0..400 {
+            let more = (0.01 * step as f64).powi(2);
+            let masses = [2.0, 0.3, 0.2];
+            let k = [[3.5e5, -5e4, 0.0], [-5e4, 8e4 + 2e3 * more, -3e4], [0.0, -3e4, 3e4 + 5e3 * more]];
+            let both = (0..2).flat_map(|set| (0..9).map(move |at| (set, at / 3, at % 3)));
+            let k = matrix(6, both.map(|(set, i, l)| (3 * set + i, 3 * set + l, k[i][l])));
+            let m = matrix(6, (0..6).map(|i| (i, i, masses[i % 3])));
+            let found = modes(&k, &m, Wanted::Lowest(6)).unwrap();
+            assert_eq!(found.count(), 6, "{step}");
+            assert!(found.values.chunks(2).all(|pair| (pair[1] / pair[0] - 1.0).abs() < 1e-9), "{:?}", found.values);
+        }
     }
 
     #[test]

@@ -10,7 +10,7 @@
 
 use super::{Damping, Reduced, ReductionError, Series, Whole};
 use nalgebra::{Complex, DMatrix};
-use stickslip_numerics::sparse::{Matrix, NaturalModes};
+use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes};
 
 /// Samples at most: each takes a factor of the whole structure.
 const SAMPLES: usize = 9;
@@ -28,11 +28,13 @@ const ATTEMPTS: usize = 5;
 const ALONE: usize = 96;
 const PROBES: usize = 48;
 
+/// ω, and displacements of the ports under the loads, rad/s and m.
+type Sample = (f64, DMatrix<Complex<f64>>);
+
 /// Receptances of the whole structure.
 #[derive(Debug, Clone)]
 pub struct Reference {
-    /// (ω, displacements of the ports under the loads), rad/s and m.
-    samples: Vec<(f64, DMatrix<Complex<f64>>)>,
+    samples: Vec<Sample>,
     /// Forces on the ports, side by side.
     loads: DMatrix<f64>,
     damped: bool,
@@ -72,12 +74,14 @@ impl Reference {
         let ports = whole.ports.len();
         let alone = ports <= ALONE;
         let local = local_sizes(whole);
+        let mut factors = Factors { whole, last: None };
         let loads = match alone {
             true => DMatrix::identity(ports, ports),
             false => DMatrix::from_fn(ports, PROBES, |i, k| sign(i * PROBES + k) / local[i].sqrt()),
         };
+        let together = (!alone).then_some(&loads);
         let samples: Vec<_> =
-            frequencies.iter().map(|omega| sample(whole, *omega, &loads)).collect::<Result<_, _>>()?;
+            frequencies.iter().map(|omega| factors.sample(*omega, together)).collect::<Result<_, _>>()?;
         let usual = |port: usize| {
             let mut sizes: Vec<f64> = samples.iter().map(|(_, r)| r[(port, port)].norm()).collect();
             sizes.sort_by(f64::total_cmp);
@@ -126,43 +130,73 @@ impl Reference {
     }
 }
 
-/// Receptance of the whole structure at ω, or a little further where that is a mode.
-fn sample(whole: &Whole, omega: f64, loads: &DMatrix<f64>) -> Result<(f64, DMatrix<Complex<f64>>), ReductionError> {
-    let mut failed = ReductionError::OutOfRange;
-    for attempt in 0..ATTEMPTS {
-        let omega = omega * (1.0 + NUDGE * attempt as f64);
-        match answers(whole, omega, loads) {
-            Ok(receptance) => return Ok((omega, receptance)),
-            Err(error) => failed = error,
-        }
-    }
-    Err(failed)
+/// Factors of the whole structure, one after the other.
+struct Factors<'a> {
+    whole: &'a Whole,
+    /// Its memory is that of the next.
+    last: Option<Factor>,
 }
 
-fn answers(whole: &Whole, omega: f64, loads: &DMatrix<f64>) -> Result<DMatrix<Complex<f64>>, ReductionError> {
+impl Factors<'_> {
+    /// Receptance of the whole structure at ω, or a little further where that is a mode: under loads on all ports together, or each loaded alone.
+    fn sample(&mut self, omega: f64, together: Option<&DMatrix<f64>>) -> Result<Sample, ReductionError> {
+        let mut failed = ReductionError::OutOfRange;
+        for attempt in 0..ATTEMPTS {
+            let omega = omega * (1.0 + NUDGE * attempt as f64);
+            match self.answers(omega, together) {
+                Ok(receptance) => return Ok((omega, receptance)),
+                Err(error) => failed = error,
+            }
+        }
+        Err(failed)
+    }
+
+    fn answers(
+        &mut self,
+        omega: f64,
+        together: Option<&DMatrix<f64>>,
+    ) -> Result<DMatrix<Complex<f64>>, ReductionError> {
+        let whole = self.whole;
+        let (mass, stiffness): (&Matrix, &Matrix) = (&whole.mass, &whole.stiffness);
+        let singular = |singular| ReductionError::Singular { omega, singular };
+        let see = |columns: usize, value: &dyn Fn(usize) -> Complex<f64>| {
+            DMatrix::from_fn(whole.ports.len(), columns, |i, k| {
+                whole.ports[i].iter().map(|(at, weight)| value(k * whole.dofs() + at) * *weight).sum()
+            })
+        };
+        if let Damping::Matrix(damping) = &whole.damping {
+            let sum = [(1.0, 0.0), (0.0, omega), (-omega * omega, 0.0)].map(|(re, im)| Complex::new(re, im));
+            let sum = [(sum[0], stiffness), (sum[1], damping), (sum[2], mass)];
+            let factor = whole.analysis.factor_complex(&sum).map_err(singular)?;
+            let mut complex: Vec<Complex<f64>> =
+                forces(whole, together).iter().map(|v| Complex::new(*v, 0.0)).collect();
+            factor.solve(&mut complex);
+            return Ok(see(complex.len() / whole.dofs(), &|at| complex[at]));
+        }
+        let sum = [(1.0, stiffness), (-omega * omega, mass)];
+        let factor = match self.last.take() {
+            Some(last) => last.again(&sum),
+            None => whole.analysis.factor(&sum),
+        };
+        let factor = self.last.insert(factor.map_err(singular)?);
+        if together.is_none() {
+            return Ok(factor.compliance(&whole.ports).map(|v| Complex::new(v, 0.0)));
+        }
+        let mut real = forces(whole, together);
+        factor.solve(&mut real);
+        Ok(see(real.len() / whole.dofs(), &|at| Complex::new(real[at], 0.0)))
+    }
+}
+
+/// Forces on all rows under loads of the ports, or under each of them alone.
+fn forces(whole: &Whole, together: Option<&DMatrix<f64>>) -> Vec<f64> {
+    let Some(loads) = together else { return whole.forces(0..whole.ports.len()) };
     let n = whole.dofs();
-    let (mass, stiffness): (&Matrix, &Matrix) = (&whole.mass, &whole.stiffness);
-    let singular = |singular| ReductionError::Singular { omega, singular };
-    let mut real = vec![0.0; n * loads.ncols()];
+    let mut forces = vec![0.0; n * loads.ncols()];
     for (k, (port, row)) in (0..loads.ncols()).flat_map(|k| whole.ports.iter().enumerate().map(move |row| (k, row))) {
-        row.iter().for_each(|(at, weight)| real[k * n + at] += weight * loads[(port, k)]);
+        row.iter().for_each(|(at, weight)| forces[k * n + at] += weight * loads[(port, k)]);
     }
-    let see = |value: &dyn Fn(usize) -> Complex<f64>| {
-        DMatrix::from_fn(whole.ports.len(), loads.ncols(), |i, k| {
-            whole.ports[i].iter().map(|(at, weight)| value(k * n + at) * *weight).sum()
-        })
-    };
-    if let Damping::Matrix(damping) = &whole.damping {
-        let sum = [(1.0, 0.0), (0.0, omega), (-omega * omega, 0.0)].map(|(re, im)| Complex::new(re, im));
-        let sum = [(sum[0], stiffness), (sum[1], damping), (sum[2], mass)];
-        let factor = whole.analysis.factor_complex(&sum).map_err(singular)?;
-        let mut complex: Vec<Complex<f64>> = real.iter().map(|v| Complex::new(*v, 0.0)).collect();
-        factor.solve(&mut complex);
-        return Ok(see(&|at| complex[at]));
-    }
-    let factor = whole.analysis.factor(&[(1.0, stiffness), (-omega * omega, mass)]).map_err(singular)?;
-    factor.solve(&mut real);
-    Ok(see(&|at| Complex::new(real[at], 0.0)))
+    forces
 }
 
 /// Compliances that the ports would have if every row stood on its own stiffness alone, m/N: the order of their receptances, in their units.
