@@ -1,0 +1,181 @@
+//! The orbits between three points of a curve, and the peaks that they settle.
+
+use super::shrink::{Shrink, form, parabola};
+use super::{Peak, PeakOf, Point, Unsettled};
+use crate::method::Solver;
+use crate::orbit::Orbit;
+use std::collections::BTreeMap;
+
+/// How often a peak is sought again because the search for another one has met something higher.
+const OVERTAKEN: usize = 3;
+/// Orbits that may fail while the peak of one quantity is refined: what fails costs most.
+const FAILURES: usize = 2;
+/// Share of the first bracket beyond which an orbit that its neighbour does not lead to is sought in every way.
+const AWAY: f64 = 1e-3;
+/// Relative rise to an orbit that was not found, below which that no longer matters to a peak.
+const SETTLED: f64 = 1e-5;
+/// Two orbits closer than this share of the first bracket tell nothing but rounding.
+pub(super) const CLOSEST: f64 = 1e-7;
+/// Orbits that the peak of one quantity may take beside those that others have asked for; smooth peaks take 3 to 6, kinks up to 15.
+pub(super) const ORBITS: usize = 40;
+
+/// Three points of a curve, of which the middle one is a maximum of some quantities, and the orbits between them that were asked for since.
+pub(super) struct Bracket {
+    pub(super) points: Vec<Point>,
+    /// Distance of the ends, rad/s.
+    width: f64,
+    /// Where the last search for the peak of a quantity ended (rad/s), and whether it had found it.
+    pub(super) ended: BTreeMap<usize, (f64, bool)>,
+}
+
+impl Bracket {
+    pub(super) fn new(near: &[Point]) -> Self {
+        Bracket { points: near.to_vec(), width: near[2].omega - near[0].omega, ended: BTreeMap::new() }
+    }
+
+    /// What the parabola about the highest point of a quantity reaches.
+    pub(super) fn reach(&self, quantity: usize) -> f64 {
+        let top = best(&self.points, quantity);
+        reach(&self.points[top - 1..=top + 1], quantity)
+    }
+
+    /// Asks for orbits until the peak of a quantity is found.
+    pub(super) fn refine(&mut self, solver: &mut dyn Solver, quantity: usize, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
+        let points = &mut self.points;
+        let mut shrink = Shrink::default();
+        let mut failures = 0;
+        for _ in 0..ORBITS {
+            let best = best(points, quantity);
+            let Some(omega) = shrink.next(points, best, quantity, CLOSEST * self.width) else { break };
+            if failures == FAILURES {
+                break;
+            }
+            // the orbit's neighbour on the side of the new point is as good a start as any
+            let start = points[best].start.as_deref();
+            let error = points[best].error;
+            let found = match solver.between(omega, start) {
+                // far from the neighbour it takes more than its help; close to it there is nothing to be gained
+                Err(_) if (omega - points[best].omega).abs() > AWAY * self.width => solver.orbit(omega, start),
+                found => found,
+            };
+            let point = match found {
+                Ok(orbit) => Point { omega, error, ..Point::new(&orbit, quantities) },
+                Err(_) => {
+                    failures += 1;
+                    Point::failed(omega)
+                }
+            };
+            let at = points.partition_point(|point| point.omega < omega);
+            points.insert(at, point);
+        }
+        let top = best(points, quantity);
+        self.ended.insert(quantity, (points[top].omega, shrink.found));
+    }
+
+    /// Seeks the peaks of quantities again above which others have met a higher point since: between two points of a curve there may be several tops.
+    pub(super) fn refine_overtaken(&mut self, solver: &mut dyn Solver, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
+        for _ in 0..OVERTAKEN {
+            let moved = |(quantity, (omega, _)): (&usize, &(f64, bool))| {
+                (self.points[best(&self.points, *quantity)].omega != *omega).then_some(*quantity)
+            };
+            let overtaken: Vec<usize> = self.ended.iter().filter_map(moved).collect();
+            if overtaken.is_empty() {
+                break;
+            }
+            overtaken.into_iter().for_each(|quantity| self.refine(solver, quantity, quantities));
+        }
+    }
+
+    /// Whether the highest point of a quantity is a peak that its search has found.
+    fn found(&self, quantity: usize) -> bool {
+        let omega = self.points[best(&self.points, quantity)].omega;
+        self.ended.get(&quantity) == Some(&(omega, true))
+    }
+
+    /// The peak of a quantity, as far as it is refined.
+    pub(super) fn peak(&self, quantity: usize) -> PeakOf {
+        let top = best(&self.points, quantity);
+        let point = &self.points[top];
+        let near = &self.points[top - 1..=top + 1];
+        let unsettled = if lacks_neighbours(near, quantity) {
+            Some(Unsettled::Neighbours)
+        } else {
+            (!self.found(quantity) && is_needle(near, quantity)).then_some(Unsettled::Needle)
+        };
+        let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false, unsettled };
+        PeakOf { quantity, peak, values: point.values.clone() }
+    }
+}
+
+/// The peaks of the `wanted` quantities, each of which is largest at the middle one of three points.
+pub(super) fn refine(
+    solver: &mut dyn Solver,
+    near: &[Point],
+    wanted: &[usize],
+    quantities: &dyn Fn(&Orbit) -> Vec<f64>,
+) -> Vec<PeakOf> {
+    let mut bracket = Bracket::new(near);
+    wanted.iter().for_each(|&quantity| bracket.refine(solver, quantity, quantities));
+    bracket.refine_overtaken(solver, quantities);
+    wanted.iter().map(|&quantity| bracket.peak(quantity)).collect()
+}
+
+/// The value at the vertex of the parabola through three points of which the middle one is the highest: a bound where the points are further apart than
+/// the peak is wide, and infinite where they say nothing of its height.
+pub(super) fn reach(near: &[Point], quantity: usize) -> f64 {
+    let value = near[1].value(quantity);
+    let (rise, _) = parabola(near, 1, quantity);
+    // of 1/a² the relative rise is twice that of a, for small ones: the square says it for all
+    let left = 1.0 - 2.0 * rise;
+    if left > 0.0 { value / left.sqrt() } else { f64::INFINITY }
+}
+
+/// Whether an orbit beside the highest of three points was not found, and the line from the other side through that point rises to there.
+fn lacks_neighbours(near: &[Point], quantity: usize) -> bool {
+    let rises = |other: usize, failed: usize| {
+        let run = (near[failed].omega - near[1].omega) / (near[1].omega - near[other].omega);
+        let here = form(near[1].value(quantity));
+        let rise = (here - form(near[other].value(quantity))) * run / (2.0 * here.abs());
+        // without an orbit on the other side nothing is known
+        near[failed].values.is_empty() && (near[other].values.is_empty() || rise > SETTLED)
+    };
+    rises(0, 2) || rises(2, 0)
+}
+
+/// Whether a quantity falls on both sides of the middle one of three points by more than a peak that is found, and the parabola through them rises as
+/// much above it. Beside a kink or a jump it does so on one side at most, by the time that the bracket is closed.
+fn is_needle(near: &[Point], quantity: usize) -> bool {
+    let value = near[1].value(quantity);
+    let falls = |point: &Point| value - point.value(quantity) > SETTLED * value;
+    falls(&near[0]) && falls(&near[2]) && parabola(near, 1, quantity).0 > SETTLED
+}
+
+/// The highest inner point; the first and the last one are not above it.
+pub(super) fn best(points: &[Point], quantity: usize) -> usize {
+    (1..points.len() - 1)
+        .max_by(|&a, &b| points[a].value(quantity).total_cmp(&points[b].value(quantity)))
+        .unwrap_or(points.len() / 2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::OrbitError;
+
+    /// Finds no orbit.
+    struct Nothing;
+
+    impl Solver for Nothing {
+        fn orbit(&mut self, omega: f64, _: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+            Err(OrbitError::Frequency { omega })
+        }
+    }
+
+    #[test]
+    fn orbits_that_fail_leave_the_point_of_the_grid() {
+        let curve = |w: f64| 2.0 - (w - 1.0).powi(2);
+        let near = [0.9, 1.01, 1.1].map(|omega| Point { omega, values: vec![curve(omega)], start: None, error: 0.0 });
+        let peak = refine(&mut Nothing, &near, &[0], &|_| Vec::new())[0].peak;
+        assert_eq!((peak.omega, peak.value, peak.unsettled), (1.01, curve(1.01), Some(Unsettled::Neighbours)));
+    }
+}

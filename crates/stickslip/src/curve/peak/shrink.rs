@@ -1,0 +1,165 @@
+//! How the bracket of one peak shrinks.
+//!
+//! Near a resonance the inverse square of an amplitude is a parabola in the frequency (exactly so for a linear oscillator of light
+//! damping), so that parabolas through `1/a²` find the peak in a few orbits. Where the highest point is a kink, the onset of slip, two
+//! straight lines do.
+
+use super::Point;
+
+/// Relative rise of a quantity, as the parabola predicts it, below which its peak counts as found: a hundred times the rounding of a
+/// closed orbit. The frequency is then known to 1e-5 of the width of the peak.
+pub(super) const RISE: f64 = 1e-10;
+/// Share of the estimated error of an orbit below which a rise is its noise, and the largest rise that counts as such: the switches of a
+/// sampled series move in steps.
+const NOISE: f64 = 1e-4;
+const MOST_NOISE: f64 = 1e-7;
+/// Share of the rise that a parabola predicts which must come true for the next trial to be a parabola again.
+const KEPT: f64 = 0.5;
+/// Broken promises after which only halving is left.
+const JUMP: usize = 15;
+
+/// How the bracket of one quantity shrinks: by parabolas as long as they keep what they promise, else by crossing lines and by halving.
+#[derive(Debug, Default)]
+pub(super) struct Shrink {
+    /// The quantity that the last trial was to reach.
+    promised: Option<f64>,
+    /// Trials that did not keep their promise since one did.
+    broken: usize,
+    /// Where the last trial was two lines that cross: the form there, as promised.
+    kink: Option<(f64, f64)>,
+    /// Whether the peak is found: there is nothing more to be had.
+    pub(super) found: bool,
+}
+
+impl Shrink {
+    /// The frequency of the next orbit; `None` if the peak is found.
+    pub(super) fn next(&mut self, points: &[Point], best: usize, quantity: usize, closest: f64) -> Option<f64> {
+        let [left, middle, right] = [best - 1, best, best + 1].map(|i| points[i].omega);
+        let value = points[best].value(quantity);
+        let (rise, vertex) = parabola(points, best, quantity);
+        let floor = closest.max(4.0 * f64::EPSILON * middle);
+        let enough = (NOISE * points[best].error).clamp(RISE, MOST_NOISE);
+        let at_kink = self.kink.is_some_and(|(omega, promised)| {
+            omega == middle && (form(value) - promised).abs() <= enough * promised.abs()
+        });
+        match self.promised {
+            Some(promised) if value < promised => self.broken += 1,
+            _ => self.broken = 0,
+        }
+        // a promise that nothing more is to be had counts only from who has kept the last one
+        self.found = (rise <= enough && self.broken == 0) || at_kink;
+        if self.found || right - left <= 2.0 * floor {
+            return None;
+        }
+        self.promised = Some(value * (1.0 + KEPT * rise));
+        self.kink = None;
+        let wider = if right - middle > middle - left { 0.5 * (middle + right) } else { 0.5 * (left + middle) };
+        let inside = |omega: &f64| *omega > left + floor && *omega < right - floor;
+        // what neither describes is a jump
+        let form = if self.broken < JUMP { self.broken % 3 } else { 2 };
+        let trial = match form {
+            0 => vertex.filter(inside),
+            1 => {
+                self.kink = crossing(points, best, quantity).filter(|(omega, _)| inside(omega));
+                self.kink.map(|(omega, _)| omega)
+            }
+            _ => None,
+        };
+        let mut trial = trial.unwrap_or(wider);
+        if (trial - middle).abs() < floor {
+            // a step to the side on which the bracket is wider closes it there
+            trial = middle + if right - middle > middle - left { floor } else { -floor };
+        }
+        inside(&trial).then_some(trial)
+    }
+}
+
+/// What is interpolated: `1/a²` of positive quantities, which falls where they rise.
+pub(super) fn form(value: f64) -> f64 {
+    if value > 0.0 { -1.0 / (value * value) } else { f64::NEG_INFINITY }
+}
+
+/// Of the parabola through a point and its neighbours: how far its vertex lies above the point, as a share of the quantity, and where.
+/// Without one (a failed neighbour, a straight line) the rise is unbounded.
+pub(super) fn parabola(points: &[Point], best: usize, quantity: usize) -> (f64, Option<f64>) {
+    let [a, x, b] = [best - 1, best, best + 1].map(|i| points[i].omega);
+    let [fa, fx, fb] = [best - 1, best, best + 1].map(|i| form(points[i].value(quantity)));
+    let (left, right) = ((fx - fa) / (x - a), (fx - fb) / (b - x));
+    let curvature = (left + right) / (b - a);
+    if !(curvature.is_finite() && curvature > 0.0) {
+        return (f64::INFINITY, None);
+    }
+    // slope of the parabola at the middle point
+    let slope = (left * (b - x) - right * (x - a)) / (b - a);
+    let rise = slope * slope / (4.0 * curvature);
+    // f = -a⁻²: a relative rise r of the quantity is 2 r |f|
+    (0.5 * rise / fx.abs(), Some(x + 0.5 * slope / curvature))
+}
+
+/// Where the two straight lines cross that the points left and right of the best one lie on, and the form there.
+fn crossing(points: &[Point], best: usize, quantity: usize) -> Option<(f64, f64)> {
+    let at = |i: usize| Some((points.get(i)?.omega, form(points.get(i)?.value(quantity))));
+    let (before, after) = (at(best.checked_sub(2)?)?, at(best + 2)?);
+    let (left, here, right) = (at(best - 1)?, at(best)?, at(best + 1)?);
+    let slope = |p: (f64, f64), q: (f64, f64)| (q.1 - p.1) / (q.0 - p.0);
+    let meet = |p: (f64, f64), s: f64, q: (f64, f64), t: f64| {
+        let omega = p.0 + (q.1 - p.1 - t * (q.0 - p.0)) / (s - t);
+        (omega, p.1 + s * (omega - p.0))
+    };
+    // the best point lies on the one line or on the other
+    let rising = meet(here, slope(left, here), right, slope(right, after));
+    let falling = meet(left, slope(before, left), here, slope(here, right));
+    // a crossing below the best point is none
+    [rising, falling].into_iter().find(|(omega, form)| *omega > left.0 && *omega < right.0 && *form >= here.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bracket::{CLOSEST, ORBITS, best};
+    use super::*;
+
+    /// Refines the middle one of three points of a formula; returns frequency, value, and evaluations.
+    fn check(curve: &dyn Fn(f64) -> f64, [a, x, b]: [f64; 3]) -> (f64, f64, usize) {
+        let point = |omega: f64| Point { omega, values: vec![curve(omega)], start: None, error: 0.0 };
+        let mut points = vec![point(a), point(x), point(b)];
+        let mut shrink = Shrink::default();
+        let mut count = 0;
+        while count < ORBITS {
+            let top = best(&points, 0);
+            let Some(omega) = shrink.next(&points, top, 0, CLOSEST * (b - a)) else { break };
+            let at = points.partition_point(|point| point.omega < omega);
+            points.insert(at, point(omega));
+            count += 1;
+        }
+        let top = &points[best(&points, 0)];
+        (top.omega, top.value(0), count)
+    }
+
+    #[test]
+    fn the_peak_of_a_linear_oscillator_takes_a_handful_of_orbits() {
+        // |1/(1 - w² + 2 j ζ w)| is highest at w² = 1 - 2 ζ² with 1/(2 ζ √(1 - ζ²))
+        let zeta: f64 = 1e-3;
+        let curve = |w: f64| 1.0 / (1.0 - w * w).hypot(2.0 * zeta * w);
+        let (omega, value, count) = check(&curve, [0.99, 0.9991, 1.01]);
+        assert!((value * 2.0 * zeta * (1.0 - zeta * zeta).sqrt() - 1.0).abs() < 1e-10, "{value}");
+        assert!((omega - (1.0 - 2.0 * zeta * zeta).sqrt()).abs() < 1e-5 * zeta, "{omega}");
+        assert!(count <= 8, "{count}");
+    }
+
+    #[test]
+    fn a_kink_is_found_as_well() {
+        let curve =
+            |w: f64| if w < 1.05 { 1.0 + 3.0 * (w - 1.05) } else { 1.0 - 0.2 * (w - 1.05) + (w - 1.05).powi(2) };
+        let (omega, value, count) = check(&curve, [0.9, 1.1, 1.2]);
+        assert!((value - 1.0).abs() < 1e-7 && (omega - 1.05).abs() < 1e-7, "{omega} {value} {count}");
+        assert!(count <= 24, "{count}");
+    }
+
+    #[test]
+    fn a_jump_ends_within_the_bound() {
+        let (omega, _, count) = check(&|w| if w < 1.05 { 1.0 + w } else { 0.1 }, [0.9, 1.0, 1.2]);
+        // the points below the jump lie on a slope that a parabola creeps up: it ends close to the edge
+        assert!((omega - 1.05).abs() < 1e-4 * 0.3, "{omega}");
+        assert!(count <= ORBITS, "{count}");
+    }
+}
