@@ -1,12 +1,14 @@
 //! The equations of harmonic balance with a parameter, for continuation.
 
+use super::balance::LARGEST;
 use super::equations::{Level, Solution, transfer};
 use super::estimate::{Compared, estimate};
 use super::kept::Kept;
 use super::ports::Ports;
 use super::rest::Rest;
 use super::sparse::GUESSED;
-use super::{HarmonicBalance, LARGEST, TOLERANCE, path};
+use super::storage::{check_memory, memory};
+use super::{HarmonicBalance, TOLERANCE, path};
 use crate::method::evidence::Judge;
 use crate::method::guess::Guess;
 use crate::method::{MethodError, OrbitError};
@@ -68,7 +70,7 @@ impl<'a> BranchEquations<'a> {
         let level =
             |top: usize| Level::new(kept.up_to(top), method.samples_at(top, &ports), &ports, None).with_matrix();
         let harmonics = kept.up_to(top).len();
-        super::check_memory(super::memory(&ports, &rest, harmonics, true), &ports, (harmonics, 1))?;
+        check_memory(memory(&ports, &rest, harmonics, true), &ports, (harmonics, 1))?;
         let few = 2 * ports.count() * kept.up_to(kept.double(top)).len() <= LARGEST;
         let (finer, level) = (few.then(|| level(kept.double(top))), level(top));
         let motion = Solution::rest(level.linear.len());

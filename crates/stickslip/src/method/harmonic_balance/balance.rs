@@ -1,0 +1,310 @@
+//! The solver: searches for the harmonics of one orbit after the other.
+
+use super::budget::{POINT, Work, is_affordable};
+use super::equations::{self, Level, Solution};
+use super::kept::Kept;
+use super::ports::Ports;
+use super::recent::{RECENT, Recent};
+use super::rest::Rest;
+use super::solve::Lost;
+use super::sparse::{self, Sparse};
+use super::storage::{MEMORY, check_memory, level_memory};
+use super::{FIRST, HarmonicBalance, NAME, TOLERANCE, coupled, path, work};
+use crate::method::evidence::Judge;
+use crate::method::guess::Guess;
+use crate::method::{MethodError, OrbitError, Solver};
+use crate::model::System;
+use crate::orbit::{Course, Orbit};
+use nalgebra::DVector;
+use num_complex::Complex64;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+/// Newton iterations from a neighbouring orbit, which take 2 to 5.
+const NEARBY: usize = 20;
+/// Laws of velocity begin with this many harmonics at most, and double them from there: the sets of slipping samples are then nearly
+/// known.
+const COLD: usize = 15;
+/// Unknowns beyond which no error is estimated by elimination: one would take seconds, and a search takes ten and more.
+pub(super) const LARGEST: usize = 2600;
+/// Harmonics times axes squared up to which products with all of them take a tenth of a second, so that an error is estimated.
+const ESTIMATED: f64 = 1e7;
+
+/// The solver of a system.
+pub(super) struct Balance {
+    pub(super) system: Arc<System>,
+    pub(super) method: HarmonicBalance,
+    /// Periods of the drive in one of the motion; harmonics count those of the motion.
+    pub(super) periods: usize,
+    /// The drive's frequency, rad/s; that of the motion is `omega` everywhere here.
+    pub(super) drive: f64,
+    /// Of a ring in a travelling wave those of the first sector.
+    pub(super) ports: Ports,
+    /// And those of the whole ring.
+    pub(super) around: Option<Ports>,
+    pub(super) rest: Rest,
+    /// One harmonic in banded form, of which the others need multiples, if that is the system's.
+    pub(super) banded: Option<Sparse>,
+    pub(super) kept: Kept,
+    pub(super) first: usize,
+    pub(super) judge: Judge,
+    pub(super) levels: BTreeMap<usize, Level>,
+    /// The last orbits, the newest first.
+    pub(super) recent: VecDeque<Recent>,
+    /// Frequencies (rad/s) at which the motion was followed and no orbit was found, and what it did.
+    pub(super) followed: Vec<(f64, Course)>,
+    /// How often it was followed to find one.
+    pub(super) tried_in_time: usize,
+    /// By the highest harmonic, of many contacts the last solution that was compared with one of twice the harmonics, and that.
+    pub(super) compared: BTreeMap<usize, [Solution; 2]>,
+}
+
+impl Balance {
+    pub(super) fn new(system: System, method: HarmonicBalance, periods: usize) -> Result<Self, MethodError> {
+        let kept = if periods > 1 {
+            Kept::slowed(&system, periods)
+        } else {
+            Kept::new(&system, |z| z != Complex64::new(0.0, 0.0))
+        };
+        method.check(kept.highest)?;
+        let (ports, around) = Ports::of_sector(&system)?;
+        let rest = Rest::new(&system, &ports);
+        let first = (FIRST * kept.scale).max(kept.highest);
+        let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
+        let banded = Sparse::new(&system, &ports, &[1]);
+        let bytes = level_memory(banded.as_ref(), &ports, &rest, harmonics.len());
+        check_memory(bytes, &ports, (harmonics.len(), periods))?;
+        Ok(Balance {
+            method,
+            periods,
+            drive: 0.0,
+            ports,
+            around,
+            rest,
+            banded,
+            kept,
+            first,
+            judge: Judge::new(&system),
+            system: Arc::new(system),
+            levels: BTreeMap::new(),
+            recent: VecDeque::new(),
+            followed: Vec::new(),
+            tried_in_time: 0,
+            compared: BTreeMap::new(),
+        })
+    }
+
+    /// The level of highest harmonic `top`, ready for `omega`.
+    ///
+    /// # Errors
+    /// A resonance without damping.
+    pub(super) fn level(&mut self, top: usize, omega: f64) -> Result<&mut Level, Lost> {
+        let harmonics = self.kept.up_to(top);
+        let samples = self.method.samples_at(top, &self.ports);
+        let (system, ports) = (&self.system, &self.ports);
+        let level = self.levels.entry(top).or_insert_with(|| {
+            let sparse = Sparse::new(system, ports, &harmonics);
+            Level::new(harmonics, samples, ports, sparse)
+        });
+        level.drive(&self.system, &self.ports, &self.rest, omega).map_err(Lost::at)?;
+        let elsewhere = self.taken(Some(top));
+        let level = self.levels.get_mut(&top).expect("made above");
+        level.elsewhere = elsewhere;
+        Ok(level)
+    }
+
+    /// Begins a point.
+    pub(super) fn begin_point(&mut self, drive: f64) {
+        self.drive = drive;
+        self.levels.values_mut().for_each(Level::begin_point);
+    }
+
+    /// What the searches of the point have taken, but those with harmonics up to one number.
+    pub(super) fn taken(&self, but: Option<usize>) -> Work {
+        let counted = self.levels.iter().filter(|(top, _)| but != Some(**top));
+        counted.map(|(_, level)| level.taken_of_point(&self.ports)).fold(Work::default(), Work::and)
+    }
+
+    /// Whether they have taken all that they may.
+    pub(super) fn is_spent(&self) -> bool {
+        self.taken(None).is_beyond(POINT)
+    }
+
+    /// Whether a solution with twice the harmonics takes no more than seconds, of a point that has taken so much.
+    pub(super) fn can_compare(&self, top: usize, taken: Work) -> bool {
+        let harmonics = self.kept.up_to(self.kept.double(top)).len();
+        let axes = self.ports.count();
+        let products = (harmonics * axes * axes) as f64;
+        let size = 2 * axes * harmonics;
+        let multiplied = coupled::by_products(size, &self.ports) && products <= ESTIMATED;
+        let few = match &self.banded {
+            Some(_) => true,
+            None => size <= LARGEST || multiplied,
+        };
+        let bounded = self.banded.is_some() || self.ports.has_forces();
+        let affordable = !bounded || is_affordable(work::step(self.banded.as_ref(), &self.ports, harmonics), taken);
+        few && affordable && level_memory(self.banded.as_ref(), &self.ports, &self.rest, harmonics) <= MEMORY
+    }
+
+    /// Solves at `top`, from a motion at another number of harmonics or from the first guess.
+    pub(super) fn solve(&mut self, top: usize, omega: f64, from: Option<(usize, &Solution)>) -> Result<Solution, Lost> {
+        let start = match from {
+            Some((other, motion)) => {
+                let harmonics = self.levels[&other].harmonics().to_vec();
+                equations::transfer(motion, &harmonics, self.level(top, omega)?.harmonics())
+            }
+            None if self.ports.has_forces() && top > COLD * self.kept.scale && top / 2 >= self.first => {
+                let coarse = self.solve(top / 2, omega, None)?;
+                return self.solve(top, omega, Some((top / 2, &coarse)));
+            }
+            None => {
+                // the guess solves the whole structure densely: large systems begin without friction
+                let guess = (self.system.dofs() < sparse::GUESSED).then(|| Guess::new(&self.system, omega));
+                self.level(top, omega)?;
+                let begun = self.levels[&top].begin(&self.system, &self.ports, guess.as_ref(), omega);
+                self.approached(top, omega, guess.as_ref()).unwrap_or(begun)
+            }
+        };
+        let level = self.levels.get_mut(&top).expect("made above");
+        level.solve(&self.ports, omega, start)
+    }
+
+    pub(super) fn lost(&self, lost: Lost) -> OrbitError {
+        if let Some(resonance) = lost.resonance {
+            return OrbitError::Resonance { method: NAME, omega: self.drive, resonance };
+        }
+        if lost.away {
+            return OrbitError::drift(NAME, self.drive);
+        }
+        OrbitError::NotConverged {
+            method: NAME,
+            omega: self.drive,
+            iterations: lost.iterations,
+            residual: lost.residual,
+            spent: self.is_spent(),
+            instead: String::new(),
+        }
+    }
+
+    /// Harmonics of the places.
+    pub(super) fn places(
+        &mut self,
+        top: usize,
+        omega: f64,
+        motion: &Solution,
+    ) -> Result<Vec<DVector<Complex64>>, Lost> {
+        path::places(self.levels.get_mut(&top).expect("solved"), &self.rest, omega, motion).map_err(Lost::at)
+    }
+
+    pub(super) fn finish(
+        &mut self,
+        top: usize,
+        omega: f64,
+        motion: Solution,
+        x: Vec<DVector<Complex64>>,
+        truncation: Option<f64>,
+    ) -> Result<Orbit, OrbitError> {
+        let setting = path::Setting {
+            system: &self.system,
+            ports: &self.ports,
+            around: self.around.as_ref(),
+            omega,
+            first: self.periods,
+            odd: self.kept.half_period(),
+            truncation,
+            tolerance: self.method.tolerance.unwrap_or(TOLERANCE),
+            judge: Some(&mut self.judge),
+        };
+        let level = self.levels.get_mut(&top).expect("solved");
+        let orbit = path::orbit(setting, level, &motion, x).ok_or(OrbitError::drift(NAME, self.drive))?;
+        if !path::balances(&self.system, &orbit) {
+            let lost = Lost::after(motion.iterations, orbit.evidence.energy_gap);
+            return Err(self.lost(lost));
+        }
+        self.recent.truncate(RECENT - 1);
+        self.recent.push_front(Recent { start: orbit.start.clone(), omega, top, motion });
+        Ok(Orbit { omega: self.drive, periods: self.periods, ..orbit })
+    }
+
+    /// The solution near another one, without an estimate of its error, and without the long ways of [`Level::solve`]: a search that asks
+    /// for it can do without.
+    pub(super) fn nearby(&mut self, top: usize, omega: f64, near: &Solution) -> Result<Orbit, OrbitError> {
+        self.level(top, omega).map(|_| ()).map_err(|l| self.lost(l))?;
+        let mut motion = Solution { iterations: 0, ..near.clone() };
+        let level = self.levels.get_mut(&top).expect("made above");
+        let mut found = level.polish(&self.ports, omega, &mut motion, NEARBY);
+        if found.is_err() && self.ports.has_forces() {
+            motion = Solution { iterations: motion.iterations, ..near.clone() };
+            found = level.by_interior_points(&self.ports, omega, &mut motion);
+            if found.is_err() {
+                motion = Solution { iterations: motion.iterations, ..near.clone() };
+                found = level.by_proximal_points(&self.ports, omega, &mut motion);
+            }
+        }
+        found.map_err(|l| self.lost(l))?;
+        let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
+        self.finish(top, omega, motion, x, None)
+    }
+
+    /// The user's number of harmonics, or as many as are needed, from `first` on.
+    pub(super) fn from(
+        &mut self,
+        first: usize,
+        omega: f64,
+        warm: Option<(usize, Solution)>,
+    ) -> Result<Orbit, OrbitError> {
+        match self.method.harmonics {
+            Some(top) => self.fixed(top, omega, warm),
+            None => self.chosen(first, omega, warm),
+        }
+    }
+
+    /// Whether a search begins on the line through the last two motions: of many contacts, and of elastic ones where motions do not separate, so that whatever
+    /// it begins with leads to the same orbit. Rigid friction jumps from one set of slipping samples to the next.
+    pub(super) fn goes_ahead(&self, top: usize) -> bool {
+        let unique = self.judge.proves() && !self.ports.has_forces();
+        unique || self.levels.get(&top).is_some_and(Level::is_coupled)
+    }
+
+    /// The harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess.
+    pub(super) fn warm(&self, start: Option<&[f64]>, omega: f64) -> Option<(usize, Solution)> {
+        let start = start?;
+        let same = self.recent.iter().position(|recent| recent.start == start);
+        let near = self.recent.get(same.unwrap_or(0))?;
+        let before = self.recent.iter().skip(same.unwrap_or(0) + 1).find(|recent| recent.top == near.top);
+        let motion = match before {
+            Some(before) if self.goes_ahead(near.top) => near.towards(before, omega),
+            _ => near.motion.clone(),
+        };
+        Some((near.top, motion))
+    }
+}
+
+impl Solver for Balance {
+    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        if !(omega.is_finite() && omega > 0.0) {
+            return Err(OrbitError::Frequency { omega });
+        }
+        self.begin_point(omega);
+        let omega = omega / self.periods as f64;
+        let warm = self.warm(start, omega);
+        match self.from(self.first, omega, warm) {
+            Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
+                let by_time = |balance: &mut Self| balance.by_time(omega).ok_or(error);
+                self.by_its_course(omega).unwrap_or_else(|| by_time(self))
+            }
+            found => found,
+        }
+    }
+
+    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        match self.warm(start, omega / self.periods as f64) {
+            // the harmonics that the neighbour needed are enough
+            Some((top, motion)) if omega.is_finite() && omega > 0.0 => {
+                self.begin_point(omega);
+                self.nearby(top, omega / self.periods as f64, &motion)
+            }
+            _ => self.orbit(omega, start),
+        }
+    }
+}
