@@ -14,6 +14,9 @@ const FAILURES: usize = 2;
 const AWAY: f64 = 1e-3;
 /// Relative rise to an orbit that was not found, below which that no longer matters to a peak.
 const SETTLED: f64 = 1e-5;
+/// Fall of a quantity beside its highest point, as a share, from which a search that has ended there has not found how high the peak is. [`CLOSEST`]
+/// leaves 1e-7 of it beside a kink, 1e-3 beside a fold, and half of it where nothing bounds the peak.
+const STEEP: f64 = 1e-2;
 /// Two orbits closer than this share of the first bracket tell nothing but rounding.
 pub(super) const CLOSEST: f64 = 1e-7;
 /// Orbits that the peak of one quantity may take beside those that others have asked for; smooth peaks take 3 to 6, kinks up to 15.
@@ -142,12 +145,12 @@ fn lacks_neighbours(near: &[Point], quantity: usize) -> bool {
     rises(0, 2) || rises(2, 0)
 }
 
-/// Whether a quantity falls on both sides of the middle one of three points by more than a peak that is found, and the parabola through them rises as
-/// much above it. Beside a kink or a jump it does so on one side at most, by the time that the bracket is closed.
+/// Whether a quantity falls on both sides of the middle one of three points by more than it does beside a kink or a fold by the time that the bracket is
+/// closed: near a fold with the root of the distance, on one side.
 fn is_needle(near: &[Point], quantity: usize) -> bool {
     let value = near[1].value(quantity);
-    let falls = |point: &Point| value - point.value(quantity) > SETTLED * value;
-    falls(&near[0]) && falls(&near[2]) && parabola(near, 1, quantity).0 > SETTLED
+    let falls = |point: &Point| value - point.value(quantity) > STEEP * value;
+    falls(&near[0]) && falls(&near[2])
 }
 
 /// The highest inner point; the first and the last one are not above it.
