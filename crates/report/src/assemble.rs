@@ -93,10 +93,10 @@ fn written(
         tally.append(block.tally.clone());
         join(&mut shapes, block.tables.iter().map(Shape::of).collect());
     }
-    shapes.retain(|shape| !shape.columns.is_empty());
+    shapes.retain(|shape| !shape.header.columns.is_empty());
 
     let mut thinning =
-        Thinning::new(study, &shapes.iter().map(|shape| (shape.name.as_str(), shape.rows)).collect::<Vec<_>>());
+        Thinning::new(study, &shapes.iter().map(|shape| (shape.header.name.as_str(), shape.rows)).collect::<Vec<_>>());
     let is_whole = thinning.keeps_all();
     let (mut begun, mut names): (Vec<String>, Vec<String>) = Default::default();
     let mut sinks: Vec<(&str, Box<dyn Rows>)> = Vec::new();
@@ -108,13 +108,14 @@ fn written(
     };
     for block in blocks() {
         for table in block?.tables.into_iter().filter(|table| !table.columns.is_empty()) {
+            let Some(shape) = shapes.iter().find(|shape| shape.header.name == table.name) else { continue };
+            let table = shape.filled(table);
             if !begun.contains(&table.name) {
                 begun.push(table.name.clone());
-                let Some(shape) = shapes.iter().find(|shape| shape.name == table.name) else { continue };
                 for sink in &wanted {
-                    let name = sink.file_name(&shape.name)?;
+                    let name = sink.file_name(&table.name)?;
                     let file = BufWriter::with_capacity(1 << 20, aside.file(&name)?);
-                    sinks.push((&shape.name, (sink.begin)(&table, Box::new(file))?));
+                    sinks.push((&shape.header.name, (sink.begin)(&table, Box::new(file))?));
                     names.push(name);
                 }
             }
@@ -142,7 +143,7 @@ fn written(
         let output = wanted.iter().position(|sink| name.ends_with(&format!(".{}", sink.extension)));
         let table = shapes
             .iter()
-            .position(|shape| wanted.iter().any(|sink| *name == format!("{}.{}", shape.name, sink.extension)));
+            .position(|shape| wanted.iter().any(|sink| *name == format!("{}.{}", shape.header.name, sink.extension)));
         (output, table)
     });
     let files = with_record(&dataset, &shapes, out, &names, files)?;

@@ -22,25 +22,27 @@ fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
 /// What a table holds, for the record.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Shape {
-    pub name: String,
+    /// Its columns, without rows.
+    pub header: Table,
     pub rows: usize,
-    /// Names of its columns, and what their cells hold.
-    pub columns: Vec<(String, &'static str)>,
 }
 
 impl Shape {
     pub fn of(table: &Table) -> Shape {
-        let columns = table.columns.iter().map(|column| (column.name.clone(), sort(&column.values)));
-        Shape { name: table.name.clone(), rows: table.rows(), columns: columns.collect() }
+        Shape { header: table.header(), rows: table.rows() }
     }
 
     /// More rows of the same table.
     pub fn add(&mut self, more: Shape) {
-        if self.columns.is_empty() {
-            *self = more;
-        } else {
-            self.rows += more.rows;
-        }
+        self.header.append(more.header);
+        self.rows += more.rows;
+    }
+
+    /// Rows of the table with all of its columns.
+    pub fn filled(&self, rows: Table) -> Table {
+        let mut filled = self.header.clone();
+        filled.append(rows);
+        filled
     }
 }
 
@@ -72,10 +74,10 @@ pub(crate) fn with_shapes(dataset: &Dataset, shapes: &[Shape], files: &[String])
         "failures": dataset.failures,
         "files": files,
         "tables": shapes.iter().map(|t| serde_json::json!({
-            "file": format!("{}.csv", t.name),
+            "file": format!("{}.csv", t.header.name),
             "rows": t.rows,
-            "columns": t.columns.iter().map(|c| &c.0).collect::<Vec<_>>(),
-            "values": t.columns.iter().map(|c| c.1).collect::<Vec<_>>(),
+            "columns": t.header.columns.iter().map(|c| &c.name).collect::<Vec<_>>(),
+            "values": t.header.columns.iter().map(|c| sort(&c.values)).collect::<Vec<_>>(),
         })).collect::<Vec<_>>(),
         "study": record.study,
     });

@@ -75,6 +75,27 @@ impl Values {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// Cells of the same sort, without a value: what a case does not have. A count that there is not is zero.
+    pub(crate) fn blank(&self, rows: usize) -> Values {
+        match self {
+            Values::Number(_) => Values::Number(vec![f64::NAN; rows]),
+            Values::Integer(_) => Values::Integer(vec![0; rows]),
+            Values::Text(_) => Values::Text(vec![String::new(); rows]),
+            Values::Flag(_) => Values::Flag(vec![None; rows]),
+        }
+    }
+
+    /// More cells of the same sort after these.
+    pub(crate) fn extend(&mut self, more: Values) {
+        match (self, more) {
+            (Values::Number(a), Values::Number(b)) => a.extend(b),
+            (Values::Integer(a), Values::Integer(b)) => a.extend(b),
+            (Values::Text(a), Values::Text(b)) => a.extend(b),
+            (Values::Flag(a), Values::Flag(b)) => a.extend(b),
+            (a, b) => panic!("a column has two sorts of values: {a:?}, {b:?}"),
+        }
+    }
 }
 
 /// The header of a column that is named after a place: a direction of a node, `node.direction`, is written with `_`.
@@ -177,24 +198,48 @@ impl Table {
         self.columns.first().map_or(0, |c| c.values.len())
     }
 
-    /// The rows of `more` after these; a table without columns takes them over.
+    /// The columns without rows.
+    pub fn header(&self) -> Table {
+        let empty = |column: &Column| Column { name: column.name.clone(), values: column.values.blank(0) };
+        Table { name: self.name.clone(), columns: self.columns.iter().map(empty).collect() }
+    }
+
+    /// The rows of `more` after these. Cases may have columns that others lack (the `return_defect` of a method that `auto` chooses for some): the table has
+    /// those of both, in the order of both, with cells without a value where there was none.
     ///
     /// # Panics
-    /// If the columns differ.
+    /// If a column has two sorts of values.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip_study::dataset::{Column, Table, Values};
+    /// let column = |name: &str| Column { name: name.to_owned(), values: Values::Number(vec![1.0]) };
+    /// let mut table = Table { name: "curve".to_owned(), columns: vec![column("a"), column("c")] };
+    /// table.append(Table { name: "curve".to_owned(), columns: vec![column("a"), column("b"), column("c")] });
+    /// let names: Vec<&str> = table.columns.iter().map(|column| column.name.as_str()).collect();
+    /// assert_eq!((names, table.rows()), (vec!["a", "b", "c"], 2));
+    /// assert!(table.numbers("b").unwrap()[0].is_nan());
+    /// ```
     pub fn append(&mut self, more: Table) {
         if self.columns.is_empty() {
             self.columns = more.columns;
             return;
         }
-        for (column, other) in self.columns.iter_mut().zip(more.columns) {
-            assert_eq!(column.name, other.name, "rows of one table have the same columns");
-            match (&mut column.values, other.values) {
-                (Values::Number(a), Values::Number(b)) => a.extend(b),
-                (Values::Integer(a), Values::Integer(b)) => a.extend(b),
-                (Values::Text(a), Values::Text(b)) => a.extend(b),
-                (Values::Flag(a), Values::Flag(b)) => a.extend(b),
-                (a, b) => panic!("column {} has two sorts of values: {a:?}, {b:?}", column.name),
-            }
+        let (rows, new) = (self.rows(), more.rows());
+        let mut next = 0;
+        for other in more.columns {
+            let Some(at) = self.columns[next..].iter().position(|column| column.name == other.name) else {
+                let mut values = other.values.blank(rows);
+                values.extend(other.values);
+                self.columns.insert(next, Column { name: other.name, values });
+                next += 1;
+                continue;
+            };
+            self.columns[next + at].values.extend(other.values);
+            next += at + 1;
+        }
+        for column in self.columns.iter_mut().filter(|column| column.values.len() == rows) {
+            column.values.extend(column.values.blank(new));
         }
     }
 }

@@ -1,15 +1,17 @@
-//! Tables that grow row by row.
+//! Tables that grow row by row. A row may lack what others have: its cell has no value.
 
 use crate::columns::REDUCTION_ERROR;
 use crate::dataset::{Column, Table, Values as Cells, column_name};
 use crate::study::Case;
 use stickslip::model::ReductionEvidence;
 
-/// Columns that grow row by row, in a fixed order.
+/// Columns that grow row by row, in an order that all rows keep.
 #[derive(Debug, Default)]
 pub struct Rows {
     columns: Vec<Column>,
     next: usize,
+    /// Rows that have ended.
+    ended: usize,
     /// Whether they are of linear motions, which have no harmonics of joints.
     linear: bool,
 }
@@ -22,13 +24,13 @@ impl Rows {
 
     fn cells(&mut self, name: &str, empty: Cells) -> &mut Cells {
         let name = column_name(name);
-        if self.next == self.columns.len() {
-            self.columns.push(Column { name: name.to_string(), values: empty });
+        let at = self.columns[self.next..].iter().position(|column| column.name == name);
+        self.next += at.unwrap_or(0);
+        if at.is_none() {
+            self.columns.insert(self.next, Column { name: name.to_string(), values: empty.blank(self.ended) });
         }
-        let column = &mut self.columns[self.next];
-        assert_eq!(column.name, name, "rows of one table have the same columns");
         self.next += 1;
-        &mut column.values
+        &mut self.columns[self.next - 1].values
     }
 
     /// A real number.
@@ -87,6 +89,10 @@ impl Rows {
     /// Ends a row.
     pub fn end(&mut self) {
         self.next = 0;
+        for column in self.columns.iter_mut().filter(|column| column.values.len() == self.ended) {
+            column.values.extend(column.values.blank(1));
+        }
+        self.ended += 1;
     }
 
     /// The table.

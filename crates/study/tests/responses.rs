@@ -459,6 +459,45 @@ frequency = { from = "14 Hz", to = "19 Hz", points = 101 }
     assert_eq!(found.record.points.keys().collect::<Vec<_>>(), ["converged"]);
 }
 
+/// `auto` goes from event to event where friction has two limits, and by harmonic balance where it falls with velocity: one table has what either tells.
+#[test]
+fn cases_of_two_methods_stand_in_one_table() {
+    let text = r#"
+schema = 1
+[parameters]
+vs = "0 m/s"
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "10 N/mm"
+damping = "2 N s/m"
+[[joint]]
+name = "foot"
+between = ["m", "ground"]
+law = { kind = "stribeck", limit = "1 N", static_limit = "1.2 N", velocity = "vs" }
+[[force]]
+on = "m"
+amplitude = "3 N"
+[study]
+kind = "response"
+frequency = { from = "12 Hz", to = "20 Hz", points = 3 }
+vary = { vs = ["0 mm/s", "200 mm/s", "0 mm/s"] }
+"#;
+    let found = dataset(text);
+    let curve = &found.tables[0];
+    assert_eq!(curve.rows(), 9);
+    assert!(curve.columns.iter().all(|column| column.values.len() == 9));
+    let defects = curve.numbers("return_defect").unwrap();
+    assert!(defects[..3].iter().chain(&defects[6..]).all(|defect| defect.is_nan()), "{defects:?}");
+    let truncation = curve.numbers("truncation").unwrap();
+    assert!(truncation[3..6].iter().all(|error| *error >= 0.0), "{truncation:?}");
+    // the first and the last case are the same
+    let amplitude = curve.numbers("m_amplitude_m").unwrap();
+    assert_eq!(amplitude[..3], amplitude[6..]);
+}
+
 /// A hardening spring bends the resonance over the frequencies behind it, and two motions are stable there: that of the table is told to have another. With
 /// twenty times the damping the bend is a hundredth of the width, and there is one.
 #[test]
