@@ -587,7 +587,9 @@ impl Costing<'_> {
             Some(harmonics) => harmonics / SERIES_HARMONICS,
             None => (SERIES_TOLERANCE / asked).powf(SERIES_ORDER.recip()).min(MOST_HARMONICS / SERIES_HARMONICS),
         };
-        let each = self.pace.of(SERIES_USUAL, SERIES) * (self.masses + self.joints).max(1.0);
+        // friction that falls with velocity is hard to find everywhere
+        let usual = if self.falls { SERIES } else { SERIES_USUAL };
+        let each = self.pace.of(usual, SERIES) * (self.masses + self.joints).max(1.0);
         (each + self.coupled()) * factor * length.max(1.0).powf(SERIES_LENGTH)
     }
 

@@ -8,7 +8,7 @@ use super::assembly::NEAR_REST;
 use super::flow::Flow;
 use super::followed::{self, Kind};
 use super::incremental::flow::IncrementalFlow;
-use super::periodic::{APPROACH, norm};
+use super::periodic::norm;
 use super::vibration;
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
@@ -71,13 +71,19 @@ impl Judge {
         self.proven
     }
 
-    /// The motion to which one from `start` comes after a while, over one period; `None` where no flow follows the system.
-    pub fn approach(&mut self, system: &System, omega: f64, mut start: Vec<f64>) -> Option<Arc<dyn Path>> {
+    /// The motion to which one from `start` comes after so many returns, over one period; `None` where no flow follows the system.
+    pub fn approach(
+        &mut self,
+        system: &System,
+        omega: f64,
+        mut start: Vec<f64>,
+        returns: usize,
+    ) -> Option<Arc<dyn Path>> {
         let flow = self.flow.as_mut()?;
         let period = TAU / omega;
         flow.set_drive(system, omega);
         start.resize(flow.states(), 0.0);
-        for _ in 0..APPROACH {
+        for _ in 0..returns {
             flow.run(&mut start, period, None).ok()?;
             if start.iter().any(|z| !z.is_finite()) {
                 return None;

@@ -367,18 +367,21 @@ fn evaluate(
 pub(crate) fn newton_step(derivative: &DMatrix<f64>, gap: &DVector<f64>, sign: f64, weights: &[f64]) -> DVector<f64> {
     let n = gap.len();
     // in energy coordinates, so that singular values and the least norm mean something
-    let scaled = DMatrix::from_fn(n, n, |i, j| {
-        let identity = if i == j { 1.0 } else { 0.0 };
-        weights[i] * (identity - sign * derivative[(i, j)]) / weights[j]
-    });
+    let scaled = || {
+        DMatrix::from_fn(n, n, |i, j| {
+            let identity = if i == j { 1.0 } else { 0.0 };
+            weights[i] * (identity - sign * derivative[(i, j)]) / weights[j]
+        })
+    };
     let right = DVector::from_fn(n, |i, _| -weights[i] * gap[i]);
-    let lu = scaled.clone().lu();
-    let pivots = lu.u().diagonal().map(f64::abs);
-    let solution = if n > 0 && pivots.min() > CONTINUUM * pivots.max() {
+    let lu = scaled().lu();
+    let pivots = || (0..n).map(|i| lu.lu_internal()[(i, i)].abs());
+    let (least, most) = (pivots().fold(f64::INFINITY, f64::min), pivots().fold(0.0, f64::max));
+    let solution = if n > 0 && least > CONTINUUM * most {
         lu.solve(&right)
     } else {
         // numbers out of range have no least step: the transient is let die instead
-        eigen::singular(scaled).and_then(|svd| svd.solve(&right, CONTINUUM * svd.singular_values.amax()).ok())
+        eigen::singular(scaled()).and_then(|svd| svd.solve(&right, CONTINUUM * svd.singular_values.amax()).ok())
     };
     let mut step = solution.unwrap_or_else(|| right.clone());
     for i in 0..n {

@@ -15,7 +15,7 @@ use crate::rows::Rows;
 use crate::values::hertz;
 use crate::warnings::driven;
 use crate::words::{display_unit, shown_hertz};
-use crate::work::{Computed, Grain, Part, Prepared, Work};
+use crate::work::{Computed, Part, Prepared, Work};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
@@ -47,7 +47,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &["orbit", "orbits", "multipliers"],
     },
-    grain: |_| Grain::Frequencies,
+    grain: orbits::grain,
     cost,
     warnings: driven,
     compute,

@@ -2,14 +2,21 @@
 
 use crate::note::Note;
 use crate::point::location_of;
-use crate::study::Case;
-use crate::work::{NOT_REACHED, Part, Work};
+use crate::study::{Case, Study};
+use crate::work::{Grain, NOT_REACHED, Part, Work};
 use stickslip::curve::sweep::{See, Watch, stretch};
 use stickslip::method::{MethodError, OrbitError};
 use stickslip::orbit::Orbit;
 
 /// A frequency (rad/s) and what was found there; `None` if the run was stopped before.
 type Point = (f64, Option<Result<Orbit, OrbitError>>);
+
+/// What is computed at a time: stretches of frequencies, each of which begins alone; the whole curve where laws allow several orbits at a frequency, since
+/// what is found alone need not be what the points before lead to. The laws of the first case stand for all.
+pub(super) fn grain(study: &Study) -> Grain {
+    let unique = |case: Case| case.model.joints.iter().all(|joint| joint.law.is_incrementally_passive());
+    if study.case(0).is_ok_and(unique) { Grain::Frequencies } else { Grain::Case }
+}
 
 /// The outcomes at the frequencies of a unit of one case, each started from its neighbour; `see` looks at each as soon as it is there.
 pub(super) fn sweep(work: &Work<'_>, see: &mut See<'_>) -> Result<(), MethodError> {

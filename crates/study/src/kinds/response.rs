@@ -72,7 +72,7 @@ pub(super) const KIND: Kind = Kind {
     // an amplification is that of a whole curve
     grain: |study| match study.is_adaptive() || study.wants(amplification::KEY.name) {
         true => Grain::Case,
-        false => Grain::Frequencies,
+        false => orbits::grain(study),
     },
     cost,
     warnings: |cases| sampled(cases).into_iter().chain(amplification::none(cases)).chain(many_peaks(cases)).collect(),
@@ -108,7 +108,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         Some(_) => peaks,
         None => 0.0,
     };
-    let back = if costing.study.is_adaptive() || !both_ways::applies(costing.system()) { 0.0 } else { points };
+    let back = if both_ways::applies(costing.system()) { points } else { 0.0 };
     let curves = costing.cases.min(MOST_CURVES as f64) * costing.places.min(MOST_PANELS as f64 + SINGLE as f64);
     Cost {
         tables: vec![
@@ -256,7 +256,7 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Vec<Point>, Me
     let sought = Sought::new(prepared);
     let point = |orbit: &Orbit| Point::new(orbit, &|orbit| sought.quantities(orbit));
     let mut points = Vec::new();
-    let mut ways = BothWays::new(work);
+    let mut ways = BothWays::of(work, Vec::new());
     orbits::sweep(work, &mut |omega, outcome| {
         stretch.add(omega, outcome.map(|outcome| kept(prepared, outcome)));
         ways.iter_mut().zip(outcome).for_each(|(ways, outcome)| ways.add(omega, outcome));
@@ -304,10 +304,16 @@ fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) 
         stretch.add(adaptive.range.1, None);
     }
     let mut points = Vec::with_capacity(curve.len());
+    let mut known = Vec::with_capacity(curve.len());
     for (mut point, (kept, shape)) in curve {
+        let values = kept.0.places.iter().map(|[amplitude, ..]| *amplitude).filter(|amplitude| amplitude.is_finite());
+        known.push(Point { values: values.collect(), ..point.clone() });
         stretch.add(point.omega, Some(kept));
         point.values.extend(shape);
         points.push(point);
+    }
+    if let Some(ways) = BothWays::of(work, known) {
+        ways.compared(work)?.into_iter().for_each(|note| note.join(&mut stretch.part.notes));
     }
     Ok(if prepared.case.values.flag("peaks").unwrap_or(true) { points } else { Vec::new() })
 }

@@ -42,12 +42,14 @@ pub(crate) struct Segment {
     pub displacement: Vec<Complex64>,
     /// Forces of the parts of joints, parts × basis, row after row.
     pub force: Vec<Complex64>,
+    /// The basis functions at its end.
+    pub at_end: Vec<Complex64>,
 }
 
 impl Segment {
     /// Memory that its signals take, bytes.
     fn bytes(&self) -> usize {
-        16 * (self.displacement.len() + self.force.len())
+        16 * (self.displacement.len() + self.force.len() + self.at_end.len())
     }
 
     /// The basis of its signals.
@@ -389,9 +391,9 @@ impl Flow {
         self.used += 1;
         let basis = &segment.driven.basis;
         let (n, nb) = (self.mechanics.n, basis.len());
-        self.values.resize(nb, ZERO);
-        basis.evaluate(length, &mut self.values);
-        let values = &self.values[..];
+        segment.at_end.resize(nb, ZERO);
+        basis.evaluate(length, &mut segment.at_end);
+        let values = &segment.at_end[..];
         for row in 0..n {
             let range = row * nb..(row + 1) * nb;
             state[row] = real_dot(&segment.displacement[range.clone()], values);
@@ -468,7 +470,7 @@ impl Flow {
                 let nb = basis.len();
                 self.rate.resize(nb, ZERO);
                 basis.differentiate(&segment.force[part * nb..(part + 1) * nb], &mut self.rate);
-                real_dot(&self.rate, &self.values)
+                real_dot(&self.rate, &segment.at_end)
             }
             _ => {
                 for k in 0..n {

@@ -40,8 +40,6 @@ pub(crate) struct ExactPath {
 struct Piece {
     segment: Segment,
     velocity: Vec<Complex64>,
-    /// The basis functions at its end.
-    at_end: Vec<Complex64>,
 }
 
 /// Makes the orbit of the flow's last run, which began at the state `closed`; states are measured by `weights`.
@@ -97,9 +95,7 @@ impl ExactPath {
             .iter()
             .map(|segment| {
                 let basis = segment.basis();
-                let mut at_end = vec![ZERO; basis.len()];
-                basis.evaluate(segment.length, &mut at_end);
-                Piece { velocity: derivative(basis, &segment.displacement), at_end, segment: segment.clone() }
+                Piece { velocity: derivative(basis, &segment.displacement), segment: segment.clone() }
             })
             .collect();
         let (rates, omega) = (flow.drive.rates.clone(), flow.drive.omega);
@@ -234,7 +230,7 @@ impl<'a> Measuring<'a> {
         for piece in &path.pieces {
             cuts.push(cuts[cuts.len() - 1] + piece.basis().len());
         }
-        let products = |piece: &Piece| Products::new(piece.basis(), &piece.at_end, piece.segment.length);
+        let products = |piece: &Piece| Products::new(piece.basis(), &piece.segment.at_end, piece.segment.length);
         Measuring {
             path,
             axes: path.system.axes().map(|(_, axis)| axis).collect(),
@@ -248,7 +244,7 @@ impl<'a> Measuring<'a> {
     fn turning(&self, omega: f64) -> Turning {
         let of = |piece: &Piece| {
             let turn = Complex64::new(0.0, -omega * piece.segment.start).exp();
-            (turn, FourierIntegrals::new(piece.basis(), &piece.at_end, omega, piece.segment.length))
+            (turn, FourierIntegrals::new(piece.basis(), &piece.segment.at_end, omega, piece.segment.length))
         };
         self.path.pieces.iter().map(of).collect()
     }
@@ -354,7 +350,7 @@ impl Signals for Measuring<'_> {
         let mut sum = 0.0;
         for (piece, range) in self.pieces() {
             let u = &u[range];
-            let travel = real_dot(u, &piece.at_end) - piece.basis().beginning(u);
+            let travel = real_dot(u, &piece.segment.at_end) - piece.basis().beginning(u);
             for share in self.path.of_joint(axis) {
                 let contact = piece.segment.contacts[share.part];
                 sum += contact.sign() * self.path.parts[share.part].limit() * share.of(contact) * travel;
@@ -421,7 +417,7 @@ impl Piece {
         values.resize(nb, ZERO);
         shifted.resize(nb, ZERO);
         basis.evaluate(0.0, values);
-        let (first, last) = (real_dot(signal, values), real_dot(signal, &self.at_end));
+        let (first, last) = (real_dot(signal, values), real_dot(signal, &self.segment.at_end));
         let (mut low, mut high) = (first.min(last), first.max(last));
         let mut time = 0.0;
         let mut now = real_dot(slope, values);

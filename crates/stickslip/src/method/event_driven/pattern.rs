@@ -376,12 +376,16 @@ impl Pattern {
             }
         }
         for row in 0..n {
-            for k in 0..count {
-                out[row * nb + k] = self.shape[(row, k)] * work.eta[k];
-                out[row * nb + constant].re += (self.shape[(row, k)] * work.fixed[k]).re;
+            let out = &mut out[row * nb..(row + 1) * nb];
+            let shapes = self.shape.as_slice().iter().skip(row).step_by(n);
+            let mut moved = out[constant].re;
+            for (((out, shape), eta), fixed) in out[..count].iter_mut().zip(shapes).zip(&work.eta).zip(&work.fixed) {
+                *out = shape * eta;
+                moved += (shape * fixed).re;
             }
+            out[constant].re = moved;
             for (r, (k, h, forward)) in driven.resonant.iter().enumerate() {
-                out[row * nb + count + drive.rates.len() + r] = self.shape[(row, *k)] * forward * work.turn[*h];
+                out[count + drive.rates.len() + r] = self.shape[(row, *k)] * forward * work.turn[*h];
             }
         }
         self.add_polynomials(mechanics, drive, driven, state, work, out);
@@ -471,14 +475,23 @@ impl Pattern {
                 }
             }
         }
-        let columns = sensitivity.as_slice().chunks_exact(states);
-        for (to, from) in work.product.chunks_exact_mut(states).zip(columns) {
-            to.fill(0.0);
-            for (column, factor) in work.transition.chunks_exact(states).zip(from) {
-                to.iter_mut().zip(column).for_each(|(to, x)| *to += x * factor);
+        let (transition, columns) = (work.transition.as_slice(), sensitivity.as_mut_slice());
+        match states {
+            2 => carry_columns::<2>(transition, columns),
+            3 => carry_columns::<3>(transition, columns),
+            4 => carry_columns::<4>(transition, columns),
+            5 => carry_columns::<5>(transition, columns),
+            6 => carry_columns::<6>(transition, columns),
+            _ => {
+                for (to, from) in work.product.chunks_exact_mut(states).zip(columns.chunks_exact(states)) {
+                    to.fill(0.0);
+                    for (column, factor) in transition.chunks_exact(states).zip(from) {
+                        to.iter_mut().zip(column).for_each(|(to, x)| *to += x * factor);
+                    }
+                }
+                columns.copy_from_slice(&work.product);
             }
         }
-        sensitivity.copy_from_slice(&work.product);
     }
 
     /// Displacements and velocities at the end of a stretch per unit of state `j` at its start, into `motion` (2n).
@@ -494,10 +507,17 @@ impl Pattern {
             }
         }
         let starts = &self.start.as_slice()[j * count..(j + 1) * count];
-        for (start, moved) in starts.iter().zip(moved.chunks_exact(4 * n.max(1))) {
-            let (real, imaginary) = moved.split_at(2 * n);
-            for ((motion, re), im) in motion.iter_mut().zip(real).zip(imaginary) {
-                *motion += re * start.re - im * start.im;
+        match n {
+            1 => add_modes::<2>(starts, moved, motion),
+            2 => add_modes::<4>(starts, moved, motion),
+            3 => add_modes::<6>(starts, moved, motion),
+            _ => {
+                for (start, moved) in starts.iter().zip(moved.chunks_exact(4 * n.max(1))) {
+                    let (real, imaginary) = moved.split_at(2 * n);
+                    for ((motion, re), im) in motion.iter_mut().zip(real).zip(imaginary) {
+                        *motion += re * start.re - im * start.im;
+                    }
+                }
             }
         }
     }
@@ -557,6 +577,28 @@ impl Pattern {
             motion.copy_from_slice(moved);
         }
     }
+}
+
+/// Multiplies the `columns` of a sensitivity by a `transition`, column after column, in registers.
+fn carry_columns<const STATES: usize>(transition: &[f64], columns: &mut [f64]) {
+    for column in columns.as_chunks_mut::<STATES>().0 {
+        let mut sum = [0.0; STATES];
+        for (moved, factor) in transition.as_chunks::<STATES>().0.iter().zip(&*column) {
+            (0..STATES).for_each(|i| sum[i] += moved[i] * factor);
+        }
+        *column = sum;
+    }
+}
+
+/// Adds what the modes move by from `starts` to the displacements and velocities `motion`, in registers.
+fn add_modes<const MOTIONS: usize>(starts: &[Complex64], moved: &[f64], motion: &mut [f64]) {
+    let mut sum = [0.0; MOTIONS];
+    sum.copy_from_slice(motion);
+    for (start, parts) in starts.iter().zip(moved.as_chunks::<MOTIONS>().0.as_chunks::<2>().0) {
+        let [real, imaginary] = parts;
+        (0..MOTIONS).for_each(|i| sum[i] += real[i] * start.re - imaginary[i] * start.im);
+    }
+    motion.copy_from_slice(&sum);
 }
 
 /// `Σ a b`, in four sums side by side.

@@ -8,7 +8,7 @@ use super::recent::{RECENT, Recent};
 use super::rest::Rest;
 use super::solve::Lost;
 use super::sparse::{self, Sparse};
-use super::storage::{MEMORY, check_memory, level_memory};
+use super::storage::{MARCHED, MEMORY, check_memory, level_memory, marched};
 use super::{FIRST, HarmonicBalance, NAME, TOLERANCE, coupled, path, work};
 use crate::method::evidence::Judge;
 use crate::method::guess::Guess;
@@ -72,7 +72,8 @@ impl Balance {
         let first = (FIRST * kept.scale).max(kept.highest);
         let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
         let banded = Sparse::new(&system, &ports, &[1]);
-        let bytes = level_memory(banded.as_ref(), &ports, &rest, harmonics.len());
+        let samples = method.samples_at(method.harmonics.unwrap_or(first), &ports);
+        let bytes = level_memory(banded.as_ref(), &ports, &rest, (harmonics.len(), samples));
         check_memory(bytes, &ports, (harmonics.len(), periods))?;
         Ok(Balance {
             method,
@@ -143,7 +144,11 @@ impl Balance {
         };
         let bounded = self.banded.is_some() || self.ports.has_forces();
         let affordable = !bounded || is_affordable(work::step(self.banded.as_ref(), &self.ports, harmonics), taken);
-        few && affordable && level_memory(self.banded.as_ref(), &self.ports, &self.rest, harmonics) <= MEMORY
+        // it is compared with twice the samples, too
+        let samples = 2 * self.method.samples_at(self.kept.double(top), &self.ports);
+        let fits = marched(&self.ports, harmonics, samples) <= MARCHED
+            && level_memory(self.banded.as_ref(), &self.ports, &self.rest, (harmonics, samples)) <= MEMORY;
+        few && affordable && fits
     }
 
     /// Solves at `top`, from a motion at another number of harmonics or from the first guess.
@@ -266,6 +271,13 @@ impl Balance {
         unique || self.levels.get(&top).is_some_and(Level::is_coupled)
     }
 
+    /// Where a search begins: with an orbit of its own; where several orbits exist, with what the state of another solver's orbit leads to.
+    pub(super) fn near(&mut self, start: Option<&[f64]>, omega: f64) -> Option<(usize, Solution)> {
+        let foreign = start.filter(|start| self.recent.iter().all(|recent| recent.start != *start));
+        let led = foreign.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.led(start, omega));
+        led.or_else(|| self.warm(start, omega))
+    }
+
     /// The harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess.
     pub(super) fn warm(&self, start: Option<&[f64]>, omega: f64) -> Option<(usize, Solution)> {
         let start = start?;
@@ -287,7 +299,7 @@ impl Solver for Balance {
         }
         self.begin_point(omega);
         let omega = omega / self.periods as f64;
-        let warm = self.warm(start, omega);
+        let warm = self.near(start, omega);
         match self.from(self.first, omega, warm) {
             Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
                 let by_time = |balance: &mut Self| balance.by_time(omega).ok_or(error);
@@ -298,9 +310,10 @@ impl Solver for Balance {
     }
 
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        match self.warm(start, omega / self.periods as f64) {
+        let near = self.near(start, omega / self.periods as f64).filter(|_| omega.is_finite() && omega > 0.0);
+        match near {
             // the harmonics that the neighbour needed are enough
-            Some((top, motion)) if omega.is_finite() && omega > 0.0 => {
+            Some((top, motion)) => {
                 self.begin_point(omega);
                 self.nearby(top, omega / self.periods as f64, &motion)
             }

@@ -6,6 +6,7 @@ use super::equations::Solution;
 use crate::method::OrbitError;
 use crate::method::course::course;
 use crate::method::guess::Guess;
+use crate::method::periodic::APPROACH;
 use crate::orbit::{Course, JointSample, Orbit, Path};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -14,6 +15,8 @@ use std::f64::consts::TAU;
 const MOST_FOLLOWED: usize = 8;
 /// Degrees of freedom up to which it is followed to find an orbit: steps of integrations multiply full matrices.
 const MOST_DOFS_IN_TIME: usize = 60;
+/// Returns of a motion from the state of a neighbouring orbit before it is read: what it brings along from there, Newton's method does away with.
+const LED: usize = 1;
 
 impl Balance {
     /// A start near a motion that repeats after several periods: the describing functions know none, and Newton's method would never leave those
@@ -21,8 +24,21 @@ impl Balance {
     /// none to be found.
     pub(super) fn approached(&mut self, top: usize, omega: f64, guess: Option<&Guess>) -> Option<Solution> {
         let start = guess.filter(|_| self.periods > 1 && !self.judge.proves())?.state(self.system.dofs());
-        let path = self.judge.approach(&self.system, omega, start)?;
+        let path = self.judge.approach(&self.system, omega, start, APPROACH)?;
         self.series_of(&*path, top, omega)
+    }
+
+    /// A start near the motion that a state of another solver's orbit leads to. Where motions separate it says which of several orbits is meant; a solver
+    /// knows the harmonics of its own orbits only.
+    pub(super) fn led(&mut self, start: &[f64], omega: f64) -> Option<(usize, Solution)> {
+        let dofs = self.system.dofs();
+        if self.judge.proves() || self.periods > 1 || dofs > MOST_DOFS_IN_TIME || start.len() < 2 * dofs {
+            return None;
+        }
+        let top = self.method.harmonics.unwrap_or(self.first);
+        self.level(top, omega).ok()?;
+        let path = self.judge.approach(&self.system, omega, start[..2 * dofs].to_vec(), LED)?;
+        Some((top, self.series_of(&*path, top, omega)?))
     }
 
     /// Where the search has found no orbit: from the motion that rest comes to in time, `None` where it is not followed. Of frequencies at which there is
@@ -35,7 +51,7 @@ impl Balance {
         }
         self.tried_in_time += 1;
         self.level(top, omega).ok()?;
-        let path = self.judge.approach(&self.system, omega, vec![0.0; 2 * self.system.dofs()])?;
+        let path = self.judge.approach(&self.system, omega, vec![0.0; 2 * self.system.dofs()], APPROACH)?;
         let warm = Some((top, self.series_of(&*path, top, omega)?));
         self.from(top, omega, warm).ok()
     }

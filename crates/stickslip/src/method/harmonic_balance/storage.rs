@@ -8,6 +8,8 @@ use crate::method::{MethodError, PERIOD};
 
 /// Memory of the equations, bytes, beyond which nothing is begun: 1000 nodes of three directions with five harmonics need half of it without modes.
 pub(super) const MEMORY: f64 = 4e9;
+/// Memory in which laws with memory are followed, bytes, beyond which no series is compared with a longer one: every length has its own, on every thread.
+pub(super) const MARCHED: f64 = 5e8;
 
 /// What there may be less of: a motion of several periods of the drive has as many times the harmonics.
 fn fewer(periods: usize) -> (&'static str, &'static str) {
@@ -47,12 +49,24 @@ pub(super) fn memory(ports: &Ports, rest: &Rest, harmonics: usize, always: bool)
     tangents(ports, harmonics) + 8.0 * (structure + formed)
 }
 
-/// Memory of a level, bytes; of one in banded form if one harmonic of that is given.
-pub(super) fn level_memory(banded: Option<&Sparse>, ports: &Ports, rest: &Rest, harmonics: usize) -> f64 {
-    match banded {
+/// Memory of a level, bytes, with so many samples; of one in banded form if one harmonic of that is given.
+pub(super) fn level_memory(
+    banded: Option<&Sparse>,
+    ports: &Ports,
+    rest: &Rest,
+    (harmonics, samples): (usize, usize),
+) -> f64 {
+    let equations = match banded {
         Some(banded) => tangents(ports, harmonics) + banded.memory(harmonics),
         None => memory(ports, rest, harmonics, false),
-    }
+    };
+    equations + marched(ports, harmonics, samples)
+}
+
+/// Memory in which laws with memory are followed, one after the other, bytes: the derivatives of their forces at all samples by all harmonics.
+pub(super) fn marched(ports: &Ports, harmonics: usize, samples: usize) -> f64 {
+    let axes = ports.iter().filter(|port| port.marches()).map(|port| port.axes * port.axes).max().unwrap_or(0);
+    8.0 * 2.0 * (axes * harmonics) as f64 * samples as f64
 }
 
 /// Memory of the derivatives of the ports, bytes.

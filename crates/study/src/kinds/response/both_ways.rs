@@ -1,5 +1,6 @@
 //! A curve followed in both directions, where several orbits may exist at one frequency: what the points of the table do not show.
 
+use super::super::peak_of::held;
 use crate::note::Note;
 use crate::summary::may_have_several;
 use crate::work::Work;
@@ -14,6 +15,8 @@ const LARGE: usize = 24;
 /// Orbits are others whose amplitudes differ by more than this share of the largest, and by more than so many of their estimated errors.
 const OTHER: f64 = 1e-2;
 const ERRORS: f64 = 3.0;
+/// Amplitudes below this share of a mean are its rounding.
+const ROUNDING: f64 = 1e-10;
 
 /// The points of a stretch of a curve, as they were found on the way there.
 pub(super) struct BothWays {
@@ -25,28 +28,26 @@ fn amplitudes(orbit: &Orbit) -> Vec<f64> {
 }
 
 impl BothWays {
-    /// `None` where there is one orbit at a frequency, or the model is large.
-    pub(super) fn new(work: &Work<'_>) -> Option<Self> {
-        (work.points.len() > 1 && applies(&work.case().system)).then(|| BothWays { points: Vec::new() })
+    /// Of these points; `None` where there is one orbit at a frequency, or the model is large.
+    pub(super) fn of(work: &Work<'_>, points: Vec<Point>) -> Option<Self> {
+        applies(&work.case().system).then_some(BothWays { points })
     }
 
     pub(super) fn add(&mut self, omega: f64, outcome: Result<&Orbit, &OrbitError>) {
         self.points.push(outcome.map_or_else(|_| Point::failed(omega), |orbit| Point::new(orbit, &amplitudes)));
     }
 
-    /// Follows the points back, from what is found alone behind the last one, or at it, and notes where other orbits are found.
+    /// Follows the points back, from what is found alone at the last one, and notes where other orbits are found.
     pub(super) fn compared(&self, work: &Work<'_>) -> Result<Vec<Note>, MethodError> {
         let (method, system) = (&*work.case().method, &work.case().system);
-        let behind = work.case().case.frequencies.as_ref().and_then(|f| f.get(work.points.end));
-        let Some(first) = behind.or(self.points.last().map(|point| point.omega)) else { return Ok(Vec::new()) };
+        let Some(last) = self.points.last() else { return Ok(Vec::new()) };
         // what is found there alone need not be what the points before lead to
-        let start = method.solver(system)?.orbit(first, None).ok().map(|orbit| orbit.start);
+        let start = method.solver(system)?.orbit(last.omega, None).ok().map(|orbit| orbit.start);
         let mut omegas = self.points.iter().rev().map(|point| point.omega);
         let mut notes = Vec::new();
         back(method, system, start, &mut omegas, &work.context.stop, &mut |orbit| {
-            let found =
-                self.points.iter().find(|point| point.omega == orbit.omega).and_then(|point| other(point, orbit));
-            notes.extend(found);
+            let point = self.points.iter().find(|point| point.omega == orbit.omega);
+            notes.extend(point.and_then(|point| other(point, orbit, held(system, orbit.omega))));
         })?;
         Ok(notes)
     }
@@ -58,12 +59,15 @@ pub(super) fn applies(system: &System) -> bool {
     system.dofs() + directions <= LARGE && may_have_several(system)
 }
 
-/// That an orbit is another one than that of a point at its frequency; `None` if there is none there or it is the same.
-fn other(point: &Point, orbit: &Orbit) -> Option<Note> {
+/// That an orbit is another one than that of a point at its frequency; `None` if there is none there or it is the same. What friction holds, or nothing
+/// drives, moves by rounding, of its mean or of `held`, m.
+fn other(point: &Point, orbit: &Orbit, held: f64) -> Option<Note> {
     let found = amplitudes(orbit);
-    let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+    let held = orbit.places.iter().map(|place| ROUNDING * place.mean.abs()).fold(held, f64::max);
+    let largest = |values: &[f64]| values.iter().copied().fold(held.max(f64::MIN_POSITIVE), f64::max);
     let (here, there) = (largest(&point.values), largest(&found));
-    let enough = OTHER.max(ERRORS * point.error) * here.max(there);
+    let enough = (OTHER.max(ERRORS * point.error) * here.max(there)).max(held);
     let differs = point.values.iter().zip(&found).any(|(a, b)| (a - b).abs() > enough);
-    differs.then(|| Note::OtherOrbit { points: 1, from: point.omega, to: point.omega, ratio: there / here })
+    let ratio = (there / here).clamp(f64::MIN_POSITIVE, f64::MAX);
+    differs.then_some(Note::OtherOrbit { points: 1, from: point.omega, to: point.omega, ratio })
 }
