@@ -30,12 +30,14 @@ pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>)
     });
     let omegas: Vec<f64> = between.chain(omegas.last().copied()).collect();
     let mut absent = Vec::new();
-    let mut follow = |reference: Reference| -> Option<Vec<Option<Orbit>>> {
+    // an orbit of many places fills megabytes, of which a row needs the amplitudes
+    let amplitudes = |orbit: Orbit| orbit.places.iter().map(|place| place.amplitude()).collect::<Vec<f64>>();
+    let mut follow = |reference: Reference| -> Option<Vec<Option<Vec<f64>>>> {
         // what the laws have no reference for was said when the study was checked
         let model = reference.model(&prepared.case.model).ok()?;
         let found = model.assemble().map_err(|error| error.to_string()).and_then(|system| {
             let mut solver = solver(prepared, &system).map_err(|error| error.to_string())?;
-            Ok(omegas.iter().map(|omega| solver.orbit(*omega, None).ok()).collect())
+            Ok(omegas.iter().map(|omega| solver.orbit(*omega, None).ok().map(amplitudes)).collect())
         });
         found.map_err(|why| absent.push(format!("{WARNING}{}", reference.missing(&why)))).ok()
     };
@@ -45,8 +47,8 @@ pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>)
         rows.number(DRIVE, hertz(*omega));
         for (what, curve) in &curves {
             for (place, name) in prepared.system.places().iter().enumerate() {
-                let orbit = curve.as_ref().and_then(|curve| curve[i].as_ref());
-                let amplitude = orbit.map_or(f64::NAN, |orbit| orbit.places[place].amplitude());
+                let point = curve.as_ref().and_then(|curve| curve[i].as_ref());
+                let amplitude = point.map_or(f64::NAN, |amplitudes| amplitudes[place]);
                 rows.number(&amplitude_of(&format!("{name}_{what}")), amplitude);
             }
         }
