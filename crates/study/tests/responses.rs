@@ -459,36 +459,40 @@ frequency = { from = "14 Hz", to = "19 Hz", points = 101 }
     assert_eq!(found.record.points.keys().collect::<Vec<_>>(), ["converged"]);
 }
 
+/// A mass of 1 kg on a spring with a damper, a joint to the ground and a force.
+fn one_mass(spring: &str, damping: &str, law: &str, force: &str, rest: &str) -> String {
+    format!(
+        r#"
+schema = 1
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "{spring}"
+damping = "{damping}"
+[[joint]]
+name = "joint"
+between = ["m", "ground"]
+law = {{ {law} }}
+[[force]]
+on = "m"
+amplitude = "{force}"
+{rest}
+"#
+    )
+}
+
 /// A stop at a gap bends the resonance over: however many points, and where they lie, the high branch is followed to its end. The peak and where it is are
 /// those of the branch by arc length; SciPy's DOP853, swept up, is on it at 18.29 Hz.
 #[test]
 fn the_high_branch_goes_on_whatever_the_points_are() {
     for frequency in ["points = 151", "points = 601", "tolerance = \"0.1 %\""] {
         for method in ["auto", "harmonic-balance"] {
-            let text = format!(
-                r#"
-schema = 1
-[[mass]]
-name = "a"
-mass = "1 kg"
-[[spring]]
-between = ["a", "ground"]
-stiffness = "1e4 N/m"
-damping = "2 kg/s"
-[[joint]]
-name = "stop"
-between = ["a", "ground"]
-law = {{ kind = "gap", gap = "1 mm", stiffness = "1e4 N/m" }}
-[[force]]
-on = "a"
-amplitude = "2 N"
-[method]
-kind = "{method}"
-[study]
-kind = "response"
-frequency = {{ from = "10 Hz", to = "25 Hz", {frequency} }}
-"#
-            );
+            let range = format!("frequency = {{ from = \"10 Hz\", to = \"25 Hz\", {frequency} }}");
+            let rest = format!("[method]\nkind = \"{method}\"\n[study]\nkind = \"response\"\n{range}");
+            let stop = r#"kind = "gap", gap = "1 mm", stiffness = "1e4 N/m""#;
+            let text = one_mass("1e4 N/m", "2 kg/s", stop, "2 N", &rest);
             let found = dataset(&text);
             let peaks = found.tables.iter().find(|table| table.name == "peaks").unwrap();
             let (at, height) = (peaks.numbers("frequency_Hz").unwrap(), peaks.numbers("amplitude_m").unwrap());
@@ -505,30 +509,15 @@ frequency = {{ from = "10 Hz", to = "25 Hz", {frequency} }}
 /// `auto` goes from event to event where friction has two limits, and by harmonic balance where it falls with velocity: one table has what either tells.
 #[test]
 fn cases_of_two_methods_stand_in_one_table() {
-    let text = r#"
-schema = 1
+    let falling = r#"kind = "stribeck", limit = "1 N", static_limit = "1.2 N", velocity = "vs""#;
+    let rest = r#"
 [parameters]
 vs = "0 m/s"
-[[mass]]
-name = "m"
-mass = "1 kg"
-[[spring]]
-between = ["m", "ground"]
-stiffness = "10 N/mm"
-damping = "2 N s/m"
-[[joint]]
-name = "foot"
-between = ["m", "ground"]
-law = { kind = "stribeck", limit = "1 N", static_limit = "1.2 N", velocity = "vs" }
-[[force]]
-on = "m"
-amplitude = "3 N"
 [study]
 kind = "response"
 frequency = { from = "12 Hz", to = "20 Hz", points = 3 }
-vary = { vs = ["0 mm/s", "200 mm/s", "0 mm/s"] }
-"#;
-    let found = dataset(text);
+vary = { vs = ["0 mm/s", "200 mm/s", "0 mm/s"] }"#;
+    let found = dataset(&one_mass("10 N/mm", "2 N s/m", falling, "3 N", rest));
     let curve = &found.tables[0];
     assert_eq!(curve.rows(), 9);
     assert!(curve.columns.iter().all(|column| column.values.len() == 9));
@@ -546,32 +535,14 @@ vary = { vs = ["0 mm/s", "200 mm/s", "0 mm/s"] }
 #[test]
 fn a_curve_that_folds_is_followed_both_ways() {
     let study = |stiffness: &str, damping: f64, points: usize| {
-        let text = format!(
-            r#"
-schema = 1
-[[mass]]
-name = "m"
-mass = "1 kg"
-[[spring]]
-between = ["m", "ground"]
-stiffness = "10 kN/m"
-damping = "{damping} N s/m"
-[[joint]]
-name = "bent"
-between = ["m", "ground"]
-law = {{ kind = "cubic", stiffness = "{stiffness} N/m^3" }}
-[[force]]
-on = "m"
-amplitude = "10 N"
-[study]
-kind = "response"
-frequency = {{ from = "13 Hz", to = "20 Hz", points = {points} }}
-"#
-        );
+        let law = format!("kind = \"cubic\", stiffness = \"{stiffness} N/m^3\"");
+        let range = format!("frequency = {{ from = \"13 Hz\", to = \"20 Hz\", points = {points} }}");
+        let rest = format!("[study]\nkind = \"response\"\n{range}");
+        let text = one_mass("10 kN/m", &format!("{damping} N s/m"), &law, "10 N", &rest);
         let notes = dataset(&text).notes;
         notes.into_iter().filter(|note| note.contains("followed the other way")).collect::<Vec<String>>()
     };
-    // from the last frequency on, and from the first point of the next stretch
+    // fewer points than a stretch of a curve with one orbit has, and more
     for points in [41, 141] {
         for stiffness in ["2e7", "-1e6"] {
             let notes = study(stiffness, 1.0, points);

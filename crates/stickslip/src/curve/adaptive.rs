@@ -57,8 +57,7 @@ impl Adaptive {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Kept<R>>, MethodError> {
         // where laws allow several orbits at a frequency, what is found alone need not be what the points before lead to: one after the other then
-        let unique = system.joints().iter().all(|joint| joint.law().is_incrementally_passive());
-        let chunk = if unique { CHUNK } else { MOST };
+        let chunk = if system.has_passive_joints() { CHUNK } else { MOST };
         let solve = |omegas: &[(f64, Option<&[f64]>)]| -> Result<Vec<Kept<R>>, MethodError> {
             // a solver for every few points: its memory pays, and the chunks are the same on any number of threads
             let chunks: Vec<Result<Vec<Kept<R>>, MethodError>> = omegas

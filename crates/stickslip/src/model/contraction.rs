@@ -33,7 +33,12 @@ impl System {
     /// assert!(!system.on(driven).unwrap().contracts());
     /// ```
     pub fn contracts(&self) -> bool {
-        self.joints().iter().all(|joint| joint.law().is_incrementally_passive()) && self.structure().dissipates()
+        self.has_passive_joints() && self.structure().dissipates()
+    }
+
+    /// Whether no joint lets two motions under the same drive separate.
+    pub(crate) fn has_passive_joints(&self) -> bool {
+        self.joints().iter().all(|joint| joint.law().is_incrementally_passive())
     }
 }
 

@@ -256,7 +256,7 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Vec<Point>, Me
     let sought = Sought::new(prepared);
     let point = |orbit: &Orbit| Point::new(orbit, &|orbit| sought.quantities(orbit));
     let mut points = Vec::new();
-    let mut ways = BothWays::of(work, Vec::new());
+    let mut ways = BothWays::of(work);
     orbits::sweep(work, &mut |omega, outcome| {
         stretch.add(omega, outcome.map(|outcome| kept(prepared, outcome)));
         ways.iter_mut().zip(outcome).for_each(|(ways, outcome)| ways.add(omega, outcome));
@@ -304,15 +304,17 @@ fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) 
         stretch.add(adaptive.range.1, None);
     }
     let mut points = Vec::with_capacity(curve.len());
-    let mut known = Vec::with_capacity(curve.len());
+    let mut ways = BothWays::of(work);
     for (mut point, (kept, shape)) in curve {
-        let values = kept.0.places.iter().map(|[amplitude, ..]| *amplitude).filter(|amplitude| amplitude.is_finite());
-        known.push(Point { values: values.collect(), ..point.clone() });
+        if let Some(ways) = &mut ways {
+            let amplitudes = kept.0.places.iter().map(|[amplitude, ..]| *amplitude);
+            ways.add_point(Point { values: amplitudes.filter(|a| a.is_finite()).collect(), ..point.clone() });
+        }
         stretch.add(point.omega, Some(kept));
         point.values.extend(shape);
         points.push(point);
     }
-    if let Some(ways) = BothWays::of(work, known) {
+    if let Some(ways) = ways {
         ways.compared(work)?.into_iter().for_each(|note| note.join(&mut stretch.part.notes));
     }
     Ok(if prepared.case.values.flag("peaks").unwrap_or(true) { points } else { Vec::new() })

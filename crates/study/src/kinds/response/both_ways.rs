@@ -28,13 +28,18 @@ fn amplitudes(orbit: &Orbit) -> Vec<f64> {
 }
 
 impl BothWays {
-    /// Of these points; `None` where there is one orbit at a frequency, or the model is large.
-    pub(super) fn of(work: &Work<'_>, points: Vec<Point>) -> Option<Self> {
-        applies(&work.case().system).then_some(BothWays { points })
+    /// `None` where there is one orbit at a frequency, or the model is large.
+    pub(super) fn of(work: &Work<'_>) -> Option<Self> {
+        applies(&work.case().system).then(|| BothWays { points: Vec::new() })
     }
 
     pub(super) fn add(&mut self, omega: f64, outcome: Result<&Orbit, &OrbitError>) {
-        self.points.push(outcome.map_or_else(|_| Point::failed(omega), |orbit| Point::new(orbit, &amplitudes)));
+        self.add_point(outcome.map_or_else(|_| Point::failed(omega), |orbit| Point::new(orbit, &amplitudes)));
+    }
+
+    /// A point with the amplitudes of all places, or none.
+    pub(super) fn add_point(&mut self, point: Point) {
+        self.points.push(point);
     }
 
     /// Follows the points back, from what is found alone at the last one, and notes where other orbits are found.
