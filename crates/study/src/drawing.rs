@@ -214,7 +214,7 @@ pub(crate) fn join(parts: impl IntoIterator<Item = String>) -> String {
 
 /// The numbers of a column in some rows; NaN where there are none.
 pub(crate) fn numbers(table: &Table, column: &str, rows: Range<usize>) -> Vec<f64> {
-    match table.numbers(column) {
+    match table.numbers(&column_name(column)) {
         Some(values) => values[rows].to_vec(),
         None => vec![f64::NAN; rows.len()],
     }

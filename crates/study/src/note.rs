@@ -49,8 +49,8 @@ pub enum Note {
         from: f64,
         /// See `from`.
         to: f64,
-        /// Largest amplitude of the other orbit over that of the one in the table, where they differ most.
-        ratio: f64,
+        /// Largest amplitude of the other orbit over that of the one in the table: where it is lowest, and where it is highest.
+        ratios: [f64; 2],
     },
     /// Points at which the method that `auto` had chosen found no orbit and another one did.
     Instead {
@@ -165,14 +165,12 @@ impl Note {
         for known in notes.iter_mut() {
             match (known, &self) {
                 (
-                    Note::OtherOrbit { points, from, to, ratio },
-                    Note::OtherOrbit { points: more, from: low, to: high, ratio: other },
+                    Note::OtherOrbit { points, from, to, ratios: [least, most] },
+                    Note::OtherOrbit { points: more, from: low, to: high, ratios: other },
                 ) => {
                     *points += more;
                     (*from, *to) = (from.min(*low), to.max(*high));
-                    if other.ln().abs() > ratio.ln().abs() {
-                        *ratio = *other;
-                    }
+                    (*least, *most) = (least.min(other[0]), most.max(other[1]));
                     return;
                 }
                 (Note::Truncated(points, largest), Note::Truncated(more, other))
@@ -266,18 +264,19 @@ impl Note {
                  its slider (`jenkins`) makes the one that is shown unique, kind = \"transient\" follows the one of a given start.",
                 points(*count)
             )),
-            Note::OtherOrbit { points: count, from, to, ratio } => {
+            Note::OtherOrbit { points: count, from, to, ratios: [least, most] } => {
                 let hertz = |omega: f64| significant(omega / TAU, 6);
-                let size = match *ratio >= 1.0 {
-                    true => format!("up to {} times as high", significant(*ratio, 3)),
-                    false => format!("down to {} of the height", significant(*ratio, 3)),
-                };
+                let higher = (*most >= 1.0).then(|| format!("up to {} times as high", significant(*most, 3)));
+                let lower = (*least < 1.0).then(|| format!("down to {} of the height", significant(*least, 3)));
+                let size: Vec<String> = higher.into_iter().chain(lower).collect();
                 Some(format!(
-                    "warning: at {} between {} and {} Hz the curve has another orbit when it is followed the other way, {size}: which one is met depends \
-                     on how the motion began. Kind `branch` follows both and what joins them, with its folds.",
+                    "warning: at {} between {} and {} Hz the curve has another orbit when it is followed the other way, {}: which one is met depends \
+                     on how the motion began. `way_back.csv` has these orbits, and peaks that only they have are `way_back` in `peaks.csv`. Kind `branch` \
+                     follows both and what joins them, with its folds.",
                     points(*count),
                     hertz(*from),
-                    hertz(*to)
+                    hertz(*to),
+                    size.join(" and ")
                 ))
             }
             Note::Instead { points: count, chosen, found } => Some(format!(
@@ -342,8 +341,8 @@ mod tests {
             instead("shooting"),
             instead("event-driven"),
             instead("shooting"),
-            Note::OtherOrbit { points: 2, from: 3.0 * TAU, to: 4.0 * TAU, ratio: 2.0 },
-            Note::OtherOrbit { points: 1, from: 2.0 * TAU, to: 2.0 * TAU, ratio: 0.25 },
+            Note::OtherOrbit { points: 2, from: 3.0 * TAU, to: 4.0 * TAU, ratios: [2.0, 2.0] },
+            Note::OtherOrbit { points: 1, from: 2.0 * TAU, to: 2.0 * TAU, ratios: [0.25, 0.25] },
         ] {
             note.join(&mut notes);
         }
@@ -362,7 +361,8 @@ mod tests {
         assert!(texts[6].starts_with("At 2 points `shooting`") && texts[6].contains("`harmonic-balance` did"));
         assert!(texts[7].starts_with("At 1 point `event-driven`"), "{}", texts[7]);
         assert!(
-            texts[8].contains("at 3 points between 2 and 4 Hz") && texts[8].contains("down to 0.25"),
+            texts[8].contains("at 3 points between 2 and 4 Hz")
+                && texts[8].contains("up to 2 times as high and down to 0.25 of"),
             "{}",
             texts[8]
         );

@@ -1,7 +1,7 @@
 //! What a response can be asked for beside its curve, against closed forms of linear oscillators and against sums over single loops.
 
 use std::f64::consts::TAU;
-use stickslip_study::dataset::{Dataset, Emphasis, Table, Values};
+use stickslip_study::dataset::{Dataset, Emphasis, Panel, Table, Values};
 use stickslip_study::read_study;
 use stickslip_study::run::{Context, run};
 
@@ -549,6 +549,43 @@ fn a_curve_that_folds_is_followed_both_ways() {
             assert!(notes.len() == 1 && notes[0].starts_with("warning: at "), "{stiffness} {points}: {notes:?}");
         }
         assert_eq!(study("1e6", 20.0, points), Vec::<String>::new());
+    }
+}
+
+/// A softening spring bends the resonance towards lower frequencies: on the way there the curve jumps up beside it, and only the way back meets the peak. It
+/// is that of the branch by arc length, where no point and no direction decides; the rows of the way back are on it, and the figure has them.
+#[test]
+fn a_peak_that_only_the_way_back_meets_is_found() {
+    let study = |kind: &str, points: &str| {
+        let range = format!("frequency = {{ from = \"14 Hz\", to = \"17 Hz\" {points} }}");
+        let rest = format!("[study]\nkind = \"{kind}\"\n{range}");
+        dataset(&one_mass("10 kN/m", "2 N s/m", "kind = \"cubic\", stiffness = \"-1e9 N/m^3\"", "0.3 N", &rest))
+    };
+    let table = |of: &Dataset, name: &str| of.tables.iter().find(|table| table.name == name).cloned().unwrap();
+    let branch = table(&study("branch", ""), "peaks");
+    let (at, height) = (branch.numbers("frequency_Hz").unwrap()[0], branch.numbers("amplitude_m").unwrap()[0]);
+    for points in [", points = 61", ", tolerance = \"0.1 %\""] {
+        let found = study("response", points);
+        let peaks = table(&found, "peaks");
+        let (frequency, amplitude) = (peaks.numbers("frequency_Hz").unwrap(), peaks.numbers("amplitude_m").unwrap());
+        let back = peaks.flags("way_back").unwrap();
+        let of_back: Vec<usize> = (0..back.len()).filter(|row| back[*row] == Some(true)).collect();
+        assert_eq!(of_back.len(), 1, "{peaks:?}");
+        let row = of_back[0];
+        assert!((frequency[row] - at).abs() < 1e-5 && (amplitude[row] / height - 1.0).abs() < 1e-7, "{peaks:?}");
+        assert!((0..back.len()).all(|other| other == row || amplitude[other] < 0.7 * height), "{peaks:?}");
+        // on the high branch a frequency above the peak has less, and more than the curve of the way there
+        let (curve, way_back) = (table(&found, "curve"), table(&found, "way_back"));
+        let (there, low) = (curve.numbers("frequency_Hz").unwrap(), curve.numbers("m_amplitude_m").unwrap());
+        let (over, high) = (way_back.numbers("frequency_Hz").unwrap(), way_back.numbers("m_amplitude_m").unwrap());
+        assert!(over.len() > 10 && over.is_sorted() && over[0] > at, "{over:?}");
+        assert!(high.is_sorted_by(|a, b| a > b) && high[0] < height, "{high:?}");
+        for (omega, high) in over.iter().zip(high) {
+            let same = there.iter().position(|known| known == omega).unwrap();
+            assert!(*high > 1.5 * low[same], "{omega}");
+        }
+        let dotted = |panel: &Panel| panel.series.iter().filter(|series| series.label == "way back").count();
+        assert_eq!(found.figure.panels.iter().map(dotted).collect::<Vec<_>>(), [1]);
     }
 }
 

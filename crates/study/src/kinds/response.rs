@@ -28,9 +28,9 @@ use crate::survey::Surveyed;
 use crate::values::{Frequencies, hertz};
 use crate::warnings::sampled;
 use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
-use both_ways::BothWays;
+use both_ways::{BothWays, Other};
 use drawn::SINGLE;
-use peaks::{Found, Sought, peaks_of};
+use peaks::{Found, Sought};
 use references::{REFERENCE_POINTS, references};
 use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::peak::Point;
@@ -67,7 +67,14 @@ pub(super) const KIND: Kind = Kind {
         uses_method: true,
         needs: anything,
         adapts: true,
-        tables: &[tables::CURVE, tables::PEAKS, tables::REFERENCES, tables::AMPLIFICATION, tables::SHAPES],
+        tables: &[
+            tables::CURVE,
+            tables::PEAKS,
+            tables::REFERENCES,
+            tables::AMPLIFICATION,
+            tables::SHAPES,
+            tables::WAY_BACK,
+        ],
     },
     // an amplification is that of a whole curve
     grain: |study| match study.is_adaptive() || study.wants(amplification::KEY.name) {
@@ -85,6 +92,8 @@ const PEAKS: f64 = 1.3;
 const REFINING: f64 = 6.0;
 /// Peaks of the largest amplitude of a disk: of twelve blades that differ by 2 % three or so.
 const LEADING: f64 = 3.0;
+/// Share of the points of a curve at which the way back has another orbit.
+const OTHERS: f64 = 0.2;
 
 fn cost(costing: &Costing<'_>) -> Cost {
     let (points, values) = (costing.points(), &costing.case.values);
@@ -117,11 +126,12 @@ fn cost(costing: &Costing<'_>) -> Cost {
             Shape { rows: linear, numbers: 1.0 + 2.0 * costing.places, words: 0.0 },
             Shape { rows: tuned, numbers: costing.varied + 5.0, words: 1.0 },
             Shape { rows: shapes, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
+            costing.orbits((OTHERS * back).floor()),
         ],
         drawn: curves * costing.frequencies,
         unit: costing.orbit_bytes(),
         work: points * costing.extra()
-            + (points + back + REFINING * refined + tuned * costing.frequencies) * costing.orbit()
+            + (points + (1.0 + OTHERS) * back + REFINING * refined + tuned * costing.frequencies) * costing.orbit()
             + 2.0 * linear * costing.reference(),
     }
 }
@@ -153,7 +163,7 @@ fn compute(work: &Work<'_>) -> Computed {
         }
         _ => evenly(work, &mut stretch),
     };
-    let points = found.map_err(|error| (case.index, error))?;
+    let (points, others) = found.map_err(|error| (case.index, error))?;
     let mut part = stretch.part;
     let of = part.points.values().sum::<u64>() as usize;
     part.notes.push(Note::Stuck { case: case.label(), points: stretch.stuck, of });
@@ -161,7 +171,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let (mut amplified, mut shapes) = (Rows::default(), Rows::default());
     if !points.is_empty() && !work.context.stopped() {
         let mut peaks = Rows::default();
-        let all = peaks_of(work, points).map_err(|error| (case.index, error))?;
+        let all = peaks::all(work, points, &others).map_err(|error| (case.index, error))?;
         for found in &all {
             if let Some(why) = found.peak.unsettled {
                 let at = || {
@@ -174,6 +184,9 @@ fn compute(work: &Work<'_>) -> Computed {
             peaks.number(DRIVE, hertz(found.peak.omega));
             peaks.number(AMPLITUDE, found.peak.value);
             peaks.flag(AT_RANGE_END, Some(found.peak.at_end));
+            if both_ways::applies(&prepared.system) {
+                peaks.flag(tables::WAY_BACK, Some(found.way_back));
+            }
             peaks.reduced(prepared.system.reduction_evidence());
             peaks.end();
         }
@@ -194,8 +207,18 @@ fn compute(work: &Work<'_>) -> Computed {
     } else {
         part.tables.push(Rows::default());
     }
-    part.tables.extend([amplified, shapes]);
+    let mut way_back = Rows::default();
+    others.iter().for_each(|other| orbit_row(prepared, other.point.omega, &other.summary, &mut way_back));
+    part.tables.extend([amplified, shapes, way_back]);
     Ok(part)
+}
+
+/// The row of an orbit.
+fn orbit_row(prepared: &Prepared, omega: f64, summary: &Summary, rows: &mut Rows) {
+    rows.varied(&prepared.case);
+    rows.number(DRIVE, hertz(omega));
+    summary.write(prepared, rows);
+    rows.end();
 }
 
 /// The row of a peak of a disk, with every place.
@@ -234,10 +257,14 @@ impl<'a> Computing<'a> {
         self.stuck += usize::from(summary.stuck);
         notes.into_iter().for_each(|note| note.join(&mut self.part.notes));
         self.omegas.push(omega);
-        self.rows.varied(case);
-        self.rows.number(DRIVE, hertz(omega));
-        summary.write(self.prepared, &mut self.rows);
-        self.rows.end();
+        orbit_row(self.prepared, omega, &summary, &mut self.rows);
+    }
+
+    /// The other orbits that the curve has when it is followed the other way.
+    fn compare(&mut self, work: &Work<'_>, ways: Option<BothWays>) -> Result<Vec<Other>, MethodError> {
+        let others = ways.map_or_else(|| Ok(Vec::new()), |ways| ways.others(work))?;
+        others.iter().for_each(|other| other.note.clone().join(&mut self.part.notes));
+        Ok(others)
     }
 }
 
@@ -249,8 +276,11 @@ fn kept(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> (Summary, 
     (summary, notes)
 }
 
-/// The points of the unit's frequencies; those among which peaks are sought, if they are.
-fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Vec<Point>, MethodError> {
+/// The points among which peaks are sought, if they are, and what the way back has beside them.
+type Followed = (Vec<Point>, Vec<Other>);
+
+/// The points of the unit's frequencies.
+fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, MethodError> {
     let prepared = work.case();
     let wanted = wants_peaks(work);
     let sought = Sought::new(prepared);
@@ -264,11 +294,9 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Vec<Point>, Me
             points.push(outcome.map_or_else(|_| Point::failed(omega), point));
         }
     })?;
-    if let Some(ways) = ways {
-        ways.compared(work)?.into_iter().for_each(|note| note.join(&mut stretch.part.notes));
-    }
+    let others = stretch.compare(work, ways)?;
     if !wanted || points.is_empty() {
-        return Ok(Vec::new());
+        return Ok((Vec::new(), others));
     }
     // its first and last points are looked at together with the neighbours that other units compute for themselves
     let count = prepared.case.frequencies.as_ref().map_or(0, |f| f.len());
@@ -285,11 +313,11 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Vec<Point>, Me
         let after = near(work.points.end, points[points.len() - 1].start.as_deref());
         points.push(after);
     }
-    Ok(points)
+    Ok((points, others))
 }
 
 /// The points that the curve needs.
-fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) -> Result<Vec<Point>, MethodError> {
+fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) -> Result<Followed, MethodError> {
     let prepared = work.case();
     let sought = Sought::new(prepared);
     // the shape has no say in where points are
@@ -314,10 +342,8 @@ fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) 
         point.values.extend(shape);
         points.push(point);
     }
-    if let Some(ways) = ways {
-        ways.compared(work)?.into_iter().for_each(|note| note.join(&mut stretch.part.notes));
-    }
-    Ok(if prepared.case.values.flag("peaks").unwrap_or(true) { points } else { Vec::new() })
+    let others = stretch.compare(work, ways)?;
+    Ok((if prepared.case.values.flag("peaks").unwrap_or(true) { points } else { Vec::new() }, others))
 }
 
 /// Whether peaks are asked for, on a curve that can have any.

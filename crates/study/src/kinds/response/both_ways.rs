@@ -1,7 +1,9 @@
 //! A curve followed in both directions, where several orbits may exist at one frequency: what the points of the table do not show.
 
 use super::super::peak_of::held;
+use super::peaks::Sought;
 use crate::note::Note;
+use crate::point::Summary;
 use crate::summary::may_have_several;
 use crate::work::Work;
 use stickslip::curve::peak::Point;
@@ -23,6 +25,16 @@ pub(super) struct BothWays {
     points: Vec<Point>,
 }
 
+/// An orbit of the way back at a frequency where the way there has another one.
+pub(super) struct Other {
+    /// What is kept of it.
+    pub(super) summary: Summary,
+    /// It, among which peaks are sought.
+    pub(super) point: Point,
+    /// That there are two.
+    pub(super) note: Note,
+}
+
 fn amplitudes(orbit: &Orbit) -> Vec<f64> {
     orbit.places.iter().map(|place| place.amplitude()).collect()
 }
@@ -42,20 +54,55 @@ impl BothWays {
         self.points.push(point);
     }
 
-    /// Follows the points back, from what is found alone at the last one, and notes where other orbits are found.
-    pub(super) fn compared(&self, work: &Work<'_>) -> Result<Vec<Note>, MethodError> {
-        let (method, system) = (&*work.case().method, &work.case().system);
+    /// Follows the points back, from what is found alone at the last one: the other orbits that are found, in the order of the way there.
+    pub(super) fn others(&self, work: &Work<'_>) -> Result<Vec<Other>, MethodError> {
+        let prepared = work.case();
+        let (method, system) = (&*prepared.method, &prepared.system);
         let Some(last) = self.points.last() else { return Ok(Vec::new()) };
+        let mut solver = method.solver(system)?;
         // what is found there alone need not be what the points before lead to
-        let start = method.solver(system)?.orbit(last.omega, None).ok().map(|orbit| orbit.start);
+        let start = solver.orbit(last.omega, None).ok().map(|orbit| orbit.start);
         let mut omegas = self.points.iter().rev().map(|point| point.omega);
-        let mut notes = Vec::new();
+        let mut others = Vec::new();
+        let sought = Sought::new(prepared);
         back(method, system, start, &mut omegas, &work.context.stop, &mut |orbit| {
-            let point = self.points.iter().find(|point| point.omega == orbit.omega);
-            notes.extend(point.and_then(|point| other(point, orbit, held(system, orbit.omega))));
+            let Some(point) = self.points.iter().find(|point| point.omega == orbit.omega) else { return };
+            let held = held(system, orbit.omega);
+            let differs = |orbit: &Orbit| other(point, orbit, held);
+            // the way back asks for no errors: of an orbit that is shown they are known
+            let shown = differs(orbit).and_then(|_| solver.orbit(orbit.omega, Some(&orbit.start)).ok());
+            if let Some((orbit, note)) = shown.and_then(|orbit| differs(&orbit).map(|note| (orbit, note))) {
+                let point = Point::new(&orbit, &|orbit| sought.quantities(orbit));
+                others.push(Other { summary: Summary::new(prepared, Ok(&orbit)), point, note });
+            }
         })?;
-        Ok(notes)
+        others.reverse();
+        Ok(others)
     }
+}
+
+/// The stretches of the way back on which it has other orbits than the way there, whose points are `there`: each with its neighbours of both ways.
+pub(super) fn stretches(there: &[Point], others: &[Other]) -> Vec<Vec<Point>> {
+    let mut stretches: Vec<Vec<Point>> = Vec::new();
+    let mut others = others.iter().map(|other| &other.point).peekable();
+    let mut open = false;
+    for (i, point) in there.iter().enumerate() {
+        match others.next_if(|other| other.omega == point.omega) {
+            Some(other) => {
+                if !open {
+                    stretches.push(i.checked_sub(1).map(|before| there[before].clone()).into_iter().collect());
+                }
+                stretches.last_mut().into_iter().for_each(|stretch| stretch.push(other.clone()));
+                open = true;
+            }
+            None if open => {
+                stretches.last_mut().into_iter().for_each(|stretch| stretch.push(point.clone()));
+                open = false;
+            }
+            None => {}
+        }
+    }
+    stretches
 }
 
 /// Whether a curve of this system is followed both ways.
@@ -74,5 +121,5 @@ fn other(point: &Point, orbit: &Orbit, held: f64) -> Option<Note> {
     let enough = (OTHER.max(ERRORS * point.error) * here.max(there)).max(held);
     let differs = point.values.iter().zip(&found).any(|(a, b)| (a - b).abs() > enough);
     let ratio = (there / here).clamp(f64::MIN_POSITIVE, f64::MAX);
-    differs.then_some(Note::OtherOrbit { points: 1, from: point.omega, to: point.omega, ratio })
+    differs.then_some(Note::OtherOrbit { points: 1, from: point.omega, to: point.omega, ratios: [ratio; 2] })
 }

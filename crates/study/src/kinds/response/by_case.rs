@@ -76,6 +76,9 @@ impl Drawn<'_> {
                 let style = if light { Style::Dashed } else { Style::Solid };
                 panel.series.push(Series { style, ..Series::line(name, x, y, self.colour_of(name, *place)) });
             }
+            let colour_of = |(name, place): &(String, usize)| self.colour_of(name, *place);
+            let back = |shown: &(String, usize)| self.way_back(stretch, &[&shown.0], colour_of(shown));
+            panel.series.extend(self.shown.iter().filter_map(back));
             for (name, place) in &self.shown {
                 panel.series.extend(self.marks(stretch, name, self.colour_of(name, *place)));
             }
@@ -93,6 +96,7 @@ impl Drawn<'_> {
         let (x, y, worst) = self.envelope(stretch);
         panel.title = join([panel.title, worst]);
         panel.series.push(Series::line(format!("largest of {} places", names.len()), x, y, 0));
+        panel.series.extend(self.way_back(stretch, &names, 0));
         panel
     }
 

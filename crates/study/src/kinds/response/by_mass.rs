@@ -106,6 +106,8 @@ impl Drawn<'_> {
             let line = of_case(stretch, mass.unwrap_or("largest"), x, y, colour);
             let value = line.value;
             panel.series.push(line);
+            let names = mass.map_or_else(|| self.names(), |name| vec![name]);
+            panel.series.extend(self.way_back(stretch, &names, colour).map(|back| Series { value, ..back }));
             if let (Some(name), true) = (mass, group.len() <= SINGLE) {
                 panel.series.extend(self.marks(stretch, name, colour).map(|marks| Series { value, ..marks }));
             }

@@ -20,6 +20,17 @@ const MANY: usize = 2;
 /// Names of places with amplitude (m) and phase (degrees) of each.
 pub(super) type Shape<'a> = Vec<(&'a str, f64, f64)>;
 
+/// A peak of a mass in a case.
+#[derive(Debug, Clone)]
+pub(super) struct PeakOf {
+    pub(super) case: usize,
+    pub(super) mass: String,
+    /// Frequency (Hz) and amplitude (m).
+    pub(super) at: (f64, f64),
+    /// Whether only the way back has it.
+    pub(super) way_back: bool,
+}
+
 /// What is drawn.
 pub(super) struct Drawn<'a> {
     pub(super) drawing: &'a Drawing<'a>,
@@ -28,8 +39,10 @@ pub(super) struct Drawn<'a> {
     pub(super) index: HashMap<&'a str, &'a Column>,
     /// Names of the masses that are shown, and their numbers.
     pub(super) shown: Vec<(String, usize)>,
-    /// Case, and mass, frequency (Hz), amplitude (m) of the peaks inside the range.
-    pub(super) peaks: Vec<(usize, (String, f64, f64))>,
+    /// The orbits of the way back where they are others, and the rows of each case.
+    pub(super) way_back: Option<(&'a Table, Vec<Stretch>)>,
+    /// Those inside the range.
+    pub(super) peaks: Vec<PeakOf>,
     /// What a disk does at its peaks, and the rows of each case.
     pub(super) shapes: Option<(&'a Table, Vec<Stretch>)>,
     /// Names of the joints whose forces are shown.
@@ -58,7 +71,28 @@ impl Drawn<'_> {
     pub(super) fn line(&self, stretch: &Stretch, name: &str) -> (Vec<f64>, Vec<f64>) {
         let x = numbers(self.curve, DRIVE, stretch.rows.clone());
         let y = self.amplitudes(name, stretch.rows.clone());
-        self.with_peaks(stretch, x.into_iter().zip(y).collect(), &|mass, _| mass == name)
+        self.scaled(
+            self.with_peaks(stretch, x.into_iter().zip(y).collect(), &|peak| !peak.way_back && peak.mass == name),
+        )
+    }
+
+    /// The curves of the way back where it has other orbits: of one mass with its peaks, or the largest of several; in the same colour, none in most figures.
+    pub(super) fn way_back(&self, stretch: &Stretch, names: &[&str], colour: usize) -> Option<Series> {
+        let (table, stretches) = self.way_back.as_ref()?;
+        let rows = stretches.iter().find(|of| of.case == stretch.case)?.rows.clone();
+        let x = numbers(table, DRIVE, rows.clone());
+        let all: Vec<Vec<f64>> = names.iter().map(|name| numbers(table, &amplitude_of(name), rows.clone())).collect();
+        let largest = |i: usize| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max);
+        let points = (0..x.len()).map(|i| (x[i], largest(i))).collect();
+        let mut points = self.with_peaks(stretch, points, &|peak| peak.way_back && names == [peak.mass.as_str()]);
+        // where both ways have the same orbits, the line has a gap
+        let there = numbers(self.curve, DRIVE, stretch.rows.clone());
+        let alike: Vec<f64> = there.into_iter().filter(|omega| !x.contains(omega)).collect();
+        let within = points.first().map_or(0.0, |first| first.0)..points.last().map_or(0.0, |last| last.0);
+        points.extend(alike.into_iter().filter(|x| within.contains(x)).map(|x| (x, f64::NAN)));
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (x, y) = self.scaled(points);
+        Some(Series { style: Style::Dotted, ..Series::line("way back", x, y, colour) })
     }
 
     /// The largest amplitude over the shown masses at the frequencies of the curve.
@@ -74,9 +108,9 @@ impl Drawn<'_> {
         let alike = leading(heights.iter().copied())
             .is_none_or(|worst| heights.iter().all(|height| *height >= (1.0 - EQUAL) * heights[worst]));
         // between the points of the curve another one may be higher
-        for (mass, _, height) in self.peaks.iter().filter(|peak| peak.0 == stretch.case).map(|peak| &peak.1) {
-            if let Some(i) = self.shown.iter().position(|(name, _)| name == mass) {
-                heights[i] = heights[i].max(*height);
+        for peak in self.peaks_of(stretch).filter(|peak| !peak.way_back) {
+            if let Some(i) = self.shown.iter().position(|(name, _)| *name == peak.mass) {
+                heights[i] = heights[i].max(peak.at.1);
             }
         }
         let worst = leading(heights.into_iter()).filter(|_| !alike);
@@ -87,7 +121,8 @@ impl Drawn<'_> {
             y0 + (omega - x0) / (x1 - x0) * (y1 - y0)
         };
         // a peak of one mass below another one is none of the envelope
-        let (x, y) = self.with_peaks(stretch, points.clone(), &|_, peak| points.len() > 1 && peak.1 > below(peak.0));
+        let counts = |peak: &PeakOf| !peak.way_back && points.len() > 1 && peak.at.1 > below(peak.at.0);
+        let (x, y) = self.scaled(self.with_peaks(stretch, points.clone(), &counts));
         (x, y, worst.map_or_else(|| "all are alike".to_owned(), |worst| format!("worst is {}", self.shown[worst].0)))
     }
 
@@ -135,24 +170,26 @@ impl Drawn<'_> {
         both.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, frequency, shape)| (frequency, shape))
     }
 
+    fn peaks_of(&self, stretch: &Stretch) -> impl Iterator<Item = &PeakOf> {
+        self.peaks.iter().filter(|peak| peak.case == stretch.case)
+    }
+
     fn with_peaks(
         &self,
         stretch: &Stretch,
         mut points: Vec<(f64, f64)>,
-        counts: &dyn Fn(&str, (f64, f64)) -> bool,
-    ) -> (Vec<f64>, Vec<f64>) {
-        let of_case = self.peaks.iter().filter(|peak| peak.0 == stretch.case).map(|peak| &peak.1);
-        points.extend(of_case.filter(|(mass, x, y)| counts(mass, (*x, *y))).map(|(_, x, y)| (*x, *y)));
+        counts: &dyn Fn(&PeakOf) -> bool,
+    ) -> Vec<(f64, f64)> {
+        points.extend(self.peaks_of(stretch).filter(|peak| counts(peak)).map(|peak| peak.at));
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        self.scaled(points)
+        points
     }
 
     /// Marks at the peaks of one mass.
     pub(super) fn marks(&self, stretch: &Stretch, name: &str, colour: usize) -> impl Iterator<Item = Series> {
-        let of_case = self.peaks.iter().filter(move |peak| peak.0 == stretch.case).map(|peak| &peak.1);
-        of_case
-            .filter(move |(mass, _, _)| mass == name)
-            .map(move |(_, x, y)| Series::marks("peak", vec![x * self.factor.0], vec![y * self.factor.1], colour))
+        self.peaks_of(stretch).filter(move |peak| peak.mass == name).map(move |PeakOf { at: (x, y), .. }| {
+            Series::marks("peak", vec![x * self.factor.0], vec![y * self.factor.1], colour)
+        })
     }
 
     /// Grey curves of the linear structures: of one mass, or the largest over the shown ones.

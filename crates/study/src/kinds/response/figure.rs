@@ -1,7 +1,7 @@
 //! The figure of a response.
 
 use super::super::shares;
-use super::drawn::{Drawn, force};
+use super::drawn::{Drawn, PeakOf, force};
 use super::{amplification, tables};
 use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, amplitude_of};
 use crate::dataset::{Axis, Figure, Panel, Sharing};
@@ -27,13 +27,16 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
     }
     let columns = || shown.iter().map(|(name, _)| amplitude_of(name));
     let (x, x_factor) = drawing.axis(0, "frequency", largest(curve, [DRIVE.to_owned()]), "Hz");
-    let (y, y_factor) = drawing.axis(1, "amplitude", largest(curve, columns()), "m");
+    let tables = [Some(curve), drawing.table(tables::WAY_BACK)];
+    let highest = tables.into_iter().flatten().map(|table| largest(table, columns())).fold(0.0, f64::max);
+    let (y, y_factor) = drawing.axis(1, "amplitude", highest, "m");
     let (unit, force_factor) = display_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
     let stretches = drawing.stretches(curve);
     let drawn = Drawn {
         drawing,
         curve,
         index: curve.index(),
+        way_back: drawing.table(tables::WAY_BACK).map(|table| (table, drawing.stretches(table))),
         peaks: peaks_by_case(drawing),
         shapes: drawing.table(tables::SHAPES).map(|table| (table, drawing.stretches(table))),
         factor: (x_factor, y_factor),
@@ -84,10 +87,11 @@ fn heights(drawn: &Drawn<'_>) -> Vec<Panel> {
     drawn.drawing.by_listed(&stretches).into_iter().filter_map(of_group).collect()
 }
 
-/// The peaks inside the range: case, and mass, frequency (Hz), amplitude (m).
-fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<(usize, (String, f64, f64))> {
+/// The peaks inside the range.
+fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<PeakOf> {
     let Some(table) = drawing.table(tables::PEAKS) else { return Vec::new() };
     let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
+    let way_back = table.flags(tables::WAY_BACK).unwrap_or_default();
     let masses = words(table, tables::MASS);
     // a table from elsewhere may lack columns
     if masses.len() != table.rows() {
@@ -98,7 +102,8 @@ fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<(usize, (String, f64, f64))> {
         let (x, y) = (numbers(table, DRIVE, stretch.rows.clone()), numbers(table, AMPLITUDE, stretch.rows.clone()));
         for (i, row) in stretch.rows.clone().enumerate() {
             if at_end.get(row) == Some(&Some(false)) {
-                peaks.push((stretch.case, (masses[row].clone(), x[i], y[i])));
+                let way_back = way_back.get(row).copied().flatten() == Some(true);
+                peaks.push(PeakOf { case: stretch.case, mass: masses[row].clone(), at: (x[i], y[i]), way_back });
             }
         }
     }

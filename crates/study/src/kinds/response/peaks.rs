@@ -1,6 +1,7 @@
 //! The peaks of a stretch of a response curve.
 
 use super::super::peak_of::{held, named_places, worst};
+use super::both_ways::{Other, stretches};
 use crate::work::{Prepared, Work};
 use stickslip::curve::peak::{self, Peak, Point};
 use stickslip::method::MethodError;
@@ -69,6 +70,8 @@ pub(super) struct Found {
     pub(super) peak: Peak,
     /// Amplitude (m) and phase (degrees) of every place, of a disk at a refined peak.
     pub(super) shape: Vec<f64>,
+    /// Whether only the way back has it.
+    pub(super) way_back: bool,
 }
 
 impl Found {
@@ -78,9 +81,24 @@ impl Found {
     }
 }
 
+/// The peaks of a curve and those that only the way back has, whose orbits are `others`, by frequency.
+pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Other]) -> Result<Vec<Found>, MethodError> {
+    let mut of_others = Vec::new();
+    for stretch in stretches(&points, others) {
+        let known = |omega: f64| others.iter().any(|other| other.point.omega == omega);
+        let neighbours: Vec<f64> = stretch.iter().map(|point| point.omega).filter(|omega| !known(*omega)).collect();
+        let found = peaks_of(work, stretch)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
+        of_others.extend(found.map(|found| Found { way_back: true, ..found }));
+    }
+    let mut all = peaks_of(work, points)?;
+    all.extend(of_others);
+    all.sort_by(|a, b| a.peak.omega.total_cmp(&b.peak.omega));
+    Ok(all)
+}
+
 /// The peaks of a stretch of a curve, by frequency. The ends of the whole curve count as peaks at the end of the range if it falls away
 /// from them.
-pub(super) fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodError> {
+fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodError> {
     let prepared = work.case();
     let sought = Sought::new(prepared);
     let count = sought.amplitudes_count();
@@ -96,7 +114,7 @@ pub(super) fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>
             .filter(falls)
             .map(|q| {
                 let peak = Peak { omega: end.omega, value: end.values[q], at_end: true, unsettled: None };
-                Found { mass: sought.mass(q, &end.values), peak, shape: Vec::new() }
+                Found { mass: sought.mass(q, &end.values), peak, shape: Vec::new(), way_back: false }
             })
             .collect()
     };
@@ -119,7 +137,7 @@ pub(super) fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>
     inner.retain(|found| !ends_a_level(&points, found.quantity, &found.peak));
     let inner = inner.into_iter().map(|found| {
         let mass = sought.mass(found.quantity, &found.values);
-        Found { mass, peak: found.peak, shape: found.values[count..].to_vec() }
+        Found { mass, peak: found.peak, shape: found.values[count..].to_vec(), way_back: false }
     });
     Ok(first.into_iter().chain(inner).chain(last).filter(|found| moves(&found.peak)).collect())
 }
