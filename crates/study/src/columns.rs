@@ -6,6 +6,8 @@ pub(crate) const FREQUENCY: &str = "frequency_Hz";
 pub(crate) const AMPLITUDE: &str = "amplitude_m";
 /// Whether a peak is only the end of the range.
 pub(crate) const AT_RANGE_END: &str = "at_range_end";
+/// Whether only the way back from the last frequency to the first has a peak.
+pub(crate) const WAY_BACK: &str = "way_back";
 /// Defect of the return map.
 pub(crate) const RESIDUAL: &str = "residual";
 /// Relative gap between work put in and energy lost.

@@ -83,11 +83,6 @@ impl Orbits {
     }
 }
 
-/// Whether there may be several orbits at one frequency.
-pub(crate) fn may_have_several(system: &System) -> bool {
-    matches!(Orbits::new(system), Some(Orbits::Several(_)))
-}
-
 /// Joints that are named as the reason for several orbits.
 const NAMED: usize = 2;
 

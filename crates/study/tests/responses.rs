@@ -587,6 +587,21 @@ fn a_peak_that_only_the_way_back_meets_is_found() {
         let dotted = |panel: &Panel| panel.series.iter().filter(|series| series.label == "way back").count();
         assert_eq!(found.figure.panels.iter().map(dotted).collect::<Vec<_>>(), [1]);
     }
+    // the same peak counts where a parameter is sought that makes it lowest
+    let rest = r#"
+[parameters]
+k3 = "-1e9 N/m^3"
+[study]
+kind = "performance"
+frequency = { from = "14 Hz", to = "17 Hz", points = 61 }
+vary = { k3 = ["-1e9 N/m^3", "-1 N/m^3"] }"#;
+    let law = "kind = \"cubic\", stiffness = \"k3\"";
+    let performance = table(&dataset(&one_mass("10 kN/m", "2 N s/m", law, "0.3 N", rest)), "performance");
+    let peaks = performance.numbers("amplitude_m").unwrap();
+    assert!((peaks[0] / height - 1.0).abs() < 1e-7, "{performance:?}");
+    // F / (c √(k/m - c²/4m²)) of the linear one
+    assert!((peaks[1] / (0.3 / (2.0 * f64::sqrt(1e4 - 1.0))) - 1.0).abs() < 1e-5, "{performance:?}");
+    assert_eq!(performance.flags("way_back").unwrap(), [Some(true), Some(false)]);
 }
 
 /// Theory 11.13: over a stop without a gap, driven at 2.6 times the natural frequency, the motion that repeats with the drive is unstable; with

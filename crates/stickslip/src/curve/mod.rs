@@ -1,6 +1,7 @@
 //! Families of orbits along a parameter.
 
 pub mod adaptive;
+pub mod both_ways;
 pub mod modes;
 pub mod peak;
 pub mod performance;

@@ -4,11 +4,14 @@
 //! parameter this is the classical curve of friction damping: free at the left, stuck at the right, a minimum between.
 //! Source: Griffin (1980), Fig. 4.
 
+use super::both_ways::{BothWays, stretches};
 use super::peak::{Peak, Point, highest};
+use super::sweep::{Watch, stretch};
 use crate::method::{Method, MethodError};
 use crate::model::System;
 use crate::orbit::{Accuracy, Orbit};
 use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
 use stickslip_numerics::maximum::maximum;
 
 /// What is computed.
@@ -33,6 +36,8 @@ pub struct Row {
     pub value: f64,
     /// The highest peak; `None` if no orbit converged.
     pub peak: Option<Peak>,
+    /// Whether only the way back from the last frequency to the first has it, where a system allows several orbits at one ([`super::both_ways`]).
+    pub way_back: bool,
     /// Orbits of the grid that were not found.
     pub failed: usize,
     /// Orbits of the grid whose series is too short for the tolerance, or whose error was not estimated.
@@ -103,24 +108,39 @@ impl<E: Send> Performance<'_, E> {
             (0..=last).map(|i| self.range.0 + (self.range.1 - self.range.0) * i as f64 / last as f64).collect();
         let (mut failed, mut inaccurate) = (0, 0);
         let mut points: Vec<Point> = Vec::with_capacity(omegas.len());
-        for omega in omegas {
-            let start = points.last().and_then(|point| point.start.as_deref());
-            points.push(match solver.orbit(omega, start) {
+        let mut ways = BothWays::of(&system);
+        let (stop, finished) = (AtomicBool::new(false), || ());
+        let watch = Watch { finished: &finished, stop: &stop };
+        stretch(&mut *solver, &mut omegas.into_iter(), watch, &mut |omega, outcome| {
+            let Some(outcome) = outcome else { return };
+            ways.iter_mut().for_each(|ways| ways.add(omega, outcome));
+            points.push(match outcome {
                 Ok(orbit) => {
                     inaccurate += usize::from(orbit.evidence.accuracy != Accuracy::Converged);
-                    Point::new(&orbit, self.quantities)
+                    Point::new(orbit, self.quantities)
                 }
                 Err(_) => {
                     failed += 1;
                     Point::failed(omega)
                 }
             });
-        }
+        });
         let wanted = points.iter().map(|point| point.values.len()).max().unwrap_or(0);
-        let peak = highest(&mut *solver, &points, wanted, self.quantities);
+        let mut peak = highest(&mut *solver, &points, wanted, self.quantities);
+        let mut way_back = false;
+        if let Some(ways) = ways {
+            let others = ways.others(self.method, &system, &stop).map_err(PerformanceError::Method)?;
+            let others: Vec<Point> = others.iter().map(|other| Point::new(&other.orbit, self.quantities)).collect();
+            for points in stretches(&points, &others) {
+                let other = highest(&mut *solver, &points, wanted, self.quantities);
+                if other.is_some_and(|other| peak.is_none_or(|peak| other.value > peak.value)) {
+                    (peak, way_back) = (other, true);
+                }
+            }
+        }
         // a peak that is left open counts as one that was not found
         failed += usize::from(peak.is_some_and(|peak| peak.unsettled.is_some()));
-        Ok(Row { value, peak, failed, inaccurate })
+        Ok(Row { value, peak, way_back, failed, inaccurate })
     }
 
     /// The curve over `values` (rising), and its optimum.

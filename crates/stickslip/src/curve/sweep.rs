@@ -54,10 +54,10 @@ pub fn sweep<R: Send>(
         .map(|block| {
             let range = block * BLOCK..((block + 1) * BLOCK).min(count);
             let mut rows = Vec::with_capacity(range.len());
-            stretch(method, system, &mut range.clone().map(omega), watch, &mut |_, outcome| {
+            stretch(&mut *method.solver(system)?, &mut range.clone().map(omega), watch, &mut |_, outcome| {
                 let index = range.start + rows.len();
                 rows.push(outcome.map(|outcome| row(index, outcome)));
-            })?;
+            });
             Ok(rows)
         })
         .collect();
@@ -73,17 +73,7 @@ pub type See<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
 
 /// Runs `system` over some frequencies (rad/s), one after the other, each started from the one before, and those that have no orbit from
 /// there from the one behind; `see` looks at each outcome, in order.
-///
-/// # Errors
-/// The method cannot take the system.
-pub fn stretch(
-    method: &dyn Method,
-    system: &System,
-    omegas: &mut dyn Iterator<Item = f64>,
-    watch: Watch<'_>,
-    see: &mut See<'_>,
-) -> Result<(), MethodError> {
-    let mut solver = method.solver(system)?;
+pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, watch: Watch<'_>, see: &mut See<'_>) {
     let mut start: Option<Vec<f64>> = None;
     // points that were not found, until an orbit is found behind them
     let mut missing: Vec<Missing> = Vec::new();
@@ -105,15 +95,14 @@ pub fn stretch(
         }
         if let Some(behind) = found {
             let before = missing.len() - 1;
-            from_behind(&mut *solver, &behind, &mut missing[..before], watch);
+            from_behind(solver, &behind, &mut missing[..before], watch);
         }
         for point in &mut missing {
-            point.seek_alone(&mut *solver, watch);
+            point.seek_alone(solver, watch);
             see(point.omega, Some(point.outcome.as_ref()));
         }
         missing.clear();
     }
-    Ok(())
 }
 
 /// Follows a curve the other way: seeks orbits at some frequencies (rad/s), one after the other, the first one from the orbit of `start`, each of the
@@ -228,14 +217,14 @@ mod tests {
         let system = crate::model::example::blade_couple().assemble().unwrap();
         let watch = Watch { finished: &|| (), stop: &AtomicBool::new(false) };
         let mut seen = Vec::new();
-        stretch(&Folded { fold }, &system, &mut omegas.iter().copied(), watch, &mut |omega, outcome| {
+        let mut solver = Folded { fold }.solver(&system).unwrap();
+        stretch(&mut *solver, &mut omegas.iter().copied(), watch, &mut |omega, outcome| {
             let outcome = outcome.expect("not stopped");
             if let Ok(orbit) = outcome {
                 assert_eq!(orbit.omega, omega);
             }
             seen.push((omega, outcome.is_ok()));
-        })
-        .unwrap();
+        });
         seen
     }
 

@@ -23,7 +23,8 @@ pub(super) fn sweep(work: &Work<'_>, see: &mut See<'_>) -> Result<(), MethodErro
     let prepared = work.case();
     let watch = Watch { finished: &*work.context.finished, stop: &work.context.stop };
     let mut omegas = work.points.clone().map(|index| work.omega(index));
-    stretch(&*prepared.method, &prepared.system, &mut omegas, watch, see)
+    stretch(&mut *prepared.method.solver(&prepared.system)?, &mut omegas, watch, see);
+    Ok(())
 }
 
 /// The orbits of a unit of one case.

@@ -5,7 +5,7 @@ use crate::key::{Key, Takes, optional};
 use crate::names::Names;
 use crate::values::Values;
 use crate::work::Prepared;
-use stickslip::model::{Model, System};
+use stickslip::model::Model;
 use stickslip::orbit::Orbit;
 
 /// Stands for every mass, unless one has this name.
@@ -59,16 +59,4 @@ pub(super) fn peak_places(prepared: &Prepared) -> Vec<usize> {
 /// The largest amplitude among some places, m.
 pub(super) fn worst(orbit: &Orbit, places: &[usize]) -> f64 {
     places.iter().map(|place| orbit.places[*place].amplitude()).fold(0.0, f64::max)
-}
-
-/// Amplitudes below this share of what the loads would do to a mass by itself are rounding: friction holds it.
-const HELD: f64 = 1e-10;
-
-/// The amplitude (m) below which a place counts as held at a frequency: a share of `F / (k + Ω²m)`, the largest there is.
-pub(super) fn held(system: &System, omega: f64) -> f64 {
-    let (mass, stiffness) = (system.structure().mass(), system.structure().stiffness());
-    let alone = |i: usize, force: f64| force / (stiffness[(i, i)].abs() + omega * omega * mass[(i, i)]);
-    let loads = system.excitation(omega);
-    let sizes = loads.iter().flat_map(|(_, force)| force.iter().enumerate().map(|(i, f)| alone(i, f.norm())));
-    HELD * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
 }

@@ -5,8 +5,8 @@ mod tables;
 pub use tables::{Curve, Optimum, Point, curves};
 
 use super::keys::{FREQUENCY, anything, check_masses};
-use super::peak_of::{PEAK_OF, check_peak_of, held, peak_places};
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE};
+use super::peak_of::{PEAK_OF, check_peak_of, peak_places};
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series};
 use crate::drawing::{Drawing, Stretch, largest, numbers};
@@ -21,6 +21,8 @@ use crate::study::{VariedValue, varied_text};
 use crate::values::{Values, hertz};
 use crate::warnings::sampled;
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
+use stickslip::curve::both_ways;
+use stickslip::curve::peak::held;
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
@@ -52,6 +54,7 @@ const OPTIMUM: f64 = 35.0;
 
 fn cost(costing: &Costing<'_>) -> Cost {
     let (cases, curves) = (costing.cases, costing.curves());
+    let ways = if both_ways::applies(costing.system()) { 2.0 } else { 1.0 };
     Cost {
         tables: vec![
             Shape { rows: cases, numbers: costing.varied + 4.0, words: 1.0 },
@@ -59,7 +62,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: cases,
         unit: costing.orbit_bytes(),
-        work: (cases + curves * OPTIMUM) * (costing.frequencies + REFINING) * costing.orbit(),
+        work: (cases + curves * OPTIMUM) * (ways * costing.frequencies + REFINING) * costing.orbit(),
     }
 }
 
@@ -103,6 +106,9 @@ fn compute(work: &Work<'_>) -> Computed {
         rows.number(DRIVE, row.peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
         rows.number(AMPLITUDE, row.peak.map_or(f64::NAN, |peak| peak.value));
         rows.flag(AT_RANGE_END, row.peak.map(|peak| peak.at_end));
+        if both_ways::applies(&prepared.system) {
+            rows.flag(WAY_BACK, row.peak.map(|_| row.way_back));
+        }
         rows.integer(tables::FAILED, row.failed as u64);
         rows.reduced(prepared.system.reduction_evidence());
         rows.text("status", status);

@@ -1,7 +1,6 @@
 //! Response curves: amplitude over drive frequency.
 
 mod amplification;
-mod both_ways;
 mod by_case;
 mod by_mass;
 mod drawn;
@@ -15,7 +14,7 @@ pub use tables::{Curve, MassCurve, curves};
 use super::keys::{FREQUENCY, OUTPUT, anything, check_output};
 use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of};
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, amplitude_of, phase_of};
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_of, phase_of};
 use crate::cost::{Cost, Costing, Shape};
 use crate::drawing::{MOST_CURVES, MOST_PANELS};
 use crate::info::KindInfo;
@@ -28,11 +27,11 @@ use crate::survey::Surveyed;
 use crate::values::{Frequencies, hertz};
 use crate::warnings::sampled;
 use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
-use both_ways::{BothWays, Other};
 use drawn::SINGLE;
 use peaks::{Found, Sought};
 use references::{REFERENCE_POINTS, references};
 use stickslip::curve::adaptive::Adaptive;
+use stickslip::curve::both_ways::{self, BothWays, Other};
 use stickslip::curve::peak::Point;
 use stickslip::dimension::Dimension;
 use stickslip::method::{MethodError, OrbitError};
@@ -185,7 +184,7 @@ fn compute(work: &Work<'_>) -> Computed {
             peaks.number(AMPLITUDE, found.peak.value);
             peaks.flag(AT_RANGE_END, Some(found.peak.at_end));
             if both_ways::applies(&prepared.system) {
-                peaks.flag(tables::WAY_BACK, Some(found.way_back));
+                peaks.flag(WAY_BACK, Some(found.way_back));
             }
             peaks.reduced(prepared.system.reduction_evidence());
             peaks.end();
@@ -207,9 +206,7 @@ fn compute(work: &Work<'_>) -> Computed {
     } else {
         part.tables.push(Rows::default());
     }
-    let mut way_back = Rows::default();
-    others.iter().for_each(|other| orbit_row(prepared, other.point.omega, &other.summary, &mut way_back));
-    part.tables.extend([amplified, shapes, way_back]);
+    part.tables.extend([amplified, shapes, stretch.way_back]);
     Ok(part)
 }
 
@@ -238,13 +235,22 @@ struct Computing<'a> {
     prepared: &'a Prepared,
     part: Part,
     rows: Rows,
+    /// Those of the way back.
+    way_back: Rows,
     omegas: Vec<f64>,
     stuck: usize,
 }
 
 impl<'a> Computing<'a> {
     fn new(prepared: &'a Prepared) -> Self {
-        Computing { prepared, part: Part::default(), rows: Rows::default(), omegas: Vec::new(), stuck: 0 }
+        Computing {
+            prepared,
+            part: Part::default(),
+            rows: Rows::default(),
+            way_back: Rows::default(),
+            omegas: Vec::new(),
+            stuck: 0,
+        }
     }
 
     /// Takes in a point; `None` if the run was stopped before.
@@ -260,11 +266,18 @@ impl<'a> Computing<'a> {
         orbit_row(self.prepared, omega, &summary, &mut self.rows);
     }
 
-    /// The other orbits that the curve has when it is followed the other way.
-    fn compare(&mut self, work: &Work<'_>, ways: Option<BothWays>) -> Result<Vec<Other>, MethodError> {
-        let others = ways.map_or_else(|| Ok(Vec::new()), |ways| ways.others(work))?;
-        others.iter().for_each(|other| other.note.clone().join(&mut self.part.notes));
-        Ok(others)
+    /// Takes in the other orbits that the curve has when it is followed the other way: as points among which peaks are sought.
+    fn compare(&mut self, work: &Work<'_>, ways: Option<BothWays>) -> Result<Vec<Point>, MethodError> {
+        let Some(ways) = ways else { return Ok(Vec::new()) };
+        let (prepared, sought) = (self.prepared, Sought::new(self.prepared));
+        let others = ways.others(&*prepared.method, &prepared.system, &work.context.stop)?;
+        let points = others.iter().map(|Other { orbit, ratio }| {
+            let note = Note::OtherOrbit { points: 1, from: orbit.omega, to: orbit.omega, ratios: [*ratio; 2] };
+            note.join(&mut self.part.notes);
+            orbit_row(prepared, orbit.omega, &Summary::new(prepared, Ok(orbit)), &mut self.way_back);
+            Point::new(orbit, &|orbit| sought.quantities(orbit))
+        });
+        Ok(points.collect())
     }
 }
 
@@ -277,7 +290,7 @@ fn kept(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> (Summary, 
 }
 
 /// The points among which peaks are sought, if they are, and what the way back has beside them.
-type Followed = (Vec<Point>, Vec<Other>);
+type Followed = (Vec<Point>, Vec<Point>);
 
 /// The points of the unit's frequencies.
 fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, MethodError> {
@@ -286,7 +299,7 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, Meth
     let sought = Sought::new(prepared);
     let point = |orbit: &Orbit| Point::new(orbit, &|orbit| sought.quantities(orbit));
     let mut points = Vec::new();
-    let mut ways = BothWays::of(work);
+    let mut ways = BothWays::of(&prepared.system);
     orbits::sweep(work, &mut |omega, outcome| {
         stretch.add(omega, outcome.map(|outcome| kept(prepared, outcome)));
         ways.iter_mut().zip(outcome).for_each(|(ways, outcome)| ways.add(omega, outcome));
@@ -332,7 +345,7 @@ fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) 
         stretch.add(adaptive.range.1, None);
     }
     let mut points = Vec::with_capacity(curve.len());
-    let mut ways = BothWays::of(work);
+    let mut ways = BothWays::of(&prepared.system);
     for (mut point, (kept, shape)) in curve {
         if let Some(ways) = &mut ways {
             let amplitudes = kept.0.places.iter().map(|[amplitude, ..]| *amplitude);

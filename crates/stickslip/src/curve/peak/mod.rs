@@ -153,6 +153,18 @@ fn higher(one: Peak, other: Peak) -> Peak {
     if other.value > one.value || (other.value == one.value && one.at_end) { other } else { one }
 }
 
+/// Amplitudes below this share of what the loads would do to a mass by itself are rounding: friction holds it.
+const HELD: f64 = 1e-10;
+
+/// The amplitude (m) below which a place counts as held at a frequency: a share of `F / (k + Ω²m)`, the largest there is.
+pub fn held(system: &System, omega: f64) -> f64 {
+    let (mass, stiffness) = (system.structure().mass(), system.structure().stiffness());
+    let alone = |i: usize, force: f64| force / (stiffness[(i, i)].abs() + omega * omega * mass[(i, i)]);
+    let loads = system.excitation(omega);
+    let sizes = loads.iter().flat_map(|(_, force)| force.iter().enumerate().map(|(i, f)| alone(i, f.norm())));
+    HELD * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
+}
+
 /// A peak of one of several quantities.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PeakOf {

@@ -3,7 +3,7 @@
 use super::super::shares;
 use super::drawn::{Drawn, PeakOf, force};
 use super::{amplification, tables};
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, amplitude_of};
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_of};
 use crate::dataset::{Axis, Figure, Panel, Sharing};
 use crate::drawing::{Drawing, Layout, MOST_PANELS, Stretch, join, largest, numbers, words};
 use crate::histogram;
@@ -91,7 +91,7 @@ fn heights(drawn: &Drawn<'_>) -> Vec<Panel> {
 fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<PeakOf> {
     let Some(table) = drawing.table(tables::PEAKS) else { return Vec::new() };
     let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
-    let way_back = table.flags(tables::WAY_BACK).unwrap_or_default();
+    let way_back = table.flags(WAY_BACK).unwrap_or_default();
     let masses = words(table, tables::MASS);
     // a table from elsewhere may lack columns
     if masses.len() != table.rows() {

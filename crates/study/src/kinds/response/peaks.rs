@@ -1,9 +1,9 @@
 //! The peaks of a stretch of a response curve.
 
-use super::super::peak_of::{held, named_places, worst};
-use super::both_ways::{Other, stretches};
+use super::super::peak_of::{named_places, worst};
 use crate::work::{Prepared, Work};
-use stickslip::curve::peak::{self, Peak, Point};
+use stickslip::curve::both_ways::stretches;
+use stickslip::curve::peak::{self, Peak, Point, held};
 use stickslip::method::MethodError;
 use stickslip::orbit::Orbit;
 use stickslip_numerics::leading::leading;
@@ -82,10 +82,10 @@ impl Found {
 }
 
 /// The peaks of a curve and those that only the way back has, whose orbits are `others`, by frequency.
-pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Other]) -> Result<Vec<Found>, MethodError> {
+pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Point]) -> Result<Vec<Found>, MethodError> {
     let mut of_others = Vec::new();
     for stretch in stretches(&points, others) {
-        let known = |omega: f64| others.iter().any(|other| other.point.omega == omega);
+        let known = |omega: f64| others.iter().any(|other| other.omega == omega);
         let neighbours: Vec<f64> = stretch.iter().map(|point| point.omega).filter(|omega| !known(*omega)).collect();
         let found = peaks_of(work, stretch)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
         of_others.extend(found.map(|found| Found { way_back: true, ..found }));

@@ -17,8 +17,7 @@ pub(super) const REFERENCES: &str = "references";
 pub(super) const AMPLIFICATION: &str = "amplification";
 /// One row per peak of a disk at which no place moves more, with the shape there.
 pub(super) const SHAPES: &str = "peak_shapes";
-/// One row per orbit that the curve has when it is followed from its last frequency to its first, and does not have the other way; and whether a peak
-/// is one of these.
+/// One row per orbit that the curve has when it is followed from its last frequency to its first, and does not have the other way.
 pub(super) const WAY_BACK: &str = "way_back";
 /// The peak of the tuned disk.
 pub(super) const TUNED_FREQUENCY: &str = "tuned_frequency_Hz";

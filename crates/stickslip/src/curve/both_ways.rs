@@ -1,0 +1,165 @@
+//! A curve followed in both directions, where several orbits may exist at one frequency: what its points do not show.
+
+use super::peak::{Point, held};
+use super::sweep::back;
+use crate::method::{Method, MethodError, OrbitError};
+use crate::model::System;
+use crate::orbit::Orbit;
+use std::sync::atomic::AtomicBool;
+
+/// Degrees of freedom and directions of joints beyond which the way back is left out: it takes as long as the curve.
+const LARGE: usize = 24;
+/// Orbits are others whose amplitudes differ by more than this share of the largest, and by more than so many of their estimated errors.
+const OTHER: f64 = 1e-2;
+const ERRORS: f64 = 3.0;
+/// Amplitudes below this share of a mean are its rounding.
+const ROUNDING: f64 = 1e-10;
+
+/// The points of a curve, as they were found on the way there.
+///
+/// # Example
+/// A softening spring bends the resonance towards lower frequencies; on the way there the curve steps onto the high branch late.
+/// ```
+/// use std::sync::{Arc, atomic::AtomicBool};
+/// use stickslip::curve::both_ways::BothWays;
+/// use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
+/// use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring};
+/// let on_ground = || ["m".to_owned(), GROUND.to_owned()];
+/// let system = Model {
+///     masses: vec![Mass::new("m", 1.0)],
+///     springs: vec![Spring { between: on_ground(), stiffness: 1e4, damping: 2.0 }],
+///     joints: vec![Joint { name: "j".into(), between: on_ground(), law: Arc::new(stickslip::law::Cubic { stiffness: -1e9 }) }],
+///     forces: vec![Force { on: "m".into(), amplitude: 0.3, phase: 0.0, harmonic: 1 }],
+///     ..Model::default()
+/// }
+/// .assemble()
+/// .unwrap();
+/// let method = HarmonicBalance::default();
+/// let (mut ways, mut solver, mut start) = (BothWays::of(&system).unwrap(), method.solver(&system).unwrap(), None);
+/// for i in 0..41 {
+///     let orbit = solver.orbit(88.0 + 0.4 * f64::from(i), start.as_deref()).unwrap();
+///     ways.add(orbit.omega, Ok(&orbit));
+///     start = Some(orbit.start);
+/// }
+/// let others = ways.others(&method, &system, &AtomicBool::new(false)).unwrap();
+/// assert!(others.len() > 10 && others.iter().all(|other| other.ratio > 1.5));
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct BothWays {
+    points: Vec<Point>,
+}
+
+/// An orbit of the way back at a frequency where the way there has another one.
+#[derive(Debug, Clone)]
+pub struct Other {
+    /// It.
+    pub orbit: Orbit,
+    /// Its largest amplitude over that of the other one.
+    pub ratio: f64,
+}
+
+impl BothWays {
+    /// `None` where there is one orbit at a frequency, or the system is large.
+    pub fn of(system: &System) -> Option<Self> {
+        applies(system).then(Self::default)
+    }
+
+    /// The next point.
+    pub fn add(&mut self, omega: f64, outcome: Result<&Orbit, &OrbitError>) {
+        self.add_point(outcome.map_or_else(|_| Point::failed(omega), |orbit| Point::new(orbit, &amplitudes)));
+    }
+
+    /// The next point, with the amplitudes of all places, m, or without an orbit.
+    pub fn add_point(&mut self, point: Point) {
+        self.points.push(point);
+    }
+
+    /// Follows the points back, from what is found alone at the last one: the other orbits that are found, in the order of the way there. When `stop` is
+    /// true it ends early.
+    ///
+    /// # Errors
+    /// The method cannot take the system.
+    pub fn others(&self, method: &dyn Method, system: &System, stop: &AtomicBool) -> Result<Vec<Other>, MethodError> {
+        let Some(last) = self.points.last() else { return Ok(Vec::new()) };
+        let mut solver = method.solver(system)?;
+        // what is found there alone need not be what the points before lead to
+        let start = solver.orbit(last.omega, None).ok().map(|orbit| orbit.start);
+        let mut omegas = self.points.iter().rev().map(|point| point.omega);
+        let mut others = Vec::new();
+        back(method, system, start, &mut omegas, stop, &mut |orbit| {
+            let Some(point) = self.points.iter().find(|point| point.omega == orbit.omega) else { return };
+            let held = held(system, orbit.omega);
+            // the way back asks for no errors: of an orbit that is shown they are known
+            let shown = other(point, orbit, held).and_then(|_| solver.orbit(orbit.omega, Some(&orbit.start)).ok());
+            others.extend(shown.and_then(|orbit| other(point, &orbit, held).map(|ratio| Other { orbit, ratio })));
+        })?;
+        others.reverse();
+        Ok(others)
+    }
+}
+
+/// Whether curves of a system are followed both ways.
+pub fn applies(system: &System) -> bool {
+    let directions: usize = system.joints().iter().map(|joint| joint.law().directions()).sum();
+    system.dofs() + directions <= LARGE && !system.contracts()
+}
+
+/// The stretches of the way back on which it has other orbits, the points `others`, than the way there, whose points are `there`: each with its neighbours,
+/// which both ways have.
+pub fn stretches(there: &[Point], others: &[Point]) -> Vec<Vec<Point>> {
+    let mut stretches: Vec<Vec<Point>> = Vec::new();
+    let mut others = others.iter().peekable();
+    let mut open = false;
+    for (i, point) in there.iter().enumerate() {
+        let other = others.next_if(|other| other.omega == point.omega);
+        if other.is_some() && !open {
+            stretches.push(i.checked_sub(1).map(|before| there[before].clone()).into_iter().collect());
+        }
+        if (other.is_some() || open)
+            && let Some(stretch) = stretches.last_mut()
+        {
+            stretch.push(other.unwrap_or(point).clone());
+        }
+        open = other.is_some();
+    }
+    stretches
+}
+
+fn amplitudes(orbit: &Orbit) -> Vec<f64> {
+    orbit.places.iter().map(|place| place.amplitude()).collect()
+}
+
+/// Largest amplitude of an orbit over that of a point at its frequency, if it is another one. What friction holds, or nothing drives, moves by rounding, of
+/// its mean or of `held`, m.
+fn other(point: &Point, orbit: &Orbit, held: f64) -> Option<f64> {
+    if point.values.is_empty() {
+        return None;
+    }
+    let found = amplitudes(orbit);
+    let held = orbit.places.iter().map(|place| ROUNDING * place.mean.abs()).fold(held, f64::max);
+    let largest = |values: &[f64]| values.iter().copied().fold(held.max(f64::MIN_POSITIVE), f64::max);
+    let (here, there) = (largest(&point.values), largest(&found));
+    let enough = (OTHER.max(ERRORS * point.error) * here.max(there)).max(held);
+    let differs = point.values.iter().zip(&found).any(|(a, b)| (a - b).abs() > enough);
+    differs.then(|| (there / here).clamp(f64::MIN_POSITIVE, f64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stretch_has_a_neighbour_where_there_is_one() {
+        let point = |omega: f64| Point { values: vec![omega], ..Point::failed(omega) };
+        let there: Vec<Point> = (0..8).map(|i| point(f64::from(i))).collect();
+        let of = |omegas: &[f64]| -> Vec<Vec<f64>> {
+            let others: Vec<Point> = omegas.iter().map(|omega| point(*omega)).collect();
+            let omegas = |stretch: Vec<Point>| stretch.iter().map(|point| point.omega).collect();
+            stretches(&there, &others).into_iter().map(omegas).collect()
+        };
+        assert!(of(&[]).is_empty());
+        assert_eq!(of(&[2.0, 3.0]), [[1.0, 2.0, 3.0, 4.0]]);
+        assert_eq!(of(&[0.0, 4.0, 6.0]), [vec![0.0, 1.0], vec![3.0, 4.0, 5.0], vec![5.0, 6.0, 7.0]]);
+        assert_eq!(of(&[7.0]), [[6.0, 7.0]]);
+    }
+}
