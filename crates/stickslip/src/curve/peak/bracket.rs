@@ -17,6 +17,11 @@ const SETTLED: f64 = 1e-5;
 /// Fall of a quantity beside its highest point, as a share, from which a search that has ended there has not found how high the peak is. [`CLOSEST`]
 /// leaves 1e-7 of it beside a kink, 1e-3 beside a fold, and half of it where nothing bounds the peak.
 const STEEP: f64 = 1e-2;
+/// Share of the first bracket over which a straight `1/a²` that comes to nothing says that nothing in sight bounds the curve. Its slope to a point so many
+/// times as far away as the nearest tells straight from bent: less than the first one over this.
+const REACH: f64 = 0.5;
+const FARTHER: f64 = 4.0;
+const BENT: f64 = 1.5;
 /// Two orbits closer than this share of the first bracket tell nothing but rounding.
 pub(super) const CLOSEST: f64 = 1e-7;
 /// Orbits that the peak of one quantity may take beside those that others have asked for; smooth peaks take 3 to 6, kinks up to 15.
@@ -95,6 +100,27 @@ impl Bracket {
         self.ended.get(&quantity) == Some(&(omega, true))
     }
 
+    /// Whether the curve jumps down on one side of the highest point and rises to it from the other as straight as to something without a bound. To a
+    /// fold it rises with the root of the distance, to a top in front of one ever less.
+    fn is_cut_off(&self, top: usize, quantity: usize) -> bool {
+        let here = &self.points[top];
+        let value = here.value(quantity);
+        let jumps = |point: &Point| value - point.value(quantity) > STEEP * value;
+        let straight = |side: &mut dyn Iterator<Item = &Point>| {
+            let slopes = side.map(|point| {
+                let run = (here.omega - point.omega).abs();
+                (run, (form(value) - form(point.value(quantity))) / run)
+            });
+            let slopes: Vec<(f64, f64)> = slopes.collect();
+            let Some(&(nearest, slope)) = slopes.first() else { return false };
+            let farther = slopes.iter().find(|(run, _)| *run >= FARTHER * nearest);
+            slope * REACH * self.width > -form(value) && farther.is_some_and(|(_, other)| slope < BENT * other)
+        };
+        let (left, right) = self.points.split_at(top);
+        (jumps(&right[1]) && straight(&mut left.iter().rev()))
+            || (jumps(&left[top - 1]) && straight(&mut right[1..].iter()))
+    }
+
     /// The peak of a quantity, as far as it is refined.
     pub(super) fn peak(&self, quantity: usize) -> PeakOf {
         let top = best(&self.points, quantity);
@@ -102,8 +128,12 @@ impl Bracket {
         let near = &self.points[top - 1..=top + 1];
         let unsettled = if lacks_neighbours(near, quantity) {
             Some(Unsettled::Neighbours)
+        } else if self.found(quantity) {
+            None
+        } else if is_needle(near, quantity) {
+            Some(Unsettled::Needle)
         } else {
-            (!self.found(quantity) && is_needle(near, quantity)).then_some(Unsettled::Needle)
+            self.is_cut_off(top, quantity).then_some(Unsettled::CutOff)
         };
         let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false, unsettled };
         PeakOf { quantity, peak, values: point.values.clone() }

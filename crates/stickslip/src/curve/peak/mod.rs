@@ -31,6 +31,8 @@ pub enum Unsettled {
     Neighbours,
     /// The curve still rises steeply from both sides where the search ends.
     Needle,
+    /// The curve still rises steeply where it jumps to another orbit.
+    CutOff,
 }
 
 impl std::fmt::Display for Unsettled {
@@ -43,6 +45,10 @@ impl std::fmt::Display for Unsettled {
             Unsettled::Needle => {
                 "this peak is narrower than its search resolves, and the real one is higher, or has no bound: without damping friction bounds a \
                  resonance only up to a force; add the damping that the structure has, or take a narrower range"
+            }
+            Unsettled::CutOff => {
+                "the curve still rises steeply to this peak where it jumps to another orbit, so that the real one is higher, or has no bound: follow it \
+                 with kind `branch`; without damping add what the structure has"
             }
         })
     }
@@ -288,5 +294,34 @@ mod tests {
         };
         assert!(peak(0.0).unsettled.is_some(), "{:?}", peak(0.0));
         assert_eq!(peak(0.5).unsettled, None);
+    }
+
+    /// A stop on one side bends the resonance over: without damping it grows without a bound towards `2 / (1/ω + 1/ω')` with the frequencies `ω` off and `ω'`
+    /// on the stop, 117.1573 rad/s, and is lost before; with damping it has a top in front of its fold.
+    #[test]
+    fn a_peak_that_is_lost_on_its_way_up_is_open() {
+        let peak = |damping: f64, points: usize| {
+            let mut model = Model::default();
+            model.masses.push(Mass::new("m", 1.0));
+            model.springs.push(Spring { between: ["m".to_owned(), GROUND.to_owned()], stiffness: 1e4, damping });
+            model.forces.push(Force { on: "m".to_owned(), amplitude: 2.0, phase: 0.0, harmonic: 1 });
+            let law = std::sync::Arc::new(crate::law::Gap { gap: 1e-3, stiffness: 1e4 });
+            model.joints.push(Joint { name: "j".to_owned(), between: ["m".to_owned(), GROUND.to_owned()], law });
+            let system = model.assemble().unwrap();
+            let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
+            let (mut solver, mut found) = (EventDriven.solver(&system).unwrap(), Vec::<Point>::new());
+            for i in 0..=points {
+                let start = found.last().and_then(|point| point.start.as_deref());
+                let omega = 100.0 + 30.0 * i as f64 / points as f64;
+                let orbit = solver.orbit(omega, start);
+                found.push(orbit.map_or(Point::failed(omega), |orbit| Point::new(&orbit, &amplitude)));
+            }
+            highest(&mut *solver, &found, 1, &amplitude).unwrap()
+        };
+        for points in [10, 31] {
+            let open = peak(0.0, points);
+            assert!(open.unsettled.is_some() && open.omega < 117.158, "{points}: {open:?}");
+            assert_eq!(peak(2.0, points).unsettled, None, "{points}");
+        }
     }
 }
