@@ -413,8 +413,9 @@ const SERIES_USUAL: f64 = 1.5e-5;
 const HARD: f64 = 40.0;
 const HARD_RIGID: (f64, f64) = (3.0, 80.0);
 const HARD_SMOOTH: f64 = 10.0;
-/// Friction that falls with velocity needs the most of both. Measured: 0.16 to 0.4 s for two masses and a joint.
-const HARD_FALLING: f64 = 120.0;
+/// Friction that falls with velocity needs the most of both. Measured: 0.16 to 0.4 s for two masses and a joint; 2.4 s a point where 511 harmonics are tried
+/// in vain.
+const HARD_FALLING: (f64, f64) = (120.0, 500.0);
 /// A multiplication in an elimination, s. Measured: 2.8e-10 in bands, for steps of a ring of 96 blades with 96 rigid joints and 15 harmonics, and 1e-10 in blocks.
 const ELIMINATED: f64 = 2e-10;
 /// Steps of rigid friction at the harmonics that are given and at those of the estimate: from a neighbour, and where Newton's method alone finds
@@ -575,7 +576,7 @@ impl Costing<'_> {
     /// Time of one series of harmonics, s; of as many as it needs if `None`.
     pub fn series(&self, harmonics: Option<f64>) -> f64 {
         let factor = match (self.smooth, self.is_rigid(), harmonics) {
-            (_, _, None) if self.falls => HARD_FALLING,
+            (_, _, None) if self.falls => self.pace.of(HARD_FALLING.0, HARD_FALLING.1),
             (false, false, _) => 1.0,
             (_, _, None) => HARD,
             (true, _, Some(_)) => HARD_SMOOTH,

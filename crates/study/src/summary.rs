@@ -110,7 +110,7 @@ pub struct JointSummary {
 const LOOKED_AT: usize = 9;
 /// The longest time that a study may take is told if it is longer than what it usually takes by this factor, and not soon over, s.
 const WIDE: f64 = 3.0;
-const SOON: f64 = 60.0;
+const SOON: f64 = 5.0;
 /// A run that takes longer says so at its start, s.
 const LONG_RUN: f64 = 3600.0;
 /// Degrees of freedom beyond which only the first case is looked at, so that a summary takes no longer than a second.
