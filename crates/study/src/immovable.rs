@@ -2,7 +2,8 @@
 //!
 //! In `k - m Ω²` the second term is lost in the rounding of the first where `m Ω² < ε k`, with ε = 2.2e-16: the result is the same for a mass of
 //! zero. Such a stiffness stands for "rigid", costs the exact method `√(k/m)/Ω` > 7e7 oscillations per period, and is refused. Where it is so of every
-//! mass, no stiffness stands out, and the drive is too slow.
+//! mass, no stiffness stands out, and the drive is too slow. The other way round a spring is lost beside a mass: a mode far below the drive makes terms of
+//! `Ω/ω` times the motion that cancel each other, and rounding is left.
 
 use crate::expression::displayed;
 use crate::info::Complaint;
@@ -57,8 +58,32 @@ pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
         mass.name,
         displayed(omega, Some(Dimension::FREQUENCY)),
     );
+    Some(refused(by, message))
+}
+
+/// Share of a motion that rounding may take beside a mode far below the drive.
+const LOST: f64 = 1e-6;
+
+/// The stiffest element that holds a mass and is lost beside its inertia at the drive frequency `omega`, rad/s, `ε √(m Ω²/k) >` [`LOST`]; `None` if there
+/// is none.
+pub(crate) fn too_soft(model: &Model, omega: f64) -> Option<ModelError> {
+    let lost = |held: &Held<'_>| f64::EPSILON * omega > LOST * (held.stiffness / held.mass.mass).sqrt();
+    let Held { mass, stiffness, by } = held(model).find(lost)?;
+    let message = format!(
+        "{} is so soft for {} that it does nothing to `{}` at {}: the stiffness is lost in the rounding of the inertia. Leave it out, or give the mass \
+         that moves",
+        displayed(stiffness, Some(Dimension::STIFFNESS)),
+        displayed(mass.mass, Some(Dimension::MASS)),
+        mass.name,
+        displayed(omega, Some(Dimension::FREQUENCY)),
+    );
+    Some(refused(by, message))
+}
+
+/// What is wrong with an element.
+fn refused(by: Element, message: String) -> ModelError {
     let key = if matches!(by, Element::Joint(_)) { "law" } else { "stiffness" };
-    Some(ModelError { element: by, key, message, wrong_name: None })
+    ModelError { element: by, key, message, wrong_name: None }
 }
 
 /// By how much more than rounding inertia is there at the frequency that is named instead: so slow a motion is that of rest all the same.

@@ -4,7 +4,7 @@ use crate::disk::{self, Again};
 use crate::error::{Location, Problem, Source, StudyError};
 use crate::expression::{Value, displayed};
 use crate::figure;
-use crate::immovable::{immovable, too_slow};
+use crate::immovable::{immovable, too_slow, too_soft};
 use crate::info::{Complaint, KindInfo};
 use crate::key::VERSION;
 use crate::memory;
@@ -634,7 +634,9 @@ impl Study {
             problems.push(self.complaint(complaint));
             return None;
         }
-        if let Some(error) = lowest.and_then(|omega| immovable(&model, omega)) {
+        let highest = values.frequencies("frequency").and_then(Frequencies::highest);
+        let unseen = lowest.and_then(|omega| immovable(&model, omega));
+        if let Some(error) = unseen.or_else(|| highest.and_then(|omega| too_soft(&model, omega))) {
             problems.push(self.model_problem(&error, &model));
             return None;
         }

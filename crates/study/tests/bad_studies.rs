@@ -287,6 +287,19 @@ fn masses_that_cannot_move_are_refused() {
     assert!(read_study("a.toml", &text, &[]).is_ok());
 }
 
+/// A stiffness that is lost beside inertia, `ε √(m Ω²/k) > 1e-6`: rounding took a tenth of the motion of 1e30 kg.
+#[test]
+fn springs_that_do_nothing_are_refused() {
+    let omega = 122.5 * std::f64::consts::TAU;
+    let least = 0.181_09 * (omega * f64::EPSILON / 1e-6).powi(2);
+    let with = |stiffness: f64| read_study("a.toml", &EXAMPLE.replacen("\"k\"", &format!("{stiffness:e}"), 1), &[]);
+    assert!(with(1.01 * least).is_ok());
+    let error = with(0.99 * least).unwrap_err();
+    assert_eq!((error.line(), error.key()), (Some(25), Some("stiffness")), "{error}");
+    assert!(error.message().contains("does nothing to `blade1` at 122.5 Hz"), "{error}");
+    assert!(with(0.0).is_ok());
+}
+
 /// A drive so slow that no mass has inertia is a matter of the frequency, and what is named instead is taken.
 #[test]
 fn drives_without_inertia_are_refused() {
