@@ -31,6 +31,8 @@ pub(crate) struct Aim {
     pub omega: f64,
     /// Residual relative to the state at which the orbit is closed.
     pub residual: f64,
+    /// Estimated distance to the orbit, relative to the state, above which a closed one is brought nearer by one more step.
+    pub distance: f64,
     /// +1: the return is the state; -1: its mirror image.
     pub sign: f64,
     /// Energy norm below which a state counts as rest, √J: residuals are relative to the state or to this.
@@ -270,9 +272,9 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
     let (mut iterations, mut smallest, mut returns) = (0, f64::INFINITY, RETURNS);
     let mut state = start.to_vec();
     for rescue in 0..=RESCUES {
-        let end = descended(map, &state, aim, None, &mut iterations)?;
+        let end = descended(map, &state, aim, Beyond::Shortens, &mut iterations)?;
         if end.residual <= aim.residual {
-            return Ok(end);
+            return nearer(map, end, aim);
         }
         smallest = smallest.min(end.residual);
         if rescue == RESCUES || iterations >= ITERATIONS {
@@ -291,21 +293,60 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
     Err(OrbitError::not_converged(aim.method, aim.omega, iterations, smallest))
 }
 
-/// Steps of Newton's method, shortened where they do not help, until the orbit is closed, no step leaves less of the residual, a whole one
-/// multiplies it by more than `wild`, or `iterations` have been used up: how far it came. Up to `wild` one whole step may multiply it: beyond a kink
-/// the next one mostly arrives, where shortened ones would creep up to it.
+/// A closed orbit with one more step where its estimated distance to the orbit asks for it: near a resonance residuals are a small share of that, and
+/// curves would go with the way on which they were closed.
+fn nearer(map: &mut dyn ReturnMap, closed: Closed, aim: Aim) -> Result<Closed, OrbitError> {
+    if closed.residual <= ROUNDING || aim.distance == f64::INFINITY {
+        return Ok(closed);
+    }
+    let step = newton_step(&closed.derivative, &closed.gap, aim.sign, map.weights());
+    let size = |map: &dyn ReturnMap, state: &[f64]| norm(map.weights(), state).max(aim.rest).max(f64::MIN_POSITIVE);
+    if norm(map.weights(), step.as_slice()) <= aim.distance * size(map, &closed.state) {
+        return Ok(closed);
+    }
+    let state: Vec<f64> = closed.state.iter().zip(step.iter()).map(|(z, d)| z + d).collect();
+    let mut derivative = DMatrix::identity(state.len(), state.len());
+    if let Ok(gap) = evaluate(map, &state, aim, &mut derivative) {
+        let residual = norm(map.weights(), gap.as_slice()) / size(map, &state);
+        if residual <= closed.residual {
+            return Ok(Closed { state, gap, derivative, residual, iterations: closed.iterations + 1, missing: None });
+        }
+    }
+    // the last run is that of the closed state
+    derivative.fill_with_identity();
+    let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
+    evaluate(map, &closed.state, aim, &mut derivative).map_err(broke)?;
+    Ok(closed)
+}
+
+/// What one whole step may multiply the residual by: beyond a kink the next one mostly arrives, where shortened ones would creep up to it. Where
+/// shortened steps have success the residual of the whole ones grows to less than twice.
+const WILD: f64 = 3.0;
+
+/// What is done where a whole step multiplies the residual by more than [`WILD`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Beyond {
+    /// The step is shortened.
+    Shortens,
+    /// The search ends: steps of an integration that jump over the layers of a law, so that its derivative means nothing.
+    Ends,
+}
+
+/// Steps of Newton's method, shortened where they do not help, until the orbit is closed, no step leaves less of the residual, one goes too far for
+/// `beyond`, or `iterations` have been used up: how far it came. One whole step may multiply the residual by [`WILD`].
 pub(crate) fn descended(
     map: &mut dyn ReturnMap,
     start: &[f64],
     aim: Aim,
-    wild: Option<f64>,
+    beyond: Beyond,
     iterations: &mut usize,
 ) -> Result<Closed, OrbitError> {
     let n = start.len();
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
-    let (mut state, mut allowed) = (start.to_vec(), wild);
+    let (mut state, mut bold) = (start.to_vec(), true);
     let mut derivative = DMatrix::identity(n, n);
     let mut gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
+    let mut left = None; // where the bold step began, until another has come nearer than that
     loop {
         *iterations += 1;
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
@@ -328,14 +369,18 @@ pub(crate) fn descended(
                 let mut trial_derivative = DMatrix::identity(n, n);
                 if let Ok(trial_gap) = evaluate(map, &trial, aim, &mut trial_derivative) {
                     let after = norm(map.weights(), trial_gap.as_slice());
-                    let bold = fraction == 1.0 && allowed.is_some_and(|wild| after <= wild * before);
-                    if after <= DECREASE * before || bold {
-                        allowed = allowed.filter(|_| after <= DECREASE * before);
+                    let less = after <= DECREASE * before;
+                    if less || (bold && fraction == 1.0 && after <= WILD * before) {
+                        if !less {
+                            (bold, left) = (false, Some((state, before, gap, derivative)));
+                        } else if left.as_ref().is_some_and(|(_, least, ..)| after <= *least) {
+                            left = None;
+                        }
                         (state, gap, derivative) = (trial, trial_gap, trial_derivative);
                         accepted = true;
                         break;
                     }
-                    if wild.is_some_and(|wild| after > wild * before) {
+                    if beyond == Beyond::Ends && after > WILD * before {
                         break;
                     }
                 }
@@ -343,6 +388,15 @@ pub(crate) fn descended(
             }
         }
         if !accepted {
+            // a bold step that led nowhere is taken back
+            if residual > aim.residual
+                && *iterations < ITERATIONS
+                && beyond == Beyond::Shortens
+                && let Some((from, _, its_gap, its_derivative)) = left.take()
+            {
+                (state, gap, derivative) = (from, its_gap, its_derivative);
+                continue;
+            }
             return Ok(Closed { state, gap, derivative, residual, iterations: *iterations, missing: None });
         }
     }

@@ -10,7 +10,7 @@ use super::flow::Flow;
 use super::followed::Kind;
 use super::guess::Guess;
 use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
-use super::periodic::{Aim, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm};
+use super::periodic::{Aim, Beyond, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm};
 use super::relaxed::{Closing, ElasticSlider, relaxed};
 use super::repeated::Afresh;
 use super::smooth::flow::{Lengths, SmoothFlow};
@@ -38,9 +38,6 @@ const NEAR: f64 = 1e-6;
 /// layers, and would take two thirds of the time of these.
 const LONG_STEPS: f64 = 1e-8;
 const COARSE_RESIDUAL: f64 = 1e-5;
-/// Growth of the residual by a whole step of that approach which says that its steps jump over the layers of the law, so that its derivative means
-/// nothing. Up to here it may grow once; where steps are shortened with success it grows to less than twice.
-const WILD: f64 = 3.0;
 /// Residual at which the orbit is closed on the steps of the last free run, on which the map is smooth.
 const CLOSED: f64 = 1e-11;
 /// Meshes made for one orbit: the first is as good as the first search, the second nearly always enough.
@@ -348,7 +345,7 @@ impl<'a> Shooter<'a> {
             None => self.first_state(aim.omega),
         };
         let fine = self.set_tolerance(self.long_steps());
-        let near = descended(self, &first, Aim { residual: COARSE_RESIDUAL, ..aim }, Some(WILD), iterations);
+        let near = descended(self, &first, Aim { residual: COARSE_RESIDUAL, ..aim }, Beyond::Ends, iterations);
         self.set_tolerance(fine);
         near.ok()
     }
@@ -543,7 +540,7 @@ impl Solver for Shooter<'_> {
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
         self.omega = omega;
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
-        let aim = Aim { method: self.name, omega, residual: NEAR, sign, rest };
+        let aim = Aim { method: self.name, omega, residual: NEAR, distance: f64::INFINITY, sign, rest };
         let near;
         let known = start.filter(|state| state.len() == self.weights.len());
         let start = if self.periods > 1 && known.is_none() {
