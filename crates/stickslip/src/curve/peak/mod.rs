@@ -318,7 +318,7 @@ mod tests {
             }
             highest(&mut *solver, &found, 1, &amplitude).unwrap()
         };
-        for points in [10, 31] {
+        for points in [10, 31, 310, 1000] {
             let open = peak(0.0, points);
             assert!(open.unsettled.is_some() && open.omega < 117.158, "{points}: {open:?}");
             assert_eq!(peak(2.0, points).unsettled, None, "{points}");
