@@ -57,12 +57,12 @@ impl Balance {
         let start = self.refined(top, motion);
         let (few, many) = (self.kept.up_to(top), self.kept.up_to(double));
         let coarse = equations::transfer(motion, &few, &many);
-        let shorter = self.levels.get(&top).and_then(|level| level.derivatives(&self.ports));
+        let states = self.levels.get(&top).map(|level| level.states.clone());
         self.level(double, omega)?;
         let finer = self.levels.get_mut(&double).expect("made above");
         finer.prolongs = true;
         let goal = if self.ports.iter().any(Port::marches) { Goal::Solved } else { Goal::Share(KNOWN) };
-        let better = match finer.approach_by_twice_the_samples(&self.ports, omega, &start, &coarse, shorter.as_ref()) {
+        let better = match finer.approach_by_twice_the_samples(&self.ports, omega, &start, &coarse, states.as_deref()) {
             Some(better) => better,
             None => {
                 let solved = finer.solve_to(&self.ports, omega, start, goal)?;

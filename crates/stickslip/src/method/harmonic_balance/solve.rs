@@ -23,14 +23,15 @@ const MOST_ITERATIONS: usize = 3000;
 const ROUNDED: f64 = 1e-8;
 /// Iterations without half of the least residual after which a search comes no closer.
 const PATIENCE: usize = 8;
-/// Residual with which a search by fewer samples ends: what they leave out is of this size.
-const ROUGH: f64 = 1e-4;
+/// Residual with which a search by fewer samples ends where there are 1024 in all, more by the square where there are fewer: what they leave out is of this
+/// size.
+const ROUGH: f64 = 8e-4;
 /// Residual from which on a step by sketched derivatives is to leave no more than a share; where it leaves more they are given up.
 const NEAR: f64 = 1e-3;
 const SKETCH: f64 = 0.1;
 /// Share of the residual that a step by sketched derivatives leaves where the next one goes by the same: new ones would leave no less, since what fewer
 /// samples leave out is in them too.
-const KEPT: f64 = 0.03;
+const KEPT: f64 = 0.1;
 /// Steps by fewer samples, of whose residuals one has only to come below the largest: where contacts begin to slip and to open, the way to the solution
 /// leads over larger ones, and steps that never do are short and many. Four take a third of the steps fewer at the onset of slip of 16 to 300 nodes.
 /// Source: Grippo, Lampariello, Lucidi (1986), "A nonmonotone line search technique for Newton's method".
