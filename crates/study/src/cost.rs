@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 use std::f64::consts::{LN_10, TAU};
 use stickslip::curve::sweep::BLOCK;
 use stickslip::law::SharedLaw;
-use stickslip::method::{Method, auto::Auto, event_driven, harmonic_balance};
+use stickslip::method::{Method, auto::Auto, event_driven, evidence_steps, harmonic_balance};
 use stickslip::model::System;
 
 /// What a study will hold.
@@ -490,6 +490,9 @@ const STEPS: (f64, f64) = (2500.0, 25_000.0);
 /// Such a step, s: per direction of a joint, per pair of them, and per pair of masses. Measured, little and much slip: 3 and 20 ms a period for five
 /// directions, 12 and 107 for eight that friction couples, 35 and 296 for 16 of these; as much for one joint of one mass and of eight.
 const STEP: (f64, f64, f64) = (7.5e-7, 5e-8, 4e-9);
+/// What derivatives add to such a step, s, per pair of masses. Measured: returns of 4096 steps in 6 ms for two masses and a contact of two directions, and in
+/// 37 ms for 13 coordinates and one of three.
+const JUDGED: f64 = 4e-8;
 /// Resolving and assembling a case, s.
 const PREPARING: f64 = 2e-4;
 /// Its modes, times the cube of its masses, s. Measured: 0.35 s for 500.
@@ -522,7 +525,7 @@ impl Costing<'_> {
                     None => series * self.unheld(),
                 };
                 let given = case.method.options.get("harmonics").copied();
-                whole.max(self.rigid_series(given)) + self.factored(given)
+                whole.max(self.rigid_series(given)) + self.factored(given) + self.judged()
             }
             "transient" => {
                 let digit = LN_10 / (TAU * self.least_damping());
@@ -653,6 +656,18 @@ impl Costing<'_> {
             (true, false) => PERIOD.0 * size * size * self.ringing(),
             (true, true) => PERIOD.1 * size * size * self.ringing(),
         }
+    }
+
+    /// Time in which the return of an orbit by harmonic balance is followed in equal steps, s; zero where it takes no time beside the orbit.
+    fn judged(&self) -> f64 {
+        let Some((steps, with_derivatives)) = evidence_steps(self.system()) else { return 0.0 };
+        let derivatives = if with_derivatives { JUDGED * self.masses.powi(2) } else { 0.0 };
+        steps as f64 * (self.step() + derivatives)
+    }
+
+    /// Time of an orbit between others, whose return nobody asks for, s.
+    pub fn between(&self) -> f64 {
+        self.orbit() - if self.is_series() { self.judged() } else { 0.0 }
     }
 
     /// Time of one of equal steps, s.

@@ -52,6 +52,12 @@ impl PlacedLaw {
     pub fn internal(&self) -> std::ops::Range<usize> {
         self.first_state..self.first_state + self.states
     }
+    /// Derivative of an answer with these `slopes` by `(u₀, u₀', z₀, u₁, u₁')` by the velocity along direction `e` at the end of a step of average
+    /// acceleration of length `h`.
+    pub fn by_end(&self, slopes: &[f64], e: usize, h: f64) -> f64 {
+        let after = 2 * self.directions + self.states;
+        0.5 * h * slopes[after + e] + slopes[after + self.directions + e]
+    }
     /// It answers by what is no number.
     pub fn no_number(&self, time: f64) -> Breakdown {
         Breakdown::NoNumber { time, joint: self.joint.clone(), law: self.law.name() }

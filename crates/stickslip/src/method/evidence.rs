@@ -26,6 +26,23 @@ const TOLERANCE: f64 = 1e-8;
 /// Equal steps per return for laws that know only steps: they follow the motion to about 1e-6.
 const STEPS: usize = 4096;
 
+/// Equal steps in which the return of each orbit by harmonic balance is followed, which takes longer than the orbit itself, and whether with their
+/// derivatives; none where it is not followed, or by longer steps.
+///
+/// # Example
+/// ```
+/// use stickslip::method::evidence_steps;
+/// let couple = stickslip::model::example::blade_couple().assemble().unwrap();
+/// assert_eq!(evidence_steps(&couple), None); // from event to event
+/// ```
+pub fn evidence_steps(system: &System) -> Option<(usize, bool)> {
+    if system.dofs() > LARGEST || Kind::of(system, None) != Kind::Incremental {
+        return None;
+    }
+    let judge = Judge::new(system);
+    judge.flow.as_ref().map(|_| (STEPS, !judge.proven))
+}
+
 /// The flow of a system between two returns.
 pub(crate) struct Judge {
     /// `None` if the system is too large, or if no flow takes its laws.

@@ -31,6 +31,7 @@ use crate::model::{System, SystemJoint};
 use crate::orbit::Orbit;
 pub use crate::orbit::{Breakdown, OrbitError};
 use crate::structure::MOST_IN_FULL;
+pub use evidence::evidence_steps;
 use std::collections::BTreeMap;
 use ways::Advised;
 pub use ways::Ways;

@@ -54,7 +54,7 @@ const OPTIMUM: f64 = 35.0;
 
 fn cost(costing: &Costing<'_>) -> Cost {
     let (cases, curves) = (costing.cases, costing.curves());
-    let ways = if both_ways::applies(costing.system()) { 2.0 } else { 1.0 };
+    let back = f64::from(u8::from(both_ways::applies(costing.system())));
     Cost {
         tables: vec![
             Shape { rows: cases, numbers: costing.varied + 4.0, words: 1.0 },
@@ -62,7 +62,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: cases,
         unit: costing.orbit_bytes(),
-        work: (cases + curves * OPTIMUM) * (ways * costing.frequencies + REFINING) * costing.orbit(),
+        work: (cases + curves * OPTIMUM)
+            * (costing.frequencies * costing.orbit() + (back * costing.frequencies + REFINING) * costing.between()),
     }
 }
 

@@ -130,7 +130,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
         drawn: curves * costing.frequencies,
         unit: costing.orbit_bytes(),
         work: points * costing.extra()
-            + (points + (1.0 + OTHERS) * back + REFINING * refined + tuned * costing.frequencies) * costing.orbit()
+            + (points + OTHERS * back + tuned * costing.frequencies) * costing.orbit()
+            + (back + REFINING * refined) * costing.between()
             + 2.0 * linear * costing.reference(),
     }
 }

@@ -1,5 +1,6 @@
 //! Equal steps over a stretch of time, as many as the estimated error asks for.
 
+use super::carried::Carried;
 use super::law;
 use super::step::{Eliminated, Step};
 use crate::law::{Contact, Piece};
@@ -158,7 +159,7 @@ impl Flow for IncrementalFlow {
         &mut self,
         state: &mut [f64],
         duration: f64,
-        mut sensitivity: Option<&mut DMatrix<f64>>,
+        sensitivity: Option<&mut DMatrix<f64>>,
     ) -> Result<(), Breakdown> {
         let h = duration / self.count as f64;
         if self.eliminated.as_ref().is_none_or(|eliminated| eliminated.length != h) {
@@ -166,7 +167,9 @@ impl Flow for IncrementalFlow {
         }
         let eliminated = self.eliminated.take().ok_or(Breakdown::OutOfRange { time: 0.0 })?;
         self.steps.clear();
-        self.step.start(&self.assembly, state, &self.drive, sensitivity.as_deref());
+        self.step.start(&self.assembly, state, &self.drive);
+        let mut carried =
+            sensitivity.as_deref().map(|sensitivity| Carried::new(&self.assembly, &self.step.laws, sensitivity));
         // joints that are pressed at rest set in motion what neither moves nor is loaded
         let pushed = NEAR_REST * duration * self.assembly.pushed(self.step.force.as_slice());
         let scale = self.assembly.scales(state, &self.drive).1.max(pushed);
@@ -184,12 +187,15 @@ impl Flow for IncrementalFlow {
             if state.iter().any(|z| !z.is_finite()) {
                 return Err(Breakdown::Unbounded { time, place: self.assembly.farthest(state) });
             }
-            if let Some(sensitivity) = sensitivity.as_deref_mut() {
-                self.step.carry(&self.assembly, &eliminated, sensitivity);
+            if let Some(carried) = &mut carried {
+                carried.advance(&self.assembly, &eliminated, &self.step.laws, &self.step.lu);
             }
             if self.keep {
                 self.keep_step(state, (time, h));
             }
+        }
+        if let (Some(carried), Some(sensitivity)) = (carried, sensitivity) {
+            carried.write(sensitivity);
         }
         self.eliminated = Some(eliminated);
         Ok(())

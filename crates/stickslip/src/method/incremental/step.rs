@@ -20,7 +20,10 @@ pub(super) struct Eliminated {
     from_load: DMatrix<f64>,
     from_force: DMatrix<f64>,
     /// The last along the axes, axes × axes: `-h/2 G`.
-    along_from_force: DMatrix<f64>,
+    pub along_from_force: DMatrix<f64>,
+    /// For derivatives, 2n × n and axes × n.
+    pub from_state_transposed: DMatrix<f64>,
+    pub from_force_transposed: DMatrix<f64>,
 }
 
 impl Eliminated {
@@ -34,9 +37,12 @@ impl Eliminated {
         right.view_mut((0, 0), (n, n)).copy_from(&(&assembly.stiffness * -h));
         right.view_mut((0, n), (n, n)).copy_from(&(&assembly.mass - c - k));
         let from_force = &inverse * &assembly.directions * (-0.5 * h);
+        let from_state = &inverse * right;
         Some(Eliminated {
             length: h,
-            from_state: &inverse * right,
+            from_state_transposed: from_state.transpose(),
+            from_force_transposed: from_force.transpose(),
+            from_state,
             along_from_force: assembly.directions.transpose() * &from_force,
             from_force,
             from_load: inverse * (0.5 * h),
@@ -62,12 +68,12 @@ pub(super) struct Step {
     unknown: Vec<f64>,
     free: Vec<f64>,
     loads: [Vec<f64>; 2],
+    load: DVector<f64>,
     sum: DVector<f64>,
     residual: Vec<f64>,
-    lu: Lu,
+    /// The equations at the end.
+    pub lu: Lu,
     z: Vec<f64>,
-    /// Derivatives of the forces at the start by the state at the start of the run, axes × columns.
-    pub carried: DMatrix<f64>,
 }
 
 /// Newton iterations of a step; 2 to 5 are usual, kinks take some more.
@@ -92,18 +98,17 @@ impl Step {
             unknown: vec![0.0; j],
             free: vec![0.0; j],
             loads: [vec![0.0; n], vec![0.0; n]],
+            load: DVector::zeros(n),
             sum: DVector::zeros(n),
             residual: vec![0.0; j],
             lu: Lu::default(),
             z: vec![0.0; assembly.internal],
-            carried: DMatrix::zeros(0, 0),
         }
     }
 
-    /// Begins a run: the forces of the state, and their derivatives if `derivatives`.
-    pub fn start(&mut self, assembly: &Assembly, state: &[f64], drive: &Drive, sensitivity: Option<&DMatrix<f64>>) {
-        let (n, columns) = (assembly.n, sensitivity.map_or(0, DMatrix::ncols));
-        self.carried = DMatrix::zeros(assembly.axes.len(), columns);
+    /// Begins a run: the forces of the state.
+    pub fn start(&mut self, assembly: &Assembly, state: &[f64], drive: &Drive) {
+        let n = assembly.n;
         drive.load(0.0, &mut self.loads[1]);
         for (q, joint) in assembly.joints.iter().enumerate() {
             self.to[q] = relative(assembly, q, state, drive, 0.0);
@@ -111,26 +116,7 @@ impl Step {
             let at = At { motion: self.to[q], z: &state[2 * n + internal.start..2 * n + internal.end] };
             let law = &mut self.laws[q];
             law.rest(&joint.law, at);
-            for (d, axis) in joint.axes().enumerate() {
-                self.force[axis] = law.force[d];
-                let Some(sensitivity) = sensitivity else { continue };
-                let slope = law.force_slope(d);
-                let (directions, after) = (joint.directions, 2 * joint.directions + joint.states);
-                for c in 0..columns {
-                    let column = sensitivity.column(c);
-                    let (x, rest) = column.as_slice().split_at(n);
-                    let (v, z) = rest.split_at(n);
-                    let mut value = 0.0;
-                    for (e, other) in joint.axes().enumerate() {
-                        let along = &assembly.axes[other];
-                        // a step that goes nowhere begins where it ends
-                        value += (slope[e] + slope[after + e]) * along.along(x);
-                        value += (slope[directions + e] + slope[after + directions + e]) * along.along(v);
-                    }
-                    let through = joint.internal().enumerate().map(|(s, own)| slope[2 * directions + s] * z[own]);
-                    self.carried[(axis, c)] = value + through.sum::<f64>();
-                }
-            }
+            joint.axes().zip(&law.force).for_each(|(axis, force)| self.force[axis] = *force);
         }
     }
 
@@ -150,10 +136,10 @@ impl Step {
         let [old, new] = &mut self.loads;
         std::mem::swap(old, new);
         drive.load(time + h, new);
-        let load = DVector::from_fn(n, |i, _| old[i] + new[i]);
+        self.load.iter_mut().zip(&*old).zip(&*new).for_each(|((load, old), new)| *load = old + new);
         let linear = nalgebra::DVectorView::from_slice(&state[..2 * n], 2 * n);
         self.sum.gemv(1.0, &eliminated.from_state, &linear, 0.0);
-        self.sum.gemv(1.0, &eliminated.from_load, &load, 1.0);
+        self.sum.gemv(1.0, &eliminated.from_load, &self.load, 1.0);
         self.sum.gemv(1.0, &eliminated.from_force, &self.before, 1.0);
         self.z.copy_from_slice(&state[2 * n..]);
         for (axis, along) in assembly.axes.iter().enumerate() {
@@ -238,84 +224,13 @@ impl Step {
                 for (row, gain) in gains.iter().enumerate() {
                     self.residual[row] -= gain * law.force[d];
                     for (e, other) in joint.axes().enumerate() {
-                        matrix[row * j + other] -= gain * by_unknown(law, joint.directions, joint.states, d, e, h);
+                        matrix[row * j + other] -= gain * joint.by_end(law.force_slope(d), e, h);
                     }
                 }
             }
         }
         true
     }
-
-    /// Carries the columns of `sensitivity` over the step that was made last.
-    pub fn carry(&mut self, assembly: &Assembly, eliminated: &Eliminated, sensitivity: &mut DMatrix<f64>) {
-        let (n, j, h) = (assembly.n, assembly.axes.len(), eliminated.length);
-        let columns = sensitivity.ncols();
-        if columns == 0 {
-            return; // a joint that is only moved, without states
-        }
-        let mut velocity = &eliminated.from_state * sensitivity.rows(0, 2 * n);
-        velocity.gemm(1.0, &eliminated.from_force, &self.carried, 1.0);
-        let mut w = vec![0.0; j];
-        let mut direct = vec![0.0; j];
-        for c in 0..columns {
-            let column = sensitivity.column(c);
-            let (x, rest) = column.as_slice().split_at(n);
-            let (v, z) = rest.split_at(n);
-            let along: Vec<(f64, f64)> = assembly.axes.iter().map(|axis| (axis.along(x), axis.along(v))).collect();
-            // what all but the unknown does
-            let known = |slope: &[f64], joint: &PlacedLaw| {
-                let (directions, after) = (joint.directions, 2 * joint.directions + joint.states);
-                let mut value = 0.0;
-                for (e, other) in joint.axes().enumerate() {
-                    let (u, speed) = along[other];
-                    value += slope[e] * u + slope[directions + e] * speed + slope[after + e] * (u + 0.5 * h * speed);
-                }
-                value + joint.internal().enumerate().map(|(s, own)| slope[2 * directions + s] * z[own]).sum::<f64>()
-            };
-            for (joint, law) in assembly.joints.iter().zip(&self.laws) {
-                joint.axes().enumerate().for_each(|(d, axis)| direct[axis] = known(law.force_slope(d), joint));
-            }
-            for (row, w) in w.iter_mut().enumerate() {
-                let gains = eliminated.along_from_force.row(row);
-                let free = assembly.axes[row].along(velocity.column(c).as_slice());
-                *w = free + gains.iter().zip(&direct).map(|(gain, f)| gain * f).sum::<f64>();
-            }
-            self.lu.solve(&mut w);
-            let mut states = vec![0.0; assembly.internal];
-            for (joint, law) in assembly.joints.iter().zip(&self.laws) {
-                let (directions, after) = (joint.directions, 2 * joint.directions + joint.states);
-                for (s, own) in joint.internal().enumerate() {
-                    let slope = law.state_slope(s);
-                    let moved = joint
-                        .axes()
-                        .enumerate()
-                        .map(|(e, axis)| (0.5 * h * slope[after + e] + slope[after + directions + e]) * w[axis]);
-                    states[own] = known(slope, joint) + moved.sum::<f64>();
-                }
-                for (d, axis) in joint.axes().enumerate() {
-                    let moved = joint
-                        .axes()
-                        .enumerate()
-                        .map(|(e, other)| by_unknown(law, directions, joint.states, d, e, h) * w[other]);
-                    self.carried[(axis, c)] = direct[axis] + moved.sum::<f64>();
-                }
-            }
-            sensitivity.view_mut((2 * n, c), (assembly.internal, 1)).copy_from_slice(&states);
-        }
-        velocity.gemm(1.0, &eliminated.from_force, &self.carried, 1.0);
-        let mut moved = sensitivity.rows(n, n) + &velocity;
-        moved *= 0.5 * h;
-        let mut x = sensitivity.rows_mut(0, n);
-        x += moved;
-        sensitivity.rows_mut(n, n).copy_from(&velocity);
-    }
-}
-
-/// Derivative of force `d` by the velocity of the structure along direction `e` at the end of the step.
-fn by_unknown(law: &Follower, directions: usize, states: usize, d: usize, e: usize, h: f64) -> f64 {
-    let after = 2 * directions + states;
-    let slope = law.force_slope(d);
-    0.5 * h * slope[after + e] + slope[after + directions + e]
 }
 
 /// The motion of a joint in a state.
@@ -329,6 +244,7 @@ fn relative(assembly: &Assembly, q: usize, state: &[f64], drive: &Drive, time: f
 
 #[cfg(test)]
 mod tests {
+    use super::super::carried::Carried;
     use super::super::flow::IncrementalFlow;
     use super::*;
     use crate::law::{Cubic, Jenkins2d, SharedLaw};
@@ -361,11 +277,13 @@ mod tests {
         let (eliminated, drive) = (Eliminated::new(assembly, h).unwrap(), assembly.drive(system, 1.0));
         let (mut step, mut state) = (Step::new(assembly), start.to_vec());
         let mut derivative = DMatrix::identity(start.len(), start.len());
-        step.start(assembly, &state, &drive, Some(&derivative));
+        step.start(assembly, &state, &drive);
+        let mut carried = Carried::new(assembly, &step.laws, &derivative);
         for k in 0..count {
             assert!(step.advance(assembly, &eliminated, &drive, (k as f64 * h, &mut state), 1.0));
-            step.carry(assembly, &eliminated, &mut derivative);
+            carried.advance(assembly, &eliminated, &step.laws, &step.lu);
         }
+        carried.write(&mut derivative);
         (state, derivative)
     }
 
