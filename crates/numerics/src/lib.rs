@@ -7,6 +7,7 @@ pub mod definite;
 pub mod dense;
 pub mod dual;
 pub mod eigen;
+pub mod extremes;
 pub mod fourier;
 pub mod krylov;
 pub mod leading;

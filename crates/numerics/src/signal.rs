@@ -105,7 +105,7 @@ impl Basis {
 
     /// As [`Basis::evaluate`]; `size` gets the magnitude of every exponential that decays or grows.
     #[inline]
-    fn evaluate_and(&self, time: f64, out: &mut [Complex64], mut size: impl FnMut(usize, f64)) {
+    pub(crate) fn evaluate_and(&self, time: f64, out: &mut [Complex64], mut size: impl FnMut(usize, f64)) {
         let e = self.exponents.len();
         if time == 0.0 {
             out[..e].fill(Complex64::new(1.0, 0.0));
@@ -180,9 +180,15 @@ impl Basis {
         out[c + 2] = square * factor;
     }
 
+    /// The sizes of the exponents, into `out`.
+    pub(crate) fn speeds(&self, out: &mut [f64]) {
+        let every = self.exponents.iter().chain(self.resonant.iter().map(|(s, _)| s));
+        out.iter_mut().zip(every).for_each(|(speed, s)| *speed = size_of(s));
+    }
+
     /// Bounds on the sizes of the coefficients of a derivative from those of the signal, into `out`; `speeds` are the sizes of the exponents.
     #[inline]
-    fn differentiate_sizes(&self, sizes: &[f64], speeds: &[f64], out: &mut [f64]) {
+    pub(crate) fn differentiate_sizes(&self, sizes: &[f64], speeds: &[f64], out: &mut [f64]) {
         let (e, c) = (self.exponents.len(), self.constant());
         for ((out, size), speed) in out[..c].iter_mut().zip(sizes).zip(speeds) {
             *out = size * speed;
@@ -194,7 +200,7 @@ impl Basis {
     }
 
     /// Bounds `max |B_b|` over `[0, end]`, into `out`.
-    fn magnitudes(&self, end: f64, out: &mut [f64]) {
+    pub(crate) fn magnitudes(&self, end: f64, out: &mut [f64]) {
         let e = self.exponents.len();
         for (value, s) in out[..e].iter_mut().zip(&self.exponents) {
             *value = if s.re > 0.0 { (s.re * end).exp() } else { 1.0 };
@@ -220,8 +226,7 @@ impl Basis {
         scratch.prepare(nb, count);
         let Scratch { values, magnitudes, speeds, first, second, second_weights, third_weights, clear_until, rising } =
             scratch;
-        let every = self.exponents.iter().chain(self.resonant.iter().map(|(s, _)| s));
-        speeds.iter_mut().zip(every).for_each(|(speed, s)| *speed = size_of(s));
+        self.speeds(speeds);
         for k in 0..count {
             let range = k * nb..(k + 1) * nb;
             self.differentiate(&signals[range.clone()], &mut first[range.clone()]);
@@ -472,7 +477,7 @@ fn fall(g: f64, slope: f64, curvature: f64) -> f64 {
 
 /// Bound of a signal from the sizes of its coefficients and those of the basis functions.
 #[inline]
-fn bounded_by(weights: &[f64], magnitudes: &[f64]) -> f64 {
+pub(crate) fn bounded_by(weights: &[f64], magnitudes: &[f64]) -> f64 {
     weights.iter().zip(magnitudes).map(|(w, m)| w * m).sum()
 }
 

@@ -13,7 +13,8 @@ use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetr
 use num_complex::Complex64;
 use std::cell::RefCell;
 use std::sync::Arc;
-use stickslip_numerics::signal::{Basis, Begin, FirstZero, FourierIntegrals, Products, Scratch, real_dot, size_of};
+use stickslip_numerics::extremes::{Extremes, Range};
+use stickslip_numerics::signal::{Basis, FourierIntegrals, Products, real_dot};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -219,7 +220,7 @@ struct Measuring<'a> {
     products: Vec<Products>,
     /// By frequency, rad/s: what it has turned by the start of each piece, and the integrals over it.
     fourier: RefCell<Vec<(f64, Turning)>>,
-    memory: RefCell<Memory>,
+    memory: RefCell<Extremes>,
 }
 
 type Turning = Vec<(Complex64, FourierIntegrals)>;
@@ -266,15 +267,22 @@ impl<'a> Measuring<'a> {
         self.made(|piece, out| out.copy_from_slice(&of(piece)[row * out.len()..(row + 1) * out.len()]))
     }
 
-    /// Least and largest value of a signal with this derivative.
-    fn range_of(&self, signal: &[Complex64], slope: &[Complex64]) -> Result<(f64, f64), Breakdown> {
+    /// Least and largest value of a signal.
+    fn range_of(&self, signal: &[Complex64]) -> Result<(f64, f64), Breakdown> {
         let mut memory = self.memory.borrow_mut();
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (piece, range) in self.pieces() {
-            let (least, most) = piece.extremes(&signal[range.clone()], &slope[range], &mut memory)?;
-            (low, high) = (low.min(least), high.max(most));
+        let mut range = Range::new(self.path.symmetry == Symmetry::HalfPeriod);
+        // what all pieces are known to reach is sought in none of them
+        for (piece, coefficients) in self.pieces() {
+            range.take(piece.basis().beginning(&signal[coefficients]));
         }
-        Ok((low, high))
+        for (piece, coefficients) in self.pieces() {
+            let Segment { start, length, at_end, .. } = &piece.segment;
+            piece
+                .basis()
+                .extend(&mut range, (&signal[coefficients], at_end), *length, &mut memory)
+                .map_err(|_| Breakdown::TooFast { time: *start })?;
+        }
+        Ok((range.low, range.high))
     }
 
     fn derivative(&self, signal: &[Complex64]) -> Vec<Complex64> {
@@ -337,12 +345,10 @@ impl Signals for Measuring<'_> {
         sum
     }
     fn range(&self, place: &Axis) -> Result<(f64, f64), Breakdown> {
-        let [x, v] = [self.along(place, |row| self.displacement(row)), self.along(place, |row| self.velocity(row))];
-        self.range_of(&x, &v)
+        self.range_of(&self.seen(place))
     }
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Breakdown> {
-        let signal = self.relative(axis);
-        self.range_of(&signal, &self.derivative(&signal))
+        self.range_of(&self.relative(axis))
     }
     /// The sliders' alone: springs and stops give back what they take, to the last digit.
     fn dissipation(&self, axis: usize, _force: &Vec<Complex64>) -> f64 {
@@ -379,15 +385,6 @@ impl Signals for Measuring<'_> {
     }
 }
 
-/// Memory of [`Piece::extremes`], kept between calls.
-#[derive(Debug, Default)]
-struct Memory {
-    scratch: Scratch,
-    values: Vec<Complex64>,
-    slope: Vec<Complex64>,
-    shifted: Vec<Complex64>,
-}
-
 /// Derivatives of signals that follow each other.
 fn derivative(basis: &Basis, signals: &[Complex64]) -> Vec<Complex64> {
     let mut out = vec![ZERO; signals.len()];
@@ -401,74 +398,7 @@ impl Piece {
     fn basis(&self) -> &Basis {
         self.segment.basis()
     }
-
-    /// Least and largest value of `signal`, whose derivative is `slope`, over the piece.
-    /// # Errors
-    /// [`Breakdown::TooFast`] if it turns too often.
-    fn extremes(
-        &self,
-        signal: &[Complex64],
-        slope: &[Complex64],
-        memory: &mut Memory,
-    ) -> Result<(f64, f64), Breakdown> {
-        let basis = self.basis();
-        let nb = basis.len();
-        let Memory { scratch, values, slope: turning, shifted } = memory;
-        values.resize(nb, ZERO);
-        shifted.resize(nb, ZERO);
-        basis.evaluate(0.0, values);
-        let (first, last) = (real_dot(signal, values), real_dot(signal, &self.segment.at_end));
-        let (mut low, mut high) = (first.min(last), first.max(last));
-        let mut time = 0.0;
-        let mut now = real_dot(slope, values);
-        // from turning point to turning point: shift the slope to the present time and look for its next zero
-        // what is near the rounding of the signal moves no extreme, but turns millions of times where a mode is very fast
-        let rounding = NEGLIGIBLE * signal.iter().map(size_of).sum::<f64>();
-        turning.clear();
-        turning.extend_from_slice(slope);
-        for ((slope, c), exponent) in turning.iter_mut().zip(signal).zip(&basis.exponents) {
-            if size_of(c) <= rounding && exponent.re <= 0.0 {
-                *slope = ZERO;
-            }
-        }
-        let size: f64 = turning.iter().map(size_of).sum();
-        let too_fast = Breakdown::TooFast { time: self.segment.start };
-        let mut turns = 0;
-        let mut sign = if now < 0.0 { -1.0 } else { 1.0 };
-        while size > 0.0 && time < self.segment.length {
-            basis.shift(turning, time, values, sign, shifted);
-            let begin = if now.abs() > FLAT * size { Begin::Positive } else { Begin::Zero };
-            match basis.first_zero(shifted, &[begin], self.segment.length - time, scratch) {
-                FirstZero::At { time: after, .. } => {
-                    if after == 0.0 && begin == Begin::Positive {
-                        break;
-                    }
-                    turns += 1;
-                    if turns > MOST_TURNS {
-                        return Err(too_fast);
-                    }
-                    time += after;
-                    basis.evaluate(time, values);
-                    let value = real_dot(signal, values);
-                    (low, high) = (low.min(value), high.max(value));
-                    now = 0.0;
-                    sign = -sign;
-                }
-                FirstZero::None => break,
-                FirstZero::TooManySteps => return Err(too_fast),
-            }
-        }
-        Ok((low, high))
-    }
 }
-
-/// A mode whose part of a signal is below this fraction of it is rounding: the orbit is closed to 1e-12 of its state.
-const NEGLIGIBLE: f64 = 64.0 * f64::EPSILON;
-/// A slope below this fraction of its terms is a turning point.
-const FLAT: f64 = 1e-12;
-/// Turning points of one signal between two switches beyond which a mode is too fast to be followed. A mode that rings undamped at a hundred
-/// times the drive frequency turns two hundred times in a period.
-const MOST_TURNS: usize = 5000;
 
 impl Path for ExactPath {
     fn sample(&self, time: f64) -> Sample {
