@@ -10,7 +10,7 @@ use crate::info::Complaint;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
-use stickslip::law::Law;
+use stickslip::law::{Law, Parameter};
 use stickslip::model::{Element, GROUND, Mass, Model, ModelError};
 
 /// A mass beside what is stiffest of all that holds it.
@@ -120,5 +120,8 @@ pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<Complaint> {
 
 /// Stiffness of a law while it sticks, N/m; zero of a rigid one, and of one that holds nothing.
 fn stiffness(law: &dyn Law) -> f64 {
-    law.value("stiffness").filter(|_| !law.is_free()).unwrap_or(0.0)
+    // that of a cubic spring goes with the motion
+    let is = |parameter: &Parameter| parameter.key == "stiffness" && parameter.dimension == Dimension::STIFFNESS;
+    let linear = law.info().parameters.iter().any(is);
+    law.value("stiffness").filter(|_| linear && !law.is_free()).unwrap_or(0.0)
 }

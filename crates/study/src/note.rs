@@ -270,12 +270,15 @@ impl Note {
                 let lower = (*least < 1.0).then(|| format!("down to {} of the height", significant(*least, 3)));
                 let size: Vec<String> = higher.into_iter().chain(lower).collect();
                 Some(format!(
-                    "warning: at {} between {} and {} Hz the curve has another orbit when it is followed the other way, {}: which one is met depends \
+                    "warning: at {} {} the curve has another orbit when it is followed the other way, {}: which one is met depends \
                      on how the motion began. `way_back.csv` has these orbits, and peaks that only they have are `way_back` in `peaks.csv`. Kind `branch` \
                      follows both and what joins them, with its folds.",
                     points(*count),
-                    hertz(*from),
-                    hertz(*to),
+                    if hertz(*from) == hertz(*to) {
+                        format!("at {} Hz", hertz(*from))
+                    } else {
+                        format!("between {} and {} Hz", hertz(*from), hertz(*to))
+                    },
                     size.join(" and ")
                 ))
             }

@@ -115,7 +115,7 @@ mass = "0.18 kg"
 repeat = { i = 2 }
 between = ["blade{i}", "ground"]
 stiffness = "99 N/mm + 6 N/mm * i"
-damping = "0.6 kg/s"
+damping = "0.1 kg/s"
 [[joint]]
 name = "shroud"
 between = ["blade1", "blade2"]
@@ -602,6 +602,50 @@ vary = { k3 = ["-1e9 N/m^3", "-1 N/m^3"] }"#;
     // F / (c √(k/m - c²/4m²)) of the linear one
     assert!((peaks[1] / (0.3 / (2.0 * f64::sqrt(1e4 - 1.0))) - 1.0).abs() < 1e-5, "{performance:?}");
     assert_eq!(performance.flags("way_back").unwrap(), [Some(true), Some(false)]);
+}
+
+/// Two masses with a stop, of 0.17 % damping: the high branch goes on to 63.4068 Hz, where it has 4.4258 mm (by arc length; SciPy's DOP853, swept up, has 4.32 mm at
+/// 63.0 Hz), and a coarse curve fell off it at 59 Hz without a word.
+#[test]
+fn coarse_curves_stay_on_their_branch() {
+    for frequency in ["points = 41", "points = 81", "tolerance = \"1 %\""] {
+        let text = format!(
+            r#"
+schema = 1
+[[mass]]
+name = "a0"
+mass = "0.15779 kg"
+[[spring]]
+between = ["a0", "ground"]
+stiffness = "71844 N/m"
+damping = "0.56041 kg/s"
+[[mass]]
+name = "a1"
+mass = "0.18033 kg"
+[[spring]]
+between = ["a1", "a0"]
+stiffness = "48371 N/m"
+damping = "0.56041 kg/s"
+[[joint]]
+name = "c"
+between = ["a1", "ground"]
+law = {{ kind = "gap", gap = "0.0029873 m", stiffness = "66950 N/m" }}
+[[force]]
+on = "a0"
+amplitude = "1.0 N"
+[study]
+kind = "response"
+frequency = {{ from = "36.9177 Hz", to = "98.4472 Hz", {frequency} }}
+peak_of = "all"
+"#
+        );
+        let found = dataset(&text);
+        let peaks = found.tables.iter().find(|table| table.name == "peaks").unwrap();
+        let (at, height) = (peaks.numbers("frequency_Hz").unwrap(), peaks.numbers("amplitude_m").unwrap());
+        let highest = (0..height.len()).max_by(|&a, &b| height[a].total_cmp(&height[b])).unwrap();
+        let (at, height) = (at[highest], height[highest]);
+        assert!((at - 63.4068).abs() < 5e-2 && (height / 4.4258e-3 - 1.0).abs() < 3e-3, "{frequency}: {at} {height}");
+    }
 }
 
 /// Theory 11.13: over a stop without a gap, driven at 2.6 times the natural frequency, the motion that repeats with the drive is unstable; with

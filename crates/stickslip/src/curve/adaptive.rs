@@ -3,6 +3,7 @@
 //! Every interval is halved until the orbit in its middle lies where the straight line between its ends says it does. Intervals are
 //! halved level by level, so that the points are the same on any number of threads.
 
+use super::onward;
 use super::peak::Point;
 use crate::method::{Method, MethodError, OrbitError};
 use crate::model::System;
@@ -63,7 +64,7 @@ impl Adaptive {
             let chunks: Vec<Result<Vec<Kept<R>>, MethodError>> = omegas
                 .par_chunks(chunk)
                 .map(|chunk| {
-                    let mut solver = method.solver(system)?;
+                    let mut solver = onward::solver(method, system)?;
                     let mut kept = Vec::with_capacity(chunk.len());
                     let mut last: Option<Vec<f64>> = None;
                     for (omega, start) in chunk {

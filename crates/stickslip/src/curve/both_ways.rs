@@ -91,6 +91,8 @@ impl BothWays {
             let held = held(system, orbit.omega);
             // the way back asks for no errors: of an orbit that is shown they are known
             let shown = other(point, orbit, held).and_then(|_| solver.orbit(orbit.omega, Some(&orbit.start)).ok());
+            // no motion stays on what is unstable, however it began
+            let shown = shown.filter(|orbit| orbit.is_stable() != Some(false));
             others.extend(shown.and_then(|orbit| other(point, &orbit, held).map(|ratio| Other { orbit, ratio })));
         })?;
         others.reverse();

@@ -3,6 +3,7 @@
 pub mod adaptive;
 pub mod both_ways;
 pub mod modes;
+mod onward;
 pub mod peak;
 pub mod performance;
 pub mod sweep;

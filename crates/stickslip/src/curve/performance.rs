@@ -5,6 +5,7 @@
 //! Source: Griffin (1980), Fig. 4.
 
 use super::both_ways::{BothWays, stretches};
+use super::onward;
 use super::peak::{Peak, Point, highest};
 use super::sweep::{Watch, stretch};
 use crate::method::{Method, MethodError};
@@ -102,7 +103,7 @@ impl<E: Send> Performance<'_, E> {
     /// The system cannot be built, or the method cannot take it.
     pub fn peak(&self, value: f64) -> Result<Row, PerformanceError<E>> {
         let system = (self.system)(value).map_err(|cause| PerformanceError::System { value, cause })?;
-        let mut solver = self.method.solver(&system).map_err(PerformanceError::Method)?;
+        let mut solver = onward::solver(self.method, &system).map_err(PerformanceError::Method)?;
         let last = self.points.max(3) - 1;
         let omegas: Vec<f64> =
             (0..=last).map(|i| self.range.0 + (self.range.1 - self.range.0) * i as f64 / last as f64).collect();

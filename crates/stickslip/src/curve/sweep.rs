@@ -6,6 +6,7 @@
 //! A point that its neighbour does not lead to, on either side, is sought alone. Where a curve has a fold, the points beyond it have no orbit near the last one: they are sought again from behind, from the first orbit
 //! that is found after them.
 
+use super::onward;
 use crate::method::{Method, MethodError, OrbitError, Solver};
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -54,7 +55,7 @@ pub fn sweep<R: Send>(
         .map(|block| {
             let range = block * BLOCK..((block + 1) * BLOCK).min(count);
             let mut rows = Vec::with_capacity(range.len());
-            stretch(&mut *method.solver(system)?, &mut range.clone().map(omega), watch, &mut |_, outcome| {
+            stretch(&mut *solver(method, system)?, &mut range.clone().map(omega), watch, &mut |_, outcome| {
                 let index = range.start + rows.len();
                 rows.push(outcome.map(|outcome| row(index, outcome)));
             });
@@ -71,7 +72,16 @@ pub fn sweep<R: Send>(
 /// Looks at an outcome at a frequency (rad/s); `None` if the sweep was stopped before.
 pub type See<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
 
-/// Runs `system` over some frequencies (rad/s), one after the other, each started from the one before, and those that have no orbit from
+/// A solver for [`stretch`]: where several orbits exist at a frequency, on systems that are followed both ways, it goes on along the branch of its start in
+/// smaller steps before it changes to another.
+///
+/// # Errors
+/// The method cannot take the system.
+pub fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    onward::solver(method, system)
+}
+
+/// Runs the system of `solver` over some frequencies (rad/s), one after the other, each started from the one before, and those that have no orbit from
 /// there from the one behind; `see` looks at each outcome, in order.
 pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, watch: Watch<'_>, see: &mut See<'_>) {
     let mut start: Option<Vec<f64>> = None;
@@ -120,7 +130,7 @@ pub fn back(
     stop: &AtomicBool,
     see: &mut dyn FnMut(&Orbit),
 ) -> Result<(), MethodError> {
-    let mut solver = method.solver(system)?;
+    let mut solver = solver(method, system)?;
     let mut start = start;
     for omega in omegas {
         if stop.load(Ordering::Relaxed) {

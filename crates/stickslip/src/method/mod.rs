@@ -97,6 +97,9 @@ pub trait Solver {
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.orbit(omega, start)
     }
+
+    /// Says at which frequency (rad/s) the state `start` is an orbit from which others will be sought, to whoever goes on along its branch.
+    fn begin_at(&mut self, _omega: f64, _start: &[f64]) {}
 }
 
 /// A method cannot take a system.

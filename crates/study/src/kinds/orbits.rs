@@ -4,7 +4,7 @@ use crate::note::Note;
 use crate::point::location_of;
 use crate::study::{Case, Study};
 use crate::work::{Grain, NOT_REACHED, Part, Work};
-use stickslip::curve::sweep::{See, Watch, stretch};
+use stickslip::curve::sweep::{See, Watch, solver, stretch};
 use stickslip::method::{MethodError, OrbitError};
 use stickslip::orbit::Orbit;
 
@@ -23,7 +23,7 @@ pub(super) fn sweep(work: &Work<'_>, see: &mut See<'_>) -> Result<(), MethodErro
     let prepared = work.case();
     let watch = Watch { finished: &*work.context.finished, stop: &work.context.stop };
     let mut omegas = work.points.clone().map(|index| work.omega(index));
-    stretch(&mut *prepared.method.solver(&prepared.system)?, &mut omegas, watch, see);
+    stretch(&mut *solver(&*prepared.method, &prepared.system)?, &mut omegas, watch, see);
     Ok(())
 }
 

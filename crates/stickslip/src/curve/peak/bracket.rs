@@ -61,6 +61,7 @@ impl Bracket {
             // the orbit's neighbour on the side of the new point is as good a start as any
             let start = points[best].start.as_deref();
             let error = points[best].error;
+            start.into_iter().for_each(|start| solver.begin_at(points[best].omega, start));
             let found = match solver.between(omega, start) {
                 // far from the neighbour it takes more than its help; close to it there is nothing to be gained
                 Err(_) if (omega - points[best].omega).abs() > AWAY * self.width => solver.orbit(omega, start),

@@ -5,6 +5,7 @@
 mod bracket;
 mod shrink;
 
+use super::onward;
 use crate::method::{Method, MethodError, Solver};
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -217,7 +218,7 @@ pub fn all(
     let tops: Vec<(&[Point], Vec<usize>)> = tops.collect();
     let found: Vec<Result<Vec<PeakOf>, MethodError>> = tops
         .par_iter()
-        .map(|(near, wanted)| Ok(refine(&mut *method.solver(system)?, near, wanted, quantities)))
+        .map(|(near, wanted)| Ok(refine(&mut *onward::solver(method, system)?, near, wanted, quantities)))
         .collect();
     let mut peaks = Vec::new();
     for some in found {

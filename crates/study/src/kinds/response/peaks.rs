@@ -90,10 +90,22 @@ pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Point]) -> Resu
         let found = peaks_of(work, stretch)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
         of_others.extend(found.map(|found| Found { way_back: true, ..found }));
     }
+    let omegas: Vec<f64> = points.iter().map(|point| point.omega).collect();
     let mut all = peaks_of(work, points)?;
+    let sought = Sought::new(work.case());
+    all.retain(|found| !is_edge(found, &omegas, others, &sought));
     all.extend(of_others);
     all.sort_by(|a, b| a.peak.omega.total_cmp(&b.peak.omega));
     Ok(all)
+}
+
+/// Whether a peak, between two of the frequencies, is only where the way there jumps onto a branch that the way back follows on to something higher.
+fn is_edge(found: &Found, omegas: &[f64], others: &[Point], sought: &Sought) -> bool {
+    let quantity = if sought.named.is_empty() { found.mass } else { 0 };
+    let Some(other) = others.iter().rfind(|other| other.omega < found.peak.omega) else { return false };
+    let next = omegas.iter().find(|omega| **omega > other.omega);
+    next.is_some_and(|next| found.peak.omega <= *next)
+        && other.values.get(quantity).is_some_and(|value| *value >= found.peak.value)
 }
 
 /// The peaks of a stretch of a curve, by frequency. The ends of the whole curve count as peaks at the end of the range if it falls away

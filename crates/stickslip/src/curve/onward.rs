@@ -1,0 +1,117 @@
+//! The next orbit of a curve, on the branch of the last one.
+//!
+//! Where several orbits exist at a frequency, a search that begins too far from its own branch ends on another, and a curve falls off between two of its
+//! points although its branch goes on. Where an orbit differs much from that of its start the way there is gone in smaller steps: either these arrive, or the
+//! branch ends between both.
+
+use super::both_ways::applies;
+use crate::method::{Method, MethodError, OrbitError, Solver};
+use crate::model::System;
+use crate::orbit::Orbit;
+use num_complex::Complex64;
+
+/// Amplitudes of two orbits on one branch, and their first harmonics, which have a phase, differ by no more than this share of the largest from one step to the
+/// next.
+const STRIDE: f64 = 0.2;
+/// Share of the way to the next frequency below which a step is not halved again: the branch ends there, or turns.
+const FINEST: f64 = 1.0 / 512.0;
+/// Steps to the next frequency at most.
+const MOST: usize = 160;
+
+/// A solver whose orbits follow each other along a branch, of systems that are followed both ways; of others the method's own.
+///
+/// # Errors
+/// The method cannot take the system.
+pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    let solver = method.solver(system)?;
+    Ok(if applies(system) { Box::new(Onward { solver, last: None, told: None }) } else { solver })
+}
+
+struct Onward<'a> {
+    solver: Box<dyn Solver + Send + 'a>,
+    last: Option<Last>,
+    /// What it was told of.
+    told: Option<Last>,
+}
+
+/// Where a curve has arrived.
+#[derive(Clone)]
+struct Last {
+    omega: f64,
+    start: Vec<f64>,
+    /// Amplitude (m) and first harmonic of every place.
+    places: Vec<(f64, Complex64)>,
+}
+
+impl Last {
+    fn new(orbit: &Orbit) -> Self {
+        let places = orbit.places.iter().map(|place| (place.amplitude(), place.first_harmonic)).collect();
+        Last { omega: orbit.omega, start: orbit.start.clone(), places }
+    }
+
+    /// Whether an orbit may be the next one of the branch.
+    fn leads_to(&self, orbit: &Orbit) -> bool {
+        let next = Last::new(orbit);
+        let pairs = || self.places.iter().zip(&next.places);
+        let largest = pairs().fold(0.0f64, |largest, (a, b)| largest.max(a.0).max(b.0));
+        pairs().all(|(a, b)| (a.0 - b.0).abs().max((a.1 - b.1).norm()) <= STRIDE * largest)
+    }
+}
+
+impl Onward<'_> {
+    fn solve(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
+        if between { self.solver.between(omega, start) } else { self.solver.orbit(omega, start) }
+    }
+
+    fn next(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
+        let mut found = self.solve(omega, start, between);
+        let known = [&self.last, &self.told].into_iter().flatten().find(|last| start == Some(&last.start[..]));
+        if let (Some(last), Ok(orbit)) = (known, &found)
+            && !last.leads_to(orbit)
+            && let Some(orbit) = self.followed(last.clone(), omega, between)
+        {
+            found = Ok(orbit);
+        }
+        self.last = found.as_ref().ok().map(Last::new);
+        found
+    }
+
+    /// The orbit at which smaller steps arrive; `None` if they do not.
+    fn followed(&mut self, mut last: Last, omega: f64, between: bool) -> Option<Orbit> {
+        let from = last.omega;
+        let (mut at, mut step) = (0.0, 0.5);
+        for _ in 0..MOST {
+            let share: f64 = at + step;
+            let arrives = share >= 1.0;
+            let target = if arrives { omega } else { from + share * (omega - from) };
+            let found = self.solve(target, Some(&last.start), between || !arrives).ok();
+            match found.filter(|orbit| last.leads_to(orbit)) {
+                Some(orbit) if arrives => return Some(orbit),
+                Some(orbit) => (last, at, step) = (Last::new(&orbit), share, 2.0 * step),
+                None => step *= 0.5,
+            }
+            step = step.min(1.0 - at);
+            if step < FINEST {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+impl Solver for Onward<'_> {
+    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.next(omega, start, false)
+    }
+
+    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.next(omega, start, true)
+    }
+
+    fn begin_at(&mut self, omega: f64, start: &[f64]) {
+        if [&self.last, &self.told].into_iter().flatten().all(|last| last.start != start) {
+            let orbit = self.solver.between(omega, Some(start));
+            self.told = orbit.ok().map(|orbit| Last { start: start.to_vec(), ..Last::new(&orbit) });
+        }
+    }
+}
