@@ -343,7 +343,8 @@ pub(crate) fn descended(
 ) -> Result<Closed, OrbitError> {
     let n = start.len();
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
-    let (mut state, mut bold) = (start.to_vec(), true);
+    // a motion that is integrated may take for ever from where a bold step leads, unless the search ends there
+    let (mut state, mut bold) = (start.to_vec(), beyond == Beyond::Ends || aim.distance.is_finite());
     let mut derivative = DMatrix::identity(n, n);
     let mut gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
     let mut left = None; // where the bold step began, until another has come nearer than that
