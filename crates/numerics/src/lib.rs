@@ -15,6 +15,7 @@ pub mod lu;
 pub mod maximum;
 pub mod modes;
 mod null_space;
+pub mod pairs;
 pub mod quadrature;
 pub mod radau;
 pub mod random;

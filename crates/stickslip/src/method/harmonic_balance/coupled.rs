@@ -13,12 +13,13 @@
 use super::ease::SOLVED;
 use super::linear::Linear;
 use super::ports::{MANY_DIRECTIONS, Port, Ports};
-use super::receptance::{Modal, Receptance};
+use super::receptance::{CACHED, Modal, Receptance};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::dense::{ComplexLu, Lu, multiply_in_blocks};
 use stickslip_numerics::krylov::{Gmres, Limits};
+use stickslip_numerics::pairs::Pairs;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -53,6 +54,8 @@ const PRODUCTS: usize = 320;
 const USEFUL: f64 = 0.1;
 /// Products beyond which a preconditioner that was kept is made anew.
 const STALE: usize = 25;
+/// Products more than a step took for which a preconditioner was made, beyond which it is not kept for the next.
+const WORN: usize = 4;
 /// Modes with frequencies above this multiple of the highest harmonic answer it nearly as at rest.
 const ABOVE: f64 = 3.0;
 
@@ -63,7 +66,7 @@ type Above = (f64, Arc<Vec<f64>>);
 #[derive(Debug, Clone, Default)]
 pub(super) struct Coupled {
     gmres: Gmres,
-    /// Of receptances that are matrices, by the derivatives that there are.
+    /// Of receptances that are matrices, by the derivatives of this motion or of one nearby.
     harmonics: Option<Harmonics>,
     split: Option<Split>,
     above: Option<Above>,
@@ -104,7 +107,8 @@ impl Coupled {
         let right = step.to_vec();
         let (mut fresh, mut products) = (false, 0);
         let Coupled { gmres, harmonics, split, above, force, moved, parts } = self;
-        harmonics.take_if(|_| !near.kept);
+        // where forces are unknown the lowest harmonics are coupled by which samples slip
+        harmonics.take_if(|_| !near.kept && linear.ports.has_forces());
         let found = loop {
             let Some(preconditioner) =
                 linear.preconditioner(receptance, (&mut *harmonics, &mut *split, &mut *above), &mut fresh)
@@ -119,10 +123,15 @@ impl Coupled {
                 |v| preconditioner.apply(linear, v),
             );
             products += outcome.products;
+            if let Some(known) = harmonics.as_mut().filter(|_| fresh) {
+                known.products = outcome.products;
+            }
+            harmonics.take_if(|known| outcome.products > known.products + WORN);
             if fresh || outcome.solved {
                 break outcome.solved || outcome.residual <= USEFUL;
             }
             // a stiffness of another motion
+            *harmonics = None;
             *above = split.take().map(|split| (split.bound, split.above));
             step.copy_from_slice(&right);
         };
@@ -213,13 +222,13 @@ impl Linear<'_> {
         fresh: &mut bool,
     ) -> Option<Preconditioner<'b>> {
         match receptance {
-            Receptance::Formed(matrices) => {
-                *fresh = true;
+            Receptance::Formed(formed) => {
+                *fresh = harmonics.is_none();
                 if harmonics.is_none() {
-                    let lowest = self.lowest(matrices)?;
-                    let rest = matrices.iter().enumerate().skip(lowest.count);
+                    let lowest = self.lowest(&formed.matrices)?;
+                    let rest = formed.matrices.iter().enumerate().skip(lowest.count);
                     let others = rest.map(|(k, matrix)| self.of_harmonic(k, matrix)).collect::<Option<_>>()?;
-                    *harmonics = Some(Harmonics { lowest, others });
+                    *harmonics = Some(Harmonics { lowest, others, products: 0 });
                 }
                 harmonics.as_ref().map(Preconditioner::Harmonics)
             }
@@ -259,7 +268,7 @@ impl Linear<'_> {
     }
 
     /// The equations of one harmonic with the mean tangents, factored.
-    fn of_harmonic(&self, k: usize, receptance: &DMatrix<Complex64>) -> Option<ComplexLu> {
+    fn of_harmonic(&self, k: usize, receptance: &DMatrix<Complex64>) -> Option<Answer> {
         let size = receptance.nrows();
         let moved = |q: usize| &receptance.as_slice()[q * size..][..size];
         let mut matrix = vec![ZERO; size * size];
@@ -301,7 +310,34 @@ impl Linear<'_> {
                 }
             }
         }
-        ComplexLu::new(matrix, size).ok()
+        ComplexLu::new(matrix, size).ok().map(|factor| Answer::new(factor, size))
+    }
+}
+
+/// What solves the equations of one harmonic: of matrices that stay in the cache the inverse, which is exact enough to precondition with and takes a fifth of
+/// what a solution by triangles does, which are too short for blocks.
+#[derive(Debug, Clone)]
+enum Answer {
+    Inverse(Pairs),
+    Factor(ComplexLu),
+}
+
+impl Answer {
+    fn new(factor: ComplexLu, size: usize) -> Self {
+        if size > CACHED {
+            return Answer::Factor(factor);
+        }
+        let mut inverse = vec![ZERO; size * size];
+        inverse.iter_mut().step_by(size + 1).for_each(|diagonal| *diagonal = Complex64::ONE);
+        factor.solve(&mut inverse);
+        Answer::Inverse(Pairs::new(&inverse, size))
+    }
+
+    fn apply(&self, right: &mut [Complex64], memory: &mut Vec<f64>) {
+        match self {
+            Answer::Inverse(inverse) => inverse.apply(right, memory),
+            Answer::Factor(factor) => factor.solve(right),
+        }
     }
 }
 
@@ -326,7 +362,9 @@ impl Lowest {
 #[derive(Debug, Clone)]
 struct Harmonics {
     lowest: Lowest,
-    others: Vec<ComplexLu>,
+    others: Vec<Answer>,
+    /// Products that the step took for which they were made.
+    products: usize,
 }
 
 enum Preconditioner<'a> {
@@ -344,13 +382,13 @@ impl Preconditioner<'_> {
         };
         v.iter_mut().zip(linear.units).for_each(|(v, unit)| *v *= unit);
         match self {
-            Preconditioner::Harmonics(Harmonics { lowest, others }) => {
-                let mut column = vec![ZERO; v.len() / (2 * nh)];
+            Preconditioner::Harmonics(Harmonics { lowest, others, .. }) => {
+                let (mut column, mut memory) = (vec![ZERO; v.len() / (2 * nh)], Vec::new());
                 for (k, factor) in (lowest.count..).zip(others) {
                     for (c, v) in column.iter_mut().zip(v.chunks_exact(2 * nh)) {
                         *c = Complex64::new(v[2 * k], v[2 * k + 1]);
                     }
-                    factor.solve(&mut column);
+                    factor.apply(&mut column, &mut memory);
                     for (c, v) in column.iter().zip(v.chunks_exact_mut(2 * nh)) {
                         (v[2 * k], v[2 * k + 1]) = (c.re, c.im);
                     }

@@ -26,7 +26,7 @@ use super::ease::Ease;
 use super::hold::CLEAR;
 use super::linear::Linear;
 use super::ports::{Alternation, Beginning, Member, Port, Ports, REPEATS, block, blocks};
-use super::receptance::{Modal, Receptance};
+use super::receptance::{Formed, Modal, Receptance};
 use super::rest::Rest;
 use super::sparse::Sparse;
 use crate::method::guess::Guess;
@@ -192,7 +192,7 @@ impl Level {
             spent: Work::default(),
             elsewhere: Work::default(),
             alternation,
-            receptance: Receptance::Formed(Vec::new()),
+            receptance: Receptance::Formed(Formed::default()),
             penalty: vec![0.0; ports.len()],
             holding: 0.0,
             linear: vec![ZERO; nh * axes],
@@ -346,7 +346,7 @@ impl Level {
             self.series.iter().enumerate().for_each(|(q, series)| receptance[(q, q)] += series);
             Ok(receptance)
         });
-        Ok(Receptance::Formed(formed.collect::<Result<_, f64>>()?))
+        Ok(Receptance::Formed(Formed::new(formed.collect::<Result<_, f64>>()?)))
     }
 
     /// The motion to begin with: that of the describing functions, or without friction; where contacts alone hold, static rest on them, from which
@@ -695,7 +695,7 @@ impl Level {
 
     /// The Jacobian from the tangents: rows and columns in units. False where receptances are no matrices.
     pub(super) fn assemble(&mut self, ports: &Ports, omega: f64, ease: Ease, length: f64) -> bool {
-        let Receptance::Formed(receptance) = &self.receptance else { return false };
+        let Receptance::Formed(formed) = &self.receptance else { return false };
         let linear = Linear {
             ports,
             harmonics: &self.alternation.harmonics,
@@ -707,7 +707,7 @@ impl Level {
             blocks: &self.blocks,
             units: &self.units,
         };
-        linear.matrix(receptance, linear.harmonics.len(), (&mut self.product, &mut self.jacobian));
+        linear.matrix(&formed.matrices, linear.harmonics.len(), (&mut self.product, &mut self.jacobian));
         true
     }
 

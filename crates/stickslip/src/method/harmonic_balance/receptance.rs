@@ -6,19 +6,65 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::dense::{Lu, multiply_in_blocks};
+use stickslip_numerics::pairs::Pairs;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Axes from which products in blocks are the faster ones.
 const BLOCKED: usize = 12;
+/// Axes up to which all numbers of a complex matrix stay in the cache of the processor, 260 kB.
+pub(super) const CACHED: usize = 128;
 
 /// Receptances at the harmonics of a level, m/N.
 #[derive(Debug, Clone)]
 pub(super) enum Receptance {
     /// Per harmonic, axes × axes.
-    Formed(Vec<DMatrix<Complex64>>),
+    Formed(Formed),
     /// By the modes of the structure.
     Modal(Modal),
+}
+
+/// Matrices, and the same for products where these are many and the matrices stay in the cache.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Formed {
+    pub matrices: Vec<DMatrix<Complex64>>,
+    pairs: Vec<Pairs>,
+    /// Forces of one harmonic, and numbers of its product.
+    force: Vec<Complex64>,
+    memory: Vec<f64>,
+}
+
+impl Formed {
+    pub fn new(matrices: Vec<DMatrix<Complex64>>) -> Self {
+        let few = |matrix: &&DMatrix<Complex64>| (BLOCKED..=CACHED).contains(&matrix.nrows());
+        let pairs = matrices.iter().filter(few).map(|matrix| Pairs::new(matrix.as_slice(), matrix.nrows())).collect();
+        Formed { matrices, pairs, ..Formed::default() }
+    }
+
+    fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
+        let nh = self.matrices.len();
+        let axes = moved.len() / nh;
+        self.force.resize(2 * axes, ZERO);
+        let (forces, sum) = self.force.split_at_mut(axes);
+        for (k, matrix) in self.matrices.iter().enumerate() {
+            forces.iter_mut().zip(force[k..].iter().step_by(nh)).for_each(|(own, force)| *own = *force);
+            let own = if let Some(pairs) = self.pairs.get(k) {
+                pairs.apply(forces, &mut self.memory);
+                &*forces
+            } else if axes >= BLOCKED {
+                multiply_in_blocks(matrix.as_slice(), forces, sum, (axes, axes, 1), false);
+                &*sum
+            } else {
+                // column by column, as the matrix lies in memory
+                sum.fill(ZERO);
+                for (column, f) in matrix.as_slice().chunks_exact(axes).zip(&*forces) {
+                    sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += r * f);
+                }
+                &*sum
+            };
+            moved[k..].iter_mut().step_by(nh).zip(own).for_each(|(moved, own)| *moved = *own);
+        }
+    }
 }
 
 /// Modes at the harmonics of a drive frequency.
@@ -102,25 +148,7 @@ impl Receptance {
         match self {
             // without joints
             Receptance::Formed(_) if moved.is_empty() => {}
-            Receptance::Formed(matrices) => {
-                let nh = matrices.len();
-                let axes = moved.len() / nh;
-                let mut memory = vec![ZERO; 2 * axes];
-                let (forces, sum) = memory.split_at_mut(axes);
-                for (k, matrix) in matrices.iter().enumerate() {
-                    forces.iter_mut().zip(force[k..].iter().step_by(nh)).for_each(|(own, force)| *own = *force);
-                    if axes >= BLOCKED {
-                        multiply_in_blocks(matrix.as_slice(), forces, sum, (axes, axes, 1), false);
-                    } else {
-                        // column by column, as the matrix lies in memory
-                        sum.fill(ZERO);
-                        for (column, f) in matrix.as_slice().chunks_exact(axes).zip(&*forces) {
-                            sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += r * f);
-                        }
-                    }
-                    moved[k..].iter_mut().step_by(nh).zip(&*sum).for_each(|(moved, sum)| *moved = *sum);
-                }
-            }
+            Receptance::Formed(formed) => formed.apply(force, moved),
             Receptance::Modal(modal) => modal.apply(force, moved),
         }
     }
@@ -128,7 +156,7 @@ impl Receptance {
     /// Size of the motion of the first harmonic along an axis by a force along it, if that harmonic is the mean.
     pub fn mean(&self, q: usize) -> f64 {
         match self {
-            Receptance::Formed(matrices) => matrices.first().map_or(0.0, |r| r[(q, q)].norm()),
+            Receptance::Formed(formed) => formed.matrices.first().map_or(0.0, |r| r[(q, q)].norm()),
             Receptance::Modal(modal) => modal.mean[q],
         }
     }

@@ -1,0 +1,74 @@
+//! Products of a complex matrix with one vector, in real numbers.
+//!
+//! With the columns of the matrix as pairs of real and imaginary parts, `A Re(v)` and `A Im(v)` are a real matrix times two vectors, and `A v` the one and `j` times
+//! the other. That takes half of what a product in complex numbers does, whose parts have to change places.
+
+use crate::dense::multiply_in_blocks;
+use num_complex::Complex64;
+
+/// A square complex matrix.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pairs {
+    n: usize,
+    /// Column after column, `2 n × n`.
+    parts: Vec<f64>,
+}
+
+impl Pairs {
+    /// Of a matrix column after column, `n × n`.
+    ///
+    /// # Panics
+    /// If `matrix` has other than n² entries.
+    pub fn new(matrix: &[Complex64], n: usize) -> Self {
+        assert_eq!(matrix.len(), n * n, "a square matrix");
+        Pairs { n, parts: matrix.iter().flat_map(|a| [a.re, a.im]).collect() }
+    }
+
+    /// `A v`, in the place of `v`.
+    ///
+    /// # Example
+    /// ```
+    /// use num_complex::Complex64;
+    /// use stickslip_numerics::pairs::Pairs;
+    /// let (one, j) = (Complex64::ONE, Complex64::I);
+    /// let mut v = [one, j];
+    /// Pairs::new(&[one, j, j, 2.0 * one], 2).apply(&mut v, &mut Vec::new());
+    /// assert_eq!(v, [0.0 * one, 3.0 * j]);
+    /// ```
+    ///
+    /// # Panics
+    /// If the length of `v` is not n.
+    pub fn apply(&self, v: &mut [Complex64], memory: &mut Vec<f64>) {
+        let n = self.n;
+        assert_eq!(v.len(), n, "a vector as long as the matrix");
+        memory.resize(6 * n, 0.0);
+        let (parts, products) = memory.split_at_mut(2 * n);
+        let (re, im) = parts.split_at_mut(n);
+        re.iter_mut().zip(im).zip(&*v).for_each(|((re, im), v)| (*re, *im) = (v.re, v.im));
+        multiply_in_blocks(&self.parts, parts, products, (2 * n, n, 2), false);
+        let (by_re, by_im) = products.split_at(2 * n);
+        for (v, (by_re, by_im)) in v.iter_mut().zip(by_re.chunks_exact(2).zip(by_im.chunks_exact(2))) {
+            *v = Complex64::new(by_re[0] - by_im[1], by_re[1] + by_im[0]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_those_of_complex_numbers() {
+        for n in [1, 3, 12, 48, 61] {
+            let entry = |i: usize| Complex64::new(((i * 7919 + 13) as f64).sin(), ((i * 31 + 5) as f64).cos());
+            let matrix: Vec<Complex64> = (0..n * n).map(entry).collect();
+            let v: Vec<Complex64> = (0..n).map(|i| entry(i + 1000)).collect();
+            let mut product = v.clone();
+            Pairs::new(&matrix, n).apply(&mut product, &mut Vec::new());
+            for (i, product) in product.iter().enumerate() {
+                let sum: Complex64 = (0..n).map(|k| matrix[k * n + i] * v[k]).sum();
+                assert!((product - sum).norm() < 1e-13 * n as f64, "{n}: {product} {sum}");
+            }
+        }
+    }
+}
