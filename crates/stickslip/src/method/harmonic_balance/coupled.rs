@@ -55,7 +55,7 @@ const USEFUL: f64 = 0.1;
 /// Products beyond which a preconditioner that was kept is made anew.
 const STALE: usize = 25;
 /// Products more than a step took for which a preconditioner was made, beyond which it is not kept for the next.
-const WORN: usize = 4;
+const WORN: usize = 2;
 /// Modes with frequencies above this multiple of the highest harmonic answer it nearly as at rest.
 const ABOVE: f64 = 3.0;
 

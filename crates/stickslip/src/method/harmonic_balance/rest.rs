@@ -10,6 +10,7 @@
 use super::closed;
 use super::hold::HOLD;
 use super::ports::{MANY_DIRECTIONS, Ports};
+use super::receptance::CACHED;
 use super::uncoupled::{Resonant, Uncoupled};
 use crate::model::{Cyclic, System};
 use crate::structure::{DynamicStiffness, Matrices, Sector, Structure, Wave, WaveStiffness, turn};
@@ -48,6 +49,8 @@ pub(super) struct Rest {
     factored: bool,
     /// Dynamic stiffnesses of large structures at the last drive frequency, by their rates.
     factors: RefCell<Vec<Factored>>,
+    /// Receptances at the last frequency: a longer series asks for those of a shorter one again.
+    known: RefCell<Known>,
     /// What all places do under unit forces along the axes at that frequency, by the rates: of a large structure they take less memory than its factors,
     /// and nothing is factored twice.
     moved: RefCell<Vec<Moved>>,
@@ -178,6 +181,13 @@ impl Waves {
     }
 }
 
+/// Receptances at the harmonics of a frequency, rad/s.
+#[derive(Debug, Clone, Default)]
+struct Known {
+    omega: f64,
+    receptances: BTreeMap<usize, DMatrix<Complex64>>,
+}
+
 /// Modes, and what they are at the joints.
 #[derive(Debug, Clone)]
 struct Modal {
@@ -254,6 +264,7 @@ impl Rest {
             },
             factored,
             factors: RefCell::default(),
+            known: RefCell::default(),
             moved: RefCell::default(),
             structure: system.structure().clone(),
             springs: closed::springs(ports),
@@ -293,6 +304,7 @@ impl Rest {
             uncoupled: None,
             factored: true,
             factors: RefCell::default(),
+            known: RefCell::default(),
             moved: RefCell::default(),
             structure,
             directions: self.directions.clone(),
@@ -344,6 +356,22 @@ impl Rest {
     /// # Errors
     /// A resonance without damping.
     pub fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+        if self.directions.len() > CACHED {
+            return self.receptance_anew(harmonic, omega);
+        }
+        let mut known = self.known.borrow_mut();
+        if known.omega != omega {
+            *known = Known { omega, receptances: BTreeMap::new() };
+        }
+        if let Some(receptance) = known.receptances.get(&harmonic) {
+            return Ok(receptance.clone());
+        }
+        let receptance = self.receptance_anew(harmonic, omega)?;
+        known.receptances.insert(harmonic, receptance.clone());
+        Ok(receptance)
+    }
+
+    fn receptance_anew(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
         if let Some(closed) = self.closed_at(harmonic, omega) {
             return closed.receptance(omega);
         }

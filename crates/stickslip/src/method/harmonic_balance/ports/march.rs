@@ -248,17 +248,27 @@ impl Alternation {
             let sizes = (d * m, n, wide);
             multiply_in_blocks(&memory.by_state, &memory.projection, &mut memory.of_states, sizes, true);
         }
+        // forces that see where the step ends alone have a slope at every sample
+        let one = Complex64::new(1.0, 0.0);
+        let ends = |h: &usize| march.inputs() == 2 && march.waves(*h, TAU / n as f64, one)[1] == one;
+        let by_ends = few && self.harmonics.iter().all(ends);
+        let own = if by_ends { d - Chain::of(march, &memory.rows, n).momentary() } else { d };
+        for a in own..d {
+            self.momentary_tangent(march, &memory.rows, a, tangent);
+        }
         // of few harmonics all axes at once; the derivatives of long series by one fill the memory that there is
         let together = if few { d } else { 1 };
-        for first in (0..d).step_by(together.max(1)) {
+        let moved = if own == 0 { 0 } else { d };
+        for first in (0..moved).step_by(together.max(1)) {
             let tall = together * wide;
-            self.follow(march, memory, (beginning.as_deref(), &inverse), (Input::Solution { first }, together, wide));
+            let steps = (beginning.as_deref(), &inverse);
+            self.follow(march, memory, steps, (Input::Solution { first }, together, wide, own));
             if few {
                 // [sample][axis][column] times the waves of the harmonics
-                memory.spectrum.resize(d * tall * wide, 0.0);
-                let sizes = (d * tall, n, wide);
+                memory.spectrum.resize(own * tall * wide, 0.0);
+                let sizes = (own * tall, n, wide);
                 multiply_in_blocks(&memory.columns, &memory.projection, &mut memory.spectrum, sizes, true);
-                for (to, values) in memory.spectrum.chunks_exact(d * tall).enumerate() {
+                for (to, values) in memory.spectrum.chunks_exact(own * tall).enumerate() {
                     for (a, values) in values.chunks_exact(tall).enumerate() {
                         let row = &mut tangent[(a * wide + to) * size + first * wide..][..tall];
                         row.iter_mut().zip(values).for_each(|(t, value)| *t += value);
@@ -286,7 +296,7 @@ impl Alternation {
             }
         }
         if march.knows_frequency() {
-            self.follow(march, memory, (beginning.as_deref(), &inverse), (Input::Frequency, 1, 1));
+            self.follow(march, memory, (beginning.as_deref(), &inverse), (Input::Frequency, 1, 1, d));
             memory.shift_columns(m, 1);
             memory.signal.resize(n, 0.0);
             for a in 0..d {
@@ -297,6 +307,19 @@ impl Alternation {
             }
         }
         true
+    }
+
+    /// Adds the derivative of a force by where the step ends, at every sample.
+    fn momentary_tangent(&mut self, march: &dyn March, rows: &[f64], a: usize, tangent: &mut [f64]) {
+        let (m, d, width) = (march.states(), march.axes(), width(march));
+        self.reserve_slopes(1);
+        for b in 0..d {
+            let slopes = rows.chunks_exact((m + d) * width).map(|rows| rows[(m + a) * width + d + b]);
+            self.slopes[0].iter_mut().zip(slopes).for_each(|(to, slope)| *to = slope);
+            if self.slope_spectrum(0, 0) {
+                self.add_slope(tangent, (a, b), d, |_| Complex64::new(1.0, 0.0));
+            }
+        }
     }
 
     /// What makes the harmonics of a signal, real and imaginary parts, 2 × harmonics for each sample; a mean has no imaginary part.
@@ -343,15 +366,15 @@ impl Alternation {
         *steps = fixed;
     }
 
-    /// The derivative of the sampled forces by inputs, with states at t = 0 as they were, into `memory.columns`: [sample][axis][column]; the changes of
-    /// these that repeat into `memory.shift`. The columns are the parts of the harmonics of a motion along so many axes, or the frequency. `beginning`: the
+    /// The derivative of the sampled forces by inputs, with states at t = 0 as they were, into `memory.columns`: [sample][axis][column], for so many axes as are its
+    /// `own`; the changes of these states that repeat into `memory.shift`. The columns are the parts of the harmonics of a motion along so many axes, or the frequency. `beginning`: the
     /// steps of the first period, if something is never forgotten.
     fn follow(
         &self,
         march: &dyn March,
         memory: &mut Memory,
         (beginning, inverse): (Option<&[f64]>, &DMatrix<f64>),
-        (input, count, wide): (Input, usize, usize),
+        (input, count, wide, own): (Input, usize, usize, usize),
     ) {
         let n = self.samples();
         let (m, d) = (march.states(), march.axes());
@@ -374,17 +397,18 @@ impl Alternation {
             }
         }
         // from states that do not change
-        memory.columns.resize(n * d * tall, 0.0);
+        memory.columns.resize(n * own * tall, 0.0);
         let mut s = start.clone();
         for step in 1..=n {
             let i = step % n;
             let (states, forces) = memory.rows[i * size..(i + 1) * size].split_at(m * width);
             by.advance(states, waves(i), &s, &mut next);
-            let columns = &mut memory.columns[i * d * tall..][..d * tall];
+            let columns = &mut memory.columns[i * own * tall..][..own * tall];
+            let forces = &forces[..own * width];
             let same = forces.iter().zip(states).take_while(|(a, b)| a == b).count() / width;
             // forces that are states
-            let (own, other) = columns.split_at_mut(same * tall);
-            own.copy_from_slice(&next[..same * tall]);
+            let (alike, other) = columns.split_at_mut(same * tall);
+            alike.copy_from_slice(&next[..same * tall]);
             by.advance(&forces[same * width..], waves(i), &s, other);
             std::mem::swap(&mut s, &mut next);
         }
@@ -443,6 +467,17 @@ impl<'a> Chain<'a> {
     fn of(march: &dyn March, rows: &'a [f64], samples: usize) -> Self {
         let (states, axes) = (march.states(), march.axes());
         Chain { rows, width: width(march), before: march.inputs() * axes, states, axes, samples }
+    }
+
+    /// How many of the last forces depend at no sample on where the step began, nor on states: on two inputs, displacements before and after.
+    fn momentary(&self) -> usize {
+        let size = (self.states + self.axes) * self.width;
+        let remember = |a: usize| {
+            let row = |rows: &'a [f64]| &rows[(self.states + a) * self.width..][..self.width];
+            let mut rows = self.rows[..self.samples * size].chunks_exact(size).map(row);
+            rows.any(|row| row[..self.axes].iter().chain(&row[2 * self.axes..]).any(|x| *x != 0.0))
+        };
+        (0..self.axes).rev().take_while(|a| !remember(*a)).count()
     }
 
     /// Π, the states after a period by those before it; the forces at the samples by these into `forces`, [sample][axis][state].
