@@ -22,6 +22,9 @@ const STEEP: f64 = 1e-2;
 const REACH: f64 = 0.5;
 const FARTHER: f64 = 4.0;
 const BENT: f64 = 1.5;
+/// Share of the first bracket that neighbours of the highest point have left between them where a search has come to its end at a jump: more means that it
+/// was not ended. [`CLOSEST`] on both sides, doubled by the last step.
+const OPEN: f64 = 4.0 * CLOSEST;
 /// Two orbits closer than this share of the first bracket tell nothing but rounding.
 pub(super) const CLOSEST: f64 = 1e-7;
 /// Orbits that the peak of one quantity may take beside those that others have asked for; smooth peaks take 3 to 6, kinks up to 15.
@@ -101,8 +104,9 @@ impl Bracket {
         self.ended.get(&quantity) == Some(&(omega, true))
     }
 
-    /// Whether the curve jumps down on one side of the highest point and rises to it from the other as straight as to something without a bound. To a
-    /// fold it rises with the root of the distance, to a top in front of one ever less.
+    /// Whether the curve jumps down on one side of the highest point and rises to it from the other as straight as to something without a bound, or has come
+    /// to an end of the bracket, which is where a sweep found another orbit and not where this one ends. To a fold it rises with the root of the distance,
+    /// to a top in front of one ever less.
     fn is_cut_off(&self, top: usize, quantity: usize) -> bool {
         let here = &self.points[top];
         let value = here.value(quantity);
@@ -117,9 +121,17 @@ impl Bracket {
             let farther = slopes.iter().find(|(run, _)| *run >= FARTHER * nearest);
             slope * REACH * self.width > -form(value) && farther.is_some_and(|(_, other)| slope < BENT * other)
         };
+        let at_end = |end: &Point| (here.omega - end.omega).abs() <= OPEN * self.width && jumps(end);
         let (left, right) = self.points.split_at(top);
         (jumps(&right[1]) && straight(&mut left.iter().rev()))
             || (jumps(&left[top - 1]) && straight(&mut right[1..].iter()))
+            || [self.points.first(), self.points.last()].into_iter().flatten().any(at_end)
+    }
+
+    /// Whether the search has ended while there was more to be had between the neighbours of the highest point.
+    fn is_open(&self, top: usize, quantity: usize) -> bool {
+        let near = &self.points[top - 1..=top + 1];
+        near[2].omega - near[0].omega > OPEN * self.width && parabola(near, 1, quantity).0 > SETTLED
     }
 
     /// The peak of a quantity, as far as it is refined.
@@ -133,8 +145,10 @@ impl Bracket {
             None
         } else if is_needle(near, quantity) {
             Some(Unsettled::Needle)
+        } else if self.is_cut_off(top, quantity) {
+            Some(Unsettled::CutOff)
         } else {
-            self.is_cut_off(top, quantity).then_some(Unsettled::CutOff)
+            self.is_open(top, quantity).then_some(Unsettled::Open)
         };
         let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false, unsettled };
         PeakOf { quantity, peak, values: point.values.clone() }

@@ -34,6 +34,8 @@ pub enum Unsettled {
     Needle,
     /// The curve still rises steeply where it jumps to another orbit.
     CutOff,
+    /// The search has taken all orbits that it may, and its neighbours promise more.
+    Open,
 }
 
 impl std::fmt::Display for Unsettled {
@@ -50,6 +52,10 @@ impl std::fmt::Display for Unsettled {
             Unsettled::CutOff => {
                 "the curve still rises steeply to this peak where it jumps to another orbit, so that the real one is higher, or has no bound: follow it \
                  with kind `branch`; without damping add what the structure has"
+            }
+            Unsettled::Open => {
+                "the search for this peak has taken all orbits that it may, and the real one is higher; take a finer range, or follow the curve with kind \
+                 `branch`"
             }
         })
     }

@@ -14,6 +14,10 @@ const ROUNDING: f64 = 1e-10;
 /// than a resonance falls between two points of any curve that can be drawn.
 const LEVEL: f64 = 1e-8;
 
+/// Two peaks between the same frequencies of both ways that differ by less than this share are one: searches on a level top end where their first points
+/// lead them.
+const SAME: f64 = 1e-2;
+
 /// What is read off an orbit where peaks are sought.
 pub(super) struct Sought {
     /// The places of which the worst counts; none if each does.
@@ -56,6 +60,11 @@ impl Sought {
         if self.named.is_empty() { self.places } else { 1 + self.named.len() }
     }
 
+    /// The quantity of which something is a peak.
+    fn quantity(&self, found: &Found) -> usize {
+        if self.named.is_empty() { found.mass } else { 0 }
+    }
+
     /// The mass that has the peak of a quantity.
     fn mass(&self, quantity: usize, values: &[f64]) -> usize {
         let amplitudes = &values[..self.amplitudes_count()];
@@ -90,18 +99,43 @@ pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Point]) -> Resu
         let found = peaks_of(work, stretch)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
         of_others.extend(found.map(|found| Found { way_back: true, ..found }));
     }
+    let sought = Sought::new(work.case());
+    of_others.retain(|found| !is_of_the_way_there(found, &points, others, &sought));
     let omegas: Vec<f64> = points.iter().map(|point| point.omega).collect();
     let mut all = peaks_of(work, points)?;
-    let sought = Sought::new(work.case());
     all.retain(|found| !is_edge(found, &omegas, others, &sought));
-    all.extend(of_others);
+    for found in of_others {
+        match all.iter_mut().find(|other| is_same(other, &found, &omegas)) {
+            Some(same) if found.peak.value > same.peak.value => *same = Found { way_back: false, ..found },
+            Some(_) => {}
+            None => all.push(found),
+        }
+    }
     all.sort_by(|a, b| a.peak.omega.total_cmp(&b.peak.omega));
     Ok(all)
 }
 
+/// Whether two peaks, of the way there and of the way back, are one.
+fn is_same(there: &Found, back: &Found, omegas: &[f64]) -> bool {
+    let below = |peak: &Peak| omegas.partition_point(|omega| *omega <= peak.omega);
+    let (a, b) = (&there.peak, &back.peak);
+    !there.way_back && there.mass == back.mass && below(a) == below(b) && (a.value - b.value).abs() <= SAME * a.value
+}
+
+/// Whether a peak of the way back is only where it jumps to the orbits of the way there: nearer to these at the closest frequency than to its own, and no
+/// higher.
+fn is_of_the_way_there(found: &Found, points: &[Point], others: &[Point], sought: &Sought) -> bool {
+    let distance = |point: &&Point| (point.omega - found.peak.omega).abs();
+    let Some(own) = others.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return false };
+    let there = points.iter().find(|point| point.omega == own.omega);
+    let value = |point: &Point| point.values.get(sought.quantity(found)).copied();
+    let (Some(there), Some(own)) = (there.and_then(value), value(own)) else { return false };
+    there >= found.peak.value && there - found.peak.value < (own - found.peak.value).abs()
+}
+
 /// Whether a peak, between two of the frequencies, is only where the way there jumps onto a branch that the way back follows on to something higher.
 fn is_edge(found: &Found, omegas: &[f64], others: &[Point], sought: &Sought) -> bool {
-    let quantity = if sought.named.is_empty() { found.mass } else { 0 };
+    let quantity = sought.quantity(found);
     let Some(other) = others.iter().rfind(|other| other.omega < found.peak.omega) else { return false };
     let next = omegas.iter().find(|omega| **omega > other.omega);
     next.is_some_and(|next| found.peak.omega <= *next)
