@@ -5,7 +5,7 @@ use crate::expression::Value;
 use crate::key::MOST_MASSES;
 use crate::near::{nearest, shown};
 use crate::sector::{sector_of, whole};
-use crate::stated::{StatedDisk, Structure, problem_of};
+use crate::stated::{ModelStatement, StatedDisk, problem_of};
 use crate::statement::{Environment, Stated, StatedTable};
 use crate::values::{Given, Values};
 use std::borrow::Cow;
@@ -33,7 +33,7 @@ pub(crate) type Again<'a> = &'a dyn Fn(&[(usize, f64)]) -> Result<Vec<Value>, Pr
 
 /// The ring.
 pub(crate) fn ring_of(
-    structure: &Structure,
+    structure: &ModelStatement,
     disk: &StatedDisk,
     environment: &Environment<'_>,
     again: Again<'_>,
@@ -83,7 +83,7 @@ pub(crate) fn ring_of(
 }
 
 /// Ties a sector by its matrices to the next.
-fn tied(structure: &Structure, disk: &StatedDisk, sectors: usize, sector: &mut Model) -> Result<(), Problem> {
+fn tied(structure: &ModelStatement, disk: &StatedDisk, sectors: usize, sector: &mut Model) -> Result<(), Problem> {
     let table = &disk.table;
     let problem = |key: &'static str, message: String| Problem::new(table.location_of(key, None), key, message);
     if structure.matrices.is_none() {
@@ -213,7 +213,7 @@ fn mistuning<'a>(disk: &'a StatedDisk, values: &'a Values) -> Option<(&'a Stated
 
 /// The sectors, each with its deviation.
 fn mistuned(
-    structure: &Structure,
+    structure: &ModelStatement,
     disk: &StatedDisk,
     environment: &Environment<'_>,
     again: Again<'_>,

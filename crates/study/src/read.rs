@@ -23,7 +23,7 @@ use crate::document::{self, Content, Node, Table};
 use crate::error::{Location, Problem, Source, StudyError};
 use crate::near::nearest;
 use crate::schema::{self, FILE, MOST_BYTES};
-use crate::stated::Structure;
+use crate::stated::ModelStatement;
 use crate::statement::Stated;
 use crate::study::Study;
 use crate::values::Given;
@@ -250,7 +250,7 @@ impl Reader {
     }
 
     /// A model that the file states itself.
-    fn own_model(&mut self, root: &Table, file: &str) -> Option<Structure> {
+    fn own_model(&mut self, root: &Table, file: &str) -> Option<ModelStatement> {
         let lists = self.lists(root)?;
         let matrices = match root.get("structure").map(|entry| &entry.node) {
             Some(Node { value: Content::Table(table), .. }) => Some(self.matrices(table, file)?),
@@ -260,6 +260,6 @@ impl Reader {
             }
             None => None,
         };
-        Some(Structure { lists, template: None, matrices })
+        Some(ModelStatement { lists, template: None, matrices })
     }
 }

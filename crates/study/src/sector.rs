@@ -1,7 +1,7 @@
 //! What the lists state: the model, or one sector of a disk and how its forces go around.
 
 use crate::error::Problem;
-use crate::stated::{Lists, Structure};
+use crate::stated::{Lists, ModelStatement};
 use crate::statement::{Environment, Stated, StatedTable};
 use crate::substructure;
 use crate::values::Values;
@@ -16,11 +16,11 @@ fn own(lists: &Lists) -> impl Iterator<Item = &StatedTable> {
 
 /// What the lists state, and how its forces and imposed motions go around a disk.
 pub(crate) fn sector_of(
-    structure: &Structure,
+    structure: &ModelStatement,
     environment: &Environment<'_>,
     problems: &mut Vec<Problem>,
 ) -> (Model, Vec<Around>, Vec<Around>) {
-    let Structure { lists, template, matrices } = structure;
+    let ModelStatement { lists, template, matrices } = structure;
     let (mut forces, mut motions, mut wrong) = (Vec::new(), Vec::new(), Vec::new());
     let mut model = Model::default();
     let component = matrices.as_ref().and_then(|matrices| matrices.component.as_ref());

@@ -13,7 +13,7 @@ use stickslip_numerics::sparse::Matrix;
 
 /// How the model is stated: in lists, of this file or of a template's.
 #[derive(Debug, Clone)]
-pub(crate) struct Structure {
+pub(crate) struct ModelStatement {
     pub lists: Lists,
     pub template: Option<NamedTemplate>,
     pub matrices: Option<Matrices>,
@@ -138,7 +138,7 @@ impl StatedDisk {
 }
 
 /// What is wrong with a model, at the location in the file that states it; `model` has the names that there are.
-pub(crate) fn problem_of(structure: &Structure, error: &ModelError, model: &Model) -> Problem {
+pub(crate) fn problem_of(structure: &ModelStatement, error: &ModelError, model: &Model) -> Problem {
     let (list, index) = error.element.entry();
     let whole = Location::default();
     let (location, message) = match &structure.template {

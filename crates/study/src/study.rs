@@ -11,7 +11,7 @@ use crate::memory;
 use crate::near::{nearest, one_of, shown};
 use crate::sample::{Drawn, Sample};
 use crate::sector::{none_around, sector_of};
-use crate::stated::{Matrices, Structure, problem_of};
+use crate::stated::{Matrices, ModelStatement, problem_of};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
 use crate::stiffened::Exports;
 use crate::substructure;
@@ -40,7 +40,7 @@ pub struct Study {
     pub(crate) varied: Vec<Varied>,
     pub(crate) sample: Option<Sample>,
     pub(crate) replaced: Vec<Replaced>,
-    pub(crate) structure: Structure,
+    pub(crate) structure: ModelStatement,
     pub(crate) study: StatedTable,
     pub(crate) method: StatedTable,
     pub(crate) figure: StatedTable,
@@ -742,7 +742,7 @@ pub(crate) fn evaluate(
 
 /// The model: what the lists state, or the ring of which they state a sector. `again` tells the parameters with some of them changed.
 pub(crate) fn model_of(
-    structure: &Structure,
+    structure: &ModelStatement,
     environment: &Environment<'_>,
     again: Again<'_>,
     problems: &mut Vec<Problem>,

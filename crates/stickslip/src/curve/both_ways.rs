@@ -1,5 +1,6 @@
 //! A curve followed in both directions, where several orbits may exist at one frequency: what its points do not show.
 
+pub use super::onward::is_followed;
 use super::peak::{Point, held};
 use super::sweep::back;
 use crate::method::{Method, MethodError, OrbitError};
@@ -7,8 +8,6 @@ use crate::model::System;
 use crate::orbit::Orbit;
 use std::sync::atomic::AtomicBool;
 
-/// Degrees of freedom and directions of joints beyond which the way back is left out: it takes as long as the curve.
-const LARGE: usize = 24;
 /// Orbits are others whose amplitudes differ by more than this share of the largest, and by more than so many of their estimated errors.
 const OTHER: f64 = 1e-2;
 const ERRORS: f64 = 3.0;
@@ -61,7 +60,7 @@ pub struct Other {
 impl BothWays {
     /// `None` where there is one orbit at a frequency, or the system is large.
     pub fn of(system: &System) -> Option<Self> {
-        applies(system).then(Self::default)
+        is_followed(system).then(Self::default)
     }
 
     /// The next point.
@@ -98,12 +97,6 @@ impl BothWays {
         others.reverse();
         Ok(others)
     }
-}
-
-/// Whether curves of a system are followed both ways.
-pub fn applies(system: &System) -> bool {
-    let directions: usize = system.joints().iter().map(|joint| joint.law().directions()).sum();
-    system.dofs() + directions <= LARGE && !system.contracts()
 }
 
 /// The stretches of the way back on which it has other orbits, the points `others`, than the way there, whose points are `there`: each with its neighbours,

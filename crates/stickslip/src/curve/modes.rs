@@ -18,7 +18,7 @@ pub use follow::{Lost, Reason, Turn};
 use crate::method::MethodError;
 use crate::method::harmonic_balance::{ModeEquations, ModeState};
 use crate::model::System;
-use follow::Path;
+use follow::ModeCurve;
 use num_complex::Complex64;
 use stickslip_numerics::leading::leading;
 
@@ -124,7 +124,7 @@ fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEq
 pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
     let (low, high) = request.range;
-    let path = Path::follow(&mut equations, request.mode, request.range);
+    let path = ModeCurve::follow(&mut equations, request.mode, request.range);
     let last = request.points.max(2) - 1;
     let largest = path.largest(&mut equations, (low, high));
     let mut mode = Mode {
@@ -168,7 +168,7 @@ pub fn unit(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
 /// As [`mode()`].
 pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoint>, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
-    let path = Path::follow(&mut equations, request.mode, request.range);
+    let path = ModeCurve::follow(&mut equations, request.mode, request.range);
     let mut orbits = Vec::new();
     for pair in path.within(&mut equations, request.range).windows(2) {
         let [(i, above, upper), (k, below, lower)] = pair else { continue };
@@ -381,7 +381,7 @@ mod tests {
         let mut equations = ModeEquations::new(&system, 31, 1024).unwrap();
         let mut slipping = 0;
         for index in [0, 1] {
-            let path = Path::follow(&mut equations, index, (1e-4, 2e-2));
+            let path = ModeCurve::follow(&mut equations, index, (1e-4, 2e-2));
             for amplitude in [2e-2, 8e-3, 1e-3, 3.5e-4] {
                 let state = path.at(&mut equations, amplitude).unwrap();
                 let n = system.dofs();

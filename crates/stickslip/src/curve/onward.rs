@@ -4,7 +4,6 @@
 //! points although its branch goes on. Where an orbit differs much from that of its start the way there is gone in smaller steps: either these arrive, or the
 //! branch ends between both.
 
-use super::both_ways::applies;
 use crate::method::{Method, MethodError, OrbitError, Solver};
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -17,6 +16,14 @@ const STRIDE: f64 = 0.2;
 const FINEST: f64 = 1.0 / 512.0;
 /// Steps to the next frequency at most.
 const MOST: usize = 160;
+/// Degrees of freedom and directions of joints beyond which branches are not followed, nor the way back: it takes as long as the curve.
+const LARGE: usize = 24;
+
+/// Whether curves of a system are followed along their branch, and both ways: several orbits may exist at a frequency, and it is small.
+pub fn is_followed(system: &System) -> bool {
+    let directions: usize = system.joints().iter().map(|joint| joint.law().directions()).sum();
+    system.dofs() + directions <= LARGE && !system.contracts()
+}
 
 /// A solver whose orbits follow each other along a branch, of systems that are followed both ways; of others the method's own.
 ///
@@ -24,7 +31,7 @@ const MOST: usize = 160;
 /// The method cannot take the system.
 pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = method.solver(system)?;
-    Ok(if applies(system) { Box::new(Onward { solver, last: None, told: None }) } else { solver })
+    Ok(if is_followed(system) { Box::new(Onward { solver, last: None, told: None }) } else { solver })
 }
 
 struct Onward<'a> {

@@ -3,6 +3,7 @@
 //! `|f| <= limit` in stick, `f = limit u'/|u'|` in slip: the friction disk, the same in all directions.
 //! Source: Coulomb (1785); as a set-valued law Moreau (1988).
 
+use super::plane::radial;
 use super::{Coulomb, Coulomb2dArctan, Law, LawInfo, Parameter, Prox, SharedLaw};
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -69,20 +70,6 @@ impl Prox for Coulomb2d {
         let size = y[0].hypot(y[1]);
         let inside = size <= self.limit;
         radial(y, size, if inside { (size, 1.0) } else { (self.limit, 0.0) }, force, slope);
-    }
-}
-
-/// A force along `y` whose size and derivative by the size of y are given, and its derivative by y.
-pub(super) fn radial(y: &[f64], size: f64, (value, rise): (f64, f64), force: &mut [f64], slope: &mut [f64]) {
-    // across y the direction turns
-    let across = if size > 0.0 { value / size } else { rise };
-    for i in 0..2 {
-        force[i] = across * y[i];
-        for j in 0..2 {
-            let unit = if i == j { 1.0 } else { 0.0 };
-            let along = if size > 0.0 { y[i] / size * (y[j] / size) } else { 0.0 };
-            slope[2 * i + j] = across * unit + (rise - across) * along;
-        }
     }
 }
 

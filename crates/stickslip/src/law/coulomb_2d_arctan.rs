@@ -3,8 +3,8 @@
 //! `f = limit (2/π) arctan(alpha |u'|) u'/|u'|`; along one direction it is the law `coulomb-arctan`.
 //! Source: Pust, Pesek, Radolfova (2015), Eq. (2), turned around the axis.
 
-use super::coulomb_2d::radial;
 use super::plane::dot;
+use super::plane::radial;
 use super::{CoulombArctan, Law, LawInfo, Parameter, Prox, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use num_complex::Complex64;

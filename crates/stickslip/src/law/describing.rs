@@ -55,7 +55,7 @@ pub(super) fn stiffness(
 }
 
 /// Closed forms.
-fn of_piece(piece: &Piece, amplitude: f64) -> Complex64 {
+pub(super) fn of_piece(piece: &Piece, amplitude: f64) -> Complex64 {
     match *piece {
         Piece::Slider(Slider { limit: 0.0, .. }) => ZERO,
         Piece::Slider(Slider { stiffness: None, limit, .. }) => Complex64::new(0.0, 4.0 * limit / (PI * amplitude)),

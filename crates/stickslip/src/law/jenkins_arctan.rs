@@ -4,7 +4,8 @@
 //! `f' = kt (u' - tan(π f / (2 limit)) / alpha)`, `|f| < limit`.
 //! Source: Pust, Pesek, Radolfova (2015), Sec. 3, the equation of Fig. 3.
 
-use super::{CoulombArctan, Jenkins, Law, LawInfo, Mean, Parameter, Prox, Rate, RateLaw, Relative};
+use super::describing;
+use super::{CoulombArctan, Law, LawInfo, Mean, Parameter, Piece, Prox, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
@@ -72,9 +73,9 @@ impl Law for JenkinsArctan {
     fn is_incrementally_passive(&self) -> bool {
         true // the spring keeps δf²/(2 kt), and the slider's velocity grows with the force
     }
-    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+    fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
         // a search begins at the exact law; the smooth one is near it wherever it is used
-        Jenkins { stiffness: self.stiffness, limit: self.limit }.linearised(amplitude, omega)
+        describing::of_piece(&Piece::slider(Some(self.stiffness), self.limit), amplitude)
     }
 }
 

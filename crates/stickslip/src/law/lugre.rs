@@ -8,7 +8,7 @@
 //! `|v| (g q² + s1 |v| (1 - q)) + s2 v²` with `q = s0 z sgn(v) / g`, and that bracket is never negative then.
 
 use super::kink::size;
-use super::stribeck::falling;
+use super::stribeck_curve::falling;
 use super::{Contact, Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative, STATIC_LIMIT};
 use crate::dimension::Dimension;
 use std::sync::Arc;
@@ -99,7 +99,7 @@ impl Law for LuGre {
         Contact::by_limit(self.steady(velocity[0]), velocity, &[force[0] - self.viscous * velocity[0]])
     }
     fn consistent(&self) -> Result<(), String> {
-        super::stribeck::limits_fit(self.limit, self.static_limit)?;
+        super::stribeck_curve::limits_fit(self.limit, self.static_limit)?;
         if self.limit == 0.0 && self.static_limit > 0.0 {
             return Err(
                 "`limit` must be more than zero where `static_limit` is, or bristles would break at high velocity"

@@ -47,6 +47,7 @@ mod springs;
 mod step;
 mod stribeck;
 mod stribeck_arctan;
+mod stribeck_curve;
 mod valanis;
 
 pub use bouc_wen::BoucWen;

@@ -243,6 +243,20 @@ fn inverse_mean_with_slope(from: f64, to: f64) -> (f64, f64) {
     (mean, slope)
 }
 
+/// A force along `y` whose size and derivative by the size of y are given, and its derivative by y.
+pub(super) fn radial(y: &[f64], size: f64, (value, rise): (f64, f64), force: &mut [f64], slope: &mut [f64]) {
+    // across y the direction turns
+    let across = if size > 0.0 { value / size } else { rise };
+    for i in 0..2 {
+        force[i] = across * y[i];
+        for j in 0..2 {
+            let unit = if i == j { 1.0 } else { 0.0 };
+            let along = if size > 0.0 { y[i] / size * (y[j] / size) } else { 0.0 };
+            slope[2 * i + j] = across * unit + (rise - across) * along;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,6 +5,7 @@
 //! Source: Stribeck (1902); in this form Bo and Pavelescu, "The friction-speed relation and its influence on the critical velocity of
 //! stick-slip motion" (1982).
 
+use super::stribeck_curve::limits_fit;
 use super::{
     Contact, CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, Range, STATIC_LIMIT, SharedLaw, Slider,
     StribeckArctan,
@@ -12,7 +13,6 @@ use super::{
 use crate::dimension::Dimension;
 use std::f64::consts::E;
 use std::sync::Arc;
-use stickslip_numerics::dual::Real;
 
 /// The row of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
@@ -58,20 +58,6 @@ pub struct Stribeck {
     pub static_limit: f64,
     /// Velocity `vs` over which friction falls, m/s.
     pub velocity: f64,
-}
-
-/// `Fc + (Fs - Fc) exp(-(v/vs)²)`, N.
-pub(super) fn falling<S: Real>(v: S, limit: f64, static_limit: f64, velocity: f64) -> S {
-    let share = v / velocity;
-    (-(share * share)).exp() * (static_limit - limit) + limit
-}
-
-/// Whether the static limit is not below the dynamic one.
-pub(super) fn limits_fit(limit: f64, static_limit: f64) -> Result<(), String> {
-    if static_limit >= limit {
-        return Ok(());
-    }
-    Err(format!("`static_limit` must not be below `limit`, found {static_limit} N and {limit} N"))
 }
 
 impl Stribeck {
@@ -198,7 +184,7 @@ mod tests {
             let y = -4.0 + 0.04 * f64::from(k);
             let (force, slope) = resolve(y);
             let velocity = (y - force) / penalty;
-            let friction: f64 = falling(velocity, 2.0, 2.5, 0.01);
+            let friction: f64 = super::super::stribeck_curve::falling(velocity, 2.0, 2.5, 0.01);
             if velocity == 0.0 {
                 assert!(force.abs() <= 2.5);
             } else {

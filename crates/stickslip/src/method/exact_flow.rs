@@ -2,7 +2,7 @@
 
 use super::Breakdown;
 use super::drive::Drive;
-use super::event_driven::{ExactPath, Flow as Segments, Mechanics, weights};
+use super::event_driven::{ExactPath, Mechanics, SegmentedMotion, weights};
 use super::flow::Flow;
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
@@ -11,12 +11,12 @@ use std::sync::Arc;
 
 /// Follows systems of ideal sliders by events.
 pub(crate) struct ExactFlow {
-    segments: Segments,
+    segments: SegmentedMotion,
 }
 
 impl ExactFlow {
     pub fn new(mechanics: Mechanics) -> Self {
-        ExactFlow { segments: Segments::new(mechanics, Drive::default()) }
+        ExactFlow { segments: SegmentedMotion::new(mechanics, Drive::default()) }
     }
 }
 

@@ -9,13 +9,14 @@ pub mod reduction;
 mod sector;
 mod uncoupled;
 
-pub use component::{BetweenComponent, Component, ReducedComponent, Reduction, ReductionKind, SectorComponent};
+pub use component::{BetweenComponent, Component, ReducedComponent, SectorComponent};
 pub(crate) use component::{Form as ReducedForm, KeptSector, SectorBlade};
 pub use cyclic::{Axis, BladeError, Boundary, BoundaryError};
 pub(crate) use cyclic::{CyclicSector, RingEntry, RingRow};
 pub use dynamic::DynamicStiffness;
 pub use faces::{Faces, FacesError, Node};
 pub use modal::DampedModes;
+pub use reduction::{Reduction, ReductionKind};
 pub(crate) use sector::turn;
 pub use sector::{Sector, Wave, WaveStiffness};
 pub(crate) use uncoupled::UncoupledModes;

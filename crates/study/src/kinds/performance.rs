@@ -54,7 +54,7 @@ const OPTIMUM: f64 = 35.0;
 
 fn cost(costing: &Costing<'_>) -> Cost {
     let (cases, curves) = (costing.cases, costing.curves());
-    let back = f64::from(u8::from(both_ways::applies(costing.system())));
+    let back = f64::from(u8::from(both_ways::is_followed(costing.system())));
     Cost {
         tables: vec![
             Shape { rows: cases, numbers: costing.varied + 4.0, words: 1.0 },
@@ -107,7 +107,7 @@ fn compute(work: &Work<'_>) -> Computed {
         rows.number(DRIVE, row.peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
         rows.number(AMPLITUDE, row.peak.map_or(f64::NAN, |peak| peak.value));
         rows.flag(AT_RANGE_END, row.peak.map(|peak| peak.at_end));
-        if both_ways::applies(&prepared.system) {
+        if both_ways::is_followed(&prepared.system) {
             rows.flag(WAY_BACK, row.peak.map(|_| row.way_back));
         }
         rows.integer(tables::FAILED, row.failed as u64);

@@ -116,7 +116,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         Some(_) => peaks,
         None => 0.0,
     };
-    let back = if both_ways::applies(costing.system()) { points } else { 0.0 };
+    let back = if both_ways::is_followed(costing.system()) { points } else { 0.0 };
     let curves = costing.cases.min(MOST_CURVES as f64) * costing.places.min(MOST_PANELS as f64 + SINGLE as f64);
     Cost {
         tables: vec![
@@ -184,7 +184,7 @@ fn compute(work: &Work<'_>) -> Computed {
             peaks.number(DRIVE, hertz(found.peak.omega));
             peaks.number(AMPLITUDE, found.peak.value);
             peaks.flag(AT_RANGE_END, Some(found.peak.at_end));
-            if both_ways::applies(&prepared.system) {
+            if both_ways::is_followed(&prepared.system) {
                 peaks.flag(WAY_BACK, Some(found.way_back));
             }
             peaks.reduced(prepared.system.reduction_evidence());

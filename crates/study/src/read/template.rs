@@ -6,7 +6,7 @@ use crate::error::{Problem, Source, StudyError};
 use crate::expression::Value;
 use crate::near::nearest;
 use crate::schema::{FILE, Takes};
-use crate::stated::{Lists, NamedTemplate, Structure};
+use crate::stated::{Lists, ModelStatement, NamedTemplate};
 use crate::statement::Environment;
 use crate::study::{Parameter, evaluate, model_of};
 use crate::templates::{self, Template, comment_behind};
@@ -55,7 +55,7 @@ impl Reader {
         mut lists: Lists,
         table: &Table,
         source: usize,
-    ) -> Option<Structure> {
+    ) -> Option<ModelStatement> {
         for key in FILE.iter().filter(|key| matches!(key.takes, Takes::List(_)) || key.name == "structure") {
             if let Some(entry) = root.get(key.name) {
                 let message =
@@ -92,7 +92,7 @@ impl Reader {
                 entry.clone_from(law);
             }
         }
-        Some(Structure { lists, template: Some(NamedTemplate { table, source }), matrices: None })
+        Some(ModelStatement { lists, template: Some(NamedTemplate { table, source }), matrices: None })
     }
 }
 
@@ -102,7 +102,7 @@ struct CompiledTemplate {
     /// Each has the dimension of its default, if that has any.
     parameters: Vec<Parameter>,
     order: Vec<usize>,
-    structure: Structure,
+    structure: ModelStatement,
     sources: Vec<Arc<Source>>,
 }
 
@@ -136,7 +136,7 @@ fn compile_template(row: &Template) -> Result<CompiledTemplate, StudyError> {
     let order = stated.as_ref().and_then(|stated| reader.order(&stated.parameters, &[]));
     match (stated, order) {
         (Some(TemplateFile { parameters, lists, .. }), Some(order)) if reader.problems.is_empty() => {
-            let structure = Structure { lists, template: None, matrices: None };
+            let structure = ModelStatement { lists, template: None, matrices: None };
             Ok(CompiledTemplate { names: reader.names, parameters, order, structure, sources: reader.sources })
         }
         _ => Err(reader.error(row.name)),

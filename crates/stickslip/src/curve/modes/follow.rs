@@ -97,7 +97,7 @@ const TREMOR: f64 = 1e-3;
 const LOCATED: f64 = 1e-3;
 
 /// A mode's curve, followed from its large end.
-pub(super) struct Path {
+pub(super) struct ModeCurve {
     linear: Option<LinearMode>,
     arcs: Vec<ModeArc>,
     /// Whether all motions below the last followed one are its multiples: the joints stick.
@@ -105,13 +105,13 @@ pub(super) struct Path {
     pub(super) lost: Option<Lost>,
 }
 
-impl Path {
+impl ModeCurve {
     /// Follows mode `index` until it is below the modal amplitude `low`; where forces grow with amplitude, up to `high` as well.
     pub(super) fn follow(equations: &mut ModeEquations<'_>, index: usize, (low, high): (f64, f64)) -> Self {
         let modes = equations.linear_modes();
         let none = |linear| {
             let lost = Lost { at: f64::INFINITY, reason: Reason::NoBeginning };
-            Path { linear, arcs: Vec::new(), sticks: false, lost: Some(lost) }
+            ModeCurve { linear, arcs: Vec::new(), sticks: false, lost: Some(lost) }
         };
         let Some(linear) = modes.get(index).cloned() else { return none(None) };
         let faint = equations.faint(&modes, index, FAINT, APART);
@@ -134,7 +134,7 @@ impl Path {
         let mut arcs = if equations.is_unbounded() { risen(equations, &start, high) } else { Vec::new() };
         arcs.push(start);
         let (mut lowest, mut since, mut creeping) = (arcs.len() - 1, 0, 0);
-        let mut path = Path { linear: Some(linear), arcs, sticks: false, lost: None };
+        let mut path = ModeCurve { linear: Some(linear), arcs, sticks: false, lost: None };
         let mut length = FIRST;
         for _ in 0..MOST_STEPS {
             let now = &path.arcs[path.arcs.len() - 1];

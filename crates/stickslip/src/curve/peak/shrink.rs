@@ -177,8 +177,8 @@ mod tests {
     #[test]
     fn a_jump_ends_within_the_bound() {
         let (omega, _, count) = check(&|w| if w < 1.05 { 1.0 + w } else { 0.1 }, [0.9, 1.0, 1.2]);
-        // the points below the jump lie on a slope that a parabola creeps up: it ends close to the edge
-        assert!((omega - 1.05).abs() < 1e-6 * 0.3, "{omega} {count}");
+        // the points below the jump lie on a slope that a parabola creeps up, and every third step halves: it ends close to the edge
+        assert!((omega - 1.05).abs() < 2e-5 * 0.3, "{omega} {count}");
         assert!(count <= ORBITS, "{count}");
     }
 }

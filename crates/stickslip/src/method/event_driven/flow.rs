@@ -59,7 +59,7 @@ impl Segment {
 }
 
 /// Runs the motion; keeps patterns, memory and the last run's segments.
-pub(crate) struct Flow {
+pub(crate) struct SegmentedMotion {
     pub mechanics: Mechanics,
     pub drive: Drive,
     /// Square root of an energy that the loads can give, √J.
@@ -94,11 +94,11 @@ pub(crate) struct Flow {
 /// What springs before sliders can hold counts up to this multiple of what the loads can give: structures that slip at all have it below 10.
 const PRELOADED: f64 = 10.0;
 
-impl Flow {
+impl SegmentedMotion {
     pub fn new(mechanics: Mechanics, drive: Drive) -> Self {
         let (work, decision) = (Work::new(&mechanics, drive.rates.len()), Decision::new(&mechanics));
         let states = mechanics.states();
-        Flow {
+        SegmentedMotion {
             mechanics,
             drive,
             energy_scale: 0.0,
@@ -549,7 +549,7 @@ mod tests {
     use std::sync::Arc;
 
     /// Two masses with a law each to the ground and one between them, driven by the first and third harmonic.
-    fn flow(laws: [SharedLaw; 3]) -> Flow {
+    fn flow(laws: [SharedLaw; 3]) -> SegmentedMotion {
         let between = [["a", GROUND], ["b", GROUND], ["a", "b"]].map(|pair| pair.map(str::to_owned));
         let joints = between.iter().zip(laws).enumerate();
         let model = Model {
@@ -569,7 +569,7 @@ mod tests {
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
         let drive = Drive::new(&system, &mechanics.owners(), 0.7);
-        let mut flow = Flow::new(mechanics, Drive::default());
+        let mut flow = SegmentedMotion::new(mechanics, Drive::default());
         flow.set_drive(drive);
         flow
     }

@@ -19,7 +19,7 @@ mod path;
 mod pattern;
 mod work;
 
-pub(crate) use flow::Flow;
+pub(crate) use flow::SegmentedMotion;
 use mechanics::Kind;
 pub(crate) use mechanics::{Mechanics, takes};
 pub(crate) use path::ExactPath;
@@ -129,7 +129,7 @@ pub(crate) struct Exact<'a> {
     /// The method that it works for.
     name: &'static str,
     search: Search,
-    flow: Flow,
+    flow: SegmentedMotion,
     weights: Vec<f64>,
     duration: f64,
     /// Periods of the drive after which the motion repeats.
@@ -187,7 +187,7 @@ impl<'a> Exact<'a> {
     pub fn new(system: &'a System, name: &'static str, search: Search, periods: usize) -> Result<Self, MethodError> {
         let mechanics = Mechanics::new(system, name)?;
         let weights = vec![1.0; mechanics.states()];
-        let flow = Flow::new(mechanics, Drive::default());
+        let flow = SegmentedMotion::new(mechanics, Drive::default());
         Ok(Exact {
             system,
             shared: Arc::new(system.clone()),

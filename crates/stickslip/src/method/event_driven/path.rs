@@ -1,7 +1,7 @@
 //! The orbit's numbers from its closed-form segments.
 
 use super::NAME;
-use super::flow::{Flow, Segment};
+use super::flow::{Segment, SegmentedMotion};
 use super::mechanics::{Part, Share};
 use crate::law::Contact;
 use crate::method::Breakdown;
@@ -47,7 +47,7 @@ struct Piece {
 pub(super) fn orbit(
     system: &Arc<System>,
     contracts: bool,
-    flow: &Flow,
+    flow: &SegmentedMotion,
     (omega, periods): (f64, usize),
     symmetry: Symmetry,
     (closed, weights): (Closed, &[f64]),
@@ -90,7 +90,7 @@ pub(super) fn orbit(
 
 impl ExactPath {
     /// The segments of the flow's last run; `period` is the time after which they repeat (or, by symmetry, repeat mirrored twice).
-    pub fn new(system: Arc<System>, flow: &Flow, symmetry: Symmetry, period: f64) -> Self {
+    pub fn new(system: Arc<System>, flow: &SegmentedMotion, symmetry: Symmetry, period: f64) -> Self {
         let pieces = flow
             .segments()
             .iter()

@@ -13,7 +13,8 @@
 use super::ease::SOLVED;
 use super::linear::Linear;
 use super::ports::{MANY_DIRECTIONS, Port, Ports};
-use super::receptance::{CACHED, Modal, Receptance};
+use super::receptance::{Modal, Receptance};
+use super::rest::CACHED;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;

@@ -1,6 +1,6 @@
 //! What forces along the axes do to the motions along them: matrices, or where these would be too large their product alone.
 
-use super::rest::Closed;
+use super::rest::{CACHED, Closed};
 use super::uncoupled::{Resonant, Uncoupled};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -12,8 +12,6 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Axes from which products in blocks are the faster ones.
 const BLOCKED: usize = 12;
-/// Axes up to which all numbers of a complex matrix stay in the cache of the processor, 260 kB.
-pub(super) const CACHED: usize = 128;
 
 /// Receptances at the harmonics of a level, m/N.
 #[derive(Debug, Clone)]

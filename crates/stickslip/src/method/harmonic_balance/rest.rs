@@ -10,7 +10,6 @@
 use super::closed;
 use super::hold::HOLD;
 use super::ports::{MANY_DIRECTIONS, Ports};
-use super::receptance::CACHED;
 use super::uncoupled::{Resonant, Uncoupled};
 use crate::model::{Cyclic, System};
 use crate::structure::{DynamicStiffness, Matrices, Sector, Structure, Wave, WaveStiffness, turn};
@@ -24,6 +23,8 @@ use stickslip_numerics::modes::Modes;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
+/// Axes up to which all numbers of a complex matrix stay in the cache of the processor, 260 kB.
+pub(super) const CACHED: usize = 128;
 /// Share of the largest static receptance below which springs hold a direction, if any is held by [`HOLD`] alone.
 const HELD: f64 = 1e-5;
 

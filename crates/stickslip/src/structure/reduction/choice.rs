@@ -1,7 +1,6 @@
 //! The smallest reduction of a given error.
 
-use super::{Deviation, Free, Reduced, ReductionError, Reference, Whole};
-use crate::structure::ReductionKind;
+use super::{Deviation, Free, Reduced, ReductionError, ReductionKind, Reference, Whole};
 use std::ops::RangeInclusive;
 use stickslip_numerics::sparse::{ModesError, NaturalModes};
 

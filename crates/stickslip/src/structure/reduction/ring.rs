@@ -10,10 +10,13 @@
 //! Source: Yang and Griffin (2001), "A reduced-order model of mistuning using a subset of nominal system modes", J. Eng. Gas Turbines Power 123,
 //! 893-900.
 
-use super::{Damping, Deviation, Free, Reduced, ReductionError, Reference, Row, Whole, damping, residual};
+use super::{
+    Damping, Deviation, Free, Reduced, Reduction, ReductionError, ReductionKind, Reference, Row, Whole, damping,
+    residual,
+};
 use crate::structure::cyclic::{Blade, symmetrised};
 use crate::structure::sector::{in_wave, is_real};
-use crate::structure::{CyclicSector, Reduction, ReductionKind, RingEntry, turn};
+use crate::structure::{CyclicSector, RingEntry, turn};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::eigen;

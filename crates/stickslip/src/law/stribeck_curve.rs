@@ -1,0 +1,19 @@
+//! Stribeck's curve, friction that falls with the velocity, as laws share it.
+//!
+//! Source: Stribeck (1902); in this form Bo and Pavelescu (1982).
+
+use stickslip_numerics::dual::Real;
+
+/// `Fc + (Fs - Fc) exp(-(v/vs)²)`, N.
+pub(super) fn falling<S: Real>(v: S, limit: f64, static_limit: f64, velocity: f64) -> S {
+    let share = v / velocity;
+    (-(share * share)).exp() * (static_limit - limit) + limit
+}
+
+/// Whether the static limit is not below the dynamic one.
+pub(super) fn limits_fit(limit: f64, static_limit: f64) -> Result<(), String> {
+    if static_limit >= limit {
+        return Ok(());
+    }
+    Err(format!("`static_limit` must not be below `limit`, found {static_limit} N and {limit} N"))
+}
