@@ -91,15 +91,13 @@ impl StructureSummary {
             return lines;
         };
         lines.extend(before.map(|before| ("reduced", before)));
-        let mut own: Vec<String> = reduced.frequencies.iter().map(|omega| hertz(*omega)).collect();
-        if own.is_empty() {
-            own.push("none".to_owned());
-        }
+        let own: Vec<String> = reduced.frequencies.iter().map(|omega| hertz(*omega)).collect();
+        let own = if own.is_empty() { "none computed".to_owned() } else { format!("{} Hz", own.join(", ")) };
         let free = match reduced.free {
             None | Some(0) => String::new(),
             Some(free) => format!(", {free} free motion{}", plural(free)),
         };
-        lines.push(("frequencies", format!("{} Hz{free}", own.join(", "))));
+        lines.push(("frequencies", own + &free));
         let ReducedSummary { coordinates, kind, error, up_to, .. } = reduced;
         lines.push(("reduced", format!("{coordinates} coordinates ({kind}), {}", within(*error, *up_to))));
         lines
