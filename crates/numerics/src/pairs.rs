@@ -24,6 +24,11 @@ impl Pairs {
         Pairs { n, parts: matrix.iter().flat_map(|a| [a.re, a.im]).collect() }
     }
 
+    /// Memory of its numbers, bytes.
+    pub fn bytes(&self) -> usize {
+        size_of::<f64>() * self.parts.len()
+    }
+
     /// `A v`, in the place of `v`.
     ///
     /// # Example

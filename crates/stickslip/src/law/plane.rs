@@ -19,6 +19,24 @@ fn beyond<S: Real>(a: [S; 2], s: S, b: [S; 2]) -> [S; 2] {
     [a[0] + b[0] * s, a[1] + b[1] * s]
 }
 
+/// Distance of the squared force from the squared limit, relative, up to which it is the limit: the rounding of the step before.
+const ROUNDED: f64 = 1e-14;
+
+/// The direction of a force that slipped in the step before and goes on, `b` being its growth along the way and `c` its distance from the limit, see [`step`].
+/// It is scaled to one by the limit, so that nothing but the direction waits
+/// for the force: two roots and the exponential are known before the last step is.
+#[inline]
+fn slips_on<S: Real>(force: [S; 2], first: S, b: S, c: S) -> Option<[S; 2]> {
+    let square = first.re() * first.re();
+    let on = b.re() > 0.0 && square >= f64::MIN_POSITIVE && c.re().abs() <= ROUNDED * square;
+    on.then(|| {
+        let inverse = first.recip();
+        // one over the size to first order of the rounding
+        let scale = inverse * (-dot(force, force) * (inverse * inverse) * 0.5 + 1.5);
+        [force[0] * scale, force[1] * scale]
+    })
+}
+
 /// Difference of the limits relative to their sum below which the logarithm is a series; its ninth term is then below rounding.
 const FLAT: f64 = 0.1;
 /// Relative change of the limit below which the derivative of that is one; its fifth term is then below rounding.
@@ -63,23 +81,30 @@ pub(super) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, limits: 
     let a = dot(way, way) * (stiffness * stiffness) - change * change;
     let b = (dot(force, way) * stiffness - first * change) * 2.0;
     let c = dot(force, force) - first * first;
-    let discriminant = b * b - a * c * 4.0;
-    let share = if discriminant.re() <= 0.0 {
-        zero // it slips at once, across its force
-    } else if b.re() > 0.0 {
-        c * -2.0 / (b + discriminant.sqrt())
-    } else {
-        (discriminant.sqrt() - b) / (a * 2.0)
-    };
     let length = dot(way, way).sqrt();
     let ahead = [way[0] / length, way[1] / length];
-    let held = beyond(force, share * stiffness, way);
-    let size = dot(held, held).sqrt();
-    if size.re() <= 0.0 {
-        // contact that begins here slips along the motion
-        return [ahead[0] * last, ahead[1] * last];
-    }
-    let direction = [held[0] / size, held[1] / size];
+    // derivatives see where slip begins also where that is at once
+    let on = if S::NDERIV == 0 { slips_on(force, first, b, c) } else { None };
+    let (share, size, direction) = match on {
+        Some(direction) => (zero, first, direction),
+        None => {
+            let discriminant = b * b - a * c * 4.0;
+            let share = if discriminant.re() <= 0.0 {
+                zero // it slips at once, across its force
+            } else if b.re() > 0.0 {
+                c * -2.0 / (b + discriminant.sqrt())
+            } else {
+                (discriminant.sqrt() - b) / (a * 2.0)
+            };
+            let held = beyond(force, share * stiffness, way);
+            let size = dot(held, held).sqrt();
+            if size.re() <= 0.0 {
+                // contact that begins here slips along the motion
+                return [ahead[0] * last, ahead[1] * last];
+            }
+            (share, size, [held[0] / size, held[1] / size])
+        }
+    };
     let exponent = length * (S::from(1.0) - share) * stiffness * inverse_mean(size, last);
     let factor = (-exponent).exp();
     let cosine = dot(direction, ahead);
@@ -171,23 +196,27 @@ pub(super) fn step_with_slopes(force: [f64; 2], way: [f64; 2], stiffness: f64, l
     let a = length * length * (stiffness * stiffness) - change * change;
     let b = (dot(force, way) * stiffness - first * change) * 2.0;
     let c = dot(force, force) - first * first;
-    let discriminant = b * b - a * c * 4.0;
-    let root = discriminant.max(0.0).sqrt();
-    let share = if discriminant <= 0.0 {
-        0.0
-    } else if b > 0.0 {
-        c * -2.0 / (b + root)
-    } else {
-        (root - b) / (a * 2.0)
+    let (share, root, held, size, direction) = match slips_on(force, first, b, c) {
+        Some(direction) => (0.0, b, force, first, direction),
+        None => {
+            let root = (b * b - a * c * 4.0).max(0.0).sqrt();
+            let share = if root <= 0.0 {
+                0.0
+            } else if b > 0.0 {
+                c * -2.0 / (b + root)
+            } else {
+                (root - b) / (a * 2.0)
+            };
+            let held = beyond(force, share * stiffness, way);
+            let size = dot(held, held).sqrt();
+            if size <= 0.0 {
+                return ([ahead[0] * last, ahead[1] * last], turning(ahead, last, heading));
+            }
+            (share, root, held, size, [held[0] / size, held[1] / size])
+        }
     };
-    let held = beyond(force, share * stiffness, way);
-    let size = dot(held, held).sqrt();
-    if size <= 0.0 {
-        return ([ahead[0] * last, ahead[1] * last], turning(ahead, last, heading));
-    }
-    let direction = [held[0] / size, held[1] / size];
     // |held| = first + share change, by its derivative
-    let begins = if discriminant > 0.0 {
+    let begins = if root > 0.0 {
         let by = -2.0 / root;
         Gradient {
             force: [by * held[0], by * held[1]],
@@ -292,6 +321,8 @@ mod tests {
                 stiffness,
                 [seeded(limits[0], 4), seeded(limits[1], 5)],
             );
+            let value = step(force, way, stiffness, limits);
+            assert!((value[0] - found[0]).hypot(value[1] - found[1]) <= 1e-13, "{k}: {value:?} {found:?}");
             slid += usize::from(found[0].hypot(found[1]) > 0.999_999 * limits[1] && limits[1] > 0.0);
             for a in 0..2 {
                 assert!((dual[a].re - found[a]).abs() <= 1e-13, "{k}: {found:?}");

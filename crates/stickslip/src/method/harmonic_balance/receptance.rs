@@ -39,6 +39,13 @@ impl Formed {
         Formed { matrices, pairs, ..Formed::default() }
     }
 
+    /// Memory of the matrices and of what is kept of them for products, bytes.
+    #[cfg(test)]
+    pub fn bytes(&self) -> usize {
+        self.matrices.iter().map(|matrix| size_of_val(matrix.as_slice())).sum::<usize>()
+            + self.pairs.iter().map(Pairs::bytes).sum::<usize>()
+    }
+
     fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
         let nh = self.matrices.len();
         let axes = moved.len() / nh;

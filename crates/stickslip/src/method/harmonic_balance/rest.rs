@@ -372,6 +372,12 @@ impl Rest {
         Ok(receptance)
     }
 
+    /// Memory of the receptances that are kept, bytes.
+    #[cfg(test)]
+    pub fn bytes(&self) -> usize {
+        self.known.borrow().receptances.values().map(|matrix| size_of_val(matrix.as_slice())).sum()
+    }
+
     fn receptance_anew(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
         if let Some(closed) = self.closed_at(harmonic, omega) {
             return closed.receptance(omega);

@@ -120,6 +120,11 @@ impl Level {
         let taken = (self.assembled, self.eliminated, self.products);
         self.exchange_samples();
         let rough = self.search(ports, omega, motion, ease, (most, Goal::Rough(self.rough())));
+        if rough.is_ok() {
+            // from where the motion repeats is known by these samples
+            self.follow_slopes(ports, omega, motion, (ease, false));
+            self.keeps_slopes = true;
+        }
         self.exchange_samples();
         if rough.is_ok() && self.search(ports, omega, motion, ease, (most, goal)).is_ok() {
             return Ok(());
@@ -158,7 +163,8 @@ impl Level {
             Goal::Share(share) => SOLVED.max(share * residual),
         };
         let mut sketched = self.sketches && !rough;
-        let (mut rough_slopes, mut kept) = (false, false);
+        let mut kept = self.keeps_slopes && sketched;
+        let mut rough_slopes = kept;
         let mut recent = [residual; REMEMBERED];
         let mut least = f64::INFINITY;
         // the residual that is to be halved, and for how long it was not
@@ -227,6 +233,7 @@ impl Level {
             residual = self.evaluate(ports, omega, motion, ease, length, Slopes::None);
         }
         self.nearby = false;
+        self.keeps_slopes = false;
         motion.residual = residual;
         if residual <= solved || (waited > PATIENCE && residual <= ROUNDED) {
             Ok(())

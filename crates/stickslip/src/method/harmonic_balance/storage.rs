@@ -1,6 +1,7 @@
 //! The memory that equations take, before they are made.
 
 use super::ports::Ports;
+use super::rest::CACHED;
 use super::rest::Rest;
 use super::sparse::Sparse;
 use super::{NAME, coupled};
@@ -31,14 +32,18 @@ pub(super) fn check_memory(bytes: f64, ports: &Ports, (harmonics, periods): (usi
     Err(MethodError::Option { method: NAME, key, message })
 }
 
-/// Memory of a level that is not banded, bytes: derivatives of the ports; receptances and their factors, or modes along the axes with the factor of
+/// Memory of a level that is not banded, bytes: derivatives of the ports; receptances and what preconditions steps, or modes along the axes with the factor of
 /// what most of them add; and where a matrix may be formed, that.
 pub(super) fn memory(ports: &Ports, rest: &Rest, harmonics: usize, always: bool) -> f64 {
     let (axes, pair) = (ports.count() as f64, 2.0 * harmonics as f64);
     let size = pair * axes;
     let structure = match rest.modes_for(ports).filter(|_| !always) {
         Some(structure) => structure.at.len() as f64 + 3.0 * axes * axes,
-        None => 4.0 * harmonics as f64 * axes * axes,
+        None => {
+            // the matrices; where they stay in the cache also for products, and for the longer series; and what preconditions steps
+            let each = if ports.count() <= CACHED { 4.0 } else { 2.0 };
+            2.0 * each * harmonics as f64 * axes * axes + coupled::of_lowest(ports, harmonics) as f64
+        }
     };
     // whoever needs it in any case has it beside a factor of it and that of the step before
     let formed = match always {
@@ -72,4 +77,59 @@ pub(super) fn marched(ports: &Ports, harmonics: usize, samples: usize) -> f64 {
 /// Memory of the derivatives of the ports, bytes.
 fn tangents(ports: &Ports, harmonics: usize) -> f64 {
     8.0 * ports.iter().map(|port| (2.0 * (harmonics * port.axes) as f64).powi(2)).sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::equations::Level;
+    use super::super::ports::Ports;
+    use super::super::receptance::Receptance;
+    use super::super::rest::Rest;
+    use super::memory;
+    use crate::law::{Coulomb, Jenkins2d, SharedLaw};
+    use crate::model::{Axis, System};
+    use crate::structure::Structure;
+    use nalgebra::DMatrix;
+    use num_complex::Complex64;
+    use std::sync::Arc;
+
+    /// A row of bodies on springs, every one of which rubs on the ground.
+    fn row(joints: usize, law: &SharedLaw) -> System {
+        let (each, n) = (law.directions(), joints * law.directions());
+        let stiffness = DMatrix::from_fn(n, n, |i, k| [2.5, -1.0].get(i.abs_diff(k)).copied().unwrap_or(0.0));
+        let names = (0..n).map(|i| format!("{i}")).collect();
+        let structure = Structure::new(names, DMatrix::identity(n, n), &stiffness * 0.04, stiffness).unwrap();
+        let mut builder = System::builder(structure).force(0, 1, Complex64::new(3.0, 0.0));
+        for joint in 0..joints {
+            let axes = (0..each).map(|a| Axis::new(vec![(joint * each + a, 1.0)])).collect();
+            builder = builder.joint(format!("{joint}"), law.clone(), axes);
+        }
+        builder.build().unwrap()
+    }
+
+    /// What is kept of receptances and to precondition steps is counted, of matrices that stay in the cache and of larger ones, and with unknown forces.
+    #[test]
+    fn what_steps_keep_is_counted() {
+        let plane: SharedLaw = Arc::new(Jenkins2d { stiffness: 1.0, limit: 0.1 });
+        let rigid: SharedLaw = Arc::new(Coulomb { limit: 0.1 });
+        for (joints, law) in [(20, &plane), (70, &plane), (30, &rigid)] {
+            let system = row(joints, law);
+            let ports = Ports::new(&system).unwrap();
+            let rest = Rest::new(&system, &ports);
+            let harmonics = [1, 3, 5, 7, 9, 11, 13];
+            let mut level = Level::new(harmonics.to_vec(), 128, &ports, None);
+            level.drive(&system, &ports, &rest, 0.9).unwrap();
+            let start = level.begin(&system, &ports, None, 0.9);
+            level.solve(&ports, 0.9, start).unwrap();
+            let Receptance::Formed(formed) = &level.receptance else { panic!("receptances are matrices") };
+            let coupled = level.coupled.as_ref().expect("by products");
+            assert!(coupled.bytes() > 0, "{joints}: none is kept");
+            let kept = formed.bytes() + rest.bytes() + coupled.bytes() + size_of_val(&level.tangents[..]);
+            // where a matrix may be formed that is counted too
+            let size = level.residual.len() as f64;
+            let formed = if size <= super::coupled::FORMED as f64 { 8.0 * size * size } else { 0.0 };
+            let counted = memory(&ports, &rest, harmonics.len(), false) - formed;
+            assert!((1.0..1.5).contains(&(counted / kept as f64)), "{joints}: {counted:.1e} of {kept:.1e}");
+        }
+    }
 }
