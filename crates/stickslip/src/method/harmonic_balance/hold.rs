@@ -1,8 +1,15 @@
 //! What keeps the equations regular where the model decides nothing.
 
+use num_complex::Complex64;
+
 /// A direction that nothing holds gets, for its mean position only, a spring that makes it as slow as this fraction of the drive
 /// frequency: its mean is arbitrary otherwise. The motion changes by the square of it.
 pub(super) const HOLD: f64 = 1e-5;
+
+/// The spring of such a direction at a rate, 1/s² times its mass: at rest only.
+pub(super) fn soft_spring(s: Complex64, omega: f64) -> f64 {
+    if s == Complex64::ZERO { (HOLD * omega).powi(2) } else { 0.0 }
+}
 
 /// How far ε stays above the least one at which a resolvent is single-valued: nearer, its slope grows without bound.
 pub(super) const CLEAR: f64 = 2.0;

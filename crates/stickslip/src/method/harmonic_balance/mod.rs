@@ -29,6 +29,7 @@ mod interior;
 mod kept;
 mod length;
 mod linear;
+mod modal;
 mod mode;
 mod open;
 mod path;
@@ -43,6 +44,7 @@ mod sparse;
 mod storage;
 mod subharmonic;
 mod uncoupled;
+mod waves;
 mod work;
 
 use super::{Method, MethodError, MethodInfo, MethodOption, Options, PERIOD, Solver, periods};

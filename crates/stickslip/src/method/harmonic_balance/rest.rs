@@ -8,24 +8,25 @@
 //! matrices are those of one sector. Displacements and forces are those of the whole ring all the same.
 
 use super::closed;
-use super::hold::HOLD;
+use super::hold::soft_spring;
+use super::modal::{Modal, fractions, free_fraction};
 use super::ports::{MANY_DIRECTIONS, Ports};
 use super::uncoupled::{Resonant, Uncoupled};
-use crate::model::{Cyclic, System};
-use crate::structure::{DynamicStiffness, Matrices, Sector, Structure, Wave, WaveStiffness, turn};
+use super::waves::{Factored, Waves};
+use crate::model::System;
+use crate::structure::{DynamicStiffness, Matrices, Structure};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip_numerics::dense::Lu;
-use stickslip_numerics::modes::Modes;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Axes up to which all numbers of a complex matrix stay in the cache of the processor, 260 kB.
 pub(super) const CACHED: usize = 128;
-/// Share of the largest static receptance below which springs hold a direction, if any is held by [`HOLD`] alone.
+/// Share of the largest static receptance below which springs hold a direction, if any is held by a soft spring alone.
 const HELD: f64 = 1e-5;
 
 /// Degrees of freedom beyond which full matrices are not taken apart into modes: at 200 that takes a second, with the third power.
@@ -82,126 +83,11 @@ struct Moved {
     columns: Arc<DMatrix<Complex64>>,
 }
 
-/// A dynamic stiffness at a rate (1/s), made at a drive frequency (rad/s); singular at a resonance without damping.
-#[derive(Debug, Clone)]
-struct Factored<F = DynamicStiffness> {
-    rate: Complex64,
-    omega: f64,
-    factor: Result<Arc<F>, Resonant>,
-}
-
-/// The waves on a ring: one per nodal diameter that a harmonic has met.
-#[derive(Debug, Clone)]
-struct Waves {
-    cyclic: Cyclic,
-    sector: Sector,
-    met: RefCell<BTreeMap<usize, Result<Arc<Wave>, Resonant>>>,
-    factors: RefCell<Vec<(usize, Factored<WaveStiffness>)>>,
-}
-
-impl Waves {
-    fn new(structure: &Structure, cyclic: Cyclic) -> Option<Self> {
-        let sector = Sector::of(structure, cyclic.sectors)?;
-        Some(Waves { cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
-    }
-
-    /// Displacements of the first sector in a wave under complex forces on it, in place, columns one after the other.
-    fn solve(&self, diameter: usize, (s, omega): (Complex64, f64), loads: &mut [Complex64]) -> Result<(), Resonant> {
-        self.factor(diameter, s, omega)?.solve(loads);
-        Ok(())
-    }
-
-    /// Kept as long as the drive frequency stays.
-    fn factor(&self, diameter: usize, s: Complex64, omega: f64) -> Result<Arc<WaveStiffness>, Resonant> {
-        let mut factors = self.factors.borrow_mut();
-        factors.retain(|(_, kept)| kept.omega == omega);
-        if let Some((_, kept)) = factors.iter().find(|(d, kept)| *d == diameter && kept.rate == s) {
-            return kept.factor.clone();
-        }
-        let mut met = self.met.borrow_mut();
-        let wave = met
-            .entry(diameter)
-            .or_insert_with(|| self.sector.wave(diameter).map(Arc::new).map_err(|_| Resonant))
-            .clone()?;
-        let factor = wave.dynamic_stiffness(s, hold(s, omega)).map(Arc::new).map_err(|_| Resonant);
-        factors.push((diameter, Factored { rate: s, omega, factor: factor.clone() }));
-        factor
-    }
-
-    /// `Wᴴ` in a wave: forces on the first sector under unit forces along the axes of its joints and, with their lag, of its neighbours', n × q.
-    fn columns(&self, diameter: usize, directions: &[Vec<(usize, f64)>]) -> DMatrix<Complex64> {
-        let n = self.sector.dofs();
-        let mut columns = DMatrix::from_element(n, directions.len(), ZERO);
-        for (q, rows) in directions.iter().enumerate() {
-            rows.iter().for_each(|&(i, w)| columns[(i % n, q)] += self.phase(diameter, i / n).conj() * w);
-        }
-        columns
-    }
-
-    fn phase(&self, diameter: usize, sector: usize) -> Complex64 {
-        turn((diameter * sector) as i64, self.cyclic.sectors)
-    }
-
-    fn receptance(
-        &self,
-        diameter: usize,
-        at: (Complex64, f64),
-        directions: &[Vec<(usize, f64)>],
-    ) -> Result<DMatrix<Complex64>, Resonant> {
-        let columns = self.columns(diameter, directions);
-        let mut moved = columns.clone();
-        self.solve(diameter, at, moved.as_mut_slice())?;
-        Ok(columns.adjoint() * moved)
-    }
-
-    /// Displacements along the axes under unit forces along each alone, without its neighbours': the mean of all waves. At a real rate.
-    fn own(&self, (rate, omega): (f64, f64), directions: &[Vec<(usize, f64)>]) -> Result<Vec<f64>, Resonant> {
-        let sectors = self.cyclic.sectors;
-        let mut own = vec![0.0; directions.len()];
-        for diameter in 0..=sectors / 2 {
-            // a wave the other way around is as stiff
-            let both = if (2 * diameter).is_multiple_of(sectors) { 1.0 } else { 2.0 };
-            let receptance = self.receptance(diameter, (Complex64::new(rate, 0.0), omega), directions)?;
-            own.iter_mut().enumerate().for_each(|(q, own)| *own += both * receptance[(q, q)].re / sectors as f64);
-        }
-        Ok(own)
-    }
-
-    /// Displacements of the ring under forces on it that travel.
-    fn respond(
-        &self,
-        diameter: usize,
-        at: (Complex64, f64),
-        force: &DVector<Complex64>,
-    ) -> Result<DVector<Complex64>, Resonant> {
-        let n = self.sector.dofs();
-        let mut one = force.as_slice()[..n].to_vec();
-        self.solve(diameter, at, &mut one)?;
-        let phases: Vec<Complex64> = (0..self.cyclic.sectors).map(|k| self.phase(diameter, k)).collect();
-        Ok(DVector::from_fn(force.len(), |i, _| one[i % n] * phases[i / n]))
-    }
-}
-
 /// Receptances at the harmonics of a frequency, rad/s.
 #[derive(Debug, Clone, Default)]
 struct Known {
     omega: f64,
     receptances: BTreeMap<usize, DMatrix<Complex64>>,
-}
-
-/// Modes, and what they are at the joints.
-#[derive(Debug, Clone)]
-struct Modal {
-    lambda: Vec<Complex64>,
-    /// n × modes, and modes × n.
-    shape: DMatrix<Complex64>,
-    left: DMatrix<Complex64>,
-    /// The same along the axes: q × modes, and modes × q.
-    shape_at: DMatrix<Complex64>,
-    left_at: DMatrix<Complex64>,
-    /// Free directions, n × r and r × q.
-    free: DMatrix<f64>,
-    free_at: DMatrix<f64>,
 }
 
 /// The structure at rest with its contacts closed, see [`closed`].
@@ -257,7 +143,7 @@ impl Rest {
         let alone = waves.is_none();
         Rest {
             n,
-            modal: if factored || !alone { None } else { modal(system, &columns(n, &directions)) },
+            modal: if factored || !alone { None } else { Modal::new(system, &columns(n, &directions)) },
             uncoupled: if alone && (factored || (directions.len() >= MANY_DIRECTIONS && is_modal(system.structure()))) {
                 Uncoupled::new(system.structure(), &directions).map(Arc::new)
             } else {
@@ -619,7 +505,7 @@ impl Rest {
         if let Some(kept) = factors.iter().find(|kept| kept.rate == s) {
             return kept.factor.clone();
         }
-        let factor = self.structure.held_stiffness(s, hold(s, omega)).map(Arc::new).map_err(|_| Resonant);
+        let factor = self.structure.held_stiffness(s, soft_spring(s, omega)).map(Arc::new).map_err(|_| Resonant);
         let bytes = |factor: &Result<Arc<DynamicStiffness>, Resonant>| factor.as_ref().map_or(0, |f| f.bytes());
         while !factors.is_empty()
             && factors.iter().map(|kept| bytes(&kept.factor)).sum::<usize>() + bytes(&factor) > KEPT
@@ -641,11 +527,6 @@ fn is_modal(structure: &Structure) -> bool {
     structure.diagonals().is_some()
 }
 
-/// As in the modal form, what nothing holds has a mean position by a soft spring, 1/s² times its mass.
-fn hold(s: Complex64, omega: f64) -> f64 {
-    if s == ZERO { (HOLD * omega).powi(2) } else { 0.0 }
-}
-
 /// Directions as columns, n × q.
 fn columns(n: usize, directions: &[Vec<(usize, f64)>]) -> DMatrix<f64> {
     let mut columns = DMatrix::zeros(n, directions.len());
@@ -653,44 +534,6 @@ fn columns(n: usize, directions: &[Vec<(usize, f64)>]) -> DMatrix<f64> {
         rows.iter().for_each(|&(i, w)| columns[(i, q)] = w);
     }
     columns
-}
-
-/// `1/(s - λ)` and `1/(s - λ*)`.
-fn fractions(s: Complex64, lambda: Complex64, omega: f64) -> (Complex64, Complex64) {
-    let hold = HOLD * HOLD * omega;
-    let one = |d: Complex64| if d.norm() < hold { Complex64::new(1.0 / hold, 0.0) } else { 1.0 / d };
-    (one(s - lambda), one(s - lambda.conj()))
-}
-
-fn free_fraction(s: Complex64, omega: f64) -> Complex64 {
-    if s == ZERO { Complex64::new((HOLD * omega).powi(-2), 0.0) } else { 1.0 / (s * s) }
-}
-
-/// Modes in the structure's coordinates; `None` if the mass matrix is not positive definite or modes fall together: then frequencies are
-/// factored one by one.
-fn modal(system: &System, direction: &DMatrix<f64>) -> Option<Modal> {
-    let n = system.dofs();
-    // M = L Lᵀ; with q = Lᵀ x the masses are ones
-    let factor = system.structure().mass().clone().cholesky()?;
-    let to = factor.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
-    let back = to.transpose();
-    let modes =
-        Modes::new(&(&to * system.structure().damping() * &back), &(&to * system.structure().stiffness() * &back))
-            .ok()?;
-    let complex = |matrix: &DMatrix<f64>| matrix.map(|w| Complex64::new(w, 0.0));
-    let shape = complex(&back) * modes.shape;
-    let left = modes.from_velocity * complex(&to);
-    let free = back * modes.free;
-    let along = complex(direction);
-    Some(Modal {
-        shape_at: along.transpose() * &shape,
-        left_at: &left * along,
-        free_at: free.transpose() * direction,
-        lambda: modes.lambda,
-        shape,
-        left,
-        free,
-    })
 }
 
 #[cfg(test)]
