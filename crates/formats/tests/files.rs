@@ -158,6 +158,21 @@ fn nastran_output4_of_pyyeti() {
 }
 
 #[test]
+fn nastran_cards_of_pyyeti() {
+    let nodes = ["7.x", "7.y", "9.x", "10.z", "100.x", "100.rz"].map(String::from);
+    let file = "pyyeti.pch";
+    assert_eq!(check(file, Some("KAAX"), "nastran-dmig", "punch").names(), Some(&nodes[..]));
+    assert_eq!(check(file, Some("BAAX"), "nastran-dmig", "punch_tilted").names(), Some(&nodes[..]));
+    // a row of zeros has no card
+    let left = ["7.x", "7.y", "10.z", "100.x", "100.rz"].map(String::from);
+    assert_eq!(check(file, Some("MAAX"), "nastran-dmig", "punch_mass").names(), Some(&left[..]));
+    let left = ["7.x", "7.y", "10.z"].map(String::from);
+    assert_eq!(check(file, Some("PAX"), "nastran-dmig", "punch_rectangular").names(), Some(&left[..]));
+    let listed: Vec<_> = list(data(file), None).expect("a list").iter().map(ToString::to_string).collect();
+    assert_eq!(listed.join(", "), "KAAX (6 x 6), MAAX (5 x 5), BAAX (6 x 6), PAX (3 x 3)");
+}
+
+#[test]
 fn abaqus_nastran_and_ansys_by_the_letter() {
     check("abaqus_coordinate.mtx", None, "coordinate", "abaqus");
     let nodes = ["7.x", "7.y", "9.x", "10.z", "100.x", "100.rz"].map(String::from);

@@ -4,7 +4,7 @@
     apt-get install calculix-ccx octave   # 2.20, 7.3.0
     venv/bin/python make.py
 
-Nothing but these programs writes a file here, except those of Abaqus, ANSYS and Nastran DMIG, which follow their documentation.
+Nothing but these programs writes a file here, except `punch.pch` and those of Abaqus and ANSYS, which follow their documentation.
 Expected values stand in `NAME.bits`: rows and columns, then `row column bits` of every entry, the bits as 16 hexadecimal digits.
 """
 
@@ -17,9 +17,10 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pandas as pd
 import scipy.io
 import scipy.sparse as sp
-from pyyeti.nastran import op4
+from pyyeti.nastran import op4, wtdmig
 
 HERE = Path(__file__).parent
 warnings.simplefilter("ignore")
@@ -126,12 +127,32 @@ def octave():
         file["plain"] = STIFFNESS
 
 
+# Grid points and components of the rows.
+NODES = [(7, 1), (7, 2), (9, 1), (10, 3), (100, 1), (100, 6)]
+
+
+def ten_digits(matrix):
+    return np.vectorize(lambda x: float(f"{x:.9e}"))(matrix)
+
+
 def nastran():
     names, matrices = ["kaa", "maa", "gen"], [STIFFNESS, np.where(abs(MASS) < 1e-300, 0, MASS), GENERAL]
     for sparse in ["dense", "bigmat", "nonbigmat"]:
         op4.write(HERE / f"{sparse}_text.op4", names, matrices, binary=False, digits=16, sparse=sparse)
         op4.write(HERE / f"{sparse}_little.op4", names, matrices, binary=True, endian="<", sparse=sparse)
     op4.write(HERE / "bigmat_big_endian.op4", names, matrices, binary=True, endian=">", sparse="bigmat")
+
+    # Symmetric; square; rectangular, whose columns are numbers. A punch file has no row of zeros, and no word of it.
+    rows = pd.MultiIndex.from_tuples(NODES, names=["id", "dof"])
+    tilted = np.tril(STIFFNESS) + np.triu(STIFFNESS, 1) / 3
+    cards = {"KAAX": pd.DataFrame(STIFFNESS, rows, rows), "MAAX": pd.DataFrame(MASS, rows, rows),
+             "BAAX": pd.DataFrame(tilted, rows, rows), "PAX": pd.DataFrame(GENERAL, rows[:4], [1, 2, 3])}
+    with open(HERE / "pyyeti.pch", "w") as file:
+        wtdmig(file, cards)
+    left = [0, 1, 3, 4, 5]
+    expect("punch_mass", ten_digits(MASS[np.ix_(left, left)]))
+    expect("punch_tilted", ten_digits(tilted))
+    expect("punch_rectangular", ten_digits(GENERAL[[0, 1, 3]]))
 
 
 BRICKS = """*NODE,NSET=NALL
@@ -204,8 +225,7 @@ def fortran(value, digits, width, letter="E"):
 
 def by_the_letter():
     """Abaqus, Nastran DMIG and HBMAT, from their documentation; numbers are those that their digits hold."""
-    size = range(N)
-    nodes = [(7, 1), (7, 2), (9, 1), (10, 3), (100, 1), (100, 6)]
+    size, nodes = range(N), NODES
     coordinate = "".join(f"{i + 1:8} {j + 1:8} {STIFFNESS[i, j]: .15e}\n" for i in size for j in size if STIFFNESS[i, j])
     (HERE / "abaqus_coordinate.mtx").write_text(coordinate)
     line = lambda i, j: "%d,%d, %d,%d, %.15e\n" % (*nodes[i], *nodes[j], STIFFNESS[i, j])
@@ -219,7 +239,7 @@ def by_the_letter():
         cards += [f"{'*':8}{nodes[i][0]:16}{nodes[i][1]:16}{fortran(STIFFNESS[i, j], 9, 16, 'D')}"
                   for i in range(j, N) if STIFFNESS[i, j]]
     (HERE / "punch.pch").write_text("\n".join(cards) + "\n")
-    expect("punch", np.vectorize(lambda x: float(f"{x:.9e}"))(STIFFNESS))
+    expect("punch", ten_digits(STIFFNESS))
 
     lower = sp.csc_matrix(np.tril(STIFFNESS))
     def block(values, text, per):
