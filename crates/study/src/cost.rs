@@ -235,12 +235,11 @@ impl<'a> Costing<'a> {
         } else {
             [survey.free(), survey.stuck()].map(|modes| modes.elastic.iter().map(|mode| mode.omega).collect()).into()
         };
-        let grid: Vec<f64> = (0..given.len()).filter_map(|i| given.get(i)).collect();
         let inner = |omega: &f64| {
-            let above = grid.partition_point(|at| at < omega);
+            let above = given.count_below(*omega);
             let below = above.checked_sub(1)?;
-            let nearest = if omega - grid[below] < grid.get(above)? - omega { below } else { above };
-            (nearest > 0 && nearest + 1 < grid.len()).then_some(nearest)
+            let nearest = if omega - given.get(below)? < given.get(above)? - omega { below } else { above };
+            (nearest > 0 && nearest + 1 < given.len()).then_some(nearest)
         };
         let peaks = || all.iter().map(|modes| modes.iter().filter_map(inner).collect::<BTreeSet<_>>().len());
         self.pace.of(peaks().min(), peaks().max()).map(|peaks| peaks as f64)

@@ -28,6 +28,5 @@ pub(crate) fn range(case: &Case) -> Option<(f64, f64)> {
         return Some((a.min(b), a.max(b)));
     }
     let frequencies = case.frequencies.as_ref()?;
-    let ends = frequencies.iter().fold((f64::INFINITY, 0.0f64), |(a, b), w| (a.min(w), b.max(w)));
-    (ends.0 <= ends.1).then_some(ends)
+    Some((frequencies.lowest()?, frequencies.highest()?))
 }

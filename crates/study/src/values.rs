@@ -156,6 +156,27 @@ impl Frequencies {
         }
     }
 
+    /// Whether none is below the one before it: that of a range is told by its ends.
+    pub fn is_rising(&self) -> bool {
+        match self {
+            Frequencies::List(list) => list.is_sorted(),
+            Frequencies::Range { from, to, .. } | Frequencies::Adaptive { from, to, .. } => from <= to,
+        }
+    }
+
+    /// How many of rising ones lie below a frequency, rad/s.
+    pub(crate) fn count_below(&self, omega: f64) -> usize {
+        let (mut low, mut high) = (0, self.len());
+        while low < high {
+            let middle = low.midpoint(high);
+            match self.get(middle).is_some_and(|at| at < omega) {
+                true => low = middle + 1,
+                false => high = middle,
+            }
+        }
+        low
+    }
+
     /// All of them, rad/s.
     pub fn iter(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.len()).filter_map(|index| self.get(index))
@@ -359,6 +380,19 @@ mod tests {
         assert_eq!(between(-0.3, 0.3, None, 3, 7), 0.0);
         let third = between(1.0 / 3.0, 2.0 / 3.0, None, 1, 3);
         assert!((third - 0.5).abs() < 1e-15);
+    }
+
+    /// What units of a run and `check` ask of a range does not go over its points: one at a time these would take hours.
+    #[test]
+    fn ends_order_and_places_of_a_range_take_no_time() {
+        let most = 1_000_000_000_000;
+        let range = Frequencies::Range { from: TAU, to: 101.0 * TAU, points: most + 1 };
+        assert_eq!((range.lowest(), range.highest(), range.is_rising()), (Some(TAU), Some(101.0 * TAU), true));
+        assert_eq!((range.count_below(TAU), range.count_below(200.0 * TAU)), (0, most + 1));
+        assert_eq!(range.count_below(51.0 * TAU), most / 2);
+        assert!(!Frequencies::Range { from: 2.0, to: 1.0, points: 3 }.is_rising());
+        let list = Frequencies::List(vec![1.0, 3.0, 2.0]);
+        assert_eq!((list.is_rising(), list.lowest(), list.highest()), (false, Some(1.0), Some(3.0)));
     }
 
     #[test]

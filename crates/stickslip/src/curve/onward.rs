@@ -15,7 +15,7 @@ const STRIDE: f64 = 0.2;
 /// Share of the way to the next frequency below which a step is not halved again: the branch ends there, or turns.
 const FINEST: f64 = 1.0 / 512.0;
 /// Steps to the next frequency at most.
-const MOST: usize = 160;
+const MOST: usize = 80;
 /// Degrees of freedom and directions of joints beyond which branches are not followed, nor the way back: it takes as long as the curve.
 const LARGE: usize = 24;
 
@@ -31,7 +31,7 @@ pub fn is_followed(system: &System) -> bool {
 /// The method cannot take the system.
 pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = method.solver(system)?;
-    Ok(if is_followed(system) { Box::new(Onward { solver, last: None, told: None }) } else { solver })
+    Ok(if is_followed(system) { Box::new(Onward { solver, last: None, told: None, spent: false }) } else { solver })
 }
 
 struct Onward<'a> {
@@ -39,6 +39,8 @@ struct Onward<'a> {
     last: Option<Last>,
     /// What it was told of.
     told: Option<Last>,
+    /// Whether a search on the way has taken all that a point may: no way is gone after that.
+    spent: bool,
 }
 
 /// Where a curve has arrived.
@@ -74,6 +76,7 @@ impl Onward<'_> {
         let mut found = self.solve(omega, start, between);
         let known = [&self.last, &self.told].into_iter().flatten().find(|last| start == Some(&last.start[..]));
         if let (Some(last), Ok(orbit)) = (known, &found)
+            && !self.spent
             && !last.leads_to(orbit)
             && let Some(orbit) = self.followed(last.clone(), omega, between)
         {
@@ -91,8 +94,10 @@ impl Onward<'_> {
             let share: f64 = at + step;
             let arrives = share >= 1.0;
             let target = if arrives { omega } else { from + share * (omega - from) };
-            let found = self.solve(target, Some(&last.start), between || !arrives).ok();
-            match found.filter(|orbit| last.leads_to(orbit)) {
+            let found = self.solve(target, Some(&last.start), between || !arrives);
+            self.spent = matches!(found, Err(OrbitError::NotConverged { spent: true, .. }));
+            match found.ok().filter(|orbit| last.leads_to(orbit)) {
+                None if self.spent => return None,
                 Some(orbit) if arrives => return Some(orbit),
                 Some(orbit) => (last, at, step) = (Last::new(&orbit), share, 2.0 * step),
                 None => step *= 0.5,
@@ -120,5 +125,46 @@ impl Solver for Onward<'_> {
             let orbit = self.solver.between(omega, Some(start));
             self.told = orbit.ok().map(|orbit| Last { start: start.to_vec(), ..Last::new(&orbit) });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::event_driven::EventDriven;
+    use std::f64::consts::TAU;
+
+    /// Finds orbits where it is asked for them, and between these takes all that a point may.
+    struct Exhausted<'a> {
+        solver: Box<dyn Solver + Send + 'a>,
+        asked: std::sync::Arc<std::sync::atomic::AtomicUsize>,
+    }
+
+    impl Solver for Exhausted<'_> {
+        fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+            self.solver.orbit(omega, start)
+        }
+        fn between(&mut self, omega: f64, _: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+            self.asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            let (iterations, residual, instead) = (9, 1e-2, String::new());
+            Err(OrbitError::NotConverged { method: "exhausted", omega, iterations, residual, spent: true, instead })
+        }
+    }
+
+    #[test]
+    fn a_search_that_took_all_is_not_made_again() {
+        let system = crate::model::example::blade_couple().assemble().unwrap();
+        let asked = std::sync::Arc::default();
+        let solver = Exhausted { solver: EventDriven.solver(&system).unwrap(), asked: std::sync::Arc::clone(&asked) };
+        let mut onward = Onward { solver: Box::new(solver), last: None, told: None, spent: false };
+        let mut start: Option<Vec<f64>> = None;
+        let mut amplitudes = Vec::new();
+        for hertz in [119.5, 120.5, 121.5] {
+            let orbit = onward.orbit(TAU * hertz, start.as_deref()).unwrap();
+            amplitudes.push(orbit.places[0].amplitude());
+            start = Some(orbit.start);
+        }
+        assert!(amplitudes.windows(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() > STRIDE), "{amplitudes:?}");
+        assert_eq!(asked.load(std::sync::atomic::Ordering::Relaxed), 1);
     }
 }

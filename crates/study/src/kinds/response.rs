@@ -363,6 +363,6 @@ fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) 
 /// Whether peaks are asked for, on a curve that can have any.
 fn wants_peaks(work: &Work<'_>) -> bool {
     let case = &work.case().case;
-    let rising = |f: &Frequencies| f.len() > 2 && f.iter().is_sorted();
+    let rising = |f: &Frequencies| f.len() > 2 && f.is_rising();
     case.values.flag("peaks").unwrap_or(true) && case.frequencies.as_ref().is_some_and(rising)
 }
