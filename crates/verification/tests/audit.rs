@@ -2,7 +2,7 @@
 //! against small steps in time ([`stickslip_verification::reference`]), which share no code with any method.
 //!
 //! `STICKSLIP_AUDIT_MODELS=1000` and `STICKSLIP_AUDIT_FIRST=SEED` make it longer, `STICKSLIP_AUDIT_ROWS=100` that of the rows; it prints what
-//! converged, what was refused or failed and why.
+//! agrees, what was refused or failed and why, and what the reference cannot judge: none of that counts as right.
 
 #![allow(clippy::print_stdout)] // tests say what they measured
 
@@ -36,6 +36,8 @@ const WAITED: f64 = 1e-6;
 const SLOW: f64 = 5.0;
 /// One in so many models with laws of steps is waited for.
 const RARELY: u64 = 8;
+/// Share of orbits that the reference may leave unjudged, besides one.
+const UNJUDGED: f64 = 0.05;
 /// Share of orbits that may fail without a reason that explains it.
 const UNEXPLAINED: f64 = 0.02;
 
@@ -75,7 +77,8 @@ fn every_orbit_of_a_row_is_a_motion() {
 fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: bool) {
     let first = variable("STICKSLIP_AUDIT_FIRST", first);
     let mut counts: BTreeMap<(&str, String), usize> = BTreeMap::new();
-    let (mut wrong, mut unexplained, mut restless, mut tried) = (Vec::new(), Vec::new(), Vec::new(), 0usize);
+    let (mut wrong, mut unexplained, mut unjudged) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut tried, mut agree) = (0usize, 0usize);
     for seed in first..first + models {
         let (system, omega) = made(seed);
         let laws: Vec<&str> = system.joints().iter().map(|joint| joint.law().name()).collect();
@@ -123,20 +126,23 @@ fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: boo
                 }
             }
             let comes = coarser.zip(judged).is_some_and(|((coarser, _), (apart, _))| apart <= COMES * coarser);
+            let name = format!("{seed} {laws:?} {}", row.name);
+            let mut silent = |why: &'static str| {
+                count(format!("unjudged: {why}"));
+                unjudged.push(format!("{name}: {why}"));
+            };
             match judged {
-                Some((_, distance)) if distance <= allowed => count("agrees".to_owned()),
-                Some(_) if comes => {
-                    count("the reference is too coarse".to_owned());
-                    restless.push(format!("{seed} {laws:?} {}", row.name));
+                Some((_, distance)) if distance <= allowed => {
+                    agree += 1;
+                    count("agrees".to_owned());
                 }
-                _ if orbit.is_stable() == Some(false) => count("unstable, and says so".to_owned()),
-                None => {
-                    count("the reference does not settle".to_owned());
-                    restless.push(format!("{seed} {laws:?} {}", row.name));
-                }
+                Some(_) if comes => silent("the reference is too coarse"),
+                // small steps leave it sooner or later
+                _ if orbit.is_stable() == Some(false) => silent("unstable, and says so"),
+                None => silent("the reference does not settle"),
                 Some((_, distance)) => {
                     count("differs".to_owned());
-                    wrong.push(format!("{seed} {laws:?} {}: {distance:.1e} of {allowed:.1e}", row.name));
+                    wrong.push(format!("{name}: {distance:.1e} of {allowed:.1e}"));
                 }
             }
         }
@@ -144,8 +150,11 @@ fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: boo
     for ((method, what), count) in &counts {
         println!("{method}: {what}: {count}");
     }
-    println!("not settled: {}", restless.join("; "));
-    unexplained.iter().chain(&wrong).for_each(|line| println!("{line}"));
+    let found = agree + wrong.len() + unjudged.len();
+    println!("{agree} of {found} orbits agree, {} differ, {} are unjudged", wrong.len(), unjudged.len());
+    unjudged.iter().chain(&unexplained).chain(&wrong).for_each(|line| println!("{line}"));
+    let share = unjudged.len() as f64 / found as f64;
+    assert!(unjudged.len() as f64 <= UNJUDGED * found as f64 + 1.0, "{share:.3} of the orbits are unjudged");
     assert!(wrong.is_empty(), "{} orbits are no motions of their systems", wrong.len());
     assert!(unexplained.len() as f64 <= UNEXPLAINED * tried as f64 + 1.0, "{} of {tried} failed", unexplained.len());
 }
