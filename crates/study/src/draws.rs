@@ -42,9 +42,11 @@ fn together(draws: &[&Panel]) -> Option<Panel> {
     let bands = lines.iter().all(|one| alike(one) && one.iter().all(rises) && common(one));
     let mut series: Vec<Series> =
         first.series.iter().filter(|series| series.emphasis == Emphasis::Reference).cloned().collect();
-    if bands {
+    let pairs: Vec<Vec<Series>> =
+        if bands { (0..lines[0].len()).map(|at| of_lines(&lines, at)).collect() } else { Vec::new() };
+    // ranges that have nothing in common leave none
+    if bands && pairs.iter().flatten().all(|series| !series.x.is_empty()) {
         // bands first, so that none hides a median
-        let pairs: Vec<Vec<Series>> = (0..lines[0].len()).map(|at| of_lines(&lines, at)).collect();
         series.extend(pairs.iter().flat_map(|pair| pair.first()).cloned());
         series.extend(pairs.iter().flat_map(|pair| pair.get(1)).cloned());
         series.extend(of_points(draws));
@@ -100,7 +102,7 @@ fn of_points(draws: &[&Panel]) -> Vec<Series> {
             .map(|one| one.get(at).filter(|one| one.x == own.x).map(|one| (one.x.clone(), one.y.clone())))
             .collect();
         let median = percentiles(&all?, &own.label, own.colour).pop()?;
-        Some(Series { y: median.y, ..own.clone() })
+        Some(Series { x: median.x, y: median.y, ..own.clone() })
     };
     (0..points[0].len()).filter_map(at).collect()
 }
@@ -160,9 +162,14 @@ mod tests {
         let straight = |label: &str| panel(vec![Series::line(label, vec![0.0, 1.0], vec![1.0, 2.0], 0)]);
         // many points where the other has none between
         let bent = panel(vec![Series::line("stable", vec![0.0, 0.4, 0.5, 0.6, 1.0], vec![1.0; 5], 0)]);
-        for draws in
-            [[around(1.0), around(2.0)], [straight("stable"), straight("unstable")], [straight("stable"), bent]]
-        {
+        // nothing in common
+        let beyond = panel(vec![Series::line("stable", vec![2.0, 3.0], vec![1.0, 2.0], 0)]);
+        for draws in [
+            [around(1.0), around(2.0)],
+            [straight("stable"), straight("unstable")],
+            [straight("stable"), bent],
+            [straight("stable"), beyond],
+        ] {
             let made = together(&[&draws[0], &draws[1]]).unwrap();
             assert_eq!(made.series.len(), 2);
             assert!(made.series.iter().all(|line| line.emphasis == Emphasis::Pale && line.style == Style::Solid));

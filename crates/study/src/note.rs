@@ -14,14 +14,26 @@ use stickslip::structure::Reduction;
 /// How a note begins that is a warning.
 pub(crate) const WARNING: &str = "warning: ";
 
+/// Cases that a sentence about several names; of more it gives the number.
+const MOST_NAMED: usize = 3;
+
 /// Cases that are named one by one because a joint sticks in them: as many as are read. Of the others the points are counted together.
 const MOST_STUCK: usize = 4;
 
 /// A note.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Note {
-    /// A sentence.
+    /// A sentence about the whole study.
     Said(String),
+    /// A sentence about one case or several.
+    Of {
+        /// How many.
+        cases: usize,
+        /// The first of them, up to [`MOST_NAMED`].
+        named: Vec<String>,
+        /// What is said of them; it begins with [`WARNING`] if it is one.
+        text: String,
+    },
     /// Points whose series is too short, and the largest estimated error.
     Truncated(usize, f64),
     /// The same on a branch, whose harmonics are given, and which has no other method.
@@ -81,6 +93,11 @@ pub enum Note {
 }
 
 impl Note {
+    /// What is said of one case, or of a point of it: both in words that are empty where there is only one. It begins with [`WARNING`] if it is one.
+    pub(crate) fn of_case(case: &str, text: impl Into<String>) -> Note {
+        Note::Of { cases: 1, named: vec![case.to_owned()], text: text.into() }
+    }
+
     /// What an orbit asks for: which method found it instead of the chosen one, that it is unstable, if that is known (see [`Orbit::is_stable`]), how accurate its series is, that it is one of
     /// many, and what its `reduction_error` leaves out.
     pub(crate) fn of_orbit(model: &Model, orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
@@ -164,6 +181,15 @@ impl Note {
     fn joined(self, notes: &mut Vec<Note>) {
         for known in notes.iter_mut() {
             match (known, &self) {
+                (Note::Said(known), Note::Said(more)) if known == more => return,
+                (Note::Of { cases, named, text }, Note::Of { cases: more, named: others, text: same })
+                    if text == same =>
+                {
+                    *cases += more;
+                    let room = MOST_NAMED.saturating_sub(named.len());
+                    named.extend(others.iter().take(room).cloned());
+                    return;
+                }
                 (
                     Note::OtherOrbit { points, from, to, ratios: [least, most] },
                     Note::OtherOrbit { points: more, from: low, to: high, ratios: other },
@@ -221,6 +247,15 @@ impl Note {
         let points = |count: usize| format!("{count} point{}", if count == 1 { "" } else { "s" });
         match self {
             Note::Said(text) => Some(text.clone()),
+            Note::Of { cases, named, text } => {
+                let (warning, said) = text.strip_prefix(WARNING).map_or(("", text.as_str()), |said| (WARNING, said));
+                let first = named.join("; ");
+                Some(match cases - named.len() {
+                    0 if first.is_empty() => text.clone(),
+                    0 => format!("{warning}{first}: {said}"),
+                    more => format!("{warning}{cases} cases ({first} and {more} more): {said}"),
+                })
+            }
             Note::Truncated(count, largest) => Some(format!(
                 "At {} the series is too short: its estimated error is beyond the `tolerance` of the method, and up to {largest:.1e}. \
                  Leave `harmonics` out or raise it, raise `tolerance` if that is good enough, or use `event-driven` where the laws \
@@ -371,6 +406,28 @@ mod tests {
         );
     }
 
+    /// What is true of many cases is a line, not a page: a warning of 16 draws stood there 16 times.
+    #[test]
+    fn what_is_said_of_many_cases_is_said_once() {
+        let texts = |cases: usize| {
+            let mut notes = Vec::new();
+            for case in 1..=cases {
+                Note::of_case(&format!("k = {case} N/m"), "warning: it moves too fast").join(&mut notes);
+                Note::of_case(&format!("k = {case} N/m"), "No joint slips.").join(&mut notes);
+                Note::Said("There is no speed.".to_owned()).join(&mut notes);
+            }
+            notes.iter().filter_map(Note::text).collect::<Vec<_>>()
+        };
+        let general = "There is no speed.";
+        assert_eq!(texts(1), ["warning: k = 1 N/m: it moves too fast", "k = 1 N/m: No joint slips.", general]);
+        assert_eq!(texts(2)[0], "warning: k = 1 N/m; k = 2 N/m: it moves too fast");
+        let many = texts(16);
+        assert_eq!(many[0], "warning: 16 cases (k = 1 N/m; k = 2 N/m; k = 3 N/m and 13 more): it moves too fast");
+        assert_eq!((many.len(), many[2].as_str()), (3, general));
+        // the one case of a study has no name
+        assert_eq!(Note::of_case("", "warning: it moves too fast").text().unwrap(), "warning: it moves too fast");
+    }
+
     /// A branch takes no other method: its note names its own keys alone.
     #[test]
     fn what_helps_a_branch_is_said_of_a_branch() {
@@ -394,7 +451,13 @@ mod tests {
         let all: Vec<Note> = (0..3 * MOST_STUCK)
             .flat_map(|unit| {
                 let (case, points) = (format!("case {}", unit / 3), if unit % 7 < 2 { 0 } else { unit % 5 });
-                [Note::Stuck { case, points, of: 10 }, Note::Truncated(unit % 2, unit as f64), Note::History(1)]
+                let of_case = Note::of_case(&case, format!("It is so in {} ways.", unit % 3));
+                [
+                    Note::Stuck { case, points, of: 10 },
+                    Note::Truncated(unit % 2, unit as f64),
+                    Note::History(1),
+                    of_case,
+                ]
             })
             .chain((0..700).map(|unit| Note::Stuck { case: format!("late {}", unit / 3), points: unit % 4, of: 10 }))
             .collect();
@@ -408,7 +471,7 @@ mod tests {
             whole.iter().filter_map(Note::text).collect::<Vec<_>>()
         };
         let one_by_one = joined(1);
-        assert!(one_by_one.len() <= MOST_STUCK + 4, "{}", one_by_one.len());
+        assert!(one_by_one.len() <= MOST_STUCK + 7, "{}", one_by_one.len());
         assert!(one_by_one.iter().any(|text| text.starts_with("In further cases")), "{one_by_one:?}");
         for stretch in [2, 3, 7, 50, 1000, all.len()] {
             assert_eq!(joined(stretch), one_by_one, "{stretch}");

@@ -4,27 +4,40 @@ use crate::dataset::{Series, Style};
 
 /// The ends of the band and the line in it, as shares.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
+/// Of the curves that have values at all those that must have one at an abscissa, where a band is drawn. Where the ranges of curves end one after the
+/// other, those that go on are no sample of all: with this share the median of them is that of all to 2.5 percentage points.
+const MOST_OF_THEM: f64 = 0.95;
 /// Relative distance of abscissae that are the same but for rounding: amplitudes that were computed, at which a curve begins.
 const SAME: f64 = 1e-9;
 
-/// Median and band of curves `(x, y)` over the abscissae of the first one. A point that a curve has not, because it failed or lies outside, does
-/// not count there.
+/// Median and band of curves `(x, y)` over the abscissae of the first one with the most points. A curve may lack a point, because it failed or lies
+/// outside; where so many do that the others are no sample of all, there is a gap, and at the ends nothing.
 pub(crate) fn percentiles(curves: &[(Vec<f64>, Vec<f64>)], label: &str, colour: usize) -> Vec<Series> {
-    let Some((grid, _)) = curves.first() else { return Vec::new() };
-    let mut bounds: [Vec<f64>; 3] = Default::default();
+    let Some(grid) = curves.iter().map(|(x, _)| x).reduce(|a, b| if b.len() > a.len() { b } else { a }) else {
+        return Vec::new();
+    };
     let all: Vec<Vec<f64>> = curves.iter().map(|(x, y)| over(grid, x, y)).collect();
-    for at in 0..grid.len() {
+    let known = curves.iter().filter(|(_, y)| y.iter().any(|value| !value.is_nan())).count();
+    let sorted = |at: usize| {
         let mut values: Vec<f64> = all.iter().map(|y| y[at]).filter(|value| !value.is_nan()).collect();
         values.sort_by(f64::total_cmp);
-        for (bound, share) in bounds.iter_mut().zip(SHARES) {
-            bound.push(quantile(&values, share));
-        }
-    }
-    let [low, middle, high] = bounds;
+        Some(values).filter(|values| !values.is_empty() && values.len() as f64 >= MOST_OF_THEM * known as f64)
+    };
+    let values: Vec<Option<Vec<f64>>> = (0..grid.len()).map(sorted).collect();
+    let first = values.iter().position(Option::is_some).unwrap_or(0);
+    let end = values.iter().rposition(Option::is_some).map_or(first, |last| last + 1);
+    let x = &grid[first..end];
+    let of = |share: f64| -> Vec<f64> {
+        values[first..end]
+            .iter()
+            .map(|values| values.as_ref().map_or(f64::NAN, |values| quantile(values, share)))
+            .collect()
+    };
+    let [low, middle, high] = SHARES.map(of);
     let named = |what: &str| if label.is_empty() { what.to_owned() } else { format!("{label}, {what}") };
     vec![
-        Series::band(named("5 % to 95 %"), grid.clone(), low, high, colour),
-        Series { style: Style::Solid, ..Series::line(named("median"), grid.clone(), middle, colour) },
+        Series::band(named("5 % to 95 %"), x.to_vec(), low, high, colour),
+        Series { style: Style::Solid, ..Series::line(named("median"), x.to_vec(), middle, colour) },
     ]
 }
 
@@ -68,8 +81,7 @@ mod tests {
     fn bands_are_percentiles_at_every_abscissa() {
         let x = vec![1.0, 2.0, 3.0];
         let mut curves: Vec<(Vec<f64>, Vec<f64>)> =
-            [8.0, 1.0, 16.0, 2.0, 4.0].iter().map(|y| (x.clone(), vec![*y, 2.0 * y, f64::NAN])).collect();
-        curves[4].1[2] = 7.0;
+            [8.0, 1.0, 16.0, 2.0, 4.0].iter().map(|y| (x.clone(), vec![*y, 2.0 * y, 7.0])).collect();
         let series = percentiles(&curves, "blade1", 2);
         let near = |found: &[f64], expected: [f64; 3]| {
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{found:?} {expected:?}");
@@ -78,6 +90,15 @@ mod tests {
         near(&series[0].y, [14.4, 28.8, 7.0]);
         near(&series[1].y, [4.0, 8.0, 7.0]);
         assert_eq!((series[0].style, series[1].label.as_str()), (Style::Band, "blade1, median"));
+        // four of five are too few to stand for all: a gap, and at the end nothing
+        curves[4].1[1] = f64::NAN;
+        assert!(percentiles(&curves, "", 0)[1].y[1].is_nan());
+        curves[0].1[2] = f64::NAN;
+        assert_eq!(percentiles(&curves, "", 0)[0].x, [1.0]);
+        // 19 of 20 are enough, and one that has no value at all is none of them
+        let lacks = |i: usize| [[1.0, f64::NAN, 1.0], [f64::NAN; 3]].get(i).copied().unwrap_or([1.0; 3]).to_vec();
+        let most: Vec<(Vec<f64>, Vec<f64>)> = (0..21).map(|i| (x.clone(), lacks(i))).collect();
+        assert_eq!(percentiles(&most, "", 0)[1].y, [1.0; 3]);
         // one that begins a rounding later has its first point all the same
         let later = (vec![1.0 + 1e-15, 2.0], vec![3.0, 5.0]);
         let series = percentiles(&[(vec![1.0, 2.0], vec![1.0, 5.0]), later], "", 0);
@@ -85,6 +106,6 @@ mod tests {
         // a curve with other points counts between them, and not beyond
         let other = (vec![1.0, 3.0], vec![10.0, 30.0]);
         let series = percentiles(&[(vec![0.0, 2.0], vec![5.0, 20.0]), other], "", 0);
-        assert_eq!(series[1].y, [5.0, 20.0]);
+        assert_eq!((&series[1].x[..], &series[1].y[..]), (&[2.0][..], &[20.0][..]));
     }
 }

@@ -118,7 +118,8 @@ fn compute(work: &Work<'_>) -> Computed {
     (work.context.finished)();
     let (status, reason) = judged(unit, &mode);
     part.count(|| location_of(prepared), status, reason);
-    part.notes.extend(remarks(prepared, unit, &mode).into_iter().map(Note::Said));
+    let place = location_of(prepared);
+    part.notes.extend(remarks(unit, &mode).into_iter().map(|text| Note::of_case(&place, text)));
     let (mut rows, mut summary) = (Rows::default(), Rows::default());
     let (mut stretch, mut before) = (1, f64::INFINITY);
     let reduction = prepared.system.reduction_evidence();
@@ -219,14 +220,13 @@ fn judged(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
 const SLIPS: f64 = 1e-9;
 
 /// What the reader must know of a mode that was followed.
-fn remarks(prepared: &Prepared, unit: f64, mode: &Mode) -> Vec<String> {
-    let place = location_of(prepared);
+fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
     let mut remarks: Vec<String> = mode
         .turns
         .iter()
         .map(|turn| {
             format!(
-                "{place}: the curve turns at {} and goes back to {} before it falls for good; between them there are several \
+                "the curve turns at {} and goes back to {} before it falls for good; between them there are several \
                  motions, and below the first the values jump.",
                 amplitude(unit, turn.at),
                 amplitude(unit, turn.up)
@@ -234,15 +234,14 @@ fn remarks(prepared: &Prepared, unit: f64, mode: &Mode) -> Vec<String> {
         })
         .collect();
     if mode.travels {
-        remarks.push(format!(
-            "{place}: two modes have this frequency, and every mixture of both is a motion while the joints stick; the wave that travels is followed, \
+        let text = "two modes have this frequency, and every mixture of both is a motion while the joints stick; the wave that travels is followed, \
              in which places of equal sectors move one after the other by equal amplitudes. The other mode is the wave that runs the other way. \
-             Mixtures that stand slip otherwise."
-        ));
+             Mixtures that stand slip otherwise.";
+        remarks.push(text.to_owned());
     }
     let joints = mode.points.iter().chain(&mode.largest).map(|point| (point.damping - point.viscous).abs());
     if !mode.points.is_empty() && joints.fold(0.0, f64::max) < SLIPS {
-        remarks.push(format!("{place}: no joint slips between these amplitudes; the joints add no damping."));
+        remarks.push("no joint slips between these amplitudes; the joints add no damping.".to_owned());
     }
     remarks
 }

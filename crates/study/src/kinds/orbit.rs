@@ -81,7 +81,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
     for (orbit, stable) in orbits::found(work, &mut part)? {
         let omega = orbit.omega;
-        part.notes.extend(one_of_many(prepared, &orbit));
+        one_of_many(prepared, &orbit).into_iter().for_each(|note| note.join(&mut part.notes));
         summary.varied(&prepared.case);
         summary.number("frequency_Hz", hertz(omega));
         let mut row = Summary::of(prepared, &orbit, stable);
@@ -98,8 +98,8 @@ fn compute(work: &Work<'_>) -> Computed {
         let all = if wanted { orbit.multipliers() } else { Some(Vec::new()) };
         if all.is_none() {
             let place = location_of(&prepared.case, omega);
-            part.notes
-                .push(Note::Said(format!("{place}: the multipliers are not known, as the orbit has no return map.")));
+            let text = "the multipliers are not known, as the orbit has no return map.";
+            Note::of_case(&place, text).join(&mut part.notes);
         }
         for (index, multiplier) in all.unwrap_or_default().iter().enumerate() {
             multipliers.varied(&prepared.case);
@@ -126,11 +126,11 @@ fn compute(work: &Work<'_>) -> Computed {
 /// That the orbit of a joint that sticks is one of a continuum; where it is not its own mirror image, [`Note::History`] says so.
 fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
     (orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
-        Note::Said(format!(
-            "{}: {} sticks for the whole period; the orbit is one of a continuum, the symmetric one is shown.",
-            location_of(&prepared.case, orbit.omega),
-            orbit.evidence.stuck.join(", ")
-        ))
+        let stuck = orbit.evidence.stuck.join(", ");
+        let text = format!(
+            "{stuck} sticks for the whole period; the orbit is one of a continuum, the symmetric one is shown."
+        );
+        Note::of_case(&location_of(&prepared.case, orbit.omega), text)
     })
 }
 

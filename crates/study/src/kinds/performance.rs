@@ -97,11 +97,11 @@ fn compute(work: &Work<'_>) -> Computed {
         };
         part.count(|| prepared.case.label(), status, failed.then(reason));
         if row.inaccurate > 0 {
-            part.notes.push(Note::Said(format!(
-                "{}: at {} frequencies of the grid the series is too short for the `tolerance` of the method; look at one with kind = \"response\".",
-                prepared.case.label(),
+            let text = format!(
+                "at {} frequencies of the grid the series is too short for the `tolerance` of the method; look at one with kind = \"response\".",
                 row.inaccurate
-            )));
+            );
+            Note::of_case(&prepared.case.label(), text).join(&mut part.notes);
         }
         rows.varied(&prepared.case);
         rows.number(DRIVE, row.peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
@@ -127,8 +127,8 @@ fn compute(work: &Work<'_>) -> Computed {
         optima.text("status", best.as_ref().map_or("none", status));
         optima.end();
         if best.is_none() {
-            let at = if outer.is_empty() { String::new() } else { format!(" at {}", varied_text(outer)) };
-            part.notes.push(Note::Said(format!("{WARNING}{}", no_optimum(work, &curve, &inner.name, &at))));
+            let why = no_optimum(work, &curve, &inner.name);
+            Note::of_case(&varied_text(outer), format!("{WARNING}{why}")).join(&mut part.notes);
         }
     }
     part.tables = vec![rows, optima];
@@ -136,7 +136,7 @@ fn compute(work: &Work<'_>) -> Computed {
 }
 
 /// Why no value of the parameter is the best one.
-fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, parameter: &str, at: &str) -> String {
+fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, parameter: &str) -> String {
     let level = curve.lowest();
     let height = |row: &usize| curve.rows[*row].peak.map_or(f64::NAN, |peak| peak.value);
     let text = |row: Option<&usize>| {
@@ -144,14 +144,14 @@ fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, parameter: &str, at: &s
         value.map_or_else(String::new, |value| value.text.clone())
     };
     match level[..] {
-        [] => format!("no peak was found at any value of {parameter}{at}"),
-        [_] => format!("the lowest peak stands at an end of the values of {parameter}{at}: widen them"),
+        [] => format!("no peak was found at any value of {parameter}"),
+        [_] => format!("the lowest peak stands at an end of the values of {parameter}: widen them"),
         _ if level.len() == curve.rows.len() && level.iter().all(|row| height(row) == 0.0) => format!(
-            "nothing whose peak counts moves at any value of {parameter}{at}, so none is the best: friction holds it, or no force reaches it; raise \
+            "nothing whose peak counts moves at any value of {parameter}, so none is the best: friction holds it, or no force reaches it; raise \
              the excitation, or look at other values"
         ),
         _ => format!(
-            "{} values of {parameter}{at} have the same lowest peak, from {} to {}: none of them is the best",
+            "{} values of {parameter} have the same lowest peak, from {} to {}: none of them is the best",
             level.len(),
             text(level.first()),
             text(level.last())

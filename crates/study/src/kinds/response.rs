@@ -195,7 +195,7 @@ fn compute(work: &Work<'_>) -> Computed {
         if work.study.wants(amplification::KEY.name)
             && let Err(why) = amplification::row(work, &all, &mut amplified)
         {
-            part.notes.push(Note::Said(format!("{WARNING}no amplification, {}: {why}.", case.label())));
+            part.notes.push(Note::of_case(&case.label(), format!("{WARNING}no amplification: {why}.")));
         }
     } else {
         part.tables.push(Rows::default());

@@ -280,7 +280,8 @@ fn compute(work: &Work<'_>) -> Computed {
             Note::InTime(reduction.up_to).join(&mut part.notes);
         }
         if excitation == Excitation::Free {
-            part.notes.extend(read_off(prepared, &decays, step, &mut decay, &mut summary));
+            let unread = read_off(prepared, &decays, step, &mut decay, &mut summary);
+            part.notes.extend(unread.map(|text| Note::of_case(&case.label(), text)));
         }
         (work.context.finished)();
         let at = || drive.map_or_else(|| case.label(), |omega| location_of(case, omega));
@@ -298,14 +299,21 @@ fn compute(work: &Work<'_>) -> Computed {
 /// Samples per cycle that turning points need: with 20 the damping ratio is off by 1e-3 of a cycle's decrement, with 3 it is anything.
 const PER_CYCLE: f64 = 20.0;
 
-/// Frequency and damping, cycle by cycle, of the mass that moves most; with too few samples a note instead.
-fn read_off(prepared: &Prepared, decays: &[Decay], step: f64, rows: &mut Rows, summary: &mut Rows) -> Option<Note> {
+/// Frequency and damping, cycle by cycle, of the mass that moves most; with too few samples what is to be said instead.
+fn read_off(
+    prepared: &Prepared,
+    decays: &[Decay],
+    step: f64,
+    rows: &mut Rows,
+    summary: &mut Rows,
+) -> Option<&'static str> {
     let most = (0..decays.len()).max_by(|&a, &b| decays[a].largest().total_cmp(&decays[b].largest()));
     let (mass, cycles) = most.map(|most| (&prepared.system.places()[most], decays[most].cycles()))?;
     if cycles.iter().any(|cycle| cycle.frequency * step * PER_CYCLE > 1.0) {
-        let text = "warning: the samples are too far apart to read damping off the decay, or it moves too fast for them: take a \
-                    `time_step` below a twentieth of its period";
-        return Some(Note::Said(text.to_owned()));
+        return Some(
+            "warning: the samples are too far apart to read damping off the decay, or it moves too fast for them: take a \
+             `time_step` below a twentieth of its period",
+        );
     }
     for cycle in &cycles {
         rows.varied(&prepared.case);
