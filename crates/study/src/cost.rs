@@ -41,12 +41,20 @@ const DRAWN: f64 = 240.0;
 /// exact 8 kB for the couple and 170 kB for 8 masses and joints, smooth 80 kB and 600 kB.
 const ORBIT_ENTRY: f64 = 500.0;
 const SMOOTH_ENTRY: f64 = 24_000.0;
-/// Bytes of an orbit that is a series, per harmonic coefficient of a place or joint. Measured: 15 kB for the couple,
+/// Bytes of a series while it is sought, per harmonic coefficient of a place or joint. Measured: 15 kB for the couple,
 /// 130 kB for 8 masses and joints, at 15 harmonics.
 const SERIES_ENTRY: f64 = 80.0;
 /// Bytes of the samples of a joint's forces and contact over a period. Measured: a ring of 480 blades and joints with seven harmonics takes
 /// 87 MB on two threads, those that are about to be solved included.
 const SERIES_SAMPLES: f64 = 40.0 * 1024.0;
+/// Bytes of a complex coefficient: of the motion that an orbit keeps, one for every harmonic, the mean and the state at its start, of every degree of
+/// freedom; of its equations, along the directions of a joint.
+const COEFFICIENT: f64 = 16.0;
+const DIRECTIONS: f64 = 3.0;
+/// Bytes of what is measured of a place, with its name.
+const MEASURED: f64 = 100.0;
+/// Samples per period for which those of the joints were measured.
+const SAMPLED: f64 = 1024.0;
 /// Numbers, per entry of a full matrix, of a method that follows the motion in time: three of the structure, its inverse mass, and the return
 /// map with its products, of twice as many rows.
 const IN_TIME: f64 = 16.0;
@@ -257,7 +265,20 @@ impl<'a> Costing<'a> {
 
     /// Bytes of the orbits that a unit of frequencies keeps at a time.
     pub fn kept_orbits(&self) -> f64 {
-        self.frequencies.min(BLOCK as f64) * self.orbit_bytes()
+        let orbits = self.frequencies.min(BLOCK as f64);
+        if self.is_series() {
+            let option = |name: &str, default: f64| self.case.method.options.get(name).copied().unwrap_or(default);
+            let kept = self.kept_series_bytes(option("harmonics", SERIES_HARMONICS), option("samples", SAMPLED));
+            return orbits * kept + self.orbit_bytes();
+        }
+        orbits * self.orbit_bytes()
+    }
+
+    /// Bytes of an orbit that is a series of so many harmonics, once it is found. Measured: 1.0 MB for a ring of 12 sectors with 1188 coordinates and 12
+    /// joints of three directions, at 15 harmonics.
+    pub fn kept_series_bytes(&self, harmonics: f64, samples: f64) -> f64 {
+        let coefficients = (harmonics + 2.0) * (self.masses + DIRECTIONS * self.joints);
+        COEFFICIENT * coefficients + MEASURED * self.places + SERIES_SAMPLES * samples / SAMPLED * self.joints
     }
 
     /// Bytes of an orbit in memory.
@@ -281,7 +302,7 @@ impl<'a> Costing<'a> {
         self.instants() * SAMPLE * (2.0 + self.masses + self.joints)
     }
 
-    /// Bytes of an orbit in memory that is a series of so many harmonics.
+    /// Bytes that a series of so many harmonics takes while it is sought.
     pub fn series_bytes(&self, harmonics: f64) -> f64 {
         SERIES_ENTRY * (2.0 * harmonics + 1.0) * (2.0 * self.masses + 4.0 * self.joints)
     }

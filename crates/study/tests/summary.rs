@@ -318,6 +318,30 @@ fn studies_that_need_too_much_memory_are_refused_in_advance() {
     refused(&cases, "vary");
 }
 
+/// A point of a branch keeps the coefficients of its motion, not what the equations take while they are solved.
+#[test]
+fn a_branch_is_counted_by_what_it_keeps() {
+    let (name, masses) = (|i: usize| if i == 0 { "ground".to_owned() } else { format!("m{i}") }, 300);
+    let one = |i: usize| {
+        let (before, name) = (name(i - 1), name(i));
+        format!(
+            "[[mass]]\nname = \"{name}\"\nmass = \"1 kg\"\n\n\
+             [[spring]]\nbetween = [\"{name}\", \"{before}\"]\nstiffness = \"1 MN/m\"\ndamping = \"1 kg/s\"\n\n"
+        )
+    };
+    let chain: String = (1..=masses).map(one).collect();
+    let text = format!(
+        "schema = 1\n\n{chain}[[joint]]\nname = \"j\"\nbetween = [\"m1\", \"ground\"]\n\
+         law = {{ kind = \"jenkins\", stiffness = \"1 MN/m\", limit = \"1 N\" }}\n\n\
+         [[force]]\non = \"m1\"\namplitude = \"1 N\"\n\n\
+         [study]\nkind = \"branch\"\nsteps = 10\nfrequency = {{ from = \"1 Hz\", to = \"2 Hz\" }}\n"
+    );
+    let size = ModelSummary::new(&study(&text)).unwrap().size;
+    // 16 harmonics of 16 bytes and the start, what is measured of each mass, 40 kB of the joint
+    let kept = 50.0 * (16.0 * 17.0 * 300.0 + 100.0 * 300.0 + 40.0 * 1024.0);
+    assert!((kept..3.0 * kept).contains(&(size.memory as f64)), "{} {kept}", size.memory);
+}
+
 #[test]
 fn sizes_are_those_of_the_tables() {
     let context = Context::unwatched(1);

@@ -1,5 +1,8 @@
 //! Branches of orbits by arc length, along the drive frequency or along a design parameter, around turning points.
 
+mod standing;
+
+use self::standing::Top;
 use super::keys::{HARMONICS, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples};
 use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
@@ -88,11 +91,13 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let branches = if along_parameter(costing.study) { costing.curves() } else { costing.cases };
     let steps = branches * values.count("steps").unwrap_or(100) as f64;
     let harmonics = values.count("harmonics").map(|h| h as f64);
+    let length = harmonics.unwrap_or(HARMONICS as f64);
+    let samples = values.count("samples").unwrap_or(SERIES_SAMPLES) as f64;
     let rows = steps * POINTS;
     Cost {
         tables: vec![costing.orbits(rows), Shape { rows: branches * MARKS, numbers: costing.varied + 2.0, words: 0.0 }],
         drawn: rows * costing.places,
-        unit: rows / branches * costing.series_bytes(harmonics.unwrap_or(HARMONICS as f64)),
+        unit: rows / branches * costing.kept_series_bytes(length, samples) + costing.series_bytes(length),
         work: rows * costing.extra() + steps * FOLLOWED * costing.series(harmonics),
     }
 }
@@ -179,9 +184,9 @@ fn compute(work: &Work<'_>) -> Computed {
         Summary::of(prepared, &point.orbit, stable).write(prepared, &mut rows);
         rows.end();
     }
-    for (value, height) in &branch.peaks {
-        begin(&mut peaks, *value);
-        peaks.number("amplitude_m", *height);
+    for (value, height) in peaks_of(&branch, &places) {
+        begin(&mut peaks, value);
+        peaks.number("amplitude_m", height);
         peaks.reduced(prepared.system.reduction_evidence());
         peaks.end();
     }
@@ -202,6 +207,26 @@ fn compute(work: &Work<'_>) -> Computed {
     }
     part.tables = vec![rows, peaks, turns];
     Ok(part)
+}
+
+/// The peaks of a branch that stand out by more than the error of its rows.
+fn peaks_of(branch: &Branch, places: &[usize]) -> Vec<(f64, f64)> {
+    let heights: Vec<f64> = branch.points.iter().map(|point| worst(&point.orbit, places)).collect();
+    let errors: Vec<f64> =
+        branch.points.iter().map(|point| point.orbit.evidence.truncation.unwrap_or(f64::NAN)).collect();
+    // a peak stands between the neighbours of the row that is next to it
+    let near = |row: usize, (value, height): (f64, f64)| {
+        let [a, b, c] = [row - 1, row, row + 1].map(|row| branch.points[row].value);
+        (a.min(b).min(c)..=a.max(b).max(c)).contains(&value)
+            && heights[row] >= heights[row - 1]
+            && heights[row] > heights[row + 1]
+            && height >= heights[row]
+    };
+    let mut rows = 1..heights.len().saturating_sub(1);
+    let place = |peak: &(f64, f64)| rows.find(|row| near(*row, *peak)).map(|row| Top { row, height: peak.1 });
+    let Some(tops) = branch.peaks.iter().map(place).collect::<Option<Vec<Top>>>() else { return branch.peaks.clone() };
+    let kept = standing::out(&tops, &heights, &errors);
+    branch.peaks.iter().zip(kept).filter(|(_, kept)| *kept).map(|(peak, _)| *peak).collect()
 }
 
 /// The method that solves the series of a branch.
