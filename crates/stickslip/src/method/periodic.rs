@@ -256,7 +256,7 @@ const ITERATIONS: usize = 60;
 /// Times that the transient is let die before the search is given up.
 const RESCUES: usize = 6;
 /// Halvings of a Newton step before the transient is let die instead.
-const HALVINGS: usize = 4;
+const HALVINGS: i32 = 4;
 /// Returns by which the transient dies between Newton attempts.
 const RETURNS: usize = 40;
 /// A state this many times larger than rest (10^7 times what the loads do statically) is no orbit that could be checked.
@@ -323,6 +323,16 @@ fn nearer(map: &mut dyn ReturnMap, closed: Closed, aim: Aim) -> Result<Closed, O
 /// shortened steps have success the residual of the whole ones grows to less than twice.
 const WILD: f64 = 3.0;
 
+/// Share of the residual that a whole step leaves before a double root: a quarter where the distance is halved, a third where the period begins in slip.
+/// Such a root is the edge of a continuum of stick offsets: a motion that creeps towards it slips by the square of what is missing, so that the residual
+/// is at rounding where half of the digits are, and what slip is left fails the energy balance.
+const HALVES: std::ops::Range<f64> = 0.2..0.4;
+/// After two such steps in a row, how many of them are taken at once: two to the root, and a little on to where the contact sticks. What returns from
+/// there is at rest.
+const ONTO: f64 = 2.125;
+/// Share of the residual that this must leave at most: a contact that sticks leaves nothing, one that slips on the other side some thousandths.
+const MOSTLY: f64 = 1e-3;
+
 /// What is done where a whole step multiplies the residual by more than [`WILD`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Beyond {
@@ -348,6 +358,7 @@ pub(crate) fn descended(
     let mut derivative = DMatrix::identity(n, n);
     let mut gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
     let mut left = None; // where the bold step began, until another has come nearer than that
+    let mut shares = [1.0; 2]; // of the residual, which the last two steps left
     loop {
         *iterations += 1;
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
@@ -364,13 +375,20 @@ pub(crate) fn descended(
         let mut accepted = false;
         if residual > aim.residual && *iterations < ITERATIONS {
             let step = newton_step(&derivative, &gap, aim.sign, map.weights());
-            let mut fraction = 1.0;
-            for _ in 0..=HALVINGS {
-                let trial: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + fraction * d).collect();
+            let onto = shares.iter().all(|share| HALVES.contains(share)).then_some((ONTO, MOSTLY));
+            let shorter = (0..=HALVINGS).map(|halvings| (0.5f64.powi(halvings), DECREASE));
+            for (fraction, enough) in onto.into_iter().chain(shorter) {
+                let mut trial: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + fraction * d).collect();
+                if fraction > 1.0 {
+                    if map.returned(&mut trial, None).is_err() {
+                        continue;
+                    }
+                    trial.iter_mut().for_each(|z| *z *= aim.sign);
+                }
                 let mut trial_derivative = DMatrix::identity(n, n);
                 if let Ok(trial_gap) = evaluate(map, &trial, aim, &mut trial_derivative) {
                     let after = norm(map.weights(), trial_gap.as_slice());
-                    let less = after <= DECREASE * before;
+                    let less = after <= enough * before;
                     if less || (bold && fraction == 1.0 && after <= WILD * before) {
                         if !less {
                             (bold, left) = (false, Some((state, before, gap, derivative)));
@@ -378,14 +396,14 @@ pub(crate) fn descended(
                             left = None;
                         }
                         (state, gap, derivative) = (trial, trial_gap, trial_derivative);
+                        shares = [shares[1], if fraction == 1.0 { after / before } else { 1.0 }];
                         accepted = true;
                         break;
                     }
-                    if beyond == Beyond::Ends && after > WILD * before {
+                    if beyond == Beyond::Ends && fraction <= 1.0 && after > WILD * before {
                         break;
                     }
                 }
-                fraction *= 0.5;
             }
         }
         if !accepted {

@@ -285,7 +285,7 @@ impl Solver for Exact<'_> {
 mod tests {
     use super::*;
     use crate::law::Coulomb;
-    use crate::model::{Force, GROUND, Mass, Model, Spring, example};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
 
     /// The return at 8 N begins in stick, and that of the neighbour's state in slip: one step goes across the kink between them, and the orbit is
     /// the same as from below, from above and from a guess.
@@ -304,6 +304,32 @@ mod tests {
             for (one, other) in warm.places.iter().zip(&cold.places) {
                 let apart = (one.amplitude() / other.amplitude() - 1.0).abs();
                 assert!(apart < 6e-11, "{}: {apart:.1e} from {neighbour} Hz", one.name);
+            }
+        }
+    }
+
+    /// A load whose peak passes the slip limit shifts a mass on rigid friction until a spring takes the rest: it creeps towards that place, slower and
+    /// slower, and the orbit is one that sticks between `(peak - limit) / k` and `(trough + limit) / k`.
+    #[test]
+    fn what_creeps_until_it_sticks_sticks() {
+        let (stiffness, limit) = (1e4, 3.7);
+        for (damping, excess, omega) in [(0.5, 1e-3, 20.0), (5.0, 0.06, 64.0), (13.0, 0.3, 95.0), (50.0, 1.0, 150.0)] {
+            for (constant, phase) in [(1.46, 0.0), (1.46, 0.7), (1.2, 2.5)] {
+                let peak = limit + excess;
+                let between = || ["m".to_owned(), GROUND.to_owned()];
+                let force = |amplitude: f64, harmonic: u32| Force { on: "m".into(), amplitude, phase, harmonic };
+                let model = Model {
+                    masses: vec![Mass::new("m", 1.0)],
+                    springs: vec![Spring { between: between(), stiffness, damping }],
+                    joints: vec![Joint { name: "j".into(), between: between(), law: Arc::new(Coulomb { limit }) }],
+                    forces: vec![Force { phase: 0.0, ..force(constant, 0) }, force(peak - constant, 1)],
+                    ..Model::default()
+                };
+                let orbit = EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(omega, None);
+                let orbit = orbit.unwrap_or_else(|error| panic!("{damping} {excess} {omega} {constant}: {error}"));
+                let place = &orbit.places[0];
+                let stuck = excess / stiffness..(2.0 * constant - excess) / stiffness;
+                assert!(place.amplitude() < 1e-15 && stuck.contains(&place.mean), "{place:?} {stuck:?}");
             }
         }
     }
