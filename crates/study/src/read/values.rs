@@ -9,6 +9,7 @@ use crate::near::{nearest, one_of, shown};
 use crate::schema::{self, Key, MOST_POINTS, Presence, Takes};
 use crate::statement::{Quantity, Stated, StatedEntry, StatedTable, Weights};
 use crate::values::Given;
+use std::ops::RangeInclusive;
 use stickslip::model::{NEXT, is_identifier, is_place};
 
 impl Reader {
@@ -114,15 +115,7 @@ impl Reader {
                 Some(Stated::Quantity { quantity, dimension, within, example })
             }
             (Takes::Count(from, to), Content::Number { whole: Some(whole), .. }) => {
-                if (*from..=*to).contains(whole) {
-                    return Some(Stated::Fixed(Given::Count(u64::try_from(*whole).unwrap_or(0))));
-                }
-                let message = format!("expected {}, found {whole}", schema::described(&key.takes));
-                let problem = Problem::new(&node.location, key.name, message);
-                let limit = key.name == "points" && *to == MOST_POINTS as i64 && whole > to;
-                let help = limit.then(|| format!("the limit of a study is {MOST_POINTS} points"));
-                self.problems.push(problem.maybe_help(help));
-                None
+                self.count(key, *whole, *from..=*to, &node.location)
             }
             (Takes::Flag, Content::Flag(flag)) => Some(Stated::Fixed(Given::Flag(*flag))),
             (Takes::Frequencies(_), Content::Text { .. } | Content::Number { .. }) => {
@@ -132,20 +125,7 @@ impl Reader {
                 Some(Stated::List(self.quantities(key.name, list, &node.location)?))
             }
             (Takes::Frequencies(_), Content::Table(table)) if table.get("tolerance").is_some() => {
-                let before = self.problems.len();
-                let mut stated = self.table(table, schema::ADAPTIVE, &format!("the range of `{}`", shown(key.name)));
-                let mut take = |key: &str| {
-                    let at = stated.entries.iter().position(|entry| entry.key == key)?;
-                    match stated.entries.swap_remove(at).value {
-                        Stated::Quantity { quantity, .. } => Some(quantity),
-                        _ => None,
-                    }
-                };
-                let (from, to, tolerance) = (take("from"), take("to"), take("tolerance"));
-                if self.problems.len() > before {
-                    return None;
-                }
-                Some(Stated::Adaptive { from: from?, to: to?, tolerance: tolerance? })
+                self.adaptive(key, table)
             }
             (Takes::Frequencies(keys), Content::Table(table)) => {
                 let (from, to, points) = self.range(table, keys, key.name)?;
@@ -178,14 +158,14 @@ impl Reader {
                 Some(Stated::Sums(vec![self.weights(key, table)?]))
             }
             (Takes::Weights, Content::List(list)) if !list.is_empty() => {
-                let mut sums = Vec::with_capacity(list.len());
-                for node in list {
-                    match &node.value {
-                        Content::Table(table) if !table.entries.is_empty() => sums.push(self.weights(key, table)?),
-                        _ => return self.wrong_type(key, node),
+                let sum = |node: &Node| match &node.value {
+                    Content::Table(table) if !table.entries.is_empty() => self.weights(key, table),
+                    _ => {
+                        self.wrong_type(key, node);
+                        None
                     }
-                }
-                Some(Stated::Sums(sums))
+                };
+                Some(Stated::Sums(list.iter().map(sum).collect::<Option<_>>()?))
             }
             (Takes::Vector, Content::List(list)) if list.len() == 3 => {
                 Some(Stated::Vector(self.quantities(key.name, list, &node.location)?))
@@ -204,6 +184,38 @@ impl Reader {
             }
             _ => self.wrong_type(key, node),
         }
+    }
+
+    /// A whole number within limits.
+    fn count(&mut self, key: &Key, whole: i64, within: RangeInclusive<i64>, location: &Location) -> Option<Stated> {
+        if within.contains(&whole) {
+            return Some(Stated::Fixed(Given::Count(u64::try_from(whole).unwrap_or(0))));
+        }
+        let message = format!("expected {}, found {whole}", schema::described(&key.takes));
+        let problem = Problem::new(location, key.name, message);
+        let most = *within.end();
+        let limit = key.name == "points" && most == MOST_POINTS as i64 && whole > most;
+        let help = limit.then(|| format!("the limit of a study is {MOST_POINTS} points"));
+        self.problems.push(problem.maybe_help(help));
+        None
+    }
+
+    /// A range whose points follow the curve.
+    fn adaptive(&mut self, key: &Key, table: &Table) -> Option<Stated> {
+        let before = self.problems.len();
+        let mut stated = self.table(table, schema::ADAPTIVE, &format!("the range of `{}`", shown(key.name)));
+        let mut take = |key: &str| {
+            let at = stated.entries.iter().position(|entry| entry.key == key)?;
+            match stated.entries.swap_remove(at).value {
+                Stated::Quantity { quantity, .. } => Some(quantity),
+                _ => None,
+            }
+        };
+        let (from, to, tolerance) = (take("from"), take("to"), take("tolerance"));
+        if self.problems.len() > before {
+            return None;
+        }
+        Some(Stated::Adaptive { from: from?, to: to?, tolerance: tolerance? })
     }
 
     pub(super) fn unknown_word(&mut self, key: &str, word: &str, location: &Location, words: Vec<&str>) {
