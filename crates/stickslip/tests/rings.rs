@@ -1,11 +1,11 @@
-//! Rings of many nodes, each in contact with the next along two or three directions.
+//! Rings of many nodes, each in contact with the next along one to three directions.
 
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use stickslip::law::{BoucWen, Dahl, FrictionContact, Jenkins2d, SharedLaw};
+use stickslip::law::{BoucWen, Dahl, FrictionContact, Jenkins, Jenkins2d, SharedLaw};
 use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
-use stickslip::model::{Axis, System};
+use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::Orbit;
 use stickslip::structure::Structure;
 use stickslip_numerics::sparse::Matrix;
@@ -91,4 +91,52 @@ fn laws_of_rates() {
     let bouc_wen = BoucWen { stiffness: 1e4, beta: 2e3, gamma: 1e3, exponent: 1.0 };
     check(1, Arc::new(bouc_wen), 200, &OMEGAS[1..3]);
     check(1, Arc::new(Dahl { stiffness: 1e4, limit: 3.0 }), 200, &OMEGAS[1..3]);
+}
+
+/// Blades whose springs are spread by 2 %, without a pattern, with a damper between each and the next, under engine order 5.
+fn mistuned(blades: usize) -> System {
+    let mut model = Model::default();
+    let name = |i: usize| format!("b{}", i % blades);
+    // an odd multiplier modulo 2^32 (Knuth), summed to a spread with a standard deviation of one
+    let mut state = 12345u32;
+    let mut uniform = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state) / 2f64.powi(32)
+    };
+    for i in 0..blades {
+        let spread = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+        model.masses.push(Mass::new(name(i), 0.2));
+        let stiffness = 1e5 * (1.0 + 0.02 * spread);
+        model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness, damping: 0.5 });
+        let phase = TAU * 5.0 * i as f64 / blades as f64;
+        model.forces.push(Force { on: name(i), amplitude: 5.0, phase, harmonic: 1 });
+        let law = Arc::new(Jenkins { stiffness: 2e4, limit: 2.0 });
+        model.joints.push(Joint { name: format!("j{i}"), between: [name(i), name(i + 1)], law });
+    }
+    model.assemble().unwrap()
+}
+
+/// Newton iterations of a point, each started from the one `step` Hz before: mean and most.
+fn iterations(blades: usize, from: f64, step: f64, points: u32) -> (f64, usize) {
+    let system = mistuned(blades);
+    let method = HarmonicBalance { harmonics: Some(5), samples: None, tolerance: Some(0.1) };
+    let mut solver = method.solver(&system).unwrap();
+    let mut start = solver.orbit(TAU * from, None).unwrap().start;
+    let counts: Vec<usize> = (1..=points)
+        .map(|i| {
+            let orbit = solver.orbit(TAU * (from + step * f64::from(i)), Some(&start)).unwrap();
+            start = orbit.start;
+            orbit.evidence.iterations
+        })
+        .collect();
+    (counts.iter().sum::<usize>() as f64 / f64::from(points), counts.into_iter().max().unwrap())
+}
+
+/// The more dampers, the more of them begin to slip or to stick between two points: they are settled by themselves, and the ring takes no more steps.
+#[test]
+fn steps_do_not_grow_with_the_blades() {
+    let [(few, _), (mean, most)] = [24, 96].map(|blades| iterations(blades, 113.5, 0.05, 12));
+    assert!(mean <= 1.5 * few && most <= 10, "{few}, {mean}, {most}");
+    let (mean, most) = iterations(192, 113.5, 0.05, 12);
+    assert!(mean <= 2.0 * few && most <= 12, "{few}, {mean}, {most}");
 }

@@ -29,12 +29,13 @@ use super::ports::{Alternation, Beginning, Member, Port, Ports, REPEATS, block, 
 use super::receptance::{Formed, Modal, Receptance};
 use super::rest::Rest;
 use super::sparse::Sparse;
+use super::window::Settling;
 use crate::method::guess::Guess;
 use crate::model::{Cyclic, System};
 use nalgebra::DVector;
 use num_complex::Complex64;
 pub(super) use yardsticks::penalty;
-use yardsticks::weight;
+pub(super) use yardsticks::weight;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -75,13 +76,15 @@ pub(super) struct Level {
     /// Compliances in series with the axes, m/N.
     series: Vec<f64>,
     /// Stiffness of closed contacts along the axes (N/m) that the structure has for the mean; empty if it is held without them.
-    springs: Vec<f64>,
+    pub(super) springs: Vec<f64>,
     /// What acts on it: forces less those of these springs, [axis][harmonic], N.
     acting: Vec<Complex64>,
     /// Motion of all places without friction, per harmonic.
     pub free: Vec<DVector<Complex64>>,
     /// In place of receptance and Jacobian, for large systems.
     pub sparse: Option<Sparse>,
+    /// What settling contacts by themselves keeps, where that is possible.
+    pub(super) settling: Option<Settling>,
     /// In place of the Jacobian, for many joints that the structure couples.
     pub(super) coupled: Option<Coupled>,
     /// Whether its matrix is needed, and with it receptances as matrices.
@@ -210,6 +213,7 @@ impl Level {
             blocks,
             forces: ports.iter().flat_map(|port| vec![port.is_force(); port.axes]).collect(),
             jacobian: Vec::new(),
+            settling: None,
             coupled: None,
             with_matrix: false,
             products: 0,
@@ -575,6 +579,9 @@ impl Level {
         (self.assembled, self.eliminated, self.products, self.alternation.marched) = (0, 0, 0, 0);
         (self.spent, self.elsewhere) = (Work::default(), Work::default());
         self.prolongs = false;
+        if let Some(settling) = &mut self.settling {
+            settling.helps = true;
+        }
     }
 
     /// Begins a search, which knows nothing of the laws' memories.

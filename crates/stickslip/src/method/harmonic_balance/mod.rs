@@ -19,6 +19,7 @@ mod balance;
 mod branch;
 mod budget;
 mod closed;
+mod clusters;
 mod coupled;
 mod ease;
 mod equations;
@@ -45,6 +46,7 @@ mod storage;
 mod subharmonic;
 mod uncoupled;
 mod waves;
+mod window;
 mod work;
 
 use super::{Method, MethodError, MethodInfo, MethodOption, Options, PERIOD, Solver, periods};

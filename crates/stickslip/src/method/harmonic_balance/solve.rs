@@ -187,6 +187,7 @@ impl Level {
             let beaten = if rough { recent.iter().fold(residual, |most, r| most.max(*r)) } else { residual };
             let mut fraction = 1.0;
             let mut after = f64::INFINITY;
+            let settles = self.can_settle(ports);
             for halving in 0..=HALVINGS + 1 {
                 if halving > HALVINGS {
                     fraction = 1.0;
@@ -195,6 +196,13 @@ impl Level {
                 after = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
                 if after < (1.0 - SHORTENS * fraction) * beaten || self.is_exhausted(ports) {
                     break;
+                }
+                if settles && halving == 0 && after.is_finite() {
+                    // most contacts may be where the step leads them: those that are not take steps of their own
+                    if let Some(settled) = self.settle(ports, (omega, ease), motion, (length, beaten)) {
+                        after = settled;
+                        break;
+                    }
                 }
                 fraction *= 0.5;
             }

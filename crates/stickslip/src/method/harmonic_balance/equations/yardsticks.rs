@@ -75,6 +75,6 @@ pub fn penalty(receptance: f64, top: usize, omega: f64) -> f64 {
 }
 
 /// Weight of a harmonic in norms: that of its velocity.
-pub(super) fn weight(h: usize) -> f64 {
+pub(in super::super) fn weight(h: usize) -> f64 {
     ((h * h) as f64).max(1.0)
 }
