@@ -116,6 +116,14 @@ const LONG_RUN: f64 = 3600.0;
 /// Degrees of freedom beyond which only the first case is looked at, so that a summary takes no longer than a second.
 const LARGE: usize = 60;
 
+/// Times the excitation, beyond which the first slip is one by rounding: what symmetry keeps from a joint loads it by the last digits of the others.
+const UNLOADED: f64 = 1e6;
+
+/// What the excitation does to a joint as a share of its limit, zero where that is rounding.
+fn load(onset: &Onset) -> f64 {
+    if onset.largest * UNLOADED < 1.0 { 0.0 } else { onset.largest }
+}
+
 impl ModelSummary {
     /// Summarises a study.
     ///
@@ -209,8 +217,8 @@ impl ModelSummary {
                 "pressed_N": joint.pressed,
                 "pressed_at_rest_N": joint.at_rest,
                 "slip_displacement_m": joint.displacement.filter(|displacement| displacement.is_finite()),
-                "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / onset.largest).filter(|x| x.is_finite()),
-                "most_loaded_at_Hz": joint.onset.as_ref().map(|onset| onset.at / TAU),
+                "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / load(onset)).filter(|x| x.is_finite()),
+                "most_loaded_at_Hz": joint.onset.as_ref().filter(|onset| load(onset) > 0.0).map(|onset| onset.at / TAU),
                 "slips_Hz": joint.onset.as_ref()
                     .map(|onset| onset.slips.iter().map(|(a, b)| [a / TAU, b / TAU]).collect::<Vec<_>>()),
             })

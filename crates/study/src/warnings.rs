@@ -6,7 +6,7 @@ use crate::values::{Frequencies, Values};
 use crate::words::{quantity, significant};
 use std::f64::consts::TAU;
 use stickslip::curve::modes::unit;
-use stickslip::model::{LinearMode, Modes};
+use stickslip::model::{Cyclic, LinearMode, Modes};
 
 /// Of a kind that needs something to drive the motion.
 pub(crate) fn driven(cases: &[Surveyed]) -> Vec<String> {
@@ -108,6 +108,11 @@ fn coarse(cases: &[Surveyed]) -> Option<String> {
     let Some(Frequencies::Range { points, .. }) = cases[0].case.frequencies else { return None };
     // what is said holds for every case
     let narrow = cases.iter().map(narrowest).collect::<Option<Vec<Narrow>>>()?;
+    // modes by nodal diameter take time, so that they are sought where something is to be said
+    let narrow = match cases.iter().any(|one| one.case.model.ring.is_some_and(|ring| ring.order.is_some())) {
+        true => cases.iter().map(narrowest_met).collect::<Option<Vec<Narrow>>>()?,
+        false => narrow,
+    };
     let Narrow { at, width, points: enough } = narrow.into_iter().max_by(|a, b| a.points.total_cmp(&b.points))?;
     let (from, to) = range(&cases[0].case)?;
     let hertz = |omega: f64, digits: i32| significant(omega / TAU, digits);
@@ -132,16 +137,44 @@ fn narrowest(one: &Surveyed) -> Option<Narrow> {
     if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
         return None; // not known
     }
+    let all = one.survey.harmonics().into_iter().flat_map(|harmonic| resonances(free, stuck, harmonic));
+    narrowest_of(all, (from, to, points))
+}
+
+/// The same of a tuned disk in a travelling wave, where each harmonic of the excitation meets the modes of one nodal diameter.
+fn narrowest_met(one: &Surveyed) -> Option<Narrow> {
+    let Some(Frequencies::Range { from, to, points }) = one.case.frequencies else { return None };
+    let ring = one.case.model.ring.filter(|ring| ring.equal);
+    let Some((sectors, order)) = ring.and_then(|ring| Some((ring.sectors, ring.order?))) else {
+        return narrowest(one);
+    };
+    let harmonics = one.survey.harmonics();
+    let highest = to * f64::from(*harmonics.last()?);
+    let below = |modes: &Modes| modes.elastic.iter().filter(|mode| mode.omega <= highest).count();
+    let most = below(one.survey.free()).max(below(one.survey.stuck()));
+    let Ok(Some(waves)) = one.case.model.wave_modes(most) else { return narrowest(one) };
+    let met = |harmonic: u32| {
+        let turns = Cyclic { sectors, order }.diameter(harmonic as usize);
+        waves.iter().find(|wave| wave.diameter == turns.min(sectors - turns))
+    };
+    let of = |harmonic: u32| met(harmonic).map(|wave| resonances(&wave.free, &wave.stuck, harmonic));
+    narrowest_of(harmonics.iter().filter_map(|harmonic| of(*harmonic)).flatten(), (from, to, points))
+}
+
+/// The drive frequencies at which a harmonic meets the modes, joints free and stuck in their order, the lower and the higher one with the width, rad/s.
+fn resonances(free: &Modes, stuck: &Modes, harmonic: u32) -> Vec<(f64, f64, f64)> {
     let width = |mode: &LinearMode| 2.0 * mode.damping * mode.omega;
     let paired = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
-    let harmonics = one.survey.harmonics();
-    let all = paired.flat_map(|(free, stuck)| {
+    let h = f64::from(harmonic);
+    let between = |(free, stuck): (&LinearMode, &LinearMode)| {
         let width = width(free).max(width(stuck));
-        harmonics.iter().map(|h| f64::from(*h)).map(move |h| {
-            let (low, high) = (free.omega.min(stuck.omega) / h, free.omega.max(stuck.omega) / h);
-            (low, high, width / h)
-        })
-    });
+        (free.omega.min(stuck.omega) / h, free.omega.max(stuck.omega) / h, width / h)
+    };
+    paired.map(between).collect()
+}
+
+/// The narrowest of these within a range of frequencies, if it is narrower than their distance.
+fn narrowest_of(all: impl Iterator<Item = (f64, f64, f64)>, (from, to, points): (f64, f64, usize)) -> Option<Narrow> {
     // without damping there is no width, and where friction bounds the motion it is that of friction
     let inside = all.filter(|(low, high, width)| *low >= from && *high <= to && *width > 0.0);
     let (at, _, width) = inside.min_by(|a, b| a.2.total_cmp(&b.2))?;

@@ -819,3 +819,41 @@ fn wedges_that_nothing_presses() {
     let words = ["nothing holds `wedge_0.x`", "`face1_0`, `face2_0`", "and 18 more touch them", "no preload presses"];
     warns(&template("under-platform-wedge", &[edit, alone]), &words);
 }
+
+#[test]
+fn a_tuned_disk_is_warned_of_the_nodal_diameters_that_its_excitation_meets() {
+    // with three nodal diameters the disk has a mode at 99 Hz free and 101 Hz stuck, with two and four none from 96 to 104 Hz
+    let disk = |order: i32, more: &str| {
+        format!(
+            "schema = 1\nmodel = {{ template = \"bladed-disk\" }}\n[parameters]\nEO = {order}\n[study]\nkind = \"response\"\npeak_of = \"blade\"\n\
+             frequency = {{ from = \"96 Hz\", to = \"104 Hz\", points = 9 }}\n{more}"
+        )
+    };
+    for order in [3, -3, 21, 27] {
+        warns(&disk(order, ""), &["1 Hz apart", "the resonance at 99.253 Hz", "may step over it"]);
+    }
+    for order in [2, 4] {
+        silent(&disk(order, ""));
+    }
+    // blades that differ answer with all of them
+    let mistuned = "[disk]\nsectors = 24\nmistuning = { of = \"kb\", deviation = \"1 %\", seed = 7 }\n";
+    warns(&disk(2, mistuned), &["may step over it"]);
+}
+
+#[test]
+fn what_only_rounding_loads_does_not_slip() {
+    let first = |amplitude: &str| {
+        let text = format!(
+            "schema = 1\nmodel = {{ template = \"bladed-disk\" }}\n[parameters]\nEO = 0\nF0 = \"{amplitude}\"\n[study]\nkind = \"response\"\n\
+             peak_of = \"blade\"\nfrequency = {{ from = \"96 Hz\", to = \"104 Hz\", points = 801 }}\n"
+        );
+        let summary = summary(&text);
+        assert!(summary.to_json()["joints"][0]["slips_at_excitation_times"].is_null(), "{}", summary.to_json());
+        summary.to_string()
+    };
+    // all blades move alike, so that no shroud is loaded
+    let rounding = first("1 N");
+    assert!(rounding.contains("sticks, under a million times the excitation too"), "{rounding}");
+    let none = first("0 N");
+    assert!(none.contains("the excitation does not reach it"), "{none}");
+}

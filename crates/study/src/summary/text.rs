@@ -1,6 +1,6 @@
 //! The summary in words, for a terminal.
 
-use super::{JointSummary, ModelSummary, Orbits};
+use super::{JointSummary, ModelSummary, Orbits, load};
 use crate::words::{bytes_text, plural, quantity, significant};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
@@ -86,6 +86,8 @@ impl ModelSummary {
         let factor = significant(1.0 / onset.largest, 3);
         if onset.largest == 0.0 {
             text += "; the excitation does not reach it";
+        } else if load(onset) == 0.0 {
+            text += "; sticks, under a million times the excitation too";
         } else if onset.slips.is_empty() {
             text += &format!("; sticks; {factor} times the excitation would make it slip{at}");
         } else if several {
@@ -169,7 +171,7 @@ impl fmt::Display for ModelSummary {
         if lines > LISTED {
             let mut loads: BTreeMap<&str, f64> = BTreeMap::new();
             for joint in &self.joints {
-                let load = joint.onset.as_ref().map_or(0.0, |onset| onset.largest);
+                let load = joint.onset.as_ref().map_or(0.0, load);
                 let most = loads.entry(whole(&joint.name)).or_default();
                 *most = most.max(equalised(load));
             }
