@@ -178,10 +178,18 @@ pub const fn default(
 const FROM: Key =
     required("from", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "first value", "\"119 Hz\"");
 const TO: Key = required("to", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "last value", "\"123 Hz\"");
+const POINTS: Key =
+    required("points", Takes::Count(2, MOST_POINTS as i64), "number of values, both ends included", "241");
 
 /// Keys of the range of a frequency.
-pub const RANGE: &[Key] =
-    &[FROM, TO, required("points", Takes::Count(2, MOST_POINTS as i64), "number of values, both ends included", "241")];
+pub const RANGE: &[Key] = &[FROM, TO, POINTS];
+
+/// Keys of the range of a speed, which may begin at rest.
+pub const SPEEDS: &[Key] = &[
+    required("from", Takes::Quantity(Dimension::FREQUENCY, Within::AtLeastZero), "first value", "\"0 rpm\""),
+    TO,
+    POINTS,
+];
 
 /// Keys of a range of frequencies of which the ends count.
 pub const ENDS: &[Key] = &[

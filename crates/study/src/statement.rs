@@ -42,8 +42,8 @@ pub(crate) enum Stated {
     Fixed(Given),
     Names(Vec<(String, Location)>),
     Quantity { quantity: Quantity, dimension: Dimension, within: Within, example: &'static str },
-    List(Vec<Quantity>),
-    Range { from: Quantity, to: Quantity, points: usize },
+    List(Vec<Quantity>, Within),
+    Range { from: Quantity, to: Quantity, points: usize, within: Within },
     Adaptive { from: Quantity, to: Quantity, tolerance: Quantity },
     ByName(Vec<(String, Location, Quantity)>, Dimension),
     Vector(Vec<Quantity>),
@@ -196,24 +196,26 @@ impl Stated {
         environment: &Environment<'_>,
         problems: &mut Vec<Problem>,
     ) -> Result<Given, Problem> {
-        let frequency = (Dimension::FREQUENCY, Within::Positive);
         Ok(match self {
             Stated::Fixed(given) => given.clone(),
             Stated::Names(names) => Given::Names(names.iter().map(|(name, _)| name.clone()).collect()),
             Stated::Quantity { quantity, dimension, within, example } => {
                 Given::Quantity(quantity.number(key, (*dimension, *within), example, environment)?, *dimension)
             }
-            Stated::List(list) => {
+            Stated::List(list, within) => {
+                let frequency = (Dimension::FREQUENCY, *within);
                 let numbers = list.iter().map(|q| q.number(key, frequency, "\"121 Hz\"", environment));
                 Given::Frequencies(Frequencies::List(numbers.collect::<Result<_, _>>()?))
             }
-            Stated::Range { from, to, points } => {
+            Stated::Range { from, to, points, within } => {
+                let frequency = (Dimension::FREQUENCY, *within);
                 let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
                 let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
                 not_empty(start, end, to, Some(Dimension::FREQUENCY))?;
                 Given::Frequencies(Frequencies::Range { from: start, to: end, points: *points })
             }
             Stated::Adaptive { from, to, tolerance } => {
+                let frequency = (Dimension::FREQUENCY, Within::Positive);
                 let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
                 let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
                 not_empty(start, end, to, Some(Dimension::FREQUENCY))?;

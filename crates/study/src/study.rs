@@ -285,7 +285,7 @@ impl Study {
     /// Number of points: cases times frequencies.
     pub fn points(&self) -> usize {
         let frequencies = match self.study.entry("frequency").map(|entry| &entry.value) {
-            Some(Stated::List(list)) => list.len(),
+            Some(Stated::List(list, _)) => list.len(),
             Some(Stated::Range { points, .. }) => *points,
             Some(Stated::Adaptive { .. }) => stickslip::curve::adaptive::FIRST + 1,
             _ => 1,

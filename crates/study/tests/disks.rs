@@ -252,6 +252,17 @@ fn campbell_crossings() {
         assert_eq!(rows.len(), usize::from((20.0..200.0).contains(&speed)), "{order} {speed}");
         assert!(rows.iter().all(|row| (speeds[*row] / speed - 1.0).abs() < 1e-9), "{order}");
     }
+    // a diagram from rest has the same, though no line of an engine order leaves zero for a mode there
+    let from_rest = kind.replace("20 Hz\", to = \"200 Hz\", points = 7", "0 rpm\", to = \"12000 rpm\", points = 11");
+    let same = crossings(&format!("{plain}{from_rest}"));
+    let others = (same.integers("engine_order").unwrap(), same.numbers("speed_Hz").unwrap());
+    for (order, speed) in orders.iter().zip(speeds) {
+        let mut near = others.0.iter().zip(others.1).filter(|(other, _)| *other == order);
+        assert!(near.any(|(_, other)| (other / speed - 1.0).abs() < 1e-9), "{order} {speed}");
+    }
+    let negative = from_rest.replace("0 rpm", "-1 rpm");
+    let error = read_study("c.toml", &format!("{plain}{negative}"), &[]).unwrap_err();
+    assert!(error.message().contains("must be zero or more"), "{error}");
     let ring = crossings(&format!("{sector}[disk]\nsectors = 6\n{kind}"));
     let (orders, diameters) = (ring.integers("engine_order").unwrap(), ring.integers("nodal_diameter").unwrap());
     assert!(ring.rows() > 8);

@@ -11,7 +11,7 @@ use crate::dataset::{Figure, Panel, Series, Style, Table};
 use crate::drawing::{Drawing, Stretch, largest, numbers, words};
 use crate::draws;
 use crate::info::{Complaint, KindInfo};
-use crate::key::RANGE;
+use crate::key::SPEEDS;
 use crate::key::{Takes, default, required};
 use crate::kind::Kind;
 use crate::note::Note;
@@ -40,8 +40,8 @@ pub(super) const KIND: Kind = Kind {
         keys: &[
             required(
                 "speed",
-                Takes::Frequencies(RANGE),
-                "speeds of rotation, as frequencies",
+                Takes::Frequencies(SPEEDS),
+                "speeds of rotation, as frequencies, zero at rest",
                 "{ from = \"10 Hz\", to = \"120 Hz\", points = 56 }",
             ),
             default(

@@ -318,7 +318,7 @@ impl Reader {
         let cases = listed.fold(draws, |product, varied| product.saturating_mul(varied.points.len()));
         let frequency = study.entry("frequency");
         let frequencies = match frequency.map(|entry| &entry.value) {
-            Some(Stated::List(list)) => list.len(),
+            Some(Stated::List(list, _)) => list.len(),
             Some(Stated::Range { points, .. }) => *points,
             _ => 1,
         };

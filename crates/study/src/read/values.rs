@@ -6,7 +6,7 @@ use crate::document::{Content, Entry, Node, Table};
 use crate::error::{Location, Problem};
 use crate::expression::Expression;
 use crate::near::{nearest, one_of, shown};
-use crate::schema::{self, Key, MOST_POINTS, Presence, Takes};
+use crate::schema::{self, Key, MOST_POINTS, Presence, Takes, Within};
 use crate::statement::{Quantity, Stated, StatedEntry, StatedTable, Weights};
 use crate::values::Given;
 use std::ops::RangeInclusive;
@@ -118,18 +118,18 @@ impl Reader {
                 self.count(key, *whole, *from..=*to, &node.location)
             }
             (Takes::Flag, Content::Flag(flag)) => Some(Stated::Fixed(Given::Flag(*flag))),
-            (Takes::Frequencies(_), Content::Text { .. } | Content::Number { .. }) => {
-                Some(Stated::List(vec![self.quantity(key.name, node)?]))
+            (Takes::Frequencies(keys), Content::Text { .. } | Content::Number { .. }) => {
+                Some(Stated::List(vec![self.quantity(key.name, node)?], within(keys)))
             }
-            (Takes::Frequencies(_), Content::List(list)) => {
-                Some(Stated::List(self.quantities(key.name, list, &node.location)?))
+            (Takes::Frequencies(keys), Content::List(list)) => {
+                Some(Stated::List(self.quantities(key.name, list, &node.location)?, within(keys)))
             }
             (Takes::Frequencies(_), Content::Table(table)) if table.get("tolerance").is_some() => {
                 self.adaptive(key, table)
             }
             (Takes::Frequencies(keys), Content::Table(table)) => {
                 let (from, to, points) = self.range(table, keys, key.name)?;
-                Some(Stated::Range { from, to, points })
+                Some(Stated::Range { from, to, points, within: within(keys) })
             }
             (Takes::ByName(dimension), Content::Table(table)) => {
                 let mut names = Vec::new();
@@ -371,4 +371,10 @@ impl Reader {
             _ => None,
         }
     }
+}
+
+/// In which range the frequencies lie that a range with these keys may have.
+fn within(keys: &[Key]) -> Within {
+    let first = keys.iter().find(|key| key.name == "from").map(|key| key.takes);
+    if let Some(Takes::Quantity(_, within)) = first { within } else { Within::Positive }
 }

@@ -226,7 +226,7 @@ fn each_quantity(table: &StatedTable, each: &mut dyn FnMut(&'static str, &Quanti
             Stated::Quantity { quantity, dimension, .. } => each(entry.key, quantity, Some(*dimension)),
             Stated::Vector(parts) => parts.iter().for_each(|q| each(entry.key, q, Some(Dimension::NONE))),
             Stated::Sums(sums) => sums.iter().flatten().for_each(|(_, _, q)| each(entry.key, q, Some(Dimension::NONE))),
-            Stated::List(list) => list.iter().for_each(|q| each(entry.key, q, Some(Dimension::FREQUENCY))),
+            Stated::List(list, _) => list.iter().for_each(|q| each(entry.key, q, Some(Dimension::FREQUENCY))),
             Stated::Range { from, to, .. } => {
                 each(entry.key, from, None);
                 each(entry.key, to, None);
