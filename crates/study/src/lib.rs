@@ -5,6 +5,7 @@
 
 pub mod block;
 pub mod book;
+mod cause;
 mod columns;
 pub mod cost;
 pub mod dataset;

@@ -19,13 +19,14 @@ mod values;
 
 pub use template::TemplateParameter;
 
+use crate::cause;
 use crate::document::{self, Content, Node, Table};
 use crate::error::{Location, Problem, Source, StudyError};
 use crate::near::nearest;
 use crate::schema::{self, FILE, MOST_BYTES};
 use crate::stated::ModelStatement;
 use crate::statement::Stated;
-use crate::study::Study;
+use crate::study::{Study, stated};
 use crate::values::Given;
 use reader::Reader;
 use std::io::Read;
@@ -225,6 +226,14 @@ impl Reader {
         }
         let replaced = self.replace(&mut varied, &parameters, overrides);
         let order = self.order(&parameters, &varied)?;
+        let mut structure = structure?;
+        if let Some(template) = &mut structure.template {
+            let choice = varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
+            let stated = stated(&parameters, &choice);
+            let behind = |index: usize| cause::given(template.source, &stated, [index]);
+            let names = |index: usize| behind(index).into_iter().map(|index| self.names[index].clone()).collect();
+            template.given = (0..parameters.len()).map(names).collect();
+        }
         self.limit_points(&study, &varied, sample)?;
         let stem = Path::new(file).file_stem().and_then(|stem| stem.to_str()).unwrap_or("study").to_owned();
         Some(Study {
@@ -241,7 +250,7 @@ impl Reader {
             varied,
             sample,
             replaced,
-            structure: structure?,
+            structure,
             study,
             method: method?,
             figure,

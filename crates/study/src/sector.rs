@@ -48,7 +48,7 @@ pub(crate) fn sector_of(
         let before = problems.len();
         let values = table.values(environment, problems);
         if let Some(template) = template {
-            problems[before..].iter_mut().for_each(|problem| template.reword(element, problem));
+            problems[before..].iter_mut().for_each(|problem| template.reword(element, table, problem));
         }
         values
     };

@@ -6,6 +6,7 @@ use crate::names::Names;
 use crate::near::{nearest, one_of};
 use crate::statement::{Stated, StatedTable};
 use crate::stiffened::Stiffened;
+use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Element, Model, ModelError};
 use stickslip::structure::{Component, Node, Reduction, ReductionKind};
@@ -57,20 +58,38 @@ pub(crate) struct NamedTemplate {
     pub table: StatedTable,
     /// Its file among the sources.
     pub source: usize,
+    /// Of every parameter the names of those by which it is computed and that the study gives, itself among them.
+    pub given: Vec<Vec<String>>,
 }
 
 impl NamedTemplate {
     /// Rewords a problem in the template's file for a user who has not written it: at the location where the template is
     /// named.
-    pub fn reword(&self, element: Element, problem: &mut Problem) {
+    pub fn reword(&self, element: Element, table: &StatedTable, problem: &mut Problem) {
         if problem.location.source == self.source {
-            problem.message = self.blame(element, &problem.key, &problem.message);
+            problem.message = self.blame(element, Some(table), &problem.key, &problem.message);
             problem.location = self.table.location_of("template", None).clone();
         }
     }
 
-    pub fn blame(&self, element: Element, key: &str, message: &str) -> String {
-        format!("these parameters make {element} of the template wrong: `{key}` {message}")
+    /// What is wrong with an element, with the parameters behind what it states of a key.
+    fn blame(&self, element: Element, table: Option<&StatedTable>, key: &str, message: &str) -> String {
+        let (mut own, mut all) = (BTreeSet::new(), BTreeSet::new());
+        if let Some(table) = table {
+            table.each_quantity(&mut |of, quantity, _| {
+                let behind = quantity.expression.parameters().filter_map(|index| self.given.get(index)).flatten();
+                let names: Vec<String> = behind.map(|name| format!("`{name}`")).collect();
+                own.extend(names.iter().filter(|_| of == key).cloned());
+                all.extend(names);
+            });
+        }
+        let names: Vec<String> = if own.is_empty() { all } else { own }.into_iter().collect();
+        let who = match &names[..] {
+            [] => "these parameters make".to_owned(),
+            [one] => format!("the value of {one} makes"),
+            several => format!("the values of {} make", several.join(", ")),
+        };
+        format!("{who} {element} of the template wrong: `{key}` {message}")
     }
 }
 
@@ -153,7 +172,8 @@ pub(crate) fn problem_of(structure: &ModelStatement, error: &ModelError, model: 
         }
         Some(template) => {
             let location = template.table.location_of(if error.key == "law" { "law" } else { "template" }, None);
-            (location, template.blame(error.element, error.key, &error.message))
+            let table = index.and_then(|index| structure.lists.get(list).get(index));
+            (location, template.blame(error.element, table, error.key, &error.message))
         }
     };
     let places = model.place_names();

@@ -62,6 +62,34 @@ impl StatedTable {
         if self.turn.is_empty() { message.to_owned() } else { format!("{message} ({})", self.turn) }
     }
 
+    /// Calls `each` with the key, the quantity and its dimension (where the schema tells it) of every quantity in the table.
+    pub fn each_quantity(&self, each: &mut dyn FnMut(&'static str, &Quantity, Option<Dimension>)) {
+        for entry in &self.entries {
+            match &entry.value {
+                Stated::Fixed(_) | Stated::Names(_) => {}
+                Stated::Quantity { quantity, dimension, .. } => each(entry.key, quantity, Some(*dimension)),
+                Stated::Vector(parts) => parts.iter().for_each(|q| each(entry.key, q, Some(Dimension::NONE))),
+                Stated::Sums(sums) => {
+                    sums.iter().flatten().for_each(|(_, _, q)| each(entry.key, q, Some(Dimension::NONE)));
+                }
+                Stated::List(list, _) => list.iter().for_each(|q| each(entry.key, q, Some(Dimension::FREQUENCY))),
+                Stated::Range { from, to, .. } => {
+                    each(entry.key, from, None);
+                    each(entry.key, to, None);
+                }
+                Stated::Adaptive { from, to, tolerance } => {
+                    each(entry.key, from, None);
+                    each(entry.key, to, None);
+                    each(entry.key, tolerance, Some(Dimension::NONE));
+                }
+                Stated::ByName(list, dimension) => {
+                    list.iter().for_each(|(_, _, q)| each(entry.key, q, Some(*dimension)));
+                }
+                Stated::Law(_, table) | Stated::Table(table) => table.each_quantity(each),
+            }
+        }
+    }
+
     /// The location of a key's value, or of a name in it; the table's own if there is no such key.
     pub fn location_of(&self, key: &str, name: Option<&str>) -> &Location {
         let Some(entry) = self.entry(key) else { return &self.location };

@@ -1,5 +1,6 @@
 //! A study that has been read: its cases, each with its model and the values of its kind.
 
+use crate::cause;
 use crate::disk::{self, Again};
 use crate::error::{Location, Problem, Source, StudyError};
 use crate::expression::{Value, displayed};
@@ -607,7 +608,8 @@ impl Study {
         let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed.as_slice()) {
             Ok(values) => values,
             Err(problem) => {
-                problems.push(problem);
+                let template = self.structure.template.as_ref().map(|template| template.source);
+                problems.push(cause::blame(problem, template, &self.names, &stated(&self.parameters, &choice)));
                 return None;
             }
         };
@@ -738,6 +740,23 @@ pub(crate) fn evaluate(
         };
     }
     Ok(environment.values)
+}
+
+/// The parameters as they are stated, with the choices made for the varied ones.
+pub(crate) fn stated<'a>(
+    parameters: &'a [Parameter],
+    choice: &HashMap<usize, (&'a Varied, usize)>,
+) -> Vec<cause::Stated<'a>> {
+    let of = |quantity: &'a Quantity| {
+        let Quantity { text, location, expression, .. } = quantity;
+        cause::Stated { text, location, expression: Some(expression) }
+    };
+    let one = |(index, parameter): (usize, &'a Parameter)| match choice.get(&index) {
+        None => of(&parameter.quantity),
+        Some((Varied { points: VariedPoints::List(list), .. }, point)) => of(&list[*point]),
+        Some((varied, _)) => cause::Stated { text: "one of its values", location: &varied.location, expression: None },
+    };
+    parameters.iter().enumerate().map(one).collect()
 }
 
 /// The model: what the lists state, or the ring of which they state a sector. `again` tells the parameters with some of them changed.

@@ -484,3 +484,27 @@ fn large_files_are_read_in_reasonable_time() {
     survives(&format!("{} = 1", "a.".repeat(100_000)));
     assert!(start.elapsed().as_secs() < 60, "{:?}", start.elapsed());
 }
+
+#[test]
+fn what_is_wrong_in_a_template_names_the_values_of_the_user() {
+    let study = |parameters: &str, vary: &str| {
+        format!(
+            "schema = 1\nmodel = {{ template = \"under-platform-wedge\" }}\n[parameters]\n{parameters}\n[study]\nkind = \"response\"\n\
+             frequency = \"120 Hz\"\n{vary}"
+        )
+    };
+    let error = |text: String| read_study("wedge.toml", &text, &[]).unwrap_err();
+    let found = error(study("m = \"5 g\"\na1 = \"-30 deg\"\nmu = 0.2", ""));
+    let expected =
+        "with m = 5 g, a1 = -30 deg the template's `N1`, C*sin(a2)/sin(a1 + a2), is wrong: this divides by zero";
+    assert_eq!((found.line(), found.file_name(), found.message()), (Some(4), "wedge.toml", expected), "{found}");
+    let found = error(study("mu = 0.2", "vary = { a1 = [\"30 deg\", \"-30 deg\"] }"));
+    assert!(found.message().contains("with a1 = -30 deg the template's `N1`"), "{found}");
+    assert_eq!(found.underlined(), Some("\"-30 deg\""), "{found}");
+    let set = [("a1".to_owned(), "-30 deg".to_owned())];
+    let found = read_study("wedge.toml", &study("mu = 0.2", ""), &set).unwrap_err();
+    assert_eq!(found.file_name(), "--set a1", "{found}");
+    // an element of it: what its key is computed by
+    let found = error(study("m = \"-5 g\"\nmu = 0.2\nspeed = \"5000 rpm\"", ""));
+    assert!(found.message().starts_with("the value of `m` makes"), "{found}");
+}

@@ -235,8 +235,8 @@ pub enum OrbitError {
     },
     /// Nothing holds the structure against the mean of the forces, or only friction does.
     #[error(
-        "{method} finds no motion at Ω = {omega:.4} rad/s that stays where it is: nothing but friction holds the structure against \
-         a mean force; add the spring that holds it{}",
+        "{method} finds no motion at Ω = {omega:.4} rad/s that stays where it is: friction or contacts alone hold some of the structure, and \
+         its mean leaves them; press the contacts harder, or add the spring that holds it{}",
         if .instead.is_empty() { String::new() } else { format!("{instead}, which finds the motion where friction is enough") }
     )]
     Drift {
@@ -259,8 +259,9 @@ pub enum OrbitError {
     },
     /// Nothing bounds the motion of the structure without its joints.
     #[error(
-        "{method} finds the structure without its joints in a resonance without damping at Ω = {omega:.4} rad/s: nothing bounds its motion at \
-         {resonance:.4} rad/s; give it damping, or take a frequency beside it"
+        "{method} finds the structure without its joints {} at Ω = {omega:.4} rad/s: {}",
+        if *resonance == 0.0 { "free to stand anywhere" } else { "in a resonance without damping" },
+        unbounded(*resonance)
     )]
     Resonance {
         /// The method.
@@ -384,6 +385,14 @@ fn unsettled(repeats: Option<usize>, instead: &str) -> String {
             if instead.is_empty() { "" } else { ", which does not wait" }
         ),
     }
+}
+
+/// What is wrong with a structure that has a resonance without damping there, rad/s, and what to do; at zero it is a mean that nothing holds.
+fn unbounded(resonance: f64) -> String {
+    if resonance == 0.0 {
+        return "nothing holds some of its bodies; add a spring that does, or a constant force or preload that presses their contacts".to_owned();
+    }
+    format!("nothing bounds its motion at {resonance:.4} rad/s; give it damping, or take a frequency beside it")
 }
 
 impl OrbitError {

@@ -1,6 +1,7 @@
 //! `[parameters]`, values from outside the file, and `vary`: which there are, in which order they can be evaluated, how many cases they make.
 
 use super::reader::Reader;
+use crate::cause;
 use crate::document::{Content, Entry, Node, Table};
 use crate::error::Problem;
 use crate::expression::is_reserved;
@@ -8,7 +9,7 @@ use crate::near::{nearest, one_of, shown};
 use crate::sample::{DESIGNS, DISTRIBUTIONS, Design, Drawn, MOST_SOBOL, Sample, WITHIN};
 use crate::schema::{self, Key, MOST_CASES, MOST_POINTS, SAMPLE, Takes};
 use crate::statement::{Quantity, Stated, StatedTable};
-use crate::study::{Parameter, Replaced, Varied, VariedPoints, evaluate};
+use crate::study::{Parameter, Replaced, Varied, VariedPoints, evaluate, stated};
 use crate::values::Given;
 use std::collections::HashMap;
 use stickslip::model::is_identifier;
@@ -98,6 +99,8 @@ impl Reader {
         let values = match evaluate(&self.names, parameters, &order, &HashMap::new(), &[]) {
             Ok(values) => values,
             Err(problem) => {
+                let stated = stated(parameters, &HashMap::new());
+                let problem = cause::blame(problem, self.template, &self.names, &stated);
                 self.problems.push(problem);
                 return None;
             }

@@ -20,6 +20,8 @@ pub(super) struct Reader {
     /// Parameters, in order, and their index by name.
     pub(super) names: Vec<String>,
     pub(super) index: HashMap<String, usize>,
+    /// The file of the template that is named, among the sources.
+    pub(super) template: Option<usize>,
     /// The repetition of the entry that is being read, and which of its turns.
     pub(super) repetition: Repetition,
     pub(super) number: usize,

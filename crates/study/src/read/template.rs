@@ -44,6 +44,7 @@ impl Reader {
         };
         let mut parameters = self.parameters(&root, Vec::new(), &[])?;
         self.settle_dimensions(&mut parameters, &(0..self.names.len()).collect::<Vec<_>>())?;
+        self.template = Some(source);
         Some(TemplateFile { parameters, lists: self.lists(&root)?, source })
     }
 
@@ -92,7 +93,11 @@ impl Reader {
                 entry.clone_from(law);
             }
         }
-        Some(ModelStatement { lists, template: Some(NamedTemplate { table, source }), matrices: None })
+        Some(ModelStatement {
+            lists,
+            template: Some(NamedTemplate { table, source, given: Vec::new() }),
+            matrices: None,
+        })
     }
 }
 

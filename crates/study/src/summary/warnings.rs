@@ -3,7 +3,7 @@
 use crate::expression::displayed;
 use crate::linear::Reference;
 use crate::note::WARNING;
-use crate::statement::{Environment, Quantity, Stated, StatedTable};
+use crate::statement::{Environment, StatedTable};
 use crate::study::{Study, evaluate};
 use crate::survey::Surveyed;
 use crate::words::significant;
@@ -194,7 +194,7 @@ fn unused(study: &Study) -> Option<String> {
 fn used_parameters(study: &Study) -> BTreeSet<usize> {
     let mut open: Vec<usize> = Vec::new();
     let mut from = |table: &StatedTable| {
-        each_quantity(table, &mut |_, quantity, _| open.extend(quantity.expression.parameters()));
+        table.each_quantity(&mut |_, quantity, _| open.extend(quantity.expression.parameters()));
     };
     from(&study.study);
     from(&study.method);
@@ -216,30 +216,6 @@ fn used_parameters(study: &Study) -> BTreeSet<usize> {
         }
     }
     used
-}
-
-/// Calls `each` with the key, the quantity and its dimension (where the schema tells it) of every quantity in a table.
-fn each_quantity(table: &StatedTable, each: &mut dyn FnMut(&'static str, &Quantity, Option<Dimension>)) {
-    for entry in &table.entries {
-        match &entry.value {
-            Stated::Fixed(_) | Stated::Names(_) => {}
-            Stated::Quantity { quantity, dimension, .. } => each(entry.key, quantity, Some(*dimension)),
-            Stated::Vector(parts) => parts.iter().for_each(|q| each(entry.key, q, Some(Dimension::NONE))),
-            Stated::Sums(sums) => sums.iter().flatten().for_each(|(_, _, q)| each(entry.key, q, Some(Dimension::NONE))),
-            Stated::List(list, _) => list.iter().for_each(|q| each(entry.key, q, Some(Dimension::FREQUENCY))),
-            Stated::Range { from, to, .. } => {
-                each(entry.key, from, None);
-                each(entry.key, to, None);
-            }
-            Stated::Adaptive { from, to, tolerance } => {
-                each(entry.key, from, None);
-                each(entry.key, to, None);
-                each(entry.key, tolerance, Some(Dimension::NONE));
-            }
-            Stated::ByName(list, dimension) => list.iter().for_each(|(_, _, q)| each(entry.key, q, Some(*dimension))),
-            Stated::Law(_, table) | Stated::Table(table) => each_quantity(table, each),
-        }
-    }
 }
 
 /// That a reference curve which the figure asks for does not exist; the first case stands for all.
@@ -282,7 +258,7 @@ fn bare_angles(study: &Study, first: &Environment<'_>) -> Vec<String> {
     let lists = &study.structure.lists;
     for list in [&lists.place, &lists.mass, &lists.spring, &lists.joint, &lists.force, &lists.motion] {
         for table in list {
-            each_quantity(table, &mut |_, quantity, _| turned.extend(quantity.expression.angles()));
+            table.each_quantity(&mut |_, quantity, _| turned.extend(quantity.expression.angles()));
         }
     }
     let values = &first.values;
@@ -302,7 +278,7 @@ fn bare_numbers(study: &Study, first: &Environment<'_>) -> Vec<String> {
     let lists = &study.structure.lists;
     for (list, tables) in [("joint", &lists.joint), ("force", &lists.force), ("motion", &lists.motion)] {
         for (index, table) in tables.iter().enumerate() {
-            each_quantity(table, &mut |key, quantity, dimension| {
+            table.each_quantity(&mut |key, quantity, dimension| {
                 let Ok(value) = quantity.value(key, first) else { return };
                 let easily = easily_meant(dimension, value.si, value.with_pi);
                 let Some((unit, other, converted)) = easily.filter(|_| value.dimension.is_none()) else { return };

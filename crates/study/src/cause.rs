@@ -1,0 +1,40 @@
+//! Which values of a user make an expression of a template wrong: its text is not the user's, so that the values are where the problem is.
+
+use crate::error::{Location, Problem};
+use crate::expression::Expression;
+use crate::near::shown;
+use std::collections::BTreeSet;
+
+/// The value of a parameter in a case, as it is stated.
+pub(crate) struct Stated<'a> {
+    pub text: &'a str,
+    pub location: &'a Location,
+    /// `None` of one out of a range.
+    pub expression: Option<&'a Expression>,
+}
+
+/// The parameters by which each one is computed and that are not stated in the file of the template, itself among them, in their order.
+pub(crate) fn given(template: usize, stated: &[Stated<'_>], of: impl IntoIterator<Item = usize>) -> BTreeSet<usize> {
+    let (mut found, mut open) = (BTreeSet::new(), of.into_iter().collect::<Vec<_>>());
+    while let Some(next) = open.pop() {
+        if found.insert(next) {
+            open.extend(stated[next].expression.into_iter().flat_map(Expression::parameters));
+        }
+    }
+    found.retain(|index| stated[*index].location.source != template);
+    found
+}
+
+/// The same problem, placed at the first value of the user that leads to it where it is one of a parameter of the template.
+pub(crate) fn blame(problem: Problem, template: Option<usize>, names: &[String], stated: &[Stated<'_>]) -> Problem {
+    let Some(template) = template.filter(|source| *source == problem.location.source) else { return problem };
+    let Some(wrong) = names.iter().position(|name| *name == problem.key) else { return problem };
+    let given = given(template, stated, [wrong]);
+    let Some(first) = given.first() else { return problem };
+    let value = |index: &usize| format!("{} = {}", names[*index], shown(stated[*index].text.trim()));
+    let values: Vec<String> = given.iter().map(value).collect();
+    let Problem { key, message, help, .. } = problem;
+    let text = stated[wrong].text.trim();
+    let message = format!("with {} the template's `{key}`, {text}, is wrong: {message}", values.join(", "));
+    Problem::new(stated[*first].location, names[*first].clone(), message).maybe_help(help)
+}
