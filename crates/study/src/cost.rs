@@ -88,6 +88,8 @@ pub struct Cost {
     pub unit: f64,
     /// Time of the methods on one thread, s.
     pub work: f64,
+    /// How much of it there is only where the results ask for it, s, and where it is spared, in words.
+    pub spared: Option<(f64, &'static str)>,
 }
 
 /// What is known of a study when its cost is asked: counts, and what one orbit takes. The first case stands for all.
@@ -538,12 +540,8 @@ impl Costing<'_> {
         let shooting = size * size * self.ringing() * if self.has_states { shooting.1 } else { shooting.0 };
         let series = self.series(case.method.options.get("harmonics").copied());
         match case.method.name.as_str() {
-            // of a ring in a travelling wave one sector of twice the size is solved
             _ if self.is_series() => {
-                let whole = match self.system().cyclic() {
-                    Some(ring) => series * (2.0 / ring.sectors as f64).min(1.0),
-                    None => series * self.unheld(),
-                };
+                let whole = series * self.sector() * self.unheld();
                 let given = case.method.options.get("harmonics").copied();
                 whole.max(self.rigid_series(given)) + self.factored(given) + self.judged()
             }
@@ -596,7 +594,12 @@ impl Costing<'_> {
         self.pace.of(usual, hard)
     }
 
-    /// Time of one series of harmonics, s; of as many as it needs if `None`.
+    /// Share of the structure that is solved for an orbit: of a ring in a travelling wave one sector of twice the size.
+    pub fn sector(&self) -> f64 {
+        self.system().cyclic().map_or(1.0, |ring| (2.0 / ring.sectors as f64).min(1.0))
+    }
+
+    /// Time of one series of harmonics of the whole structure, s; of as many as it needs if `None`.
     pub fn series(&self, harmonics: Option<f64>) -> f64 {
         let factor = match (self.smooth, self.is_rigid(), harmonics) {
             (_, _, None) if self.falls => self.pace.of(HARD_FALLING.0, HARD_FALLING.1),

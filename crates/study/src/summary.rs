@@ -9,7 +9,7 @@ mod warnings;
 
 pub use structure::{DIRECTIONS, StructureSummary, mass_along};
 
-use crate::cost::{Costing, Size};
+use crate::cost::{Cost, Costing, Size};
 use crate::error::StudyError;
 use crate::kinds;
 use crate::study::Study;
@@ -49,6 +49,8 @@ pub struct ModelSummary {
     pub size: Size,
     /// What it will mostly take on one thread, s; rough.
     pub usual_seconds: f64,
+    /// What it takes instead where the results do not ask for all of it, s, and where that is, in words.
+    pub spared: Option<(f64, &'static str)>,
     /// What it may take where orbits are hard to find, s; rough, and rather too long than too short.
     pub seconds: f64,
 }
@@ -164,7 +166,12 @@ impl ModelSummary {
         let kind = kinds::of(study);
         let slow = Costing::new(study, &cases[0]);
         let (usual, cost) = (slow.usual(), (kind.cost)(&slow));
-        let usual_seconds = usual.seconds(&(kind.cost)(&usual));
+        let usual_cost = (kind.cost)(&usual);
+        let usual_seconds = usual.seconds(&usual_cost);
+        let spared = usual_cost.spared.map(|(work, place)| {
+            let rest = Cost { work: usual_cost.work - work, ..usual_cost };
+            (usual.seconds(&rest), place)
+        });
         Ok(ModelSummary {
             case: shown.case.label(),
             cases: study.cases(),
@@ -179,6 +186,7 @@ impl ModelSummary {
             warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
             size: slow.size(&cost, Units::of(study, (kind.grain)(study)).len()),
             usual_seconds,
+            spared,
             seconds: slow.seconds(&cost).max(usual_seconds),
         })
     }
@@ -193,7 +201,12 @@ impl ModelSummary {
 
     /// How long it will take, in words.
     pub(crate) fn time(&self) -> String {
-        let usual = format!("{} on one thread", crate::words::about(self.usual_seconds));
+        let mut usual = format!("{} on one thread", crate::words::about(self.usual_seconds));
+        if let Some((seconds, place)) = self.spared
+            && self.usual_seconds >= (WIDE * seconds).max(SOON)
+        {
+            usual += &format!(", {} {place}", crate::words::about(seconds));
+        }
         if self.seconds < WIDE * self.usual_seconds || self.seconds < SOON {
             return usual;
         }

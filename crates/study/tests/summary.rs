@@ -620,6 +620,37 @@ fn the_usual_time_of_wedges_is_that_which_was_measured() {
     }
 }
 
+/// Branches of tuned rings follow one sector. Measured: 2.2 s for 12 blades with wedges, which took as long for 36.
+#[test]
+fn a_branch_of_a_tuned_disk_takes_the_time_of_a_sector() {
+    let kind = (r#"kind = "response""#, r#"kind = "branch""#);
+    let method = "\n[method]\nkind = \"harmonic-balance\"\nharmonics = 9\ntolerance = 0.05\n";
+    let vary = (r#"vary = { speed = ["2000 rpm", "2600 rpm", "4000 rpm", "8000 rpm"] }"#, "");
+    let seconds = |blades: &str| {
+        let edits = [kind, (", points = 71", ""), vary, (method, "\n"), ("references = true", ""), ("N = 12 ", blades)];
+        summary(&template("under-platform-wedge", &edits)).usual_seconds
+    };
+    let (few, many) = (seconds("N = 12 "), seconds("N = 36 "));
+    assert!((0.7..7.0).contains(&few) && (few - many).abs() < 0.2 * few, "{few} s, {many} s");
+}
+
+/// The search for an optimum takes most of a performance study, if there is one: both times are told.
+#[test]
+fn an_optimum_takes_its_time_if_there_is_one() {
+    let small = ("points = 241", "points = 2001");
+    let kind = ("kind = \"response\"", "kind = \"performance\"");
+    let curve = summary(&template(
+        "blade-couple",
+        &[small, kind, ("kind = \"coulomb\"", "kind = \"coulomb-arctan\", alpha = \"25 s/mm\"")],
+    ));
+    let (least, place) = curve.spared.unwrap();
+    assert!(least < 0.2 * curve.usual_seconds, "{least} s of {} s", curve.usual_seconds);
+    assert!(curve.to_string().contains(place), "{curve}");
+    // of two values none is between the others
+    let two = (r#"["2 N", "4 N", "6 N", "8 N"]"#, r#"["2 N", "4 N"]"#);
+    assert!(summary(&template("blade-couple", &[kind, two])).spared.is_none());
+}
+
 /// Transients of 13 points were measured: 0.4 s with the exact law, 26 s with the smooth one. The free contact has nearly no damping of its own, but the drive
 /// does not move it, and friction does not leave it alone: only the longest time counts with it.
 #[test]

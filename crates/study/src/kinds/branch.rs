@@ -98,7 +98,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
         tables: vec![costing.orbits(rows), Shape { rows: branches * MARKS, numbers: costing.varied + 2.0, words: 0.0 }],
         drawn: rows * costing.places,
         unit: rows / branches * costing.kept_series_bytes(length, samples) + costing.series_bytes(length),
-        work: rows * costing.extra() + steps * FOLLOWED * costing.series(harmonics),
+        spared: None,
+        work: rows * costing.extra() + steps * FOLLOWED * costing.sector() * costing.series(harmonics),
     }
 }
 

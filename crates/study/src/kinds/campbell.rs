@@ -100,6 +100,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: costing.cases * (speeds * lines + crossings),
         unit: speeds * lines * 8.0,
+        spared: None,
         work: costing.cases * found * 2.0 * waves * size.powi(3) * EIGEN,
     }
 }

@@ -88,6 +88,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: rows,
         unit: costing.kept_orbits() + costing.samples_bytes(),
+        spared: None,
         work: points * (costing.orbit() + costing.reading(read)),
     }
 }

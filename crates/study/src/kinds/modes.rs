@@ -82,6 +82,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: 2.0 * rows,
         unit: points * costing.series_bytes(harmonics),
+        spared: None,
         work: (rows * FOLLOWED + costing.cases * costing.steps(STEPS))
             * (costing.series(Some(harmonics)) + elimination),
     }

@@ -117,6 +117,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         tables: vec![Shape { rows, numbers: costing.varied + 4.0 + shapes, words: 1.0 }],
         drawn: rows,
         unit: if each > SPARSE { FACTOR * each } else { 8.0 * each * each },
+        spared: None,
         work: costing.cases * waves * if each > SPARSE { LOWEST * each.powf(1.5) } else { EIGEN * each.powi(3) },
     }
 }

@@ -71,6 +71,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         // the panels beyond the most that are drawn are made all the same
         drawn: rows * (costing.places + costing.joints),
         unit: costing.kept_orbits(),
+        spared: None,
         work: points * (costing.orbit() + followed + map + costing.extra() + costing.reading(costing.instants())),
     }
 }

@@ -55,6 +55,8 @@ const OPTIMUM: f64 = 35.0;
 fn cost(costing: &Costing<'_>) -> Cost {
     let (cases, curves) = (costing.cases, costing.curves());
     let back = f64::from(u8::from(both_ways::is_followed(costing.system())));
+    let peak = costing.frequencies * costing.orbit() + (back * costing.frequencies + REFINING) * costing.between();
+    let tried = if costing.study.last_varied() < FEWEST_VALUES { 0.0 } else { curves * OPTIMUM };
     Cost {
         tables: vec![
             Shape { rows: cases, numbers: costing.varied + 4.0, words: 1.0 },
@@ -62,8 +64,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: cases,
         unit: costing.orbit_bytes(),
-        work: (cases + curves * OPTIMUM)
-            * (costing.frequencies * costing.orbit() + (back * costing.frequencies + REFINING) * costing.between()),
+        work: (cases + tried) * peak,
+        spared: (tried > 0.0).then_some((tried * peak, "where no optimum lies between the values")),
     }
 }
 

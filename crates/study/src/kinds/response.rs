@@ -129,6 +129,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: curves * costing.frequencies,
         unit: costing.orbit_bytes(),
+        spared: None,
         work: points * costing.extra()
             + (points + OTHERS * back + tuned * costing.frequencies) * costing.orbit()
             + (back + REFINING * refined) * costing.between()

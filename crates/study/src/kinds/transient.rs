@@ -137,6 +137,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         ],
         drawn: points.min(MOST_PANELS as f64) * samples * costing.places,
         unit: 0.0,
+        spared: None,
         work: points * (periods * costing.period() + costing.patterns(periods) + costing.reading(samples)),
     }
 }
