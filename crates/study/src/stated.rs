@@ -33,6 +33,12 @@ pub(crate) struct Matrices {
 }
 
 impl Matrices {
+    /// Whether a model made of them turns at a speed that stiffens it.
+    fn spins(&self, model: &Model) -> bool {
+        let (own, of_model) = (self.component.as_ref(), model.substructure.as_ref().map(|own| &own.component));
+        own.zip(of_model).is_some_and(|(own, of_model)| own.matrices().2 != of_model.matrices().2)
+    }
+
     /// CRC-32 of the rows' names and of all entries, by which files that changed between two runs are told apart.
     pub fn check(&self) -> Option<String> {
         let component = self.component.as_ref()?;
@@ -160,12 +166,16 @@ impl StatedDisk {
 pub(crate) fn problem_of(structure: &ModelStatement, error: &ModelError, model: &Model) -> Problem {
     let (list, index) = error.element.entry();
     let whole = Location::default();
+    // where the export at rest is not at fault, its sum with the other is
+    let softened =
+        structure.matrices.as_ref().is_some_and(|matrices| error.key == "stiffness" && matrices.spins(model));
+    let key = if softened { "stiffened" } else { error.key };
     let (location, message) = match &structure.template {
         None => {
             let matrices = structure.matrices.as_ref().filter(|_| list == "structure");
             let table =
                 matrices.map(|matrices| &matrices.table).or_else(|| structure.lists.get(list).get(index.unwrap_or(0)));
-            let location = table.map_or(&whole, |table| table.location_of(error.key, error.wrong_name.as_deref()));
+            let location = table.map_or(&whole, |table| table.location_of(key, error.wrong_name.as_deref()));
             let end = without_end(model).filter(|_| error.key == "reduce");
             let message = end.map_or(&error.message[..], |(message, _)| message);
             (location, table.map_or_else(|| message.to_owned(), |table| table.with_turn(message)))
@@ -191,10 +201,14 @@ pub(crate) fn problem_of(structure: &ModelStatement, error: &ModelError, model: 
         }
         None if error.element == Element::Whole => Some("add a [[mass]] or a [[motion]]".to_owned()),
         None if error.key == "reduce" => advice_on_reduction(model),
+        None if softened => Some(
+            "lower `speed`: what both exports add up to there has lost more stiffness than rotation gives; or check `at` and the sign of the second export"
+                .to_owned(),
+        ),
         None if error.key == "name" => Some("choose another name".to_owned()),
         None => None,
     };
-    Problem::new(location, error.key, message).maybe_help(help)
+    Problem::new(location, key, message).maybe_help(help)
 }
 
 /// Lowest frequencies that are shown where a structure cannot be reduced.

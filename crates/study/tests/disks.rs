@@ -289,6 +289,7 @@ fn stiffened(key: &str, disk: &str, more: &str) -> Result<Study, StudyError> {
     write("k.mtx", STIFFNESS);
     write("m.mtx", MASS);
     write("k100.mtx", &STIFFNESS.replace("4 4 3e4", "4 4 3.5e4").replace("3 3 8e4", "3 3 8.2e4"));
+    write("soft.mtx", &STIFFNESS.replace("4 4 3e4", "4 4 1e4"));
     write("small.mtx", "%%MatrixMarket matrix coordinate real symmetric\n1 1 1\n1 1 1\n");
     write("rows.csv", "row,name\n1,1.x\n2,2.x\n3,3.x\n4,4.x\n");
     write("pairs.csv", "high,low\n2,1\n");
@@ -392,6 +393,13 @@ fn a_campbell_diagram_of_a_sector_that_rotation_stiffens() {
         let text = format!("{} {}", error.message(), error.help_text().unwrap_or_default());
         assert!(text.contains(words), "{key}: {text}");
     }
+    // the export at rest is not at fault where the sum of both buckles
+    let key = "stiffened = { file = \"soft.mtx\", at = \"100 Hz\", speed = \"speed\" }";
+    assert!(stiffened(key, "boundary = \"pairs.csv\"", kind).is_ok());
+    let fast = kind.replace("speed = \"0 Hz\"", "speed = \"100 Hz\"");
+    let error = stiffened(key, "boundary = \"pairs.csv\"", &fast).unwrap_err();
+    assert!(error.message().starts_with("1 eigenvalue lies below -"), "{}", error.message());
+    assert!(error.help_text().unwrap().starts_with("lower `speed`"));
 }
 
 #[test]
