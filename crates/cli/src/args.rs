@@ -65,7 +65,7 @@ pub enum Command {
         /// Throw away what a long run that did not end has kept
         #[arg(long)]
         restart: bool,
-        /// Compute one part of so many, for `stickslip merge`; on as many machines as you like
+        /// Compute one part of so many, on as many machines as you like; `stickslip merge` joins them, and takes what outputs there are to be
         #[arg(long, value_name = "N/OF", conflicts_with_all = ["only", "also", "json", "open", "watch"])]
         shard: Option<Shard>,
         /// How progress is shown: a bar on a terminal, or for programs one JSON object a line on standard error

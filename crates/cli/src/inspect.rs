@@ -1,12 +1,13 @@
 //! `stickslip inspect`: what is in files of matrices, and whether they can be those of a structure.
 
 use crate::{Ending, print};
+use std::borrow::Cow;
 use std::f64::consts::TAU;
-use std::fmt::Write;
+use std::fmt::{self, Write};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use stickslip::structure::Component;
-use stickslip_formats::{self as formats, Error, Kind, Matrix, Report, names};
+use stickslip_formats::{self as formats, Error, Kind, Matrix, Report, aligned, constrained, names};
 use stickslip_numerics::definite::sparse_definite;
 use stickslip_numerics::sparse;
 use stickslip_study::summary::{DIRECTIONS, mass_along};
@@ -103,7 +104,13 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
     }
     if square.len() > 1 {
         match chosen(&square) {
-            Ok((stiffness, mass, why)) => text += &pair(stiffness, mass, why, beside.as_deref()),
+            Ok((stiffness, mass, why)) => {
+                let _ = writeln!(text, "{} as stiffness, {} as mass, {why}", stiffness.name, mass.name);
+                text += &match Pair::new(stiffness, mass, beside.as_deref()) {
+                    Ok(pair) => pair.to_string(),
+                    Err(why) => format!("  no frequencies: {why}\n"),
+                };
+            }
             Err(why) => text += &format!("no frequencies: {why}\n"),
         }
     }
@@ -141,10 +148,12 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Name
             let _ = writeln!(text, "  {line}");
         }
         if matrix.rows() == matrix.columns() && matrix.rows() > 1 {
-            if let Some(sparse) =
-                converted(&matrix).filter(|sparse| sparse.asymmetry(SYMMETRIC * sparse.largest()).is_none())
+            let out = constrained(&[&matrix], matrix.rows());
+            if let Some(sparse) = converted(&matrix, &out)
+                .filter(|sparse| sparse.n() > 0 && sparse.asymmetry(SYMMETRIC * sparse.largest()).is_none())
             {
-                let _ = writeln!(text, "  {}", definite(&sparse));
+                let beside = if out.is_empty() { "" } else { ", without the rows that are constrained" };
+                let _ = writeln!(text, "  {}{beside}", definite(&sparse));
             }
             let role = Role::of(file, name);
             let name = match name {
@@ -161,9 +170,11 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Name
 /// Difference across the diagonal, relative to the largest entry, of a matrix that was written with ten digits.
 const SYMMETRIC: f64 = 1e-9;
 
-fn converted(matrix: &Matrix) -> Option<sparse::Matrix> {
-    let entries = matrix.both_triangles().map(|entry| (entry.row as usize, entry.column as usize, entry.value));
-    sparse::Matrix::from_triplets(matrix.rows(), entries).ok()
+/// A square matrix without some of its rows.
+fn converted(matrix: &Matrix, out: &[usize]) -> Option<sparse::Matrix> {
+    let free = if out.is_empty() { Cow::Borrowed(matrix) } else { Cow::Owned(matrix.clone().without(out).ok()?) };
+    let entries = free.both_triangles().map(|entry| (entry.row as usize, entry.column as usize, entry.value));
+    sparse::Matrix::from_triplets(free.rows(), entries).ok()
 }
 
 fn definite(matrix: &sparse::Matrix) -> &'static str {
@@ -192,61 +203,85 @@ fn chosen(square: &[Named]) -> Result<(&Named, &Named, &'static str), String> {
                 .to_owned());
         }
     };
-    match stiffness.matrix.rows() == mass.matrix.rows() {
-        true => Ok((stiffness, mass, why)),
-        false => Err(format!(
-            "{} as stiffness has {} rows, and {} as mass {}",
-            stiffness.name,
-            stiffness.matrix.rows(),
-            mass.name,
-            mass.matrix.rows()
-        )),
+    Ok((stiffness, mass, why))
+}
+
+/// Stiffness and mass of a structure, as a study takes them: rows by their names, without those that are constrained.
+struct Pair {
+    /// Rows that are left out.
+    constrained: usize,
+    /// The lowest angular frequencies, or why there are none.
+    frequencies: Result<Vec<f64>, String>,
+    /// Along every direction that names of rows have: the mass, in its units.
+    mass: Vec<(&'static str, f64)>,
+}
+
+impl Pair {
+    /// Of rows with names of their own, else those `beside` them. Why they are no pair, otherwise.
+    fn new(stiffness: &Named, mass: &Named, beside: Option<&[String]>) -> Result<Pair, String> {
+        let of_mass = match mass.matrix.names() {
+            Some(_) => Cow::Owned(aligned(mass.matrix.clone(), &stiffness.matrix).map_err(|error| error.to_string())?),
+            None => Cow::Borrowed(&mass.matrix),
+        };
+        let rows = stiffness.matrix.rows();
+        if of_mass.rows() != rows {
+            let (stiffness, mass, other) = (&stiffness.name, &mass.name, of_mass.rows());
+            return Err(format!("{stiffness} as stiffness has {rows} rows, and {mass} as mass {other}"));
+        }
+        let out = constrained(&[&stiffness.matrix, &of_mass], rows);
+        let names = stiffness.matrix.names().or(of_mass.names()).or(beside.filter(|names| names.len() == rows));
+        if out.len() == rows {
+            return Err("no row of both is free".to_owned());
+        }
+        let free = (0..rows).filter(|row| out.binary_search(row).is_err());
+        let names: Vec<String> = free.map(|row| names.map_or_else(String::new, |names| names[row].clone())).collect();
+        let pair = converted(&stiffness.matrix, &out).zip(converted(&of_mass, &out));
+        let (stiffness, mass) = pair.ok_or_else(|| "an entry is not finite".to_owned())?;
+        let along = |along| Some((along, mass_along(&names, &mass, along)?));
+        let along = DIRECTIONS.into_iter().filter_map(along).collect();
+        let component = Component::new(names, mass, None, stiffness).map_err(|error| error.to_string());
+        let lowest = component.and_then(|component| component.frequencies(LOWEST).map_err(|error| error.to_string()));
+        Ok(Pair { constrained: out.len(), frequencies: lowest, mass: along })
     }
 }
 
-/// Lowest frequencies of stiffness and mass, and of every set of units the mass, where rows have names, of their own or `beside` them.
-fn pair(stiffness: &Named, mass: &Named, why: &str, beside: Option<&[String]>) -> String {
-    let mut text = format!("{} as stiffness, {} as mass, {why}\n", stiffness.name, mass.name);
-    let rows = stiffness.matrix.rows();
-    let names = stiffness.matrix.names().or(mass.matrix.names()).or(beside.filter(|names| names.len() == rows));
-    let names = names.map_or_else(|| vec![String::new(); rows], <[String]>::to_vec);
-    let found = converted(&stiffness.matrix).zip(converted(&mass.matrix));
-    let weighed = found.as_ref().map(|(_, mass)| {
-        let along = |along| Some((along, mass_along(&names, mass, along)?));
-        DIRECTIONS.into_iter().filter_map(along).collect::<Vec<_>>()
-    });
-    let found = found.ok_or_else(|| "an entry is not finite".to_owned());
-    let found = found.and_then(|(k, m)| Component::new(names.clone(), m, None, k).map_err(|error| error.to_string()));
-    let frequencies = found.and_then(|component| component.frequencies(LOWEST).map_err(|error| error.to_string()));
-    match frequencies {
-        Ok(lowest) => {
-            let hertz = |unit: f64| {
-                lowest.iter().map(|omega| format!("{:.6e}", omega / TAU * unit)).collect::<Vec<_>>().join(", ")
-            };
-            let _ = writeln!(text, "  lowest frequencies, Hz: {} (times in seconds)", hertz(1.0));
-            let _ = writeln!(text, "                          {} (times in milliseconds)", hertz(1e3));
+impl fmt::Display for Pair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.constrained > 0 {
+            let rows = if self.constrained == 1 { "row is" } else { "rows are" };
+            writeln!(f, "  {} {rows} constrained, and left out", self.constrained)?;
         }
-        Err(error) => {
-            let _ = writeln!(text, "  no frequencies: {error}");
+        match &self.frequencies {
+            Ok(lowest) => {
+                let hertz = |unit: f64| {
+                    lowest.iter().map(|omega| format!("{:.6e}", omega / TAU * unit)).collect::<Vec<_>>().join(", ")
+                };
+                writeln!(f, "  lowest frequencies, Hz: {} (times in seconds)", hertz(1.0))?;
+                writeln!(f, "                          {} (times in milliseconds)", hertz(1e3))?;
+                if lowest.len() < LOWEST {
+                    writeln!(f, "                          there are no more of them")?;
+                }
+            }
+            Err(error) => writeln!(f, "  no frequencies: {error}")?,
         }
+        let Some(&(_, first)) = self.mass.first() else {
+            return writeln!(
+                f,
+                "  mass: no row is called by a direction (449.x), so that nobody can tell it, nor the units"
+            );
+        };
+        let each: Vec<String> = self.mass.iter().map(|(along, total)| format!("along {along} {total:.6e}")).collect();
+        writeln!(f, "  mass of what is free, in its units: {}", each.join(", "))?;
+        for set in unit_sets::TABLE {
+            let kilograms = set.mass * first;
+            let usual = if USUAL.contains(&kilograms) { ", as a blade may have" } else { "" };
+            writeln!(f, "    {kilograms:.4e} kg if units = \"{}\"{usual}", set.name)?;
+        }
+        let (from, to) = (USUAL.start(), USUAL.end());
+        writeln!(
+            f,
+            "  the files do not say their units: take those with which it weighs what it does; blades have {from} kg to {to} kg. Frequencies tell seconds \
+             from milliseconds only"
+        )
     }
-    let along = weighed.unwrap_or_default();
-    let Some(&(_, first)) = along.first() else {
-        text += "  mass: no row is called by a direction (449.x), so that nobody can tell it, nor the units\n";
-        return text;
-    };
-    let each: Vec<String> = along.iter().map(|(along, total)| format!("along {along} {total:.6e}")).collect();
-    let _ = writeln!(text, "  mass of what is free, in its units: {}", each.join(", "));
-    for set in unit_sets::TABLE {
-        let kilograms = set.mass * first;
-        let usual = if USUAL.contains(&kilograms) { ", as a blade may have" } else { "" };
-        let _ = writeln!(text, "    {kilograms:.4e} kg if units = \"{}\"{usual}", set.name);
-    }
-    let (from, to) = (USUAL.start(), USUAL.end());
-    let _ = writeln!(
-        text,
-        "  the files do not say their units: take those with which it weighs what it does; blades have {from} kg to {to} kg. Frequencies tell seconds \
-         from milliseconds only"
-    );
-    text
 }

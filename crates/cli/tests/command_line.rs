@@ -776,6 +776,43 @@ fn inspect_tells_frequencies_and_mass() {
     assert!(unnamed.contains("lowest frequencies") && unnamed.contains("mass: no row"), "{unnamed}");
 }
 
+/// What programs do with constrained and massless rows is seen by `inspect` as a study sees it: zero rows of ANSYS, the 1e36 of Abaqus, rows that the mass
+/// matrix does not have. Two springs of 4 and 9 N/m on 1 kg each, and a third row that is constrained, or has no mass.
+#[test]
+fn inspect_leaves_out_what_is_constrained() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    let banner = "%%MatrixMarket matrix coordinate real general\n3 3 2\n";
+    write("k_zero.mtx", &format!("{banner}1 1 4\n3 3 9\n"));
+    write("m_zero.mtx", &format!("{banner}1 1 1\n3 3 1\n"));
+    write("k_light.mtx", "1,1, 1,1, 4.\n2,1, 2,1, 9.\n3,1, 3,1, 16.\n");
+    write("m_light.mtx", "1,1, 1,1, 1.\n2,1, 2,1, 1.\n");
+    write("k_held.mtx", "1,1, 1,1, 4.\n2,1, 2,1, 9.\n3,1, 3,1, 1e36\n");
+    write("m_held.mtx", "1,1, 1,1, 1.\n2,1, 2,1, 1.\n3,1, 3,1, 5.\n");
+    write("m_other.mtx", "1,1, 1,1, 1.\n2,1, 2,1, 1.\n7,1, 7,1, 5.\n");
+    let inspect = |kind: &str, mass: &str| {
+        let (stiffness, mass) = (format!("k_{kind}.mtx"), format!("m_{mass}.mtx"));
+        let inspected = stickslip(folder.path(), &["inspect", &stiffness, &mass]);
+        assert_eq!(code(&inspected), 0, "{}", stderr(&inspected));
+        String::from_utf8_lossy(&inspected.stdout).into_owned()
+    };
+    let lowest = [2.0, 3.0].map(|omega| format!("{:.6e}", omega / std::f64::consts::TAU)).join(", ");
+    for (kind, left_out) in [("zero", true), ("light", false), ("held", true)] {
+        let said = inspect(kind, kind);
+        assert!(said.contains(&format!("lowest frequencies, Hz: {lowest} (times in seconds)")), "{kind}: {said}");
+        assert!(said.contains("there are no more of them"), "{kind}: {said}");
+        assert_eq!(said.contains("1 row is constrained, and left out"), left_out, "{kind}: {said}");
+        assert_eq!(
+            said.contains("positive definite, without the rows that are constrained"),
+            left_out,
+            "{kind}: {said}"
+        );
+        assert_eq!(said.contains("along x 2.000000e0\n"), kind != "zero", "{kind}: {said}");
+    }
+    let said = inspect("held", "other");
+    assert!(said.contains("no frequencies: row `7.x` of the matrix is not among the 3 names"), "{said}");
+}
+
 /// Names tell stiffness from mass before sizes do: a heavy mass on a soft spring, and three matrices, of which one is the damping. 4 N/m and 100 kg
 /// are 0.2 rad/s.
 #[test]

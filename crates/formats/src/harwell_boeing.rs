@@ -51,9 +51,11 @@ struct Fixed {
 const WIDEST: usize = 10_000;
 
 impl Fixed {
-    /// Of `(8I10)`, `(1P,4E20.12)`, `(4D25.16E3)`.
+    /// Of `(8I10)`, `(1P,4E20.12)`, `(1P,4(E20.12))`, `(4D25.16E3)`.
     fn new(text: &str) -> Option<Self> {
-        let inner: String = text.strip_prefix('(')?.strip_suffix(')')?.to_uppercase().split_whitespace().collect();
+        let inner = text.strip_prefix('(')?.strip_suffix(')')?.to_uppercase();
+        // a field alone in a group is that field
+        let inner: String = inner.split_whitespace().collect::<String>().replace(['(', ')'], "");
         // A scale factor changes how many digits stand before the point, not the value, as there is an exponent.
         let inner = inner.split_once('P').map_or(inner.as_str(), |(_, rest)| rest.trim_start_matches(','));
         let letter = inner.find(['I', 'E', 'D', 'F', 'G'])?;
@@ -115,7 +117,12 @@ fn header(bytes: &[u8]) -> Result<Header<'_>, Error> {
     let (rows, columns, entries) = (sizes.count(rows)?, sizes.count(columns)?, sizes.count(entries)?);
     let line = lines.expect("the formats")?;
     let text = String::from_utf8_lossy(line.text).into_owned();
-    let mut formats = text.split_inclusive(')').map(str::trim);
+    let mut depth = 0;
+    let closes = |letter: char| {
+        depth += i32::from(letter == '(') - i32::from(letter == ')');
+        letter == ')' && depth <= 0
+    };
+    let mut formats = text.split_inclusive(closes).map(str::trim);
     let mut format = |what: &str| {
         let found = formats.next().unwrap_or_default();
         Fixed::new(found).ok_or_else(|| line.malformed(&format!("the format of {what}"), &shown(found.as_bytes())))
@@ -203,6 +210,7 @@ mod tests {
         };
         check("(8I10)", Some((8, 10)));
         check("(1P,4E20.12)", Some((4, 20)));
+        check("(1P,4(E20.12))", Some((4, 20)));
         check("(1p4d25.16e3)", Some((4, 25)));
         check("(I14)", Some((1, 14)));
         check("( 3 F 12.4 )", Some((3, 12)));

@@ -22,6 +22,7 @@ mod abaqus_element;
 mod abaqus_input;
 mod ansys_full;
 mod bytes;
+mod constrained;
 mod coordinate;
 mod error;
 mod file;
@@ -45,6 +46,7 @@ use std::path::Path;
 use file::{io, load};
 use format::Item;
 
+pub use constrained::{aligned, constrained};
 pub use error::{Error, Kind, Location};
 pub use format::{Format, Variable};
 pub use inflate::{EXPANSION, UNPACKED_ALWAYS};
@@ -84,6 +86,7 @@ pub fn read(path: impl AsRef<Path>, format: Option<&str>, name: Option<&str>) ->
 /// # Errors
 /// As [`read`], without the name of a file.
 pub fn read_bytes(bytes: &[u8], format: Option<&str>, name: Option<&str>) -> Result<Matrix, Error> {
+    let bytes = unmarked(bytes);
     let format = find(bytes, format)?;
     let items = (format.open)(bytes)?;
     let item = pick(format, &items, name)?;
@@ -111,6 +114,7 @@ pub fn list(path: impl AsRef<Path>, format: Option<&str>) -> Result<Vec<Variable
 /// # Errors
 /// As [`list`], without the name of a file.
 pub fn list_bytes(bytes: &[u8], format: Option<&str>) -> Result<Vec<Variable>, Error> {
+    let bytes = unmarked(bytes);
     let items = (find(bytes, format)?.open)(bytes)?;
     Ok(items.into_iter().map(|item| item.variable).collect())
 }
@@ -136,6 +140,11 @@ pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     std::fs::write(path, bytes).map_err(|error| io(path, &error))
 }
 
+/// Without the mark that some editors put before text in UTF-8.
+fn unmarked(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
 /// The format of that name, or the one that the content is of.
 fn find(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
     let names = || TABLE.iter().map(|format| format.name).collect::<Vec<_>>().join(", ");
@@ -150,8 +159,20 @@ fn find(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
     if bytes.starts_with(&[0x1f, 0x8b]) {
         return Err(fault("the file is compressed by gzip".into(), "unpack it first: gunzip FILE".into()));
     }
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err(fault(
+            "the file is text in UTF-16".into(),
+            "save it as UTF-8: PowerShell's > writes UTF-16".into(),
+        ));
+    }
     let found = TABLE.iter().find(|format| (format.sniff)(bytes));
     found.ok_or_else(|| {
+        if mat5::is_version_4(bytes) {
+            return fault(
+                "the file is of MATLAB version 4".into(),
+                "save it again: save('matrices.mat', 'K', 'M', '-v7'), or scipy.io.savemat with format='5'".into(),
+            );
+        }
         fault(
             "no format is known by this content".into(),
             format!("state the format if it is one of {}, else export the matrix in one of these", names()),
@@ -189,8 +210,9 @@ fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> R
 /// Rows and columns beyond this many, and beyond [`ROWS_PER_BYTE`], are no size of this file but a damaged number.
 const ROWS_ALWAYS: usize = 1 << 20;
 
-/// Rows and columns for every byte of a file: a row has at least an index, of which deflate needs a few bits at least.
-const ROWS_PER_BYTE: usize = 64;
+/// Rows and columns for every byte of a file. A row with an entry takes a line of text, and that of a diagonal some two bytes where its numbers are
+/// compressed; so many rows without any stand in small files only.
+const ROWS_PER_BYTE: usize = 1;
 
 /// Refuses sizes that a file of this length cannot fill: whoever holds one number a row shall not run out of memory.
 fn check_size(rows: usize, columns: usize, length: usize) -> Result<(), Error> {

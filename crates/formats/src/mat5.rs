@@ -45,6 +45,21 @@ fn order(bytes: &[u8]) -> Option<Order> {
     }
 }
 
+/// Whether it begins as a file of version 4 does, which is another format: a type in decimal digits, sizes, and a name that ends with a zero.
+pub(crate) fn is_version_4(bytes: &[u8]) -> bool {
+    let number = |at: usize, read: fn([u8; 4]) -> u32| Some(read(bytes.get(at..at + 4)?.try_into().ok()?));
+    [u32::from_le_bytes, u32::from_be_bytes].into_iter().any(|read| {
+        let numbers: Option<Vec<u32>> = (0..5).map(|k| number(4 * k, read)).collect();
+        let Some([kind, rows, columns, complex, name]) = numbers.as_deref() else { return false };
+        // thousands: the order of bytes; hundreds: none; tens: the type of numbers; ones: full, text, sparse
+        let known = *kind < 5000 && kind / 100 % 10 == 0 && kind / 10 % 10 <= 5 && kind % 10 <= 2;
+        let named = bytes.get(20..20 + (*name).min(64) as usize).and_then(<[u8]>::split_last);
+        let named =
+            named.is_some_and(|(end, name)| *end == 0 && !name.is_empty() && name.iter().all(u8::is_ascii_graphic));
+        known && *rows > 0 && *columns > 0 && *complex <= 1 && named
+    })
+}
+
 /// An element: its type and its bytes.
 struct Element<'a> {
     kind: u32,

@@ -2,10 +2,8 @@
 
 use std::fmt;
 
+use crate::constrained::CLAMPED;
 use crate::matrix::Matrix;
-
-/// What Abaqus puts on the diagonal of a constrained row.
-const CLAMPED: f64 = 1e36;
 
 /// Names that a report shows.
 const SHOWN: usize = 6;
@@ -81,7 +79,7 @@ impl Report {
             zero_diagonal: where_is(|value| value == 0.0),
             negative_diagonal: where_is(|value| value < 0.0),
             empty: (0..matrix.rows()).filter(|&row| !filled[row]).collect(),
-            clamped: where_is(|value| value == CLAMPED),
+            clamped: where_is(|value| value >= CLAMPED),
             names: matrix.names().map(|names| (names.iter().take(SHOWN).cloned().collect(), names.len())),
             origin: [origin.format, &origin.variable].map(str::trim).join(" ").trim().to_string(),
         }

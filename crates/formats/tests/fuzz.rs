@@ -380,3 +380,18 @@ fn memory_follows_the_file() {
         eprintln!("{}: {:.1} times its {} bytes", format.name, memory as f64 / bytes.len() as f64, bytes.len());
     }
 }
+
+/// One damaged index far beyond all others is no row of a structure.
+#[test]
+fn a_damaged_index_makes_no_rows() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut text: String = (1..=100_000).map(|row| format!("{row} {row} 2.0\n")).collect();
+    assert_eq!(read_bytes(text.as_bytes(), None, None).expect("a diagonal").rows(), 100_000);
+    text += "14889400 14889400 1.0\n";
+    MEMORY.reset_peak_usage();
+    let before = MEMORY.current_usage();
+    let error = read_bytes(text.as_bytes(), None, None).expect_err("more rows than bytes").to_string();
+    let memory = MEMORY.peak_usage().saturating_sub(before);
+    assert!(error.contains("14889400 rows") && error.contains("damaged"), "{error}");
+    assert!(memory <= 10 * text.len(), "{memory} bytes of memory for {}", text.len());
+}

@@ -296,6 +296,10 @@ fn directions(table: &StatedTable, values: &Values) -> Result<(Vec<String>, Vec<
         (false, None, None) => owned(&CARTESIAN[..sums.unwrap_or(CARTESIAN.len())]),
     };
     let rows = if framed { owned(&CARTESIAN) } else { names.clone() };
+    if framed && count.is_some_and(|count| count != CARTESIAN.len()) {
+        return Err(problem("normal", "a local frame needs three rows: those of x, y and z".to_owned())
+            .map_help("of a plane structure name the rows in order, tangent and normal, without a frame, or turn them by sum = { … }"));
+    }
     if let Some(count) = count.filter(|count| *count != names.len()) {
         let message = format!("{} directions for {count} rows", names.len());
         return Err(problem("directions", message).map_help("give each row the name of its direction"));
@@ -356,7 +360,22 @@ fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<P
             }
         }
         _ => {
-            for name in values.names(key).unwrap_or_default() {
+            let names = values.names(key).unwrap_or_default();
+            if let Some(twice) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
+                let (place, name) = (table.location_of(key, Some(twice.1)), shown(twice.1));
+                let message =
+                    format!("the row `{name}` stands twice, and a node moves along each of its directions once");
+                return Err(Box::new(
+                    Problem::new(place, key, message).help("name each row once; a weighted sum of rows is sum = { … }"),
+                ));
+            }
+            let framed = values.vector("normal").is_some();
+            let ordered = if framed { in_space(names) } else { Some(names.iter().collect()) };
+            let ordered = ordered.ok_or_else(|| {
+                problem("normal", format!("a local frame needs the rows of x, y and z, not {}", names.join(", ")))
+                    .map_help("name them in dofs = [\"188.x\", \"188.y\", \"188.z\"], or the node in nodes = [\"188\"]")
+            })?;
+            for name in ordered {
                 rows.push(vec![(find(name)?, 1.0)]);
             }
         }
@@ -381,15 +400,27 @@ fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<P
     Ok(Place { name: values.text("name").unwrap_or_default().to_owned(), directions, rows, frame, of: None })
 }
 
+/// Rows of a node in the order in which a frame takes them, x, y, z: by the ends of their names; as they stand where no end is one of these; none
+/// where some are, and not each once.
+fn in_space(names: &[String]) -> Option<Vec<&String>> {
+    let end =
+        |name: &String| CARTESIAN.iter().position(|axis| name.rsplit_once('.').is_some_and(|(_, end)| end == *axis));
+    if names.iter().all(|name| end(name).is_none()) {
+        return Some(names.iter().collect());
+    }
+    let along = |axis: usize| names.iter().find(|name| end(name) == Some(axis));
+    (0..CARTESIAN.len()).map(along).collect::<Option<Vec<_>>>().filter(|rows| rows.len() == names.len())
+}
+
 /// A row of a node.
 fn find_of(component: &Component, table: &StatedTable, node: &str, along: &str) -> Result<usize, Box<Problem>> {
     let name = format!("{node}.{along}");
     component.row(&name).ok_or_else(|| {
         let place = table.location_of("nodes", Some(node));
-        Box::new(
-            Problem::new(place, "nodes", format!("the structure has no row `{}`", shown(&name)))
-                .help(near(component, &name)),
-        )
+        Box::new(Problem::new(place, "nodes", format!("the structure has no row `{}`", shown(&name))).help(format!(
+            "{}; or state directions = [\"x\", …] with those that every one of the nodes has",
+            near(component, &name)
+        )))
     })
 }
 

@@ -167,10 +167,21 @@ impl ModelSummary {
         let slow = Costing::new(study, &cases[0]);
         let (usual, cost) = (slow.usual(), (kind.cost)(&slow));
         let usual_cost = (kind.cost)(&usual);
-        let usual_seconds = usual.seconds(&usual_cost);
+        let times: Vec<[f64; 2]> = cases
+            .iter()
+            .map(|one| {
+                let slow = Costing::new(study, one);
+                let usual = slow.usual();
+                [usual.seconds(&(kind.cost)(&usual)), slow.seconds(&(kind.cost)(&slow))]
+            })
+            .collect();
+        // each as if all cases were like it
+        let [usual_seconds, seconds] =
+            [0, 1].map(|of| times.iter().map(|time| time[of]).sum::<f64>() / times.len() as f64);
+        let whole = usual.seconds(&usual_cost);
         let spared = usual_cost.spared.map(|(work, place)| {
             let rest = Cost { work: usual_cost.work - work, ..usual_cost };
-            (usual.seconds(&rest), place)
+            (usual_seconds * usual.seconds(&rest) / whole, place)
         });
         Ok(ModelSummary {
             case: shown.case.label(),
@@ -187,7 +198,7 @@ impl ModelSummary {
             size: slow.size(&cost, Units::of(study, (kind.grain)(study)).len()),
             usual_seconds,
             spared,
-            seconds: slow.seconds(&cost).max(usual_seconds),
+            seconds: seconds.max(usual_seconds),
         })
     }
 

@@ -99,7 +99,7 @@ pub(crate) fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyE
             let index = model.joints.iter().position(|j| j.name == *joint).unwrap_or(0);
             study.error_at("joint", index, "law", message, help)
         }
-        MethodError::NeedsMass { place, .. } => {
+        MethodError::NeedsMass { place, .. } | MethodError::Empty { place, .. } | MethodError::Light { place, .. } => {
             match model.masses.iter().position(|mass| mass.places().contains(place)) {
                 Some(index) => study.error_at("mass", index, "mass", message, help),
                 None => study.error_at("structure", 0, "mass", message, help),
@@ -134,7 +134,10 @@ fn advice(study: &Study, case: &Case, ways: &Ways) -> String {
             row.name,
             displayed(ANY_WIDTH, Some(Dimension::VELOCITY))
         ),
-        None => format!("a study of the kind `{}` chooses no method; where one is chosen, {ways}", kind.name),
+        None => format!(
+            "a study of the kind `{}` goes by a method of its own, which does not take this; in kinds that choose one, {ways}",
+            kind.name
+        ),
     }
 }
 

@@ -414,7 +414,7 @@ fn wrong_sectors_by_matrices_are_refused_at_their_place() {
         ("", "needs `boundary`"),
         ("boundary = \"none.csv\"", "cannot be read"),
         ("boundary = \"wrong.csv\"", "expected the columns low,high, found `left,right`"),
-        ("boundary = \"strange.csv\"", "constrain both alike"),
+        ("boundary = \"strange.csv\"", "no row of node `9`, and rows of node `1`"),
         ("boundary = \"pairs.csv\"\naxis = \"z\"", "constrain both alike"),
         ("boundary = \"pairs.csv\"\nblade = \"pairs.csv\"", "expected the columns node"),
         ("boundary = \"pairs.csv\"\nblade = \"rim_blade.csv\"", "row `1.x` of the blade stands on the boundary"),

@@ -383,6 +383,28 @@ fn a_turned_frame_has_the_same_orbit() {
     assert!((first - numbers(&turned, "pad_t1_amplitude_m")[0]).abs() > 1e-2 * first);
 }
 
+/// A frame takes the rows of a node along x, y and z by their names, in whatever order they are stated.
+#[test]
+fn rows_of_a_frame_are_taken_by_their_names() {
+    let brick = blade();
+    let node = tip(&brick, 0, 0);
+    let folder = tempfile::tempdir().unwrap();
+    write_pair(folder.path(), &brick, "mtx", (1.0, 1.0));
+    let of = |rows: [&str; 3]| {
+        let rows = rows.map(|along| format!("\"{node}.{along}\"")).join(", ");
+        let text = structure("mtx", "rows.csv", "m-kg-s", &format!("{DAMPED}\nreduce = {{ up_to = \"5 kHz\" }}"))
+            + &format!("[[place]]\nname = \"pad\"\ndofs = [{rows}]\nnormal = [0, 1, 2]\n")
+            + "[[force]]\non = \"pad.n\"\namplitude = \"5 N\"\n\
+               [study]\nkind = \"response\"\nfrequency = [\"600 Hz\", \"700 Hz\"]\n\
+               [method]\nkind = \"harmonic-balance\"\nharmonics = 1\n";
+        let data = results(folder.path(), &text);
+        ["pad_t1_amplitude_m", "pad_t2_amplitude_m", "pad_n_amplitude_m"].map(|column| numbers(&data, column).to_vec())
+    };
+    let straight = of(["x", "y", "z"]);
+    assert!(straight[2].iter().all(|x| *x > 0.0));
+    assert_eq!(of(["z", "x", "y"]), straight);
+}
+
 /// Each mistake says which file or key, and what to do.
 #[test]
 fn what_is_wrong_is_said() {
@@ -447,6 +469,7 @@ fn what_is_wrong_is_said() {
     told(DAMPED, &format!("{DAMPED}\nmodal_damping = 0.01"), &["one damping"]);
     told(DAMPED, "reduce = { modes = 3, up_to = \"1 kHz\" }", &["leave out one"]);
     told("dofs = [", "normal = [0, 0, 0]\ndofs = [", &["normal"]);
+    told(&format!("\"{node}.z\"]"), &format!("\"{node}.x\"]"), &["stands twice", "sum = {"]);
     told("tip.z", "tip", &["several directions"]);
     told("tip.z", "top.z", &["no place `top.z`"]);
     // what is moved takes along what is the same

@@ -11,12 +11,21 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use stickslip::law::{Coulomb, Jenkins, LawInfo, SharedLaw, TABLE};
+use stickslip::law::{Coulomb, Jenkins, LawInfo, Parameter, Range, SharedLaw, TABLE};
 use stickslip::method::{Method, event_driven::EventDriven};
 use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Orbit, Sample};
 use stickslip::structure::{Structure, StructureError};
 use stickslip_study::templates;
+
+/// The Rust of the book, which compiles and runs.
+#[cfg(doctest)]
+mod book {
+    #[doc = include_str!("../../../docs/src/getting_started.md")]
+    struct GettingStarted;
+    #[doc = include_str!("../../../docs/src/matrices.md")]
+    struct Matrices;
+}
 
 /// A small generator of uniform numbers, so that every test can name its models by a seed.
 /// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators" (2014), SplitMix64.
@@ -52,16 +61,36 @@ fn definite(random: &mut Random, n: usize, least: f64, size: f64) -> DMatrix<f64
     DMatrix::identity(n, n) * least + &b * b.transpose() * size
 }
 
-/// One of these laws with parameters up to twice or half of its sample's.
+/// One of these laws with parameters up to twice or half of its sample's, and those that may be left out as they are there.
 pub fn random_law(random: &mut Random, among: &[&'static LawInfo]) -> SharedLaw {
+    drawn_law(random, among, |random, value, p| if p.default.is_some() { value } else { around(random, value) })
+}
+
+/// One of these laws with parameters from all that each may be: zero, of either sign, any count.
+pub fn any_law(random: &mut Random, among: &[&'static LawInfo]) -> SharedLaw {
+    drawn_law(random, among, |random, value, p| match p.range {
+        Range::Positive => around(random, value),
+        Range::ZeroOrMore => around(random, value) * f64::from(random.unit() > 0.15),
+        Range::Any => around(random, value) * if random.unit() < 0.3 { -1.0 } else { 1.0 },
+        Range::Within(least, most) => random.between(least.max(-10.0), most.min(10.0)),
+        Range::Count(most) => 1.0 + random.below(most.min(2 * value as u32) as usize) as f64,
+    })
+}
+
+/// Up to twice or half as much.
+fn around(random: &mut Random, value: f64) -> f64 {
+    value * 2f64.powf(random.between(-1.0, 1.0))
+}
+
+fn drawn_law(
+    random: &mut Random,
+    among: &[&'static LawInfo],
+    draw: impl Fn(&mut Random, f64, &Parameter) -> f64,
+) -> SharedLaw {
     let row = among[(random.unit() * among.len() as f64) as usize];
     for _ in 0..20 {
-        let values: Vec<f64> = row
-            .sample
-            .iter()
-            .zip(row.parameters)
-            .map(|(value, p)| if p.default.is_some() { *value } else { value * 2f64.powf(random.between(-1.0, 1.0)) })
-            .collect();
+        let pairs = row.sample.iter().zip(row.parameters);
+        let values: Vec<f64> = pairs.map(|(value, p)| draw(random, *value, p)).collect();
         let keys = row.parameters.iter().map(|p| p.key).zip(values).collect();
         if let Ok(law) = row.build(&keys) {
             return law;
@@ -75,8 +104,17 @@ pub fn random_system(seed: u64) -> (System, f64) {
     random_system_of(seed, TABLE)
 }
 
+/// The same with parameters of the laws from all that they may be.
+pub fn random_system_of_any(seed: u64) -> (System, f64) {
+    system_with(seed, &|random| any_law(random, TABLE))
+}
+
 /// The same with joints of these laws.
 pub fn random_system_of(seed: u64, among: &[&'static LawInfo]) -> (System, f64) {
+    system_with(seed, &|random| random_law(random, among))
+}
+
+fn system_with(seed: u64, law: &dyn Fn(&mut Random) -> SharedLaw) -> (System, f64) {
     let mut random = Random::new(seed);
     let n = 1 + (random.unit() * 4.0) as usize;
     let mass = definite(&mut random, n, 0.5, 1.0);
@@ -88,7 +126,7 @@ pub fn random_system_of(seed: u64, among: &[&'static LawInfo]) -> (System, f64) 
     let structure = Structure::new(places, mass, damping, stiffness).unwrap();
     let mut builder = System::builder(structure);
     for j in 0..1 + (random.unit() * 2.0) as usize {
-        let law = random_law(&mut random, among);
+        let law = law(&mut random);
         let axes = (0..law.directions()).map(|_| {
             let one = (random.unit() * n as f64) as usize;
             let other = (random.unit() * n as f64) as usize;

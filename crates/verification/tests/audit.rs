@@ -1,7 +1,7 @@
 //! Random systems with random laws, small ones with full matrices and long rows and rings, in every method that takes them, each orbit held
 //! against small steps in time ([`stickslip_verification::reference`]), which share no code with any method.
 //!
-//! `STICKSLIP_AUDIT_MODELS=1000` and `STICKSLIP_AUDIT_FIRST=SEED` make it longer, `STICKSLIP_AUDIT_ROWS=100` that of the rows; it prints what
+//! `STICKSLIP_AUDIT_MODELS=1000` and `STICKSLIP_AUDIT_FIRST=SEED` make it longer, `STICKSLIP_AUDIT_ROWS=100` that of the rows, `STICKSLIP_AUDIT_ANY=300` that of laws with any parameters; it prints what
 //! agrees, what was refused or failed and why, and what the reference cannot judge: none of that counts as right.
 
 #![allow(clippy::print_stdout)] // tests say what they measured
@@ -12,10 +12,11 @@ use stickslip::method::TABLE as METHODS;
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
 use stickslip_verification::reference::Reference;
-use stickslip_verification::{random_row, random_system};
+use stickslip_verification::{random_row, random_system, random_system_of_any};
 
 /// Models without a wish.
 const MODELS: u64 = 12;
+const ANY: u64 = 6;
 const ROWS: u64 = 2;
 /// The first of the rows without a wish: with those before it goes a quarter of a minute.
 const FIRST_ROW: u64 = 4;
@@ -65,6 +66,12 @@ fn distance(system: &System, omega: f64, orbit: &Orbit, steps: usize) -> Option<
 fn every_orbit_is_a_motion() {
     let models = variable("STICKSLIP_AUDIT_MODELS", MODELS);
     audit(&random_system, 0, models, models > MODELS);
+}
+
+/// The same with laws whose parameters are anything that they may be: zero, of either sign, any count.
+#[test]
+fn every_orbit_of_any_parameters_is_a_motion() {
+    audit(&random_system_of_any, 0, variable("STICKSLIP_AUDIT_ANY", ANY), false);
 }
 
 /// Where harmonic balance has the structure in modes or in banded form, and coupled joints by the dozen.

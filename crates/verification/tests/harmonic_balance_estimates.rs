@@ -6,9 +6,10 @@
 
 #![allow(clippy::print_stdout)] // tests say what they measured
 
-use stickslip::law::TABLE;
+use std::sync::Arc;
+use stickslip::law::{BoucWen, Dahl, LuGre, SharedLaw, TABLE};
 use stickslip::method::{Method, harmonic_balance::HarmonicBalance, shooting::Shooting};
-use stickslip::model::System;
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::Orbit;
 use stickslip_verification::random_system_of;
 
@@ -73,6 +74,50 @@ fn the_estimate_holds_for_every_law() {
         }
         let largest = errors.iter().copied().fold(0.0, f64::max);
         println!("{}: {judged} judged, error / estimate up to {worst:.2}, error up to {largest:.1e}", info.name);
+    }
+    assert!(low.is_empty(), "{}", low.join("\n"));
+}
+
+/// Laws whose states cross their range between two samples are to a series as steep as rigid friction, and samples place a change of sign to a sample only: two
+/// motions may be near each other by chance (9.8e-6 where the error was 1.9e-4). The way over which they cross it is a thousandth to a millionth of the motion.
+#[test]
+fn the_estimate_holds_for_stiff_laws_with_states() {
+    let laws = |stiffness: f64| -> [SharedLaw; 3] {
+        let range = 0.3 / stiffness;
+        [
+            Arc::new(Dahl { stiffness, limit: 0.5 }),
+            Arc::new(BoucWen { stiffness, beta: 1.0 / (range * range), gamma: 0.0, exponent: 2.0 }),
+            Arc::new(LuGre { stiffness, damping: 0.0, viscous: 0.1, limit: 0.4, static_limit: 0.5, velocity: 1e-2 }),
+        ]
+    };
+    let mut low = Vec::new();
+    for stiffness in [1e4, 1e5, 1e6] {
+        for law in laws(stiffness) {
+            let ground = GROUND.to_owned();
+            let between = ["m".to_owned(), ground.clone()];
+            let spring = Spring { between: between.clone(), stiffness: 100.0, damping: 0.5 };
+            let model = Model {
+                masses: vec![Mass::new("m", 1.0)],
+                springs: vec![spring],
+                joints: vec![Joint { name: "j".to_owned(), between, law: law.clone() }],
+                forces: vec![Force { on: "m".to_owned(), amplitude: 1.0, phase: 0.0, harmonic: 1 }],
+                ..Model::default()
+            };
+            let (system, omega) = (model.assemble().unwrap(), 1.5 * std::f64::consts::TAU);
+            let truth =
+                Shooting { tolerance: 1e-10, ..Shooting::default() }.solver(&system).unwrap().orbit(omega, None);
+            let truth = truth.unwrap();
+            for tolerance in [1e-3, 2e-4] {
+                let method = HarmonicBalance { tolerance: Some(tolerance), ..HarmonicBalance::default() };
+                let found = method.solver(&system).unwrap().orbit(omega, None);
+                let Ok(found) = found else { continue };
+                let (error, estimate) = (distance(&found, &truth), found.evidence.truncation.unwrap());
+                println!("{} {stiffness:.0e} {tolerance:.0e}: error {error:.1e}, estimate {estimate:.1e}", law.name());
+                if error > FACTOR * estimate {
+                    low.push(format!("{} {stiffness:e}: error {error:.1e}, estimate {estimate:.1e}", law.name()));
+                }
+            }
+        }
     }
     assert!(low.is_empty(), "{}", low.join("\n"));
 }

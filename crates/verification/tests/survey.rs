@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stickslip::dimension::Dimension;
-use stickslip::law::{Coulomb, FrictionContact, Jenkins, Parameter, SharedLaw, TABLE};
+use stickslip::law::{Coulomb, FrictionContact, Jenkins, Parameter, SharedLaw, Stribeck, TABLE};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Modes, Motion, Onset, Spring, Survey};
 use stickslip_study::templates;
 
@@ -162,6 +162,31 @@ fn a_network_agrees_with_scipy() {
     // the compliance that stands for rigid joints is 1e-10 of the structure's
     close(&flat(&onsets[0].slips), &[28.081772350591542, 36.90272319394895], 1e-9);
     close(&flat(&onsets[1].slips), &[26.566375940502397, 36.23457606164326], 1e-9);
+}
+
+/// Rigid joints side by side carry a load by their limits and slip together; one with a static limit slips at that.
+#[test]
+fn rigid_joints_along_one_line_slip_together() {
+    let model = |limits: [(f64, f64); 3]| Model {
+        masses: vec![mass("a", 1.0)],
+        springs: vec![spring("a", GROUND, 1e4, 2.0)],
+        joints: (0..3)
+            .map(|i| {
+                let law = Stribeck { limit: limits[i].0, static_limit: limits[i].1, velocity: 0.0 };
+                joint(format!("j{i}"), "a", GROUND, Arc::new(law))
+            })
+            .collect(),
+        forces: vec![force("a", 6.0, 0.0, 1)],
+        ..Model::default()
+    };
+    for limits in [[(12.75, 12.75), (0.4, 0.4), (1.3, 1.3)], [(1.0, 2.0), (0.5, 3.0), (0.1, 0.1)]] {
+        let sum: f64 = limits.iter().map(|(_, holds)| holds).sum();
+        let onsets = model(limits).survey().unwrap().onset(20.0, 150.0).unwrap();
+        for onset in onsets {
+            // compliances of 1e-12 of the structure share the load to as many digits as they leave
+            assert!((onset.largest * sum / 6.0 - 1.0).abs() < 1e-4, "{limits:?}: {} for {}", onset.largest, 6.0 / sum);
+        }
+    }
 }
 
 /// A chain of `n` equal masses, tied to the ground at both ends: `ω_i = 2 √(k/m) sin(iπ / (2(n + 1)))`.

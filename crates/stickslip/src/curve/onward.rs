@@ -125,6 +125,7 @@ impl Solver for Onward<'_> {
             let orbit = self.solver.between(omega, Some(start));
             self.told = orbit.ok().map(|orbit| Last { start: start.to_vec(), ..Last::new(&orbit) });
         }
+        self.solver.begin_at(omega, start);
     }
 }
 

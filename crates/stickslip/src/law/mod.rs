@@ -159,7 +159,8 @@ pub const MOST_DIRECTIONS: usize = 3;
 pub trait Law: Debug + Send + Sync {
     /// Its row: name, summary, parameters.
     fn info(&self) -> &'static LawInfo;
-    /// The parameters' values in SI, in the order of its row.
+    /// The parameters' values in SI, in the order of its row. Two laws of one row with the same values are taken for the same law: what else tells them
+    /// apart has to be among them.
     fn values(&self) -> Vec<f64>;
     /// Directions of relative motion, 1 to [`MOST_DIRECTIONS`].
     fn directions(&self) -> usize {

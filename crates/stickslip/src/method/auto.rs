@@ -177,6 +177,12 @@ impl Solver for WithSecond<'_> {
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.seek(omega, start, true)
     }
+    fn begin_at(&mut self, omega: f64, start: &[f64]) {
+        match self.second.as_mut().and_then(Option::as_mut).filter(|_| self.last.as_deref() == Some(start)) {
+            Some(second) => second.begin_at(omega, start),
+            None => self.first.begin_at(omega, start),
+        }
+    }
 }
 
 #[cfg(test)]

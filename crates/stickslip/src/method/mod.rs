@@ -129,6 +129,38 @@ pub enum MethodError {
         /// What to use instead.
         ways: Box<Ways>,
     },
+    /// A place that has nothing but joints.
+    #[error(
+        "{method} needs a mass, a spring or a damper at `{place}`: nothing else says how it moves between its joints; of joints in series make one, as \
+         of two `jenkins`, which have the smaller limit and the springs of both in series{}", .ways.behind()
+    )]
+    Empty {
+        /// The method.
+        method: &'static str,
+        /// The place.
+        place: String,
+        /// What to use instead.
+        ways: Box<Ways>,
+    },
+    /// A place so light between rigid joints that its inertia is lost.
+    #[error(
+        "{method} loses the inertia of `{place}`, which is {ratio:.0e} times lighter than what it rubs on at joint `{joint}` and rubs on something else, \
+         too: of rigid joints in series the weaker one slips, so leave the other and the place out, or give it {least:.0e} of that mass{}", .ways.behind()
+    )]
+    Light {
+        /// The method.
+        method: &'static str,
+        /// The place.
+        place: String,
+        /// The joint.
+        joint: String,
+        /// The other mass by its own.
+        ratio: f64,
+        /// The share of the other mass that is enough.
+        least: f64,
+        /// What to use instead.
+        ways: Box<Ways>,
+    },
     /// More degrees of freedom than the method's full matrices may have.
     #[error("{method} carries full matrices over at most {most} places, and there are {dofs}{}", .ways.behind())]
     TooLarge {
@@ -175,6 +207,14 @@ impl MethodError {
         MethodError::NeedsMass { method, place: system.structure().places()[place].clone(), ways: Box::default() }
     }
 
+    /// `method` needs anything but joints at a place: whether a system has one without.
+    pub(crate) fn empty(method: &'static str, system: &System) -> Option<Self> {
+        let mut empty = vec![true; system.dofs()];
+        system.structure().entries().for_each(|(row, _, _)| empty[row] = false);
+        let place = system.structure().places()[empty.iter().position(|empty| *empty)?].clone();
+        Some(MethodError::Empty { method, place, ways: Box::default() })
+    }
+
     /// `method` carries full matrices: whether those of a system are too large for it.
     pub(crate) fn too_large(method: &'static str, system: &System) -> Option<Self> {
         let (dofs, most) = (system.dofs(), MOST_IN_FULL);
@@ -191,6 +231,8 @@ impl MethodError {
         match self {
             MethodError::Law { ways, .. }
             | MethodError::NeedsMass { ways, .. }
+            | MethodError::Empty { ways, .. }
+            | MethodError::Light { ways, .. }
             | MethodError::TooLarge { ways, .. }
             | MethodError::NotPositive { ways, .. } => Some(&**ways),
             MethodError::Option { .. } => None,
@@ -213,6 +255,8 @@ impl MethodError {
         match &mut self {
             MethodError::Law { ways, .. }
             | MethodError::NeedsMass { ways, .. }
+            | MethodError::Empty { ways, .. }
+            | MethodError::Light { ways, .. }
             | MethodError::TooLarge { ways, .. }
             | MethodError::NotPositive { ways, .. } => {
                 **ways = instead;

@@ -45,7 +45,7 @@ const MESHES: usize = 6;
 /// A mesh is good when closing the orbit on it moves the state by at most this many times the error per step: that is what the
 /// choice of the steps alone does. A motion that is waited for and changes by no more from one return to the next goes on in the same steps.
 const SETTLED: f64 = 100.0;
-/// Energy gap above which an orbit is not reported as converged.
+/// Energy gap above which an orbit is not reported as converged, and what the last mesh may move it by, relative.
 const ENERGY_GAP: f64 = 1e-5;
 /// Error of an orbit in equal steps, in errors per step of the stiff integration: 1e-5 of the motion when no tolerance is given.
 const EQUAL_STEPS: f64 = 1e3;
@@ -324,10 +324,13 @@ impl<'a> Shooter<'a> {
             let closed = closed?;
             iterations += closed.iterations;
             let moved: Vec<f64> = closed.state.iter().zip(&state).map(|(a, b)| a - b).collect();
-            if norm(&self.weights, &moved) <= SETTLED * self.tolerance * self.size(&closed.state, aim) || mesh == MESHES
-            {
+            let moved = norm(&self.weights, &moved) / self.size(&closed.state, aim);
+            if moved <= SETTLED * self.tolerance || (mesh == MESHES && moved <= ENERGY_GAP) {
                 // the last run of the iteration was that of the closed state
                 return Ok(Closed { iterations, ..closed });
+            }
+            if mesh == MESHES {
+                return Err(OrbitError::not_converged(NAME, aim.omega, iterations, moved));
             }
             (state, fits) = (closed.state, false);
         }

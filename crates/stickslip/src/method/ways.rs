@@ -94,6 +94,9 @@ impl Solver for Advised<'_> {
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.solver.between(omega, start).map_err(|error| advised(error, self.system))
     }
+    fn begin_at(&mut self, omega: f64, start: &[f64]) {
+        self.solver.begin_at(omega, start);
+    }
 }
 
 /// Degrees of freedom beyond which no other method is fast enough to be named, and to ask all of them takes a tenth of a second.

@@ -277,7 +277,8 @@ impl Assembler<'_> {
             joint.law.check().map_err(|error| ModelError::new(element, "law", error.to_string()))?;
             differ(&joint.between, element)?;
             let mut axes = Vec::new();
-            for (along, [a, b]) in self.places.axes(&joint.between, joint.law.directions(), element)? {
+            let faces = (joint.law.directions(), joint.law.normal());
+            for (along, [a, b]) in self.places.axes(&joint.between, faces, element)? {
                 signs.iter_mut().for_each(|signs| signs.push(0.0));
                 let (axis, moved) = self.axis(&self.along(&[(a, 1.0), (b, -1.0)]));
                 let mut imposed = Vec::new();
@@ -339,11 +340,19 @@ fn finite_at_least_zero(value: f64, element: Element, key: &'static str, unit: &
     Err(ModelError::new(element, key, format!("must be a finite number, zero or more, in {unit}, found {value}")))
 }
 
+/// Amplitudes (N, m) of which energies, over their stiffness and damping, neither vanish nor overflow.
+const SIZES: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
+
 fn harmonic_amplitude(amplitude: f64, phase: f64, element: Element) -> Result<Complex64, ModelError> {
     for (value, key) in [(amplitude, "amplitude"), (phase, "phase")] {
         if !value.is_finite() {
             return Err(ModelError::new(element, key, format!("must be a finite number, found {value}")));
         }
+    }
+    if amplitude != 0.0 && !SIZES.contains(&amplitude.abs()) {
+        let message =
+            format!("{amplitude:e} in SI has no square that a computer can hold; is its unit the one that was meant?");
+        return Err(ModelError::new(element, "amplitude", message));
     }
     Ok(Complex64::from_polar(1.0, phase) * amplitude)
 }

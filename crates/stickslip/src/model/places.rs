@@ -143,8 +143,13 @@ impl Places {
         Err(ModelError { wrong_name: Some(name.to_owned()), ..ModelError::new(element, key, message) })
     }
 
-    /// Where both ends of a joint lead, along each of `count` directions.
-    pub fn axes(&self, between: &[String; 2], count: usize, element: Element) -> Result<Vec<Along<'_>>, ModelError> {
+    /// Where both ends of a joint lead, along each of `count` directions, one of which may be the normal.
+    pub fn axes(
+        &self,
+        between: &[String; 2],
+        (count, normal): (usize, Option<usize>),
+        element: Element,
+    ) -> Result<Vec<Along<'_>>, ModelError> {
         let key = "between";
         let nodes: Vec<&Vec<String>> = between.iter().filter_map(|name| self.directions.get(name)).collect();
         let Some(directions) = nodes.first().copied() else {
@@ -169,6 +174,16 @@ impl Places {
                 } else {
                     directions.join(", ")
                 }
+            );
+            return Err(ModelError::new(element, key, message));
+        }
+        // tangents are alike, and which direction is the normal would go by which node is named first
+        let normals = normal.map(|at| nodes.iter().filter_map(|own| own.get(at)).collect::<Vec<_>>());
+        if let Some([one, other]) = normals.as_deref().filter(|ends| ends.len() == 2 && ends[0] != ends[1]) {
+            let message = format!(
+                "the law presses along one direction of its nodes, and that is {one} of `{}` and {other} of `{}`: state their directions in the \
+                 same order, tangents first",
+                between[0], between[1]
             );
             return Err(ModelError::new(element, key, message));
         }

@@ -138,8 +138,8 @@ pub(crate) fn measure<S: Signals>(
         let dissipation: f64 = axes.clone().map(|axis| signals.dissipation(axis, &forces[axis])).sum();
         let displacement = axes.map(|axis| signals.relative_range(axis).map(mirrored)).collect::<Result<_, _>>()?;
         let Faces { shares, switches, rests } = signals.faces(j);
-        // a law without a limit never slips: it is not stuck, and its orbit is none of many
-        if rests && joint.law().scale().is_finite() {
+        // a law without a limit never slips, and a smooth one gives way however little: neither is stuck, and their orbits are none of many
+        if rests && joint.law().scale().is_finite() && joint.law().rate().is_none() {
             stuck.push(joint.name().to_owned());
         }
         joints.push(JointMotion {

@@ -64,6 +64,11 @@ pub enum BoundaryError {
         "node `{0}` stands on both sides: what lies on the axis turns about itself and cannot be tied; hold it, or leave it out of the model"
     )]
     Both(String),
+    /// A node without any row, whose other has some.
+    #[error(
+        "the structure has no row of node `{0}`, and rows of node `{1}` that it is tied to: is that its name? what is constrained is so on both sides"
+    )]
+    Unknown(String, String),
     /// A direction is missing.
     #[error(
         "node `{high}` of the high side moves along {along}, and node `{low}` of the low side lacks a direction for that; constrain both alike"
@@ -152,8 +157,11 @@ impl Boundary {
         let none = BTreeMap::new();
         for (low, high) in pairs {
             let [own, other] = [low, high].map(|node| of_node.get(node.as_str()).unwrap_or(&none));
-            if own.is_empty() && other.is_empty() {
-                return Err(BoundaryError::NoRows(high.clone()));
+            match (own.is_empty(), other.is_empty()) {
+                (true, true) => return Err(BoundaryError::NoRows(high.clone())),
+                (true, false) => return Err(BoundaryError::Unknown(low.clone(), high.clone())),
+                (false, true) => return Err(BoundaryError::Unknown(high.clone(), low.clone())),
+                (false, false) => {}
             }
             boundary.tie(own, other).map_err(|along| match along {
                 (along, true) => BoundaryError::Direction(format!("{high}.{along}")),

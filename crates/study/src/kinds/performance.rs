@@ -89,9 +89,17 @@ fn compute(work: &Work<'_>) -> Computed {
             "A performance curve needs at least {FEWEST_VALUES} values of one parameter: add vary = {{ Ft = [ … ] }} to [study]."
         )));
     }
-    let curve = curve(work).map_err(|error| (work.case().case.index, error))?;
+    // the curve goes by the values as they rise, the table as they are listed
+    let value = |case: &usize| split(&work.cases[*case]).map_or(0.0, |(_, inner)| inner.si);
+    let mut order: Vec<usize> = (0..work.cases.len()).collect();
+    order.sort_by(|a, b| value(a).total_cmp(&value(b)));
+    let values: Vec<f64> = order.iter().map(value).collect();
+    let curve = curve(work, &values).map_err(|error| (work.case().case.index, error))?;
+    let mut listed: Vec<_> = order.iter().zip(&curve.rows).collect();
+    listed.sort_by_key(|(case, _)| **case);
     let (mut rows, mut optima) = (Rows::default(), Rows::default());
-    for (prepared, row) in work.cases.iter().zip(&curve.rows) {
+    for (&case, row) in listed {
+        let prepared = &work.cases[case];
         let (failed, status) = (row.failed > 0 || row.peak.is_none(), status(row));
         let reason = || match row.peak.and_then(|peak| peak.unsettled) {
             Some(why) => why.to_string(),
@@ -129,7 +137,7 @@ fn compute(work: &Work<'_>) -> Computed {
         optima.text("status", best.as_ref().map_or("none", status));
         optima.end();
         if best.is_none() {
-            let why = no_optimum(work, &curve, &inner.name);
+            let why = no_optimum(work, &curve, (&inner.name, &order));
             Note::of_case(&varied_text(outer), format!("{WARNING}{why}")).join(&mut part.notes);
         }
     }
@@ -137,12 +145,12 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
-/// Why no value of the parameter is the best one.
-fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, parameter: &str) -> String {
+/// Why no value of the parameter is the best one; `order` has the case of every row of the curve.
+fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, (parameter, order): (&str, &[usize])) -> String {
     let level = curve.lowest();
     let height = |row: &usize| curve.rows[*row].peak.map_or(f64::NAN, |peak| peak.value);
     let text = |row: Option<&usize>| {
-        let value = row.and_then(|row| work.cases[*row].case.varied.last());
+        let value = row.and_then(|row| work.cases[order[*row]].case.varied.last());
         value.map_or_else(String::new, |value| value.text.clone())
     };
     match level[..] {
@@ -175,7 +183,7 @@ fn split(prepared: &Prepared) -> Option<(&[VariedValue], &VariedValue)> {
     prepared.case.varied.split_last().map(|(last, outer)| (outer, last))
 }
 
-fn curve(work: &Work<'_>) -> Result<PerformanceCurve, MethodError> {
+fn curve(work: &Work<'_>, values: &[f64]) -> Result<PerformanceCurve, MethodError> {
     let first = work.case();
     let places = peak_places(first);
     let frequencies: Vec<f64> = work.points.clone().map(|index| work.omega(index)).collect();
@@ -197,8 +205,7 @@ fn curve(work: &Work<'_>) -> Result<PerformanceCurve, MethodError> {
             amplitudes.map(|amplitude| if amplitude > held { amplitude } else { 0.0 }).collect()
         },
     };
-    let values: Vec<f64> = work.cases.iter().map(|p| split(p).map_or(0.0, |(_, inner)| inner.si)).collect();
-    let result = performance.curve(&values);
+    let result = performance.curve(values);
     (0..work.cases.len() * frequencies.len()).for_each(|_| (work.context.finished)());
     match result {
         Ok(curve) => Ok(curve),
@@ -254,11 +261,11 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         let label = if label.is_empty() { "peak".to_owned() } else { label };
         let (x, y) = (parameter(table, stretch.rows.clone()), height(table, stretch.rows.clone()));
         let mut points: Vec<(f64, f64)> = x.into_iter().zip(y).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
         if let Some(optima) = drawing.table(tables::OPTIMUM).filter(|optima| colour < optima.rows()) {
             // one row for every curve; the refined optimum is a point of the line
             let best = (parameter(optima, colour..colour + 1)[0], height(optima, colour..colour + 1)[0]);
-            let rising = points.is_sorted_by(|a, b| a.0 < b.0);
-            if rising && best.0.is_finite() {
+            if best.0.is_finite() {
                 let at = points.partition_point(|point| point.0 < best.0);
                 points.insert(at, best);
             }

@@ -16,9 +16,6 @@ use stickslip::structure::{Component, StructureError};
 use stickslip_formats::{self as formats, names};
 use stickslip_numerics::sparse::Matrix;
 
-/// A diagonal from which on a row is one that the program has constrained by a penalty.
-const CLAMPED: f64 = 1e36;
-
 impl Reader {
     /// The table and its matrices; none if a problem was found.
     pub(super) fn matrices(&mut self, table: &Table, study_file: &str) -> Option<Matrices> {
@@ -66,13 +63,10 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     let missing = |key| problem(key, "the file is missing".to_owned());
     let stiffness = one("stiffness")?.ok_or_else(|| missing("stiffness"))?;
     // rows without an entry are not written by some programs: those of the stiffness count
-    let ordered = |(key, matrix): Read| match (stiffness.1.names(), matrix.names()) {
-        (Some(names), Some(own)) if names != own => {
-            let path = file(stated, key).map_or_else(PathBuf::new, |file| folder.join(file.path));
-            let ordered = matrix.in_order_of(names).map_err(|error| said(error, &path));
-            ordered.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
-        }
-        _ => Ok((key, matrix)),
+    let ordered = |(key, matrix): Read| {
+        let path = file(stated, key).map_or_else(PathBuf::new, |file| folder.join(file.path));
+        let ordered = formats::aligned(matrix, &stiffness.1).map_err(|error| said(error, &path));
+        ordered.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
     };
     let mass = ordered(one("mass")?.ok_or_else(|| missing("mass"))?)?;
     let damping = one("damping")?.map(ordered).transpose()?;
@@ -101,14 +95,18 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     let names = row_names(stated, folder, [&stiffness.1, &mass.1])?;
     let (damped, spins) = (damping.is_some(), stiffened.is_some());
     let all: Vec<Read> = [Some(stiffness), Some(mass), damping, stiffened].into_iter().flatten().collect();
-    let kept = kept(&all, rows);
+    let left_out = formats::constrained(&all.iter().map(|(_, matrix)| matrix).collect::<Vec<_>>(), rows);
+    let kept: Vec<usize> = (0..rows).filter(|row| left_out.binary_search(row).is_err()).collect();
+    let free = |(key, matrix): Read| {
+        let free = matrix.without(&left_out).map_err(|error| said(error, Path::new("")));
+        free.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
+    };
+    let all = all.into_iter().map(free).collect::<Result<Vec<Read>, Problem>>()?;
     let units = match stated.entry("units").map(|entry| &entry.value) {
         Some(Stated::Fixed(Given::Text(text))) => unit_sets::find(text),
         _ => None,
     };
     let units = units.ok_or_else(|| problem("units", "the units are missing".to_owned()))?;
-    let mut new = vec![usize::MAX; rows];
-    kept.iter().enumerate().for_each(|(at, row)| new[*row] = at);
     let matrix = |key: &'static str, matrix: &formats::Matrix| {
         let unit = match key {
             "stiffness" | "stiffened" => units.stiffness(),
@@ -116,10 +114,8 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
             _ => units.damping(),
         };
         let entries =
-            matrix.both_triangles().map(|entry| (new[entry.row as usize], new[entry.column as usize], entry.value));
-        let inside = entries.filter(|(row, column, _)| *row != usize::MAX && *column != usize::MAX);
-        let made = Matrix::from_triplets(kept.len(), inside.map(|(row, column, value)| (row, column, value * unit)));
-        made.map_err(|error| problem(key, error.to_string()))
+            matrix.both_triangles().map(|entry| (entry.row as usize, entry.column as usize, entry.value * unit));
+        Matrix::from_triplets(kept.len(), entries).map_err(|error| problem(key, error.to_string()))
     };
     let mut made = all.iter().map(|(key, read)| matrix(key, read));
     let mut next = || made.next().transpose();
@@ -129,7 +125,8 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     let stiffened = if spins { next()? } else { None };
     let stiffened = stiffened.map(|there| Stiffened::new(&stiffness, &there));
     let stiffened = stiffened.transpose().map_err(|error| problem("stiffened", error.to_string()))?;
-    let names = kept.iter().map(|row| names[*row].clone()).collect();
+    let name = |row: &usize| Some(&names[*row]).filter(|name| !name.is_empty()).cloned();
+    let names = kept.iter().map(|row| name(row).unwrap_or_else(|| (row + 1).to_string())).collect();
     let component = Component::new(names, mass, damping, stiffness).map_err(|error| match &error {
         StructureError::NegativeMass => {
             // the other way round they may be a structure: then that is what is wrong
@@ -158,7 +155,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     if let Some(Err(error)) = stiffened.as_ref().map(|stiffened| stiffened.at(&component, 1.0)) {
         return Err(problem("stiffened", error.to_string()));
     }
-    Ok((component, stiffened, rows - kept.len()))
+    Ok((component, stiffened, left_out.len()))
 }
 
 /// What is wrong with a file, in the words of the formats, and what to do.
@@ -193,37 +190,16 @@ fn file(stated: &StatedTable, key: &str) -> Option<File> {
     }
 }
 
-/// The names of all rows: from a file of their own, or those that a matrix came with; numbers from 1 where there are none.
+/// The names of all rows: from a file of their own, or those that a matrix came with; empty where there are none.
 fn row_names(stated: &StatedTable, folder: &Path, matrices: [&formats::Matrix; 2]) -> Result<Vec<String>, Problem> {
     let rows = matrices[0].rows();
-    let mut all = match file(stated, "dofs") {
-        Some(file) => {
-            let path = folder.join(&file.path);
-            names::read(&path, rows).map_err(|error| {
-                let (message, help) = said(error, &path);
-                Problem::new(stated.location_of("dofs", None), "dofs", message).help(help)
-            })?
-        }
-        None => {
-            let named = matrices.iter().find_map(|matrix| matrix.names());
-            named.map_or_else(|| vec![String::new(); rows], <[String]>::to_vec)
-        }
+    let Some(file) = file(stated, "dofs") else {
+        let named = matrices.iter().find_map(|matrix| matrix.names());
+        return Ok(named.map_or_else(|| vec![String::new(); rows], <[String]>::to_vec));
     };
-    for (row, name) in all.iter_mut().enumerate().filter(|(_, name)| name.is_empty()) {
-        *name = (row + 1).to_string();
-    }
-    Ok(all)
-}
-
-/// Rows that are not constrained.
-fn kept(matrices: &[Read], rows: usize) -> Vec<usize> {
-    let (mut filled, mut clamped) = (vec![false; rows], vec![false; rows]);
-    for (_, matrix) in matrices {
-        for entry in matrix.entries() {
-            let (row, column) = (entry.row as usize, entry.column as usize);
-            (filled[row], filled[column]) = (true, true);
-            clamped[row] |= row == column && entry.value >= CLAMPED;
-        }
-    }
-    (0..rows).filter(|&row| filled[row] && !clamped[row]).collect()
+    let path = folder.join(&file.path);
+    names::read(&path, rows).map_err(|error| {
+        let (message, help) = said(error, &path);
+        Problem::new(stated.location_of("dofs", None), "dofs", message).help(help)
+    })
 }

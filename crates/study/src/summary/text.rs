@@ -186,7 +186,7 @@ impl fmt::Display for ModelSummary {
         match &self.orbits {
             Some(Orbits::One) => line("orbits", "one at each frequency, but for offsets that stuck contacts keep")?,
             Some(Orbits::Several(why)) => {
-                let what = "each point says whether its own is stable, if that is known, kind `branch` follows those that are joined to it";
+                let what = "each point says whether its own is stable, if that is known, kind `branch`, if it takes the laws, follows those that are joined to it";
                 line("orbits", &format!("several may exist at one frequency ({why}): {what}"))?;
             }
             None => {}

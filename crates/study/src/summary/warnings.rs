@@ -70,7 +70,7 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
         )
     });
     let others = survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
-    let others = others.filter(|one| !between(one));
+    let others = others.filter(|one| !between(one) && !one.held_in_motion);
     others.take(NAMED).map(one).chain(open).chain(preloaded(cases)).collect()
 }
 

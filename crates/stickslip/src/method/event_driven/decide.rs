@@ -207,12 +207,11 @@ impl Decision {
         if self.dropped.is_empty() && !self.resting.iter().any(|&i| lets_go(i)) {
             return false;
         }
-        let size = self.size(mechanics, drive, 2);
-        let (contacts, acceleration) = (&mut self.contacts, &self.acceleration);
         let back = self.dropped.iter().position(|&i| {
-            let relative = mechanics.parts[i].direction.dot(acceleration) + drive.imposed_at(i, time, 2);
-            relative * contacts[i].sign() < -BALANCED * size
+            let relative = mechanics.parts[i].direction.dot(&self.acceleration) + drive.imposed_at(i, time, 2);
+            relative * self.contacts[i].sign() < -BALANCED * self.size(mechanics, drive, i, 2)
         });
+        let contacts = &mut self.contacts;
         if let Some(back) = back {
             self.resting.push(self.dropped.swap_remove(back));
             self.resting.sort_unstable();
@@ -249,16 +248,13 @@ impl Decision {
         if !problem.solve() {
             return false;
         }
-        // what the limits can do to an acceleration
-        let most = (0..self.at_rest.len())
-            .map(|k| {
-                problem.delassus.column(k).iter().zip(&problem.high).map(|(d, limit)| d * limit).sum::<f64>().abs()
-            })
-            .fold(0.0, f64::max);
-        let size = problem.push.amax() + most;
         self.undecided.clear();
         for (k, &i) in self.at_rest.iter().enumerate() {
             let (relative, lambda) = (problem.relative[k], problem.lambda[k]);
+            // with what the limits can do to it: that of its own masses, as another joint may join far lighter ones
+            let own = problem.delassus.column(k);
+            let held: f64 = own.iter().zip(&problem.high).map(|(d, limit)| d.abs() * limit).sum();
+            let size = problem.push[k].abs() + held;
             if relative.abs() > BALANCED * size {
                 self.contacts[i] = Contact::slip(relative); // a joint that is only moved has no force here
             } else if lambda.abs() >= problem.high[k] * (1.0 - AT_LIMIT) {
@@ -272,17 +268,17 @@ impl Decision {
         true
     }
 
-    /// The size of the terms that the derivative of this order (2: acceleration) is the sum of.
-    fn size(&self, mechanics: &Mechanics, drive: &Drive, order: u32) -> f64 {
+    /// The size of the terms that the derivative of this order (2: acceleration) of the motion along a part is the sum of.
+    fn size(&self, mechanics: &Mechanics, drive: &Drive, part: usize, order: u32) -> f64 {
         let limit = mechanics.parts.iter().filter(|p| p.is_slider()).map(Part::holds).fold(0.0, f64::max);
-        let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax() };
+        let mobility = self.response.column(part).amax();
         let imposed = drive
             .rates
             .iter()
             .zip(&drive.imposed)
             .map(|(rate, g)| rate * rate * g.iter().map(|g| g.norm()).fold(0.0, f64::max));
         let acceleration = mobility * (self.pushed + limit) + imposed.sum::<f64>();
-        acceleration * drive.omega.max(mechanics.fastest).powi(order as i32 - 2)
+        acceleration * drive.omega.max(mechanics.fastest_along[part]).powi(order as i32 - 2)
     }
 
     /// Poses the problem of the sliders at rest but for its bounds: their relative acceleration (`order` 2) or a higher derivative, that
@@ -315,7 +311,7 @@ impl Decision {
             let next = level as usize + 2;
             multiply(&mechanics.inverse_mass, &self.free, &mut self.derivatives[next]);
             self.pose(mechanics, drive, time, level + 2, Some(next));
-            let least = self.size(mechanics, drive, level + 2);
+            let least: Vec<f64> = self.at_rest.iter().map(|&i| self.size(mechanics, drive, i, level + 2)).collect();
             let problem = &mut self.problem;
             for (k, i) in self.at_rest.iter().enumerate() {
                 // a force at its limit can only recede
@@ -326,10 +322,10 @@ impl Decision {
             if !problem.solve() {
                 return;
             }
-            let size = problem.push.amax().max(problem.held.amax()).max(least);
             let (contacts, at_rest) = (&mut self.contacts, &self.at_rest);
             self.undecided.retain(|&(i, sign)| {
                 let Some(k) = at_rest.iter().position(|&rest| rest == i) else { return false };
+                let size = problem.push[k].abs().max(problem.held[k].abs()).max(least[k]);
                 if problem.relative[k] * sign > BALANCED * size && size > 0.0 {
                     contacts[i] = Contact::slip(sign);
                     return false;
@@ -385,8 +381,10 @@ impl Decision {
         self.begin_derivatives(n, state);
         for level in 1..=LEVELS {
             let order = level + 1;
-            let size = self.size(mechanics, drive, order);
+            let sizes: Vec<f64> = undecided.iter().map(|&(i, _)| self.size(mechanics, drive, i, order)).collect();
+            let mut sizes = sizes.into_iter();
             undecided.retain(|&(i, sign)| {
+                let size = sizes.next().unwrap_or(0.0);
                 let part = &mechanics.parts[i];
                 let slope = part.direction.dot(&self.derivatives[order as usize]) + drive.imposed_at(i, time, order);
                 if slope.abs() <= BALANCED * size {

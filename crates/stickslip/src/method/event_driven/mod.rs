@@ -308,6 +308,58 @@ mod tests {
         }
     }
 
+    /// A mass of 1 kg on 10 N/mm that rubs with 1 N, driven near its resonance, and another one with these ends of a second rigid joint.
+    fn with_another(mass: f64, ends: [&str; 2], stiffness: f64) -> Model {
+        let joint = |name: &str, between: [&str; 2], limit| Joint {
+            name: name.into(),
+            between: between.map(String::from),
+            law: Arc::new(Coulomb { limit }),
+        };
+        let spring = |on: &str, stiffness, damping| Spring { between: [on.into(), GROUND.into()], stiffness, damping };
+        Model {
+            masses: vec![Mass::new("a", 1.0), Mass::new("b", mass)],
+            springs: vec![spring("a", 1e4, 2.0), spring("b", stiffness, 0.0)],
+            joints: vec![joint("j1", ["a", ends[0]], 1.0), joint("j2", ["b", ends[1]], 2.0)],
+            forces: vec![Force { on: "a".into(), amplitude: 3.0, phase: 0.0, harmonic: 1 }],
+            ..Model::default()
+        }
+    }
+
+    /// What counts as no acceleration of a joint goes by its own masses: a body far away, however light, changes nothing.
+    #[test]
+    fn a_light_body_beside_it_changes_no_orbit() {
+        let amplitude = |mass: f64| {
+            let system = with_another(mass, [GROUND, GROUND], 1e4).assemble().unwrap();
+            let orbit = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 16.0, None).unwrap();
+            orbit.places[0].amplitude()
+        };
+        let alone = amplitude(1.0);
+        for mass in [1e-6, 1e-9, 1e-12, 1e-15] {
+            assert!((amplitude(mass) / alone - 1.0).abs() < 1e-9, "{mass}: {} and {alone}", amplitude(mass));
+        }
+    }
+
+    /// Of rigid joints in series the weaker one slips, whatever is between them, as long as its inertia has digits; it is refused where it has none.
+    #[test]
+    fn a_shoe_between_two_joints_is_light_or_refused() {
+        let orbit = |mass: f64| -> Result<f64, String> {
+            let system = with_another(mass, ["b", GROUND], 0.0).assemble().unwrap();
+            let mut solver = EventDriven.solver(&system).map_err(|error| error.to_string())?;
+            let orbit = solver.orbit(std::f64::consts::TAU * 16.0, None).map_err(|error| error.to_string())?;
+            Ok(orbit.places[0].amplitude())
+        };
+        let system = with_another(1.0, [GROUND, GROUND], 1e4).assemble().unwrap();
+        let alone = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 16.0, None).unwrap();
+        for mass in [1e-3, 1e-6, 1.1e-8] {
+            let found = orbit(mass).unwrap();
+            assert!((found / alone.places[0].amplitude() - 1.0).abs() < 1e-9, "{mass}: {found}");
+        }
+        for mass in [0.9e-8, 1e-12, 1e-15] {
+            let refused = orbit(mass).unwrap_err();
+            assert!(refused.contains("loses the inertia of `b`") && refused.contains("joint `j1`"), "{refused}");
+        }
+    }
+
     /// A load whose peak passes the slip limit shifts a mass on rigid friction until a spring takes the rest: it creeps towards that place, slower and
     /// slower, and the orbit is one that sticks between `(peak - limit) / k` and `(trough + limit) / k`.
     #[test]

@@ -47,6 +47,8 @@ pub(super) struct Balance {
     pub(super) banded: Option<Sparse>,
     pub(super) kept: Kept,
     pub(super) first: usize,
+    /// Whether a law was met whose force samples see as a jump.
+    pub(super) steep: bool,
     pub(super) judge: Judge,
     pub(super) levels: BTreeMap<usize, Level>,
     /// The last orbits, the newest first.
@@ -67,12 +69,16 @@ impl Balance {
             Kept::new(&system, |z| z != Complex64::new(0.0, 0.0))
         };
         method.check(kept.highest)?;
+        if let Some(error) = MethodError::empty(NAME, &system) {
+            return Err(error);
+        }
         let (ports, around) = Ports::of_sector(&system)?;
         let rest = Rest::new(&system, &ports);
         let first = (FIRST * kept.scale).max(kept.highest);
         let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
         let banded = Sparse::new(&system, &ports, &[1]);
-        let samples = method.samples_at(method.harmonics.unwrap_or(first), &ports);
+        let steep = ports.has_steep();
+        let samples = method.samples_at(method.harmonics.unwrap_or(first), &ports, steep);
         let bytes = level_memory(banded.as_ref(), &ports, &rest, (harmonics.len(), samples));
         check_memory(bytes, &ports, (harmonics.len(), periods))?;
         Ok(Balance {
@@ -85,6 +91,7 @@ impl Balance {
             banded,
             kept,
             first,
+            steep,
             judge: Judge::new(&system),
             system: Arc::new(system),
             levels: BTreeMap::new(),
@@ -101,7 +108,7 @@ impl Balance {
     /// A resonance without damping.
     pub(super) fn level(&mut self, top: usize, omega: f64) -> Result<&mut Level, Lost> {
         let harmonics = self.kept.up_to(top);
-        let samples = self.method.samples_at(top, &self.ports);
+        let samples = self.method.samples_at(top, &self.ports, self.steep);
         let (system, ports) = (&self.system, &self.ports);
         let level = self.levels.entry(top).or_insert_with(|| {
             let sparse = Sparse::new(system, ports, &harmonics);
@@ -145,17 +152,29 @@ impl Balance {
         let bounded = self.banded.is_some() || self.ports.has_forces();
         let affordable = !bounded || is_affordable(work::step(self.banded.as_ref(), &self.ports, harmonics), taken);
         // it is compared with twice the samples, too
-        let samples = 2 * self.method.samples_at(self.kept.double(top), &self.ports);
+        let samples = 2 * self.method.samples_at(self.kept.double(top), &self.ports, self.steep);
         let fits = marched(&self.ports, harmonics, samples) <= MARCHED
             && level_memory(self.banded.as_ref(), &self.ports, &self.rest, (harmonics, samples)) <= MEMORY;
         few && affordable && fits
     }
 
-    /// Solves at `top`, from a motion at another number of harmonics or from the first guess.
+    /// Solves at `top`, from a motion at another number of harmonics or from the first guess. Where that shows that a law is steep, it is solved by the
+    /// samples that such laws need, as is all that follows.
     pub(super) fn solve(&mut self, top: usize, omega: f64, from: Option<(usize, &Solution)>) -> Result<Solution, Lost> {
+        let motion = self.solve_as_known(top, omega, from)?;
+        if self.steep || !self.levels[&top].jumps(&self.ports, &motion) {
+            return Ok(motion);
+        }
+        self.steep = true;
+        self.levels.clear();
+        self.compared.clear();
+        self.solve_as_known(top, omega, Some((top, &motion)))
+    }
+
+    fn solve_as_known(&mut self, top: usize, omega: f64, from: Option<(usize, &Solution)>) -> Result<Solution, Lost> {
         let start = match from {
             Some((other, motion)) => {
-                let harmonics = self.levels[&other].harmonics().to_vec();
+                let harmonics = self.kept.up_to(other);
                 equations::transfer(motion, &harmonics, self.level(top, omega)?.harmonics())
             }
             None if self.ports.has_forces() && top > COLD * self.kept.scale && top / 2 >= self.first => {

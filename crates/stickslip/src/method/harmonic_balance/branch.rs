@@ -67,8 +67,9 @@ impl<'a> BranchEquations<'a> {
         let (ports, around) = Ports::of_sector(&system).map_err(|error| error.with_ways(&system))?;
         let rest = Rest::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
-        let level =
-            |top: usize| Level::new(kept.up_to(top), method.samples_at(top, &ports), &ports, None).with_matrix();
+        let level = |top: usize| {
+            Level::new(kept.up_to(top), method.samples_at(top, &ports, ports.has_steep()), &ports, None).with_matrix()
+        };
         let harmonics = kept.up_to(top).len();
         check_memory(memory(&ports, &rest, harmonics, true), &ports, (harmonics, 1))?;
         let few = 2 * ports.count() * kept.up_to(kept.double(top)).len() <= LARGEST;
@@ -166,7 +167,8 @@ impl<'a> BranchEquations<'a> {
             finer.polish(&self.ports, self.omega, &mut motion, CHECK).ok()?;
             let better = path::places(finer, &self.rest, self.omega, &motion).ok()?;
             let coarse = Compared { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
-            let at = (self.kept, self.omega);
+            let steep = self.ports.has_steep() || self.level.jumps(&self.ports, &self.motion);
+            let at = (self.kept, self.omega, steep);
             Some(estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &motion, &better)))
         });
         let setting = path::Setting {

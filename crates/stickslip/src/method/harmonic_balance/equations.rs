@@ -610,6 +610,15 @@ impl Level {
         std::mem::swap(&mut self.alternation, sketch);
     }
 
+    /// Whether the states of a law cross their range between two samples of a motion somewhere: to the series it is as steep as a law of velocity then, and
+    /// samples place a change of its sign to a sample only.
+    pub fn jumps(&self, ports: &Ports, motion: &Solution) -> bool {
+        let (nh, samples) = (self.harmonics().len(), self.all_samples() as f64);
+        let phase = |k: usize| self.harmonics()[k] as f64 * std::f64::consts::TAU / samples;
+        let fastest = |q: usize| (0..nh).map(|k| motion.c[q * nh + k].norm() * phase(k)).sum::<f64>();
+        ports.iter().any(|port| port.layer().is_some_and(|layer| port.range().any(|q| fastest(q) > layer)))
+    }
+
     /// Whether nothing but contacts holds some body.
     pub fn stands(&self) -> bool {
         !self.springs.is_empty()

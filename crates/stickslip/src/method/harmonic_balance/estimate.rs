@@ -31,7 +31,7 @@ pub(super) fn estimate(
     seen: &[Axis],
     ports: &Ports,
     rest: &Rest,
-    (kept, omega): (Kept, f64),
+    (kept, omega, steep): (Kept, f64, bool),
     coarse: &Compared,
     (finer, better, places): (&mut Level, &Solution, &[DVector<Complex64>]),
 ) -> f64 {
@@ -61,7 +61,7 @@ pub(super) fn estimate(
     for q in ports.iter().filter(|port| port.series > 0.0).flat_map(|port| port.range()) {
         compare(&|k| coarse.along[q * few + k], &|k| fine.along[q * many + k], 0.0);
     }
-    let share = if ports.has_steep() {
+    let share = if steep {
         STEEP_SHARE
     } else if ports.has_forces() {
         RIGID_SHARE

@@ -75,7 +75,7 @@ impl Balance {
         let y = self.places(double, omega, &better)?;
         let finer = self.levels.get_mut(&double).expect("solved");
         let coarse = Compared { harmonics: &few, places: x, along: &motion.c };
-        let at = (self.kept, omega);
+        let at = (self.kept, omega, self.steep);
         let error = estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &better, &y));
         Ok((error, better))
     }
@@ -129,11 +129,11 @@ impl Balance {
                 Err(_) if top > first && !self.is_spent() => break,
                 Err(lost) => return Err(self.lost(lost)),
             };
-            if (self.ports.has_forces() || self.ports.has_steep()) && top > first {
+            if (self.ports.has_forces() || self.steep) && top > first {
                 error = error.max(CHANCE * estimate);
             }
             // where friction falls with velocity chance is frequent: the first distance has none before it that would show it
-            let shown = top > first || !self.ports.has_falling();
+            let shown = top > first || !(self.steep && self.ports.has_falling());
             if error <= tolerance && shown {
                 return self.finish(top, omega, motion, x, Some(error));
             }

@@ -153,9 +153,9 @@ impl HarmonicBalance {
     }
 
     /// Samples at a number of harmonics: what the user gave holds for the user's harmonics; the solution that checks it takes as many as
-    /// it needs, so that too few are seen in the estimate.
-    fn samples_at(&self, top: usize, ports: &Ports) -> usize {
-        let each = if ports.has_steep() { SAMPLES_OF_STEEP } else { SAMPLES_PER_HARMONIC };
+    /// it needs, so that too few are seen in the estimate. `steep`: see [`Ports::has_steep`] and [`Level::jumps`](equations::Level::jumps).
+    fn samples_at(&self, top: usize, ports: &Ports, steep: bool) -> usize {
+        let each = if steep { SAMPLES_OF_STEEP } else { SAMPLES_PER_HARMONIC };
         let remembered = ports.iter().any(Port::marches);
         let tolerance = self.tolerance.unwrap_or(TOLERANCE);
         let steps = !ports.is_empty() && ports.iter().all(Port::steps);

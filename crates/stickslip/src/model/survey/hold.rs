@@ -58,8 +58,8 @@ impl Hold {
     /// Along one of the law's axes.
     fn of(law: &dyn Law, axis: usize) -> Hold {
         let Some(branches) = law.sliders() else { return Hold::smooth(law, axis) };
-        let branches = || branches.iter().filter(|branch| branch.limit > 0.0);
-        let rigid = branches().filter(|branch| branch.stiffness.is_none()).map(|branch| branch.limit);
+        let branches = || branches.iter().filter(|branch| branch.static_limit > 0.0);
+        let rigid = branches().filter(|branch| branch.stiffness.is_none()).map(|branch| branch.static_limit);
         if let Some(limit) = rigid.reduce(|a, b| a + b) {
             return Hold::Rigid { limit };
         }

@@ -39,7 +39,7 @@ impl Model {
         }
         let ends = |between: &[String; 2]| Some((*index.get(&between[0])?, *index.get(&between[1])?));
         self.springs.iter().filter(|s| s.stiffness > 0.0).filter_map(|s| ends(&s.between)).for_each(|e| bodies.join(e));
-        let mut gripped = bodies.clone();
+        let (mut gripped, mut held) = (bodies.clone(), bodies.clone());
         let carry: BTreeSet<usize> = joints.iter().filter(|j| j.hold != Hold::Nothing).map(|j| j.joint).collect();
         let faces: BTreeSet<usize> = joints.iter().filter(|j| j.pressed.is_some()).map(|j| j.joint).collect();
         // by which joints with faces bodies are touched, pressed on each other or not
@@ -56,6 +56,9 @@ impl Model {
                 let carries = carry.contains(&number);
                 if carries {
                     gripped.join(e);
+                }
+                if carries || joint.law.scale().is_infinite() && joint.law.closed().is_none() {
+                    held.join(e);
                 }
                 if faces.contains(&number) {
                     let found = if carries { &mut touched } else { &mut beside };
@@ -75,6 +78,7 @@ impl Model {
                 Some(one) => loose[*one].masses.push(place.clone()),
                 None => {
                     let held_by_friction = gripped.of(at) == gripped.of(0);
+                    let held_in_motion = !held_by_friction && held.of(at) == held.of(0);
                     known.insert(body, loose.len());
                     let of_body = |found: &[(usize, &str)]| {
                         let mut names: Vec<String> = Vec::new();
@@ -86,7 +90,13 @@ impl Model {
                         names
                     };
                     let (contacts, faces) = (of_body(&touched), of_body(&beside));
-                    loose.push(Loose { masses: vec![place.clone()], held_by_friction, contacts, faces });
+                    loose.push(Loose {
+                        masses: vec![place.clone()],
+                        held_by_friction,
+                        held_in_motion,
+                        contacts,
+                        faces,
+                    });
                 }
             }
         }

@@ -78,6 +78,8 @@ pub struct Loose {
     pub masses: Vec<String>,
     /// Whether joints that are stuck hold it.
     pub held_by_friction: bool,
+    /// Whether joints hold it whose force nothing bounds, and which have no stiffness at rest.
+    pub held_in_motion: bool,
     /// The joints with faces that press on it, which hold it while they do.
     pub contacts: Vec<String>,
     /// The joints with faces that nothing presses, which may touch it.

@@ -24,8 +24,11 @@ const MOST_INSTANTS: usize = 4096;
 const HALVINGS: usize = 40;
 /// Share of two steps to which the place of the largest load is found: the load is flat there.
 const LOCATED: f64 = 1e-5;
-/// Compliance of a rigid joint, as a share of that of the structure: joints that hold in a ring share the load by it.
+/// Compliance of a rigid joint, as a share of that of the structure: joints that hold in a ring, or side by side, share the load by it.
 const COMPLIANCE: f64 = 1e-10;
+/// The least share of that which a joint has whose limit is larger than that of others: it carries the more of a load that they share, as those along
+/// one line carry it by their limits, and slip together.
+const STIFFEST: f64 = 1e-3;
 /// Relative distance of frequencies up to which two modes are a pair.
 const EQUAL: f64 = 1e-9;
 
@@ -87,7 +90,7 @@ impl Survey {
         for (column, joint) in rigid.iter().enumerate() {
             self.joints[*joint].at.iter().for_each(|(i, value)| w[(*i, column)] += value);
         }
-        let normal = w.transpose() * &w + DMatrix::identity(rigid.len(), rigid.len()) * COMPLIANCE;
+        let normal = w.transpose() * &w + DMatrix::from_diagonal(&DVector::from_vec(self.compliances(&rigid)));
         let forces = Cholesky::new(normal)?.solve(&(w.transpose() * rest));
         let share = |(index, joint): (usize, &Stuck)| match joint.hold {
             Hold::Nothing => 0.0,
@@ -97,6 +100,16 @@ impl Survey {
             }
         };
         Some(self.joints.iter().enumerate().map(share).collect())
+    }
+
+    /// Of rigid joints, as shares of the structure's.
+    fn compliances(&self, rigid: &[usize]) -> Vec<f64> {
+        let limit = |joint: &usize| match self.joints[*joint].hold {
+            Hold::Rigid { limit } => limit,
+            Hold::Nothing | Hold::Spring { .. } => f64::INFINITY,
+        };
+        let least = rigid.iter().map(limit).fold(f64::INFINITY, f64::min);
+        rigid.iter().map(|joint| COMPLIANCE * (least / limit(joint)).max(STIFFEST)).collect()
     }
 
     fn rigid(&self) -> Vec<usize> {
@@ -202,12 +215,12 @@ impl Survey {
             }
         }
         let scale = (0..n).map(|i| a[(i, i)].norm()).fold(0.0, f64::max);
-        for (row, joint) in rigid.iter().enumerate() {
+        for (row, (joint, compliance)) in rigid.iter().zip(self.compliances(&rigid)).enumerate() {
             for (i, wi) in &self.joints[*joint].at {
                 a[(*i, n + row)] += wi;
                 a[(n + row, *i)] += wi;
             }
-            a[(n + row, n + row)] -= COMPLIANCE / scale.max(f64::MIN_POSITIVE);
+            a[(n + row, n + row)] -= compliance / scale.max(f64::MIN_POSITIVE);
             b[n + row] = -imposed(*joint);
         }
         let x = if n + rigid.len() == 0 { b } else { a.lu().solve(&b)? };

@@ -188,6 +188,18 @@ impl Port {
         }
     }
 
+    /// How far the motion goes while the states of a law cross their range, m; none of a law that has none, or whose force nothing bounds.
+    pub fn layer(&self) -> Option<f64> {
+        self.stateful().map(|_| self.scale / self.stiffness()).filter(|layer| layer.is_finite())
+    }
+
+    fn stateful(&self) -> Option<&SharedLaw> {
+        match &self.kernel {
+            Kernel::Rate(law) if law.rate().is_some_and(|rate| rate.states() > 0) => Some(law),
+            _ => None,
+        }
+    }
+
     /// The law, if the velocity alone decides its bounded force, which is sampled.
     fn steep(&self) -> Option<&SharedLaw> {
         match &self.kernel {
@@ -292,7 +304,8 @@ impl Ports {
 
     /// Whether such a force falls with velocity.
     pub fn has_falling(&self) -> bool {
-        self.list.iter().filter_map(Port::steep).any(|law| !law.is_incrementally_passive())
+        let laws = self.list.iter().filter_map(|port| port.steep().or_else(|| port.stateful()));
+        laws.into_iter().any(|law| !law.is_incrementally_passive())
     }
 }
 
