@@ -75,7 +75,7 @@ fn slowness() -> f64 {
     let mut model = stickslip::model::example::blade_couple();
     model.joints[0].law = Arc::new(stickslip::law::CoulombArctan { limit: 2.0, alpha: 25e3 });
     let system = model.assemble().unwrap();
-    let mut orbit = || {
+    let orbit = || {
         let clock = Clock::start();
         let mut solver = Shooting::default().solver(&system).unwrap();
         solver.orbit(std::f64::consts::TAU * 121.0, None).unwrap();

@@ -145,7 +145,12 @@ impl fmt::Display for Ways {
         let width = "with a `width` (m/s) over which friction changes its sign";
         match (&self.methods[..], &self.with_width[..]) {
             ([], []) => {
-                let one = |(methods, said): &(Vec<&str>, String)| format!("{} {said}", methods.join(" and "));
+                let one = |(methods, said): &(Vec<&str>, String)| match &methods[..] {
+                    [only] => format!("{only} {said}"),
+                    [first, other] => format!("{first} {said}, and so does {other}"),
+                    [first, others @ ..] => format!("{first} {said}, and so do {}", others.join(" and ")),
+                    [] => said.clone(),
+                };
                 write!(f, "no method takes it: {}", self.missing.iter().map(one).collect::<Vec<_>>().join("; "))
             }
             (methods, []) => write!(f, "use method {}", one_of(methods)),

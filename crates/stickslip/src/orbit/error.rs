@@ -103,6 +103,12 @@ pub enum Breakdown {
     },
 }
 
+/// An estimate with as many digits as tell it from a tolerance of two.
+fn told_apart(estimate: f64, tolerance: f64) -> String {
+    let short = format!("{estimate:.1e}");
+    if short == format!("{tolerance:.1e}") { format!("{estimate:.3e}") } else { short }
+}
+
 /// What to do about a series that is too short.
 fn beyond(needed: Option<usize>) -> String {
     let raise = "raise `tolerance`";
@@ -214,8 +220,8 @@ pub enum OrbitError {
     },
     /// The series that the method may take is too short for the tolerance.
     #[error(
-        "{method} reaches an estimated error of {estimate:.1e} at Ω = {omega:.4} rad/s with {harmonics} harmonics, not {tolerance:.1e}{}{instead}",
-        beyond(*.needed)
+        "{method} reaches an estimated error of {} at Ω = {omega:.4} rad/s with {harmonics} harmonics, not {tolerance:.1e}{}{instead}",
+        told_apart(*.estimate, *.tolerance), beyond(*.needed)
     )]
     Truncation {
         /// The method.
