@@ -48,6 +48,24 @@ pub(crate) struct Decision {
     derivatives: Vec<DVector<f64>>,
 }
 
+/// The terms of accelerations: the largest force on a mass (N), the imposed accelerations (m/s²), and the rates (rad/s) with which they change, for
+/// each part.
+struct Terms<'a> {
+    force: f64,
+    imposed: f64,
+    omega: f64,
+    fastest: &'a [f64],
+}
+
+impl Terms<'_> {
+    /// The size of those that the derivative of this order (2: acceleration) of the motion along a part is the sum of; `response` are the accelerations
+    /// that a unit force of the part causes.
+    fn size(&self, part: usize, response: &DMatrix<f64>, order: u32) -> f64 {
+        let acceleration = response.column(part).amax() * self.force + self.imposed;
+        acceleration * self.omega.max(self.fastest[part]).powi(order as i32 - 2)
+    }
+}
+
 /// The complementarity problem of the sliders at rest, with its solution.
 #[derive(Debug, Clone, Default)]
 struct Problem {
@@ -207,9 +225,10 @@ impl Decision {
         if self.dropped.is_empty() && !self.resting.iter().any(|&i| lets_go(i)) {
             return false;
         }
+        let terms = self.terms(mechanics, drive);
         let back = self.dropped.iter().position(|&i| {
             let relative = mechanics.parts[i].direction.dot(&self.acceleration) + drive.imposed_at(i, time, 2);
-            relative * self.contacts[i].sign() < -BALANCED * self.size(mechanics, drive, i, 2)
+            relative * self.contacts[i].sign() < -BALANCED * terms.size(i, &self.response, 2)
         });
         let contacts = &mut self.contacts;
         if let Some(back) = back {
@@ -268,17 +287,20 @@ impl Decision {
         true
     }
 
-    /// The size of the terms that the derivative of this order (2: acceleration) of the motion along a part is the sum of.
-    fn size(&self, mechanics: &Mechanics, drive: &Drive, part: usize, order: u32) -> f64 {
+    /// What accelerations are the sums of, of all parts together.
+    fn terms<'a>(&self, mechanics: &'a Mechanics, drive: &Drive) -> Terms<'a> {
         let limit = mechanics.parts.iter().filter(|p| p.is_slider()).map(Part::holds).fold(0.0, f64::max);
-        let mobility = self.response.column(part).amax();
         let imposed = drive
             .rates
             .iter()
             .zip(&drive.imposed)
             .map(|(rate, g)| rate * rate * g.iter().map(|g| g.norm()).fold(0.0, f64::max));
-        let acceleration = mobility * (self.pushed + limit) + imposed.sum::<f64>();
-        acceleration * drive.omega.max(mechanics.fastest_along[part]).powi(order as i32 - 2)
+        Terms {
+            force: self.pushed + limit,
+            imposed: imposed.sum(),
+            omega: drive.omega,
+            fastest: &mechanics.fastest_along,
+        }
     }
 
     /// Poses the problem of the sliders at rest but for its bounds: their relative acceleration (`order` 2) or a higher derivative, that
@@ -305,13 +327,13 @@ impl Decision {
     /// Sliders exactly at their limit with zero acceleration: `undecided` holds them with the sign of their force.
     fn settle_derivatives(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64]) {
         self.begin_derivatives(mechanics.n, state);
+        let terms = self.terms(mechanics, drive);
         for level in 1..LEVELS {
             self.at_rest.retain(|i| self.contacts[*i] == Contact::Stick);
             self.free_derivative(mechanics, drive, time, level);
             let next = level as usize + 2;
             multiply(&mechanics.inverse_mass, &self.free, &mut self.derivatives[next]);
             self.pose(mechanics, drive, time, level + 2, Some(next));
-            let least: Vec<f64> = self.at_rest.iter().map(|&i| self.size(mechanics, drive, i, level + 2)).collect();
             let problem = &mut self.problem;
             for (k, i) in self.at_rest.iter().enumerate() {
                 // a force at its limit can only recede
@@ -322,10 +344,10 @@ impl Decision {
             if !problem.solve() {
                 return;
             }
-            let (contacts, at_rest) = (&mut self.contacts, &self.at_rest);
+            let (contacts, at_rest, response) = (&mut self.contacts, &self.at_rest, &self.response);
             self.undecided.retain(|&(i, sign)| {
                 let Some(k) = at_rest.iter().position(|&rest| rest == i) else { return false };
-                let size = problem.push[k].abs().max(problem.held[k].abs()).max(least[k]);
+                let size = problem.push[k].abs().max(problem.held[k].abs()).max(terms.size(i, response, level + 2));
                 if problem.relative[k] * sign > BALANCED * size && size > 0.0 {
                     contacts[i] = Contact::slip(sign);
                     return false;
@@ -379,12 +401,11 @@ impl Decision {
             })
             .collect();
         self.begin_derivatives(n, state);
+        let terms = self.terms(mechanics, drive);
         for level in 1..=LEVELS {
             let order = level + 1;
-            let sizes: Vec<f64> = undecided.iter().map(|&(i, _)| self.size(mechanics, drive, i, order)).collect();
-            let mut sizes = sizes.into_iter();
             undecided.retain(|&(i, sign)| {
-                let size = sizes.next().unwrap_or(0.0);
+                let size = terms.size(i, &self.response, order);
                 let part = &mechanics.parts[i];
                 let slope = part.direction.dot(&self.derivatives[order as usize]) + drive.imposed_at(i, time, order);
                 if slope.abs() <= BALANCED * size {
