@@ -152,7 +152,7 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Name
             if let Some(sparse) = converted(&matrix, &out)
                 .filter(|sparse| sparse.n() > 0 && sparse.asymmetry(SYMMETRIC * sparse.largest()).is_none())
             {
-                let beside = if out.is_empty() { "" } else { ", without the rows that are constrained" };
+                let beside = if out.is_empty() { "" } else { ", but for rows without an entry or with 1e36" };
                 let _ = writeln!(text, "  {}{beside}", definite(&sparse));
             }
             let role = Role::of(file, name);
