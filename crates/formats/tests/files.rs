@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use stickslip_formats::{Kind, Matrix, Report, list, names, read, write};
+use stickslip_formats::{Kind, Matrix, Report, list, names, read, read_bytes, write};
 
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
@@ -204,4 +204,20 @@ fn what_is_written_reads_back_to_the_last_bit() {
     let path = folder.path().join("names.csv");
     names::write(&path, &named).expect("a file");
     assert_eq!(names::read(&path, 6).expect("names"), named.names().expect("names"));
+}
+
+/// A mark before the text is no part of it; what is nearly known is called by its name, with what to do.
+#[test]
+fn what_is_nearly_known_is_called_by_its_name() {
+    let text = std::fs::read(data("stiffness.mtx")).expect("a file");
+    let marked = [&b"\xef\xbb\xbf"[..], &text].concat();
+    assert_eq!(bits(&read_bytes(&marked, None, None).expect("a matrix")), expected("stiffness").2);
+    let wide: Vec<u8> = [0xff, 0xfe].into_iter().chain(text.iter().flat_map(|byte| [*byte, 0])).collect();
+    let error = read_bytes(&wide, None, None).expect_err("UTF-16").to_string();
+    assert!(error.contains("UTF-16") && error.contains("UTF-8"), "{error}");
+    // a 1 x 1 matrix K of doubles
+    let head = [0u32, 1, 1, 0, 2].into_iter().flat_map(u32::to_le_bytes);
+    let old: Vec<u8> = head.chain(*b"K\0").chain(2.5f64.to_le_bytes()).collect();
+    let error = read_bytes(&old, None, None).expect_err("version 4").to_string();
+    assert!(error.contains("MATLAB version 4") && error.contains("-v7"), "{error}");
 }

@@ -259,6 +259,25 @@ amplitude = { from = "1 mm", to = "1 m", points = 5 }"#;
     }
 }
 
+/// A list of values in any order has the same optimum, and its rows as they are listed.
+#[test]
+fn performance_takes_values_in_any_order() {
+    let of = |limits: &str| {
+        let study = format!(
+            "kind = \"performance\"\nfrequency = {{ from = \"0.14 Hz\", to = \"0.24 Hz\", points = 21 }}\nvary = {{ F = {limits} }}"
+        );
+        let text = oscillating("0.1 kg/s", "{ kind = \"jenkins\", stiffness = \"0.5 N/m\", limit = \"F\" }", &study);
+        let text = text.replace("F0 = \"1 N\"", "F0 = \"1 N\"\nF = \"1 N\"");
+        let data = dataset(&text);
+        let optimum = table(&data, "optimum").numbers("F_N").unwrap()[0];
+        (optimum, table(&data, "performance").numbers("F_N").unwrap().to_vec())
+    };
+    let (rising, _) = of("[\"0.1 N\", \"0.5 N\", \"1 N\", \"4 N\"]");
+    let (mixed, listed) = of("[\"0.1 N\", \"4 N\", \"0.5 N\", \"1 N\"]");
+    assert!(rising > 0.1 && rising < 4.0 && mixed == rising, "{rising} {mixed}");
+    assert_eq!(listed, [0.1, 4.0, 0.5, 1.0]);
+}
+
 /// Curves of a performance study tell the value of their outer parameter, so that many of them can have a colour bar.
 #[test]
 fn performance_curves_tell_their_parameter() {

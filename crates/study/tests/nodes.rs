@@ -236,3 +236,30 @@ fn a_turned_face_that_cannot_be_is_refused_with_the_reason() {
         assert!(found.contains(words), "{place}: {found}");
     }
 }
+
+/// Which direction is the normal goes by no order in which nodes are named: those of different orders are refused. Amplitudes without a square are, too.
+#[test]
+fn normals_and_sizes_that_mislead_are_refused() {
+    let study = "[study]\nkind = \"orbit\"\nfrequency = \"1 Hz\"\n";
+    let good = text(study)
+        + "[[mass]]\nname = \"other\"\nmass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n\
+           [[spring]]\nbetween = [\"other.x\", \"ground\"]\nstiffness = 100\n[[spring]]\nbetween = [\"other.z\", \"ground\"]\nstiffness = 100\n\
+           [[joint]]\nname = \"face\"\nbetween = [\"tip\", \"other\"]\n\
+           law = { kind = \"friction-contact\", tangential = 20, normal = 10, friction = 0.5, preload = 1 }\n";
+    let refused = |text: &str| -> Option<String> {
+        let study = match read_study("study.toml", text, &[]) {
+            Ok(study) => study,
+            Err(error) => return Some(error.to_string()),
+        };
+        run(&study, &Context::unwatched(1)).err().map(|error| error.to_string())
+    };
+    assert_eq!(refused(&good), None);
+    let turned = good.replace(
+        "1 kg\"\ndirections = [\"x\", \"z\"]\n[[spring]]\nbetween = [\"other",
+        "1 kg\"\ndirections = [\"z\", \"x\"]\n[[spring]]\nbetween = [\"other",
+    );
+    let said = refused(&turned).expect("two normals");
+    assert!(said.contains("z of `tip` and x of `other`"), "{said}");
+    let said = refused(&good.replace("amplitude = \"2 N\"", "amplitude = \"1e-200 N\"")).expect("no square");
+    assert!(said.contains("no square"), "{said}");
+}
