@@ -164,20 +164,14 @@ impl ModelSummary {
         });
         let joints = joints.collect();
         let kind = kinds::of(study);
-        let slow = Costing::new(study, &cases[0]);
-        let (usual, cost) = (slow.usual(), (kind.cost)(&slow));
-        let usual_cost = (kind.cost)(&usual);
-        let times: Vec<[f64; 2]> = cases
-            .iter()
-            .map(|one| {
-                let slow = Costing::new(study, one);
-                let usual = slow.usual();
-                [usual.seconds(&(kind.cost)(&usual)), slow.seconds(&(kind.cost)(&slow))]
-            })
-            .collect();
+        let costings: Vec<Costing<'_>> = cases.iter().map(|one| Costing::new(study, one)).collect();
         // each as if all cases were like it
-        let [usual_seconds, seconds] =
-            [0, 1].map(|of| times.iter().map(|time| time[of]).sum::<f64>() / times.len() as f64);
+        let time = |costing: &Costing<'_>| costing.seconds(&(kind.cost)(costing));
+        let mean =
+            |times: &dyn Fn(&Costing<'_>) -> f64| costings.iter().map(times).sum::<f64>() / costings.len() as f64;
+        let (usual_seconds, seconds) = (mean(&|one| time(&one.usual())), mean(&time));
+        let (slow, usual) = (&costings[0], costings[0].usual());
+        let (cost, usual_cost) = ((kind.cost)(slow), (kind.cost)(&usual));
         let whole = usual.seconds(&usual_cost);
         let spared = usual_cost.spared.map(|(work, place)| {
             let rest = Cost { work: usual_cost.work - work, ..usual_cost };

@@ -209,7 +209,10 @@ impl MethodError {
 
     /// `method` needs anything but joints at a place: whether a system has one without.
     pub(crate) fn empty(method: &'static str, system: &System) -> Option<Self> {
-        let mut empty = vec![true; system.dofs()];
+        let mut empty: Vec<bool> = (0..system.dofs()).map(|row| system.structure().own_mass(row) == 0.0).collect();
+        if !empty.contains(&true) {
+            return None; // what has mass is not looked through
+        }
         system.structure().entries().for_each(|(row, _, _)| empty[row] = false);
         let place = system.structure().places()[empty.iter().position(|empty| *empty)?].clone();
         Some(MethodError::Empty { method, place, ways: Box::default() })

@@ -85,6 +85,11 @@ impl Part {
         self.holds() > self.limit() && self.is_slider()
     }
 
+    /// The rows that it acts on.
+    fn rows(&self) -> impl Iterator<Item = usize> + '_ {
+        self.direction.iter().enumerate().filter(|(_, weight)| **weight != 0.0).map(|(row, _)| row)
+    }
+
     /// What displacements or velocities are along it, without imposed motion.
     pub fn along(&self, values: &[f64]) -> f64 {
         self.direction.iter().zip(values).map(|(w, x)| w * x).sum()
@@ -250,12 +255,10 @@ pub(crate) struct Mechanics {
 /// A place between several rigid sliders that is too light beside what one of them joins it to.
 fn light(system: &System, parts: &[Part], method: &'static str) -> Option<MethodError> {
     let rigid = || parts.iter().filter(|part| matches!(part.kind, Kind::Rigid { .. }));
-    let rows = |part: &Part| (0..part.direction.len()).filter(|&i| part.direction[i] != 0.0).collect::<Vec<_>>();
-    let mass = |i: &usize| system.structure().own_mass(*i);
+    let mass = |row: usize| system.structure().own_mass(row);
     rigid().find_map(|part| {
-        let rows = rows(part);
-        let lightest = *rows.iter().min_by(|a, b| mass(a).total_cmp(&mass(b)))?;
-        let ratio = rows.iter().map(mass).fold(0.0, f64::max) / mass(&lightest);
+        let lightest = part.rows().min_by(|&a, &b| mass(a).total_cmp(&mass(b)))?;
+        let ratio = part.rows().map(mass).fold(0.0, f64::max) / mass(lightest);
         let several = rigid().filter(|part| part.direction[lightest] != 0.0).nth(1).is_some();
         (several && ratio > LIGHTEST).then(|| MethodError::Light {
             method,
@@ -333,9 +336,7 @@ impl Mechanics {
         }
         let rate = |i: usize| (system.structure().stiffness()[(i, i)] / system.structure().mass()[(i, i)]).sqrt();
         let fastest = (0..n).map(rate).fold(0.0, f64::max);
-        let moves = |part: &Part, i: usize| part.direction[i] != 0.0;
-        let fastest_along =
-            parts.iter().map(|part| (0..n).filter(|&i| moves(part, i)).map(rate).fold(0.0, f64::max)).collect();
+        let fastest_along = parts.iter().map(|part| part.rows().map(rate).fold(0.0, f64::max)).collect();
         Ok(Mechanics {
             n,
             fastest,

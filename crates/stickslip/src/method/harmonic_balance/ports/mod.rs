@@ -95,8 +95,7 @@ impl Port {
 
     /// Whether its law is followed through the period, step by step, so that derivatives cost many times what forces cost.
     pub fn marches(&self) -> bool {
-        matches!(self.kernel, Kernel::Step(_))
-            || matches!(&self.kernel, Kernel::Rate(law) if law.rate().is_some_and(|rate| rate.states() > 0))
+        self.steps() || self.stateful().is_some()
     }
 
     /// Whether it is followed by its return map.
@@ -193,6 +192,7 @@ impl Port {
         self.stateful().map(|_| self.scale / self.stiffness()).filter(|layer| layer.is_finite())
     }
 
+    /// The law, if its states are followed.
     fn stateful(&self) -> Option<&SharedLaw> {
         match &self.kernel {
             Kernel::Rate(law) if law.rate().is_some_and(|rate| rate.states() > 0) => Some(law),
@@ -302,7 +302,7 @@ impl Ports {
         self.list.iter().any(|port| port.steep().is_some())
     }
 
-    /// Whether such a force falls with velocity.
+    /// Whether such a force, or that of a law whose states are followed, may fall with velocity.
     pub fn has_falling(&self) -> bool {
         let laws = self.list.iter().filter_map(|port| port.steep().or_else(|| port.stateful()));
         laws.into_iter().any(|law| !law.is_incrementally_passive())
