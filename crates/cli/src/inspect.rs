@@ -1,6 +1,6 @@
 //! `stickslip inspect`: what is in files of matrices, and whether they can be those of a structure.
 
-use crate::{Ending, print};
+use crate::ending::{Ending, print};
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::fmt::{self, Write};

@@ -8,6 +8,7 @@ macro_rules! complain {
 }
 
 mod args;
+mod ending;
 mod inspect;
 mod list;
 mod merge;
@@ -20,34 +21,11 @@ mod speak;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
+use ending::{Ending, print};
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use stickslip_report::stream::Start;
-
-/// How a command ends; the numbers are those of the exit status.
-#[derive(Debug)]
-pub enum Ending {
-    /// All points converged.
-    Done,
-    /// Results are written, some points failed.
-    SomeFailed,
-    /// The input is wrong; nothing was written. The report has been printed.
-    WrongInput,
-    /// Anything else, in words.
-    Failed(String),
-}
-
-impl Ending {
-    fn code(&self) -> ExitCode {
-        match self {
-            Ending::Done => ExitCode::SUCCESS,
-            Ending::Failed(_) => ExitCode::from(1),
-            Ending::WrongInput => ExitCode::from(2),
-            Ending::SomeFailed => ExitCode::from(3),
-        }
-    }
-}
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -114,14 +92,6 @@ fn main() -> ExitCode {
         speak::error(message);
     }
     ending.code()
-}
-
-/// Prints on standard output; a reader that has gone away (`| head`) is no error.
-fn print(text: &str) -> Ending {
-    match std::io::stdout().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Ending::Failed(error.to_string()),
-        _ => Ending::Done,
-    }
 }
 
 fn new(name: &str, file: Option<&Path>) -> Ending {

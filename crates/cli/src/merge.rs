@@ -1,6 +1,7 @@
 //! `stickslip merge`: the parts of a study, joined.
 
-use crate::{Ending, run};
+use crate::ending::Ending;
+use crate::run;
 use std::path::{Path, PathBuf};
 use stickslip_report::assemble::{Parts, assemble};
 use stickslip_report::stored::study_of;

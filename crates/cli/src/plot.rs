@@ -1,7 +1,7 @@
 //! `stickslip plot`: figures from stored results, and runs beside each other. Nothing is computed.
 
+use crate::ending::{Ending, print};
 use crate::run::{outputs, show, show_figure};
-use crate::{Ending, print};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use stickslip_report::compare;

@@ -1,6 +1,7 @@
 //! `stickslip reduce`: the structure of a study in few coordinates, as files that a study can read instead of the whole.
 
-use crate::{Ending, print, run, speak};
+use crate::ending::{Ending, print};
+use crate::{run, speak};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,9 @@
 //! `stickslip run`, `check` and `paper`.
 
 use crate::args::Destination;
+use crate::ending::{Ending, print};
 use crate::progress::{self, Progress};
-use crate::{Ending, open, print, speak};
+use crate::{open, speak};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Read, Write};

@@ -20,7 +20,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 use stickslip::curve::modes::{ModeRequest, mode};
 use stickslip::dimension::Dimension;
-use stickslip::method::{self, Method, Options, Solver};
+use stickslip::method::{self, Method, Options, Solver, advised};
 use stickslip::model::{
     Around, Disk, Force, Joint, Mass, Model, ModelError, Motion, Spring, Substructure, SubstructureDamping, System,
 };
@@ -66,7 +66,7 @@ struct Ready {
 
 /// The solver of a system that is kept beside it.
 fn kept_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solver + Send>, method::MethodError> {
-    let solver = method.solver(system)?;
+    let solver = advised(method, system)?;
     // SAFETY: the system stands on the heap and does not move; `Ready` drops the solver before its own reference to the system, and gives
     // the solver to nobody
     #[allow(unsafe_code)]
@@ -420,7 +420,7 @@ impl PyModel {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let asked = self.asked(py, method, options)?;
-        let prepared = py.detach(|| asked.method.solver(&asked.system).map(|_| asked.method.choice(&asked.system)));
+        let prepared = py.detach(|| advised(&*asked.method, &asked.system).map(|_| asked.method.choice(&asked.system)));
         self.raised()?;
         let choice = prepared.map_err(|cause| error::method(py, cause))?;
         let out = PyDict::new(py);

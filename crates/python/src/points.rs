@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::sync::Arc;
 use stickslip::curve::sweep::{BLOCK, Watch as Sweep, sweep};
-use stickslip::method::{Method, OrbitError};
+use stickslip::method::{Method, OrbitError, advised};
 use stickslip::model::{Model, ModelError, System};
 use stickslip::orbit::Orbit;
 use stickslip_study::run::Context;
@@ -67,7 +67,7 @@ pub fn along_parameters(
             parameters::put(&mut model, name, values[index]).map_err(|cause| Refusal::Model(at(cause.to_string())))?;
         }
         let system = model.assemble().map_err(|cause| Refusal::Model(at(said(&cause, &model))))?;
-        let solver = asked.method.solver(&system);
+        let solver = advised(&*asked.method, &system);
         let mut solver = solver.map_err(|cause| Refusal::Method(at(cause.to_string())))?;
         let outcome = solver.orbit(omegas[index], None);
         (context.finished)();

@@ -181,7 +181,7 @@ fn farther(model: &Model, system: &System) -> Option<System> {
 
 /// What a point differs from the orbit in other coordinates, if one is found.
 fn again(farther: &System, method: &dyn Method, point: &Point) -> Option<Again> {
-    let orbit = method.prepare(farther).ok()?.orbit(point.omega, None).ok()?;
+    let orbit = method.solver(farther).ok()?.orbit(point.omega, None).ok()?;
     let reduced = farther.reduced()?;
     let differences = orbit.places.iter().zip(&point.amplitudes).map(|(there, here)| (there.amplitude() - here).abs());
     let (worst, difference) = differences.enumerate().fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });

@@ -75,11 +75,11 @@ impl Prepared {
         let method = (row.build)(&case.method.options).map_err(|error| refused(study, &case, &error))?;
         let system =
             case.model.assemble().map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
+        let told = |error: MethodError| refused(study, &case, &error.with(method::ways(&system)));
         if study.kind().uses_method {
-            method.solver(&system).map_err(|error| refused(study, &case, &error))?;
+            method.solver(&system).map_err(told)?;
         }
-        (study.kind().needs)(&case.values, &case.method.options, &system)
-            .map_err(|error| refused(study, &case, &error))?;
+        (study.kind().needs)(&case.values, &case.method.options, &system).map_err(told)?;
         Ok(Prepared { case, system, method })
     }
 }

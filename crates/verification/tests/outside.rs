@@ -396,7 +396,7 @@ impl Method for Linear {
     fn name(&self) -> &'static str {
         "linear"
     }
-    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         match system.joints().first() {
             None => Ok(Box::new(LinearSolver(system))),
             Some(joint) => Err(MethodError::law("linear", joint, "joints are none of its matters")),

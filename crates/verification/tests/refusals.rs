@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use stickslip::law::{Range, SharedLaw, TABLE};
-use stickslip::method::{self, MethodError, MethodInfo, Options, WIDTH};
+use stickslip::method::{self, MethodError, MethodInfo, Options, WIDTH, advised};
 use stickslip::model::{Axis, System};
 use stickslip::structure::Structure;
 
@@ -59,7 +59,7 @@ fn a_width_is_more_than_nothing() {
 
 fn asked(row: &MethodInfo, width: bool, system: &System) -> Result<(), MethodError> {
     let options = if width { Options::from([(WIDTH.to_owned(), WIDTH_GIVEN)]) } else { Options::new() };
-    (row.build)(&options).unwrap().solver(system).map(drop)
+    advised(&*(row.build)(&options).unwrap(), system).map(drop)
 }
 
 fn named(name: &str) -> &'static MethodInfo {

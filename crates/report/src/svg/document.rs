@@ -1,6 +1,6 @@
 //! An SVG document as it grows: lines, areas, marks, text.
 
-use super::{AXIS, LABEL, MARK, TEXT};
+use super::style::{AXIS, LABEL, MARK, TEXT};
 use crate::clip::Point;
 use crate::font::{self, Weight};
 use std::fmt::Write;

@@ -1,6 +1,6 @@
 //! Where everything in a figure stands: every text is measured before it is placed.
 
-use super::{BAR, GAP, LABEL, LEADING, MARGIN, PANEL_TITLE, TICK, TICK_LENGTH, TITLE};
+use super::style::{BAR, GAP, LABEL, LEADING, MARGIN, PANEL_TITLE, TICK, TICK_LENGTH, TITLE};
 use crate::axis::{self, Range, Ticks};
 use crate::clip::{Point, Window};
 use crate::colour::Colour;

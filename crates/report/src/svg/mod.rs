@@ -6,6 +6,7 @@
 
 mod document;
 mod layout;
+mod style;
 
 pub(crate) use document::escape;
 
@@ -17,34 +18,14 @@ use crate::frame::{self, AREA, PALE, Shades};
 use document::{Pen, Svg, Text};
 use layout::{Bar, Layout, Placed, PlotArea, SAMPLE};
 use stickslip_study::dataset::{Dataset, Emphasis, Figure, Panel, Series, Style};
+use style::{
+    AXIS, BAR, BAR_STEPS, FINE_GRID, GRID, LABEL, LEADING, LINE, MARGIN, MARK, MINOR_LENGTH, PANEL_TITLE, SMALL_MARK,
+    THIN, TICK, TICK_LENGTH, TITLE,
+};
 
 /// The output `svg`.
 pub const OUTPUT: Output =
     Output { name: "svg", summary: "figure.svg, for papers and slides", make: files, sink: None, usual: true };
-
-/// Sizes of text, px. A figure of two columns printed 170 mm wide shows the ticks at 6 to 7 pt.
-const TITLE: f64 = 18.0;
-const PANEL_TITLE: f64 = 15.0;
-const LABEL: f64 = 15.0;
-const TICK: f64 = 13.5;
-/// Height of a line of text, part of its size.
-const LEADING: f64 = 1.3;
-/// Outer margin of the figure and space between panels, px.
-const MARGIN: f64 = 16.0;
-const GAP: f64 = 26.0;
-const TICK_LENGTH: f64 = 5.0;
-const MINOR_LENGTH: f64 = 3.0;
-const LINE: f64 = 1.8;
-const THIN: f64 = 1.0;
-const MARK: f64 = 3.8;
-const SMALL_MARK: f64 = 2.0;
-/// The colour bar: its width, and the number of steps that look continuous.
-const BAR: f64 = 16.0;
-const BAR_STEPS: usize = 96;
-const TEXT: &str = "#1a1a1a";
-const AXIS: &str = "#444444";
-const GRID: &str = "#e3e3e3";
-const FINE_GRID: &str = "#f2f2f2";
 
 fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
     Ok(vec![File::new("figure.svg", to_svg(&dataset.figure))])

@@ -3,7 +3,7 @@
 pub use super::onward::is_followed;
 use super::peak::{Point, held};
 use super::sweep::back;
-use crate::method::{Method, MethodError, OrbitError};
+use crate::method::{Method, MethodError, OrbitError, advised};
 use crate::model::System;
 use crate::orbit::Orbit;
 use std::sync::atomic::AtomicBool;
@@ -80,7 +80,7 @@ impl BothWays {
     /// The method cannot take the system.
     pub fn others(&self, method: &dyn Method, system: &System, stop: &AtomicBool) -> Result<Vec<Other>, MethodError> {
         let Some(last) = self.points.last() else { return Ok(Vec::new()) };
-        let mut solver = method.solver(system)?;
+        let mut solver = advised(method, system)?;
         // what is found there alone need not be what the points before lead to
         let start = solver.orbit(last.omega, None).ok().map(|orbit| orbit.start);
         let mut omegas = self.points.iter().rev().map(|point| point.omega);

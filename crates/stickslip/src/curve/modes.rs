@@ -15,8 +15,8 @@ mod follow;
 
 pub use follow::{Lost, Reason, Turn};
 
-use crate::method::MethodError;
 use crate::method::harmonic_balance::{ModeEquations, ModeState};
+use crate::method::{MethodError, ways};
 use crate::model::System;
 use follow::ModeCurve;
 use num_complex::Complex64;
@@ -102,7 +102,7 @@ pub fn check(system: &System) -> Result<(), MethodError> {
 
 /// The equations of the modes of a system, or what else takes it.
 fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEquations<'_>, MethodError> {
-    ModeEquations::new(system, harmonics, samples).map_err(|error| error.with_ways(system))
+    ModeEquations::new(system, harmonics, samples).map_err(|error| error.with(ways(system)))
 }
 
 /// Follows a mode from an amplitude at which friction hardly matters downwards.

@@ -4,7 +4,7 @@
 //! points although its branch goes on. Where an orbit differs much from that of its start the way there is gone in smaller steps: either these arrive, or the
 //! branch ends between both.
 
-use crate::method::{Method, MethodError, OrbitError, Solver};
+use crate::method::{Method, MethodError, OrbitError, Solver, advised};
 use crate::model::System;
 use crate::orbit::Orbit;
 use num_complex::Complex64;
@@ -30,7 +30,7 @@ pub fn is_followed(system: &System) -> bool {
 /// # Errors
 /// The method cannot take the system.
 pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-    let solver = method.solver(system)?;
+    let solver = advised(method, system)?;
     Ok(if is_followed(system) { Box::new(Onward { solver, last: None, told: None, spent: false }) } else { solver })
 }
 

@@ -207,7 +207,7 @@ mod tests {
         fn name(&self) -> &'static str {
             "folded"
         }
-        fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+        fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
             Ok(Box::new(FoldedSolver { solver: EventDriven.solver(system)?, fold: self.fold, last: None }))
         }
     }

@@ -8,8 +8,9 @@
 //! `|v| (g q² + s1 |v| (1 - q)) + s2 v²` with `q = s0 z sgn(v) / g`, and that bracket is never negative then.
 
 use super::kink::size;
+use super::parameter::STATIC_LIMIT;
 use super::stribeck_curve::falling;
-use super::{Contact, Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative, STATIC_LIMIT};
+use super::{Contact, Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;

@@ -1,9 +1,14 @@
-//! The parameters of a law, and the row that describes it.
+//! The parameters of a law, and what is wrong with their values.
 
-use super::SharedLaw;
 use crate::dimension::Dimension;
-use std::collections::BTreeMap;
 use std::fmt;
+
+/// The key of a slip limit.
+pub(super) const LIMIT: &str = "limit";
+/// The key of the force up to which faces hold once they rest.
+pub(super) const STATIC_LIMIT: &str = "static_limit";
+/// The key of the number of tangential directions, of laws that leave it open.
+pub const TANGENTS: &str = "tangents";
 
 /// The values that a parameter may have; all are finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,7 +81,7 @@ impl Parameter {
 
     /// The slip limit, N; zero is a joint that carries no force: the free reference of a damper.
     pub const fn limit(doc: &'static str) -> Self {
-        Parameter::new(super::LIMIT, Dimension::FORCE, Range::ZeroOrMore, doc)
+        Parameter::new(LIMIT, Dimension::FORCE, Range::ZeroOrMore, doc)
     }
 
     /// The same parameter with its dimension raised to the value of another one.
@@ -119,67 +124,6 @@ impl Parameter {
     pub const fn or(self, default: f64) -> Self {
         Parameter { default: Some(default), ..self }
     }
-}
-
-/// What can be known of a law without an instance of it.
-#[derive(Debug)]
-pub struct LawInfo {
-    /// Name in study files.
-    pub name: &'static str,
-    /// One line of what it is, with its equation.
-    pub summary: &'static str,
-    /// Its parameters.
-    pub parameters: &'static [Parameter],
-    /// Values of a typical instance in the order of `parameters`, SI: for examples and for tests that run over all laws.
-    pub sample: &'static [f64],
-    /// Builds the law from values in the order of `parameters`, SI; no check is made here.
-    pub build: fn(&[f64]) -> SharedLaw,
-}
-
-impl LawInfo {
-    /// A typical instance.
-    pub fn sample(&self) -> SharedLaw {
-        (self.build)(self.sample)
-    }
-
-    /// Builds the law from values by key (SI).
-    ///
-    /// # Errors
-    /// The keys that are missing, or a value that is not finite or out of its range.
-    ///
-    /// # Example
-    /// ```
-    /// use std::collections::BTreeMap;
-    /// let row = stickslip::law::find("coulomb").unwrap();
-    /// let law = row.build(&BTreeMap::from([("limit", 2.0)])).unwrap();
-    /// assert_eq!(law.values(), [2.0]);
-    /// ```
-    pub fn build(&self, values: &BTreeMap<&str, f64>) -> Result<SharedLaw, BuildError> {
-        let value = |p: &Parameter| values.get(p.key).copied().or(p.default);
-        let missing: Vec<&'static str> = self.parameters.iter().filter(|p| value(p).is_none()).map(|p| p.key).collect();
-        if !missing.is_empty() {
-            return Err(BuildError::Missing { law: self.name, keys: missing });
-        }
-        let ordered: Vec<f64> = self.parameters.iter().filter_map(value).collect();
-        // numbers out of range could not be built from
-        check(self, &ordered)?;
-        let law = (self.build)(&ordered);
-        law.check()?;
-        Ok(law)
-    }
-}
-
-/// Whether every value is in its range.
-pub(super) fn check(info: &LawInfo, values: &[f64]) -> Result<(), LawError> {
-    for (parameter, &value) in info.parameters.iter().zip(values) {
-        if !parameter.range.has(value) {
-            let Parameter { key, range, .. } = *parameter;
-            let of = |key: &str| Some(values[info.parameters.iter().position(|p| p.key == key)?]);
-            let dimension = parameter.dimension_under(of).unwrap_or(Dimension::NONE);
-            return Err(LawError::Value { law: info.name, key, dimension, range, value });
-        }
-    }
-    Ok(())
 }
 
 /// A dimension in words; what has none is a number.

@@ -1,26 +1,9 @@
 //! The rate view: force and rates of internal states, smooth in the motion.
 
-use super::MOST_DIRECTIONS;
+use super::relative::{MOST_DIRECTIONS, Relative};
 use super::slopes::{FEW, Slopes, WIDTH, seeded};
 use std::fmt::Debug;
 use stickslip_numerics::dual::{Dual, Real};
-
-/// The relative motion at a joint, along up to three directions; the first ones count, as many as the law has.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Relative<S> {
-    /// Relative displacement `u`, m.
-    pub displacement: [S; MOST_DIRECTIONS],
-    /// Relative velocity `u'`, m/s.
-    pub velocity: [S; MOST_DIRECTIONS],
-}
-
-impl<S: Real> Relative<S> {
-    /// Motion along one direction.
-    pub fn along(displacement: S, velocity: S) -> Self {
-        let zero = S::from(0.0);
-        Relative { displacement: [displacement, zero, zero], velocity: [velocity, zero, zero] }
-    }
-}
 
 /// What the author of a law of rate form writes, once for numbers and for dual numbers: `f = h(u, u', z)`, `z' = g(u, u', z)`, both continuous, and
 /// smooth but for kinks, such as `|u'|` where the motion turns: integration shortens its steps there.

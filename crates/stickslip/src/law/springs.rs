@@ -2,7 +2,8 @@
 //!
 //! No row of the table: it stands for other laws in the linear references, see [`super::Law::closed`].
 
-use super::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Piece, Range, Rate, RateLaw, Relative, STUCK, SharedLaw};
+use super::pieces::STUCK;
+use super::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Piece, Range, Rate, RateLaw, Relative, SharedLaw};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;

@@ -1,6 +1,6 @@
 //! The step view: the force at the end of a step, from the motion over it and the state before it (return map).
 
-use super::MOST_DIRECTIONS;
+use super::relative::MOST_DIRECTIONS;
 use super::slopes::{FEW, Slopes, WIDTH, seeded};
 use std::fmt::Debug;
 use stickslip_numerics::dual::{Dual, Real};

@@ -5,11 +5,9 @@
 //! Source: Stribeck (1902); in this form Bo and Pavelescu, "The friction-speed relation and its influence on the critical velocity of
 //! stick-slip motion" (1982).
 
+use super::parameter::STATIC_LIMIT;
 use super::stribeck_curve::limits_fit;
-use super::{
-    Contact, CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, Range, STATIC_LIMIT, SharedLaw, Slider,
-    StribeckArctan,
-};
+use super::{Contact, CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, Range, SharedLaw, Slider, StribeckArctan};
 use crate::dimension::Dimension;
 use std::f64::consts::E;
 use std::sync::Arc;

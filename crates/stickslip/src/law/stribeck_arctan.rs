@@ -4,8 +4,9 @@
 //! less the larger `alpha vs` is: at 1000 and `Fc = 0.8 Fs` the largest force is 0.8 % below Fs.
 //! Source: the arctangent of Pust, Pesek, Radolfova (2015), Eq. (2), around Stribeck's curve.
 
+use super::parameter::STATIC_LIMIT;
 use super::stribeck_curve::{falling, limits_fit};
-use super::{Contact, Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative, STATIC_LIMIT};
+use super::{Contact, Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::f64::consts::FRAC_2_PI;
 use std::sync::Arc;

@@ -1,9 +1,10 @@
 //! Picks a method: event-driven for exact laws, shooting for smooth ones, harmonic balance where it costs less and for waves around a disk.
 
 use super::harmonic_balance::HarmonicBalance;
+use super::list::LIST;
 use super::{
-    Choice, Method, MethodError, MethodInfo, Options, Solver, Ways, event_driven, event_driven::EventDriven,
-    harmonic_balance, shooting::Shooting, transient,
+    Choice, Method, MethodError, MethodInfo, Options, Solver, event_driven, event_driven::EventDriven,
+    harmonic_balance, shooting::Shooting, transient, ways,
 };
 use crate::model::System;
 use crate::orbit::{Orbit, OrbitError};
@@ -50,10 +51,10 @@ impl Auto {
         if method.name() != harmonic_balance::NAME || HarmonicBalance::takes_laws(system) {
             return (method, because);
         }
-        let methods = Ways::of(system).methods;
+        let methods = ways(system).methods;
         // waiting is the last resort
         let other = methods.iter().find(|name| **name != transient::INFO.name).or(methods.first());
-        match other.and_then(|name| super::find(name)).and_then(|row| (row.build)(&Options::new()).ok()) {
+        match other.and_then(|name| named(name)) {
             Some(other) => (other, format!("{} refuses a law", harmonic_balance::NAME)),
             // who refuses says what else there is
             None => (method, because),
@@ -102,9 +103,9 @@ impl Method for Auto {
     fn closes_motions(&self, system: &System) -> bool {
         Auto::chosen(system).0.closes_motions(system)
     }
-    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         let (method, _) = Auto::chosen(system);
-        let first = method.prepare(system)?;
+        let first = method.solver(system)?;
         Ok(Box::new(WithSecond { first, chosen: method.name(), system, second: None, last: None }))
     }
 }
@@ -131,9 +132,9 @@ impl<'a> WithSecond<'a> {
             }
             name => name != transient::INFO.name && system.dofs() <= DOFS && joints <= FOLLOWED,
         };
-        let methods = Ways::of(system).methods;
+        let methods = ways(system).methods;
         let name = methods.into_iter().find(|name| *name != self.chosen && cheap(name))?;
-        super::find(name).and_then(|row| (row.build)(&Options::new()).ok())?.prepare(system).ok()
+        named(name)?.solver(system).ok()
     }
 
     /// By the first method, and by the second one where that finds nothing that it may have missed.
@@ -157,6 +158,11 @@ impl<'a> WithSecond<'a> {
         self.last = Some(orbit.start.clone());
         Ok(orbit)
     }
+}
+
+/// The method of the list with this name, without options.
+fn named(name: &str) -> Option<Box<dyn Method>> {
+    (LIST.iter().find(|row| row.name == name)?.build)(&Options::new()).ok()
 }
 
 /// Whether another method may find what this one says that it did not.
@@ -245,7 +251,7 @@ mod tests {
         for (model, method) in [(massless, "harmonic-balance"), (many, "event-driven")] {
             let system = model.assemble().unwrap();
             assert_eq!(Auto.choice(&system).method, method);
-            assert!(Auto.prepare(&system).is_ok(), "{}", Auto.choice(&system));
+            assert!(Auto.solver(&system).is_ok(), "{}", Auto.choice(&system));
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::Breakdown;
 use super::drive::Drive;
-use super::event_driven::{ExactPath, Mechanics, SegmentedMotion, weights};
+use super::event_driven::{ExactPath, Mechanics, SegmentedMotion};
 use super::flow::Flow;
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
@@ -29,7 +29,7 @@ impl Flow for ExactFlow {
         self.segments.set_drive(Drive::at(system, &owners, omega));
     }
     fn weights(&self) -> Vec<f64> {
-        weights(&self.segments.mechanics, self.segments.drive.omega)
+        self.segments.mechanics.weights(self.segments.drive.omega)
     }
     fn energy_scale(&self) -> f64 {
         self.segments.energy_scale

@@ -10,15 +10,13 @@ use super::flow::Flow;
 use super::followed::Kind;
 use super::guess::Guess;
 use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
+use super::option::{PERIOD, periods, width};
 use super::periodic::{Aim, Beyond, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm};
 use super::relaxed::{Closing, ElasticSlider, relaxed};
 use super::repeated::Afresh;
 use super::smooth::flow::{Lengths, SmoothFlow};
 use super::stepped::SteppedPath;
-use super::{
-    Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, PERIOD, Solver, WIDTH, periods, vibration,
-    width,
-};
+use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH, vibration};
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::measure::measure;
@@ -123,7 +121,7 @@ impl Method for Shooting {
     fn name(&self) -> &'static str {
         NAME
     }
-    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         let shooter = Shooter::new(system, *self, NAME, Search::Newton)?;
         Ok(if self.period > 1 { Box::new(Afresh(shooter)) } else { Box::new(shooter) })
     }

@@ -4,7 +4,7 @@
 //! period. In a run-up every cycle has its own frequency, constant over the cycle and continuous in phase, as in a stepped-sine test.
 
 use super::flow::Flow;
-use super::{Breakdown, MethodError, followed};
+use super::{Breakdown, MethodError, followed, ways};
 use crate::model::System;
 use crate::orbit::{Path, Sample, Symmetry};
 use std::f64::consts::TAU;
@@ -201,7 +201,7 @@ impl TimeHistory {
     }
 
     fn flow(system: &System, width: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
-        followed::of(system, width, TOLERANCE, NAME).map_err(|error| error.with_ways(system))
+        followed::of(system, width, TOLERANCE, NAME).map_err(|error| error.with(ways(system)))
     }
 
     /// Drive frequency of the cycle that begins at `time`: of a run-up the one with which the cycle ends when that of the frequency that

@@ -7,9 +7,10 @@
 
 use super::event_driven::Exact;
 use super::followed::Kind;
+use super::option::{PERIOD, periods, width};
 use super::periodic::Search;
 use super::shooting::{Shooter, Shooting};
-use super::{Method, MethodError, MethodInfo, MethodOption, PERIOD, Solver, WIDTH, periods, width};
+use super::{Method, MethodError, MethodInfo, MethodOption, Solver, WIDTH};
 use crate::dimension::Dimension;
 use crate::model::System;
 
@@ -90,7 +91,7 @@ impl Method for Transient {
     fn name(&self) -> &'static str {
         NAME
     }
-    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         let returns = self.periods.div_ceil(self.period);
         let search = Search::Settle { tolerance: self.tolerance, returns };
         if Kind::of(system, self.width) == Kind::Exact {

@@ -4,16 +4,21 @@
 //! closed form where it can; [`Orbit::sample`] gives the motion at any time.
 
 mod error;
+mod evidence;
 pub(crate) mod measure;
+mod motion;
+mod path;
 mod sampled;
 mod stability;
 
 pub use crate::law::Contact;
-use crate::law::{MOST_DIRECTIONS, Piece, SharedLaw, Slider};
+use crate::law::{Piece, SharedLaw, Slider};
 use crate::model::System;
 pub use error::{Breakdown, Course, OrbitError};
+pub use evidence::{Accuracy, Evidence};
+pub use motion::{Energy, JointMotion, PlaceMotion, Symmetry};
 use nalgebra::DMatrix;
-use num_complex::Complex64;
+pub use path::{JointSample, Path, Sample};
 pub use stability::Stability;
 use std::fmt;
 use std::sync::Arc;
@@ -47,133 +52,6 @@ pub struct Orbit {
     pub(crate) path: Arc<dyn Path>,
 }
 
-/// Which return the orbit was closed on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Symmetry {
-    /// `x(t + T/2) = -x(t)`.
-    HalfPeriod,
-    /// `x(t + T) = x(t)` only.
-    FullPeriod,
-}
-
-impl Symmetry {
-    /// Of orbits that repeat after so many periods of the drive: an odd number of them has a half after which an odd excitation is mirrored.
-    pub(crate) fn of(system: &System, periods: usize) -> Symmetry {
-        if system.is_odd() && periods % 2 == 1 { Symmetry::HalfPeriod } else { Symmetry::FullPeriod }
-    }
-}
-
-/// Motion of one place over a period of the orbit.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PlaceMotion {
-    /// Name.
-    pub name: String,
-    /// Largest displacement, m.
-    pub maximum: f64,
-    /// Smallest displacement, m.
-    pub minimum: f64,
-    /// Mean displacement, m.
-    pub mean: f64,
-    /// First harmonic `X` in `x = Re(X e^{jΩt}) + …`, m.
-    pub first_harmonic: Complex64,
-}
-
-impl PlaceMotion {
-    /// Half of peak to peak, m.
-    pub fn amplitude(&self) -> f64 {
-        0.5 * (self.maximum - self.minimum)
-    }
-    /// Phase of the first harmonic against `cos Ωt`, degrees in (-180, 180].
-    pub fn phase_deg(&self) -> f64 {
-        self.first_harmonic.arg().to_degrees()
-    }
-}
-
-/// What one joint does over a period.
-#[derive(Debug, Clone, PartialEq)]
-pub struct JointMotion {
-    /// Name.
-    pub name: String,
-    /// Energy lost in friction per period, J.
-    pub dissipation: f64,
-    /// Fraction of the period in which the joint slips.
-    pub slip_fraction: f64,
-    /// Fraction of the period in which its faces rest on each other.
-    pub stick_fraction: f64,
-    /// Fraction of the period in which its faces are apart. What the three fractions leave of one is a stop that touches.
-    pub open_fraction: f64,
-    /// Smallest and largest relative displacement along each of its directions, m.
-    pub displacement: Vec<(f64, f64)>,
-    /// Changes between stick and slip, or of the slip direction, per period.
-    pub switches: usize,
-}
-
-/// Energies per period of the orbit, J.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Energy {
-    /// Work of the forces and of imposed motion.
-    pub work_in: f64,
-    /// Loss in viscous dampers.
-    pub viscous: f64,
-    /// Loss in joints.
-    pub friction: f64,
-}
-
-/// Whether an orbit, whose equations are solved, is as accurate as it was asked to be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Accuracy {
-    /// It is: exactly, or by the estimate of its error.
-    Converged,
-    /// The estimated error of its series is larger than the tolerance.
-    Truncated,
-    /// It is a series whose error was not estimated.
-    Unchecked,
-}
-
-impl Accuracy {
-    /// The status that tables show.
-    pub fn status(self) -> &'static str {
-        match self {
-            Accuracy::Converged => "converged",
-            Accuracy::Truncated => "truncated",
-            Accuracy::Unchecked => "unchecked",
-        }
-    }
-}
-
-/// The numbers that say how far an orbit may be trusted.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Evidence {
-    /// Distance between the state and its return, relative to the vibration (the state without its mean), in the energy norm.
-    pub residual: f64,
-    /// `|work in - viscous - friction| / work in`, from independent integrals.
-    pub energy_gap: f64,
-    /// Switches per period.
-    pub switches: usize,
-    /// Iterations of the method.
-    pub iterations: usize,
-    /// The highest harmonic of the motion's own frequency in it, if it is a series.
-    pub harmonics: Option<usize>,
-    /// Estimated relative error of the amplitudes from discretisation; `None` for a method that has none.
-    pub truncation: Option<f64>,
-    /// Whether that is as little as was asked for.
-    pub accuracy: Accuracy,
-    /// Distance between the state at t = 0 and where an independent flow brings it after a return, relative to the vibration, in the energy norm;
-    /// the residual itself where the orbit was found by a flow, `None` where no flow follows the system, or where it is too large to be followed
-    /// without being asked ([`Orbit::return_defect`]).
-    pub return_defect: Option<f64>,
-    /// Names of joints that stick for the whole period: their offset is not unique, the orbit is one of a continuum
-    /// (the symmetric one, with [`Symmetry::HalfPeriod`]).
-    pub stuck: Vec<String>,
-    /// Names of joints of which a part, a slider behind a spring or all, sticks for the whole period of a motion that is not its own mirror image:
-    /// where it is relaxed depends on how the motion began, and with it the means, and the amplitudes too where a law knows positions. The orbit
-    /// is then the one in which what sticks behind a spring carries no mean force, as it is where joints creep; with method `transient`
-    /// the one that its motion led to.
-    pub history: Vec<String>,
-    /// The method that was to find it and did not, where another one did: see [`Auto`](crate::method::auto::Auto).
-    pub instead_of: Option<&'static str>,
-}
-
 /// The laws of a system's joints.
 pub(crate) fn laws(system: &System) -> impl Iterator<Item = &SharedLaw> {
     system.joints().iter().map(|joint| joint.law())
@@ -200,64 +78,6 @@ pub(crate) fn history<'a>(
     };
     let kept = laws.zip(joints).filter(|(law, motion)| holds(law, motion));
     kept.map(|(_, motion)| motion.name.clone()).collect()
-}
-
-/// The state of a motion at one instant.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sample {
-    /// Displacements, length n, m.
-    pub displacement: Vec<f64>,
-    /// Velocities, length n, m/s.
-    pub velocity: Vec<f64>,
-    /// Accelerations, length n, m/s².
-    pub acceleration: Vec<f64>,
-    /// The joints.
-    pub joints: Vec<JointSample>,
-    /// Displacement of, and force that moves, each place with imposed motion: m, N.
-    pub moved: Vec<(f64, f64)>,
-}
-
-/// A joint at one instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct JointSample {
-    /// Relative displacement, m; along the joint's directions, as many as it has, like all that follows.
-    pub displacement: [f64; MOST_DIRECTIONS],
-    /// Relative velocity, m/s.
-    pub velocity: [f64; MOST_DIRECTIONS],
-    /// Force, N.
-    pub force: [f64; MOST_DIRECTIONS],
-    /// Stick, slip or apart.
-    pub contact: Contact,
-}
-
-impl JointSample {
-    /// Of a joint with one direction.
-    pub fn along(displacement: f64, velocity: f64, force: f64, contact: Contact) -> Self {
-        let first = |value: f64| [value, 0.0, 0.0];
-        JointSample { displacement: first(displacement), velocity: first(velocity), force: first(force), contact }
-    }
-
-    /// Power that the joint takes, W.
-    pub fn power(&self) -> f64 {
-        self.force.iter().zip(self.velocity).map(|(f, v)| f * v).sum()
-    }
-}
-
-/// A motion that can be evaluated at any time of its period; with [`Orbit::new`] the motion of a method from elsewhere becomes an orbit.
-pub trait Path: Send + Sync {
-    /// The state at `time` in `[0, T)`.
-    fn sample(&self, time: f64) -> Sample;
-    /// The instants at which something switches, in `[0, T)`, rising.
-    fn switch_times(&self) -> Vec<f64>;
-    /// The derivative of the return from `start`, of a method that makes none by itself; `None` if there is none.
-    fn return_map(&self, _start: &[f64], _symmetry: Symmetry) -> Option<DMatrix<f64>> {
-        None
-    }
-    /// How far an independent motion from `start` is from it after a return, relative to the vibration, of a method that finds its orbits in another
-    /// way than by motion; `None` if nothing follows it.
-    fn return_defect(&self, _start: &[f64], _symmetry: Symmetry) -> Option<f64> {
-        None
-    }
 }
 
 /// What a method says of an orbit beside its path.

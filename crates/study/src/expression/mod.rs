@@ -17,123 +17,19 @@
 //! computed with `pi` is refused as a frequency, since it was probably meant in rad/s. A ratio of two masses is a pure number; it is
 //! *not* bare and does not fit where a stiffness is expected.
 
+mod operation;
 mod parser;
+mod value;
 
 use crate::units::{Fault, power, times};
+pub use operation::FUNCTIONS;
+use operation::Operation;
+pub(crate) use operation::is_reserved;
 use parser::Parser;
-use std::f64::consts::TAU;
 use std::ops::Range;
 use stickslip::dimension::Dimension;
-
-/// A number with or without a dimension.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Value {
-    /// The number, SI (rad/s for frequencies); of a bare number, as written.
-    pub si: f64,
-    /// Its dimension; `None` for a bare number.
-    pub dimension: Option<Dimension>,
-    /// Whether a bare number was computed with `pi`.
-    pub(crate) with_pi: bool,
-}
-
-impl Value {
-    /// A bare number.
-    pub fn bare(si: f64) -> Self {
-        Value { si, dimension: None, with_pi: false }
-    }
-
-    /// A number of known dimension, SI.
-    pub fn of(si: f64, dimension: Dimension) -> Self {
-        Value { si, dimension: Some(dimension), with_pi: false }
-    }
-
-    /// The number in SI as a quantity of this dimension.
-    ///
-    /// # Errors
-    /// Message and help, if the dimension is another one.
-    pub fn to(self, expected: Dimension) -> Result<f64, (String, Option<String>)> {
-        let Some(found) = self.dimension else {
-            return self.in_si_unit_of(expected);
-        };
-        if found == expected {
-            return Ok(self.si);
-        }
-        let only_radians = Dimension { rad: expected.rad, ..found } == expected;
-        let help = match (only_radians, expected.rad.cmp(&found.rad)) {
-            (true, std::cmp::Ordering::Greater) if expected == Dimension::FREQUENCY => Some(
-                "1/s does not say whether it counts radians or cycles: multiply by `1 rad`, as in \"sqrt(k/m) * 1 rad\", \
-                 or by `1 rev`"
-                    .to_owned(),
-            ),
-            (true, std::cmp::Ordering::Greater) => Some("a radian is missing: multiply by `1 rad`".to_owned()),
-            (true, std::cmp::Ordering::Less) => Some("a radian is left over: divide by `1 rad`".to_owned()),
-            _ => None,
-        };
-        Err((format!("expected {}, found {}", described(expected), described(found)), help))
-    }
-
-    fn in_si_unit_of(self, dimension: Dimension) -> Result<f64, (String, Option<String>)> {
-        let counts_cycles = dimension == Dimension::FREQUENCY || dimension == Dimension::SWEEP_RATE;
-        if counts_cycles && self.with_pi {
-            return Err((
-                "a bare number is in Hz here, but this one was computed with `pi`".to_owned(),
-                Some("say the unit: \"… * 1 rad/s\" or \"… * 1 Hz\"".to_owned()),
-            ));
-        }
-        Ok(if counts_cycles { self.si * TAU } else { self.si })
-    }
-}
-
-/// Dimension with an article-free name: `stiffness (N/m)`.
-pub(crate) fn described(dimension: Dimension) -> String {
-    match dimension {
-        Dimension::NONE => "a pure number".to_owned(),
-        other if other.name_and_unit().is_none() => format!("a quantity in {other}"),
-        other => format!("{other}"),
-    }
-}
-
-/// A number in its dimension's main unit, with as many digits as a reader wants: `2.5 N`, `121 Hz`.
-pub(crate) fn displayed(si: f64, dimension: Option<Dimension>) -> String {
-    let (value, unit) = match dimension {
-        None | Some(Dimension::NONE) => (si, String::new()),
-        Some(Dimension::FREQUENCY) => (si / TAU, "Hz".to_owned()),
-        Some(Dimension::SWEEP_RATE) => (si / TAU, "Hz/s".to_owned()),
-        Some(other) => (si, other.name_and_unit().map_or_else(|| other.to_string(), |(_, unit)| unit.to_owned())),
-    };
-    let rounded: f64 = format!("{value:.8e}").parse().unwrap_or(value);
-    let number = if rounded != 0.0 && !(1e-4..1e7).contains(&rounded.abs()) {
-        format!("{rounded:e}")
-    } else {
-        rounded.to_string()
-    };
-    if unit.is_empty() { number } else { format!("{number} {unit}") }
-}
-
-/// The functions of expressions.
-pub const FUNCTIONS: &[&str] = &["sqrt", "sin", "cos", "tan", "exp", "ln", "abs", "min", "max"];
-
-/// Whether a parameter cannot have this name.
-pub(crate) fn is_reserved(name: &str) -> bool {
-    FUNCTIONS.contains(&name) || name == "pi" || is_not_finite(name)
-}
-
-fn is_not_finite(name: &str) -> bool {
-    ["nan", "inf", "infinity"].iter().any(|word| name.eq_ignore_ascii_case(word))
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Operation {
-    Push(Value),
-    Parameter(usize),
-    Negate,
-    Add,
-    Subtract,
-    Multiply,
-    Divide,
-    Power,
-    Call { function: &'static str, arguments: usize },
-}
+pub use value::Value;
+pub(crate) use value::{described, displayed};
 
 /// An expression, compiled: steps for a stack machine, so that no depth of nesting can exhaust ours.
 #[derive(Debug, Clone, PartialEq)]
@@ -366,6 +262,7 @@ pub fn quantity(text: &str, dimension: Dimension) -> Result<f64, Fault> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     const PARAMETERS: [&str; 6] = ["m", "m1", "k", "f", "Ft", "omega"];
 

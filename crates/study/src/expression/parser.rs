@@ -1,6 +1,7 @@
 //! Text to the steps of an expression, by recursive descent.
 
-use super::{FUNCTIONS, Operation, Value, is_not_finite};
+use super::Value;
+use super::operation::{FUNCTIONS, Operation, is_not_finite};
 use crate::near::{nearest, shown};
 use crate::units::{self, Fault, Names};
 use std::ops::Range;

@@ -34,7 +34,7 @@ use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::both_ways::{self, BothWays, Other};
 use stickslip::curve::peak::Point;
 use stickslip::dimension::Dimension;
-use stickslip::method::{MethodError, OrbitError};
+use stickslip::method::{MethodError, OrbitError, advised};
 use stickslip::orbit::Orbit;
 
 pub(super) const KIND: Kind = Kind {
@@ -315,7 +315,7 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, Meth
     }
     // its first and last points are looked at together with the neighbours that other units compute for themselves
     let count = prepared.case.frequencies.as_ref().map_or(0, |f| f.len());
-    let mut solver = prepared.method.solver(&prepared.system)?;
+    let mut solver = advised(&*prepared.method, &prepared.system)?;
     let mut near = |index: usize, start: Option<&[f64]>| match solver.orbit(work.omega(index), start) {
         Ok(orbit) => point(&orbit),
         Err(_) => Point::failed(work.omega(index)),

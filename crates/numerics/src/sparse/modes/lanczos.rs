@@ -1,6 +1,6 @@
 //! A run of the Lanczos process: a basis that grows block by block, and the modes that have converged in it.
 
-use super::{BLOCK, ModesError, NaturalModes};
+use super::found::{BLOCK, ModesError, NaturalModes};
 use crate::eigen;
 use crate::sparse::{Factor, Matrix, columns};
 use nalgebra::DMatrix;

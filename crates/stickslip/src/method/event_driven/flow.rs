@@ -4,6 +4,7 @@ use super::decide::{AT_LIMIT, Decision};
 use super::mechanics::{Kind, Mechanics, Part, REST};
 use super::memory::Memory;
 use super::pattern::{Beginning, Driven, Pattern, Work};
+use super::tolerances::NEAR_REST;
 use crate::law::Contact;
 use crate::method::Breakdown;
 use crate::method::drive::Drive;
@@ -232,7 +233,7 @@ impl SegmentedMotion {
         let most = if loads > 0.0 { PRELOADED * loads } else { f64::INFINITY };
         self.energy_scale = loads + springs.map(|energy| energy.min(most)).sum::<f64>();
         let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax().sqrt() };
-        self.moving = drive.imposed_velocity().max(super::NEAR_REST * self.energy_scale * mobility);
+        self.moving = drive.imposed_velocity().max(NEAR_REST * self.energy_scale * mobility);
         self.drive = drive;
         self.memory.change_drive();
     }

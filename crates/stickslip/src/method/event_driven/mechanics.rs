@@ -367,4 +367,20 @@ impl Mechanics {
     pub fn states(&self) -> usize {
         2 * self.n + self.elastic
     }
+
+    /// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia.
+    pub fn weights(&self, omega: f64) -> Vec<f64> {
+        let mut weights = vec![1.0; self.states()];
+        for i in 0..self.n {
+            let inertia = omega * omega * self.mass[(i, i)];
+            weights[i] = self.stiffness[(i, i)].max(inertia).sqrt();
+            weights[self.n + i] = self.mass[(i, i)].sqrt();
+        }
+        for part in &*self.parts {
+            if let (Some(s), Some(kt)) = (part.state(), part.stiffness()) {
+                weights[2 * self.n + s] = 1.0 / kt.sqrt();
+            }
+        }
+        weights
+    }
 }

@@ -17,27 +17,29 @@ mod mechanics;
 mod memory;
 mod path;
 mod pattern;
+mod tolerances;
 mod work;
 
 pub(crate) use flow::SegmentedMotion;
 use mechanics::Kind;
 pub(crate) use mechanics::{Mechanics, takes};
 pub(crate) use path::ExactPath;
+pub(crate) use tolerances::MISSING_WORK;
+use tolerances::{CLOSED, ENERGY_GAP, NAME, NEAR_REST};
 pub use work::{ALONE, orbit_work};
 
 use super::drive::Drive;
 use super::guess::Guess;
+use super::option::{PERIOD, periods};
 use super::periodic::{Aim, Closed, ReturnMap, Search, approached};
 use super::relaxed::{Closing, ElasticSlider, relaxed};
 use super::repeated::Afresh;
-use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, PERIOD, Solver, periods, vibration};
+use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, Solver, vibration};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
-
-pub(crate) const NAME: &str = "event-driven";
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -50,21 +52,12 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     },
 };
 
-/// Residual at which an orbit is closed, relative to its state: a hundred times the rounding of one period.
-const CLOSED: f64 = 1e-12;
 /// Estimated distance to the orbit, relative to its state, above which a closed one takes one more step: near a resonance it is dozens of times the
 /// residual. Amplitudes of the couple err by 3e-11 at most, by 6e-11 without it; one orbit in fifty takes that step.
 const NEAREST: f64 = 7e-12;
-/// Energy gap per missing distance of a motion that has not quite settled: the stored energy, over the work of a period, of a
-/// structure with Q of a thousand.
-pub(crate) const MISSING_WORK: f64 = 1e3;
-/// A state counts as rest below this fraction of what the loads could cause.
-const NEAR_REST: f64 = 1e-3;
 /// Springs below this fraction of the stiffest hold nothing, and a force that they leave below this fraction of itself is held: rounding of a
 /// stiffness matrix with some digits lost in its assembly.
 const UNHELD: f64 = 1e-12;
-/// Energy gap above which an orbit is not reported as converged. The closed-form integrals are exact to about 1e-12.
-const ENERGY_GAP: f64 = 1e-8;
 
 /// The exact method.
 ///
@@ -83,7 +76,7 @@ impl Method for EventDriven {
     fn name(&self) -> &'static str {
         NAME
     }
-    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         Ok(Box::new(Exact::new(system, NAME, Search::Newton, 1)?))
     }
 }
@@ -99,26 +92,9 @@ impl Method for Subharmonic {
     fn name(&self) -> &'static str {
         NAME
     }
-    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         Ok(Box::new(Afresh(Exact::new(system, NAME, Search::Newton, self.period)?)))
     }
-}
-
-/// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia.
-pub(crate) fn weights(mechanics: &Mechanics, omega: f64) -> Vec<f64> {
-    let n = mechanics.n;
-    let mut weights = vec![1.0; mechanics.states()];
-    for i in 0..n {
-        let inertia = omega * omega * mechanics.mass[(i, i)];
-        weights[i] = mechanics.stiffness[(i, i)].max(inertia).sqrt();
-        weights[n + i] = mechanics.mass[(i, i)].sqrt();
-    }
-    for part in mechanics.parts.iter() {
-        if let (Some(s), Some(kt)) = (part.state(), part.stiffness()) {
-            weights[2 * n + s] = 1.0 / kt.sqrt();
-        }
-    }
-    weights
 }
 
 /// Finds orbits by exact motion, with either search.
@@ -240,7 +216,7 @@ impl Solver for Exact<'_> {
         }
         let drive = Drive::new(self.system, &self.flow.mechanics.owners(), omega);
         self.flow.set_drive(drive);
-        self.weights = weights(&self.flow.mechanics, omega);
+        self.weights = self.flow.mechanics.weights(omega);
         let symmetry = self.search.symmetry(self.system, self.periods);
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;

@@ -1,8 +1,8 @@
 //! The orbit's numbers from its closed-form segments.
 
-use super::NAME;
 use super::flow::{Segment, SegmentedMotion};
 use super::mechanics::{Part, Share};
+use super::tolerances::{CLOSED, ENERGY_GAP, NAME, NEAR_REST};
 use crate::law::Contact;
 use crate::method::Breakdown;
 use crate::method::periodic::{Closed, norm};
@@ -20,7 +20,7 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Work below this fraction of the stored energy is no yardstick for the energy gap: an orbit that is closed to `CLOSED` of its state may have
 /// gained or lost that much, and the gap that this makes must stay below what is allowed.
-const STORED: f64 = super::CLOSED / super::ENERGY_GAP;
+const STORED: f64 = CLOSED / ENERGY_GAP;
 
 /// The closed-form segments of one return, with all that is needed to evaluate them.
 #[derive(Debug, Clone)]
@@ -55,7 +55,7 @@ pub(super) fn orbit(
     let period = periods as f64 * std::f64::consts::TAU / omega;
     let path = ExactPath::new(system.clone(), flow, symmetry, period);
     let measured = measure(system, &Measuring::new(&path), omega, (symmetry, period))?;
-    let rest = super::NEAR_REST * flow.energy_scale;
+    let rest = NEAR_REST * flow.energy_scale;
     let share = vibration::share(&path, (symmetry, period), &closed.state, (weights, rest));
     let stored = share * norm(weights, &closed.state).powi(2);
     let mut orbit = Orbit {

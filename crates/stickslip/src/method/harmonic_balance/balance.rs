@@ -3,13 +3,14 @@
 use super::budget::{POINT, Work, is_affordable};
 use super::equations::{self, Level, Solution};
 use super::kept::Kept;
+use super::options::{FIRST, HarmonicBalance, NAME, TOLERANCE};
 use super::ports::Ports;
 use super::recent::{RECENT, Recent};
 use super::rest::Rest;
 use super::solve::Lost;
 use super::sparse::{self, Sparse};
 use super::storage::{MARCHED, MEMORY, check_memory, level_memory, marched};
-use super::{FIRST, HarmonicBalance, NAME, TOLERANCE, coupled, path, work};
+use super::{coupled, path, work};
 use crate::method::evidence::Judge;
 use crate::method::guess::Guess;
 use crate::method::{MethodError, OrbitError, Solver};

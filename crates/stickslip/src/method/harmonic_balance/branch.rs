@@ -4,14 +4,15 @@ use super::balance::LARGEST;
 use super::equations::{Level, Solution, transfer};
 use super::estimate::{Compared, estimate};
 use super::kept::Kept;
+use super::options::{HarmonicBalance, TOLERANCE};
+use super::path;
 use super::ports::Ports;
 use super::rest::Rest;
 use super::sparse::GUESSED;
 use super::storage::{check_memory, memory};
-use super::{HarmonicBalance, TOLERANCE, path};
 use crate::method::evidence::Judge;
 use crate::method::guess::Guess;
-use crate::method::{MethodError, OrbitError};
+use crate::method::{MethodError, OrbitError, ways};
 use crate::model::System;
 use crate::orbit::Orbit;
 use num_complex::Complex64;
@@ -64,7 +65,7 @@ impl<'a> BranchEquations<'a> {
         let kept = Kept::new(&system, |_| true);
         method.check(kept.highest)?;
         let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
-        let (ports, around) = Ports::of_sector(&system).map_err(|error| error.with_ways(&system))?;
+        let (ports, around) = Ports::of_sector(&system).map_err(|error| error.with(ways(&system)))?;
         let rest = Rest::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
         let level = |top: usize| {

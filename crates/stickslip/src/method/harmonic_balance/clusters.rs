@@ -11,7 +11,8 @@
 //! Newton methods with restricted additive Schwarz based nonlinear elimination for problems with high local nonlinearity".
 
 use super::ease::Ease;
-use super::equations::{Level, Slopes, Solution, weight};
+use super::equations::{Level, Slopes, Solution};
+use super::kept::weight;
 use super::ports::{Port, Ports, block};
 use super::solve::{HALVINGS, SHORTENS};
 use super::window::{Neighbours, Settling, Window};

@@ -13,7 +13,7 @@
 //! Where nothing but contacts holds a body, the mean has the springs of closed contacts in `R`, and their force is taken off `f`: see `closed`.
 //!
 //! `ε` is no free parameter: it is the impedance of the structure at the contact at the highest harmonic, the resolution of the series
-//! (see [`penalty`]). Another ε changes the solution no more than the missing harmonics do.
+//! (see [`penalty`](super::penalty::penalty)). Another ε changes the solution no more than the missing harmonics do.
 //!
 //! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian frequency-time method".
 
@@ -24,7 +24,9 @@ use super::budget::Work;
 use super::coupled::{Coupled, Near, by_products, dot};
 use super::ease::Ease;
 use super::hold::CLEAR;
+use super::kept::weight;
 use super::linear::Linear;
+use super::penalty::penalty as penalty_of;
 use super::ports::{Alternation, Beginning, Member, Port, Ports, REPEATS, block, blocks};
 use super::receptance::{Formed, Modal, Receptance};
 use super::rest::Rest;
@@ -34,8 +36,6 @@ use crate::method::guess::Guess;
 use crate::model::{Cyclic, System};
 use nalgebra::DVector;
 use num_complex::Complex64;
-pub(super) use yardsticks::penalty;
-pub(super) use yardsticks::weight;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -327,7 +327,7 @@ impl Level {
             *penalty = if imposed {
                 f64::INFINITY
             } else {
-                self::penalty(receptance, top, omega).max(CLEAR * port.least_penalty)
+                penalty_of(receptance, top, omega).max(CLEAR * port.least_penalty)
             };
         }
         self.holding = 0.0;

@@ -64,3 +64,8 @@ impl Kept {
 fn common_divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { common_divisor(b, a % b) }
 }
+
+/// Weight of a harmonic in norms: that of its velocity.
+pub(super) fn weight(h: usize) -> f64 {
+    ((h * h) as f64).max(1.0)
+}

@@ -12,9 +12,9 @@ mod readings;
 
 pub(crate) use linear::LinearMode;
 
-use super::equations::penalty;
 use super::hold::{CLEAR, stay};
 use super::open::{open, shorten};
+use super::penalty::penalty;
 use super::ports::{Alternation, Port, Ports};
 use super::solve::{HALVINGS, SHORTENS};
 use crate::method::MethodError;
@@ -134,7 +134,7 @@ impl<'a> ModeEquations<'a> {
         2 * self.alternation.harmonics.len() * (self.system.dofs() + self.forces()) + 2
     }
 
-    /// ε of every contact, N s/m, see [`super::equations::penalty`]. In place of the receptance of the highest harmonic stands that without
+    /// ε of every contact, N s/m, see [`penalty`]. In place of the receptance of the highest harmonic stands that without
     /// its resonances, `wᵀ (K + h² ω² M)⁻¹ w`: it changes smoothly along the mode, and where the harmonics are many it is the same.
     fn penalties(&self, omega: f64) -> Vec<f64> {
         if self.contacts.is_empty() {

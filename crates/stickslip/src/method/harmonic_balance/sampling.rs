@@ -5,14 +5,6 @@ use super::ease::{GIVEN, SOLVED};
 use super::equations::{Level, Slopes, Solution};
 use super::ports::{Alternation, Beginning, Port, Ports};
 
-/// Error of a motion by 1024 samples, relative, that laws with a memory were seen to have (hysteresis in a plane, contacts that part): as many more are
-/// taken as the tolerance asks for, and the estimate says whether they were enough.
-const SEEN: f64 = 2e-5;
-/// Samples from which that is reckoned, and at most as many.
-const AT: f64 = 1024.0;
-const MOST: f64 = 65536.0;
-/// The share of the tolerance that they are to leave, where fewer than that do: beside the harmonics that are missing it is not seen.
-const LEFT: f64 = 0.05;
 /// The last step by twice the samples, at most, as a share of the distance that is to be known: steps leave some hundredths of themselves.
 const SHARE: f64 = 0.1;
 /// The same of many contacts, of which another step costs as much as the first: one is enough. Measured: of 16 and of 100 nodes the distance
@@ -21,17 +13,6 @@ const SHARE_OF_COUPLED: f64 = 3.0;
 /// Steps, and what each is to leave of the one before.
 const MOST_STEPS: usize = 8;
 const CLOSER: f64 = 0.3;
-
-/// Samples per period that laws with a memory need for an error of the motion, relative.
-pub(super) fn samples_for(tolerance: f64) -> usize {
-    (AT * (SEEN / tolerance).sqrt().max(1.0)).min(MOST) as usize
-}
-
-/// The same of laws in steps, which are exact on a straight way however long it is: fewer where the tolerance is larger.
-pub(super) fn samples_of_steps(tolerance: f64) -> usize {
-    let fewer = (SEEN / (LEFT * tolerance)).sqrt().min(1.0);
-    (samples_for(tolerance) as f64 * fewer) as usize
-}
 
 impl Level {
     /// The motion near `start` by twice the samples, as exactly as its distance from `coarse` is to be known; `states`, those of the shorter series that is
@@ -142,10 +123,9 @@ impl Level {
 #[cfg(test)]
 mod tests {
     use super::super::equations::{Level, Solution, transfer};
+    use super::super::options::{HarmonicBalance, LEFT, TOLERANCE, samples_for, samples_of_steps};
     use super::super::ports::Ports;
     use super::super::rest::Rest;
-    use super::super::{HarmonicBalance, TOLERANCE};
-    use super::{LEFT, samples_for, samples_of_steps};
     use crate::law::{Dahl, FrictionContact, Jenkins2d, SharedLaw, Valanis};
     use crate::method::Method;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, System};

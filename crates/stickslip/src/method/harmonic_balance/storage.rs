@@ -5,7 +5,8 @@ use super::rest::CACHED;
 use super::rest::Rest;
 use super::sparse::Sparse;
 use super::{NAME, coupled};
-use crate::method::{MethodError, PERIOD};
+use crate::method::MethodError;
+use crate::method::option::PERIOD;
 
 /// Memory of the equations, bytes, beyond which nothing is begun: 1000 nodes of three directions with five harmonics need half of it without modes.
 pub(super) const MEMORY: f64 = 4e9;

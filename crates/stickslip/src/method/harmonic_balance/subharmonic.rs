@@ -3,8 +3,9 @@
 use super::balance::Balance;
 use super::kept::Kept;
 use super::{HarmonicBalance, NAME};
+use crate::method::option::PERIOD;
 use crate::method::repeated::Afresh;
-use crate::method::{Method, MethodError, PERIOD, Solver};
+use crate::method::{Method, MethodError, Solver};
 use crate::model::System;
 use num_complex::Complex64;
 
@@ -35,7 +36,7 @@ impl Method for Subharmonic {
     fn closes_motions(&self, _system: &System) -> bool {
         false
     }
-    fn prepare<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         let highest = Kept::new(system, |z| z != Complex64::new(0.0, 0.0)).highest;
         self.balance.check(highest)?;
         let (period, times) = (self.period.max(1), |count: usize| count.saturating_mul(self.period.max(1)));

@@ -1,9 +1,9 @@
 //! What a step of Newton's method costs, and an orbit, by counting: known before anything is computed.
 
-use super::FIRST;
 use super::budget::{FEWEST, POINT, WORK};
 use super::coupled::{by_products, step_products};
 use super::kept::Kept;
+use super::options::FIRST;
 use super::ports::Ports;
 use super::sparse::Sparse;
 use crate::law::Piece;

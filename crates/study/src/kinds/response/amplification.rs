@@ -16,6 +16,7 @@ use crate::values::{Frequencies, Values, hertz};
 use crate::work::Work;
 use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::peak::{self, Peak, Point};
+use stickslip::method::advised;
 use stickslip::model::Model;
 use stickslip::orbit::Orbit;
 
@@ -93,7 +94,7 @@ fn tuned(work: &Work<'_>) -> Result<Option<Peak>, String> {
             curve.into_iter().map(|(point, ())| point).collect()
         }
         _ => {
-            let mut solver = method.solver(&system).map_err(|error| error.to_string())?;
+            let mut solver = advised(method, &system).map_err(|error| error.to_string())?;
             let mut points: Vec<Point> = Vec::new();
             for index in work.points.clone().take_while(|_| !work.context.stopped()) {
                 let start = points.last().and_then(|point| point.start.as_deref());

@@ -16,7 +16,7 @@ pub(super) const REFERENCE_POINTS: usize = 4;
 /// A solver of a linear reference: its joints have other laws than those for which the method was chosen, so that any may do.
 fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     prepared.method.solver(system).or_else(|error| {
-        let others = error.ways().into_iter().flat_map(|ways| &ways.methods).filter_map(|name| method::find(name));
+        let others = method::ways(system).methods.into_iter().filter_map(method::find);
         let mut takes = others.filter_map(|row| (row.build)(&Options::new()).ok()?.solver(system).ok());
         takes.next().ok_or(error)
     })

@@ -1,13 +1,10 @@
 //! What is large and what is small: the length of a motion, the units of residuals, the penalty of contacts, the limits that nothing reaches.
 
+use super::super::kept::weight;
 use super::super::ports::{Port, Ports};
 use super::{Level, Solution};
 use num_complex::Complex64;
 
-/// The penalty ε is the contact's impedance at the highest harmonic times `1 + RIPPLE / highest`. Above that harmonic a series cannot
-/// follow the force: with a larger ε it chatters in stick, with a smaller one a passage through zero is blurred. The second term
-/// makes the passage sharp where the harmonics are few and do not chatter, so that one harmonic is the describing function.
-const RIPPLE: f64 = 30.0;
 /// Where contacts alone hold, the length of a motion counts up to so many times that of its harmonics and of rest.
 const FAR: f64 = 4.0;
 /// Share of the mean displacement that constant loads cause on closed contacts, below which no motion is solved more exactly than this share: the
@@ -66,15 +63,4 @@ impl Level {
         let least = limits.filter(|limit| *limit > 0.0).fold(f64::INFINITY, f64::min);
         Some(4.0 * self.holding / least).filter(|factor| factor.is_finite()).unwrap_or(1.0)
     }
-}
-
-/// The penalty ε (N s/m) of a contact with the receptance (m/N) of the highest harmonic `top`, see [`RIPPLE`].
-pub fn penalty(receptance: f64, top: usize, omega: f64) -> f64 {
-    let impedance = 1.0 / (receptance * top as f64 * omega);
-    impedance * (1.0 + RIPPLE / top as f64)
-}
-
-/// Weight of a harmonic in norms: that of its velocity.
-pub(in super::super) fn weight(h: usize) -> f64 {
-    ((h * h) as f64).max(1.0)
 }

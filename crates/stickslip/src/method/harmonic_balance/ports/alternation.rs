@@ -1,5 +1,6 @@
 //! The alternation between frequency and time: the signals of a port over a period, and what its kernels have in common.
 
+use super::memory::REPEATS;
 use crate::law::MOST_DIRECTIONS;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -84,7 +85,7 @@ impl Alternation {
         Alternation {
             relaxed_at_zero: false,
             marched: 0,
-            repeats: super::REPEATS,
+            repeats: REPEATS,
             fourier: Fourier::new(samples),
             pairs: harmonics.iter().map(|&h| (h, ZERO)).collect(),
             signal: zeros.clone(),

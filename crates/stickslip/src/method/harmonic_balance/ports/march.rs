@@ -7,16 +7,14 @@
 //! from its mean position.
 
 use super::alternation::{Alternation, share};
-use super::memory::Memory;
+use super::memory::{Memory, REPEATS};
 use crate::law::MOST_DIRECTIONS;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip_numerics::dense::multiply_in_blocks;
 
-/// Distance of the states from those a period later, relative to their size, at which they repeat: the rounding of a thousand steps.
-pub(in super::super) const REPEATS: f64 = 1e-12;
-/// The same where they come no closer.
+/// The same as [`REPEATS`] where they come no closer.
 const ROUNDED: f64 = 1e-9;
 /// Periods, at most: hysteresis that slips forgets in a few.
 const PERIODS: usize = 60;

@@ -2,6 +2,9 @@
 
 use num_complex::Complex64;
 
+/// Distance of the states from those a period later, relative to their size, at which they repeat: the rounding of a thousand steps.
+pub(in super::super) const REPEATS: f64 = 1e-12;
+
 /// Memory of a march.
 #[derive(Debug, Clone, Default)]
 pub(in super::super) struct Memory {

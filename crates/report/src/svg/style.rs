@@ -1,0 +1,25 @@
+//! Sizes and colours of a figure.
+
+/// Sizes of text, px. A figure of two columns printed 170 mm wide shows the ticks at 6 to 7 pt.
+pub(super) const TITLE: f64 = 18.0;
+pub(super) const PANEL_TITLE: f64 = 15.0;
+pub(super) const LABEL: f64 = 15.0;
+pub(super) const TICK: f64 = 13.5;
+/// Height of a line of text, part of its size.
+pub(super) const LEADING: f64 = 1.3;
+/// Outer margin of the figure and space between panels, px.
+pub(super) const MARGIN: f64 = 16.0;
+pub(super) const GAP: f64 = 26.0;
+pub(super) const TICK_LENGTH: f64 = 5.0;
+pub(super) const MINOR_LENGTH: f64 = 3.0;
+pub(super) const LINE: f64 = 1.8;
+pub(super) const THIN: f64 = 1.0;
+pub(super) const MARK: f64 = 3.8;
+pub(super) const SMALL_MARK: f64 = 2.0;
+/// The colour bar: its width, and the number of steps that look continuous.
+pub(super) const BAR: f64 = 16.0;
+pub(super) const BAR_STEPS: usize = 96;
+pub(super) const TEXT: &str = "#1a1a1a";
+pub(super) const AXIS: &str = "#444444";
+pub(super) const GRID: &str = "#e3e3e3";
+pub(super) const FINE_GRID: &str = "#f2f2f2";

@@ -1,0 +1,94 @@
+//! Points of a curve, and peaks among them.
+
+use crate::orbit::Orbit;
+
+/// A refined peak.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peak {
+    /// Frequency, rad/s.
+    pub omega: f64,
+    /// The quantity that was maximised.
+    pub value: f64,
+    /// True if the largest value stands at an end of the range: the real peak may lie beyond.
+    pub at_end: bool,
+    /// Why the real peak may be higher; `None` where the search found it.
+    pub unsettled: Option<Unsettled>,
+}
+
+/// Why a search for a peak left open how high it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unsettled {
+    /// Orbits beside the highest one were not found.
+    Neighbours,
+    /// The curve still rises steeply from both sides where the search ends.
+    Needle,
+    /// The curve still rises steeply where it jumps to another orbit.
+    CutOff,
+    /// The search has taken all orbits that it may, and its neighbours promise more.
+    Open,
+}
+
+impl std::fmt::Display for Unsettled {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Unsettled::Neighbours => {
+                "orbits beside this peak were not found, and the real one may be higher: much higher with little or no damping, or where friction \
+                 cannot bound the motion; look closer with a finer range or another method"
+            }
+            Unsettled::Needle => {
+                "this peak is narrower than its search resolves, and the real one is higher, or has no bound: without damping friction bounds a \
+                 resonance only up to a force; add the damping that the structure has, or take a narrower range"
+            }
+            Unsettled::CutOff => {
+                "the curve still rises steeply to this peak where it jumps to another orbit, so that the real one is higher, or has no bound: follow it \
+                 with kind `branch`; without damping add what the structure has"
+            }
+            Unsettled::Open => {
+                "the search for this peak has taken all orbits that it may, and the real one is higher; take a finer range, or follow the curve with kind \
+                 `branch`"
+            }
+        })
+    }
+}
+
+/// A point of a curve on which peaks are sought.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// Frequency, rad/s.
+    pub omega: f64,
+    /// The quantities; empty if there is no orbit.
+    pub values: Vec<f64>,
+    /// State of the orbit, a start for its neighbours.
+    pub start: Option<Vec<f64>>,
+    /// Estimated relative error of the quantities; zero of exact orbits.
+    pub error: f64,
+}
+
+impl Point {
+    /// What a curve keeps of an orbit.
+    pub fn new(orbit: &Orbit, quantities: &dyn Fn(&Orbit) -> Vec<f64>) -> Self {
+        let error = orbit.evidence.truncation.unwrap_or(0.0);
+        Point { omega: orbit.omega, values: quantities(orbit), start: Some(orbit.start.clone()), error }
+    }
+
+    /// A frequency at which no orbit was found.
+    pub fn failed(omega: f64) -> Self {
+        Point { omega, values: Vec::new(), start: None, error: 0.0 }
+    }
+
+    /// A quantity; below all others if there is no orbit.
+    pub(super) fn value(&self, quantity: usize) -> f64 {
+        self.values.get(quantity).copied().filter(|value| value.is_finite()).unwrap_or(f64::NEG_INFINITY)
+    }
+}
+
+/// A peak of one of several quantities.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PeakOf {
+    /// The number of the quantity.
+    pub quantity: usize,
+    /// The peak.
+    pub peak: Peak,
+    /// All quantities there.
+    pub values: Vec<f64>,
+}

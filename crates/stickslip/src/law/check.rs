@@ -1,0 +1,72 @@
+//! Whether a law can be what its values and its author say.
+
+use super::{BuildError, Law, LawError, LawInfo, Parameter, SharedLaw, mirror};
+use crate::dimension::Dimension;
+use std::collections::BTreeMap;
+
+impl LawInfo {
+    /// Builds the law from values by key (SI).
+    ///
+    /// # Errors
+    /// The keys that are missing, or a value that is not finite or out of its range.
+    ///
+    /// # Example
+    /// ```
+    /// use std::collections::BTreeMap;
+    /// let row = stickslip::law::find("coulomb").unwrap();
+    /// let law = row.build(&BTreeMap::from([("limit", 2.0)])).unwrap();
+    /// assert_eq!(law.values(), [2.0]);
+    /// ```
+    pub fn build(&self, values: &BTreeMap<&str, f64>) -> Result<SharedLaw, BuildError> {
+        let value = |p: &Parameter| values.get(p.key).copied().or(p.default);
+        let missing: Vec<&'static str> = self.parameters.iter().filter(|p| value(p).is_none()).map(|p| p.key).collect();
+        if !missing.is_empty() {
+            return Err(BuildError::Missing { law: self.name, keys: missing });
+        }
+        let ordered: Vec<f64> = self.parameters.iter().filter_map(value).collect();
+        // numbers out of range could not be built from
+        in_range(self, &ordered)?;
+        let law = (self.build)(&ordered);
+        law.check()?;
+        Ok(law)
+    }
+}
+
+impl dyn Law + '_ {
+    /// Checks that every parameter is finite and in its range, that they fit each other, that internal states have a size, and that an odd law is one.
+    ///
+    /// # Errors
+    /// [`LawError`] names the first parameter that is not.
+    pub fn check(&self) -> Result<(), LawError> {
+        in_range(self.info(), &self.values())?;
+        // what is compared with a size of nothing is no number
+        let sizes = [
+            self.step().filter(|step| step.states() > 0).map(|step| step.state_scale()),
+            self.rate().filter(|rate| rate.states() > 0).map(|rate| rate.state_scale()),
+        ];
+        if let Some(size) = sizes.into_iter().flatten().find(|size| !(size.is_finite() && *size > 0.0)) {
+            let message =
+                format!("the size of its internal states, `state_scale`, must be finite and above zero, found {size}");
+            return Err(LawError::Inconsistent { law: self.name(), message });
+        }
+        if self.is_odd() && mirror::is_broken(self) {
+            let message = "it says that it is odd, and the mirror image of a motion does not have the mirror image of its force: `is_odd` must be \
+                           false";
+            return Err(LawError::Inconsistent { law: self.name(), message: message.to_owned() });
+        }
+        self.consistent().map_err(|message| LawError::Inconsistent { law: self.name(), message })
+    }
+}
+
+/// Whether every value is in its range.
+fn in_range(info: &LawInfo, values: &[f64]) -> Result<(), LawError> {
+    for (parameter, &value) in info.parameters.iter().zip(values) {
+        if !parameter.range.has(value) {
+            let Parameter { key, range, .. } = *parameter;
+            let of = |key: &str| Some(values[info.parameters.iter().position(|p| p.key == key)?]);
+            let dimension = parameter.dimension_under(of).unwrap_or(Dimension::NONE);
+            return Err(LawError::Value { law: info.name, key, dimension, range, value });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,143 @@
+//! What to use instead of a method that cannot take a system or finds nothing: every method of the list is asked.
+
+use super::list::LIST;
+use super::{Method, MethodError, MethodInfo, Options, OrbitError, Solver, WIDTH, Ways, event_driven, transient};
+use crate::model::System;
+use crate::orbit::Orbit;
+
+/// The solver of a method for one system, with errors that name the methods to use instead.
+///
+/// # Errors
+/// As [`Method::solver`], with the methods that take the system.
+///
+/// # Example
+/// ```
+/// use stickslip::law::Stribeck;
+/// use std::sync::Arc;
+/// use stickslip::method::{advised, event_driven::EventDriven, find};
+/// let mut model = stickslip::model::example::blade_couple();
+/// model.joints[0].law = Arc::new(Stribeck { limit: 2.0, static_limit: 3.0, velocity: 0.01 });
+/// let system = model.assemble().unwrap();
+/// let error = advised(&EventDriven, &system).err().unwrap();
+/// let ways = error.ways().unwrap();
+/// assert_eq!(ways.methods, ["harmonic-balance"]);
+/// assert_eq!(ways.with_width, ["transient", "shooting"]);
+/// let options = [("width".to_owned(), 1e-4)].into();
+/// assert!((find("shooting").unwrap().build)(&options).unwrap().solver(&system).is_ok());
+/// ```
+pub fn advised<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    let solver = method.solver(system).map_err(|error| error.with(ways(system)))?;
+    Ok(Box::new(Advised { solver, system }))
+}
+
+/// A velocity, m/s, over which friction is smoothed to see whether it can be: laws have smooth neighbours of every width or of none.
+const ANY_WIDTH: f64 = 1e-3;
+
+/// Asks every method of the list which of them take a system.
+pub fn ways(system: &System) -> Ways {
+    among(system, |_| true)
+}
+
+/// Asks the methods whose names `asked` accepts.
+fn among(system: &System, asked: impl Fn(&str) -> bool) -> Ways {
+    let mut ways = Ways::default();
+    for row in LIST.iter().filter(|row| asked(row.name)) {
+        let plain = Options::new();
+        let smoothed = Options::from([(WIDTH.to_owned(), ANY_WIDTH)]);
+        let smooths = row.options.iter().any(|option| option.key == WIDTH);
+        // what a method misses in smoothed laws is what is really in its way
+        let last = if smooths { &smoothed } else { &plain };
+        match (refusal(row, &plain, system), refusal(row, last, system)) {
+            (None, _) => ways.methods.push(row.name),
+            (Some(_), None) => ways.with_width.push(row.name),
+            (Some(_), Some(refusal)) => {
+                let said = refusal.strip_prefix(row.name).map(|rest| rest.trim_start().to_owned()).unwrap_or(refusal);
+                match ways.missing.iter_mut().find(|(_, known)| *known == said) {
+                    Some((methods, _)) => methods.push(row.name),
+                    None => ways.missing.push((vec![row.name], said)),
+                }
+            }
+        }
+    }
+    if ways.any() {
+        ways.missing.clear();
+    }
+    ways
+}
+
+/// A solver whose errors name the methods that may find what it did not: only such as take the system.
+struct Advised<'a> {
+    solver: Box<dyn Solver + Send + 'a>,
+    system: &'a System,
+}
+
+impl Solver for Advised<'_> {
+    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.solver.orbit(omega, start).map_err(|error| with_ways(error, self.system))
+    }
+    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.solver.between(omega, start).map_err(|error| with_ways(error, self.system))
+    }
+    fn begin_at(&mut self, omega: f64, start: &[f64]) {
+        self.solver.begin_at(omega, start);
+    }
+}
+
+/// Degrees of freedom beyond which no other method is fast enough to be named, and to ask all of them takes a tenth of a second.
+const ASKED: usize = 200;
+
+/// An error with what to use instead.
+fn with_ways(mut error: OrbitError, system: &System) -> OrbitError {
+    if system.dofs() > ASKED {
+        return error;
+    }
+    let words = |asked: &dyn Fn(&str) -> bool| {
+        let ways = among(system, asked);
+        if ways.any() { format!(", or {ways}") } else { String::new() }
+    };
+    match &mut error {
+        // waiting is the last resort
+        OrbitError::Truncation { method, instead, .. } | OrbitError::NotConverged { method, instead, .. } => {
+            *instead = words(&|name| ![*method, transient::INFO.name].contains(&name));
+        }
+        OrbitError::Unsettled { method, instead, repeats: None, .. } => *instead = words(&|name| name != *method),
+        OrbitError::Drift { method, instead, .. } if *method != event_driven::INFO.name => {
+            *instead = words(&|name| name == event_driven::INFO.name);
+        }
+        _ => {}
+    }
+    error
+}
+
+/// Why a method refuses a system, if it does.
+fn refusal(row: &MethodInfo, options: &Options, system: &System) -> Option<String> {
+    let solver = (row.build)(options).and_then(|method| method.solver(system).map(drop));
+    solver.err().map(|error| error.alone().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Coulomb, CoulombArctan, SharedLaw};
+    use crate::method::harmonic_balance::HarmonicBalance;
+    use std::sync::Arc;
+
+    /// A tolerance that no series of this length reaches: what is named takes the law, and what does not take it is not named.
+    #[test]
+    fn errors_name_methods_that_take_the_system() {
+        let exact: SharedLaw = Arc::new(Coulomb { limit: 4.0 });
+        for (law, named, unnamed) in [
+            (exact, "`event-driven`, or `shooting` with a `width`", "`transient`"),
+            (Arc::new(CoulombArctan { limit: 4.0, alpha: 1e4 }), "`shooting`", "event-driven"),
+        ] {
+            let mut model = crate::model::example::blade_couple();
+            model.joints[0].law = law;
+            let system = model.assemble().unwrap();
+            let method = HarmonicBalance { tolerance: Some(1e-11), ..HarmonicBalance::default() };
+            let error = advised(&method, &system).unwrap().orbit(std::f64::consts::TAU * 121.0, None).unwrap_err();
+            let said = error.to_string();
+            assert!(matches!(error, OrbitError::Truncation { .. }), "{said}");
+            assert!(said.contains(named) && !said.contains(unnamed), "{said}");
+        }
+    }
+}

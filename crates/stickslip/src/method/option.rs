@@ -1,0 +1,57 @@
+//! Options of methods: keys in `[method]`, and those that several of them have.
+
+use super::MethodError;
+use crate::dimension::Dimension;
+use std::collections::BTreeMap;
+
+/// An option of a method: a key in `[method]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MethodOption {
+    /// Key in `[method]`.
+    pub key: &'static str,
+    /// Physical dimension.
+    pub dimension: Dimension,
+    /// Whether it is a count: a whole number from 1.
+    pub count: bool,
+    /// One line, with what happens when it is absent.
+    pub doc: &'static str,
+}
+
+/// How many periods of the drive an orbit takes.
+pub(super) const PERIOD: MethodOption = MethodOption {
+    key: "period",
+    dimension: Dimension::NONE,
+    count: true,
+    doc: "periods of the drive after which the motion repeats; motions that repeat earlier are found too; 1 when absent",
+};
+
+/// Most periods of the drive that one of the motion may take: more are another motion than one that repeats.
+const MOST_PERIODS: f64 = 100.0;
+
+/// The option [`PERIOD`] of a method.
+pub(super) fn periods(method: &'static str, options: &Options) -> Result<usize, MethodError> {
+    let periods = options.get(PERIOD.key).copied().unwrap_or(1.0);
+    if (1.0..=MOST_PERIODS).contains(&periods) {
+        return Ok(periods as usize);
+    }
+    let message = format!("must lie between 1 and {MOST_PERIODS}, found {periods}");
+    Err(MethodError::Option { method, key: PERIOD.key, message })
+}
+
+/// The key of the velocity over which exact laws are smoothed, of the methods that can do so.
+pub const WIDTH: &str = "width";
+
+/// The option [`WIDTH`] of a method, m/s.
+pub(super) fn width(method: &'static str, options: &Options) -> Result<Option<f64>, MethodError> {
+    match options.get(WIDTH).copied() {
+        Some(width) if !(width.is_finite() && width > 0.0) => {
+            let message =
+                format!("must be more than zero, found {width}; leave it out where laws are smooth by themselves");
+            Err(MethodError::Option { method, key: WIDTH, message })
+        }
+        width => Ok(width),
+    }
+}
+
+/// Options of a method that were given, by key, SI.
+pub type Options = BTreeMap<String, f64>;
