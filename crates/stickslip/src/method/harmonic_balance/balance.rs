@@ -1,6 +1,6 @@
 //! The solver: searches for the harmonics of one orbit after the other.
 
-use super::budget::{POINT, Work, is_affordable};
+use super::budget::{self, POINT, Work, is_affordable};
 use super::equations::{self, Level, Solution};
 use super::kept::Kept;
 use super::options::{FIRST, HarmonicBalance, NAME, TOLERANCE};
@@ -52,6 +52,8 @@ pub(super) struct Balance {
     pub(super) steep: bool,
     pub(super) judge: Judge,
     pub(super) levels: BTreeMap<usize, Level>,
+    /// Points in a row, the last ones, whose searches took most of what they may and found nothing.
+    pub(super) in_vain: usize,
     /// The last orbits, the newest first.
     pub(super) recent: VecDeque<Recent>,
     /// Frequencies (rad/s) at which the motion was followed and no orbit was found, and what it did.
@@ -96,6 +98,7 @@ impl Balance {
             judge: Judge::new(&system),
             system: Arc::new(system),
             levels: BTreeMap::new(),
+            in_vain: 0,
             recent: VecDeque::new(),
             followed: Vec::new(),
             tried_in_time: 0,
@@ -117,8 +120,9 @@ impl Balance {
         });
         level.drive(&self.system, &self.ports, &self.rest, omega).map_err(Lost::at)?;
         let elsewhere = self.taken(Some(top));
+        let share = budget::share_after(self.in_vain);
         let level = self.levels.get_mut(&top).expect("made above");
-        level.elsewhere = elsewhere;
+        (level.elsewhere, level.share) = (elsewhere, share);
         Ok(level)
     }
 
@@ -134,9 +138,24 @@ impl Balance {
         counted.map(|(_, level)| level.taken_of_point(&self.ports)).fold(Work::default(), Work::and)
     }
 
+    /// What the searches of the point may take.
+    fn allowed(&self) -> Work {
+        POINT.times(budget::share_after(self.in_vain))
+    }
+
     /// Whether they have taken all that they may.
     pub(super) fn is_spent(&self) -> bool {
-        self.taken(None).is_beyond(POINT)
+        self.taken(None).is_beyond(self.allowed())
+    }
+
+    /// Ends a point: what the next one may take.
+    fn end_point(&mut self, found: Result<Orbit, OrbitError>) -> Result<Orbit, OrbitError> {
+        match &found {
+            Ok(_) => self.in_vain = 0,
+            Err(_) if self.taken(None).is_beyond(self.allowed().times(budget::MOST)) => self.in_vain += 1,
+            Err(_) => {}
+        }
+        found
     }
 
     /// Whether a solution with twice the harmonics takes no more than seconds, of a point that has taken so much.
@@ -151,7 +170,7 @@ impl Balance {
             None => size <= LARGEST || multiplied,
         };
         let bounded = self.banded.is_some() || self.ports.has_forces();
-        let affordable = !bounded || is_affordable(work::step(self.banded.as_ref(), &self.ports, harmonics), taken);
+        let affordable = !bounded || is_affordable(work::step(self.banded.as_ref(), &self.ports, harmonics), taken, self.allowed());
         // it is compared with twice the samples, too
         let samples = 2 * self.method.samples_at(self.kept.double(top), &self.ports, self.steep);
         let fits = marched(&self.ports, harmonics, samples) <= MARCHED
@@ -320,13 +339,14 @@ impl Solver for Balance {
         self.begin_point(omega);
         let omega = omega / self.periods as f64;
         let warm = self.near(start, omega);
-        match self.from(self.first, omega, warm) {
+        let found = match self.from(self.first, omega, warm) {
             Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
                 let by_time = |balance: &mut Self| balance.by_time(omega).ok_or(error);
                 self.by_its_course(omega).unwrap_or_else(|| by_time(self))
             }
             found => found,
-        }
+        };
+        self.end_point(found)
     }
 
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
@@ -335,9 +355,36 @@ impl Solver for Balance {
             // the harmonics that the neighbour needed are enough
             Some((top, motion)) => {
                 self.begin_point(omega);
-                self.nearby(top, omega / self.periods as f64, &motion)
+                let found = self.nearby(top, omega / self.periods as f64, &motion);
+                self.end_point(found)
             }
             _ => self.orbit(omega, start),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::example;
+
+    /// Points that take most of what they may in vain leave less to those that follow, and an orbit gives it back.
+    #[test]
+    fn points_in_vain_leave_less_to_the_next() {
+        let system = example::blade_couple_massless().assemble().unwrap();
+        let mut balance = Balance::new(system, HarmonicBalance::default(), 1).unwrap();
+        let omega = std::f64::consts::TAU * 121.0;
+        let vain = |balance: &mut Balance, marched: usize| {
+            balance.begin_point(omega);
+            balance.level(7, omega).unwrap().alternation.marched = marched;
+            balance.end_point(Err(OrbitError::Frequency { omega })).unwrap_err();
+            balance.allowed().eliminated / POINT.eliminated
+        };
+        assert_eq!([0, usize::MAX / 2, 0].map(|marched| vain(&mut balance, marched)), [1.0, 1.0, 1.0]);
+        let less = vain(&mut balance, usize::MAX / 2);
+        assert!(less < 0.2, "{less}");
+        assert_eq!(balance.level(7, omega).unwrap().share, less);
+        balance.orbit(omega, None).unwrap();
+        assert_eq!(balance.allowed(), POINT);
     }
 }

@@ -6,6 +6,13 @@
 pub(super) const SEARCH: Work = Work { eliminated: 1.0, marched: 1.0 };
 pub(super) const POINT: Work = Work { eliminated: 3.0, marched: 1.0 };
 
+/// Points in a row that took most of what they may, and found nothing, after which the next ones of the same solver may take this share: what is found
+/// takes less, and a curve without orbits is to end. Whatever is found gives back all.
+const IN_VAIN: usize = 2;
+const AFTERWARDS: f64 = 0.15;
+/// What counts as most of it.
+pub(super) const MOST: f64 = 0.5;
+
 /// Multiplications of one search, about four seconds of one core.
 pub(super) const WORK: f64 = 2e10;
 /// Eliminations of a search in any case, where nothing shorter was solved before or where laws are smooth: one that is to end takes a few of them.
@@ -14,9 +21,14 @@ pub(super) const FEWEST: f64 = 40.0;
 /// steps are then short, as much as three counted ones: `coulomb-2d` at 4 contacts has its 1023 harmonics within 0.3 s.
 const BEGUN: f64 = 3.0;
 
-/// Whether a series whose steps take so many multiplications is begun by a point that has taken so much.
-pub(super) fn is_affordable(step: f64, taken: Work) -> bool {
-    BEGUN * step <= WORK * (POINT.eliminated - taken.eliminated)
+/// Whether a series whose steps take so many multiplications is begun by a point that has taken so much of what it may.
+pub(super) fn is_affordable(step: f64, taken: Work, allowed: Work) -> bool {
+    BEGUN * step <= WORK * (allowed.eliminated - taken.eliminated)
+}
+
+/// The share of the work of a search, and of a point, that is left after so many points in a row took most of it in vain.
+pub(super) fn share_after(in_vain: usize) -> f64 {
+    if in_vain < IN_VAIN { 1.0 } else { AFTERWARDS }
 }
 
 /// Work, relative to that of one search: eliminations, and steps of laws with a memory.
@@ -30,6 +42,11 @@ impl Work {
     /// Both together.
     pub fn and(self, other: Work) -> Work {
         Work { eliminated: self.eliminated + other.eliminated, marched: self.marched + other.marched }
+    }
+
+    /// A share of both.
+    pub fn times(self, share: f64) -> Work {
+        Work { eliminated: share * self.eliminated, marched: share * self.marched }
     }
 
     /// Whether there is more of one or the other than so much.

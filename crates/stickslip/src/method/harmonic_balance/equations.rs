@@ -17,40 +17,29 @@
 //!
 //! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian frequency-time method".
 
+mod drive;
+mod sketch;
 mod unknowns;
 mod yardsticks;
 
 use super::budget::Work;
 use super::coupled::{Coupled, Near, by_products, dot};
 use super::ease::Ease;
-use super::hold::CLEAR;
 use super::kept::weight;
 use super::linear::Linear;
-use super::penalty::penalty as penalty_of;
-use super::ports::{Alternation, Beginning, Member, Port, Ports, REPEATS, block, blocks};
-use super::receptance::{Formed, Modal, Receptance};
-use super::rest::Rest;
+use super::ports::{Alternation, Beginning, Port, Ports, block, blocks};
+use super::receptance::{Formed, Receptance};
 use super::sparse::Sparse;
 use super::window::Settling;
-use crate::method::guess::Guess;
-use crate::model::{Cyclic, System};
+use crate::model::Cyclic;
 use nalgebra::DVector;
 use num_complex::Complex64;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// The receptance below which motion counts as imposed, relative to that of the excited structure.
-const RIGID: f64 = 1e-14;
-
-/// All samples for one of a sketch, at most, and how many a sketch has at least for the wave of the highest harmonic; it has half of all at most.
-/// Measured: a step by so few leaves 0.01 of the residual, which the next one by the same leaves of that; with five for the wave the error that five harmonics leave
-/// of 16 nodes is known to 0.12 instead of 0.05.
-const FEWER: usize = 6;
-const SKETCHED: usize = 8;
-/// Distance of the states from those a period later, relative to their size, at which sketched derivatives are taken: what fewer samples leave out.
-const ALMOST: f64 = 1e-3;
 /// The share of the springs of closed contacts that a law's derivative has beside a structure that has them.
 pub(super) const OPEN: f64 = -1.0;
+
 /// All that belongs to one number of harmonics.
 #[derive(Debug, Clone)]
 pub(super) struct Level {
@@ -62,6 +51,8 @@ pub(super) struct Level {
     /// What searches before it took of the present point, here and at other levels, see [`Level::taken`].
     pub spent: Work,
     pub elsewhere: Work,
+    /// The share of their work that searches may take, see [`share_after`](super::budget::share_after).
+    pub share: f64,
     pub alternation: Alternation,
     /// Of the axes; empty in the banded form.
     pub(super) receptance: Receptance,
@@ -172,16 +163,6 @@ impl Level {
         level
     }
 
-    /// Keeps fewer samples beside all, if that is enough for a sketch.
-    pub(super) fn keep_sketch(&mut self) {
-        let top = self.harmonics().last().copied().unwrap_or(0);
-        let all = self.alternation.samples();
-        let least = (SKETCHED * (top + 1)).max(all / FEWER);
-        let few = [2, 3].map(|base: usize| base * least.div_ceil(base).next_power_of_two());
-        let few = few.into_iter().min().filter(|few| 2 * few <= all);
-        self.sketch = few.map(|few| Alternation::new(self.harmonics().to_vec(), few));
-    }
-
     /// The same with a derivative that is a matrix, whatever its size.
     pub fn with_matrix(self) -> Self {
         Level { with_matrix: true, ..self }
@@ -199,6 +180,7 @@ impl Level {
             prolongs: false,
             spent: Work::default(),
             elsewhere: Work::default(),
+            share: 1.0,
             alternation,
             receptance: Receptance::Formed(Formed::default()),
             penalty: vec![0.0; ports.len()],
@@ -260,134 +242,6 @@ impl Level {
             ..Level::unassembled(self.alternation.clone(), ports, None)
         };
         (level, motion)
-    }
-
-    /// Prepares for a drive frequency.
-    ///
-    /// # Errors
-    /// A frequency (rad/s) at which the structure without its joints has a resonance without damping.
-    pub fn drive(&mut self, system: &System, ports: &Ports, rest: &Rest, omega: f64) -> Result<(), f64> {
-        let n = system.dofs();
-        let excitation = system.excitation(omega);
-        let nh = self.harmonics().len();
-        for port in ports.iter() {
-            self.series[port.range()].fill(port.series);
-        }
-        let closed = if self.alternation.harmonics[0] == 0 { rest.closed(omega) } else { None };
-        self.springs.clear();
-        self.springs.extend(closed.iter().flat_map(|closed| &closed.springs));
-        self.free.clear();
-        if let Some(sparse) = &mut self.sparse {
-            // at a singular frequency: the next number has none of its zeros
-            sparse.close(&self.springs);
-            sparse.drive(omega).or_else(|_| sparse.drive(omega * (1.0 + f64::EPSILON)))?;
-        } else {
-            self.receptance = self.receptance(ports, rest, omega)?;
-        }
-        for k in 0..nh {
-            let h = self.alternation.harmonics[k];
-            let load = excitation.iter().find(|(number, _)| *number as usize == h);
-            let mut free = DVector::from_element(n, ZERO);
-            if let Some(sparse) = &mut self.sparse {
-                if let Some((_, force)) = load {
-                    sparse.respond(k, |i| force[i], free.as_mut_slice());
-                }
-            } else {
-                if let Some((_, force)) = load {
-                    free = rest.respond(h, omega, force).map_err(|_| h as f64 * omega)?;
-                }
-            }
-            for q in 0..ports.count() {
-                let axis = ports.axis(system, q);
-                self.linear[q * nh + k] = axis.along_complex(&free) + axis.imposed_at(h as u32);
-            }
-            self.free.push(free);
-        }
-        for (q, imposed) in self.imposed.iter_mut().enumerate() {
-            *imposed = ports.axis(system, q).imposed_at(0).re;
-        }
-        if !ports.has_forces() {
-            return Ok(());
-        }
-        let top = self.alternation.harmonics[nh - 1].max(1);
-        let [mass, _, stiffness] = system.structure().largest();
-        let stiff = stiffness.max(omega * omega * mass);
-        let soft = 1.0 / stiff.max(f64::MIN_POSITIVE);
-        // on the real axis: the impedance of the highest harmonic without the resonances that it may meet
-        let rate = top as f64 * omega;
-        let smooth = match &mut self.sparse {
-            Some(sparse) => sparse.own_at(rate),
-            None => rest.own_at(rate, omega).map_err(|_| rate)?,
-        };
-        for (penalty, port) in self.penalty.iter_mut().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
-            // one for all axes of a port, so that no direction of its plane is another
-            let mean = port.range().map(|q| smooth[q]).sum::<f64>() / port.axes as f64;
-            let receptance = mean + port.series;
-            let imposed = port.series == 0.0 && receptance <= RIGID * soft / (top * top) as f64;
-            *penalty = if imposed {
-                f64::INFINITY
-            } else {
-                penalty_of(receptance, top, omega).max(CLEAR * port.least_penalty)
-            };
-        }
-        self.holding = 0.0;
-        for (penalty, port) in self.penalty.iter().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
-            for q in port.range() {
-                let moving = self.linear[q * nh..(q + 1) * nh].iter().zip(&self.alternation.harmonics);
-                let velocity = moving.map(|(c, h)| *h as f64 * omega * c.norm()).fold(0.0, f64::max);
-                if velocity > 0.0 {
-                    self.holding = self.holding.max(penalty * velocity);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Receptances of the axes with the springs in series, as matrices unless these would be many and modes are at hand.
-    fn receptance(&self, ports: &Ports, rest: &Rest, omega: f64) -> Result<Receptance, f64> {
-        let harmonics = self.harmonics();
-        if let Some(structure) = rest.modes_for(ports).filter(|_| !self.with_matrix) {
-            let closed = if harmonics[0] == 0 { rest.closed(omega) } else { None };
-            let modal = Modal::new((structure, closed), (harmonics, omega), &self.series);
-            return modal.map(Receptance::Modal).map_err(|_| omega);
-        }
-        let formed = harmonics.iter().map(|&h| {
-            let mut receptance = rest.receptance(h, omega).map_err(|_| h as f64 * omega)?;
-            self.series.iter().enumerate().for_each(|(q, series)| receptance[(q, q)] += series);
-            Ok(receptance)
-        });
-        Ok(Receptance::Formed(Formed::new(formed.collect::<Result<_, f64>>()?)))
-    }
-
-    /// The motion to begin with: that of the describing functions, or without friction; where contacts alone hold, static rest on them, from which
-    /// a step leads to the motion that sticks.
-    pub fn begin(&self, system: &System, ports: &Ports, guess: Option<&Guess>, omega: f64) -> Solution {
-        let nh = self.harmonics().len();
-        let mut motion = self.unhindered();
-        if self.stands() {
-            return self.at_rest(1.0);
-        }
-        let Some(guess) = guess else { return motion };
-        for port in ports.iter() {
-            for (rate, x) in &guess.harmonics {
-                let h = (rate / omega).round() as usize;
-                let Ok(k) = self.harmonics().binary_search(&h) else { continue };
-                for q in port.range() {
-                    let (_, a) = ports.place(q);
-                    // what does the work of all
-                    let work = |member: &Member| member.factor * guess.force(system, (member.joint, a), (h as u32, x));
-                    let force: Complex64 = port.members.iter().map(work).sum();
-                    if !force.is_finite() {
-                        continue; // rigid friction that does not move at all
-                    }
-                    let axis = ports.axis(system, q);
-                    let moved = axis.along_complex(x) + axis.imposed_at(h as u32);
-                    motion.c[q * nh + k] = moved - force * port.series;
-                    motion.force[q * nh + k] = force;
-                }
-            }
-        }
-        motion
     }
 
     /// Forces and residual at the unknowns in `motion`; the rest of it follows. The derivatives of the ports go into `self.tangents`, see [`Slopes`].
@@ -530,50 +384,6 @@ impl Level {
         self.linearised = false;
     }
 
-    /// The derivatives that [`Slopes::Cheap`] left out, at the motion that was evaluated last. If they are `sketched` those of return maps are taken by
-    /// fewer samples, where the level has such: a step of Newton's method by them leaves some thousandths of the residual, whose own samples are all
-    /// there. Whether some are so.
-    pub fn follow_slopes(
-        &mut self,
-        ports: &Ports,
-        omega: f64,
-        motion: &mut Solution,
-        (ease, sketched): (Ease, bool),
-    ) -> bool {
-        let nh = self.harmonics().len();
-        self.alternation.relaxed_at_zero = motion.relaxed_at_zero;
-        let mut any = false;
-        for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.marches()) {
-            let range = port.first * nh..(port.first + port.axes) * nh;
-            let slot = &mut self.tangents[block(&self.blocks, p, port, nh)];
-            let (c, force) = (&motion.c[range.clone()], &mut motion.force[range.clone()]);
-            let mut alternation = &mut self.alternation;
-            let mut rough = false;
-            if let Some(sketch) = self.sketch.as_mut().filter(|_| sketched && port.steps()) {
-                let image = &mut self.image[..range.len()];
-                sketch.relaxed_at_zero = alternation.relaxed_at_zero;
-                sketch.begin.clone_from(&self.states[p]);
-                sketch.repeats = ALMOST;
-                sketch.respond(port, (omega, ease.limits), c, image, Some(&mut *slot));
-                sketch.repeats = REPEATS;
-                rough = image.iter().all(|f| f.is_finite());
-                if rough {
-                    alternation = sketch;
-                }
-            }
-            if !rough {
-                alternation.begin.clone_from(&self.states[p]);
-                alternation.respond(port, (omega, ease.limits), c, force, Some(slot));
-            }
-            // what holds was not sampled
-            any |= rough && !alternation.state.is_empty();
-            self.states[p].forgets.clone_from(&alternation.forgets);
-            self.add_springs(p, port, OPEN);
-        }
-        self.linearised = true;
-        any
-    }
-
     /// Begins a point: what its searches may take is theirs together.
     pub fn begin_point(&mut self) {
         (self.assembled, self.eliminated, self.products, self.alternation.marched) = (0, 0, 0, 0);
@@ -591,23 +401,6 @@ impl Level {
         (self.nearby, self.linearised, self.sketches) = (false, false, self.sketch.is_some());
         self.keeps_slopes = false;
         self.states.iter_mut().for_each(|known| *known = Beginning::default());
-    }
-
-    /// Samples of a period, also while those of a sketch stand in for them.
-    pub fn all_samples(&self) -> usize {
-        self.sketch.iter().map(|sketch| sketch.samples()).fold(self.alternation.samples(), usize::max)
-    }
-
-    /// Whether there are fewer samples beside all.
-    pub fn keeps_sketch(&self) -> bool {
-        self.sketch.is_some()
-    }
-
-    /// The sketch becomes what is sampled, and back: forces by fewer samples then, and derivatives that are theirs.
-    pub fn exchange_samples(&mut self) {
-        let Some(sketch) = &mut self.sketch else { return };
-        sketch.marched = self.alternation.marched;
-        std::mem::swap(&mut self.alternation, sketch);
     }
 
     /// Whether the states of a law cross their range between two samples of a motion somewhere: to the series it is as steep as a law of velocity then, and
@@ -756,9 +549,10 @@ pub(super) fn transfer(motion: &Solution, from: &[usize], to: &[usize]) -> Solut
 #[cfg(test)]
 mod tests {
     use super::super::path;
+    use super::super::rest::Rest;
     use super::*;
     use crate::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw};
-    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, System, example};
     use std::sync::Arc;
 
     /// A row of masses with joints of every law between them, driven with or without a mean.

@@ -324,7 +324,8 @@ impl Level {
 
     /// Whether the search has taken all the work that it may, or that its point may.
     pub(super) fn is_exhausted(&self, ports: &Ports) -> bool {
-        self.taken(ports).is_beyond(SEARCH) || self.elsewhere.and(self.taken_of_point(ports)).is_beyond(POINT)
+        self.taken(ports).is_beyond(SEARCH.times(self.share))
+            || self.elsewhere.and(self.taken_of_point(ports)).is_beyond(POINT.times(self.share))
     }
 
     /// The Newton step into `self.step`, in the unknowns' units.
