@@ -1,6 +1,7 @@
 //! Bladed disks in study files.
 
 use std::f64::consts::TAU;
+use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
 use stickslip::model::Model;
 use stickslip_study::run::{Context, run};
 use stickslip_study::{Case, Study, StudyError, read_study};
@@ -336,6 +337,42 @@ fn samples_of_a_disk_by_its_matrices() {
         tip.len() == 6 && tip.iter().all(|tip| *tip > 0.0) && tip.windows(2).all(|pair| pair[0] != pair[1]),
         "{tip:?}"
     );
+}
+
+/// Theory 12: a sector by its matrices with joints between neighbours, in the travelling wave, is the whole ring whose symmetry nobody knows: friction
+/// behind springs, rigid, and smooth.
+#[test]
+fn a_sector_by_its_matrices_with_a_joint_is_its_ring() {
+    let laws = [
+        "kind = \"jenkins\", stiffness = \"2e3 N/m\", limit = \"0.2 N\"",
+        "kind = \"coulomb\", limit = \"0.2 N\"",
+        "kind = \"jenkins-arctan\", stiffness = \"2e3 N/m\", limit = \"0.2 N\", alpha = \"300 s/m\"",
+    ];
+    for (law, hertz) in laws.iter().flat_map(|law| [(law, 43.7), (law, 44.6)]) {
+        // samples that are a multiple of the sectors are alike in all of these
+        let more = format!(
+            "[[joint]]\nname = \"shroud\"\nbetween = [\"tip\", \"next.tip\"]\nlaw = {{ {law} }}\n\
+             [[force]]\non = \"tip\"\namplitude = \"1 N\"\nengine_order = 2\n\
+             [study]\nkind = \"response\"\nfrequency = \"{hertz} Hz\"\n\
+             [method]\nkind = \"harmonic-balance\"\nharmonics = 9\nsamples = 768\n"
+        );
+        let sector = by_matrices("boundary = \"pairs.csv\"\n", &more).unwrap().case(0).unwrap().model;
+        assert!(sector.ring.is_some());
+        let ring = Model { ring: None, ..sector.clone() };
+        let orbit = |model: &Model| {
+            let method = HarmonicBalance { harmonics: Some(9), samples: Some(768), tolerance: None };
+            method.solver(&model.assemble().unwrap()).unwrap().orbit(TAU * hertz, None).unwrap()
+        };
+        let (one, all) = (orbit(&sector), orbit(&ring));
+        assert_eq!(one.places.len(), all.places.len());
+        let size = all.places.iter().map(|place| place.amplitude()).fold(0.0, f64::max);
+        let apart = |a: f64, b: f64| (a - b).abs() / size;
+        let places = one.places.iter().zip(&all.places).map(|(a, b)| apart(a.amplitude(), b.amplitude()));
+        let losses = one.joints.iter().zip(&all.joints).map(|(a, b)| apart(a.dissipation, b.dissipation));
+        let worst = places.chain(losses).fold(0.0, f64::max);
+        assert!(worst < 1e-10, "{law} at {hertz} Hz: {worst:.1e}");
+        assert!(one.joints.iter().all(|joint| joint.slip_fraction > 0.1), "{law}: a test without slip tests nothing");
+    }
 }
 
 /// With `x₂ = x₁ e^{jθ}` the waves of the sector have real matrices of three rows, to which rotation adds `(Ω/100 Hz)²` of what the second file

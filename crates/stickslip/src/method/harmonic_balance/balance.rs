@@ -170,7 +170,8 @@ impl Balance {
             None => size <= LARGEST || multiplied,
         };
         let bounded = self.banded.is_some() || self.ports.has_forces();
-        let affordable = !bounded || is_affordable(work::step(self.banded.as_ref(), &self.ports, harmonics), taken, self.allowed());
+        let affordable =
+            !bounded || is_affordable(work::step(self.banded.as_ref(), &self.ports, harmonics), taken, self.allowed());
         // it is compared with twice the samples, too
         let samples = 2 * self.method.samples_at(self.kept.double(top), &self.ports, self.steep);
         let fits = marched(&self.ports, harmonics, samples) <= MARCHED
