@@ -268,7 +268,7 @@ const PLACE: &[Key] = &[
     optional(
         "dof",
         Takes::Row,
-        "the one row that it is, by its name `node.direction`, or its number from 1",
+        "the one row that it is, by its name `node.direction`; by its number from 1 where rows have no names",
         "\"1353.y\"",
     ),
     optional(
