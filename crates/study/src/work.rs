@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stickslip::curve::sweep::BLOCK;
 use stickslip::dimension::Dimension;
-use stickslip::method::{self, Method, MethodError, Options, WIDTH, Ways};
+use stickslip::method::{self, Method, MethodError, Options, Refusal, WIDTH, Ways};
 use stickslip::model::System;
 
 /// Units that may be under way or waiting for their turn, per thread: enough that none waits for a long one, few enough to keep little.
@@ -94,25 +94,23 @@ pub(crate) fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyE
         index => format!("{refusal} ({})", study.case_words(index)),
     };
     let help = error.ways().map(|ways| advice(study, case, ways));
-    match error {
-        MethodError::Law { joint, .. } => {
+    match &error.refusal {
+        Refusal::Law { joint, .. } => {
             let index = model.joints.iter().position(|j| j.name == *joint).unwrap_or(0);
             study.error_at("joint", index, "law", message, help)
         }
-        MethodError::NeedsMass { place, .. } | MethodError::Empty { place, .. } | MethodError::Light { place, .. } => {
+        Refusal::NeedsMass { place, .. } | Refusal::Empty { place, .. } | Refusal::Light { place, .. } => {
             match model.masses.iter().position(|mass| mass.places().contains(place)) {
                 Some(index) => study.error_at("mass", index, "mass", message, help),
                 None => study.error_at("structure", 0, "mass", message, help),
             }
         }
         // a kind that needs no method has the method's options among its own keys
-        MethodError::Option { key, .. } => {
+        Refusal::Option { key, .. } => {
             let table = if study.kind().uses_method { "method" } else { "study" };
             study.error_at(table, 0, key, message, None)
         }
-        MethodError::NotPositive { .. } | MethodError::TooLarge { .. } => {
-            study.error_at("method", 0, "kind", message, help)
-        }
+        Refusal::NotPositive { .. } | Refusal::TooLarge { .. } => study.error_at("method", 0, "kind", message, help),
     }
 }
 

@@ -4,7 +4,7 @@
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip::law::{SharedLaw, TABLE};
-use stickslip::method::{Method, MethodError, harmonic_balance::HarmonicBalance};
+use stickslip::method::{Method, MethodError, Refusal, advised, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Axis, System};
 use stickslip::orbit::Orbit;
 use stickslip_verification::held::{FORCE, MASS, OMEGA, STIFFNESS, held, load};
@@ -68,10 +68,10 @@ fn every_law_balances_the_structure() {
         let law = (info.build)(info.sample);
         let system = held(&law, DAMPING, constant);
         let method = HarmonicBalance { harmonics: Some(31), ..HarmonicBalance::default() };
-        let mut solver = match method.solver(&system) {
+        let mut solver = match advised(&method, &system) {
             Ok(solver) => solver,
             // a law may be refused by name, with what to use instead
-            Err(MethodError::Law { ways, .. }) => {
+            Err(MethodError { refusal: Refusal::Law { .. }, ways }) => {
                 assert!(ways.methods.contains(&"event-driven"), "{}: {ways}", info.name);
                 continue;
             }

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip::law::TABLE;
-use stickslip::method::{self, Method, MethodError, Options, auto::Auto};
+use stickslip::method::{self, Method, MethodError, Options, Refusal, advised, auto::Auto};
 use stickslip::model::{Axis, System};
 use stickslip::orbit::Orbit;
 use stickslip::structure::Structure;
@@ -56,10 +56,10 @@ fn every_law_in_every_method_moves_as_the_reference() {
         let mut taken = 0;
         for row in method::TABLE {
             let method = (row.build)(&Options::new()).unwrap();
-            let mut solver = match method.solver(&system) {
+            let mut solver = match advised(&*method, &system) {
                 Ok(solver) => solver,
                 // refused by name, with what to use instead
-                Err(MethodError::Law { law, ways, .. }) => {
+                Err(MethodError { refusal: Refusal::Law { law, .. }, ways }) => {
                     assert!(law == info.name && !ways.methods.is_empty(), "{} in {}: {ways}", info.name, row.name);
                     continue;
                 }

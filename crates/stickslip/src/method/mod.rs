@@ -34,7 +34,7 @@ mod ways;
 
 pub use crate::orbit::{Breakdown, OrbitError};
 pub use advice::{advised, ways};
-pub use error::MethodError;
+pub use error::{MethodError, Refusal};
 pub use evidence::evidence_steps;
 use list::LIST;
 pub use option::{MethodOption, Options, WIDTH};

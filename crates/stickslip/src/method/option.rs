@@ -35,7 +35,7 @@ pub(super) fn periods(method: &'static str, options: &Options) -> Result<usize, 
         return Ok(periods as usize);
     }
     let message = format!("must lie between 1 and {MOST_PERIODS}, found {periods}");
-    Err(MethodError::Option { method, key: PERIOD.key, message })
+    Err(MethodError::option(method, PERIOD.key, message))
 }
 
 /// The key of the velocity over which exact laws are smoothed, of the methods that can do so.
@@ -47,7 +47,7 @@ pub(super) fn width(method: &'static str, options: &Options) -> Result<Option<f6
         Some(width) if !(width.is_finite() && width > 0.0) => {
             let message =
                 format!("must be more than zero, found {width}; leave it out where laws are smooth by themselves");
-            Err(MethodError::Option { method, key: WIDTH, message })
+            Err(MethodError::option(method, WIDTH, message))
         }
         width => Ok(width),
     }

@@ -82,7 +82,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
         let tolerance = options.get("tolerance").copied().unwrap_or(TOLERANCE);
         if !(1e-13..=1e-3).contains(&tolerance) {
             let message = format!("must lie between 1e-13 and 1e-3, found {tolerance}");
-            return Err(MethodError::Option { method: NAME, key: "tolerance", message });
+            return Err(MethodError::option(NAME, "tolerance", message));
         }
         Ok(Box::new(Shooting { tolerance, width: width(NAME, options)?, period: periods(NAME, options)? }))
     },

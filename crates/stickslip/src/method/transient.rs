@@ -50,7 +50,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
         let tolerance = options.get("tolerance").copied().unwrap_or(TOLERANCE);
         if !(1e-12..=1e-2).contains(&tolerance) {
             let message = format!("must lie between 1e-12 and 1e-2, found {tolerance}");
-            return Err(MethodError::Option { method: NAME, key: "tolerance", message });
+            return Err(MethodError::option(NAME, "tolerance", message));
         }
         let most = options.get("periods").map_or(PERIODS, |periods| *periods as usize);
         let (width, period) = (width(NAME, options)?, periods(NAME, options)?);

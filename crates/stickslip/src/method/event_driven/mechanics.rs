@@ -5,7 +5,7 @@
 //! What each carries of the part's force is its [`Share`].
 
 use crate::law::{Contact, Law, Piece};
-use crate::method::MethodError;
+use crate::method::{MethodError, Refusal};
 use crate::model::{Line, System};
 use crate::structure::Matrices;
 use nalgebra::{DMatrix, DVector};
@@ -260,14 +260,14 @@ fn light(system: &System, parts: &[Part], method: &'static str) -> Option<Method
         let lightest = part.rows().min_by(|&a, &b| mass(a).total_cmp(&mass(b)))?;
         let ratio = part.rows().map(mass).fold(0.0, f64::max) / mass(lightest);
         let several = rigid().filter(|part| part.direction[lightest] != 0.0).nth(1).is_some();
-        (several && ratio > LIGHTEST).then(|| MethodError::Light {
+        let light = Refusal::Light {
             method,
             place: system.structure().places()[lightest].clone(),
             joint: system.joints()[part.joint].name().to_owned(),
             ratio,
             least: LIGHTEST.recip(),
-            ways: Box::default(),
-        })
+        };
+        (several && ratio > LIGHTEST).then(|| light.into())
     })
 }
 

@@ -89,7 +89,7 @@ impl HarmonicBalance {
 
     /// Whether the options fit each other and excitation up to harmonic `highest`.
     pub(super) fn check(&self, highest: usize) -> Result<(), MethodError> {
-        let option = |key, message| Err(MethodError::Option { method: NAME, key, message });
+        let option = |key, message| Err(MethodError::option(NAME, key, message));
         if let Some(harmonics) = self.harmonics
             && (harmonics < highest.max(1) || harmonics > 10_000)
         {

@@ -30,7 +30,7 @@ pub(super) fn check_memory(bytes: f64, ports: &Ports, (harmonics, periods): (usi
         1e-9 * bytes,
         1e-9 * MEMORY
     );
-    Err(MethodError::Option { method: NAME, key, message })
+    Err(MethodError::option(NAME, key, message))
 }
 
 /// Memory of a level that is not banded, bytes: derivatives of the ports; receptances and what preconditions steps, or modes along the axes with the factor of

@@ -40,10 +40,9 @@ impl Method for Subharmonic {
         let highest = Kept::new(system, |z| z != Complex64::new(0.0, 0.0)).highest;
         self.balance.check(highest)?;
         let (period, times) = (self.period.max(1), |count: usize| count.saturating_mul(self.period.max(1)));
-        let too_high = |_| MethodError::Option {
-            method: NAME,
-            key: PERIOD.key,
-            message: format!("{period} periods of harmonic {highest} are more than can be counted"),
+        let too_high = |_| {
+            let message = format!("{period} periods of harmonic {highest} are more than can be counted");
+            MethodError::option(NAME, PERIOD.key, message)
         };
         u32::try_from(times(highest)).map_err(too_high)?;
         let HarmonicBalance { harmonics, samples, tolerance } = self.balance;
