@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
-use stickslip::model::Model;
+use stickslip::model::{Model, Ring};
 use stickslip_study::run::{Context, run};
 use stickslip_study::{Case, Study, StudyError, read_study};
 
@@ -357,8 +357,11 @@ fn a_sector_by_its_matrices_with_a_joint_is_its_ring() {
              [method]\nkind = \"harmonic-balance\"\nharmonics = 9\nsamples = 768\n"
         );
         let sector = by_matrices("boundary = \"pairs.csv\"\n", &more).unwrap().case(0).unwrap().model;
-        assert!(sector.ring.is_some());
-        let ring = Model { ring: None, ..sector.clone() };
+        let whole = sector.ring.map(|ring| Ring { order: None, ..ring });
+        let ring = Model { ring: whole, ..sector.clone() };
+        assert!(
+            Model { ring: None, ..sector.clone() }.assemble().unwrap_err().to_string().contains("no model by itself")
+        );
         let orbit = |model: &Model| {
             let method = HarmonicBalance { harmonics: Some(9), samples: Some(768), tolerance: None };
             method.solver(&model.assemble().unwrap()).unwrap().orbit(TAU * hertz, None).unwrap()

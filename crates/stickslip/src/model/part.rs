@@ -39,8 +39,15 @@ impl Part {
                 }
             }
         }
-        if let (Some(ring), Some(of)) = (model.ring, &substructure.disk) {
-            return Part::ring(substructure, of, ring.sectors, model);
+        match (model.ring, &substructure.disk) {
+            (Some(ring), Some(of)) => return Part::ring(substructure, of, ring.sectors, model),
+            // places of all sectors would be those of one
+            (None, Some(_)) => {
+                let message = "a sector by its matrices is no model by itself: its ring, which `Disk::ring` makes, says how many of them there are; for \
+                               the whole ring without its waves take `Ring { order: None, .. }`";
+                return Err(ModelError::new(Element::Whole, "boundary", message));
+            }
+            (_, None) => {}
         }
         match substructure.reduction {
             Reduction::None { up_to } => Part::whole(substructure, up_to, model),

@@ -5,9 +5,9 @@ use super::super::rest::Rest;
 use super::super::sparse::Sparse;
 use super::*;
 use crate::law::{BoucWen, Cubic, Dahl, Gap, Jenkins, Law, LawInfo, Rate, RateLaw, Relative, Step, StepLaw, Stribeck};
-use crate::method::Method;
 use crate::method::harmonic_balance::HarmonicBalance;
 use crate::method::shooting::Shooting;
+use crate::method::{Method, advised};
 use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
 use crate::orbit::Orbit;
 use crate::structure::Structure;
@@ -152,7 +152,7 @@ fn refusals_name_the_law_and_what_would_do() {
         let structure = Structure::new(places, one.clone(), one.clone(), one).unwrap();
         let axes = (0..d).map(|i| Axis::new(vec![(i, 1.0)])).collect();
         let system = System::builder(structure).joint("rub", law.clone(), axes).build().unwrap();
-        let error = HarmonicBalance::default().solver(&system).err().expect("refused").to_string();
+        let error = advised(&HarmonicBalance::default(), &system).err().expect("refused").to_string();
         for part in ["harmonic-balance", "rub", law.name(), words] {
             assert!(error.contains(part), "{error}");
         }
