@@ -52,7 +52,7 @@ pub(super) struct Balance {
     pub(super) steep: bool,
     pub(super) judge: Judge,
     pub(super) levels: BTreeMap<usize, Level>,
-    /// Points in a row, the last ones, whose searches took most of what they may and found nothing.
+    /// Points in a row, the last ones, whose searches took long and found nothing, see [`budget::ENOUGH`].
     pub(super) in_vain: usize,
     /// The last orbits, the newest first.
     pub(super) recent: VecDeque<Recent>,
@@ -120,9 +120,9 @@ impl Balance {
         });
         level.drive(&self.system, &self.ports, &self.rest, omega).map_err(Lost::at)?;
         let elsewhere = self.taken(Some(top));
-        let share = budget::share_after(self.in_vain);
+        let allowed = self.allowed();
         let level = self.levels.get_mut(&top).expect("made above");
-        (level.elsewhere, level.share) = (elsewhere, share);
+        (level.elsewhere, level.allowed) = (elsewhere, allowed);
         Ok(level)
     }
 
@@ -140,7 +140,7 @@ impl Balance {
 
     /// What the searches of the point may take.
     fn allowed(&self) -> Work {
-        POINT.times(budget::share_after(self.in_vain))
+        budget::allowed_after(self.in_vain)
     }
 
     /// Whether they have taken all that they may.
@@ -152,7 +152,7 @@ impl Balance {
     fn end_point(&mut self, found: Result<Orbit, OrbitError>) -> Result<Orbit, OrbitError> {
         match &found {
             Ok(_) => self.in_vain = 0,
-            Err(_) if self.taken(None).is_beyond(self.allowed().times(budget::MOST)) => self.in_vain += 1,
+            Err(_) if self.taken(None).is_beyond(POINT.times(budget::ENOUGH)) => self.in_vain += 1,
             Err(_) => {}
         }
         found
@@ -369,7 +369,7 @@ mod tests {
     use super::*;
     use crate::model::example;
 
-    /// Points that take most of what they may in vain leave less to those that follow, and an orbit gives it back.
+    /// Points that take long in vain leave less to those that follow, and an orbit gives it back.
     #[test]
     fn points_in_vain_leave_less_to_the_next() {
         let system = example::blade_couple_massless().assemble().unwrap();
@@ -379,12 +379,12 @@ mod tests {
             balance.begin_point(omega);
             balance.level(7, omega).unwrap().alternation.marched = marched;
             balance.end_point(Err(OrbitError::Frequency { omega })).unwrap_err();
-            balance.allowed().eliminated / POINT.eliminated
+            balance.allowed()
         };
-        assert_eq!([0, usize::MAX / 2, 0].map(|marched| vain(&mut balance, marched)), [1.0, 1.0, 1.0]);
+        assert_eq!([0, usize::MAX / 2, 0].map(|marched| vain(&mut balance, marched)), [POINT; 3]);
         let less = vain(&mut balance, usize::MAX / 2);
-        assert!(less < 0.2, "{less}");
-        assert_eq!(balance.level(7, omega).unwrap().share, less);
+        assert_eq!(less, POINT.times(budget::ENOUGH));
+        assert_eq!(balance.level(7, omega).unwrap().allowed, less);
         balance.orbit(omega, None).unwrap();
         assert_eq!(balance.allowed(), POINT);
     }

@@ -6,12 +6,10 @@
 pub(super) const SEARCH: Work = Work { eliminated: 1.0, marched: 1.0 };
 pub(super) const POINT: Work = Work { eliminated: 3.0, marched: 1.0 };
 
-/// Points in a row that took most of what they may, and found nothing, after which the next ones of the same solver may take this share: what is found
-/// takes less, and a curve without orbits is to end. Whatever is found gives back all.
+/// Points in a row that took more than this share of what a point may, and found nothing, after which the next ones of the same solver may take no more
+/// than that: nearly all that are found take less, and a curve without orbits is to end. Whatever is found gives back all.
 const IN_VAIN: usize = 2;
-const AFTERWARDS: f64 = 0.15;
-/// What counts as most of it.
-pub(super) const MOST: f64 = 0.5;
+pub(super) const ENOUGH: f64 = 0.1;
 
 /// Multiplications of one search, about four seconds of one core.
 pub(super) const WORK: f64 = 2e10;
@@ -26,9 +24,9 @@ pub(super) fn is_affordable(step: f64, taken: Work, allowed: Work) -> bool {
     BEGUN * step <= WORK * (allowed.eliminated - taken.eliminated)
 }
 
-/// The share of the work of a search, and of a point, that is left after so many points in a row took most of it in vain.
-pub(super) fn share_after(in_vain: usize) -> f64 {
-    if in_vain < IN_VAIN { 1.0 } else { AFTERWARDS }
+/// What a point may take after so many in a row that found nothing with more than [`ENOUGH`].
+pub(super) fn allowed_after(in_vain: usize) -> Work {
+    if in_vain < IN_VAIN { POINT } else { POINT.times(ENOUGH) }
 }
 
 /// Work, relative to that of one search: eliminations, and steps of laws with a memory.

@@ -22,7 +22,7 @@ mod sketch;
 mod unknowns;
 mod yardsticks;
 
-use super::budget::Work;
+use super::budget::{POINT, Work};
 use super::coupled::{Coupled, Near, by_products, dot};
 use super::ease::Ease;
 use super::kept::weight;
@@ -51,8 +51,8 @@ pub(super) struct Level {
     /// What searches before it took of the present point, here and at other levels, see [`Level::taken`].
     pub spent: Work,
     pub elsewhere: Work,
-    /// The share of their work that searches may take, see [`share_after`](super::budget::share_after).
-    pub share: f64,
+    /// What all of them may take.
+    pub allowed: Work,
     pub alternation: Alternation,
     /// Of the axes; empty in the banded form.
     pub(super) receptance: Receptance,
@@ -180,7 +180,7 @@ impl Level {
             prolongs: false,
             spent: Work::default(),
             elsewhere: Work::default(),
-            share: 1.0,
+            allowed: POINT,
             alternation,
             receptance: Receptance::Formed(Formed::default()),
             penalty: vec![0.0; ports.len()],

@@ -1,7 +1,7 @@
 //! The search for a solution: Newton's method with the exact derivative, of many contacts by fewer samples first; where it fails, interior points, then
 //! proximal points, and then slip limits that are lowered from where everything sticks.
 
-use super::budget::{FEWEST, POINT, SEARCH, WORK, Work};
+use super::budget::{FEWEST, SEARCH, WORK, Work};
 use super::coupled::{FORMED, Near, product_work};
 use super::ease::{Ease, GIVEN, SOLVED};
 use super::equations::{Level, Slopes, Solution};
@@ -324,8 +324,7 @@ impl Level {
 
     /// Whether the search has taken all the work that it may, or that its point may.
     pub(super) fn is_exhausted(&self, ports: &Ports) -> bool {
-        self.taken(ports).is_beyond(SEARCH.times(self.share))
-            || self.elsewhere.and(self.taken_of_point(ports)).is_beyond(POINT.times(self.share))
+        self.taken(ports).is_beyond(SEARCH) || self.elsewhere.and(self.taken_of_point(ports)).is_beyond(self.allowed)
     }
 
     /// The Newton step into `self.step`, in the unknowns' units.
