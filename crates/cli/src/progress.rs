@@ -27,7 +27,7 @@ pub fn stop_flag() -> Arc<AtomicBool> {
         if let Ok(mut first) = first.lock() {
             *first = Some(Instant::now());
         }
-        complain!("\nstopping: finished points are kept; Ctrl-C again ends at once");
+        complain!("\nstopping: finished parts are kept; Ctrl-C again ends at once");
     });
     stop
 }

@@ -329,7 +329,9 @@ fn one(
             };
             let on = if interrupted { "; --resume goes on from there" } else { "" };
             let what = match assembled.dataset.tables.iter().all(|table| table.rows() == 0) {
-                true => "interrupted before any point was finished; the record is in",
+                true => {
+                    "interrupted before any part was finished, which is a stretch of points or a curve that is followed as a whole; the record is in"
+                }
                 false => "interrupted; the finished points are in",
             };
             Ending::Failed(format!("{what} {}{beside}{on}", results.join("").display()))

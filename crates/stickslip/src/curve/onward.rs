@@ -16,6 +16,8 @@ const STRIDE: f64 = 0.2;
 const FINEST: f64 = 1.0 / 512.0;
 /// Steps to the next frequency at most.
 const MOST: usize = 80;
+/// What the searches on one way may take together, as a share of what a point may: where each takes long, no way is gone after it.
+const EFFORT: f64 = 0.3;
 /// Degrees of freedom and directions of joints beyond which branches are not followed, nor the way back: it takes as long as the curve.
 const LARGE: usize = 24;
 
@@ -39,7 +41,7 @@ struct Onward<'a> {
     last: Option<Last>,
     /// What it was told of.
     told: Option<Last>,
-    /// Whether a search on the way has taken all that a point may: no way is gone after that.
+    /// Whether the searches on a way took too long: no way is gone after that.
     spent: bool,
 }
 
@@ -89,16 +91,17 @@ impl Onward<'_> {
     /// The orbit at which smaller steps arrive; `None` if they do not.
     fn followed(&mut self, mut last: Last, omega: f64, between: bool) -> Option<Orbit> {
         let from = last.omega;
-        let (mut at, mut step) = (0.0, 0.5);
+        let (mut at, mut step, mut effort) = (0.0, 0.5, 0.0);
         for _ in 0..MOST {
             let share: f64 = at + step;
             let arrives = share >= 1.0;
             let target = if arrives { omega } else { from + share * (omega - from) };
             let found = self.solve(target, Some(&last.start), between || !arrives);
-            self.spent = matches!(found, Err(OrbitError::NotConverged { spent: true, .. }));
+            effort += self.solver.effort();
+            self.spent = effort > EFFORT || matches!(found, Err(OrbitError::NotConverged { spent: true, .. }));
             match found.ok().filter(|orbit| last.leads_to(orbit)) {
-                None if self.spent => return None,
                 Some(orbit) if arrives => return Some(orbit),
+                _ if self.spent => return None,
                 Some(orbit) => (last, at, step) = (Last::new(&orbit), share, 2.0 * step),
                 None => step *= 0.5,
             }
@@ -120,6 +123,10 @@ impl Solver for Onward<'_> {
         self.next(omega, start, true)
     }
 
+    fn effort(&self) -> f64 {
+        self.solver.effort()
+    }
+
     fn begin_at(&mut self, omega: f64, start: &[f64]) {
         if [&self.last, &self.told].into_iter().flatten().all(|last| last.start != start) {
             let orbit = self.solver.between(omega, Some(start));
@@ -135,28 +142,36 @@ mod tests {
     use crate::method::event_driven::EventDriven;
     use std::f64::consts::TAU;
 
-    /// Finds orbits where it is asked for them, and between these takes all that a point may.
-    struct Exhausted<'a> {
+    /// Finds orbits where it is asked for them; between these each search takes so much, and finds nothing if that is all that a point may.
+    struct Slow<'a> {
         solver: Box<dyn Solver + Send + 'a>,
+        effort: f64,
         asked: std::sync::Arc<std::sync::atomic::AtomicUsize>,
     }
 
-    impl Solver for Exhausted<'_> {
+    impl Solver for Slow<'_> {
         fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
             self.solver.orbit(omega, start)
         }
-        fn between(&mut self, omega: f64, _: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
             self.asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            if self.effort < 1.0 {
+                return self.solver.between(omega, start);
+            }
             let (iterations, residual, instead) = (9, 1e-2, String::new());
-            Err(OrbitError::NotConverged { method: "exhausted", omega, iterations, residual, spent: true, instead })
+            Err(OrbitError::NotConverged { method: "slow", omega, iterations, residual, spent: true, instead })
+        }
+        fn effort(&self) -> f64 {
+            self.effort
         }
     }
 
-    #[test]
-    fn a_search_that_took_all_is_not_made_again() {
+    /// Searches between three orbits that are far apart, each with so much work.
+    fn searches(effort: f64) -> usize {
         let system = crate::model::example::blade_couple().assemble().unwrap();
         let asked = std::sync::Arc::default();
-        let solver = Exhausted { solver: EventDriven.solver(&system).unwrap(), asked: std::sync::Arc::clone(&asked) };
+        let solver = EventDriven.solver(&system).unwrap();
+        let solver = Slow { solver, effort, asked: std::sync::Arc::clone(&asked) };
         let mut onward = Onward { solver: Box::new(solver), last: None, told: None, spent: false };
         let mut start: Option<Vec<f64>> = None;
         let mut amplitudes = Vec::new();
@@ -166,6 +181,12 @@ mod tests {
             start = Some(orbit.start);
         }
         assert!(amplitudes.windows(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() > STRIDE), "{amplitudes:?}");
-        assert_eq!(asked.load(std::sync::atomic::Ordering::Relaxed), 1);
+        asked.load(std::sync::atomic::Ordering::Relaxed)
+    }
+
+    #[test]
+    fn a_way_that_takes_too_long_is_the_last() {
+        assert!(searches(0.0) > 6, "a way without searches tests nothing");
+        assert_eq!((searches(1.0), searches(0.2)), (1, 2));
     }
 }

@@ -78,6 +78,9 @@ impl Solver for Advised<'_> {
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.solver.between(omega, start).map_err(|error| with_ways(error, self.system))
     }
+    fn effort(&self) -> f64 {
+        self.solver.effort()
+    }
     fn begin_at(&mut self, omega: f64, start: &[f64]) {
         self.solver.begin_at(omega, start);
     }

@@ -183,6 +183,9 @@ impl Solver for WithSecond<'_> {
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.seek(omega, start, true)
     }
+    fn effort(&self) -> f64 {
+        self.first.effort() + self.second.iter().flatten().map(|second| second.effort()).sum::<f64>()
+    }
     fn begin_at(&mut self, omega: f64, start: &[f64]) {
         match self.second.as_mut().and_then(Option::as_mut).filter(|_| self.last.as_deref() == Some(start)) {
             Some(second) => second.begin_at(omega, start),

@@ -23,4 +23,8 @@ impl<S: Solver> Solver for Afresh<S> {
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.0.between(omega, start)
     }
+
+    fn effort(&self) -> f64 {
+        self.0.effort()
+    }
 }

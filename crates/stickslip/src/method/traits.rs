@@ -58,6 +58,12 @@ pub trait Solver {
         self.orbit(omega, start)
     }
 
+    /// The work of the last search as a share of what one point may take, of methods that count it: a way of many searches ends by it, and not by the
+    /// clock.
+    fn effort(&self) -> f64 {
+        0.0
+    }
+
     /// Says at which frequency (rad/s) the state `start` is an orbit from which others will be sought, to whoever goes on along its branch.
     fn begin_at(&mut self, _omega: f64, _start: &[f64]) {}
 }

@@ -362,6 +362,11 @@ impl Solver for Balance {
             _ => self.orbit(omega, start),
         }
     }
+
+    fn effort(&self) -> f64 {
+        let Work { eliminated, marched } = self.taken(None);
+        (eliminated / POINT.eliminated).max(marched / POINT.marched)
+    }
 }
 
 #[cfg(test)]
@@ -385,7 +390,9 @@ mod tests {
         let less = vain(&mut balance, usize::MAX / 2);
         assert_eq!(less, POINT.times(budget::ENOUGH));
         assert_eq!(balance.level(7, omega).unwrap().allowed, less);
+        assert!(balance.effort() > 1.0);
         balance.orbit(omega, None).unwrap();
         assert_eq!(balance.allowed(), POINT);
+        assert!(balance.effort() > 0.0 && balance.effort() < 1e-3, "{}", balance.effort());
     }
 }
