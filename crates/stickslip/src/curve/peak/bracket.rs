@@ -29,6 +29,8 @@ const OPEN: f64 = 4.0 * CLOSEST;
 pub(super) const CLOSEST: f64 = 1e-7;
 /// Orbits that the peak of one quantity may take beside those that others have asked for; smooth peaks take 3 to 6, kinks up to 15.
 pub(super) const ORBITS: usize = 40;
+/// The work of these searches together, as a share of what one point of a curve may take, at which a search ends where each of them takes long.
+const EFFORT: f64 = 1.0;
 
 /// Three points of a curve, of which the middle one is a maximum of some quantities, and the orbits between them that were asked for since.
 pub(super) struct Bracket {
@@ -54,11 +56,11 @@ impl Bracket {
     pub(super) fn refine(&mut self, solver: &mut dyn Solver, quantity: usize, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
         let points = &mut self.points;
         let mut shrink = Shrink::default();
-        let mut failures = 0;
+        let (mut failures, mut effort) = (0, 0.0);
         for _ in 0..ORBITS {
             let best = best(points, quantity);
             let Some(omega) = shrink.next(points, best, quantity, CLOSEST * self.width) else { break };
-            if failures == FAILURES {
+            if failures == FAILURES || effort > EFFORT {
                 break;
             }
             // the orbit's neighbour on the side of the new point is as good a start as any
@@ -70,6 +72,7 @@ impl Bracket {
                 Err(_) if (omega - points[best].omega).abs() > AWAY * self.width => solver.orbit(omega, start),
                 found => found,
             };
+            effort += solver.effort();
             let point = match found {
                 Ok(orbit) => Point { omega, error, ..Point::new(&orbit, quantities) },
                 Err(_) => {
