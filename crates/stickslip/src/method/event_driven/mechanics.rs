@@ -260,14 +260,11 @@ fn light(system: &System, parts: &[Part], method: &'static str) -> Option<Method
         let lightest = part.rows().min_by(|&a, &b| mass(a).total_cmp(&mass(b)))?;
         let ratio = part.rows().map(mass).fold(0.0, f64::max) / mass(lightest);
         let several = rigid().filter(|part| part.direction[lightest] != 0.0).nth(1).is_some();
-        let light = Refusal::Light {
-            method,
-            place: system.structure().places()[lightest].clone(),
-            joint: system.joints()[part.joint].name().to_owned(),
-            ratio,
-            least: LIGHTEST.recip(),
-        };
-        (several && ratio > LIGHTEST).then(|| light.into())
+        (several && ratio > LIGHTEST).then(|| {
+            let place = system.structure().places()[lightest].clone();
+            let joint = system.joints()[part.joint].name().to_owned();
+            Refusal::Light { method, place, joint, ratio, least: LIGHTEST.recip() }.into()
+        })
     })
 }
 
