@@ -259,7 +259,8 @@ mod tests {
                 .map(|speed| c(if case % 3 == 0 { 0.0 } else { -0.2 * draw(speed).abs() }, speed + draw(0.5)))
                 .to_vec();
             exponents[2] = exponents[0] + c(0.0, 1e-6);
-            let basis = Basis { resonant: vec![(exponents[0], c(0.0, 1e-6))], driven_by: vec![2], exponents };
+            let resonant = vec![(exponents[0], c(0.0, 1e-6))];
+            let basis = Basis { resonant, driven_by: vec![2], exponents, drifts: case % 2 == 0 };
             let mut signal: Vec<Complex64> = (0..basis.len()).map(|_| c(draw(1.0), draw(1.0))).collect();
             signal[3] *= [0.0, 1e-3, 1e-17][case % 3];
             let length = 0.1 + draw(5.0).abs();
@@ -287,8 +288,8 @@ mod tests {
         let zero = Complex64::new(0.0, 0.0);
         let mut memory = Extremes::default();
         let mut of = |amplitude: f64| {
-            let signal = [Complex64::new(0.0, -1.0), Complex64::new(amplitude, 0.0), zero, zero, zero];
-            let mut values = [zero; 5];
+            let signal = [Complex64::new(0.0, -1.0), Complex64::new(amplitude, 0.0), zero];
+            let mut values = [zero; 3];
             basis.evaluate(100.0, &mut values);
             let mut range = Range::new(false);
             basis.extend(&mut range, (&signal, &values), 100.0, &mut memory).map(|()| range)

@@ -38,21 +38,31 @@ impl Lu {
 
     /// Factorises what the matrix was filled with; false if a pivot vanishes or is not finite.
     pub fn factorise(&mut self) -> bool {
-        let n = self.n;
+        // lengths that the compiler knows: five stages of one axis, and of one with a state
+        match self.n {
+            5 => self.eliminate(5),
+            10 => self.eliminate(10),
+            n => self.eliminate(n),
+        }
+    }
+
+    #[inline(always)]
+    fn eliminate(&mut self, n: usize) -> bool {
         self.exchanged.clear();
+        let entries = &mut self.entries[..n * n];
         for k in 0..n {
             let mut pivot = k;
             for i in k + 1..n {
-                if self.entries[i * n + k].abs() > self.entries[pivot * n + k].abs() {
+                if entries[i * n + k].abs() > entries[pivot * n + k].abs() {
                     pivot = i;
                 }
             }
-            let largest = self.entries[pivot * n + k];
+            let largest = entries[pivot * n + k];
             if largest == 0.0 || !largest.is_finite() {
                 return false;
             }
             self.exchanged.push(pivot);
-            let (top, bottom) = self.entries.split_at_mut((k + 1) * n);
+            let (top, bottom) = entries.split_at_mut((k + 1) * n);
             let row = &mut top[k * n..];
             if pivot != k {
                 let at = (pivot - k - 1) * n;

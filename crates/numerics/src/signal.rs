@@ -4,7 +4,7 @@
 //! `g(τ) = Re Σ_b c_b B_b(τ)`, where the basis functions `B_b` are
 //! - `e^{s τ}` for the modes of the system and for the harmonics of the drive,
 //! - `(e^{(s+δ) τ} - e^{s τ}) / δ` for a mode `s` that the drive `s + δ` hits (nearly) exactly,
-//! - `1, τ, τ²/2` for constant forces and for bodies that are free to move.
+//! - `1` for constant forces, and `τ, τ²/2` where bodies are free to move.
 //!
 //! Values, derivatives, integrals and bounds of such a signal are closed forms. The bound on the second derivative gives a step
 //! over which the signal provably has no zero: [`Basis::first_zero`] marches with such steps and therefore misses none.
@@ -12,12 +12,9 @@
 use crate::quadrature;
 use num_complex::Complex64;
 
-/// Number of polynomial basis functions: `1, τ, τ²/2`.
-pub const POLYNOMIALS: usize = 3;
-
 /// The functions `B_b(τ)` that the signals of one stretch of time share.
 ///
-/// Coefficients are ordered: exponentials, resonant pairs, polynomials.
+/// Coefficients are ordered: exponentials, resonant pairs, the constant, `τ, τ²/2` if it drifts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Basis {
     /// Exponents `s`, rad/s.
@@ -26,6 +23,8 @@ pub struct Basis {
     pub resonant: Vec<(Complex64, Complex64)>,
     /// Index into `exponents` of `s + δ` for every resonant pair.
     pub driven_by: Vec<usize>,
+    /// Whether `τ, τ²/2` are among the functions.
+    pub drifts: bool,
 }
 
 /// Below this `|δ τ|` the quotient `(e^{δτ} - 1)/δ` loses digits, and its series (to the 4th power) is exact to rounding.
@@ -85,9 +84,9 @@ const VANISHES: f64 = 1e-9;
 impl Basis {
     /// Number of coefficients of a signal.
     pub fn len(&self) -> usize {
-        self.exponents.len() + self.resonant.len() + POLYNOMIALS
+        self.constant() + if self.drifts { 3 } else { 1 }
     }
-    /// A basis is never empty: it has at least the polynomials.
+    /// A basis is never empty: it has at least the constant.
     pub fn is_empty(&self) -> bool {
         false
     }
@@ -128,8 +127,10 @@ impl Basis {
         }
         let c = self.constant();
         out[c] = Complex64::new(1.0, 0.0);
-        out[c + 1] = Complex64::new(time, 0.0);
-        out[c + 2] = Complex64::new(0.5 * time * time, 0.0);
+        if self.drifts {
+            out[c + 1] = Complex64::new(time, 0.0);
+            out[c + 2] = Complex64::new(0.5 * time * time, 0.0);
+        }
     }
 
     /// The value of a signal at `τ = 0`: exponentials contribute their coefficient, polynomials the constant, resonant pairs nothing.
@@ -150,9 +151,10 @@ impl Basis {
             out[self.driven_by[r]] += coefficients[e + r];
         }
         let c = self.constant();
-        out[c] = coefficients[c + 1];
-        out[c + 1] = coefficients[c + 2];
-        out[c + 2] = Complex64::new(0.0, 0.0);
+        out[c] = Complex64::new(0.0, 0.0);
+        if self.drifts {
+            (out[c], out[c + 1], out[c + 2]) = (coefficients[c + 1], coefficients[c + 2], out[c]);
+        }
     }
 
     /// Coefficients of `factor · g(time + τ)` as a signal of τ, into `out`; `values` are the basis functions at `time`.
@@ -174,10 +176,13 @@ impl Basis {
             out[e + r] = g * (s * time).exp();
             out[self.driven_by[r]] += g * values[e + r];
         }
-        let (one, linear, square) = (coefficients[c], coefficients[c + 1], coefficients[c + 2]);
-        out[c] = (one + linear * time + square * (0.5 * time * time)) * factor;
-        out[c + 1] = (linear + square * time) * factor;
-        out[c + 2] = square * factor;
+        out[c] = coefficients[c] * factor;
+        if self.drifts {
+            let (one, linear, square) = (coefficients[c], coefficients[c + 1], coefficients[c + 2]);
+            out[c] = (one + linear * time + square * (0.5 * time * time)) * factor;
+            out[c + 1] = (linear + square * time) * factor;
+            out[c + 2] = square * factor;
+        }
     }
 
     /// The sizes of the exponents, into `out`.
@@ -196,7 +201,10 @@ impl Basis {
         for (r, &driven_by) in self.driven_by.iter().enumerate() {
             out[driven_by] += sizes[e + r];
         }
-        (out[c], out[c + 1], out[c + 2]) = (sizes[c + 1], sizes[c + 2], 0.0);
+        out[c] = 0.0;
+        if self.drifts {
+            (out[c], out[c + 1], out[c + 2]) = (sizes[c + 1], sizes[c + 2], 0.0);
+        }
     }
 
     /// Bounds `max |B_b|` over `[0, end]`, into `out`.
@@ -211,8 +219,9 @@ impl Basis {
         }
         let c = self.constant();
         out[c] = 1.0;
-        out[c + 1] = end;
-        out[c + 2] = 0.5 * end * end;
+        if self.drifts {
+            (out[c + 1], out[c + 2]) = (end, 0.5 * end * end);
+        }
     }
 
     /// The first time in `(0, end]` at which one of the `signals` vanishes.
@@ -424,11 +433,8 @@ impl FourierIntegrals {
     pub fn integral(&self, basis: &Basis, g: &[Complex64]) -> Complex64 {
         if !basis.is_exponential(g) {
             let probe = Basis { exponents: vec![Complex64::new(0.0, self.nu)], ..Basis::default() };
-            let part = |turn: Complex64| {
-                let mut harmonic = [Complex64::new(0.0, 0.0); 1 + POLYNOMIALS];
-                harmonic[0] = turn;
-                quadrature((basis, g), (&probe, &harmonic), self.length)
-            };
+            let part =
+                |turn: Complex64| quadrature((basis, g), (&probe, &[turn, Complex64::new(0.0, 0.0)]), self.length);
             // Re e^{jντ} = cos ντ, Re(-j e^{jντ}) = sin ντ
             return Complex64::new(part(Complex64::new(1.0, 0.0)), -part(Complex64::new(0.0, -1.0)));
         }
@@ -534,14 +540,14 @@ mod tests {
     fn narrow_dips_are_found_and_near_misses_are_not_zeros() {
         let basis = Basis { exponents: vec![c(0.0, 1.0)], ..Basis::default() };
         let mut scratch = Scratch::default();
-        let dip = [c(-1.0, 0.0), c(0.999, 0.0), c(0.0, 0.0), c(0.0, 0.0)];
+        let dip = [c(-1.0, 0.0), c(0.999, 0.0)];
         // starts below zero at τ = 0, so shift: g(τ) = 0.999 - cos(τ + 1)
-        let shifted = [dip[0] * c(0.0, 1.0).exp(), dip[1], dip[2], dip[3]];
+        let shifted = [dip[0] * c(0.0, 1.0).exp(), dip[1]];
         let FirstZero::At { time, .. } = basis.first_zero(&shifted, &[Begin::Positive], 10.0, &mut scratch) else {
             panic!("a zero was missed");
         };
         assert!((time - (2.0 * std::f64::consts::PI - 1.0 - 0.999f64.acos())).abs() < 1e-14, "{time}");
-        let near_miss = [dip[0], c(1.000_001, 0.0), dip[2], dip[3]];
+        let near_miss = [dip[0], c(1.000_001, 0.0)];
         assert_eq!(basis.first_zero(&near_miss, &[Begin::Positive], 100.0, &mut scratch), FirstZero::None);
     }
 
@@ -549,15 +555,15 @@ mod tests {
     #[test]
     fn a_start_at_zero_is_no_zero() {
         let basis = Basis { exponents: vec![c(0.0, 1.0)], ..Basis::default() };
-        let g = [c(-1.0, 0.0), c(1.0, 0.0), c(0.0, 0.0), c(0.0, 0.0)];
+        let g = [c(-1.0, 0.0), c(1.0, 0.0)];
         let mut scratch = Scratch::default();
         assert_eq!(basis.first_zero(&g, &[Begin::Zero], 6.0, &mut scratch), FirstZero::None);
-        let sine = [c(0.0, -1.0), c(0.0, 0.0), c(0.0, 0.0), c(0.0, 0.0)];
+        let sine = [c(0.0, -1.0), c(0.0, 0.0)];
         let FirstZero::At { time, .. } = basis.first_zero(&sine, &[Begin::Zero], 6.0, &mut scratch) else {
             panic!("the zero at pi was missed");
         };
         assert!((time - std::f64::consts::PI).abs() < 1e-14);
-        let falling = [c(1.0, 0.0), c(-1.0, 0.0), c(0.0, 0.0), c(0.0, 0.0)];
+        let falling = [c(1.0, 0.0), c(-1.0, 0.0)];
         assert_eq!(
             basis.first_zero(&falling, &[Begin::Zero], 6.0, &mut scratch),
             FirstZero::At { index: 0, time: 0.0 }
@@ -568,8 +574,8 @@ mod tests {
     #[test]
     fn integrals_agree_with_quadrature() {
         let (s, delta) = (c(-0.1, 2.0), c(0.1, 1e-7));
-        let basis =
-            Basis { exponents: vec![s, s + delta, c(-30.0, 0.0)], resonant: vec![(s, delta)], driven_by: vec![1] };
+        let exponents = vec![s, s + delta, c(-30.0, 0.0)];
+        let basis = Basis { exponents, resonant: vec![(s, delta)], driven_by: vec![1], drifts: true };
         let zero = c(0.0, 0.0);
         let g = [c(1.0, 0.5), c(-0.3, 0.2), c(0.7, 0.0), zero, c(0.4, 0.0), zero, zero];
         let mut end = vec![zero; basis.len()];
@@ -580,7 +586,7 @@ mod tests {
         let nu = 1.7;
         let of = FourierIntegrals::new(&basis, &end, nu, 3.0).integral(&basis, &g);
         let probe = Basis { exponents: vec![c(0.0, nu)], ..Basis::default() };
-        let part = |turn| quadrature((&basis, &g), (&probe, &[turn, zero, zero, zero]), 3.0);
+        let part = |turn| quadrature((&basis, &g), (&probe, &[turn, zero]), 3.0);
         assert!((of - c(part(c(1.0, 0.0)), -part(c(0.0, -1.0)))).norm() < 1e-13 * of.norm(), "{of}");
         // derivative of every basis function, by differences
         for b in 0..basis.len() {

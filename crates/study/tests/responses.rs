@@ -691,7 +691,7 @@ amplitude = "1.0 N"
 /// Theory 11.13: over a stop without a gap, driven at 2.6 times the natural frequency, the motion that repeats with the drive is unstable; with
 /// `period = 2` every method gives the one that repeats after two periods, in the same columns.
 #[test]
-fn motions_of_two_periods_from_a_study_file() {
+fn theory_11_13_motions_of_two_periods_from_a_study_file() {
     let orbit = |method: &str| {
         dataset(&format!(
             r#"

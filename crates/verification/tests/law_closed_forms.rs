@@ -49,7 +49,7 @@ fn cycles(a: f64) -> [f64; 8] {
 
 /// (11.1)
 #[test]
-fn jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form() {
+fn theory_11_1_jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form() {
     // kt a, kt, loss, stiffness, damping for a slip limit of 1
     for (stiffness, a, loss, keq, ceq) in [
         (1.0, 1.25, 1.0, 0.857_622, 0.203_718),
@@ -74,7 +74,7 @@ fn jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form() {
 
 /// (11.2)
 #[test]
-fn circular_motion_slips_all_the_time() {
+fn theory_11_2_circular_motion_slips_all_the_time() {
     let (stiffness, limit, a) = (3.0, 1.0, 0.8);
     let law = Jenkins2d { stiffness, limit };
     let motion = |time: f64| {
@@ -98,7 +98,7 @@ fn circular_motion_slips_all_the_time() {
 
 /// (11.3)
 #[test]
-fn a_normal_load_in_phase_makes_a_polygon() {
+fn theory_11_3_a_normal_load_in_phase_makes_a_polygon() {
     let (mu, preload, kt, nu, a) = (0.4, 10.0, 20.0, 6.0, 1.0);
     for tangents in [1, 2] {
         let law = FrictionContact { tangential: kt, normal: nu, friction: mu, preload, tangents };
@@ -125,7 +125,7 @@ fn a_normal_load_in_phase_makes_a_polygon() {
 
 /// (11.4)
 #[test]
-fn iwan_has_segalmans_backbone_and_loss() {
+fn theory_11_4_iwan_has_segalmans_backbone_and_loss() {
     let law = |elements: u32| Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements };
     let far = law(1).slips_at();
     close("phi_max", far, 1.3 / (10.0 * (0.3 + 0.5 / 1.5)), 1e-14);
@@ -170,7 +170,7 @@ fn exact_loop_loss(law: &Iwan, u: f64) -> f64 {
 /// exact, and the loss errs by powers of `1 / elements`, which fewer elements tell. Shares are graded by `exp(1.5 / √elements)`: edges of some sliders are
 /// those of four and nine times as many.
 #[test]
-fn iwan_tends_to_segalmans_loss() {
+fn theory_11_4_iwan_tends_to_segalmans_loss() {
     let law = |elements: u32| Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements };
     let far = law(1).slips_at();
     let d = 0.3 + 0.5 / 1.5;
@@ -202,7 +202,7 @@ fn iwan_tends_to_segalmans_loss() {
 
 /// (11.5)
 #[test]
-fn dahls_loop_is_a_hyperbolic_tangent() {
+fn theory_11_5_dahls_loop_is_a_hyperbolic_tangent() {
     let law = Dahl { stiffness: 5.0, limit: 1.0 };
     let places = cycles(0.7);
     near("largest force", *first(&law, View::Rate, &places, FINE).last().unwrap(), 0.998_177_897_6, 1e-10);
@@ -211,7 +211,7 @@ fn dahls_loop_is_a_hyperbolic_tangent() {
 
 /// (11.6)
 #[test]
-fn bouc_wen_and_lugre_contain_dahl() {
+fn theory_11_6_bouc_wen_and_lugre_contain_dahl() {
     let dahl = Dahl { stiffness: 5.0, limit: 2.0 };
     let bouc_wen = BoucWen { stiffness: 5.0, beta: 2.5, gamma: 0.0, exponent: 1.0 };
     let lugre = LuGre { stiffness: 5.0, damping: 0.0, viscous: 0.0, limit: 2.0, static_limit: 2.0, velocity: 0.3 };
@@ -227,7 +227,7 @@ fn bouc_wen_and_lugre_contain_dahl() {
 
 /// (11.15): a long way to one side ends at the bound whatever gamma and the exponent are; without `beta + gamma > 0` there is none, and the law is refused.
 #[test]
-fn bouc_wen_is_bounded_if_beta_and_gamma_are_positive_together() {
+fn theory_11_15_bouc_wen_is_bounded_if_beta_and_gamma_are_positive_together() {
     for (beta, gamma, exponent) in [(1.0, 0.5, 1.0), (1.0, -0.6, 2.0), (0.5, 3.0, 1.5), (2.0, 0.0, 6.0)] {
         let law = BoucWen { stiffness: 3.0, beta, gamma, exponent };
         let bound = 3.0 * (beta + gamma).powf(-1.0 / exponent);
@@ -244,7 +244,7 @@ fn bouc_wen_is_bounded_if_beta_and_gamma_are_positive_together() {
 }
 
 #[test]
-fn lugre_slides_steadily_with_its_curve_and_holds_like_a_spring() {
+fn theory_11_6_lugre_slides_steadily_with_its_curve_and_holds_like_a_spring() {
     let law = LuGre { stiffness: 1e4, damping: 30.0, viscous: 0.4, limit: 2.0, static_limit: 2.5, velocity: 0.01 };
     for v in [-0.5, 0.005, 0.02, 1.0] {
         // a second at this velocity
@@ -300,7 +300,7 @@ impl Graded {
 
 /// (11.7): an elastic bar on rigid-plastic shear: Goodman and Klumpp's micro-slip in its limit of many sliders.
 #[test]
-fn micro_slip_of_a_bar_loses_with_the_cube_of_the_force() {
+fn theory_11_7_micro_slip_of_a_bar_loses_with_the_cube_of_the_force() {
     let (ea, tau, length) = (7.0, 0.4, 2.0);
     let far = tau * length * length / (2.0 * ea);
     let corners: Vec<f64> = (1..=1000).map(|k| far * (f64::from(k) / 1000.0).powi(2)).collect();
@@ -317,7 +317,7 @@ fn micro_slip_of_a_bar_loses_with_the_cube_of_the_force() {
 
 /// (11.8)
 #[test]
-fn spheres_of_cattaneo_and_mindlin() {
+fn theory_11_8_spheres_of_cattaneo_and_mindlin() {
     let (limit, far) = (1.3, 0.02);
     let backbone = |u: f64| limit * (1.0 - (1.0 - (u / far).min(1.0)).powf(1.5));
     let corners: Vec<f64> = (1..=1000).map(|k| far * f64::from(k) / 1000.0).collect();
@@ -333,7 +333,7 @@ fn spheres_of_cattaneo_and_mindlin() {
 
 /// (11.9), Masing's rule: after a turning point the force is the first loading at twice the scale, and the loss follows from the first loading alone.
 #[test]
-fn sliders_obey_masings_rule() {
+fn theory_11_9_sliders_obey_masings_rule() {
     let iwan = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.3, beta: 0.2, elements: 12 };
     let jenkins = Jenkins { stiffness: 10.0, limit: 1.0 };
     for law in [&iwan as &dyn Law, &jenkins] {
@@ -352,7 +352,7 @@ fn sliders_obey_masings_rule() {
 
 /// (11.10): along straight ways a step of any length is exact: the same forces at the corners, whatever lies between them.
 #[test]
-fn steps_do_not_depend_on_their_length() {
+fn theory_11_10_steps_do_not_depend_on_their_length() {
     let plane = Jenkins2d { stiffness: 3.0, limit: 1.0 };
     let contact = |tangents| FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.6, preload: 0.5, tangents };
     let points: Vec<[f64; 3]> = (0..40)
@@ -374,7 +374,7 @@ fn steps_do_not_depend_on_their_length() {
 
 /// (11.11): a contact that opens and closes under harmonic motion, in the plane: the error of its steps is of second order.
 #[test]
-fn separation_costs_no_order_of_accuracy() {
+fn theory_11_11_separation_costs_no_order_of_accuracy() {
     let law = FrictionContact { tangential: 20.0, normal: 15.0, friction: 0.4, preload: 2.0, tangents: 2 };
     let motion = |time: f64| {
         let theta = TAU * time;
@@ -431,7 +431,7 @@ fn loss_by_events(kt: f64, mu: f64, a: f64, [preload, load, lag]: [f64; 3]) -> f
 /// the closed part: they are right by their events to second order. Plain steps of either reading, which count all of it, tend to the same law to first
 /// order. In the first motion the faces stick where they meet, in the second they slip.
 #[test]
-fn both_readings_of_separation_are_one_law() {
+fn theory_11_11_both_readings_of_separation_are_one_law() {
     const FIRST_ORDER: std::ops::RangeInclusive<f64> = 1e-8..=9e-5;
     let (kt, kn, preload, a, depth) = (20.0, 15.0, 2.0, 0.5, 0.3);
     for (mu, lag) in [(0.4, 2.1), (2.5, 0.9)] {
@@ -480,7 +480,7 @@ fn both_readings_of_separation_are_one_law() {
 
 /// (11.14): below full slip the mean force of Iwan's model tells its history; amplitude and loss do not.
 #[test]
-fn iwan_remembers_in_its_mean_alone() {
+fn theory_11_14_iwan_remembers_in_its_mean_alone() {
     let law = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements: 64 };
     let (a, far) = (0.4 * law.slips_at(), law.slips_at());
     let measured = [vec![0.0], vec![0.0, 0.9 * far], vec![0.0, -0.7 * far, 0.5 * far]].map(|mut places| {

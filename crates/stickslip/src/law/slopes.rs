@@ -47,8 +47,11 @@ impl Slopes {
     #[inline]
     pub fn keep<const N: usize>(&mut self, row: usize, first: usize, value: &Dual<N>) {
         let width = N.min(self.arguments - first);
-        let at = row * self.arguments + first;
-        self.values[at..at + width].copy_from_slice(&partials(value)[..width]);
+        let kept = &mut self.values[row * self.arguments + first..];
+        match kept.first_chunk_mut::<N>() {
+            Some(kept) if width == N => *kept = partials(value), // a length that the compiler knows
+            _ => kept[..width].copy_from_slice(&partials(value)[..width]),
+        }
     }
 }
 

@@ -26,6 +26,7 @@ mod repeated;
 pub mod shooting;
 mod smooth;
 mod stepped;
+mod steps;
 pub mod time_history;
 mod traits;
 pub mod transient;

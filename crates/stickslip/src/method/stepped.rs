@@ -1,7 +1,8 @@
-//! A motion that was integrated in steps: its record, what it is at any time, and its numbers.
+//! A motion that was integrated in steps: what it is at any time, and its numbers.
 
 use super::assembly::{Assembly, PlacedLaw};
 use super::drive::Drive;
+use super::steps::{Instant, Steps};
 use crate::law::{Contact, MOST_DIRECTIONS, Relative};
 use crate::model::{Axis, System};
 use crate::orbit::measure::{Faces, Shares, Signals, extremes};
@@ -16,78 +17,6 @@ const ROUNDED: f64 = 1e-9;
 
 /// Halvings of the time between two nodes at which a joint does not do the same: a millionth of it is left.
 const HALVED: usize = 20;
-
-/// The record of a run: the state at instants, and values at the nodes of a quadrature between them.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Steps {
-    /// Nodes and weights of the quadrature within a step, over its length; the last node is its end.
-    pub nodes: Vec<(f64, f64)>,
-    /// Start and length of every step, s.
-    pub spans: Vec<(f64, f64)>,
-    /// At the instants, one more than there are steps.
-    pub instants: Vec<Instant>,
-    /// At the nodes, step after step.
-    pub values: Vec<Node>,
-}
-
-/// The motion at an instant.
-#[derive(Debug, Clone)]
-pub(crate) struct Instant {
-    /// Displacements, then velocities.
-    pub state: Vec<f64>,
-    pub acceleration: Vec<f64>,
-    /// Forces along the axes.
-    pub force: Vec<f64>,
-}
-
-/// The motion at a node.
-#[derive(Debug, Clone)]
-pub(crate) struct Node {
-    /// Displacements, then velocities.
-    pub state: Vec<f64>,
-    /// Relative velocity and force along the axes.
-    pub velocity: Vec<f64>,
-    pub force: Vec<f64>,
-    /// What the joints do.
-    pub contact: Vec<Contact>,
-}
-
-/// What two solutions of second order, the finer one in half the steps, say of the limit: `fine + (fine - coarse) / 3`, into `coarse`.
-pub(crate) fn extrapolate(coarse: &mut [f64], fine: &[f64]) {
-    coarse.iter_mut().zip(fine).for_each(|(coarse, fine)| *coarse = fine + (fine - *coarse) / 3.0);
-}
-
-impl Steps {
-    pub fn clear(&mut self) {
-        self.spans.clear();
-        self.instants.clear();
-        self.values.clear();
-    }
-
-    /// The record of a run in steps of this length with what one in halves of them, `fine`, says of their error.
-    pub fn extrapolated(mut self, fine: &Steps) -> Steps {
-        for (i, instant) in self.instants.iter_mut().enumerate() {
-            let fine = &fine.instants[2 * i];
-            extrapolate(&mut instant.state, &fine.state);
-            extrapolate(&mut instant.acceleration, &fine.acceleration);
-            extrapolate(&mut instant.force, &fine.force);
-        }
-        for (i, node) in self.values.iter_mut().enumerate() {
-            let fine = &fine.values[2 * i + 1]; // at the end of the same step
-            extrapolate(&mut node.state, &fine.state);
-            extrapolate(&mut node.velocity, &fine.velocity);
-            extrapolate(&mut node.force, &fine.force);
-            node.contact.clone_from(&fine.contact);
-        }
-        self
-    }
-
-    /// Time and weight of a node, s.
-    fn node(&self, at: usize) -> (f64, f64) {
-        let ((start, length), (node, weight)) = (self.spans[at / self.nodes.len()], self.nodes[at % self.nodes.len()]);
-        (start + node * length, weight * length)
-    }
-}
 
 pub(crate) struct SteppedPath {
     steps: Steps,
@@ -118,25 +47,22 @@ impl SteppedPath {
 
     /// Value, slope and curvature at both ends of a step of what `of` reads off the degrees of freedom.
     fn ends(&self, step: usize, of: impl Fn(&[f64]) -> f64) -> [[f64; 3]; 2] {
-        let end = |instant: &Instant| {
-            let (x, v) = instant.state.split_at(self.assembly.n);
-            [of(x), of(v), of(&instant.acceleration)]
-        };
-        [end(&self.steps.instants[step]), end(&self.steps.instants[step + 1])]
+        [step, step + 1].map(|at| {
+            let instant = self.steps.instant(at);
+            [instant.displacement, instant.velocity, instant.acceleration].map(&of)
+        })
     }
 
     /// The same along an axis.
     fn relative_ends(&self, step: usize, axis: usize) -> [[f64; 3]; 2] {
         let (start, length) = self.steps.spans[step];
-        let end = |instant: &Instant, time: f64| {
-            let (x, v) = instant.state.split_at(self.assembly.n);
+        let end = |instant: Instant, time: f64| {
             let (g, speed) = self.drive.relative_at(axis, time);
             let along = &self.assembly.axes[axis];
-            let acceleration = along.along(&instant.acceleration) + self.drive.imposed_at(axis, time, 2);
-            [along.along(x) + g, along.along(v) + speed, acceleration]
+            let acceleration = along.along(instant.acceleration) + self.drive.imposed_at(axis, time, 2);
+            [along.along(instant.displacement) + g, along.along(instant.velocity) + speed, acceleration]
         };
-        let instants = &self.steps.instants;
-        [end(&instants[step], start), end(&instants[step + 1], start + length)]
+        [end(self.steps.instant(step), start), end(self.steps.instant(step + 1), start + length)]
     }
 
     /// Least and largest value over all steps, each a quintic between its ends.
@@ -153,8 +79,8 @@ impl SteppedPath {
         let count = self.steps.nodes.len();
         let node = |i: usize| if i == 0 { 0.0 } else { self.steps.nodes[i - 1].0 };
         let value = |i: usize| match i {
-            0 => self.steps.instants[step].force[axis],
-            _ => self.steps.values[step * count + i - 1].force[axis],
+            0 => self.steps.instant(step).force[axis],
+            _ => self.steps.node(step * count + i - 1).force[axis],
         };
         let sum = (0..=count).map(|i| {
             let others = (0..=count).filter(|k| *k != i);
@@ -204,7 +130,7 @@ impl SteppedPath {
         let (count, length) = (self.steps.nodes.len(), self.steps.spans[step].1);
         let mut last = (0.0, self.contact(joint, (step, 0.0)));
         (0..count).flat_map(move |i| {
-            let next = (self.steps.nodes[i].0, self.steps.values[step * count + i].contact[joint]);
+            let next = (self.steps.nodes[i].0, self.steps.node(step * count + i).contact[joint]);
             let (from, to) = (std::mem::replace(&mut last, next), next);
             let change = if from.1 == to.1 { to.0 } else { self.change(joint, step, from, to.0) };
             [(from.1, (change - from.0) * length), (to.1, (to.0 - change) * length)]
@@ -226,7 +152,7 @@ impl SteppedPath {
             let contact = if count > 1 {
                 joint.law.contact(&motion.velocity[..joint.directions], &force[..joint.directions])
             } else {
-                let contact = self.steps.values[step].contact[q];
+                let contact = self.steps.node(step).contact[q];
                 if sign < 0.0 { contact.mirrored() } else { contact }
             };
             JointSample { displacement: motion.displacement, velocity: motion.velocity, force, contact }
@@ -271,10 +197,8 @@ impl Path for SteppedPath {
     }
 
     fn switch_times(&self) -> Vec<f64> {
-        let count = self.steps.nodes.len();
-        let at_end = |step: usize| &self.steps.values[(step + 1) * count - 1].contact;
         let mut times: Vec<f64> = (1..self.steps.spans.len())
-            .filter(|&step| at_end(step - 1) != at_end(step))
+            .filter(|&step| self.steps.contact_at_end(step - 1) != self.steps.contact_at_end(step))
             .map(|step| self.steps.spans[step].0)
             .collect();
         if self.symmetry == Symmetry::HalfPeriod {
@@ -320,30 +244,30 @@ impl Signals for SteppedPath {
     type Error = Infallible;
 
     fn displacement(&self, row: usize) -> Vec<f64> {
-        self.steps.values.iter().map(|node| node.state[row]).collect()
+        self.steps.each().map(|node| node.displacement[row]).collect()
     }
     fn velocity(&self, row: usize) -> Vec<f64> {
-        self.steps.values.iter().map(|node| node.state[self.assembly.n + row]).collect()
+        self.steps.each().map(|node| node.velocity[row]).collect()
     }
     fn relative_velocity(&self, axis: usize) -> Vec<f64> {
-        self.steps.values.iter().map(|node| node.velocity[axis]).collect()
+        self.steps.each().map(|node| node.relative[axis]).collect()
     }
     fn force(&self, axis: usize) -> Vec<f64> {
-        self.steps.values.iter().map(|node| node.force[axis]).collect()
+        self.steps.each().map(|node| node.force[axis]).collect()
     }
     fn harmonics(&self, parts: &[(f64, Complex64)]) -> Vec<f64> {
         let at = |time: f64| parts.iter().map(|(rate, a)| (a * Complex64::cis(rate * time)).re).sum();
-        (0..self.steps.values.len()).map(|i| at(self.steps.node(i).0)).collect()
+        (0..self.steps.count()).map(|i| at(self.steps.time(i).0)).collect()
     }
     fn add(&self, to: &mut Vec<f64>, signal: &Vec<f64>, factor: f64) {
         to.iter_mut().zip(signal).for_each(|(to, value)| *to += factor * value);
     }
     fn product(&self, a: &Vec<f64>, b: &Vec<f64>) -> f64 {
-        a.iter().zip(b).enumerate().map(|(i, (a, b))| self.steps.node(i).1 * a * b).sum()
+        a.iter().zip(b).enumerate().map(|(i, (a, b))| self.steps.time(i).1 * a * b).sum()
     }
     fn fourier(&self, signal: &Vec<f64>, omega: f64) -> Complex64 {
         let term = |(i, value): (usize, &f64)| {
-            let (time, weight) = self.steps.node(i);
+            let (time, weight) = self.steps.time(i);
             Complex64::cis(-omega * time) * (weight * value)
         };
         signal.iter().enumerate().map(term).sum()
@@ -355,14 +279,13 @@ impl Signals for SteppedPath {
         Ok(self.range_of(|step| self.relative_ends(step, axis)))
     }
     fn faces(&self, joint: usize) -> Faces {
-        let count = self.steps.nodes.len();
-        let shares = if count > 1 {
+        let shares = if self.steps.nodes.len() > 1 {
             Shares::of((0..self.steps.spans.len()).flat_map(|step| self.stretches(joint, step)))
         } else {
-            let nodes = self.steps.values.iter().enumerate();
-            Shares::of(nodes.map(|(i, node)| (node.contact[joint], self.steps.node(i).1)))
+            let nodes = self.steps.each().enumerate();
+            Shares::of(nodes.map(|(i, node)| (node.contact[joint], self.steps.time(i).1)))
         };
-        let at_end = |step: usize| self.steps.values[(step + 1) * count - 1].contact[joint];
+        let at_end = |step: usize| self.steps.contact_at_end(step)[joint];
         let steps = self.steps.spans.len();
         let mut switches = (1..steps).filter(|&step| at_end(step - 1) != at_end(step)).count();
         if steps > 0 {
@@ -370,6 +293,6 @@ impl Signals for SteppedPath {
             let before = if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last };
             switches += usize::from(before != at_end(0));
         }
-        Faces { shares, switches, rests: self.steps.values.iter().all(|node| node.contact[joint] == Contact::Stick) }
+        Faces { shares, switches, rests: self.steps.each().all(|node| node.contact[joint] == Contact::Stick) }
     }
 }

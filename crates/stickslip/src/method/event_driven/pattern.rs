@@ -266,6 +266,7 @@ impl Pattern {
     pub fn drive(&self, mechanics: &Mechanics, drive: &Drive) -> Driven {
         let n = mechanics.n;
         let mut driven = Driven { modes: self.lambda.len(), ..Driven::default() };
+        driven.basis.drifts = self.drifts();
         driven.basis.exponents = self.lambda.clone();
         driven.basis.exponents.extend(drive.rates.iter().map(|&rate| Complex64::new(0.0, rate)));
         let complex = |m: &DMatrix<f64>| m.map(|x| Complex64::new(x, 0.0));

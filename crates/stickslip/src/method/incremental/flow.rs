@@ -3,13 +3,14 @@
 use super::carried::Carried;
 use super::law;
 use super::step::{Eliminated, Step};
-use crate::law::{Contact, Piece};
+use crate::law::Piece;
 use crate::method::assembly::{Assembly, NEAR_REST};
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
 use crate::method::periodic::norm;
 use crate::method::relaxed::ElasticSlider;
-use crate::method::stepped::{Instant, Node, SteppedPath, Steps, extrapolate};
+use crate::method::stepped::SteppedPath;
+use crate::method::steps::{Steps, extrapolate};
 use crate::method::{Breakdown, MethodError};
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
@@ -41,6 +42,8 @@ pub(crate) struct IncrementalFlow {
     steps: Steps,
     step: Step,
     eliminated: Option<Eliminated>,
+    /// Memory: the loads at an instant.
+    load: Vec<f64>,
 }
 
 /// Estimated error of the finer of two solutions that differ by `last`, where the coarser one and the one before it differ by `earlier`:
@@ -68,9 +71,10 @@ impl IncrementalFlow {
             drive: Drive::default(),
             count: FIRST,
             keep: false,
-            steps: Steps { nodes: vec![(1.0, 1.0)], ..Steps::default() },
+            steps: Steps::new(vec![(1.0, 1.0)], &assembly),
             step: Step::new(&assembly),
             eliminated: None,
+            load: vec![0.0; assembly.n],
             assembly,
         })
     }
@@ -101,17 +105,15 @@ impl IncrementalFlow {
     fn tried(&mut self, state: &[f64], duration: f64) -> Result<(Vec<f64>, Steps), Breakdown> {
         let mut end = state.to_vec();
         self.run(&mut end, duration, None)?;
-        let empty = Steps { nodes: self.steps.nodes.clone(), ..Steps::default() };
+        let empty = Steps::new(self.steps.nodes.clone(), &self.assembly);
         Ok((end, std::mem::replace(&mut self.steps, empty)))
     }
 
     fn keep_instant(&mut self, state: &[f64], time: f64) {
-        let n = self.assembly.n;
-        let (mut load, mut acceleration) = (vec![0.0; n], vec![0.0; n]);
-        self.drive.load(time, &mut load);
-        self.assembly.accelerate(state, &mut load, self.step.force.as_slice(), &mut acceleration);
-        let force = self.step.force.as_slice().to_vec();
-        self.steps.instants.push(Instant { state: state[..2 * n].to_vec(), acceleration, force });
+        let force = self.step.force.as_slice();
+        self.drive.load(time, &mut self.load);
+        let acceleration = self.steps.keep_instant(state, force);
+        self.assembly.accelerate(state, &mut self.load, force, acceleration);
     }
 
     fn keep_step(&mut self, state: &[f64], (time, h): (f64, f64)) {
@@ -119,16 +121,11 @@ impl IncrementalFlow {
         let velocity: Vec<f64> = (0..self.assembly.axes.len())
             .map(|axis| self.assembly.relative(axis, state, &self.drive, time + h).1)
             .collect();
-        let contact: Vec<Contact> = self
-            .assembly
-            .joints
-            .iter()
-            .zip(&self.step.laws)
-            .map(|(joint, law)| law.contact(&joint.law, &velocity[joint.axes()]))
-            .collect();
+        let laws = self.assembly.joints.iter().zip(&self.step.laws);
+        let contact = laws.map(|(joint, law)| law.contact(&joint.law, &velocity[joint.axes()]));
+        let (x, rest) = state.split_at(n);
         self.steps.spans.push((time, h));
-        let force = self.step.force.as_slice().to_vec();
-        self.steps.values.push(Node { state: state[..2 * n].to_vec(), velocity, force, contact });
+        self.steps.keep_node([x, &rest[..n]], [&velocity, self.step.force.as_slice()], contact);
         self.keep_instant(state, time + h);
     }
 

@@ -9,7 +9,8 @@ use crate::method::Breakdown;
 use crate::method::assembly::Assembly;
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
-use crate::method::stepped::{Instant, Node, SteppedPath, Steps};
+use crate::method::stepped::SteppedPath;
+use crate::method::steps::Steps;
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
@@ -63,6 +64,8 @@ pub(crate) struct SmoothFlow {
     again: bool,
     stretch: f64,
     eliminated: Vec<Option<Eliminated>>,
+    /// What continues a step by the stages of the next one, whose level is so much less or more.
+    onward: Vec<Option<[[f64; STAGES]; STAGES]>>,
     step: Step,
     loads: StageLoads,
     level: usize,
@@ -89,7 +92,7 @@ impl SmoothFlow {
             drive: Drive::default(),
             tolerance,
             keep: false,
-            steps: Steps { nodes, ..Steps::default() },
+            steps: Steps::new(nodes, &assembly),
             lengths: Lengths::Chosen,
             mesh: Vec::new(),
             chosen: 0,
@@ -98,6 +101,7 @@ impl SmoothFlow {
             again: false,
             stretch: 0.0,
             eliminated: vec![None; LEVELS + 1],
+            onward: vec![None; 2 * LEVELS + 1],
             step: Step::new(&assembly),
             loads: StageLoads::default(),
             level: FIRST_LEVEL,
@@ -136,10 +140,10 @@ impl SmoothFlow {
     }
 
     /// First guess of the step's unknowns: the last step's collocation polynomial continued, or the state held.
-    fn predict(&mut self, state: &[f64], h: f64, length: Option<f64>, time: f64) {
+    fn predict(&mut self, state: &[f64], h: f64, last: Option<(usize, f64)>, time: f64) {
         let (n, j, internal) = (self.assembly.n, self.assembly.axes.len(), self.assembly.internal);
         let unknown = &mut self.step.unknown;
-        let Some(length) = length else {
+        let Some((level, length)) = last else {
             for i in 0..STAGES {
                 for axis in 0..j {
                     unknown[i * j + axis] = self.assembly.relative(axis, state, &self.drive, time).1;
@@ -149,13 +153,9 @@ impl SmoothFlow {
             }
             return;
         };
-        for (i, c) in C.iter().enumerate() {
-            let s = 1.0 + c * h / length;
-            // Lagrange polynomials of the stages
-            let weights: [f64; STAGES] = std::array::from_fn(|q| {
-                let others = (0..STAGES).filter(|r| *r != q);
-                others.map(|r| (s - C[r]) / (C[q] - C[r])).product()
-            });
+        let onward =
+            self.onward[LEVELS + self.level - level].get_or_insert_with(|| C.map(|c| onward(1.0 + c * h / length)));
+        for (i, weights) in onward.iter().enumerate() {
             for (offset, count) in [(0, j), (STAGES * j, internal)] {
                 for k in 0..count {
                     let at = |stage: usize| offset + stage * count + k;
@@ -268,36 +268,25 @@ impl SmoothFlow {
     }
 
     fn keep_instant(&mut self, state: &[f64], time: f64) {
-        let n = self.assembly.n;
-        self.set_force();
-        self.drive.load(time, &mut self.load);
-        let mut acceleration = vec![0.0; n];
-        self.assembly.accelerate(state, &mut self.load, &self.force, &mut acceleration);
-        let instant = Instant { state: state[..2 * n].to_vec(), acceleration, force: self.force.clone() };
-        self.steps.instants.push(instant);
-    }
-
-    fn set_force(&mut self) {
         forces(&self.assembly, &self.laws, &mut self.force);
+        self.drive.load(time, &mut self.load);
+        let acceleration = self.steps.keep_instant(state, &self.force);
+        self.assembly.accelerate(state, &mut self.load, &self.force, acceleration);
     }
 
     fn keep_step(&mut self, time: f64, h: f64) {
         let (n, j) = (self.assembly.n, self.assembly.axes.len());
         let Some(eliminated) = &self.eliminated[self.level] else { return };
-        let stages = self.step.stages(eliminated, &self.loads);
+        self.step.set_stages(eliminated, &self.loads);
+        let (x, v) = self.step.stages.as_slice().split_at(STAGES * n);
         self.steps.spans.push((time, h));
         for i in 0..STAGES {
-            let velocity = self.step.unknown[i * j..(i + 1) * j].to_vec();
-            let force = self.step.force.as_slice()[i * j..(i + 1) * j].to_vec();
-            let contact = self
-                .assembly
-                .joints
-                .iter()
-                .map(|joint| joint.law.contact(&velocity[joint.axes()], &force[joint.axes()]))
-                .collect();
-            let mut state = stages.as_slice()[i * n..(i + 1) * n].to_vec();
-            state.extend_from_slice(&stages.as_slice()[(STAGES + i) * n..(STAGES + i + 1) * n]);
-            self.steps.values.push(Node { state, velocity, force, contact });
+            let (velocity, force) =
+                (&self.step.unknown[i * j..(i + 1) * j], &self.step.force.as_slice()[i * j..(i + 1) * j]);
+            let joints = self.assembly.joints.iter();
+            let contact = joints.map(|joint| joint.law.contact(&velocity[joint.axes()], &force[joint.axes()]));
+            let of = i * n..(i + 1) * n;
+            self.steps.keep_node([&x[of.clone()], &v[of]], [velocity, force], contact);
         }
     }
 
@@ -359,6 +348,11 @@ impl SmoothFlow {
     }
 }
 
+/// Weights of the stages of a step in the value of its collocation polynomial at `s`, in lengths of the step from its start.
+fn onward(s: f64) -> [f64; STAGES] {
+    std::array::from_fn(|q| (0..STAGES).filter(|r| *r != q).map(|r| (s - C[r]) / (C[q] - C[r])).product())
+}
+
 /// Forces along the axes.
 fn forces(assembly: &Assembly, laws: &[RatePoint], force: &mut [f64]) {
     for (joint, point) in assembly.joints.iter().zip(laws) {
@@ -416,7 +410,8 @@ impl Flow for SmoothFlow {
     ) -> Result<(), Breakdown> {
         if self.stretch != duration {
             self.stretch = duration;
-            self.eliminated.iter_mut().for_each(|e| *e = None);
+            self.eliminated.fill(None);
+            self.onward.fill(None);
         }
         (self.accepted, self.rejected, self.again) = (0, 0, true);
         self.steps.clear();
@@ -444,14 +439,14 @@ impl Flow for SmoothFlow {
             self.derivative.clear();
             self.derivative.extend_from_slice(sensitivity.transpose().as_slice());
         }
-        let mut length = None;
+        let mut last = None;
         while position < total {
             let time = position as f64 * tick;
             let h =
                 self.attempt(lengths, tick).ok_or_else(|| self.stalled(state, (time, self.length(tick)), scale.1))?;
             let ticks = 1u64 << (LEVELS - self.level);
             self.set_loads(time, h);
-            self.predict(state, h, length, time);
+            self.predict(state, h, last, time);
             let Some(eliminated) = &self.eliminated[self.level] else {
                 return Err(Breakdown::Stalled { time, step: h });
             };
@@ -491,7 +486,7 @@ impl Flow for SmoothFlow {
                 self.keep_step(time, h);
                 self.keep_instant(state, time + h);
             }
-            length = Some(h);
+            last = Some((self.level, h));
             std::mem::swap(&mut self.previous, &mut self.step.unknown);
             self.step.unknown.resize(self.previous.len(), 0.0);
             self.accepted += 1;

@@ -15,6 +15,8 @@ use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES, squared};
 #[derive(Debug, Clone)]
 pub(crate) struct Eliminated {
     pub length: f64,
+    /// The matrix of the method times the length.
+    weights: [[f64; STAGES]; STAGES],
     /// Stage velocities of the axes from the state, stage loads, stage forces: (5 axes) × 2n, 5n, 5 axes.
     velocity_from_state: DMatrix<f64>,
     velocity_from_load: DMatrix<f64>,
@@ -63,10 +65,10 @@ impl Eliminated {
             for i in 0..STAGES {
                 for k in 0..STAGES {
                     let rows = acceleration.view((k * n, 0), (n, acceleration.ncols()));
-                    let mut x = out.view_mut((i * n, 0), (n, acceleration.ncols()));
-                    x += rows * (h * h * a2[i][k]);
-                    let mut v = out.view_mut(((STAGES + i) * n, 0), (n, acceleration.ncols()));
-                    v += rows * (h * A[i][k]);
+                    for (first, share) in [(i * n, h * h * a2[i][k]), ((STAGES + i) * n, h * A[i][k])] {
+                        let mut sum = out.view_mut((first, 0), (n, acceleration.ncols()));
+                        sum.zip_apply(&rows, |sum, a| *sum += a * share);
+                    }
                 }
             }
             out
@@ -102,6 +104,7 @@ impl Eliminated {
         let pw = &p * &assembly.directions;
         Eliminated {
             length: h,
+            weights: A.map(|row| row.map(|a| h * a)),
             velocity_from_state: velocity(&stage_from_state),
             velocity_from_load: velocity(&stage_from_load),
             velocity_from_force: velocity(&stage_from_force),
@@ -141,8 +144,12 @@ pub(crate) struct Step {
     pub points: Vec<RatePoint>,
     /// Displacements and velocities at the start.
     linear: DVector<f64>,
+    /// All stage displacements and velocities, X₁…X₅V₁…V₅, where they were asked for.
+    pub stages: DVector<f64>,
     free: DVector<f64>,
     structural: Vec<f64>,
+    /// Stage velocities without the imposed ones, axis after axis.
+    moving: Vec<[f64; STAGES]>,
     residual: Vec<f64>,
     lu: Lu,
     /// Of a derivative that is carried: stage velocities and internal states, forces of the laws, the end of the step.
@@ -157,6 +164,15 @@ const ITERATIONS: usize = 12;
 /// A correction of the unknowns below this fraction of their scale ends the iteration: the next one would be at rounding.
 const SMALL: f64 = 1e-9;
 
+/// Subtracts what `by` makes of the gains from the first rows of a column of a matrix, row after row.
+fn subtract(matrix: &mut [f64], columns: usize, column: usize, gains: &[f64], by: impl Fn(f64) -> f64) {
+    let mut at = column;
+    for gain in gains {
+        matrix[at] -= by(*gain);
+        at += columns;
+    }
+}
+
 /// Index of a stage's internal state among the unknowns.
 fn at_state(assembly: &Assembly, stage: usize, s: usize) -> usize {
     STAGES * assembly.axes.len() + stage * assembly.internal + s
@@ -170,8 +186,10 @@ impl Step {
             force: DVector::zeros(STAGES * j),
             points: (0..STAGES).flat_map(|_| points(assembly)).collect(),
             linear: DVector::zeros(2 * assembly.n),
+            stages: DVector::zeros(2 * STAGES * assembly.n),
             free: DVector::zeros(STAGES * j),
             structural: vec![0.0; j],
+            moving: vec![[0.0; STAGES]; j],
             residual: vec![0.0; unknowns],
             lu: Lu::default(),
             right: Vec::new(),
@@ -193,8 +211,9 @@ impl Step {
     ) -> bool {
         let (n, j, internal) = (assembly.n, assembly.axes.len(), assembly.internal);
         self.linear.copy_from_slice(&state[..2 * n]);
-        self.free.gemv(1.0, &eliminated.velocity_from_state, &self.linear, 0.0);
-        self.free.gemv(1.0, &eliminated.velocity_from_load, &loads.force, 1.0);
+        self.free.fill(0.0);
+        add_times(&eliminated.velocity_from_state, self.linear.as_slice(), self.free.as_mut_slice());
+        add_times(&eliminated.velocity_from_load, loads.force.as_slice(), self.free.as_mut_slice());
         for (free, (_, velocity)) in self.free.iter_mut().zip(&loads.stage) {
             *free += velocity;
         }
@@ -252,16 +271,19 @@ impl Step {
 
     /// The laws at the present unknowns.
     fn evaluate(&mut self, assembly: &Assembly, eliminated: &Eliminated, loads: &StageLoads) {
-        let (j, h) = (assembly.axes.len(), eliminated.length);
+        let j = assembly.axes.len();
+        let (unknown, stages) = (&self.unknown[..STAGES * j], &loads.stage[..STAGES * j]);
+        for (axis, moving) in self.moving.iter_mut().enumerate() {
+            *moving = std::array::from_fn(|k| unknown[k * j + axis] - stages[k * j + axis].1);
+        }
         for stage in 0..STAGES {
             for (q, joint) in assembly.joints.iter().enumerate() {
                 let mut motion = Relative::along(0.0, 0.0);
                 for (d, axis) in joint.axes().enumerate() {
                     // structural displacement from the collocation of structural velocities, imposed motion apart
                     let mut u = self.structural[axis] + loads.stage[stage * j + axis].0;
-                    for k in 0..STAGES {
-                        u += h * A[stage][k] * (self.unknown[k * j + axis] - loads.stage[k * j + axis].1);
-                    }
+                    let moving = eliminated.weights[stage].iter().zip(&self.moving[axis]);
+                    moving.for_each(|(weight, velocity)| u += weight * velocity);
                     motion.displacement[d] = u;
                     motion.velocity[d] = self.unknown[stage * j + axis];
                 }
@@ -271,17 +293,31 @@ impl Step {
                 if let Some(rate) = joint.law.rate() {
                     rate.linearise(joint.directions, &motion, z, point);
                 }
-                let row = stage * j + joint.first_axis;
-                self.force.as_mut_slice()[row..row + joint.directions]
-                    .copy_from_slice(&point.force[..joint.directions]);
+                for (d, axis) in joint.axes().enumerate() {
+                    self.force[stage * j + axis] = point.force[d];
+                }
             }
         }
     }
 
     /// Residual and Jacobian from the laws at the present unknowns.
     fn linearise(&mut self, assembly: &Assembly, eliminated: &Eliminated, state: &[f64]) {
-        let (n, j, h) = (assembly.n, assembly.axes.len(), eliminated.length);
-        let (unknowns, joints) = (self.unknown.len(), assembly.joints.len());
+        // lengths that the compiler knows: one axis, without states
+        match (assembly.axes.len(), self.unknown.len()) {
+            (1, STAGES) => self.differentiate(assembly, eliminated, state, (1, STAGES)),
+            lengths => self.differentiate(assembly, eliminated, state, lengths),
+        }
+    }
+
+    #[inline(always)]
+    fn differentiate(
+        &mut self,
+        assembly: &Assembly,
+        eliminated: &Eliminated,
+        state: &[f64],
+        (j, unknowns): (usize, usize),
+    ) {
+        let (n, h, joints) = (assembly.n, eliminated.length, assembly.joints.len());
         let jacobian = self.lu.zeros(unknowns);
         for at in 0..unknowns {
             jacobian[at * unknowns + at] = 1.0;
@@ -295,26 +331,25 @@ impl Step {
             for (q, joint) in assembly.joints.iter().enumerate() {
                 let point = &self.points[stage * joints + q];
                 let directions = joint.directions;
+                let first = at_state(assembly, stage, joint.first_state);
                 for (d, axis) in joint.axes().enumerate() {
                     let column = stage * j + axis;
                     let gains = &g[column * STAGES * j..(column + 1) * STAGES * j];
-                    let slope = point.force_slope(d);
-                    let force = point.force[d];
-                    for (row, gain) in gains.iter().enumerate() {
-                        self.residual[row] -= gain * force;
-                        let entries = &mut jacobian[row * unknowns..(row + 1) * unknowns];
-                        for e in 0..directions {
-                            entries[stage * j + joint.first_axis + e] -= gain * slope[directions + e];
-                            if slope[e] != 0.0 {
-                                for k in 0..STAGES {
-                                    entries[k * j + joint.first_axis + e] -= gain * slope[e] * h * A[stage][k];
-                                }
+                    let (slope, force) = (point.force_slope(d), point.force[d]);
+                    self.residual[..STAGES * j].iter_mut().zip(gains).for_each(|(r, gain)| *r -= gain * force);
+                    for e in 0..directions {
+                        let moved = joint.first_axis + e;
+                        subtract(jacobian, unknowns, stage * j + moved, gains, |gain| gain * slope[directions + e]);
+                        if slope[e] != 0.0 {
+                            for k in 0..STAGES {
+                                subtract(jacobian, unknowns, k * j + moved, gains, |gain| {
+                                    gain * slope[e] * h * A[stage][k]
+                                });
                             }
                         }
-                        let first = at_state(assembly, stage, joint.first_state);
-                        for s in 0..joint.states {
-                            entries[first + s] -= gain * slope[2 * directions + s];
-                        }
+                    }
+                    for s in 0..joint.states {
+                        subtract(jacobian, unknowns, first + s, gains, |gain| gain * slope[2 * directions + s]);
                     }
                 }
             }
@@ -358,19 +393,19 @@ impl Step {
         out[2 * n..].copy_from_slice(&self.unknown[last..last + assembly.internal]);
     }
 
-    /// All stage displacements and velocities of it, X₁…X₅V₁…V₅.
-    pub fn stages(&self, eliminated: &Eliminated, loads: &StageLoads) -> DVector<f64> {
-        let mut out = &eliminated.stage_from_state * &self.linear;
+    /// Sets the displacements and velocities at all stages of it.
+    pub fn set_stages(&mut self, eliminated: &Eliminated, loads: &StageLoads) {
+        let out = &mut self.stages;
+        out.gemv(1.0, &eliminated.stage_from_state, &self.linear, 0.0);
         out.gemv(1.0, &eliminated.stage_from_load, &loads.force, 1.0);
         out.gemv(1.0, &eliminated.stage_from_force, &self.force, 1.0);
-        out
     }
 
     fn combine(&self, [state, load, force]: &[DMatrix<f64>; 3], loads: &StageLoads, out: &mut [f64]) {
-        let mut out = nalgebra::DVectorViewMut::from_slice(out, state.nrows());
-        out.gemv(1.0, state, &self.linear, 0.0);
-        out.gemv(1.0, load, &loads.force, 1.0);
-        out.gemv(1.0, force, &self.force, 1.0);
+        out.fill(0.0);
+        add_times(state, self.linear.as_slice(), out);
+        add_times(load, loads.force.as_slice(), out);
+        add_times(force, self.force.as_slice(), out);
     }
 
     /// Carries a derivative over the step that was solved last: row after row, states × columns. Whole rows are added to each other, since these
@@ -510,12 +545,57 @@ fn add(factor: f64, row: &[f64], out: &mut [f64]) {
     out.iter_mut().zip(row).for_each(|(out, entry)| *out += factor * entry);
 }
 
+/// Adds `matrix x` to `out`.
+fn add_times(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64]) {
+    // lengths that the compiler knows: of one to three masses, and the stages of one axis
+    match out.len() {
+        2 => add_short_columns::<2>(matrix, x, out),
+        4 => add_short_columns::<4>(matrix, x, out),
+        5 => add_short_columns::<5>(matrix, x, out),
+        6 => add_short_columns::<6>(matrix, x, out),
+        rows => {
+            for (column, factor) in matrix.as_slice().chunks_exact(rows.max(1)).zip(x) {
+                add(*factor, column, out);
+            }
+        }
+    }
+}
+
+fn add_short_columns<const ROWS: usize>(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64]) {
+    let Some(out) = out.first_chunk_mut::<ROWS>() else { return };
+    let mut sum = *out;
+    for (column, factor) in matrix.as_slice().as_chunks::<ROWS>().0.iter().zip(x) {
+        sum.iter_mut().zip(column).for_each(|(sum, entry)| *sum += factor * entry);
+    }
+    *out = sum;
+}
+
 /// Adds `matrix x` to the first rows of `out`; `x` and `out` row after row.
 fn add_product(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64], columns: usize) {
-    for (i, out) in out.chunks_exact_mut(columns).take(matrix.nrows()).enumerate() {
-        for (k, row) in x.chunks_exact(columns).take(matrix.ncols()).enumerate() {
-            add(matrix[(i, k)], row, out);
+    // lengths that the compiler knows: of one to three masses
+    match columns {
+        2 => add_short_rows::<2>(matrix, x, out),
+        4 => add_short_rows::<4>(matrix, x, out),
+        6 => add_short_rows::<6>(matrix, x, out),
+        _ => {
+            for (i, out) in out.chunks_exact_mut(columns).take(matrix.nrows()).enumerate() {
+                for (k, row) in x.chunks_exact(columns).take(matrix.ncols()).enumerate() {
+                    add(matrix[(i, k)], row, out);
+                }
+            }
         }
+    }
+}
+
+fn add_short_rows<const COLUMNS: usize>(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64]) {
+    let (x, out) = (x.as_chunks::<COLUMNS>().0, out.as_chunks_mut::<COLUMNS>().0);
+    for (i, out) in out.iter_mut().take(matrix.nrows()).enumerate() {
+        let mut sum = *out;
+        for (k, row) in x.iter().take(matrix.ncols()).enumerate() {
+            let factor = matrix[(i, k)];
+            sum.iter_mut().zip(row).for_each(|(sum, entry)| *sum += factor * entry);
+        }
+        *out = sum;
     }
 }
 
