@@ -19,5 +19,6 @@ pub mod pairs;
 pub mod quadrature;
 pub mod radau;
 pub mod random;
+pub mod short;
 pub mod signal;
 pub mod sparse;

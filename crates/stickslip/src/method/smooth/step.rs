@@ -10,6 +10,7 @@ use crate::method::assembly::{Assembly, PlacedLaw};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::lu::Lu;
 use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES, squared};
+use stickslip_numerics::short::{add, add_product, add_product_of_rows};
 
 /// The eliminated structure for one step length.
 #[derive(Debug, Clone)]
@@ -212,8 +213,8 @@ impl Step {
         let (n, j, internal) = (assembly.n, assembly.axes.len(), assembly.internal);
         self.linear.copy_from_slice(&state[..2 * n]);
         self.free.fill(0.0);
-        add_times(&eliminated.velocity_from_state, self.linear.as_slice(), self.free.as_mut_slice());
-        add_times(&eliminated.velocity_from_load, loads.force.as_slice(), self.free.as_mut_slice());
+        add_product(eliminated.velocity_from_state.as_slice(), self.linear.as_slice(), self.free.as_mut_slice());
+        add_product(eliminated.velocity_from_load.as_slice(), loads.force.as_slice(), self.free.as_mut_slice());
         for (free, (_, velocity)) in self.free.iter_mut().zip(&loads.stage) {
             *free += velocity;
         }
@@ -403,9 +404,9 @@ impl Step {
 
     fn combine(&self, [state, load, force]: &[DMatrix<f64>; 3], loads: &StageLoads, out: &mut [f64]) {
         out.fill(0.0);
-        add_times(state, self.linear.as_slice(), out);
-        add_times(load, loads.force.as_slice(), out);
-        add_times(force, self.force.as_slice(), out);
+        add_product(state.as_slice(), self.linear.as_slice(), out);
+        add_product(load.as_slice(), loads.force.as_slice(), out);
+        add_product(force.as_slice(), self.force.as_slice(), out);
     }
 
     /// Carries a derivative over the step that was solved last: row after row, states × columns. Whole rows are added to each other, since these
@@ -421,13 +422,13 @@ impl Step {
             memory.clear();
             memory.resize(rows * columns, 0.0);
         }
-        add_product(&eliminated.velocity_from_state, derivative, &mut self.right, columns);
+        add_rows(&eliminated.velocity_from_state, derivative, &mut self.right, columns);
         self.answer_to_start(assembly, eliminated.length, derivative, columns);
-        add_product(&eliminated.velocity_from_force, &self.answer, &mut self.right, columns);
+        add_rows(&eliminated.velocity_from_force, &self.answer, &mut self.right, columns);
         self.lu.solve_rows(&mut self.right, columns);
         self.answer_to_stages(assembly, eliminated.length, columns);
-        add_product(&eliminated.end[0], derivative, &mut self.carried, columns);
-        add_product(&eliminated.end[2], &self.answer, &mut self.carried, columns);
+        add_rows(&eliminated.end[0], derivative, &mut self.carried, columns);
+        add_rows(&eliminated.end[2], &self.answer, &mut self.carried, columns);
         let (linear, inside) = derivative.split_at_mut(2 * n * columns);
         linear.copy_from_slice(&self.carried);
         let last = at_state(assembly, STAGES - 1, 0) * columns;
@@ -540,63 +541,9 @@ fn row_mut(matrix: &mut [f64], at: usize, columns: usize) -> &mut [f64] {
     &mut matrix[at * columns..(at + 1) * columns]
 }
 
-/// Adds a multiple of one row to another.
-fn add(factor: f64, row: &[f64], out: &mut [f64]) {
-    out.iter_mut().zip(row).for_each(|(out, entry)| *out += factor * entry);
-}
-
-/// Adds `matrix x` to `out`.
-fn add_times(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64]) {
-    // lengths that the compiler knows: of one to three masses, and the stages of one axis
-    match out.len() {
-        2 => add_short_columns::<2>(matrix, x, out),
-        4 => add_short_columns::<4>(matrix, x, out),
-        5 => add_short_columns::<5>(matrix, x, out),
-        6 => add_short_columns::<6>(matrix, x, out),
-        rows => {
-            for (column, factor) in matrix.as_slice().chunks_exact(rows.max(1)).zip(x) {
-                add(*factor, column, out);
-            }
-        }
-    }
-}
-
-fn add_short_columns<const ROWS: usize>(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64]) {
-    let Some(out) = out.first_chunk_mut::<ROWS>() else { return };
-    let mut sum = *out;
-    for (column, factor) in matrix.as_slice().as_chunks::<ROWS>().0.iter().zip(x) {
-        sum.iter_mut().zip(column).for_each(|(sum, entry)| *sum += factor * entry);
-    }
-    *out = sum;
-}
-
 /// Adds `matrix x` to the first rows of `out`; `x` and `out` row after row.
-fn add_product(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64], columns: usize) {
-    // lengths that the compiler knows: of one to three masses
-    match columns {
-        2 => add_short_rows::<2>(matrix, x, out),
-        4 => add_short_rows::<4>(matrix, x, out),
-        6 => add_short_rows::<6>(matrix, x, out),
-        _ => {
-            for (i, out) in out.chunks_exact_mut(columns).take(matrix.nrows()).enumerate() {
-                for (k, row) in x.chunks_exact(columns).take(matrix.ncols()).enumerate() {
-                    add(matrix[(i, k)], row, out);
-                }
-            }
-        }
-    }
-}
-
-fn add_short_rows<const COLUMNS: usize>(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64]) {
-    let (x, out) = (x.as_chunks::<COLUMNS>().0, out.as_chunks_mut::<COLUMNS>().0);
-    for (i, out) in out.iter_mut().take(matrix.nrows()).enumerate() {
-        let mut sum = *out;
-        for (k, row) in x.iter().take(matrix.ncols()).enumerate() {
-            let factor = matrix[(i, k)];
-            sum.iter_mut().zip(row).for_each(|(sum, entry)| *sum += factor * entry);
-        }
-        *out = sum;
-    }
+fn add_rows(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64], columns: usize) {
+    add_product_of_rows(matrix.as_slice(), matrix.nrows(), x, out, columns);
 }
 
 /// A point for every law.
