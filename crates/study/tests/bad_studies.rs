@@ -34,6 +34,13 @@ fn keys() {
     check("[[joint]]", "[[joints]]", (35, 3), "joints", &["did you mean `joint`?"]);
     check("name = \"shroud\"\n", "", (35, 1), "name", &["`name` is missing in joint 1", "add name ="]);
     check("schema = 1\n", "", (1, 1), "schema", &["`schema` is missing", "add schema = 1"]);
+    check(
+        "points = 241 }",
+        "points = 241, tolerance = 0.1 }",
+        (46, 51),
+        "points",
+        &["`tolerance`", "exclude each other"],
+    );
     check("schema = 1", "schema = 2", (1, 10), "schema", &["found 2", "reads schema 1"]);
     check("schema = 1", "schema = 1.0", (1, 10), "schema", &["the number 1"]);
     check("limit = \"Ft\"", "", (38, 7), "limit", &["`limit` is missing in law `coulomb`"]);

@@ -84,7 +84,8 @@ impl Search {
         }
     }
 
-    /// From the state of a neighbouring orbit if there is one of the right length and it leads anywhere, else from a first guess.
+    /// From the state of a neighbouring orbit if there is one of the right length and it leads anywhere, else from a first guess, and from rest where
+    /// that is far beyond what the loads do and leads nowhere: a resonance that friction holds does not get there.
     pub fn find<M: ReturnMap>(
         self,
         map: &mut M,
@@ -99,7 +100,12 @@ impl Search {
             return Ok(closed);
         }
         let first = guess(map);
-        self.close(map, &first, aim)
+        let found = self.close(map, &first, aim);
+        let far = aim.rest > 0.0 && norm(map.weights(), &first) > FAR * aim.rest;
+        match found {
+            Err(error) if far => self.close(map, &vec![0.0; states], aim).map_err(|_| error),
+            found => found,
+        }
     }
 
     /// From `start` to the closed orbit.
@@ -163,6 +169,9 @@ fn settle(
         let residual = norm(map.weights(), &change) / size;
         if residual.is_nan() {
             return Err(broke(Breakdown::OutOfRange { time: 0.0 })); // no later return has a size either
+        }
+        if too_large(size, aim) {
+            return Err(OrbitError::not_converged(aim.method, aim.omega, count, 1.0));
         }
         map.moves(residual);
         smallest = f64::min(smallest, residual);
@@ -261,6 +270,13 @@ const HALVINGS: i32 = 4;
 const RETURNS: usize = 40;
 /// A state this many times larger than rest (10^7 times what the loads do statically) is no orbit that could be checked.
 const LARGEST: f64 = 1e10;
+/// A first guess this many times larger than rest (10^3 times what the loads do statically) may be a resonance that friction does not let happen.
+const FAR: f64 = 1e6;
+
+/// Whether a state is so large that the work of the loads drowns in rounding, and a return changes nothing of it: an undamped resonance.
+fn too_large(size: f64, aim: Aim) -> bool {
+    aim.rest > 0.0 && size > LARGEST * aim.rest
+}
 /// A step must leave at most this share of the residual.
 const DECREASE: f64 = 0.95;
 /// Singular values below this fraction of the largest belong to the continuum of stick offsets.
@@ -367,10 +383,8 @@ pub(crate) fn descended(
         if residual.is_nan() {
             return Err(broke(Breakdown::OutOfRange { time: 0.0 }));
         }
-        if aim.rest > 0.0 && size > LARGEST * aim.rest {
-            // so large that the work of the loads drowns in rounding: an undamped resonance
-            let (method, omega) = (aim.method, aim.omega);
-            return Err(OrbitError::not_converged(method, omega, *iterations, 1.0));
+        if too_large(size, aim) {
+            return Err(OrbitError::not_converged(aim.method, aim.omega, *iterations, 1.0));
         }
         let mut accepted = false;
         if residual > aim.residual && *iterations < ITERATIONS {

@@ -19,7 +19,7 @@ use super::stepped::SteppedPath;
 use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH, vibration};
 use crate::dimension::Dimension;
 use crate::model::System;
-use crate::orbit::measure::measure;
+use crate::orbit::measure::{NO_WORK, measure};
 use crate::orbit::{Accuracy, Evidence, Orbit, Path, Symmetry, history};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -174,6 +174,8 @@ pub(super) struct Shooter<'a> {
     weights: Vec<f64>,
     omega: f64,
     duration: f64,
+    /// Energy norm below which a state counts as rest, √J.
+    rest: f64,
     contracts: bool,
 }
 
@@ -237,6 +239,7 @@ impl<'a> Shooter<'a> {
             stepping,
             omega: 0.0,
             duration: 0.0,
+            rest: 0.0,
             // smooth neighbours are passive where the exact laws are
             contracts: system.contracts(),
         })
@@ -506,7 +509,7 @@ impl<'a> Shooter<'a> {
             start: closed.state,
             evidence: Evidence {
                 residual: closed.residual,
-                energy_gap: measured.energy_gap(0.0),
+                energy_gap: measured.energy_gap(NO_WORK * self.rest * self.rest),
                 switches: measured.joints.iter().map(|joint| joint.switches).sum(),
                 iterations: closed.iterations,
                 harmonics: None,
@@ -536,6 +539,8 @@ impl Solver for Shooter<'_> {
         flow.set_drive(self.system, omega);
         self.weights = flow.weights();
         let rest = NEAR_REST * flow.energy_scale();
+        self.rest = rest;
+        let flow = self.stepping.flow();
         flow.keep(false);
         let symmetry = self.search.symmetry(self.system, self.periods);
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
@@ -582,5 +587,34 @@ impl Solver for Shooter<'_> {
             return Err(OrbitError::Evidence { method: self.name, omega, energy_gap: orbit.evidence.energy_gap });
         }
         Ok(orbit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::Gap;
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
+
+    /// A constant force presses a mass against a stop: it rests at `(f + k₂ gap) / (k + k₂)`, and nothing works.
+    #[test]
+    fn rest_under_a_constant_force_balances() {
+        let between = || ["m".to_owned(), GROUND.to_owned()];
+        let model = Model {
+            masses: vec![Mass::new("m", 1.0)],
+            springs: vec![Spring { between: between(), stiffness: 1e3, damping: 1.0 }],
+            joints: vec![Joint {
+                name: "j".into(),
+                between: between(),
+                law: Arc::new(Gap { gap: 1e-3, stiffness: 800.0 }),
+            }],
+            forces: vec![Force { on: "m".into(), amplitude: 3.0, phase: 0.0, harmonic: 0 }],
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let orbit = Shooting::default().solver(&system).unwrap().orbit(20.0, None).unwrap();
+        let (place, expected) = (&orbit.places[0], 3.8 / 1.8e3);
+        assert!((place.mean / expected - 1.0).abs() < 1e-9 && place.amplitude() < 1e-9 * expected, "{place:?}");
+        assert!(orbit.evidence.energy_gap < 1e-5, "{:?}", orbit.evidence);
     }
 }

@@ -53,7 +53,7 @@ pub(super) const KIND: Kind = Kind {
             optional(
                 "run_up",
                 Takes::Table(RUN_UP),
-                "drive frequency that changes linearly in time",
+                "drive frequency that changes linearly in time, in steps: each cycle has one frequency, and ends when that of the line does",
                 "{ from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }",
             ),
             optional(

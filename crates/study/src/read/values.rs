@@ -203,6 +203,12 @@ impl Reader {
     /// A range whose points follow the curve.
     fn adaptive(&mut self, key: &Key, table: &Table) -> Option<Stated> {
         let before = self.problems.len();
+        if let Some(entry) = table.entries.iter().find(|entry| entry.key == "points") {
+            let message = format!("`points` and `tolerance` in the range of `{}` exclude each other", shown(key.name));
+            let help = "leave one of them out: with `tolerance` the points follow the curve";
+            self.problems.push(Problem::new(&entry.key_location, "points", message).help(help));
+            return None;
+        }
         let mut stated = self.table(table, schema::ADAPTIVE, &format!("the range of `{}`", shown(key.name)));
         let mut take = |key: &str| {
             let at = stated.entries.iter().position(|entry| entry.key == key)?;
