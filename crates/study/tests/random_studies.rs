@@ -17,7 +17,6 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use stickslip::method::event_driven::EventDriven;
 use stickslip::method::harmonic_balance::HarmonicBalance;
-use stickslip::method::shooting::Shooting;
 use stickslip::method::{self, Method, Options};
 use stickslip::orbit::{Accuracy, Orbit};
 use stickslip_study::dataset::{Dataset, Table, Values};
