@@ -21,6 +21,8 @@ use std::sync::Arc;
 const LARGEST: usize = 24;
 /// Joints up to which the return of a motion whose stability is proven is followed all the same.
 const JOINTS: usize = 12;
+/// What the limits of joints that never slip are multiplied by where the derivative of the return is sought: a power of two, which leaves no rounding.
+const HELD: f64 = 2.0;
 /// Relative error per step of the integration of smooth laws.
 const TOLERANCE: f64 = 1e-8;
 /// Equal steps per return for laws that know only steps: they follow the motion to about 1e-6.
@@ -113,15 +115,16 @@ impl Judge {
         Some(flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period))
     }
 
-    /// Follows the return of a path from its state at t = 0, which begins with `start`.
+    /// Follows the return of a path, in which the joints `stuck` never slip, from its state at t = 0, which begins with `start`.
     pub fn judge(
         &mut self,
         system: &System,
         omega: f64,
         (path, symmetry): (&dyn Path, Symmetry),
         start: &[f64],
+        stuck: &[usize],
     ) -> Judged {
-        self.follow(system, omega, (path, symmetry), start, !self.proven)
+        self.follow(system, omega, (path, symmetry), start, (!self.proven).then_some(stuck))
     }
 
     /// How far the motion from `start` is from it after a return, relative to its vibration, without the derivative that costs most.
@@ -132,7 +135,7 @@ impl Judge {
         (path, symmetry): (&dyn Path, Symmetry),
         start: &[f64],
     ) -> Option<f64> {
-        self.follow(system, omega, (path, symmetry), start, false).defect
+        self.follow(system, omega, (path, symmetry), start, None).defect
     }
 
     fn follow(
@@ -141,7 +144,7 @@ impl Judge {
         omega: f64,
         (path, symmetry): (&dyn Path, Symmetry),
         start: &[f64],
-        sensitive: bool,
+        sensitive: Option<&[usize]>,
     ) -> Judged {
         let Some(flow) = &mut self.flow else { return Judged::default() };
         let (part, sign) = if symmetry == Symmetry::HalfPeriod { (0.5, -1.0) } else { (1.0, 1.0) };
@@ -152,9 +155,21 @@ impl Judge {
         let states = flow.states();
         let mut state = start.to_vec();
         state.resize(states, 0.0);
-        let mut derivative = sensitive.then(|| DMatrix::identity(states, states));
-        if flow.run(&mut state, part * TAU / omega, derivative.as_mut()).is_err() {
+        let duration = part * TAU / omega;
+        let mut derivative = sensitive.map(|_| DMatrix::identity(states, states));
+        let stuck = sensitive.unwrap_or_default();
+        let alone = derivative.as_mut().filter(|_| stuck.is_empty());
+        if flow.run(&mut state, duration, alone).is_err() {
             return Judged::default();
+        }
+        // what sticks up to its very limit slips for an instant by the error of the orbit, and the derivative would be that of slip
+        if !stuck.is_empty() {
+            let mut again = start.to_vec();
+            again.resize(states, 0.0);
+            flow.strengthen(stuck, HELD);
+            let run = flow.run(&mut again, duration, derivative.as_mut());
+            flow.strengthen(stuck, 1.0 / HELD);
+            derivative = derivative.filter(|_| run.is_ok());
         }
         // states that the method does not know begin wrong, and their return says nothing of the orbit
         let known = start.len() == states;
@@ -241,7 +256,7 @@ mod tests {
         let mut judge = Judge::new(&system);
         assert!(judge.proves());
         let mut defect =
-            |start: &[f64]| judge.judge(&system, omega, (orbit.path.as_ref(), orbit.symmetry), start).defect;
+            |start: &[f64]| judge.judge(&system, omega, (orbit.path.as_ref(), orbit.symmetry), start, &[]).defect;
         assert!(defect(&orbit.start).unwrap() < 1e-11);
         let wrong: Vec<f64> = orbit.start.iter().map(|z| 1.5 * z).collect();
         // the transient of a structure with Q of some hundreds dies by a hundredth per return, friction takes more

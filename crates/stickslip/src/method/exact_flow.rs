@@ -42,6 +42,9 @@ impl Flow for ExactFlow {
     ) -> Result<(), Breakdown> {
         self.segments.run(state, 0.0, duration, sensitivity)
     }
+    fn strengthen(&mut self, joints: &[usize], factor: f64) {
+        self.segments.mechanics.strengthen(joints, factor);
+    }
     fn keep(&mut self, _keep: bool) {} // segments are always kept: they are what it computes with
     fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Arc<dyn Path> {
         Arc::new(ExactPath::new(system.clone(), &self.segments, symmetry, period))

@@ -32,6 +32,8 @@ pub(crate) trait Flow: Send {
     fn follow(&mut self, state: &mut [f64], duration: f64) -> Result<(), Breakdown> {
         self.run(state, duration, None)
     }
+    /// Multiplies the slip limits of these joints by a factor, until it is divided by it again.
+    fn strengthen(&mut self, _joints: &[usize], _factor: f64) {}
     /// Whether runs from now on are kept for [`Flow::path`].
     fn keep(&mut self, keep: bool);
     /// The motion of the last kept run, which repeats after `period` (s).

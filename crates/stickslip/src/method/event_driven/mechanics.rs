@@ -277,6 +277,21 @@ impl Deref for Mechanics {
 }
 
 impl Mechanics {
+    /// Multiplies the slip limits of these joints by a factor.
+    pub fn strengthen(&mut self, joints: &[usize], factor: f64) {
+        let mut parts = self.parts.to_vec();
+        for part in parts.iter_mut().filter(|part| joints.contains(&part.joint)) {
+            match &mut part.kind {
+                Kind::Rigid { limit, static_limit } => {
+                    (*limit, *static_limit) = (*limit * factor, *static_limit * factor)
+                }
+                Kind::Elastic { limit, .. } => *limit *= factor,
+                Kind::Stop { .. } => {}
+            }
+        }
+        self.parts = parts.into();
+    }
+
     /// For `method`, which names itself where it refuses.
     ///
     /// # Errors

@@ -158,8 +158,8 @@ pub(super) fn orbit(
     let contracts = judge.as_ref().is_some_and(|judge| judge.proves());
     let top = harmonics.last().copied();
     let path = Series { system: system.clone(), omega, harmonics, x, force, contact };
-    let Judged { derivative, defect } =
-        judge.map_or_else(Judged::default, |judge| judge.judge(system, omega, (&path, symmetry), &start));
+    let Judged { derivative, defect } = judge
+        .map_or_else(Judged::default, |judge| judge.judge(system, omega, (&path, symmetry), &start, &path.stuck()));
     Some(Orbit {
         method: super::NAME,
         omega,
@@ -427,6 +427,14 @@ fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVecto
     force
 }
 
+impl Series {
+    /// The joints that never slip.
+    fn stuck(&self) -> Vec<usize> {
+        let sticks = |contact: &Vec<Contact>| contact.iter().all(|contact| *contact == Contact::Stick);
+        (0..self.contact.len()).filter(|&joint| sticks(&self.contact[joint])).collect()
+    }
+}
+
 impl Path for Series {
     fn sample(&self, time: f64) -> Sample {
         let n = self.system.dofs();
@@ -502,7 +510,9 @@ impl Path for Series {
     }
 
     fn return_map(&self, start: &[f64], symmetry: Symmetry) -> Option<DMatrix<f64>> {
-        Judge::of_any_size(&self.system).judge(&self.system, self.omega, (self, symmetry), start).derivative
+        let judged =
+            Judge::of_any_size(&self.system).judge(&self.system, self.omega, (self, symmetry), start, &self.stuck());
+        judged.derivative
     }
 
     fn return_defect(&self, start: &[f64], symmetry: Symmetry) -> Option<f64> {

@@ -232,6 +232,12 @@ impl Flow for IncrementalFlow {
         }
     }
 
+    fn strengthen(&mut self, joints: &[usize], factor: f64) {
+        let mut springs = self.springs();
+        springs.iter_mut().filter(|spring| joints.contains(&spring.joint)).for_each(|spring| spring.limit *= factor);
+        self.limit(&springs);
+    }
+
     fn keep(&mut self, keep: bool) {
         self.keep = keep;
     }
