@@ -501,6 +501,9 @@ impl<'a> Shooter<'a> {
         let path = self.stepping.path(&self.shared, symmetry, period);
         let Ok(measured) = measure(self.system, &path, omega, (symmetry, period));
         let laws = self.stepping.assembly().joints.iter().map(|joint| &joint.law);
+        // what closing leaves of a state may have worked on a vibration as small as rest
+        let left = CLOSED * norm(&self.weights, &closed.state) * self.rest;
+        let least = f64::max(NO_WORK * self.rest * self.rest, left / ENERGY_GAP);
         Orbit {
             method: self.name,
             omega,
@@ -509,7 +512,7 @@ impl<'a> Shooter<'a> {
             start: closed.state,
             evidence: Evidence {
                 residual: closed.residual,
-                energy_gap: measured.energy_gap(NO_WORK * self.rest * self.rest),
+                energy_gap: measured.energy_gap(least),
                 switches: measured.joints.iter().map(|joint| joint.switches).sum(),
                 iterations: closed.iterations,
                 harmonics: None,
