@@ -321,25 +321,31 @@ impl Balance {
         led.or_else(|| self.warm(start, omega))
     }
 
-    /// The start of the orbit that knows which harmonics one beside `start` needs: that one itself if it is one of the last, or one of them that is nearer
-    /// than it.
-    fn neighbour(&self, start: &[f64], omega: f64) -> Option<Vec<f64>> {
-        let distance = |recent: &Recent| (recent.omega - omega).abs();
-        let itself = self.recent.iter().find(|recent| recent.start == start);
+    /// Which of the last orbits has this start.
+    fn same(&self, start: &[f64]) -> Option<usize> {
+        self.recent.iter().position(|recent| recent.start == start)
+    }
+
+    /// Which of the last orbits knows what harmonics one beside `start` needs: that one itself, or one of them that is nearer than it.
+    fn neighbour(&self, start: &[f64], omega: f64) -> Option<usize> {
+        let distance = |at: &usize| (self.recent[*at].omega - omega).abs();
         let nearer = || {
             let (from, _) = self.begun.as_ref().filter(|(_, begun)| begun == start)?;
-            let nearest = self.recent.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-            (distance(nearest) <= (from - omega).abs()).then_some(nearest)
+            let nearest = (0..self.recent.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+            (distance(&nearest) <= (from - omega).abs()).then_some(nearest)
         };
-        itself.or_else(nearer).map(|recent| recent.start.clone())
+        self.same(start).or_else(nearer)
     }
 
     /// The harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess.
     pub(super) fn warm(&self, start: Option<&[f64]>, omega: f64) -> Option<(usize, Solution)> {
-        let start = start?;
-        let same = self.recent.iter().position(|recent| recent.start == start);
-        let near = self.recent.get(same.unwrap_or(0))?;
-        let before = self.recent.iter().skip(same.unwrap_or(0) + 1).find(|recent| recent.top == near.top);
+        self.warm_by(self.same(start?).unwrap_or(0), omega)
+    }
+
+    /// Those of one of the last orbits.
+    fn warm_by(&self, at: usize, omega: f64) -> Option<(usize, Solution)> {
+        let near = self.recent.get(at)?;
+        let before = self.recent.iter().skip(at + 1).find(|recent| recent.top == near.top);
         let motion = match before {
             Some(before) if self.goes_ahead(near.top) => near.towards(before, omega),
             _ => near.motion.clone(),
@@ -369,7 +375,7 @@ impl Solver for Balance {
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         let at = omega / self.periods as f64;
         let known = start.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.neighbour(start, at));
-        match known.and_then(|start| self.warm(Some(&start), at)) {
+        match known.and_then(|known| self.warm_by(known, at)) {
             // the harmonics that the neighbour needed are enough
             Some((top, motion)) => {
                 self.begin_point(omega);

@@ -381,11 +381,7 @@ impl Signals for Measuring<'_> {
         let contact = &self.contact[joint];
         let runs: Vec<_> = contact.chunk_by(PartialEq::eq).map(|run| (run[0], run.len() as f64)).collect();
         let changes = runs.len() - usize::from(contact.first() == contact.last());
-        Faces {
-            shares: Shares::of(runs.into_iter()),
-            switches: changes / self.halves,
-            rests: contact.iter().all(|contact| *contact == Contact::Stick),
-        }
+        Faces { shares: Shares::of(runs.into_iter()), switches: changes / self.halves, rests: rests(contact) }
     }
 }
 
@@ -430,9 +426,13 @@ fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVecto
 impl Series {
     /// The joints that never slip.
     fn stuck(&self) -> Vec<usize> {
-        let sticks = |contact: &Vec<Contact>| contact.iter().all(|contact| *contact == Contact::Stick);
-        (0..self.contact.len()).filter(|&joint| sticks(&self.contact[joint])).collect()
+        (0..self.contact.len()).filter(|&joint| rests(&self.contact[joint])).collect()
     }
+}
+
+/// Whether a joint sticks at all samples.
+fn rests(contact: &[Contact]) -> bool {
+    contact.iter().all(|contact| *contact == Contact::Stick)
 }
 
 impl Path for Series {
