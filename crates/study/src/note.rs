@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 use stickslip::law::Piece;
 use stickslip::model::{Joint, Model};
-use stickslip::orbit::{Accuracy, Orbit};
+use stickslip::orbit::{Accuracy, JointMotion, Orbit};
 use stickslip::structure::Reduction;
 
 /// How a note begins that is a warning.
@@ -19,6 +19,10 @@ const MOST_NAMED: usize = 3;
 
 /// Cases that are named one by one because a joint sticks in them: as many as are read. Of the others the points are counted together.
 const MOST_STUCK: usize = 4;
+
+/// Which orbit of a continuum is shown.
+const SHOWN: &str = "Shown is the motion in which a spring that never slips carries no mean force, as in joints that creep, or no more than balance needs \
+    on bodies that contacts alone hold; what is rigid sticks where the search found it, and method `transient` shows what its run led to.";
 
 /// A note.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -44,7 +48,7 @@ pub enum Note {
     Unstable(usize, usize),
     /// Points at which something sticks all the time in a motion that is not its own mirror image.
     History(usize),
-    /// Points at which a rigid joint sticks all the time beside one that knows positions, and the names of both at the first.
+    /// The same beside a joint whose force depends on where the bodies are, and the names of both at the first.
     Several {
         /// How many.
         points: usize,
@@ -108,7 +112,6 @@ impl Note {
             Accuracy::Unchecked => Some(Note::Unchecked(1)),
             Accuracy::Converged => None,
         };
-        let history = (!orbit.evidence.history.is_empty()).then_some(Note::History(1));
         let instead = orbit.evidence.instead_of.map(|chosen| Note::Instead {
             points: 1,
             chosen: chosen.to_owned(),
@@ -116,8 +119,8 @@ impl Note {
         });
         let falls = |joint: &Joint| joint.law.prox().is_some() && !joint.law.is_incrementally_passive();
         let unjudged = (stable.is_none() && model.joints.iter().any(falls)).then_some(Note::Unjudged(1));
-        let said = instead.into_iter().chain(unstable).chain(unjudged).chain(accuracy).chain(history);
-        said.chain(Note::several(model, orbit)).chain(Note::slipping(model, orbit)).collect()
+        let said = instead.into_iter().chain(unstable).chain(unjudged).chain(accuracy);
+        said.chain(Note::history(model, orbit)).chain(Note::slipping(model, orbit)).collect()
     }
 
     /// That friction makes harmonics above those that the coordinates were chosen for.
@@ -129,15 +132,22 @@ impl Note {
         Slipping::of(orbit, up_to).map(Note::Slipping)
     }
 
-    /// That nothing decides where a rigid joint sticks on which another one depends. Behind a spring what sticks is relaxed, and has one place.
-    fn several(model: &Model, orbit: &Orbit) -> Option<Note> {
-        let pieces = |joint: &Joint| joint.law.pieces().unwrap_or_default();
+    /// That the orbit is one of many, and whether the others may have other amplitudes: that is so where a joint has another stiffness elsewhere.
+    fn history(model: &Model, orbit: &Orbit) -> Option<Note> {
+        let stuck = orbit.evidence.history.first()?.clone();
+        let joint_of = |name: &str| model.joints.iter().find(|joint| joint.name == name);
         let is_rigid = |piece: &Piece| matches!(piece, Piece::Slider(slider) if slider.stiffness.is_none());
-        let holds = |joint: &Joint| orbit.evidence.stuck.contains(&joint.name) && pieces(joint).iter().any(is_rigid);
-        let is_stop = |piece: &Piece| matches!(piece, Piece::Stop { .. });
-        let knows = |joint: &Joint| joint.law.normal().is_some() || pieces(joint).iter().any(is_stop);
-        let first = |of: &dyn Fn(&Joint) -> bool| model.joints.iter().find(|joint| of(joint)).map(|j| j.name.clone());
-        Some(Note::Several { points: 1, stuck: first(&holds)?, knows: first(&knows)? })
+        let holds = |joint: &Joint| joint.law.pieces().unwrap_or_default().iter().any(is_rigid);
+        let rigid = orbit.evidence.stuck.iter().any(|name| joint_of(name).is_some_and(holds));
+        // behind a spring what sticks is relaxed near the mean of the motion, and what is always closed there has one stiffness
+        let knows = orbit.joints.iter().find(|motion| {
+            joint_of(&motion.name).is_some_and(|joint| match joint.law.normal() {
+                Some(_) => rigid || motion.open_fraction > 0.0,
+                None => is_curved(joint, motion),
+            })
+        });
+        let Some(knows) = knows.map(|motion| motion.name.clone()) else { return Some(Note::History(1)) };
+        Some(Note::Several { points: 1, stuck, knows })
     }
 
     /// The same where the orbit is one of a branch.
@@ -288,15 +298,12 @@ impl Note {
             }
             Note::History(count) => Some(format!(
                 "At {} a joint or a part of one sticks for the whole period, in a motion that is not its own mirror image: where it sticks \
-                 depends on how the motion began, and with it the means, and the amplitudes too if a gap or another law knows positions. \
-                 Shown is the motion in which a spring that never slips carries no mean force, as in joints that creep, or no more than \
-                 balance needs on bodies that contacts alone hold, and with method `transient` the one that its run led to.",
+                 depends on how the motion began, and with it the means. {SHOWN}",
                 points(*count)
             )),
             Note::Several { points: count, stuck, knows } => Some(format!(
-                "warning: at {} more than one orbit may be true: `{stuck}` is rigid and sticks for the whole period, where depends on how the \
-                 motion began, and with it when `{knows}` is closed; another method or another start may give other amplitudes. A spring before \
-                 its slider (`jenkins`) makes the one that is shown unique, kind = \"transient\" follows the one of a given start.",
+                "warning: at {} more than one orbit may be true: `{stuck}`, or a part of it, sticks for the whole period, where depends on how the \
+                 motion began, and with it the force of `{knows}` and the amplitudes. {SHOWN} kind = \"transient\" follows the one of a given start.",
                 points(*count)
             )),
             Note::OtherOrbit { points: count, from, to, ratios: [least, most] } => {
@@ -351,6 +358,14 @@ impl Note {
             }
         }
     }
+}
+
+/// Whether a law without memory has another stiffness where it is stretched farther.
+fn is_curved(joint: &Joint, motion: &JointMotion) -> bool {
+    let is_elastic = joint.law.rate().is_some_and(|rate| rate.states() == 0) && joint.law.scale().is_infinite();
+    let (low, high) = motion.displacement.first().copied().unwrap_or_default();
+    let stiffness = |amplitude: f64| joint.law.linearised(amplitude, 1.0).re;
+    is_elastic && high > low && stiffness(high - low) != stiffness(0.5 * (high - low))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use nalgebra::dmatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip::law::{FrictionContact, Gap, Iwan, Jenkins, SharedLaw, Valanis};
+use stickslip::law::{Coulomb, FrictionContact, Gap, Iwan, Jenkins, SharedLaw, Valanis};
 use stickslip::method::Method;
 use stickslip::method::event_driven::EventDriven;
 use stickslip::method::harmonic_balance::HarmonicBalance;
@@ -214,6 +214,43 @@ fn methods_agree_on_a_contact_that_opens_and_closes() {
                 let off = (a.maximum - b.maximum).abs().max((a.minimum - b.minimum).abs()) / a.amplitude();
                 assert!(off < allowed, "{} {omega}: {off:.1e} of {allowed:.1e}", found.method);
             }
+        }
+    }
+}
+
+/// Bodies that friction alone holds against a constant force, which it carries: the force along a body's face slips at first and shakes down. Where
+/// nothing slips any more the amplitude is `F/|k - m Ω²|` beside a body that stands still; springs that carry no mean would let all drift.
+#[test]
+fn friction_that_never_slips_carries_what_nothing_else_does() {
+    let between = |a: &str, b: &str| [a.to_owned(), b.to_owned()];
+    let joint = |name: &str, between, law: SharedLaw| Joint { name: name.into(), between, law };
+    let force = |amplitude, harmonic| Force { on: "b".into(), amplitude, phase: 0.0, harmonic };
+    let (spring, elastic, tie, mass, omega) = (1899.3, 895.2, 1671.5, 0.657, 25.0);
+    for tied in [true, false] {
+        let mut joints = vec![
+            joint("rigid", between("a", GROUND), Arc::new(Coulomb { limit: 3.51 })),
+            joint("elastic", between("b", GROUND), Arc::new(Jenkins { stiffness: elastic, limit: 3.6 })),
+        ];
+        if tied {
+            joints.push(joint("tie", between("a", "b"), Arc::new(Jenkins { stiffness: tie, limit: 2.41 })));
+        }
+        let model = Model {
+            masses: vec![Mass::new("a", 0.21), Mass::new("b", mass)],
+            springs: vec![Spring { between: between("a", "b"), stiffness: spring, damping: 1.0 }],
+            joints,
+            forces: vec![force(3.55, 1), force(1.42, 0)],
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let stiffness = spring + elastic + if tied { tie } else { 0.0 };
+        let amplitude = 3.55 / f64::hypot(stiffness - mass * omega * omega, omega);
+        let methods: [&dyn Method; 3] = [&EventDriven, &HarmonicBalance::default(), &Transient::default()];
+        for method in methods {
+            let found = orbit(method, &system, omega);
+            let error = found.places[1].amplitude() / amplitude - 1.0;
+            assert!(error.abs() < 1e-6, "{}: {error:.1e}", method.name());
+            assert!(found.places[0].amplitude() < 1e-9 * amplitude, "{}: {:?}", method.name(), found.places);
+            assert!(found.evidence.energy_gap < 1e-6 && found.evidence.history.len() >= 1, "{:?}", found.evidence);
         }
     }
 }

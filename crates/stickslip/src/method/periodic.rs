@@ -109,7 +109,7 @@ impl Search {
     }
 
     /// From `start` to the closed orbit.
-    fn close(self, map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<Closed, OrbitError> {
+    pub fn close(self, map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<Closed, OrbitError> {
         match self {
             Search::Newton => close(map, start, aim),
             Search::Settle { tolerance, returns } => settle(map, start, aim, tolerance, returns),

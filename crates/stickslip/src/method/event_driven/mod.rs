@@ -191,12 +191,15 @@ impl<'a> Exact<'a> {
     /// The orbit that a search finds.
     fn found(&mut self, start: Option<&[f64]>, search: Search, aim: Aim) -> Result<Orbit, OrbitError> {
         let Aim { method, omega, .. } = aim;
-        let closed = search.find(self, start, |exact| exact.first_state(omega), aim).map_err(|error| match error {
-            OrbitError::NotConverged { .. } | OrbitError::Unsettled { .. } if self.drifts() => {
-                OrbitError::drift(method, omega)
+        let closed = match search.find(self, start, |exact| exact.first_state(omega), aim) {
+            Err(OrbitError::NotConverged { .. } | OrbitError::Unsettled { .. }) if self.drifts() => {
+                // friction that holds is loaded by the way from rest: a guess knows no mean that it carries
+                let rest = vec![0.0; self.weights.len()];
+                let near = approached(self, rest, aim.sign);
+                search.close(self, &near, aim).map_err(|_| OrbitError::drift(method, omega))?
             }
-            error => error,
-        })?;
+            found => found?,
+        };
         self.finish(closed)
     }
 

@@ -364,7 +364,8 @@ impl Solver for Balance {
         let warm = self.near(start, omega);
         let found = match self.from(self.first, omega, warm) {
             Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
-                let by_time = |balance: &mut Self| balance.by_time(omega).ok_or(error);
+                let drifts = matches!(error, OrbitError::Drift { .. });
+                let by_time = |balance: &mut Self| balance.by_time(omega, drifts).ok_or(error);
                 self.by_its_course(omega).unwrap_or_else(|| by_time(self))
             }
             found => found,

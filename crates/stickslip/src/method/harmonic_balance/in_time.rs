@@ -42,8 +42,8 @@ impl Balance {
     }
 
     /// Where the search has found no orbit: from the motion that rest comes to in time, `None` where it is not followed. Of frequencies at which there is
-    /// more than one orbit it leads to one that attracts.
-    pub(super) fn by_time(&mut self, omega: f64) -> Option<Orbit> {
+    /// more than one orbit it leads to one that attracts. Where springs that carry no mean let it drift, friction carries what it can.
+    pub(super) fn by_time(&mut self, omega: f64, drifts: bool) -> Option<Orbit> {
         // twice the harmonics, since with few of them there may be a motion that leads nowhere
         let top = self.method.harmonics.unwrap_or(self.kept.double(self.first));
         if self.periods > 1 || self.system.dofs() > MOST_DOFS_IN_TIME || self.tried_in_time >= MOST_FOLLOWED {
@@ -52,8 +52,8 @@ impl Balance {
         self.tried_in_time += 1;
         self.level(top, omega).ok()?;
         let path = self.judge.approach(&self.system, omega, vec![0.0; 2 * self.system.dofs()], APPROACH)?;
-        let warm = Some((top, self.series_of(&*path, top, omega)?));
-        self.from(top, omega, warm).ok()
+        let motion = Solution { relaxed_at_zero: drifts, ..self.series_of(&*path, top, omega)? };
+        self.from(top, omega, Some((top, motion))).ok()
     }
 
     /// The harmonics of a motion that was followed over a period.

@@ -168,7 +168,7 @@ pub(super) fn orbit(
         start,
         evidence: Evidence {
             residual: motion.residual,
-            energy_gap: measured.energy_gap(0.0),
+            energy_gap: measured.energy_gap(still(system, omega)),
             switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: motion.iterations,
             harmonics: top,
@@ -391,14 +391,18 @@ const UNBALANCED: f64 = 1e-2;
 /// Energies below this fraction of what the loads could store in the structure are those of rounding: all is stuck.
 const STILL: f64 = 1e-9;
 
+/// Energy (J) that counts as none in a motion at this frequency.
+fn still(system: &System, omega: f64) -> f64 {
+    let [mass, _, stiffness] = system.structure().largest();
+    let stiff = stiffness.max(omega * omega * mass);
+    let loads: f64 = system.excitation(omega).iter().map(|(_, load)| load.norm_squared()).sum();
+    STILL * loads / stiff.max(f64::MIN_POSITIVE)
+}
+
 /// Whether the energies of an orbit balance, or are none.
 pub(super) fn balances(system: &System, orbit: &Orbit) -> bool {
-    let [mass, _, stiffness] = system.structure().largest();
-    let stiff = stiffness.max(orbit.omega * orbit.omega * mass);
-    let loads: f64 = system.excitation(orbit.omega).iter().map(|(_, load)| load.norm_squared()).sum();
     let Energy { work_in, viscous, friction } = orbit.energy;
-    let balance = (work_in - viscous - friction).abs();
-    orbit.evidence.energy_gap <= UNBALANCED || balance <= STILL * loads / stiff.max(f64::MIN_POSITIVE)
+    orbit.evidence.energy_gap <= UNBALANCED || (work_in - viscous - friction).abs() <= still(system, orbit.omega)
 }
 
 /// Loads and imposed motion by harmonic.

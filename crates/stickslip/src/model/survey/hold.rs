@@ -25,10 +25,8 @@ impl Stuck {
         let axes = joint.labels().zip(joint.axes()).enumerate();
         axes.map(|(axis, (name, along))| {
             let law = &**joint.law();
-            let (hold, pressed) = match law.normal() == Some(axis) {
-                true => (Hold::pressed(law, axis), Some(force_at_rest(law, axis))),
-                false => (Hold::of(law, axis), None),
-            };
+            let pressed = (law.normal() == Some(axis)).then(|| force_at_rest(law, axis));
+            let hold = pressed.map_or_else(|| Hold::of(law, axis), |force| Hold::pressed(law, axis, force));
             let closed = match hold {
                 Hold::Nothing => law.closed().and_then(|along| along.get(axis).copied()).unwrap_or(0.0),
                 Hold::Spring { .. } | Hold::Rigid { .. } => 0.0,
@@ -69,10 +67,10 @@ impl Hold {
         first.map_or(Hold::Nothing, |(k, limit)| Hold::Spring { stiffness, limit, displacement: limit / k })
     }
 
-    /// Faces pressed on each other: the spring that they are at rest, which no load makes slip.
-    fn pressed(law: &dyn Law, axis: usize) -> Hold {
+    /// Faces pressed on each other by this force (N) at rest: the spring that they are then, which no load makes slip. Faces that only touch hold nothing.
+    fn pressed(law: &dyn Law, axis: usize, force: f64) -> Hold {
         let stiffness = small_stiffness(law, axis);
-        if stiffness > 0.0 {
+        if force > 0.0 && stiffness > 0.0 {
             Hold::Spring { stiffness, limit: f64::INFINITY, displacement: f64::INFINITY }
         } else {
             Hold::Nothing
@@ -137,7 +135,7 @@ const SMALL: f64 = 1e-150;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan};
+    use crate::law::{Coulomb, CoulombArctan, Gap, Jenkins, JenkinsArctan};
 
     #[test]
     fn laws_hold_as_they_do_in_small_motion() {
@@ -146,6 +144,13 @@ mod tests {
         assert_eq!(Hold::of(&JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 }, 0), spring);
         assert_eq!(Hold::of(&Coulomb { limit: 2.0 }, 0), Hold::Rigid { limit: 2.0 });
         assert_eq!(Hold::of(&CoulombArctan { limit: 2.0, alpha: 25e3 }, 0), Hold::Rigid { limit: 2.0 });
+        // a stop holds once it is pressed, and not where it only touches
+        let stop = |gap: f64| {
+            let law = Gap { gap, stiffness: 1e4 };
+            Hold::pressed(&law, 0, force_at_rest(&law, 0))
+        };
+        assert!(matches!(stop(-1e-3), Hold::Spring { stiffness: 1e4, .. }), "{:?}", stop(-1e-3));
+        assert_eq!([0.0, 1e-3].map(stop), [Hold::Nothing; 2]);
         // without a limit a joint is a free reference
         assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 0.0 }, 0), Hold::Nothing);
         assert_eq!(Hold::of(&Coulomb { limit: 0.0 }, 0), Hold::Nothing);
