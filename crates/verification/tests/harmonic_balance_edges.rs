@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use stickslip::law::{Coulomb, Coulomb2d, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw, Stribeck};
+use stickslip::law::{Coulomb, Coulomb2d, CoulombArctan, Gap, Jenkins, JenkinsArctan, SharedLaw, Stribeck};
 use stickslip::method::shooting::Shooting;
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Motion, Spring, System, example};
@@ -162,6 +162,55 @@ fn a_free_body_drifts_or_sticks() {
     assert_eq!(error.status(), "drifts");
     let held = orbit(&HarmonicBalance::default(), &model(30.0).assemble().unwrap(), 1.0);
     assert!(held.places[0].amplitude() < 1e-9 && held.evidence.stuck == ["joint"], "{held:?}");
+}
+
+/// A slider on a body that nothing else holds carries no more than its limit, also where nothing vibrates on it: pushed by more, the body is dragged away;
+/// pushed by less, its spring is bent by what it carries.
+#[test]
+fn a_constant_force_beyond_the_limit_is_not_held() {
+    let model = |push: f64| Model {
+        masses: vec![mass("blade", 5.0), mass("shoe", 2.0)],
+        springs: vec![spring("blade", GROUND, 177e3, 2.0)],
+        joints: vec![joint("shoe", GROUND, Arc::new(Jenkins { stiffness: 45e3, limit: 6.0 }))],
+        forces: vec![force("blade", 400.0, 1), force("shoe", push, 0)],
+        ..Model::default()
+    };
+    for method in [&HarmonicBalance::default() as &dyn Method, &EventDriven] {
+        for push in [36.0, -6.01] {
+            let system = model(push).assemble().unwrap();
+            let error = method.solver(&system).unwrap().orbit(TAU * 5.0, None).unwrap_err();
+            assert!(["drifts", "not-settled"].contains(&error.status()), "{error}");
+        }
+        let held = orbit(method, &model(5.9).assemble().unwrap(), TAU * 5.0);
+        assert!((held.places[1].mean / (5.9 / 45e3) - 1.0).abs() < 1e-9, "{}: {:?}", method.name(), held.places[1]);
+    }
+}
+
+/// Multipliers beside one are those of the flow's own orbit: a series that is 4e-4 off put a pair outside the circle, 1.0047, inside it.
+#[test]
+fn a_series_beside_the_limit_of_stability_knows_its_side() {
+    let stop = |name: &str, a: &str, b: &str, gap, stiffness| Joint {
+        name: name.into(),
+        between: [a.into(), b.into()],
+        law: Arc::new(Gap { gap, stiffness }),
+    };
+    let model = Model {
+        masses: vec![mass("a", 1441.0), mass("b", 1257.0), mass("c", 869.0)],
+        springs: vec![
+            spring("a", GROUND, 2.252e6, 1791.0),
+            spring("b", GROUND, 4.412e6, 179.1),
+            spring("b", "a", 5.225e5, 179.1),
+            spring("c", GROUND, 5.761e6, 179.1),
+            spring("c", "b", 4.973e5, 1791.0),
+        ],
+        joints: vec![stop("pressed", "c", "a", -1.546e-4, 3.3e7), stop("open", "a", "c", 0.0, 4.28e6)],
+        forces: vec![Force { phase: -127f64.to_radians(), ..force("a", 1095.0, 1) }],
+        ..Model::default()
+    };
+    let system = model.assemble().unwrap();
+    let (found, exact) = (orbit(&HarmonicBalance::default(), &system, 50.52), orbit(&EventDriven, &system, 50.52));
+    let (largest, its) = (exact.multipliers().unwrap()[0].norm(), found.multipliers().unwrap()[0].norm());
+    assert!(largest > 1.004 && (its - largest).abs() < 1e-6, "{its} {largest}");
 }
 
 /// Without excitation there is rest.

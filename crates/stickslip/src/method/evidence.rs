@@ -8,13 +8,14 @@ use super::assembly::NEAR_REST;
 use super::flow::Flow;
 use super::followed::{self, Kind};
 use super::incremental::flow::IncrementalFlow;
-use super::periodic::norm;
+use super::periodic::{newton_step, norm};
 use super::vibration;
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 use std::sync::Arc;
+use stickslip_numerics::eigen;
 
 /// Degrees of freedom up to which orbits are judged without being asked: the return map is dense, and its cost grows with the cube. Beyond, one period
 /// of motion takes ten times as long as its orbit by harmonic balance, and [`crate::orbit::Orbit::return_defect`] follows it when it is asked.
@@ -23,6 +24,13 @@ const LARGEST: usize = 24;
 const JOINTS: usize = 12;
 /// What the limits of joints that never slip are multiplied by where the derivative of the return is sought: a power of two, which leaves no rounding.
 const HELD: f64 = 2.0;
+/// Distance of the largest multiplier from one, in return defects, within which it may be on the other side: multipliers where stops open and close err by two to
+/// three times the error of the motion.
+const MARGIN: f64 = 10.0;
+/// Newton steps from there to the orbit of the flow: each leaves the square of what was missing.
+const STEPS_NEARER: usize = 3;
+/// Share of the distance from its return that such a step leaves at most.
+const LEFT: f64 = 0.5;
 /// Relative error per step of the integration of smooth laws.
 const TOLERANCE: f64 = 1e-8;
 /// Equal steps per return for laws that know only steps: they follow the motion to about 1e-6.
@@ -173,10 +181,40 @@ impl Judge {
         }
         // states that the method does not know begin wrong, and their return says nothing of the orbit
         let known = start.len() == states;
-        let gap: Vec<f64> = state.iter().zip(start).map(|(end, start)| sign * end - start).collect();
+        let gap = DVector::from_iterator(start.len(), start.iter().zip(&state).map(|(start, end)| start - sign * end));
         let size = share * norm(&weights, start).max(rest).max(f64::MIN_POSITIVE);
-        Judged { derivative, defect: known.then(|| norm(&weights, &gap) / size) }
+        let defect = known.then(|| norm(&weights, gap.as_slice()) / size);
+        if let (Some(defect), Some(of_series), true) = (defect, &derivative, stuck.is_empty())
+            && eigen::largest_modulus(of_series).is_some_and(|modulus| (modulus - 1.0).abs() <= MARGIN * defect)
+        {
+            let near = of_the_orbit_beside(&mut **flow, (start, gap, of_series), (sign, duration, &weights));
+            derivative = near.or(derivative);
+        }
+        Judged { derivative, defect }
     }
+}
+
+/// The derivative of the return at the orbit of the flow beside `start`, whose `gap` from its return and derivative are given; `None` where Newton's method does
+/// not come nearer to one.
+fn of_the_orbit_beside(
+    flow: &mut dyn Flow,
+    (start, mut gap, of_series): (&[f64], DVector<f64>, &DMatrix<f64>),
+    (sign, duration, weights): (f64, f64, &[f64]),
+) -> Option<DMatrix<f64>> {
+    let (mut state, mut nearer) = (start.to_vec(), None);
+    for _ in 0..STEPS_NEARER {
+        let step = newton_step(nearer.as_ref().unwrap_or(of_series), &gap, sign, weights);
+        let from: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + d).collect();
+        let (mut end, mut derivative) = (from.clone(), DMatrix::identity(from.len(), from.len()));
+        flow.run(&mut end, duration, Some(&mut derivative)).ok()?;
+        let left = DVector::from_iterator(from.len(), from.iter().zip(&end).map(|(z, end)| z - sign * end));
+        let share = norm(weights, left.as_slice()) / norm(weights, gap.as_slice());
+        if share.is_nan() || share > LEFT {
+            break;
+        }
+        (state, gap, nearer) = (from, left, Some(derivative));
+    }
+    nearer
 }
 
 #[cfg(test)]

@@ -243,7 +243,7 @@ pub enum OrbitError {
     #[error(
         "{method} finds no motion at Ω = {omega:.4} rad/s that stays where it is: friction or contacts alone hold some of the structure, and \
          its mean leaves them; press the contacts harder, or add the spring that holds it{}",
-        if .instead.is_empty() { String::new() } else { format!("{instead}, which finds the motion where friction is enough") }
+        if .instead.is_empty() { String::new() } else { format!("{instead}, which may find one that friction holds") }
     )]
     Drift {
         /// The method.

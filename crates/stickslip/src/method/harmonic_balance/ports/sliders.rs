@@ -182,8 +182,18 @@ impl Alternation {
             anchor,
             slips: false,
         };
+        let drag = |begin: f64, end: f64, offset: f64| {
+            let anchor = Anchor::Nothing;
+            Interval { begin, end, stiffness: 0.0, offset, anchor, slips: true }
+        };
         // force and displacement at the anchor
         let (mut hold, mut from, mut anchor) = (0.0, relaxed, first);
+        let rest = kt * (self.grid.value[0] - relaxed);
+        if count == 0 && rest.abs() > limit {
+            // dragged to where nothing moves any more
+            self.intervals.push(Interval { slips: false, ..drag(0.0, TAU, limit.copysign(rest)) });
+            return;
+        }
         let mut slipped = None;
         for leg in 0..2 * count {
             let Extreme { at, value } = self.extremes[leg % count];
@@ -211,14 +221,7 @@ impl Alternation {
                 let slip = limit.copysign(trial);
                 let onset = self.passage(series, (before, end), from + (slip - hold) / kt, slip.signum());
                 self.intervals.push(hold_at(hold, from, anchor, begin, onset));
-                self.intervals.push(Interval {
-                    begin: onset,
-                    end,
-                    stiffness: 0.0,
-                    offset: slip,
-                    anchor: Anchor::Nothing,
-                    slips: true,
-                });
+                self.intervals.push(drag(onset, end, slip));
                 (hold, from, anchor, begin) = (slip, value, Anchor::At(end), end);
             } else if leg == first + count {
                 // by rounding alone
