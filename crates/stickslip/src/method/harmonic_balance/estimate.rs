@@ -1,5 +1,6 @@
 //! The error of a motion by a finer one.
 
+use super::ease::SOLVED;
 use super::equations::{Level, Solution};
 use super::kept::Kept;
 use super::ports::Ports;
@@ -14,8 +15,8 @@ const RIGID_SHARE: f64 = 1.7;
 /// The same of laws that are steep: until the series resolves their layer they leave half of it, as order 1 does, and where friction falls with
 /// velocity no less. Elsewhere the doubling leaves next to nothing.
 const STEEP_SHARE: f64 = 2.0;
-/// A motion that is less than this share of what it would be without the joints is rest, which their forces and the loads leave in rounding.
-const CANCELS: f64 = 1e-12;
+/// A motion that is less than this share of what it would be without the joints is rest: equations count as solved where they leave a tenth of that.
+const CANCELS: f64 = 10.0 * SOLVED;
 
 /// A motion for the comparison with a finer one: its harmonics and, per harmonic, the motions of the places and along the axes of the ports.
 pub(super) struct Compared<'a> {
