@@ -407,3 +407,66 @@ kind = "event-driven"
         assert!(right, "{found:?}");
     }
 }
+
+/// Where the place of a contact that sticks is one at which it comes up to its limit, for an instant of the period, the derivative of the return is that of
+/// slip: 1.41 for an orbit that is stable, the contact that is open throughout left out. Such an orbit sticks, is one of a continuum, and has no verdict.
+#[test]
+fn what_sticks_up_to_its_limit_is_not_called_unstable() {
+    let text = r#"
+schema = 1
+[[mass]]
+name = "m0"
+mass = 0.239
+directions = ["x", "z"]
+[[mass]]
+name = "m1"
+mass = 0.523
+directions = ["x", "z"]
+[[spring]]
+between = ["m0.x", "ground"]
+stiffness = 584.8
+damping = 1.163
+[[spring]]
+between = ["m0.z", "ground"]
+stiffness = 1256.0
+damping = 1.163
+[[spring]]
+between = ["m1.x", "m0.x"]
+stiffness = 183.7
+damping = 0.0
+[[spring]]
+between = ["m1.z", "m0.z"]
+stiffness = 136.1
+damping = 0.02326
+[[joint]]
+name = "j0"
+between = ["m1", "ground"]
+law = { kind = "jenkins-2d", stiffness = 140.2, limit = 0.05548 }
+[[joint]]
+name = "j1"
+between = ["m0", "m1"]
+law = { kind = "jenkins-2d", stiffness = 1537.0, limit = 0.01462 }
+[[joint]]
+name = "j2"
+between = ["m0", "m1"]
+law = { kind = "friction-contact", tangential = 102.7, normal = 1986.0, friction = 0.6843, preload = -0.127 }
+[[force]]
+on = "m0.x"
+amplitude = 0.4493
+phase = "127 deg"
+harmonic = 1
+[study]
+kind = "orbit"
+frequency = "43.3 rad/s"
+[method]
+kind = "shooting"
+"#;
+    let (_, found) = of(text);
+    assert_eq!(found.record.points.get("converged"), Some(&1), "{:?}", found.record.points);
+    let notes = &found.notes;
+    assert!(!notes.iter().any(|note| note.contains("unstable")), "{notes:?}");
+    assert!(
+        notes.iter().any(|note| note.contains("`j0`") && note.contains("sticks for the whole period")),
+        "{notes:?}"
+    );
+}

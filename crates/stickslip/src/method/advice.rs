@@ -99,8 +99,10 @@ fn with_ways(mut error: OrbitError, system: &System) -> OrbitError {
         if ways.any() { format!(", or {ways}") } else { String::new() }
     };
     match &mut error {
-        // waiting is the last resort
-        OrbitError::Truncation { method, instead, .. } | OrbitError::NotConverged { method, instead, .. } => {
+        // waiting is the last resort; who was asked already is not named again
+        OrbitError::Truncation { method, instead, .. } | OrbitError::NotConverged { method, instead, .. }
+            if instead.is_empty() =>
+        {
             *instead = words(&|name| ![*method, transient::INFO.name].contains(&name));
         }
         OrbitError::Unsettled { method, instead, repeats: None, .. } => *instead = words(&|name| name != *method),

@@ -115,8 +115,8 @@ struct WithSecond<'a> {
     first: Box<dyn Solver + Send + 'a>,
     chosen: &'static str,
     system: &'a System,
-    /// Once it was needed, `None` inside if there is none.
-    second: Option<Option<Box<dyn Solver + Send + 'a>>>,
+    /// Once it was needed, with its name; `None` inside if there is none.
+    second: Option<Option<(&'static str, Box<dyn Solver + Send + 'a>)>>,
     /// The start of the last orbit that the second one found, which says nothing to the first.
     last: Option<Vec<f64>>,
     /// The work of those that were asked for the last orbit.
@@ -125,7 +125,7 @@ struct WithSecond<'a> {
 
 impl<'a> WithSecond<'a> {
     /// The method to ask next. Waiting for a transient takes minutes.
-    fn next(&self) -> Option<Box<dyn Solver + Send + 'a>> {
+    fn next(&self) -> Option<(&'static str, Box<dyn Solver + Send + 'a>)> {
         let (system, joints) = (self.system, self.system.joints().len());
         let cheap = |name: &str| match name {
             harmonic_balance::NAME => true,
@@ -136,7 +136,7 @@ impl<'a> WithSecond<'a> {
         };
         let methods = ways(system).methods;
         let name = methods.into_iter().find(|name| *name != self.chosen && cheap(name))?;
-        named(name)?.solver(system).ok()
+        Some((name, named(name)?.solver(system).ok()?))
     }
 
     /// By the first method, and by the second one where that finds nothing that it may have missed.
@@ -155,11 +155,14 @@ impl<'a> WithSecond<'a> {
         if self.second.is_none() {
             self.second = Some(self.next());
         }
-        let Some(second) = self.second.as_mut().and_then(Option::as_mut) else { return Err(error) };
+        let Some((name, second)) = self.second.as_mut().and_then(Option::as_mut) else { return Err(error) };
         let near = start.filter(|start| self.last.as_deref() == Some(*start));
         let found = by(&mut **second, near);
         self.effort += second.effort();
-        let mut orbit = found.map_err(|_| error)?;
+        let mut orbit = match found {
+            Ok(orbit) => orbit,
+            Err(_) => return Err(error.after(name)),
+        };
         orbit.evidence.instead_of = Some(self.chosen);
         self.last = Some(orbit.start.clone());
         Ok(orbit)
@@ -194,7 +197,7 @@ impl Solver for WithSecond<'_> {
     }
     fn begin_at(&mut self, omega: f64, start: &[f64]) {
         match self.second.as_mut().and_then(Option::as_mut).filter(|_| self.last.as_deref() == Some(start)) {
-            Some(second) => second.begin_at(omega, start),
+            Some((_, second)) => second.begin_at(omega, start),
             None => self.first.begin_at(omega, start),
         }
     }
@@ -285,6 +288,17 @@ mod tests {
             assert_eq!((orbit.method, neighbour.method), (next, next));
             assert_eq!(orbit.evidence.instead_of, Some(chosen));
         }
+    }
+
+    /// What both were asked for in vain sends nobody from one to the other.
+    #[test]
+    fn who_was_asked_in_vain_is_not_advised() {
+        let system = example::blade_couple().assemble().unwrap();
+        let second = Some(Some(("harmonic-balance", Box::new(Nothing) as Box<dyn Solver + Send>)));
+        let first = Box::new(Nothing);
+        let mut solver = WithSecond { first, chosen: "event-driven", system: &system, second, last: None, effort: 0.0 };
+        let said = solver.orbit(TAU * 121.0, None).unwrap_err().to_string();
+        assert!(said.ends_with("; `harmonic-balance` finds none either"), "{said}");
     }
 
     /// A tolerance that no series which a point can pay for reaches is refused after a few short ones, with how many harmonics it would take.

@@ -501,6 +501,9 @@ impl<'a> Shooter<'a> {
         let path = self.stepping.path(&self.shared, symmetry, period);
         let Ok(measured) = measure(self.system, &path, omega, (symmetry, period));
         let laws = self.stepping.assembly().joints.iter().map(|joint| &joint.law);
+        // of what sticks up to its very limit the derivative is that of an instant of slip, and says nothing of the neighbours that stick
+        let at_its_limit =
+            measured.joints.iter().any(|joint| joint.slip_fraction > 0.0 && measured.stuck.contains(&joint.name));
         // what closing leaves of a state may have worked on a vibration as small as rest
         let left = CLOSED * norm(&self.weights, &closed.state) * self.rest;
         let least = f64::max(NO_WORK * self.rest * self.rest, left / ENERGY_GAP);
@@ -526,7 +529,7 @@ impl<'a> Shooter<'a> {
             places: measured.places,
             joints: measured.joints,
             energy: measured.energy,
-            return_map: closed.derivative,
+            return_map: if at_its_limit { DMatrix::zeros(0, 0) } else { closed.derivative },
             contracts: self.contracts,
             path: Arc::new(path),
         }

@@ -5,7 +5,7 @@ use super::drive::Drive;
 use super::steps::{Instant, Steps};
 use crate::law::{Contact, MOST_DIRECTIONS, Relative};
 use crate::model::{Axis, System};
-use crate::orbit::measure::{Faces, Shares, Signals, extremes};
+use crate::orbit::measure::{Faces, Shares, Signals, extremes, sticks};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
 use num_complex::Complex64;
 use std::convert::Infallible;
@@ -293,6 +293,6 @@ impl Signals for SteppedPath {
             let before = if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last };
             switches += usize::from(before != at_end(0));
         }
-        Faces { shares, switches, rests: self.steps.each().all(|node| node.contact[joint] == Contact::Stick) }
+        Faces { shares, switches, rests: sticks(self.steps.each().map(|node| node.contact[joint])) }
     }
 }

@@ -116,7 +116,7 @@ fn beyond(needed: Option<usize>) -> String {
         || format!("; {raise}"),
         |needed| {
             format!(
-                ": rigid friction may take {needed} and more, and with them more work than one point may; {raise}, or give friction a stiffness (law `jenkins`)"
+                ": rigid friction may take {needed} and more, and with them more work or memory than one point may; {raise}, or give friction a stiffness (law `jenkins`, in a plane `jenkins-2d`)"
             )
         },
     )
@@ -405,6 +405,17 @@ impl OrbitError {
     /// The search of `method` at `omega` ended after so many iterations, with this least residual.
     pub(crate) fn not_converged(method: &'static str, omega: f64, iterations: usize, residual: f64) -> Self {
         OrbitError::NotConverged { method, omega, iterations, residual, spent: false, instead: String::new() }
+    }
+
+    /// The same error, of a search after which `other` found nothing either.
+    pub(crate) fn after(mut self, other: &str) -> Self {
+        match &mut self {
+            OrbitError::NotConverged { instead, .. } | OrbitError::Truncation { instead, .. } => {
+                *instead = format!("; `{other}` finds none either");
+            }
+            _ => {}
+        }
+        self
     }
 
     /// No motion that `method` finds at `omega` stays where it is.

@@ -71,6 +71,18 @@ pub(crate) struct Faces {
     pub rests: bool,
 }
 
+/// Samples in which a joint that sticks may slip: it comes up to its limit, at the edge of a continuum of orbits, and how far beyond is less than samples tell.
+const EDGE: usize = 1;
+
+/// Whether a joint that does this at the samples of a return sticks all the time.
+pub(crate) fn sticks(mut contact: impl Iterator<Item = Contact>) -> bool {
+    let mut slips = 0;
+    contact.all(|contact| {
+        slips += usize::from(contact != Contact::Stick);
+        slips <= EDGE && !matches!(contact, Contact::Touch | Contact::Open)
+    })
+}
+
 /// Shares of a return in which the faces of a joint rest on each other, slide, and are apart. What is missing to one is a stop that touches.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Shares {

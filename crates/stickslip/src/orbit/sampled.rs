@@ -1,8 +1,7 @@
 //! The numbers of any path, from its samples alone: Gauss quadrature between its switches.
 
-use super::measure::{Faces, Shares, Signals, extremes};
+use super::measure::{Faces, Shares, Signals, extremes, sticks};
 use super::{Path, Sample};
-use crate::law::Contact;
 use crate::model::{Axis, System};
 use num_complex::Complex64;
 use std::convert::Infallible;
@@ -124,7 +123,7 @@ impl Signals for Sampled<'_> {
         Faces {
             shares: Shares::of((0..count).map(|i| (contact(i), self.nodes[i].1))),
             switches: (0..count).filter(|&i| contact(i) != contact(i + 1)).count(),
-            rests: (0..count).all(|i| contact(i) == Contact::Stick),
+            rests: sticks((0..count).map(contact)),
         }
     }
 }

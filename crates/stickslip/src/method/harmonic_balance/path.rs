@@ -6,7 +6,7 @@ use super::rest::Rest;
 use crate::law::{Contact, MOST_DIRECTIONS};
 use crate::method::evidence::{Judge, Judged};
 use crate::model::{Axis, MovedPlace, System};
-use crate::orbit::measure::{Faces, Shares, Signals, measure};
+use crate::orbit::measure::{Faces, Shares, Signals, measure, sticks};
 use crate::orbit::{Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -381,7 +381,11 @@ impl Signals for Measuring<'_> {
         let contact = &self.contact[joint];
         let runs: Vec<_> = contact.chunk_by(PartialEq::eq).map(|run| (run[0], run.len() as f64)).collect();
         let changes = runs.len() - usize::from(contact.first() == contact.last());
-        Faces { shares: Shares::of(runs.into_iter()), switches: changes / self.halves, rests: rests(contact) }
+        Faces {
+            shares: Shares::of(runs.into_iter()),
+            switches: changes / self.halves,
+            rests: sticks(contact.iter().copied()),
+        }
     }
 }
 
@@ -430,18 +434,8 @@ fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVecto
 impl Series {
     /// The joints that never slip.
     fn stuck(&self) -> Vec<usize> {
-        (0..self.contact.len()).filter(|&joint| rests(&self.contact[joint])).collect()
+        (0..self.contact.len()).filter(|&joint| sticks(self.contact[joint].iter().copied())).collect()
     }
-}
-
-/// Samples in which a joint that sticks may slip: it comes up to its limit, at the edge of a continuum of orbits, and how far beyond is less than samples tell.
-const EDGE: usize = 1;
-
-/// Whether a joint sticks for the whole period.
-fn rests(contact: &[Contact]) -> bool {
-    let mut slips = contact.iter().filter(|contact| **contact != Contact::Stick);
-    slips.by_ref().take(EDGE).all(|contact| !matches!(contact, Contact::Open | Contact::Touch))
-        && slips.next().is_none()
 }
 
 impl Path for Series {
