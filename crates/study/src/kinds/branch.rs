@@ -200,10 +200,14 @@ fn compute(work: &Work<'_>) -> Computed {
     let reason = match branch.end {
         End::Border => None,
         End::Stalled { at } => Some(format!("no shorter step converges beyond {name} = {:.9}", at * factor)),
-        End::Points | End::Stopped => Some("the branch does not reach the end of its range".to_owned()),
+        End::Points => Some("the branch does not reach the end of its range".to_owned()),
+        End::Stopped => Some("what follows is no orbit: its mean forces or its energies do not balance".to_owned()),
     };
     if let Some(reason) = reason {
-        let kept = format!("{reason}; its {} points so far are kept", branch.points.len());
+        let kept = format!(
+            "{reason}; its {} points so far are kept, and kind = \"response\" seeks every point by itself",
+            branch.points.len()
+        );
         part.count(label, "stalled", Some(kept));
     }
     part.tables = vec![rows, peaks, turns];
