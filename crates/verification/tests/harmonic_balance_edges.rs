@@ -114,6 +114,12 @@ fn excitation_without_a_fundamental() {
     for omega in [0.175, 0.18, 0.19] {
         agrees(&model, omega);
     }
+    // what does not move with the drive's frequency has no phase against it
+    let system = model.assemble().unwrap();
+    for method in [&EventDriven as &dyn Method, &HarmonicBalance::default()] {
+        let found = orbit(method, &system, 0.18);
+        assert!(found.places.iter().all(|place| place.amplitude() > 0.0 && place.phase_deg().is_nan()), "{found:?}");
+    }
 }
 
 /// A light part that resonates at the seventeenth harmonic, above a first comparison of seven with fifteen.

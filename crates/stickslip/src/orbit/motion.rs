@@ -34,13 +34,20 @@ pub struct PlaceMotion {
     pub first_harmonic: Complex64,
 }
 
+/// First harmonic, relative to the amplitude, that is rounding: under a drive that has none, orbits are closed to less.
+const NO_PHASE: f64 = 1e-9;
+
 impl PlaceMotion {
     /// Half of peak to peak, m.
     pub fn amplitude(&self) -> f64 {
         0.5 * (self.maximum - self.minimum)
     }
-    /// Phase of the first harmonic against `cos Ωt`, degrees in (-180, 180].
+    /// Phase of the first harmonic against `cos Ωt`, degrees in (-180, 180]; not a number where other harmonics are all of the motion.
     pub fn phase_deg(&self) -> f64 {
+        let amplitude = self.amplitude();
+        if amplitude > 0.0 && self.first_harmonic.norm() <= NO_PHASE * amplitude {
+            return f64::NAN;
+        }
         self.first_harmonic.arg().to_degrees()
     }
 }
