@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use stickslip::law::{Coulomb, Coulomb2d, CoulombArctan, Gap, Jenkins, JenkinsArctan, SharedLaw, Stribeck};
+use stickslip::law::{Coulomb, Coulomb2d, CoulombArctan, Gap, Jenkins, Jenkins2d, JenkinsArctan, SharedLaw, Stribeck};
 use stickslip::method::shooting::Shooting;
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Motion, Spring, System, example};
@@ -217,6 +217,36 @@ fn a_series_beside_the_limit_of_stability_knows_its_side() {
     let (found, exact) = (orbit(&HarmonicBalance::default(), &system, 50.52), orbit(&EventDriven, &system, 50.52));
     let (largest, its) = (exact.multipliers().unwrap()[0].norm(), found.multipliers().unwrap()[0].norm());
     assert!(largest > 1.004 && (its - largest).abs() < 1e-6, "{its} {largest}");
+}
+
+/// Rigid friction in a plane beside an elastic contact there, pushed along one direction, is friction along that: the series is as long as rigid friction
+/// asks for, with as many samples for the law with memory beside it.
+#[test]
+fn rigid_and_elastic_friction_in_a_plane_have_their_long_series() {
+    let (mass, damping, stiffness) = (679.4, 97.44, [743_700.0, 1_931_000.0]);
+    let (elastic, limit, rigid, drive, omega) = (1_842_000.0, 521.0, 11.69, 18.95, 203.3);
+    let structure = |stiffness: &[f64]| {
+        let n = stiffness.len();
+        let names = (0..n).map(|i| i.to_string()).collect();
+        let diagonal =
+            |value: &dyn Fn(usize) -> f64| DMatrix::from_fn(n, n, |i, k| if i == k { value(i) } else { 0.0 });
+        Structure::new(names, diagonal(&|_| mass), diagonal(&|_| damping), diagonal(&|i| stiffness[i])).unwrap()
+    };
+    let axes = |n: usize| (0..n).map(|row| Axis::new(vec![(row, 1.0)])).collect::<Vec<_>>();
+    let system = |stiffness: &[f64], laws: [SharedLaw; 2]| {
+        let (n, [first, second]) = (stiffness.len(), laws);
+        let builder =
+            System::builder(structure(stiffness)).joint("elastic", first, axes(n)).joint("rigid", second, axes(n));
+        builder.force(n - 1, 1, Complex64::new(drive, 0.0)).build().unwrap()
+    };
+    let plane: [SharedLaw; 2] =
+        [Arc::new(Jenkins2d { stiffness: elastic, limit }), Arc::new(Coulomb2d { limit: rigid })];
+    let line: [SharedLaw; 2] = [Arc::new(Jenkins { stiffness: elastic, limit }), Arc::new(Coulomb { limit: rigid })];
+    let found = orbit(&HarmonicBalance::default(), &system(&stiffness, plane), omega);
+    let exact = orbit(&EventDriven, &system(&stiffness[1..], line), omega);
+    let error = (found.places[1].amplitude() / exact.places[0].amplitude() - 1.0).abs();
+    assert_eq!(found.evidence.accuracy, Accuracy::Converged);
+    assert!(error < 2e-3 && error < 3.0 * found.evidence.truncation.unwrap(), "{error:.1e} {:?}", found.evidence);
 }
 
 /// Without excitation there is rest.

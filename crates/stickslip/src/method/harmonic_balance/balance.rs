@@ -9,7 +9,7 @@ use super::recent::{RECENT, Recent};
 use super::rest::Rest;
 use super::solve::Lost;
 use super::sparse::{self, Sparse};
-use super::storage::{MARCHED, MEMORY, check_memory, level_memory, marched};
+use super::storage::{MEMORY, check_memory, level_memory};
 use super::{coupled, path, work};
 use crate::method::evidence::Judge;
 use crate::method::guess::Guess;
@@ -177,8 +177,7 @@ impl Balance {
             !bounded || is_affordable(work::step(self.banded.as_ref(), &self.ports, harmonics), taken, self.allowed());
         // it is compared with twice the samples, too
         let samples = 2 * self.method.samples_at(self.kept.double(top), &self.ports, self.steep);
-        let fits = marched(&self.ports, harmonics, samples) <= MARCHED
-            && level_memory(self.banded.as_ref(), &self.ports, &self.rest, (harmonics, samples)) <= MEMORY;
+        let fits = level_memory(self.banded.as_ref(), &self.ports, &self.rest, (harmonics, samples)) <= MEMORY;
         few && affordable && fits
     }
 

@@ -1,6 +1,6 @@
 //! The memory that equations take, before they are made.
 
-use super::ports::Ports;
+use super::ports::{Ports, at_once};
 use super::rest::CACHED;
 use super::rest::Rest;
 use super::sparse::Sparse;
@@ -10,9 +10,6 @@ use crate::method::option::PERIOD;
 
 /// Memory of the equations, bytes, beyond which nothing is begun: 1000 nodes of three directions with five harmonics need half of it without modes.
 pub(super) const MEMORY: f64 = 4e9;
-/// Memory in which laws with memory are followed, bytes, beyond which no series is compared with a longer one: every length has its own, on every thread.
-pub(super) const MARCHED: f64 = 5e8;
-
 /// What there may be less of: a motion of several periods of the drive has as many times the harmonics.
 fn fewer(periods: usize) -> (&'static str, &'static str) {
     if periods > 1 { (PERIOD.key, "fewer periods, ") } else { ("harmonics", "") }
@@ -69,10 +66,10 @@ pub(super) fn level_memory(
     equations + marched(ports, harmonics, samples)
 }
 
-/// Memory in which laws with memory are followed, one after the other, bytes: the derivatives of their forces at all samples by all harmonics.
-pub(super) fn marched(ports: &Ports, harmonics: usize, samples: usize) -> f64 {
-    let axes = ports.iter().filter(|port| port.marches()).map(|port| port.axes * port.axes).max().unwrap_or(0);
-    8.0 * 2.0 * (axes * harmonics) as f64 * samples as f64
+/// Memory in which laws with memory are followed, one after the other, bytes.
+fn marched(ports: &Ports, harmonics: usize, samples: usize) -> f64 {
+    let axes = ports.iter().filter(|port| port.marches()).map(|port| port.axes).max();
+    axes.map_or(0.0, |axes| at_once(axes, samples, harmonics).1)
 }
 
 /// Memory of the derivatives of the ports, bytes.

@@ -7,11 +7,12 @@
 //! from its mean position.
 
 use super::alternation::{Alternation, share};
-use super::memory::{Memory, REPEATS};
+use super::memory::{Memory, REPEATS, at_once};
 use crate::law::MOST_DIRECTIONS;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
+use std::ops::Range;
 use stickslip_numerics::dense::multiply_in_blocks;
 
 /// The same as [`REPEATS`] where they come no closer.
@@ -243,9 +244,9 @@ impl Alternation {
             None
         };
         let wide = 2 * nh;
-        self.fill_waves(march, memory);
         let few = nh <= FEW;
         if few {
+            self.fill_waves(march, memory, 0..nh);
             self.fill_projection(&mut memory.projection);
             memory.of_states.resize(wide * d * m, 0.0);
             let sizes = (d * m, n, wide);
@@ -259,41 +260,46 @@ impl Alternation {
         for a in own..d {
             self.momentary_tangent(march, &memory.rows, a, tangent);
         }
-        // of few harmonics all axes at once; the derivatives of long series by one fill the memory that there is
-        let together = if few { d } else { 1 };
+        // of few harmonics all axes at once; the derivatives of long series by as many as there is memory for
+        let (together, count) = if few { (d, nh) } else { (1, at_once(d, n, nh).0) };
         let moved = if own == 0 { 0 } else { d };
-        for first in (0..moved).step_by(together.max(1)) {
-            let tall = together * wide;
-            let steps = (beginning.as_deref(), &inverse);
-            self.follow(march, memory, steps, (Input::Solution { first }, together, wide, own));
-            if few {
-                // [sample][axis][column] times the waves of the harmonics
-                memory.spectrum.resize(own * tall * wide, 0.0);
-                let sizes = (own * tall, n, wide);
-                multiply_in_blocks(&memory.columns, &memory.projection, &mut memory.spectrum, sizes, true);
-                for (to, values) in memory.spectrum.chunks_exact(own * tall).enumerate() {
-                    for (a, values) in values.chunks_exact(tall).enumerate() {
-                        let row = &mut tangent[(a * wide + to) * size + first * wide..][..tall];
-                        row.iter_mut().zip(values).for_each(|(t, value)| *t += value);
-                        let by_state = memory.of_states[(to * d + a) * m..][..m].iter();
-                        by_state.zip(memory.shift.chunks_exact(tall)).for_each(|(by, shift)| add(row, *by, shift));
-                    }
-                }
-                continue;
+        for range in (0..nh).step_by(count).map(|from| from..nh.min(from + count)) {
+            if !few {
+                self.fill_waves(march, memory, range.clone());
             }
-            memory.shift_columns(m, tall);
-            memory.signal.resize(n, 0.0);
-            for (a, column) in (0..d).flat_map(|a| (0..tall).map(move |column| (a, column))) {
-                for i in 0..n {
-                    memory.signal[i] = memory.columns[(i * d + a) * tall + column];
+            for first in (0..moved).step_by(together.max(1)) {
+                let (wide_here, steps) = (2 * range.len(), (beginning.as_deref(), &inverse));
+                let tall = together * wide_here;
+                self.follow(march, memory, steps, (Input::Solution { first }, together, wide_here, own));
+                if few {
+                    // [sample][axis][column] times the waves of the harmonics
+                    memory.spectrum.resize(own * tall * wide, 0.0);
+                    let sizes = (own * tall, n, wide);
+                    multiply_in_blocks(&memory.columns, &memory.projection, &mut memory.spectrum, sizes, true);
+                    for (to, values) in memory.spectrum.chunks_exact(own * tall).enumerate() {
+                        for (a, values) in values.chunks_exact(tall).enumerate() {
+                            let row = &mut tangent[(a * wide + to) * size + first * wide..][..tall];
+                            row.iter_mut().zip(values).for_each(|(t, value)| *t += value);
+                            let by_state = memory.of_states[(to * d + a) * m..][..m].iter();
+                            by_state.zip(memory.shift.chunks_exact(tall)).for_each(|(by, shift)| add(row, *by, shift));
+                        }
+                    }
+                    continue;
                 }
-                let sums = self.fourier.sums(&mut memory.signal);
-                for (l, &to) in self.harmonics.iter().enumerate() {
-                    let value = sums[to] * share(to, n);
-                    let at = (a * wide + 2 * l) * size + first * wide + column;
-                    tangent[at] += value.re;
-                    if to > 0 {
-                        tangent[at + size] += value.im;
+                memory.shift_columns(m, tall);
+                memory.signal.resize(n, 0.0);
+                for (a, column) in (0..d).flat_map(|a| (0..tall).map(move |column| (a, column))) {
+                    for i in 0..n {
+                        memory.signal[i] = memory.columns[(i * d + a) * tall + column];
+                    }
+                    let sums = self.fourier.sums(&mut memory.signal);
+                    for (l, &to) in self.harmonics.iter().enumerate() {
+                        let value = sums[to] * share(to, n);
+                        let at = (a * wide + 2 * l) * size + first * wide + 2 * range.start + column;
+                        tangent[at] += value.re;
+                        if to > 0 {
+                            tangent[at + size] += value.im;
+                        }
                     }
                 }
             }
@@ -340,30 +346,30 @@ impl Alternation {
         }
     }
 
-    /// What the parts of the harmonics of a motion make of the inputs: [sample][kind][part], and behind the samples for the first movement.
-    fn fill_waves(&self, march: &dyn March, Memory { waves, steps, .. }: &mut Memory) {
-        let (n, kinds) = (self.samples(), march.inputs());
+    /// What the parts of some harmonics of a motion make of the inputs: [sample][kind][part], and behind the samples for the first movement.
+    fn fill_waves(&self, march: &dyn March, Memory { waves, steps, .. }: &mut Memory, range: Range<usize>) {
+        let (n, kinds, harmonics) = (self.samples(), march.inputs(), &self.harmonics[range]);
         // steps are alike but for where they are on the circle
         let one = Complex64::new(1.0, 0.0);
-        let each = self.harmonics.iter().map(|&h| march.waves(h, TAU / n as f64, one));
-        let fixed: Vec<[Complex64; 4]> = each.chain(self.harmonics.iter().map(|&h| march.first_waves(h))).collect();
-        if waves.len() == 2 * (n + 1) * kinds * self.harmonics.len() && *steps == fixed {
+        let each = harmonics.iter().map(|&h| march.waves(h, TAU / n as f64, one));
+        let fixed: Vec<[Complex64; 4]> = each.chain(harmonics.iter().map(|&h| march.first_waves(h))).collect();
+        if waves.len() == 2 * (n + 1) * kinds * harmonics.len() && *steps == fixed {
             return;
         }
         waves.clear();
-        let mut at = vec![0; self.harmonics.len()];
+        let mut at = vec![0; harmonics.len()];
         for _ in 0..n {
             for kind in 0..kinds {
-                for ((at, fixed), &h) in at.iter().zip(&fixed).zip(&self.harmonics) {
+                for ((at, fixed), &h) in at.iter().zip(&fixed).zip(harmonics) {
                     waves.extend(<[f64; 2]>::from(parts(fixed[kind] * self.turns[*at], h)));
                 }
             }
-            for (at, &h) in at.iter_mut().zip(&self.harmonics) {
+            for (at, &h) in at.iter_mut().zip(harmonics) {
                 *at = (*at + h) % n;
             }
         }
         for kind in 0..kinds {
-            let first = fixed[self.harmonics.len()..].iter().zip(&self.harmonics);
+            let first = fixed[harmonics.len()..].iter().zip(harmonics);
             waves.extend(first.flat_map(|(first, &h)| <[f64; 2]>::from(parts(first[kind], h))));
         }
         *steps = fixed;

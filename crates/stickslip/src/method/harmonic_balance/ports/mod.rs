@@ -25,7 +25,7 @@ mod tests;
 pub(super) use alternation::{Alternation, Beginning};
 pub(super) use barrier::Barrier;
 use gathered::Gathered;
-pub(super) use memory::REPEATS;
+pub(super) use memory::{REPEATS, at_once};
 use prox::{Rigid, Times};
 use sliders::Part;
 
