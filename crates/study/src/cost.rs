@@ -449,6 +449,11 @@ const RIGID_EACH: (f64, f64) = (3.0, 8.0);
 /// Harmonics that rigid friction needs for [`SERIES_TOLERANCE`], usually and at worst, and the power of one over the tolerance that they go with: the error
 /// falls with an order between 1 and 3/2. Measured: 14 trees of 8 to 30 masses took 0.02 to 2 s a point, with 15 to 255.
 const RIGID_HARMONICS: (f64, f64) = (31.0, 255.0);
+/// Time of the derivatives of a law with memory beside rigid friction in a plane, which asks for hundreds of harmonics and tens of thousands of samples, s for every
+/// pair of its directions; usually, where few are enough, and at worst. Measured: 0.3 to 14.5 s a point with four to eight pairs.
+const BESIDE_RIGID: (f64, f64) = (0.0, 1.5);
+/// What a point spends of it at most, s.
+const BESIDE_RIGID_MOST: f64 = 15.0;
 const RIGID_ORDER: f64 = 2.0 / 3.0;
 /// Where harmonic balance ends.
 const MOST_HARMONICS: f64 = 511.0;
@@ -543,7 +548,7 @@ impl Costing<'_> {
             _ if self.is_series() => {
                 let whole = series * self.sector() * self.unheld();
                 let given = case.method.options.get("harmonics").copied();
-                whole.max(self.rigid_series(given)) + self.factored(given) + self.judged()
+                whole.max(self.rigid_series(given)) + self.beside_rigid(given) + self.factored(given) + self.judged()
             }
             "transient" => {
                 let digit = LN_10 / (TAU * self.least_damping());
@@ -650,6 +655,19 @@ impl Costing<'_> {
         let each = self.pace.of(RIGID_EACH.0, RIGID_EACH.1);
         let sought = each * harmonic_balance::doubling_work(system, longest);
         ELIMINATED * sought.min(harmonic_balance::most_work(system))
+    }
+
+    /// Time of laws with memory beside rigid friction in a plane, s; zero where harmonics are given, which are fewer.
+    fn beside_rigid(&self, harmonics: Option<f64>) -> f64 {
+        let laws = || self.system().joints().iter().map(|joint| joint.law());
+        let is_rigid =
+            |law: &SharedLaw| law.directions() > 1 && law.prox().is_some_and(|prox| prox.compliance() == 0.0);
+        if harmonics.is_some() || !laws().any(is_rigid) {
+            return 0.0;
+        }
+        let remembers = |law: &&SharedLaw| law.step().is_some() || law.rate().is_some_and(|rate| rate.states() > 0);
+        let pairs: usize = laws().filter(remembers).map(|law| law.directions().pow(2)).sum();
+        (self.pace.of(BESIDE_RIGID.0, BESIDE_RIGID.1) * pairs as f64).min(BESIDE_RIGID_MOST)
     }
 
     /// Time to factor the dynamic stiffness for one orbit, s; zero where none is.
