@@ -449,12 +449,12 @@ const RIGID_EACH: (f64, f64) = (3.0, 8.0);
 /// Harmonics that rigid friction needs for [`SERIES_TOLERANCE`], usually and at worst, and the power of one over the tolerance that they go with: the error
 /// falls with an order between 1 and 3/2. Measured: 14 trees of 8 to 30 masses took 0.02 to 2 s a point, with 15 to 255.
 const RIGID_HARMONICS: (f64, f64) = (31.0, 255.0);
+const RIGID_ORDER: f64 = 2.0 / 3.0;
 /// Time of the derivatives of a law with memory beside rigid friction in a plane, which asks for hundreds of harmonics and tens of thousands of samples, s for every
 /// pair of its directions; usually, where few are enough, and at worst. Measured: 0.3 to 14.5 s a point with four to eight pairs.
 const BESIDE_RIGID: (f64, f64) = (0.0, 1.5);
 /// What a point spends of it at most, s.
 const BESIDE_RIGID_MOST: f64 = 15.0;
-const RIGID_ORDER: f64 = 2.0 / 3.0;
 /// Where harmonic balance ends.
 const MOST_HARMONICS: f64 = 511.0;
 /// The order with which the error of a series falls with its length where forces have corners, and the power of its length with which its time grows.

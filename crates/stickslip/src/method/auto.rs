@@ -159,10 +159,7 @@ impl<'a> WithSecond<'a> {
         let near = start.filter(|start| self.last.as_deref() == Some(*start));
         let found = by(&mut **second, near);
         self.effort += second.effort();
-        let mut orbit = match found {
-            Ok(orbit) => orbit,
-            Err(_) => return Err(error.after(name)),
-        };
+        let mut orbit = found.map_err(|_| error.after(name))?;
         orbit.evidence.instead_of = Some(self.chosen);
         self.last = Some(orbit.start.clone());
         Ok(orbit)

@@ -1,8 +1,7 @@
 //! The memory that equations take, before they are made.
 
 use super::ports::{Ports, at_once};
-use super::rest::CACHED;
-use super::rest::Rest;
+use super::rest::{CACHED, Rest};
 use super::sparse::Sparse;
 use super::{NAME, coupled};
 use crate::method::MethodError;
@@ -10,6 +9,7 @@ use crate::method::option::PERIOD;
 
 /// Memory of the equations, bytes, beyond which nothing is begun: 1000 nodes of three directions with five harmonics need half of it without modes.
 pub(super) const MEMORY: f64 = 4e9;
+
 /// What there may be less of: a motion of several periods of the drive has as many times the harmonics.
 fn fewer(periods: usize) -> (&'static str, &'static str) {
     if periods > 1 { (PERIOD.key, "fewer periods, ") } else { ("harmonics", "") }

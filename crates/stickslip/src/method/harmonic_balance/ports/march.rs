@@ -246,7 +246,6 @@ impl Alternation {
         let wide = 2 * nh;
         let few = nh <= FEW;
         if few {
-            self.fill_waves(march, memory, 0..nh);
             self.fill_projection(&mut memory.projection);
             memory.of_states.resize(wide * d * m, 0.0);
             let sizes = (d * m, n, wide);
@@ -264,9 +263,7 @@ impl Alternation {
         let (together, count) = if few { (d, nh) } else { (1, at_once(d, n, nh).0) };
         let moved = if own == 0 { 0 } else { d };
         for range in (0..nh).step_by(count).map(|from| from..nh.min(from + count)) {
-            if !few {
-                self.fill_waves(march, memory, range.clone());
-            }
+            self.fill_waves(march, memory, range.clone());
             for first in (0..moved).step_by(together.max(1)) {
                 let (wide_here, steps) = (2 * range.len(), (beginning.as_deref(), &inverse));
                 let tall = together * wide_here;
